@@ -1,0 +1,1 @@
+"""The gripper-object plant. Card: plant/README.md."""

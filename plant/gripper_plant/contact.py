@@ -1,0 +1,83 @@
+"""One finger against a rigid surface: unilateral contact, Baumgarte stabilised.
+
+Everything is counted in the direction in which the finger opens. With the gap g = s - surface
+(g > 0 free, g <= 0 touching) the finger obeys
+
+    m·g'' = f + f_c,     f_c >= 0                                              Eq. (1)
+
+where f is the actuator's force and f_c the contact's. While the finger touches, f_c is what makes
+the constraint g = 0 hold in Baumgarte's stabilised form
+
+    g'' + 2·alpha·g' + beta^2·g = 0
+
+and never less than zero: the object pushes, it does not hold. Card: plant/README.md
+"""
+
+from math import ceil, inf, sqrt
+
+Finger = tuple[float, float, float]
+"""Position s in m and velocity in m/s (opening positive), contact force in N (>= 0)."""
+
+SUBSTEP_RATIO = 0.1
+"""Longest sub-step as a fraction of the contact's fastest time constant."""
+
+
+def substeps(alpha: float, beta: float, h: float) -> int:
+    """Number of equal sub-steps that resolve the contact (alpha, beta in 1/s) within h seconds."""
+    return max(1, ceil(h * max(2.0 * alpha, beta) / SUBSTEP_RATIO - 1e-9))
+
+
+def time_to_contact(gap: float, rate: float, acceleration: float) -> float:
+    """Seconds until g + g'·t + g''·t^2/2 first reaches zero: 0 if g <= 0, inf if it never does."""
+    if gap <= 0.0:
+        return 0.0
+    discriminant = rate * rate - 2.0 * acceleration * gap
+    if discriminant < 0.0:
+        return inf
+    approach = sqrt(discriminant) - rate
+    return 2.0 * gap / approach if approach > 0.0 else inf
+
+
+def advance(
+    s: float, v: float, surface: float, m: float, f: float, alpha: float, beta: float, h: float
+) -> Finger:
+    """Advance a finger of m kg at s m with v m/s by h seconds, the actuator force f in N held.
+
+    surface is where the object begins, in m; alpha and beta are the stabilisation rates in 1/s.
+    Free flight is exact, and so is the moment of contact within a sub-step.
+    """
+    if time_to_contact(s - surface, v, f / m) >= h:
+        return _fly(s, v, f / m, h)
+    contact_force = 0.0
+    n = substeps(alpha, beta, h)
+    d = h / n
+    for _ in range(n):
+        free = time_to_contact(s - surface, v, f / m)
+        if free >= d:
+            s, v, contact_force = _fly(s, v, f / m, d)
+        else:
+            if free > 0.0:
+                _, v, _ = _fly(s, v, f / m, free)
+                s = surface
+            s, v, contact_force = _touch(s, v, surface, m, f, alpha, beta, d - free)
+    return s, v, contact_force
+
+
+def _fly(s: float, v: float, acceleration: float, d: float) -> Finger:
+    after = v + acceleration * d
+    return s + 0.5 * d * (v + after), after, 0.0
+
+
+def _touch(
+    s: float, v: float, surface: float, m: float, f: float, alpha: float, beta: float, d: float
+) -> Finger:
+    """One trapezoidal step of the stabilised constraint; the contact force is held over it.
+
+    The rule takes the energy 2·alpha·m·d·(mean velocity)^2 and gives none, whatever d is.
+    """
+    constrained = -(2.0 * alpha * v + beta * beta * (s - surface + 0.5 * d * v)) / (
+        1.0 + alpha * d + 0.25 * beta * beta * d * d
+    )
+    contact_force = max(0.0, m * constrained - f)
+    s, v, _ = _fly(s, v, (f + contact_force) / m, d)
+    return s, v, contact_force
