@@ -1,0 +1,1 @@
+"""The optical proximity sensor. Card: sensor/README.md."""
