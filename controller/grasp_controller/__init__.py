@@ -1,0 +1,1 @@
+"""Multiple impedance control of a two-finger gripper. Card: controller/README.md."""

@@ -1,0 +1,31 @@
+"""Layer 1, contact force control: an impedance between the finger and its virtual object.
+
+    u_j = -D_i·(x_j' - x_vj1') - K_i·(x_j - x_vj1)                                      Eq. (7)
+
+At rest on an object of width W the fingers press with K_i·W/2.
+"""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from .impedance import Motion
+from .ranges import check
+
+
+@dataclass(frozen=True, slots=True)
+class Params:
+    """Parameters; a value outside its declared range raises ValueError."""
+
+    damping: Annotated[float, "N.s/m", "D_i, damping of the impedance", (0.0, 1e5)] = 14.0
+    stiffness: Annotated[float, "N/m", "K_i, stiffness of the impedance", (0.0, 1e6)] = 98.0
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+def force(p: Params, x: float, x_dot: float, x_v1: Motion) -> float:
+    """u_j in N, Eq. (7), from the finger's position in m and velocity in m/s and its virtual
+    object's motion.
+    """
+    position, velocity = x_v1
+    return -p.damping * (x_dot - velocity) - p.stiffness * (x - position)

@@ -1,0 +1,71 @@
+"""Layer 2, impact reduction: the nearer the surface, the more the approach is slowed down.
+
+f_pj = D_pj·xi_j' / xi_j                                                            Eq. (5)
+M_a1·(x_vj1'' - x_v2'') + D_a1·(x_vj1' - x_v2') + K_a1·(x_vj1 - x_v2) = f_pj        Eq. (6)
+"""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from . import impedance
+from .impedance import Motion
+from .ranges import check
+
+Pair = tuple[float, float]
+"""A value per finger: right, left."""
+
+Motions = tuple[Motion, Motion]
+"""A motion per finger: right, left."""
+
+
+@dataclass(frozen=True, slots=True)
+class Params:
+    """Parameters; a value outside its declared range raises ValueError."""
+
+    enabled: Annotated[bool, "", "layer 2 on; off, the fingers head for the target directly"] = True
+    mass: Annotated[float, "kg", "M_a1, virtual mass", (1e-3, 1e3)] = 1.0
+    damping: Annotated[float, "N.s/m", "D_a1, virtual damping", (0.0, 1e5)] = 10.0
+    stiffness: Annotated[float, "N/m", "K_a1, virtual stiffness", (1e-3, 1e6)] = 25.0
+    viscosity: Annotated[Pair, "N.s", "D_pj, viscosity of the virtual force", (-1e3, 1e3)] = (
+        0.6,
+        -0.6,
+    )
+    intensity_floor: Annotated[
+        float, "V", "intensity below which the sensor sees nothing", (1e-12, 1e3)
+    ] = 1e-6
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+def virtual_forces(p: Params, xi: Pair, xi_before: Pair, h: float) -> Pair:
+    """f_pj in N, Eq. (5), from two samples of the intensities in V, h seconds apart."""
+    xi_1, xi_2 = xi
+    was_1, was_2 = xi_before
+    d_1, d_2 = p.viscosity
+    floor = p.intensity_floor
+    return _virtual_force(d_1, xi_1, was_1, floor, h), _virtual_force(d_2, xi_2, was_2, floor, h)
+
+
+def _virtual_force(d_p: float, xi: float, xi_before: float, floor: float, h: float) -> float:
+    """Zero unless both samples reach the floor: xi'/xi has no meaning where xi is nothing."""
+    if xi < floor or xi_before < floor:
+        return 0.0
+    return d_p * (xi - xi_before) / (h * xi)
+
+
+def advance(
+    p: Params, x_v1: Motions, before: Motion, after: Motion, f_p: Pair, h: float
+) -> Motions:
+    """The virtual objects of both fingers h seconds later, Eq. (6), the forces f_p in N held.
+
+    before and after are the target's motion x_v2 at the two ends of the step.
+    """
+    a = impedance.transition(p.mass, p.damping, p.stiffness, h)
+    (x_1, v_1), (x_2, v_2) = x_v1
+    x, v = before
+    f_1, f_2 = f_p
+    e_1, e_1_dot = impedance.advance(a, x_1 - x, v_1 - v, f_1 / p.stiffness)
+    e_2, e_2_dot = impedance.advance(a, x_2 - x, v_2 - v, f_2 / p.stiffness)
+    x, v = after
+    return (x + e_1, v + e_1_dot), (x + e_2, v + e_2_dot)

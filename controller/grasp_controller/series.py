@@ -1,0 +1,102 @@
+"""The three layers in series: one control law from approach to grasp, without switching.
+
+    sensors -> layer 3, target x_v2 -> layer 2, virtual objects x_vj1 -> layer 1, forces u_j
+
+Case 2 of the paper is all three layers, Case 1 layer 3 off, Case 0 layers 3 and 2 off.
+Card: controller/README.md
+"""
+
+from dataclasses import dataclass
+from typing import Annotated, NamedTuple
+
+from . import contact_force as layer_1
+from . import impact_reduction as layer_2
+from . import simultaneous_contact as layer_3
+from .impedance import Motion
+
+Pair = tuple[float, float]
+"""A value per finger: right, left."""
+
+
+@dataclass(frozen=True, slots=True)
+class Params:
+    """The parameters of the three layers."""
+
+    simultaneous_contact: layer_3.Params = layer_3.Params()
+    impact_reduction: layer_2.Params = layer_2.Params()
+    contact_force: layer_1.Params = layer_1.Params()
+
+
+class Inputs(NamedTuple):
+    """Samples of the gripper and of its sensors."""
+
+    position: Annotated[Pair, "m", "x_j, position of the fingertip"] = (0.11, -0.11)
+    velocity: Annotated[Pair, "m/s", "x_j', velocity of the fingertip"] = (0.0, 0.0)
+    intensity: Annotated[Pair, "V", "xi_j, offset-compensated output of the proximity sensor"] = (
+        0.03,
+        0.03,
+    )
+
+
+class State(NamedTuple):
+    """The virtual objects, and what the last sample left behind."""
+
+    target: Motion
+    virtual: layer_2.Motions
+    intensity: Pair
+    simultaneous_contact_force: float
+    impact_reduction_force: Pair
+
+
+class Outputs(NamedTuple):
+    """The command to the fingers, and the inner signals of the layers."""
+
+    force: Annotated[Pair, "N", "u_j, actuator force on the finger"]
+    target_position: Annotated[float, "m", "x_v,2, target of both fingers"]
+    virtual_position: Annotated[Pair, "m", "x_vj,1, virtual object of the finger"]
+    simultaneous_contact_force: Annotated[float, "N", "f_s, virtual force of layer 3"]
+    impact_reduction_force: Annotated[Pair, "N", "f_pj, virtual force of layer 2"]
+
+
+def initial_state(p: Params, u: Inputs) -> State:
+    """Virtual objects at the measured fingers and at rest, so that nothing jumps at the start."""
+    x_1, x_2 = u.position
+    f_s = layer_3.virtual_force(p.simultaneous_contact, u.intensity)
+    return State(_middle(u), ((x_1, 0.0), (x_2, 0.0)), u.intensity, f_s, (0.0, 0.0))
+
+
+def step(p: Params, x: State, u: Inputs, h: float) -> State:
+    """Advance the virtual objects by h seconds (h > 0), the samples u held."""
+    f_s = layer_3.virtual_force(p.simultaneous_contact, u.intensity)
+    before = after = _middle(u)
+    if p.simultaneous_contact.enabled:
+        before = x.target
+        after = layer_3.advance(p.simultaneous_contact, before, after[0], f_s, h)
+    f_p = layer_2.virtual_forces(p.impact_reduction, u.intensity, x.intensity, h)
+    virtual = (after, after)
+    if p.impact_reduction.enabled:
+        virtual = layer_2.advance(p.impact_reduction, x.virtual, before, after, f_p, h)
+    return State(after, virtual, u.intensity, f_s, f_p)
+
+
+def outputs(p: Params, x: State, u: Inputs) -> Outputs:
+    """The forces for the samples u; a layer that is off passes on the layer above."""
+    target = x.target if p.simultaneous_contact.enabled else _middle(u)
+    virtual_1, virtual_2 = x.virtual if p.impact_reduction.enabled else (target, target)
+    x_1, x_2 = u.position
+    v_1, v_2 = u.velocity
+    return Outputs(
+        (
+            layer_1.force(p.contact_force, x_1, v_1, virtual_1),
+            layer_1.force(p.contact_force, x_2, v_2, virtual_2),
+        ),
+        target[0],
+        (virtual_1[0], virtual_2[0]),
+        x.simultaneous_contact_force,
+        x.impact_reduction_force,
+    )
+
+
+def _middle(u: Inputs) -> Motion:
+    """x_d of Eq. (4): no velocity and no acceleration, by definition."""
+    return layer_3.desired_position(u.position), 0.0

@@ -1,0 +1,51 @@
+"""Layer 3, simultaneous contact: moves the target to where both fingers arrive together.
+
+f_s = K_s·tanh((xi_1 - xi_2) / (xi_1 + xi_2))                                       Eq. (2)
+M_a2·(x_v2'' - x_d'') + D_a2·(x_v2' - x_d') + K_a2·(x_v2 - x_d) = f_s               Eq. (3)
+x_d = (x_1 + x_2) / 2,   x_d' = x_d'' = 0                                           Eq. (4)
+"""
+
+from dataclasses import dataclass
+from math import tanh
+from typing import Annotated
+
+from . import impedance
+from .impedance import Motion
+from .ranges import check
+
+
+@dataclass(frozen=True, slots=True)
+class Params:
+    """Parameters; a value outside its declared range raises ValueError."""
+
+    enabled: Annotated[bool, "", "layer 3 on; off, the target is the middle of the fingers"] = True
+    mass: Annotated[float, "kg", "M_a2, virtual mass", (1e-3, 1e3)] = 1.0
+    damping: Annotated[float, "N.s/m", "D_a2, virtual damping", (0.0, 1e5)] = 12.0
+    stiffness: Annotated[float, "N/m", "K_a2, virtual stiffness", (1e-3, 1e6)] = 36.0
+    gain: Annotated[float, "N", "K_s, gain of the virtual force", (-1e3, 1e3)] = 3.0
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+def virtual_force(p: Params, xi: tuple[float, float]) -> float:
+    """f_s in N, Eq. (2), from the intensities in V; zero where neither sensor sees anything."""
+    xi_1, xi_2 = xi
+    xi_1 = xi_1 if xi_1 > 0.0 else 0.0
+    xi_2 = xi_2 if xi_2 > 0.0 else 0.0
+    total = xi_1 + xi_2
+    return p.gain * tanh((xi_1 - xi_2) / total) if total > 0.0 else 0.0
+
+
+def desired_position(x: tuple[float, float]) -> float:
+    """x_d in m, Eq. (4): the middle of the fingertips."""
+    x_1, x_2 = x
+    return 0.5 * (x_1 + x_2)
+
+
+def advance(p: Params, x_v2: Motion, x_d: float, f_s: float, h: float) -> Motion:
+    """The target h seconds later, Eq. (3), x_d in m and f_s in N held."""
+    position, velocity = x_v2
+    a = impedance.transition(p.mass, p.damping, p.stiffness, h)
+    e, e_dot = impedance.advance(a, position - x_d, velocity, f_s / p.stiffness)
+    return x_d + e, e_dot
