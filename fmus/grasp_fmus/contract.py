@@ -1,0 +1,167 @@
+"""What a block declares, as a flat list of variables.
+
+A block is a module with Params, Inputs, State, Outputs, initial_state(), step() and outputs().
+Every field of Params, Inputs and Outputs carries
+
+    name: Annotated[type, unit, description, (lowest, highest), "tunable"] = default
+
+with float, bool, a tuple of them, or (in Params) another such class as its type. The range and
+"tunable" are optional. A tuple becomes name[1], name[2], a nested class name.field.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, is_dataclass
+from dataclasses import fields as dataclass_fields
+from typing import Annotated, Any, Literal, Protocol, get_args, get_origin, get_type_hints
+
+Scalar = float | bool
+Causality = Literal["input", "output", "parameter"]
+
+
+class Block(Protocol):
+    """The shape of a block module."""
+
+    @property
+    def Params(self) -> type[Any]:
+        """A frozen dataclass that checks itself."""
+
+    @property
+    def Inputs(self) -> type[Any]:
+        """A NamedTuple."""
+
+    @property
+    def Outputs(self) -> type[Any]:
+        """A NamedTuple."""
+
+    @property
+    def initial_state(self) -> Callable[[Any, Any], Any]:
+        """State from Params and Inputs."""
+
+    @property
+    def step(self) -> Callable[[Any, Any, Any, float], Any]:
+        """State h seconds later from Params, State, Inputs, h."""
+
+    @property
+    def outputs(self) -> Callable[[Any, Any, Any], Any]:
+        """Outputs from Params, State, Inputs."""
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """One field of a declaration: a scalar, or an array of size scalars."""
+
+    path: tuple[str, ...]
+    causality: Causality
+    kind: type[Scalar]
+    size: int | None
+    unit: str
+    description: str
+    limits: tuple[float, float] | None
+    tunable: bool
+    start: Any
+
+    @property
+    def names(self) -> list[str]:
+        """The names of its scalar variables, in FMI's structured naming convention."""
+        name = ".".join(self.path)
+        return [name] if self.size is None else [f"{name}[{i + 1}]" for i in range(self.size)]
+
+    @property
+    def starts(self) -> list[Any]:
+        """The start values of its scalar variables; None where there is none."""
+        return [self.start] if self.size is None else list(self.start or [None] * self.size)
+
+
+def declared(block: Block) -> list[Field]:
+    """The fields of a block: inputs, outputs, parameters, each in the order of declaration."""
+    return [
+        *_fields(block.Inputs, "input", block.Inputs._field_defaults, ()),
+        *_fields(block.Outputs, "output", {}, ()),
+        *_parameters(block.Params(), ()),
+    ]
+
+
+def count(fields: list[Field], *causalities: Causality) -> int:
+    """Number of scalar variables of the given causalities."""
+    return sum(len(f.names) for f in fields if f.causality in causalities)
+
+
+def packer(cls: type[Any], fields: list[Field]) -> Callable[[list[Any]], Any]:
+    """A function from the list of all values to Inputs, which stand at its beginning.
+
+    Compiled for the shape of the block, as NamedTuple compiles its constructor: it runs every step.
+    """
+    parts = []
+    first = 0
+    for f in fields:
+        if f.causality == "input":
+            items = ", ".join(f"v[{first + i}]" for i in range(len(f.names)))
+            parts.append(items if f.size is None else f"({items},)")
+            first += len(f.names)
+    return _compiled(f"lambda v: new(cls, ({', '.join(parts)},))", new=tuple.__new__, cls=cls)
+
+
+def unpacker(fields: list[Field]) -> Callable[[Any], list[Any]]:
+    """A function from Outputs to the list of their scalars, compiled like packer()."""
+    outputs = [f for f in fields if f.causality == "output"]
+    items = [
+        f"y[{k}]" if f.size is None else f"y[{k}][{i}]"
+        for k, f in enumerate(outputs)
+        for i in range(len(f.names))
+    ]
+    return _compiled(f"lambda y: [{', '.join(items)}]")
+
+
+def _compiled(expression: str, **names: Any) -> Callable[[Any], Any]:
+    function: Callable[[Any], Any] = eval(expression, names)  # noqa: S307 - written here, from the shape alone
+    return function
+
+
+def build_params(block: Block, fields: list[Field], values: list[Any]) -> Any:
+    """Params from the list of all values; ValueError as the block raises it."""
+    by_path: dict[tuple[str, ...], Any] = {}
+    first = 0
+    for f in fields:
+        stop = first + len(f.names)
+        by_path[f.path] = values[first] if f.size is None else tuple(values[first:stop])
+        first = stop
+    return _build(block.Params, (), by_path)
+
+
+def _build(cls: type[Any], path: tuple[str, ...], values: dict[tuple[str, ...], Any]) -> Any:
+    hints = get_type_hints(cls)
+    return cls(
+        **{
+            f.name: _build(hints[f.name], (*path, f.name), values)
+            if is_dataclass(hints[f.name])
+            else values[(*path, f.name)]
+            for f in dataclass_fields(cls)
+        }
+    )
+
+
+def _parameters(params: Any, path: tuple[str, ...]) -> Iterator[Field]:
+    hints = get_type_hints(type(params), include_extras=True)
+    for name, hint in hints.items():
+        value = getattr(params, name)
+        if is_dataclass(value):
+            yield from _parameters(value, (*path, name))
+        else:
+            yield _field((*path, name), "parameter", hint, value)
+
+
+def _fields(
+    cls: type[Any], causality: Causality, starts: dict[str, Any], path: tuple[str, ...]
+) -> Iterator[Field]:
+    for name, hint in get_type_hints(cls, include_extras=True).items():
+        yield _field((*path, name), causality, hint, starts.get(name))
+
+
+def _field(path: tuple[str, ...], causality: Causality, hint: Any, start: Any) -> Field:
+    if get_origin(hint) is not Annotated:
+        raise TypeError(f"{'.'.join(path)}: no unit and description; declare it as Annotated[...]")
+    base, unit, description, *rest = get_args(hint)
+    limits = next((r for r in rest if isinstance(r, tuple)), None)
+    size = len(get_args(base)) if get_origin(base) is tuple else None
+    kind = get_args(base)[0] if size else base
+    return Field(path, causality, kind, size, unit, description, limits, "tunable" in rest, start)
