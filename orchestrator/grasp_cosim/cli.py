@@ -1,0 +1,201 @@
+"""The command line, grasp-cosim."""
+
+import json
+import os
+import sys
+import traceback
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .errors import InputError, SimulationError
+from .evaluate import evaluate as run_evaluation
+from .grasp import CASES, FMU_FOLDER, grasp_system
+from .interface import Value
+from .recording import Result
+from .simulation import simulate
+from .system import SCHEMES, System
+
+NEGATIVE, WRONG, FAILED, INTERRUPTED = 1, 2, 3, 130
+"""Exit codes beside 0: result negative, input wrong, failure on the way, Ctrl-C."""
+
+json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+
+
+def main() -> None:
+    """Run the command line; errors are one line, without a traceback unless --debug is given."""
+    debug = "--debug" in sys.argv
+    try:
+        code = cli.main(standalone_mode=False)
+    except (InputError, click.ClickException, SimulationError) as error:
+        message = error.format_message() if isinstance(error, click.ClickException) else str(error)
+        code = FAILED if isinstance(error, SimulationError) else WRONG
+        _fail(message, debug)
+    except (KeyboardInterrupt, click.Abort):
+        code = INTERRUPTED
+        _fail("interrupted", False)
+    except Exception as error:
+        code = FAILED
+        _fail(f"{type(error).__name__}: {error} (--debug shows where)", debug)
+    sys.exit(code)
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="grasp-cosim")
+@click.option("--debug", is_flag=True, help="Show the traceback of an error.")
+def cli(debug: bool) -> None:
+    r"""FMI co-simulation of a delicate grasp.
+
+    \b
+    grasp-cosim run                  the published grasp, from FMUs
+    grasp-cosim evaluate             the published table and figures, side by side with ours
+    grasp-cosim COMMAND --help       options and an example
+    """
+
+
+@cli.command()
+@click.option("--out", type=click.Path(path_type=Path), default=FMU_FOLDER, show_default=True)
+@json_option
+def build(out: Path, as_json: bool) -> int:
+    r"""Build the FMUs: GripperPlant, ProximitySensor, GraspController.
+
+    \b
+    Example: grasp-cosim build --out /tmp/fmus
+    """
+    from grasp_fmus.build import build as build_fmus
+
+    paths = [str(path) for path in build_fmus(out)]
+    click.echo(json.dumps({"fmus": paths}) if as_json else "\n".join(paths))
+    return 0
+
+
+@cli.command()
+@click.argument("system", required=False, type=click.Path(path_type=Path))
+@click.option("--case", type=click.IntRange(0, 2), help="0 and 1: without layers 3 and 2, 3.")
+@click.option("--set", "settings", multiple=True, metavar="COMPONENT.VARIABLE=VALUE")
+@click.option("--swap", "swaps", multiple=True, metavar="COMPONENT=FMU")
+@click.option("--step", type=float, help="Communication step in s.")
+@click.option("--stop", type=float, help="Stop time in s.")
+@click.option("--scheme", type=click.Choice(SCHEMES))
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for signals.csv and run.json.")
+@click.option("--plot", is_flag=True, help="Draw grasp.png, in --out or the current folder.")
+@json_option
+def run(
+    system: Path | None,
+    case: int | None,
+    settings: tuple[str, ...],
+    swaps: tuple[str, ...],
+    step: float | None,
+    stop: float | None,
+    scheme: str | None,
+    out: Path | None,
+    plot: bool,
+    as_json: bool,
+) -> int:
+    r"""Run SYSTEM, a .toml file; by default the built-in grasp.
+
+    \b
+    Example: grasp-cosim run --case 1 --set plant.initial_object_position=0.02 --out results --plot
+    """
+    chosen = System.load(system) if system else grasp_system()
+    for text in swaps:
+        component, fmu = _pair("--swap", text, "COMPONENT=FMU")
+        chosen = chosen.swap(component, fmu, f"--swap {text}")
+    if case is not None:
+        chosen = chosen.with_values(CASES[case], f"--case {case}:")
+    values: dict[str, Value] = dict(
+        _pair("--set", text, "COMPONENT.VARIABLE=VALUE") for text in settings
+    )
+    chosen = chosen.with_values(values, "--set").with_experiment(step, stop, scheme)
+    try:
+        result = simulate(chosen, progress=True)
+    except SimulationError as error:
+        if error.result:
+            _write(error.result, out, plot)
+        raise
+    _write(result, out, plot)
+    click.echo(json.dumps(dict(result.metrics)) if as_json else _summary(result))
+    if not result.complete:
+        _fail(f"interrupted at t = {result.time[-1]:.6g} s; kept what was recorded", False)
+    return 0 if result.complete else INTERRUPTED
+
+
+@cli.command()
+@click.option("--out", type=click.Path(path_type=Path), default=Path("results"), show_default=True)
+@click.option("--workers", type=click.IntRange(1), default=os.cpu_count(), show_default="all cores")
+@json_option
+def evaluate(out: Path, workers: int, as_json: bool) -> int:
+    r"""Run the published simulation table and figures and compare.
+
+    \b
+    Example: grasp-cosim evaluate --out results
+    """
+    report = run_evaluation(grasp_system(), out, workers, progress=True)
+    holds = all(claim["holds"] for claim in report["claims"])
+    click.echo(json.dumps(report) if as_json else _verdict(report, out))
+    return 0 if holds else NEGATIVE
+
+
+def _pair(option: str, text: str, form: str) -> tuple[str, str]:
+    left, equals, right = text.partition("=")
+    if not (left and equals and right):
+        raise InputError(f"{option} {text!r}: must be {form}")
+    return left, right
+
+
+def _write(result: Result, out: Path | None, plot: bool) -> None:
+    if out:
+        result.to_csv(out / "signals.csv")
+        result.to_json(out / "run.json")
+    if plot:
+        path = (out or Path()) / "grasp.png"
+        result.plot(path)
+        click.echo(f"drew {path}", err=True)
+
+
+def _summary(result: Result) -> str:
+    m = result.metrics
+    lines = [
+        f"{m['steps']} steps of {1e3 * m['step']:g} ms, {m['scheme']}, "
+        f"{m['real_time_factor']:.2f} times as fast as real time"
+    ]
+    if "time_to_contact" in m:
+        lines += [
+            f"{label:22s}{_numbers(m[key], factor)} {unit}"
+            for label, key, factor, unit in (
+                ("time to contact", "time_to_contact", 1.0, "s"),
+                ("time difference", "time_difference", 1.0, "s"),
+                ("impact velocity", "impact_velocity", 1e3, "mm/s"),
+                ("peak contact force", "peak_contact_force", 1.0, "N"),
+                ("steady contact force", "steady_contact_force", 1.0, "N"),
+                ("target position", "target_position", 1e3, "mm"),
+                ("object shift", "object_shift", 1e3, "mm"),
+            )
+        ]
+    return "\n".join(lines)
+
+
+def _numbers(value: Any, factor: float) -> str:
+    values = value if isinstance(value, list) else [value]
+    return "  ".join("    none" if v is None else f"{factor * v:8.3f}" for v in values)
+
+
+def _verdict(report: Mapping[str, Any], out: Path) -> str:
+    rms = report["rms"]
+    return "\n".join(
+        [
+            *(f"{'holds' if c['holds'] else 'FAILS'}  {c['text']}" for c in report["claims"]),
+            f"rms of the contact times {rms['contact_times']:.3f} s, "
+            f"at a gap of 0.37 mm {rms['contact_times_at_0.37_mm']:.3f} s",
+            f"report: {out / 'report.md'}   pictures: {out / 'contact_forces.png'}, "
+            f"{out / 'target_position.png'}, {out / 'contact_times.png'}",
+        ]
+    )
+
+
+def _fail(message: str, debug: bool) -> None:
+    if debug:
+        traceback.print_exc()
+    click.echo(f"grasp-cosim: {message}", err=True)

@@ -1,0 +1,198 @@
+"""An FMU instance behind calls that are bound once, before the first step.
+
+FMPy loads the binary and runs the life cycle. In the loop its wrappers would allocate and convert
+at every call (2.5 us instead of 0.5 us), so the loop calls the FMI functions directly, on buffers
+that are parts of the master's vectors.
+"""
+
+import ctypes
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import fmpy
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import (
+    FMU2Slave,
+    fmi2CallbackAllocateMemoryTYPE,
+    fmi2CallbackFreeMemoryTYPE,
+    fmi2CallbackFunctions,
+    fmi2CallbackLoggerTYPE,
+)
+from fmpy.logging import addLoggerProxy
+
+from .errors import InputError, SimulationError
+from .interface import Interface, Value, Variable
+
+Call = Callable[[], int]
+"""A bound FMI call; returns the FMI status."""
+
+STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
+WARNING, ERROR, FATAL = 1, 3, 4
+"""FMI statuses. Up to WARNING a simulation goes on; after FATAL no call is allowed."""
+
+_FUNCTION = ctypes.PYFUNCTYPE(ctypes.c_int)
+"""Calls that keep the GIL: a Python FMU would have to take it back at once."""
+
+_SETTERS = {"Real": "setReal", "Integer": "setInteger", "Boolean": "setBoolean"}
+
+_messages: list[tuple[str, str]] = []
+"""What FMUs logged: instance and text. FMPy's logger proxy is one per process, so is this."""
+
+
+def _log(_: Any, instance: bytes | None, status: int, category: Any, message: bytes | None) -> None:
+    if status > 0:
+        text = (message or b"").decode(errors="replace")
+        _messages.append(((instance or b"").decode(errors="replace"), text))
+
+
+_callbacks = fmi2CallbackFunctions()
+_callbacks.logger = fmi2CallbackLoggerTYPE(_log)
+_callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
+_callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(fmpy.free)
+addLoggerProxy(ctypes.byref(_callbacks))
+
+
+class FmuInstance:
+    """One instance of an FMI 2.0 co-simulation FMU. Use as a context manager."""
+
+    def __init__(self, name: str, interface: Interface) -> None:
+        """Extract and instantiate; InputError where the FMU does not load."""
+        self.name = name
+        self.interface = interface
+        self._worst = FATAL
+        self._keep: list[Any] = []
+        self._folder = tempfile.TemporaryDirectory(prefix="grasp_fmu_")
+        try:
+            self._slave = self._instantiate(Path(self._folder.name))
+        except BaseException:
+            self._folder.cleanup()
+            raise
+
+    def _instantiate(self, folder: Path) -> FMU2Slave:
+        fmpy.extract(self.interface.path, folder)
+        self._resources = str(folder / "resources")
+        python_fmu = (folder / "resources" / "slavemodule.txt").exists()
+        plain = self._resources.replace(" ", "")
+        if python_fmu and quote(plain) != plain:
+            raise InputError(
+                f"{self.name}: temporary folder {folder}: a Python FMU crashes on its characters; "
+                "set TMPDIR to a folder of plain ASCII letters"
+            )
+        try:
+            slave = FMU2Slave(
+                guid=self.interface.guid,
+                unzipDirectory=folder,
+                modelIdentifier=self.interface.identifier,
+                instanceName=self.name,
+            )
+            slave.instantiate(callbacks=_callbacks, loggingOn=True)
+        except Exception as error:  # FMPy raises plain Exception
+            raise InputError(
+                f"{self.name}: {self.interface.path} does not load: {self._reason(error)}"
+            ) from error
+        self._worst = 0
+        return slave
+
+    def __enter__(self) -> "FmuInstance":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Terminate and free the FMU as far as it permits; remove what was extracted."""
+        if self._worst < ERROR:
+            self._slave.terminate()
+        if self._worst < FATAL:
+            self._slave.freeInstance()
+        if self._resources in sys.path:  # pythonfmu puts it there and leaves it
+            sys.path.remove(self._resources)
+        self._folder.cleanup()
+
+    def enter_initialization(self, values: Mapping[str, Value], stop: float) -> None:
+        """Set start values, set up the experiment (stop in s) and enter initialisation mode."""
+        with self._refusals():
+            for name, value in values.items():
+                variable = self.interface.by_name[name]
+                if variable.kind == "String":
+                    self._slave.setString([variable.reference], [value])
+                else:
+                    setter = getattr(self._slave, _SETTERS[variable.kind])
+                    setter([variable.reference], [value])
+            self._slave.setupExperiment(startTime=0.0, stopTime=stop)
+            self._slave.enterInitializationMode()
+
+    def exit_initialization(self) -> None:
+        """Leave initialisation mode."""
+        with self._refusals():
+            self._slave.exitInitializationMode()
+
+    def setters(self, variables: Sequence[Variable], reals: Any, integers: Any) -> list[Call]:
+        """Calls that pass reals (float64) and integers (int32) to the given inputs, in order."""
+        return self._bound("fmi2Set", variables, reals, integers)
+
+    def getters(self, variables: Sequence[Variable], reals: Any, integers: Any) -> list[Call]:
+        """Calls that fetch outputs into reals (float64) and integers (int32), in order."""
+        return self._bound("fmi2Get", variables, reals, integers)
+
+    def stepper(self, time: ctypes.c_double, step: float) -> Call:
+        """The call that advances by step seconds from the time in the given box."""
+        return self._function("fmi2DoStep", time, ctypes.c_double(step), ctypes.c_int(1))
+
+    def failure(self, status: int, time: float) -> SimulationError:
+        """The error for a call that returned status at time in s. The FMU is not used again."""
+        self._worst = status
+        name = STATUS[status] if status < len(STATUS) else str(status)
+        return SimulationError(
+            f"{self.name}: {self.interface.path.name} returned {name} at t = {time:.9g} s"
+            f"{self._logged()}"
+        )
+
+    def _bound(
+        self, prefix: str, variables: Sequence[Variable], reals: Any, integers: Any
+    ) -> list[Call]:
+        """One call per kind; the buffers' values follow the order of the variables of the kind."""
+        calls = []
+        offset = 0
+        for kind, buffer in (("Real", reals), ("Integer", integers), ("Boolean", integers)):
+            references = [v.reference for v in variables if v.kind == kind]
+            if not references:
+                continue
+            part = buffer[: len(references)] if kind == "Real" else buffer[offset:]
+            offset += len(references) if kind == "Integer" else 0
+            pointer = part.ctypes.data_as(ctypes.c_void_p)
+            vector = (ctypes.c_uint * len(references))(*references)
+            size = ctypes.c_size_t(len(references))
+            calls.append(self._function(prefix + kind, ctypes.byref(vector), size, pointer))
+            self._keep += [vector, buffer]
+        return calls
+
+    def _function(self, name: str, *arguments: Any) -> Call:
+        component = ctypes.c_void_p(self._slave.component)
+        return partial(_FUNCTION((name, self._slave.dll)), component, *arguments)
+
+    @contextmanager
+    def _refusals(self) -> Iterator[None]:
+        """Turns a failed call of the life cycle into an InputError."""
+        try:
+            yield
+        except FMICallException as error:
+            self._worst = error.status
+            raise InputError(
+                f"{self.name}: {self.interface.path.name} refused its initialisation: "
+                f"{self._reason(error)}"
+            ) from error
+
+    def _reason(self, error: Exception) -> str:
+        logged = self._logged()
+        return logged.removeprefix(": ") or " ".join(str(error).split())
+
+    def _logged(self) -> str:
+        """What this instance logged, as one line, and forget it."""
+        lines = [text for instance, text in _messages if instance == self.name]
+        _messages[:] = [m for m in _messages if m[0] != self.name]
+        text = " ".join(" ".join(lines).split())
+        return f": {text}" if text else ""

@@ -1,0 +1,39 @@
+"""The built-in system: the published grasp, its FMUs and its cases."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+
+from .interface import Value
+from .system import System
+
+SYSTEM = Path(__file__).parent / "grasp.toml"
+
+FMU_FOLDER = Path("fmus/build")
+"""Where the FMUs are built, below the current folder."""
+
+CASES: Mapping[int, Mapping[str, Value]] = MappingProxyType(
+    {
+        0: {
+            "controller.simultaneous_contact.enabled": False,
+            "controller.impact_reduction.enabled": False,
+        },
+        1: {
+            "controller.simultaneous_contact.enabled": False,
+            "controller.impact_reduction.enabled": True,
+        },
+        2: {
+            "controller.simultaneous_contact.enabled": True,
+            "controller.impact_reduction.enabled": True,
+        },
+    }
+)
+"""Case 0 is contact force control alone, 1 with impact reduction, 2 with simultaneous contact."""
+
+
+def grasp_system() -> System:
+    """The built-in grasp; its FMUs are built first where they are missing or out of date."""
+    from grasp_fmus.build import build
+
+    build(FMU_FOLDER)
+    return System.load(SYSTEM, FMU_FOLDER)

@@ -1,0 +1,144 @@
+"""What an FMU declares: its variables, as FMPy reads and validates them."""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import Literal
+
+import fmpy
+
+from .errors import InputError, choices
+
+Value = float | int | bool | str
+Kind = Literal["Real", "Integer", "Boolean", "String"]
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """A scalar variable; unit is None and start, low, high are absent where none is declared."""
+
+    name: str
+    kind: Kind
+    causality: str
+    reference: int
+    unit: str | None
+    start: str | None
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Interface:
+    """The interface of an FMI 2.0 co-simulation FMU."""
+
+    path: Path
+    guid: str
+    identifier: str
+    variables: tuple[Variable, ...]
+
+    @cached_property
+    def by_name(self) -> dict[str, Variable]:
+        """The variables by their names."""
+        return {v.name: v for v in self.variables}
+
+    def of(self, *causalities: str) -> list[Variable]:
+        """The variables of the given causalities, in the order of declaration."""
+        return [v for v in self.variables if v.causality in causalities]
+
+    def parse(self, place: str, name: str, value: Value) -> Value:
+        """The value for input or parameter name, checked against type, range and finiteness.
+
+        place names where the value comes from. Text is converted to the declared type.
+        """
+        settable = [v.name for v in self.of("input", "parameter")]
+        if name not in settable:
+            raise InputError(
+                f"{place}: {self.path.name} has no input or parameter {name!r}; "
+                f"valid: {choices(settable)}"
+            )
+        variable = self.by_name[name]
+        converted = _convert(variable, value)
+        if converted is None:
+            raise InputError(f"{place}: {name} = {value!r}: must be {_expected(variable)}")
+        return converted
+
+
+@lru_cache(maxsize=64)
+def _read(path: Path, modified: int) -> Interface:
+    try:
+        description = fmpy.read_model_description(path)
+    except Exception as error:  # FMPy raises whatever its XML and ZIP libraries do
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise InputError(f"{path}: not a readable FMU: {reason}") from error
+    if description.fmiVersion != "2.0" or description.coSimulation is None:
+        raise InputError(
+            f"{path}: FMI {description.fmiVersion}"
+            f"{'' if description.coSimulation else ' without co-simulation'}; "
+            "must be an FMI 2.0 co-simulation FMU"
+        )
+    return Interface(
+        path,
+        description.guid,
+        description.coSimulation.modelIdentifier,
+        tuple(_variable(v) for v in description.modelVariables),
+    )
+
+
+def read_interface(path: Path) -> Interface:
+    """The interface of the FMU at path; InputError where there is none."""
+    if not path.is_file():
+        raise InputError(f"{path}: no such FMU file")
+    return _read(path.resolve(), path.stat().st_mtime_ns)
+
+
+def _variable(v: fmpy.model_description.ScalarVariable) -> Variable:
+    declared = v.declaredType
+    kind: Kind = "Integer" if v.type == "Enumeration" else v.type
+    low, high, unit = (
+        getattr(v, key) or (getattr(declared, key, None) if declared else None)
+        for key in ("min", "max", "unit")
+    )
+    return Variable(
+        v.name,
+        kind,
+        v.causality or "local",
+        v.valueReference,
+        unit,
+        v.start,
+        -math.inf if low is None else float(low),
+        math.inf if high is None else float(high),
+    )
+
+
+def _convert(variable: Variable, value: Value) -> Value | None:
+    """The value in the variable's type, or None where it does not fit."""
+    if variable.kind == "String":
+        return value if isinstance(value, str) else None
+    if variable.kind == "Boolean":
+        if isinstance(value, str):
+            return {"true": True, "1": True, "false": False, "0": False}.get(value.lower())
+        return value if isinstance(value, bool) else None
+    if isinstance(value, bool):
+        return None
+    try:
+        number = float(value)
+    except ValueError:
+        return None
+    if not math.isfinite(number) or not variable.low <= number <= variable.high:
+        return None
+    if variable.kind == "Integer":
+        return int(number) if number == int(number) else None
+    return number
+
+
+def _expected(variable: Variable) -> str:
+    if variable.kind == "Boolean":
+        return "true or false"
+    if variable.kind == "String":
+        return "a string"
+    noun = "a whole number" if variable.kind == "Integer" else "a finite number"
+    unit = f" {variable.unit}" if variable.unit else ""
+    if math.isinf(variable.low) and math.isinf(variable.high):
+        return f"{noun}{f' in{unit}' if unit else ''}"
+    return f"{noun} from {variable.low:g} to {variable.high:g}{unit}"

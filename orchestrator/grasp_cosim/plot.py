@@ -1,0 +1,122 @@
+"""Figures of a grasp, drawn with matplotlib (the optional extra `plot`)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .errors import InputError
+from .metrics import CONTROLLER, FINGERS, PLANT, is_grasp
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from .recording import Result
+
+BLUE, RED, GREY = "#1f5fa8", "#c0392b", "#7f7f7f"
+COLOR = {1: BLUE, 2: RED}
+"""Finger 1, the right one, is blue and finger 2 red, as in the paper's figures."""
+
+FORCE_LIMIT = 12.0
+"""Top of the force axes in N; an impact that rises above it is marked with its peak."""
+
+
+def plot_run(result: Result, path: Path) -> None:
+    """Gaps, contact forces, actuator forces and target over time, as a PNG."""
+    if not is_grasp(result.signals):
+        raise InputError(f"{path}: nothing to draw; must be a system with a gripper plant")
+    figure = new_figure(7.2, 8.0)
+    gaps, contact, target = figure.subplots(3, 1, sharex=True)
+    for j in FINGERS:
+        gaps.plot(
+            result.time, 1e3 * result[f"{PLANT}.gap[{j}]"], color=COLOR[j], label=f"finger {j}"
+        )
+    _finish(gaps, "gap to the object in mm")
+    draw_contact_forces(contact, [(result, "-", "")])
+    draw_targets(target, [(result, "-", "")])
+    target.set_xlabel("time in s")
+    save(figure, path)
+
+
+def draw_contact_forces(axes: Axes, runs: Sequence[tuple[Result, str, str]]) -> None:
+    """Magnitude of the contact force on each finger; runs as (result, line style, label)."""
+    highest = 0.0
+    for result, style, label in runs:
+        for j in FINGERS:
+            force = abs(result[f"{PLANT}.contact_force[{j}]"])
+            name = f"{label}, finger {j}" if label else f"finger {j}"
+            axes.plot(result.time, force, style, color=COLOR[j], label=name)
+            highest = max(highest, float(force.max()))
+            if force.max() > FORCE_LIMIT:
+                at = result.time[int(force.argmax())]
+                axes.annotate(
+                    f"{force.max():.0f} N",
+                    (at, FORCE_LIMIT),
+                    (5, -14 * j),
+                    textcoords="offset points",
+                    color=COLOR[j],
+                    fontsize=8,
+                )
+    axes.set_ylim(-0.03 * min(highest, FORCE_LIMIT), 1.1 * min(max(highest, 1e-3), FORCE_LIMIT))
+    _finish(axes, "contact force in N")
+
+
+def draw_targets(axes: Axes, runs: Sequence[tuple[Result, str, str]]) -> None:
+    """The target position against the centre of the object; runs as (result, style, label)."""
+    for result, style, label in runs:
+        target = 1e3 * result[f"{CONTROLLER}.target_position"]
+        name = f"target, {label}" if label else "target"
+        axes.plot(result.time, target, style, color=BLUE, label=name)
+    result = runs[0][0]
+    centre = 1e3 * result[f"{PLANT}.object_position"]
+    axes.plot(result.time, centre, ":", color=GREY, label="centre of the object")
+    _finish(axes, "position in mm")
+
+
+def draw_contact_times(axes: Axes, rows: Sequence[Mapping[str, Any]], case: int) -> None:
+    """Published (circles) and simulated (lines) contact times over the object position."""
+    for j in FINGERS:
+        of_finger = [r for r in rows if r["case"] == case and r["finger"] == j]
+        x = [1e3 * r["condition"] for r in of_finger]
+        axes.plot(x, [r["simulated"] for r in of_finger], "-", color=COLOR[j], label=f"finger {j}")
+        axes.plot(
+            x,
+            [r["published"] for r in of_finger],
+            "o",
+            color=COLOR[j],
+            mfc="none",
+            label=f"finger {j}, published",
+        )
+    axes.set_title(f"Case {case}", fontsize=10)
+    axes.set_xlabel("object position in mm")
+    axes.set_ylim(0.0, 3.0)
+    _finish(axes, "time to contact in s")
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure, sizes in inches; InputError without matplotlib."""
+    try:
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise InputError(
+            "matplotlib is not installed, it draws the figures; "
+            "install it with: pip install 'grasp-cosim[plot]'"
+        ) from error
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write the figure as a PNG under a temporary name, then rename it."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f"{path.name}.part")
+    figure.savefig(part, format="png", dpi=130, metadata={"Software": None})
+    part.replace(path)
+
+
+def _finish(axes: Axes, label: str) -> None:
+    axes.set_ylabel(label)
+    axes.grid(True, color="#dddddd", linewidth=0.6)
+    axes.legend(fontsize=8, framealpha=0.9)
+    axes.spines[["top", "right"]].set_visible(False)

@@ -1,0 +1,122 @@
+"""What a simulation leaves behind: every output at every communication point."""
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .metrics import grasp_metrics
+from .plan import REAL, Plan, Signal
+from .system import NANOSECONDS, System
+
+
+class Recorder:
+    """A listener that copies the outputs at every step into tables of their final size."""
+
+    def __init__(self, plan: Plan, steps: int) -> None:
+        self._plan = plan
+        reals = sum(s.kind in REAL for s in plan.signals)
+        self._reals = np.empty((steps + 1, reals))
+        self._integers = np.empty((steps + 1, len(plan.signals) - reals), np.int32)
+        self._sources = plan.reals[:reals], plan.integers[: len(plan.signals) - reals]
+        self.rows = 0
+
+    def __call__(self, step: int) -> None:
+        """Record the values of the given step."""
+        reals, integers = self._sources
+        self._reals[step] = reals
+        self._integers[step] = integers
+        self.rows = step + 1
+
+    def signals(self) -> dict[str, npt.NDArray[Any]]:
+        """The recorded values of each output, booleans as bool."""
+        return {s.name: self._column(s) for s in self._plan.signals}
+
+    def _column(self, signal: Signal) -> npt.NDArray[Any]:
+        table = self._reals if signal.kind in REAL else self._integers
+        column = table[: self.rows, signal.slot]
+        return column.astype(bool) if signal.kind == "Boolean" else column
+
+
+@dataclass(frozen=True)
+class Result(Mapping[str, npt.NDArray[Any]]):
+    """Recorded signals by name, like result["plant.gap[1]"], on result.time in s."""
+
+    system: System
+    signals: Mapping[str, npt.NDArray[Any]]
+    units: Mapping[str, str | None]
+    wall_time: float
+    complete: bool
+    """False where the run was interrupted or an FMU failed."""
+
+    def __getitem__(self, name: str) -> npt.NDArray[Any]:
+        return self.signals[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.signals)
+
+    def __len__(self) -> int:
+        return len(self.signals)
+
+    @cached_property
+    def time(self) -> npt.NDArray[np.float64]:
+        """The communication points in s: k·step, each correctly rounded."""
+        rows = len(next(iter(self.signals.values())))
+        return np.arange(rows) * self.system.step_ns / NANOSECONDS
+
+    @cached_property
+    def metrics(self) -> Mapping[str, Any]:
+        """The figures of `run --json`; those of the grasp only if there is a gripper plant."""
+        simulated = float(self.time[-1])
+        return MappingProxyType(
+            {
+                **grasp_metrics(self.time, self.signals),
+                "wall_time": self.wall_time,
+                "real_time_factor": simulated / self.wall_time,
+                "steps": len(self.time) - 1,
+                "scheme": self.system.scheme,
+                "step": self.system.step_ns / NANOSECONDS,
+                "stop": self.system.stop_ns / NANOSECONDS,
+                "complete": self.complete,
+            }
+        )
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write time and signals with full precision, a line per communication point."""
+        columns = [self.time, *self.signals.values()]
+        names = ",".join(f'"{name}"' for name in ("time", *self.signals))
+        rows = zip(*(column.tolist() for column in columns), strict=True)
+        lines = (",".join(map(_text, row)) for row in rows)
+        write_text(Path(path), "\n".join((names, *lines)) + "\n")
+
+    def to_json(self, path: str | Path) -> None:
+        """Write the metrics, the units and the settings that led to them."""
+        settings = {
+            c.name: {"fmu": c.fmu.name, "values": dict(c.values)} for c in self.system.components
+        }
+        report = {**self.metrics, "units": dict(self.units), "components": settings}
+        write_text(Path(path), json.dumps(report, indent=2) + "\n")
+
+    def plot(self, path: str | Path) -> None:
+        """Draw the grasp as a PNG; InputError without matplotlib or without a gripper plant."""
+        from .plot import plot_run
+
+        plot_run(self, Path(path))
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file under a temporary name, then rename: there is never half of it."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f"{path.name}.part")
+    part.write_text(text, encoding="utf-8")
+    part.replace(path)
+
+
+def _text(value: float | int | bool) -> str:
+    return repr(value) if isinstance(value, float) else str(int(value))
