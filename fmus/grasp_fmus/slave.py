@@ -16,6 +16,13 @@ from .contract import Block, build_params, count, declared, packer, unpacker
 from .model_description import model_description
 
 
+class ParameterError(ValueError):
+    """Parameters that the block refuses. pythonfmu logs the repr: here, just the message."""
+
+    def __repr__(self) -> str:
+        return str(self)
+
+
 class BlockSlave(Fmi2Slave):  # type: ignore[misc]
     """A block as an FMI 2.0 co-simulation slave; a subclass names the block."""
 
@@ -51,6 +58,10 @@ class BlockSlave(Fmi2Slave):  # type: ignore[misc]
         return model_description(
             type(self).__name__, (type(self).__doc__ or "").rstrip("."), self._fields, guid
         )
+
+    def enter_initialization_mode(self) -> None:
+        """Refuse parameters set so far that the block refuses."""
+        self._refresh()
 
     def exit_initialization_mode(self) -> None:
         """Fix the initial state from the parameters and inputs set so far."""
@@ -105,5 +116,8 @@ class BlockSlave(Fmi2Slave):  # type: ignore[misc]
     def _read(self) -> None:
         """Params and Inputs from the list of values."""
         if self._params is None:
-            self._params = build_params(self.block, self._fields, self._values)
+            try:
+                self._params = build_params(self.block, self._fields, self._values)
+            except ValueError as error:
+                raise ParameterError(str(error)) from error
         self._inputs = self._pack(self._values)

@@ -6,6 +6,7 @@ that are parts of the master's vectors.
 """
 
 import ctypes
+import re
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -40,6 +41,8 @@ _FUNCTION = ctypes.PYFUNCTYPE(ctypes.c_int)
 """Calls that keep the GIL: a Python FMU would have to take it back at once."""
 
 _SETTERS = {"Real": "setReal", "Integer": "setInteger", "Boolean": "setBoolean"}
+
+_PYTHONFMU_PREFIX = re.compile(r"Fatal py exception encountered: \[\w+\] \w+ ")
 
 _messages: list[tuple[str, str]] = []
 """What FMUs logged: instance and text. FMPy's logger proxy is one per process, so is this."""
@@ -194,5 +197,5 @@ class FmuInstance:
         """What this instance logged, as one line, and forget it."""
         lines = [text for instance, text in _messages if instance == self.name]
         _messages[:] = [m for m in _messages if m[0] != self.name]
-        text = " ".join(" ".join(lines).split())
+        text = _PYTHONFMU_PREFIX.sub("", " ".join(" ".join(lines).split()))
         return f": {text}" if text else ""

@@ -8,7 +8,7 @@ with the values of the last communication point. Time is an integer number of na
 import ctypes
 from collections.abc import Callable, Sequence
 
-from .errors import InputError, choices
+from .errors import InputError, SimulationError, choices
 from .fmu import WARNING, Call
 from .plan import REAL, Instance, Link, make_plan
 from .system import NANOSECONDS, System
@@ -30,7 +30,10 @@ class Master:
         stop = self.system.stop_ns / NANOSECONDS
         for component, link in zip(self.system.components, self.plan.links, strict=True):
             link.instance.enter_initialization(component.values, stop)
-        self._propagate()
+        try:
+            self._propagate()
+        except SimulationError as error:
+            raise InputError(str(error)) from error
         for link in self.plan.links:
             link.instance.exit_initialization()
         self._notify()

@@ -1,0 +1,43 @@
+# make run    the published grasp from FMUs: .venv, build, evaluate, pictures in results/
+# make test   the tests        make check   lint, format, types, import rules
+# make bench  measurements     make cards    the variable tables of the equation cards
+
+PYTHON ?= $(firstword $(foreach p,python3 python3.13 python3.12 python3.11,$(shell \
+	$(p) -c 'import sys; print("$(p)" if sys.version_info >= (3, 11) else "")' 2>/dev/null)))
+BIN := .venv/bin
+PIP := PIP_CONSTRAINT=constraints.txt PIP_DISABLE_PIP_VERSION_CHECK=1 $(BIN)/python -m pip install --quiet
+
+.PHONY: run test check bench cards clean
+
+run: .venv/run
+	$(BIN)/grasp-cosim build
+	$(BIN)/grasp-cosim evaluate --out results
+
+test: .venv/dev
+	$(BIN)/python -m pytest -n 2
+
+check: .venv/dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/python -m pytest -q tests/test_import_rules.py
+
+bench: .venv/run
+	$(BIN)/python benchmarks/macro_step.py
+
+cards: .venv/run
+	$(BIN)/python -m grasp_fmus.cards plant/README.md=gripper_plant.rigid \
+		sensor/README.md=proximity_sensor.optics controller/README.md=grasp_controller.series
+
+.venv/run: pyproject.toml constraints.txt
+	$(if $(PYTHON),,$(error grasp-cosim needs Python 3.11 or newer; name one with PYTHON=...))
+	$(PYTHON) -m venv .venv
+	$(PIP) --editable '.[plot]'
+	touch $@
+
+.venv/dev: .venv/run
+	$(PIP) --editable '.[plot,dev]'
+	touch $@
+
+clean:
+	rm -rf .venv fmus/build results dist .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -1,0 +1,95 @@
+"""The FMUs have the variables that other tools rely on."""
+
+from pathlib import Path
+
+import pytest
+from fmpy.validation import validate_fmu
+from grasp_cosim.interface import Variable, read_interface
+
+PLANT = """
+force[1]                      input      Real     N      0.0
+force[2]                      input      Real     N      0.0
+position[1]                   output     Real     m
+position[2]                   output     Real     m
+velocity[1]                   output     Real     m/s
+velocity[2]                   output     Real     m/s
+gap[1]                        output     Real     m
+gap[2]                        output     Real     m
+contact_force[1]              output     Real     N
+contact_force[2]              output     Real     N
+contact[1]                    output     Boolean  -
+contact[2]                    output     Boolean  -
+object_position               output     Real     m
+finger_mass[1]                parameter  Real     kg     0.5
+finger_mass[2]                parameter  Real     kg     0.5
+initial_position[1]           parameter  Real     m      0.11
+initial_position[2]           parameter  Real     m      -0.11
+object_width                  parameter  Real     m      0.07
+initial_object_position       parameter  Real     m      0.03
+"""
+SENSOR = """
+gap                           input      Real     m      0.1
+intensity                     output     Real     V
+reflectance                   parameter  Real     1      1.0
+gain                          parameter  Real     V.m^n  0.0024
+diffusion_exponent            parameter  Real     1      1.1506
+offset_distance               parameter  Real     m      0.005
+"""
+CONTROLLER = """
+position[1]                   input      Real     m      0.11
+position[2]                   input      Real     m      -0.11
+velocity[1]                   input      Real     m/s    0.0
+velocity[2]                   input      Real     m/s    0.0
+intensity[1]                  input      Real     V      0.03
+intensity[2]                  input      Real     V      0.03
+force[1]                      output     Real     N
+force[2]                      output     Real     N
+target_position               output     Real     m
+virtual_position[1]           output     Real     m
+virtual_position[2]           output     Real     m
+simultaneous_contact_force    output     Real     N
+impact_reduction_force[1]     output     Real     N
+impact_reduction_force[2]     output     Real     N
+simultaneous_contact.enabled  parameter  Boolean  -      true
+simultaneous_contact.mass     parameter  Real     kg     1.0
+simultaneous_contact.damping  parameter  Real     N.s/m  12.0
+simultaneous_contact.stiffness  parameter  Real   N/m    36.0
+simultaneous_contact.gain     parameter  Real     N      3.0
+impact_reduction.enabled      parameter  Boolean  -      true
+impact_reduction.mass         parameter  Real     kg     1.0
+impact_reduction.damping      parameter  Real     N.s/m  10.0
+impact_reduction.stiffness    parameter  Real     N/m    25.0
+impact_reduction.viscosity[1]  parameter  Real    N.s    0.6
+impact_reduction.viscosity[2]  parameter  Real    N.s    -0.6
+contact_force.damping         parameter  Real     N.s/m  14.0
+contact_force.stiffness       parameter  Real     N/m    98.0
+"""
+FMUS = {"GripperPlant": PLANT, "ProximitySensor": SENSOR, "GraspController": CONTROLLER}
+
+
+def described(v: Variable) -> tuple[str, ...]:
+    row = (v.name, v.causality, v.kind, v.unit or "-")
+    return row if v.start is None else (*row, v.start)
+
+
+@pytest.mark.parametrize(("name", "table"), FMUS.items())
+def test_variables_are_those_agreed(fmus: Path, name: str, table: str) -> None:
+    agreed = {tuple(line.split()) for line in table.strip().splitlines()}
+    ours = {described(v) for v in read_interface(fmus / f"{name}.fmu").variables}
+    assert agreed <= ours
+    extra = {row[0] for row in ours - agreed}
+    assert extra <= {"baumgarte_alpha", "baumgarte_beta", "impact_reduction.intensity_floor"}
+
+
+@pytest.mark.parametrize("name", FMUS)
+def test_fmpy_finds_no_problem(fmus: Path, name: str) -> None:
+    assert validate_fmu(str(fmus / f"{name}.fmu")) == []
+
+
+@pytest.mark.parametrize("name", FMUS)
+def test_every_parameter_that_is_a_number_has_a_range(fmus: Path, name: str) -> None:
+    parameters = [
+        v for v in read_interface(fmus / f"{name}.fmu").of("parameter") if v.kind == "Real"
+    ]
+    assert parameters
+    assert all(float("-inf") < v.low < v.high < float("inf") for v in parameters)

@@ -1,0 +1,133 @@
+"""An FMU as a host sees it: plain FMPy, many instances, values before and after a set."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from fmpy import extract, read_model_description, simulate_fmu
+from fmpy.fmi2 import FMU2Slave
+from grasp_controller import series
+from gripper_plant import rigid
+from proximity_sensor import optics
+
+
+class Host:
+    """An instance driven by FMPy's own class, by variable name."""
+
+    def __init__(self, fmu: Path, folder: Path) -> None:
+        description = read_model_description(fmu)
+        self.references = {v.name: v.valueReference for v in description.modelVariables}
+        self.slave = FMU2Slave(
+            guid=description.guid,
+            unzipDirectory=extract(fmu, folder),
+            modelIdentifier=description.coSimulation.modelIdentifier,
+            instanceName="host",
+        )
+        self.slave.instantiate()
+        self.slave.setupExperiment(startTime=0.0)
+
+    def get(self, name: str) -> float:
+        return float(self.slave.getReal([self.references[name]])[0])
+
+    def set(self, **values: float) -> None:
+        for name, value in values.items():
+            self.slave.setReal([self.references[name]], [value])
+
+    def __enter__(self) -> "Host":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.slave.terminate()
+        self.slave.freeInstance()
+
+
+@pytest.mark.parametrize("name", ["GripperPlant", "ProximitySensor", "GraspController"])
+def test_runs_in_plain_fmpy(fmus: Path, name: str) -> None:
+    result: Any = simulate_fmu(fmus / f"{name}.fmu", stop_time=0.01, validate=True)
+    assert len(result) > 10
+    assert all(np.isfinite(result[column]).all() for column in result.dtype.names)
+
+
+def test_a_free_finger_in_plain_fmpy_is_a_parabola(fmus: Path) -> None:
+    result: Any = simulate_fmu(
+        fmus / "GripperPlant.fmu",
+        stop_time=0.1,
+        step_size=1e-3,
+        start_values={"force[1]": -1.0, "finger_mass[1]": 0.8},
+    )
+    expected = 0.11 - 0.5 / 0.8 * result["time"] ** 2
+    np.testing.assert_allclose(result["position[1]"], expected, rtol=1e-13)
+    assert (result["position[2]"] == -0.11).all()
+
+
+def test_outputs_agree_with_inputs_in_initialisation_mode(fmus: Path, tmp_path: Path) -> None:
+    with Host(fmus / "ProximitySensor.fmu", tmp_path) as host:
+        host.slave.enterInitializationMode()
+        for gap, reflectance in ((0.02, 1.0), (0.01, 0.5)):
+            host.set(gap=gap, reflectance=reflectance)
+            expected = 0.0024 * reflectance / (gap + 0.005) ** 1.1506
+            assert host.get("intensity") == pytest.approx(expected, rel=1e-14)
+
+
+def test_outputs_follow_a_tunable_parameter_at_run_time(fmus: Path, tmp_path: Path) -> None:
+    with Host(fmus / "ProximitySensor.fmu", tmp_path) as host:
+        host.slave.enterInitializationMode()
+        host.slave.exitInitializationMode()
+        host.slave.doStep(0.0, 1e-3)
+        before = host.get("intensity")
+        host.set(reflectance=0.25)
+        assert host.get("intensity") == 0.25 * before
+        host.slave.doStep(1e-3, 1e-3)
+        assert host.get("intensity") == 0.25 * before
+
+
+def test_values_in_any_order(fmus: Path, tmp_path: Path) -> None:
+    with Host(fmus / "GraspController.fmu", tmp_path) as host:
+        names = ["intensity[2]", "position[1]", "intensity[1]"]
+        references = [host.references[name] for name in names]
+        host.slave.enterInitializationMode()
+        host.slave.setReal(references, [0.3, 0.1, 0.2])
+        assert host.slave.getReal(references[::-1]) == [0.2, 0.1, 0.3]
+        assert host.get("virtual_position[1]") == 0.1
+
+
+def test_many_instances_come_and_go(fmus: Path, tmp_path: Path) -> None:
+    """pythonfmu 0.7.0 alone crashes the process at the second or third instance."""
+    for k in range(40):
+        with Host(fmus / "ProximitySensor.fmu", tmp_path / str(k % 3)) as host:
+            host.slave.enterInitializationMode()
+            assert host.get("intensity") > 0.0
+
+
+def test_instances_are_independent(fmus: Path, tmp_path: Path) -> None:
+    with (
+        Host(fmus / "ProximitySensor.fmu", tmp_path / "1") as one,
+        Host(fmus / "ProximitySensor.fmu", tmp_path / "2") as two,
+    ):
+        for host in (one, two):
+            host.slave.enterInitializationMode()
+        one.set(gap=0.01)
+        two.set(gap=0.02)
+        assert one.get("intensity") > two.get("intensity")
+
+
+@pytest.mark.parametrize(
+    ("name", "block"),
+    [("GripperPlant", rigid), ("ProximitySensor", optics), ("GraspController", series)],
+)
+def test_start_values_are_those_of_the_block(
+    fmus: Path, tmp_path: Path, name: str, block: Any
+) -> None:
+    with Host(fmus / f"{name}.fmu", tmp_path) as host:
+        host.slave.enterInitializationMode()
+        u = block.Inputs()
+        y = block.outputs(block.Params(), block.initial_state(block.Params(), u), u)
+        for field, value in y._asdict().items():
+            if isinstance(value, tuple):
+                pairs = [(f"{field}[{i + 1}]", v) for i, v in enumerate(value)]
+            else:
+                pairs = [(field, value)]
+            for variable, expected in pairs:
+                if not isinstance(expected, bool):
+                    assert host.get(variable) == expected

@@ -1,0 +1,61 @@
+"""Who may import whom: blocks only the standard library, the orchestrator no physics."""
+
+import ast
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+BLOCKS = {
+    "plant": "gripper_plant",
+    "sensor": "proximity_sensor",
+    "controller": "grasp_controller",
+}
+OURS = {*BLOCKS.values(), "grasp_fmus", "grasp_cosim"}
+
+
+def imports(folder: Path) -> Iterator[tuple[str, str]]:
+    """File and top-level package of every absolute import below a folder."""
+    files = sorted(folder.rglob("*.py"))
+    assert files, folder
+    for file in files:
+        for node in ast.walk(ast.parse(file.read_text("utf-8"))):
+            names = []
+            if isinstance(node, ast.Import):
+                names = [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
+                names = [node.module]
+            for name in names:
+                yield file.name, name.partition(".")[0]
+
+
+@pytest.mark.parametrize(("folder", "package"), BLOCKS.items())
+def test_a_block_imports_the_standard_library_only(folder: str, package: str) -> None:
+    foreign = {
+        (file, name)
+        for file, name in imports(ROOT / folder / package)
+        if name not in sys.stdlib_module_names
+    }
+    assert not foreign
+
+
+def test_the_orchestrator_imports_no_physics_and_no_pythonfmu() -> None:
+    forbidden = {*BLOCKS.values(), "pythonfmu"}
+    found = {(f, n) for f, n in imports(ROOT / "orchestrator/grasp_cosim") if n in forbidden}
+    assert not found
+
+
+def test_the_orchestrator_builds_the_fmus_at_two_places_only() -> None:
+    found = {f for f, n in imports(ROOT / "orchestrator/grasp_cosim") if n == "grasp_fmus"}
+    assert found == {"cli.py", "grasp.py"}
+
+
+def test_the_fmu_adapter_knows_no_physics_but_for_the_scripts() -> None:
+    found = {(f, n) for f, n in imports(ROOT / "fmus/grasp_fmus") if n in OURS - {"grasp_fmus"}}
+    assert found == {
+        ("GripperPlant.py", "gripper_plant"),
+        ("ProximitySensor.py", "proximity_sensor"),
+        ("GraspController.py", "grasp_controller"),
+    }
