@@ -52,7 +52,7 @@ def main(cards: list[str]) -> None:
     """Update the cards, each given as CARD=MODULE."""
     for card in cards:
         path, _, module = card.partition("=")
-        block: Block = importlib.import_module(module)  # type: ignore[assignment]
+        block: Block = importlib.import_module(module)
         text = updated(Path(path).read_text("utf-8"), block)
         Path(path).write_text(text, "utf-8")
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
+from .recording import Result
 from .system import System
 
 TIME_BAND = 0.10
@@ -27,6 +28,8 @@ class Run:
     times_at_sensor_contact: tuple[float, float]
     overshoot: float
     """m by which the target passes the centre of the object, seen from the start."""
+    result: Result | None
+    """Every signal, for the runs that the figures show."""
 
 
 Runs = dict[tuple[float, int], Run]

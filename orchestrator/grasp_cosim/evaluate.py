@@ -18,16 +18,16 @@ from .errors import InputError
 from .grasp import CASES
 from .metrics import FINGERS, time_at_gap
 from .plot import draw_contact_forces, draw_contact_times, draw_targets, new_figure, save
-from .recording import Result, write_text
+from .recording import write_text
 from .report import markdown, table_csv
 from .simulation import simulate
 from .system import System
 
-STOP = 5.0
+STOP = 4.5
 """s; the slowest contact is at 2.7 s and the layers settle with a time constant of 0.2 s."""
 
-SHOWN = 0.03
-"""m; the object position of the figures."""
+SHOWN, SHOWN_UNTIL = 0.03, 3.0
+"""m and s; the object position of the figures, and where their time axis ends."""
 
 SENSOR_CONTACT = 0.37e-3
 """m; the gap at which contact, were it declared there, would explain the published times best."""
@@ -52,7 +52,7 @@ def evaluate(system: System, out: Path, workers: int, progress: bool) -> dict[st
         "runs": [{"condition": r.x_m, "case": r.case, **_steady(r.metrics)} for r in runs.values()],
     }
     out.mkdir(parents=True, exist_ok=True)
-    _draw(system, rows, out)
+    _draw(runs, rows, out)
     write_text(out / "evaluation.csv", table_csv(rows))
     write_text(out / "evaluation.json", json.dumps(report, indent=2) + "\n")
     write_text(out / "report.md", markdown(report, system))
@@ -88,7 +88,8 @@ def _run_all(
 
 def _run(job: tuple[System, float, int]) -> Run:
     system, x_m, case = job
-    result = _simulate(system, x_m, case, STOP)
+    values = {**CASES[case], "plant.initial_object_position": x_m}
+    result = simulate(system.with_values(values), stop=STOP)
     moments = [time_at_gap(result.time, result.signals, j, SENSOR_CONTACT) for j in FINGERS]
     first, second = moments
     if first is None or second is None or None in result.metrics["time_to_contact"]:
@@ -97,12 +98,8 @@ def _run(job: tuple[System, float, int]) -> Run:
         )
     target = result["controller.target_position"]
     beyond = (target - x_m) * math.copysign(1.0, x_m)
-    return Run(x_m, case, dict(result.metrics), (first, second), float(beyond.max()))
-
-
-def _simulate(system: System, x_m: float, case: int, stop: float) -> Result:
-    values = {**CASES[case], "plant.initial_object_position": x_m}
-    return simulate(system.with_values(values), stop=stop)
+    shown = result if x_m == SHOWN else None
+    return Run(x_m, case, dict(result.metrics), (first, second), float(beyond.max()), shown)
 
 
 def _row(published: dict[str, Any], runs: Runs) -> dict[str, Any]:
@@ -138,20 +135,22 @@ def _steady(metrics: dict[str, Any]) -> dict[str, Any]:
     return {k: v for k, v in metrics.items() if k not in ("wall_time", "real_time_factor")}
 
 
-def _draw(system: System, rows: list[dict[str, Any]], out: Path) -> None:
-    shown = {case: _simulate(system, SHOWN, case, 3.0) for case in CASES}
+def _draw(runs: Runs, rows: list[dict[str, Any]], out: Path) -> None:
+    shown = {r.case: r.result for r in runs.values() if r.result}
     pair = [(shown[1], "--", "Case 1"), (shown[2], "-", "Case 2")]
     forces = new_figure(7.2, 6.4)
     top, bottom = forces.subplots(2, 1, sharex=True)
     draw_contact_forces(top, pair)
     draw_contact_forces(bottom, [(shown[0], "-", "Case 0")])
     bottom.set_xlabel("time in s")
+    bottom.set_xlim(0.0, SHOWN_UNTIL)
     top.set_title(f"Contact forces, object at {1e3 * SHOWN:.0f} mm", fontsize=10)
     save(forces, out / "contact_forces.png")
     targets = new_figure(7.2, 4.0)
     axes = targets.subplots()
     draw_targets(axes, pair)
     axes.set_xlabel("time in s")
+    axes.set_xlim(0.0, SHOWN_UNTIL)
     axes.set_title(f"Target position, object at {1e3 * SHOWN:.0f} mm", fontsize=10)
     save(targets, out / "target_position.png")
     times = new_figure(9.0, 4.0)

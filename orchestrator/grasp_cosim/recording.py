@@ -5,7 +5,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -74,18 +73,16 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     def metrics(self) -> Mapping[str, Any]:
         """The figures of `run --json`; those of the grasp only if there is a gripper plant."""
         simulated = float(self.time[-1])
-        return MappingProxyType(
-            {
-                **grasp_metrics(self.time, self.signals),
-                "wall_time": self.wall_time,
-                "real_time_factor": simulated / self.wall_time,
-                "steps": len(self.time) - 1,
-                "scheme": self.system.scheme,
-                "step": self.system.step_ns / NANOSECONDS,
-                "stop": self.system.stop_ns / NANOSECONDS,
-                "complete": self.complete,
-            }
-        )
+        return {
+            **grasp_metrics(self.time, self.signals),
+            "wall_time": self.wall_time,
+            "real_time_factor": simulated / self.wall_time,
+            "steps": len(self.time) - 1,
+            "scheme": self.system.scheme,
+            "step": self.system.step_ns / NANOSECONDS,
+            "stop": self.system.stop_ns / NANOSECONDS,
+            "complete": self.complete,
+        }
 
     def to_csv(self, path: str | Path) -> None:
         """Write time and signals with full precision, a line per communication point."""

@@ -1,0 +1,210 @@
+"""The grasp in continuous time, solved from event to event: a reference that shares no code.
+
+The right-hand side is Eqs. (1) to (7) and (9) as they are printed, every signal taken at the same
+moment: no sampling, no sensor or actuator step, no order of execution. Each moment at which a
+finger touches or leaves the object is located on the solution, which starts anew from there.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import tanh
+from typing import Any, NamedTuple
+
+from scipy.integrate import solve_ivp
+
+Pair = tuple[float, float]
+"""A value per finger: right, left."""
+
+State = Sequence[float]
+"""x_1, x_1', x_2, x_2', x_v11, x_v11', x_v21, x_v21', x_v2, x_v2'."""
+
+Event = Callable[[float, State], float]
+
+OPENING = (1.0, -1.0)
+"""Direction of x in which a finger opens."""
+
+REBOUND = 1e-9
+"""m; a finger that touches is free again beyond this gap.
+
+The gap of a finger at rest on the object decays to zero. What is left of it, some 1e-13 m of
+numerical noise, is no rebound.
+"""
+
+LONGEST_STEP = 5e-3
+"""s; a step of the solver in which a finger touched and left again would hide both."""
+
+
+@dataclass(frozen=True, slots=True)
+class Grasp:
+    """The published numbers in SI units, under the symbols of the equations."""
+
+    case: int = 2
+    m: Pair = (0.5, 0.5)
+    x_init: Pair = (0.11, -0.11)
+    W: float = 0.07
+    x_m: float = 0.03
+    alpha: float = 200.0
+    beta: float = 200.0
+    K: float = 0.0024
+    n: float = 1.1506
+    l_0: float = 0.005
+    reflectance: Pair = (1.0, 1.0)
+    M_a2: float = 1.0
+    D_a2: float = 12.0
+    K_a2: float = 36.0
+    K_s: float = 3.0
+    M_a1: float = 1.0
+    D_a1: float = 10.0
+    K_a1: float = 25.0
+    D_p: Pair = (0.6, -0.6)
+    D_i: float = 14.0
+    K_i: float = 98.0
+
+
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """The first contacts, and how the solution ends."""
+
+    contact_time: tuple[float | None, float | None]
+    """s; None for a finger that does not touch."""
+    closing_speed: tuple[float | None, float | None]
+    """m/s, at the first contact."""
+    contact_force: Pair
+    """N, along x."""
+    target: float
+    """m; x_v2, which is x_d without layer 3."""
+
+
+class Motion(NamedTuple):
+    """Position in m and its derivatives in m/s and m/s^2."""
+
+    x: float
+    v: float
+    a: float
+
+
+def solve(p: Grasp, stop: float, *, to_the_end: bool = False) -> Solution:
+    """The grasp up to stop in s; unless to_the_end, only until both fingers have touched."""
+    x_1, x_2 = p.x_init
+    y: State = [x_1, 0.0, x_2, 0.0, x_1, 0.0, x_2, 0.0, 0.5 * (x_1 + x_2), 0.0]
+    t, touching = 0.0, (False, False)
+    times: list[float | None] = [None, None]
+    speeds: list[float | None] = [None, None]
+    while t < stop and (to_the_end or None in times):
+        t, y, touching = _run_to_event(p, t, y, touching, stop)
+        for j in (0, 1):
+            if touching[j] and times[j] is None:
+                times[j], speeds[j] = t, -_gap(p, y, j)[1]
+    target, virtual = _targets(p, y, touching)
+    f_1, f_2 = (_contact_force(p, y, j, virtual[j], touching[j]) for j in (0, 1))
+    return Solution((times[0], times[1]), (speeds[0], speeds[1]), (f_1, f_2), target.x)
+
+
+def _run_to_event(
+    p: Grasp, t: float, y: State, touching: tuple[bool, bool], stop: float
+) -> tuple[float, State, tuple[bool, bool]]:
+    """Integrate until a finger touches or leaves, or until stop; and who touches from there on."""
+    events = [_event(p, j, touching[j]) for j in (0, 1)]
+    solution = solve_ivp(
+        lambda _, y: _slope(p, y.tolist(), touching),
+        (t, stop),
+        y,
+        method="DOP853",
+        events=events,
+        rtol=1e-9,
+        atol=1e-12,
+        max_step=LONGEST_STEP,
+    )
+    assert solution.success, solution.message
+    t, end = float(solution.t[-1]), solution.y[:, -1].tolist()
+    # Of two events at the same moment the solver names one; the sign tells of the other.
+    changed = [len(solution.t_events[j]) > 0 or events[j](t, end) < 0.0 for j in (0, 1)]
+    return t, end, (touching[0] != changed[0], touching[1] != changed[1])
+
+
+def _event(p: Grasp, j: int, touching: bool) -> Event:
+    """A function that falls through zero where the finger leaves or touches."""
+
+    def room(t: float, y: State) -> float:
+        gap, _ = _gap(p, y, j)
+        return REBOUND - gap if touching else gap
+
+    event: Any = room
+    event.terminal, event.direction = True, -1.0
+    return room
+
+
+def _slope(p: Grasp, y: State, touching: tuple[bool, bool]) -> list[float]:
+    """The derivative of the state."""
+    target, (virtual_1, virtual_2) = _targets(p, y, touching)
+    a_1 = _acceleration(p, y, 0, virtual_1, touching[0])
+    a_2 = _acceleration(p, y, 1, virtual_2, touching[1])
+    return [y[1], a_1, y[3], a_2, y[5], virtual_1.a, y[7], virtual_2.a, y[9], target.a]
+
+
+def _targets(p: Grasp, y: State, touching: tuple[bool, bool]) -> tuple[Motion, list[Motion]]:
+    """x_v2 of Eqs. (2) to (4), and from it x_vj1 of Eqs. (5) and (6).
+
+    Case 1 puts x_d in the place of x_v2, Case 0 in that of x_vj1; x_d' = x_d'' = 0 by definition.
+    """
+    x_d = 0.5 * (y[0] + y[2])
+    target = Motion(x_d, 0.0, 0.0)
+    if p.case == 2:
+        xi_1, xi_2 = (_intensity(p, y, j) for j in (0, 1))
+        f_s = p.K_s * tanh((xi_1 - xi_2) / (xi_1 + xi_2))
+        x, v = y[8], y[9]
+        target = Motion(x, v, (f_s - p.D_a2 * v - p.K_a2 * (x - x_d)) / p.M_a2)
+    if p.case == 0:
+        return target, [target, target]
+    virtual = []
+    for j in (0, 1):
+        x, v = y[4 + 2 * j], y[5 + 2 * j]
+        f_p = 0.0 if touching[j] else p.D_p[j] * _relative_intensity_rate(p, y, j)
+        deviation = f_p - p.D_a1 * (v - target.v) - p.K_a1 * (x - target.x)
+        virtual.append(Motion(x, v, target.a + deviation / p.M_a1))
+    return target, virtual
+
+
+def _gap(p: Grasp, y: State, j: int) -> Pair:
+    """l_j and its rate: from the surface at x_m +- W/2 outwards."""
+    opening = OPENING[j]
+    return opening * (y[2 * j] - p.x_m) - 0.5 * p.W, opening * y[2 * j + 1]
+
+
+def _intensity(p: Grasp, y: State, j: int) -> float:
+    """Eq. (9); no gap is less than none."""
+    gap, _ = _gap(p, y, j)
+    intensity: float = p.K * p.reflectance[j] / (max(gap, 0.0) + p.l_0) ** p.n
+    return intensity
+
+
+def _relative_intensity_rate(p: Grasp, y: State, j: int) -> float:
+    """xi'/xi, where xi' is the derivative of Eq. (9) along the motion of a free finger."""
+    gap, rate = _gap(p, y, j)
+    return -p.n * rate / (gap + p.l_0)
+
+
+def _actuator_force(p: Grasp, y: State, j: int, virtual: Motion) -> float:
+    """Eq. (7)."""
+    x, v = y[2 * j], y[2 * j + 1]
+    return -p.D_i * (v - virtual.v) - p.K_i * (x - virtual.x)
+
+
+def _contact_force(p: Grasp, y: State, j: int, virtual: Motion, touching: bool) -> float:
+    """What makes the gap obey g'' + 2 alpha g' + beta^2 g = 0, along x; never a pull.
+
+    Where it reaches zero within the surface the slope has a kink, not a jump: the solver's error
+    control copes with that.
+    """
+    if not touching:
+        return 0.0
+    gap, rate = _gap(p, y, j)
+    wanted = -2.0 * p.alpha * rate - p.beta**2 * gap
+    actuator = OPENING[j] * _actuator_force(p, y, j, virtual)
+    return OPENING[j] * max(0.0, p.m[j] * wanted - actuator)
+
+
+def _acceleration(p: Grasp, y: State, j: int, virtual: Motion, touching: bool) -> float:
+    """Eq. (1)."""
+    force = _actuator_force(p, y, j, virtual) + _contact_force(p, y, j, virtual, touching)
+    return force / p.m[j]

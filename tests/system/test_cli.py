@@ -1,0 +1,192 @@
+"""The command line: what it writes, one line per mistake, exit codes."""
+
+import csv
+import json
+import math
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from grasp_cosim import System, cli, simulate
+from grasp_cosim.grasp import CASES
+
+Run = Callable[..., tuple[int, str, str]]
+
+METRICS = {
+    "time_to_contact", "time_difference", "impact_velocity", "peak_contact_force",
+    "steady_contact_force", "object_shift", "target_position", "wall_time", "real_time_factor",
+    "steps", "scheme", "step",
+}  # fmt: skip
+
+
+@pytest.fixture
+def command(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    grasp: System,
+    tmp_path: Path,
+) -> Run:
+    """Runs a command line in an empty folder; exit code, standard output, standard error."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(cli, "grasp_system", lambda: grasp)
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["grasp-cosim", *arguments])
+        with pytest.raises(SystemExit) as exit_:
+            cli.main()
+        out, err = capsys.readouterr()
+        return int(exit_.value.code or 0), out, err
+
+    return run
+
+
+def test_run_prints_one_json_object(command: Run, grasp: System) -> None:
+    code, out, err = command("run", "--stop", "0.2", "--case", "0", "--json")
+    metrics: dict[str, Any] = json.loads(out)
+    assert (code, err) == (0, "")
+    assert set(metrics) >= METRICS
+    same = simulate(grasp.with_values(CASES[0]), stop=0.2).metrics
+    assert metrics["time_to_contact"] == same["time_to_contact"]
+    assert metrics["time_to_contact"][0] == pytest.approx(0.100, abs=2e-3)
+    assert metrics["time_to_contact"][1] is None
+    assert metrics["time_difference"] is None
+    assert (metrics["steps"], metrics["step"], metrics["scheme"]) == (2000, 1e-4, "sequential")
+
+
+def test_run_takes_all_options(command: Run, grasp: System) -> None:
+    plant = grasp.component("plant", "test").fmu
+    code, out, _ = command(
+        "run", "--case", "1", "--set", "plant.initial_object_position=0.05", "--swap",
+        f"plant={plant}", "--step", "1e-3", "--stop", "0.1", "--scheme", "jacobi", "--json",
+    )  # fmt: skip
+    metrics = json.loads(out)
+    assert code == 0
+    assert (metrics["steps"], metrics["step"], metrics["scheme"]) == (100, 1e-3, "jacobi")
+
+
+def test_run_writes_signals_metrics_and_a_picture(command: Run, tmp_path: Path) -> None:
+    code, _, err = command("run", "--stop", "0.01", "--out", "results", "--plot")
+    assert code == 0
+    assert sorted(p.name for p in (tmp_path / "results").iterdir()) == [
+        "grasp.png", "run.json", "signals.csv",
+    ]  # fmt: skip
+    assert "drew results/grasp.png" in err
+    assert (tmp_path / "results/grasp.png").read_bytes().startswith(b"\x89PNG")
+    report = json.loads((tmp_path / "results/run.json").read_text())
+    assert report["units"]["plant.gap[1]"] == "m"
+    assert report["components"]["plant"]["values"]["object_width"] == 0.07
+
+
+def test_csv_holds_every_bit(command: Run, grasp: System, tmp_path: Path) -> None:
+    command("run", "--stop", "0.01", "--out", "results")
+    result = simulate(grasp, stop=0.01)
+    with (tmp_path / "results/signals.csv").open() as file:
+        rows = list(csv.reader(file))
+    assert rows[0] == ["time", *result]
+    assert len(rows) == 102
+    for name, column in zip(rows[0][1:], list(zip(*rows[1:], strict=True))[1:], strict=True):
+        assert [float(value) for value in column] == result[name].astype(float).tolist()
+
+
+def test_case_1_is_layer_3_off(command: Run) -> None:
+    _, one, _ = command("run", "--stop", "0.01", "--case", "1", "--json")
+    _, two, _ = command(
+        "run", "--stop", "0.01", "--set", "controller.simultaneous_contact.enabled=false", "--json"
+    )
+    _, three, _ = command("run", "--stop", "0.01", "--json")
+    target = [json.loads(text)["target_position"] for text in (one, two, three)]
+    assert target[0] == target[1] != target[2]
+
+
+WRONG = [
+    (["--set", "plant.object_width=0.5"], "object_width = 0.5 m .* must fit between"),
+    (
+        ["--set", "plant.finger_mass[1]=-0.5"],
+        r"'-0.5': must be a finite number from 0.001 to 1000 kg",
+    ),
+    (["--set", "plant.finger_mass[2]=nan"], "'nan': must be a finite number"),
+    (["--set", "sensor_1.reflectance=inf"], "'inf': must be a finite number"),
+    (["--set", "plant.mass=1"], r"no input or parameter 'mass'; valid: force\[1\]"),
+    (["--set", "plnt.mass=1"], "no component 'plnt'; valid: plant, sensor_1, sensor_2, controller"),
+    (["--set", "plant.object_width"], "must be COMPONENT.VARIABLE=VALUE"),
+    (["--swap", "plant=missing.fmu"], "missing.fmu: no such FMU file"),
+    (["--swap", "plant"], "must be COMPONENT=FMU"),
+    (["--swap", "hand=x.fmu"], "no component 'hand'; valid: plant"),
+    (["--step", "0"], "step = 0.0 s: must be a number greater than 0"),
+    (["--step", "-1e-3"], "step = -0.001 s: must be a number greater than 0"),
+    (["--step", "nan"], "step = nan s: must be a number greater than 0"),
+    (["--step", "7e-4"], "does not divide stop = 3 s; stop could be 3.0002 s"),
+    (["--step", "fast"], "'fast' is not a valid float"),
+    (["--stop", "1e9"], "do not fit into memory; must have a longer step"),
+    (["--case", "3"], "3 is not in the range 0<=x<=2"),
+    (["--scheme", "euler"], "'euler' is not one of 'sequential', 'jacobi'"),
+    (["missing.toml"], "missing.toml: no such system file"),
+    (["--fast"], "No such option"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "message"), WRONG)
+def test_wrong_input_is_one_line_and_exit_2(
+    command: Run, tmp_path: Path, arguments: list[str], message: str
+) -> None:
+    code, out, err = command("run", *arguments, "--out", "results", "--json")
+    assert (code, out) == (2, "")
+    assert len(err.splitlines()) == 1
+    assert err.startswith("grasp-cosim: ")
+    assert re.search(message, err), err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_debug_shows_the_traceback(command: Run) -> None:
+    code, _, err = command("--debug", "run", "--step", "0")
+    assert code == 2
+    assert "Traceback" in err
+
+
+def test_a_bug_is_one_line_and_exit_3(command: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cli, "simulate", lambda *_, **__: math.sqrt(-1.0))
+    code, out, err = command("run")
+    assert (code, out) == (3, "")
+    assert err.startswith("grasp-cosim: ValueError: ")
+    assert len(err.splitlines()) == 1
+
+
+def test_no_matplotlib_is_one_line(command: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    code, _, err = command("run", "--stop", "0.01", "--plot")
+    assert code == 2
+    assert "pip install 'grasp-cosim[plot]'" in err
+
+
+@pytest.mark.parametrize("name", ["build", "run", "evaluate"])
+def test_help_has_an_example(command: Run, name: str) -> None:
+    code, out, _ = command(name, "--help")
+    assert code == 0
+    assert f"Example: grasp-cosim {name}" in out
+
+
+def test_build_names_what_it_built(command: Run, tmp_path: Path) -> None:
+    code, out, _ = command("build", "--out", "here", "--json")
+    built = [Path(p) for p in json.loads(out)["fmus"]]
+    assert code == 0
+    assert [p.name for p in built] == [
+        "GraspController.fmu",
+        "GripperPlant.fmu",
+        "ProximitySensor.fmu",
+    ]
+    assert all((tmp_path / p).is_file() for p in built)
+
+
+def test_the_built_in_grasp_builds_its_fmus(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "grasp_cosim", "run", "--stop", "0.01", "--json"],
+        cwd=tmp_path, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert json.loads(done.stdout)["steps"] == 100
+    assert sorted(p.name for p in (tmp_path / "fmus/build").iterdir()) == [
+        "GraspController.fmu", "GripperPlant.fmu", "ProximitySensor.fmu",
+    ]  # fmt: skip

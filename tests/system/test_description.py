@@ -1,0 +1,122 @@
+"""The system description: a mistake is one line with the place and the valid choices."""
+
+import re
+from pathlib import Path
+
+import pytest
+from grasp_cosim import InputError, System
+from grasp_cosim.grasp import SYSTEM
+from grasp_cosim.system import Port
+
+TEXT = SYSTEM.read_text("utf-8")
+
+
+def load(text: str, fmus: Path, folder: Path) -> System:
+    path = folder / "system.toml"
+    path.write_text(text, encoding="utf-8")
+    return System.load(path, fmus)
+
+
+def test_the_built_in_grasp(grasp: System) -> None:
+    assert [c.name for c in grasp.components] == ["plant", "sensor_1", "sensor_2", "controller"]
+    assert len(grasp.wires) == 10
+    assert (grasp.step_ns, grasp.stop_ns, grasp.scheme) == (100_000, 3_000_000_000, "sequential")
+
+
+def test_every_input_is_wired(grasp: System) -> None:
+    inputs = {Port(c.name, v.name) for c in grasp.components for v in c.interface.of("input")}
+    assert {wire.target for wire in grasp.wires} == inputs
+
+
+WRONG = [
+    ("[experiment]", "[experment]", "unknown entry 'experment'; valid: components, experiment"),
+    ("step = 1e-4", "stepp = 1e-4", r"\[experiment\]: unknown entry 'stepp'; valid: scheme, step"),
+    ("step = 1e-4", "step = 0", r"experiment.step = 0 s: must be a number greater than 0"),
+    ("step = 1e-4", "step = nan", "must be a number greater than 0"),
+    ("step = 1e-4", "step = 'fast'", "experiment.step = 'fast' s: must be a number"),
+    ("step = 1e-4", "step = true", "experiment.step = True s: must be a number"),
+    ("step = 1e-4", "step = 1.5e-9", "must be a whole number of nanoseconds"),
+    ("step = 1e-4", "step = 7e-4", "step = 0.0007 s does not divide stop = 3 s; stop could be"),
+    ("stop = 3.0", "", "experiment.stop = None s: must be a number"),
+    ('"sequential"', '"parallel"', "'parallel': must be one of sequential, jacobi"),
+    ("plant.gap[1] ->", "plnt.gap[1] ->", "no component 'plnt'; valid: plant, sensor_1"),
+    ("plant.gap[1] ->", "plant.gap[3] ->", r"plant has no output 'gap\[3\]'; valid: position\[1\]"),
+    ("-> sensor_1.gap", "-> sensor_1.gain", "sensor_1 has no input 'gain'; valid: gap"),
+    ("-> sensor_1.gap", "-> sensor_2.gap", "sensor_2.gap has two sources, plant.gap"),
+    ("plant.gap[1] ->", "plant.contact[1] ->", "is Boolean and sensor_1.gap is Real; must be both"),
+    ('  "plant.gap[1] -> sensor_1.gap",\n', "", "input sensor_1.gap has no source; wire one of"),
+    (" -> sensor_1.gap", " sensor_1.gap", "must be 'component.output -> component.input'"),
+    ("GripperPlant.fmu", "Gripper.fmu", "Gripper.fmu: no such FMU file"),
+    ('fmu = "GripperPlant.fmu"', "fmu = 7", r"\[components.plant\]: fmu = 7: must be the path"),
+    ('fmu = "GripperPlant.fmu"', 'fnu = "x"', "unknown entry 'fnu'; valid: fmu, values"),
+    ("object_width = 0.07", "width = 0.07", "no input or parameter 'width'; valid: force"),
+    ("object_width = 0.07", "object_width = -1.0", "must be a finite number from 0 to 10 m"),
+    ("object_width = 0.07", "object_width = nan", "object_width = nan: must be a finite number"),
+    ("object_width = 0.07", "object_width = '7 cm'", "must be a finite number from 0 to 10 m"),
+    ("object_width = 0.07", "object_width = true", "must be a finite number from 0 to 10 m"),
+    ("object_width = 0.07", "object_width = [0.07]", "must be a number, boolean or string"),
+    ("[experiment]", "[experiment", "not readable as TOML"),
+]
+
+
+@pytest.mark.parametrize(("right", "wrong", "message"), WRONG)
+def test_a_mistake_is_one_line(
+    fmus: Path, tmp_path: Path, right: str, wrong: str, message: str
+) -> None:
+    assert right in TEXT
+    with pytest.raises(InputError, match=message) as caught:
+        load(TEXT.replace(right, wrong, 1), fmus, tmp_path)
+    assert "\n" not in str(caught.value)
+
+
+def test_an_unwired_input_may_have_a_value(fmus: Path, tmp_path: Path) -> None:
+    text = TEXT.replace('  "plant.gap[1] -> sensor_1.gap",\n', "")
+    text = text.replace("[components.sensor_2]", "values = { gap = 0.02 }\n\n[components.sensor_2]")
+    assert load(text, fmus, tmp_path).component("sensor_1", "test").values == {"gap": 0.02}
+
+
+def test_missing_system_file() -> None:
+    with pytest.raises(InputError, match=r"nowhere\.toml: no such system file"):
+        System.load("nowhere.toml")
+
+
+@pytest.mark.parametrize("content", [b"", b"not a zip archive"])
+def test_a_file_that_is_no_fmu(grasp: System, tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "broken.fmu"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=re.escape(f"{path}: not a readable FMU")) as caught:
+        grasp.swap("plant", path)
+    assert "\n" not in str(caught.value)
+
+
+def test_swap_wants_the_same_variables(grasp: System, fmus: Path) -> None:
+    with pytest.raises(
+        InputError, match=r"ProximitySensor.fmu has no .* 'object_width'; valid: gap"
+    ):
+        grasp.swap("plant", fmus / "ProximitySensor.fmu")
+    with pytest.raises(InputError, match=r"sensor_1 has no input 'gap'; valid: position\[1\]"):
+        grasp.swap("sensor_1", fmus / "GraspController.fmu")
+
+
+def test_values_by_name(grasp: System) -> None:
+    changed = grasp.with_values(
+        {"plant.finger_mass[1]": 0.7, "controller.impact_reduction.enabled": False}
+    )
+    assert changed.component("plant", "test").values["finger_mass[1]"] == 0.7
+    assert changed.component("controller", "test").values["impact_reduction.enabled"] is False
+    assert "finger_mass[1]" not in grasp.component("plant", "test").values
+    assert changed.start("plant.finger_mass[1]") == 0.7
+    assert changed.start("plant.finger_mass[2]") == 0.5
+
+
+def test_text_is_converted_to_the_declared_type(grasp: System) -> None:
+    changed = grasp.with_values(
+        {"controller.impact_reduction.enabled": "false", "sensor_1.reflectance": "0.86"}
+    )
+    assert changed.component("controller", "test").values == {"impact_reduction.enabled": False}
+    assert changed.component("sensor_1", "test").values == {"reflectance": 0.86}
+
+
+def test_an_output_cannot_be_set(grasp: System) -> None:
+    with pytest.raises(InputError, match=r"no input or parameter 'gap\[1\]'"):
+        grasp.with_values({"plant.gap[1]": 0.1})

@@ -1,0 +1,173 @@
+"""Runs of the built-in grasp through FMUs."""
+
+import math
+import os
+import pty
+import re
+import select
+import signal
+import subprocess
+import sys
+import termios
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+from grasp_cosim import InputError, SimulationError, System, simulate
+from grasp_cosim.grasp import CASES, SYSTEM
+from grasp_fmus import build as builder
+
+SHORT = 0.05
+
+
+def test_every_output_is_recorded_with_its_unit(grasp: System) -> None:
+    result = simulate(grasp, stop=SHORT)
+    outputs = {
+        f"{c.name}.{v.name}": v.unit for c in grasp.components for v in c.interface.of("output")
+    }
+    assert dict(result.units) == outputs
+    assert set(result) == set(outputs)
+    assert all(len(result[name]) == len(result.time) == 501 for name in outputs)
+    assert result["plant.contact[1]"].dtype == bool
+
+
+def test_time_is_k_times_the_step(grasp: System) -> None:
+    result = simulate(grasp, stop=SHORT)
+    assert result.time.tolist() == [k * 100_000 / 1e9 for k in range(501)]
+
+
+def test_outputs_at_t_0_are_consistent(grasp: System) -> None:
+    result = simulate(grasp, stop=1e-4)
+    for j, gap in ((1, 0.045), (2, 0.105)):
+        assert result[f"plant.gap[{j}]"][0] == pytest.approx(gap, rel=1e-14)
+        intensity = 0.0024 / (gap + 0.005) ** 1.1506
+        assert result[f"sensor_{j}.intensity"][0] == pytest.approx(intensity, rel=1e-13)
+        assert result[f"controller.force[{j}]"][0] == 0.0
+    xi_1, xi_2 = (result[f"sensor_{j}.intensity"][0] for j in (1, 2))
+    f_s = 3.0 * math.tanh((xi_1 - xi_2) / (xi_1 + xi_2))
+    assert result["controller.simultaneous_contact_force"][0] == pytest.approx(f_s, rel=1e-13)
+
+
+def test_nothing_jumps_at_the_start(grasp: System) -> None:
+    """The virtual objects start where the fingers are measured, wherever the FMUs' inputs start."""
+    moved = grasp.with_values(
+        {"plant.initial_position[1]": 0.15, "plant.initial_position[2]": -0.1}
+    )
+    result = simulate(moved, stop=SHORT)
+    assert result["controller.virtual_position[1]"][0] == 0.15
+    assert result["controller.virtual_position[2]"][0] == -0.1
+    assert result["controller.target_position"][0] == pytest.approx(0.025, abs=1e-15)
+    for j in (1, 2):
+        assert np.abs(np.diff(result[f"controller.force[{j}]"])).max() < 0.02
+
+
+def test_start_values_are_honoured(grasp: System) -> None:
+    values = {"plant.initial_object_position": 0.01, "sensor_2.reflectance": 0.5}
+    result = simulate(grasp.with_values(values), stop=1e-3)
+    assert (result["plant.object_position"] == 0.01).all()
+    expected = 0.5 * 0.0024 / (0.085 + 0.005) ** 1.1506
+    assert result["sensor_2.intensity"][0] == pytest.approx(expected, rel=1e-13)
+
+
+def test_repeated_runs_give_the_same_bits(grasp: System) -> None:
+    one, two = simulate(grasp, stop=SHORT), simulate(grasp, stop=SHORT)
+    assert all((one[name] == two[name]).all() for name in one)
+
+
+def test_a_swapped_fmu_is_the_one_that_runs(grasp: System, fmus: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other.fmu"
+    other.write_bytes((fmus / "GripperPlant.fmu").read_bytes())
+    swapped = grasp.swap("plant", other)
+    assert swapped.component("plant", "test").fmu == other
+    one, two = simulate(grasp, stop=SHORT), simulate(swapped, stop=SHORT)
+    assert all((one[name] == two[name]).all() for name in one)
+
+
+def test_a_refused_parameter_is_one_line_with_the_reason(grasp: System) -> None:
+    wide = grasp.with_values({"plant.object_width": 0.5})
+    with pytest.raises(
+        InputError, match=r"^plant: GripperPlant.fmu refused .*object_width = 0.5 m"
+    ):
+        simulate(wide, stop=SHORT)
+
+
+def test_an_fmu_that_fails_on_the_way_leaves_what_was_recorded(
+    grasp: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    original = builder._sources
+
+    def failing(script: Path) -> dict[str, bytes]:
+        sources = original(script)
+        optics = sources["proximity_sensor/optics.py"]
+        trap = b"if u.gap < 0.044:\n        raise RuntimeError('the lamp is broken')\n    l = "
+        return {**sources, "proximity_sensor/optics.py": optics.replace(b"l = ", trap, 1)}
+
+    monkeypatch.setattr(builder, "_sources", failing)
+    fmu = builder.build_fmu(builder.SCRIPTS / "ProximitySensor.py", tmp_path)
+    with pytest.raises(
+        SimulationError, match=r"^sensor_1: .*fatal at t = .*lamp is broken"
+    ) as caught:
+        simulate(grasp.swap("sensor_1", fmu))
+    result = caught.value.result
+    assert result is not None
+    assert not result.complete
+    assert len(result.time) > 100
+    assert result["plant.gap[1]"][-1] == pytest.approx(0.044, abs=1e-5)
+    assert "\n" not in str(caught.value)
+    assert simulate(grasp, stop=1e-3).complete  # the process is well
+
+
+def test_runs_in_another_thread(grasp: System) -> None:
+    results: list[bool] = []
+    thread = threading.Thread(target=lambda: results.append(simulate(grasp, stop=SHORT).complete))
+    thread.start()
+    thread.join()
+    assert results == [True]
+
+
+def test_ctrl_c_keeps_what_was_recorded(fmus: Path, tmp_path: Path) -> None:
+    """On a terminal there is a progress bar; Ctrl-C is sent once it has begun to move."""
+    terminal, side = pty.openpty()
+    termios.tcsetwinsize(side, (24, 100))
+    system = str(system_file(fmus, tmp_path))
+    options = ["--stop", "1000", "--out", str(tmp_path / "out"), "--json"]
+    with subprocess.Popen(
+        [sys.executable, "-m", "grasp_cosim", "run", system, *options],
+        stdout=subprocess.PIPE,
+        stderr=side,
+        text=True,
+    ) as process:
+        os.close(side)
+        seen = b""
+        while not re.search(rb"0\.[1-9]\d/1000\.00 s", seen):
+            assert select.select([terminal], [], [], 30.0)[0], "no progress for 30 s"
+            seen += os.read(terminal, 4096)
+        process.send_signal(signal.SIGINT)
+        out, _ = process.communicate(timeout=60)
+    os.close(terminal)
+    assert process.returncode == 130
+    assert '"complete": false' in out
+    lines = (tmp_path / "out" / "signals.csv").read_text().splitlines()
+    assert len(lines) > 1000
+    assert len(lines[-1].split(",")) == len(lines[0].split(","))
+
+
+def system_file(fmus: Path, folder: Path) -> Path:
+    """The built-in system as a user's own file beside its FMUs."""
+    path = folder / "mine.toml"
+    text = SYSTEM.read_text("utf-8")
+    for name in ("GripperPlant", "ProximitySensor", "GraspController"):
+        text = text.replace(f'"{name}.fmu"', f'"{fmus / name}.fmu"')
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_schemes_agree_but_for_the_delay(grasp: System, case: int) -> None:
+    """Jacobi adds a delay of a few steps: the same motion within first order in the step."""
+    system = grasp.with_values(CASES[case])
+    one = simulate(system, step=1e-3, stop=1.0)
+    two = simulate(system, step=1e-3, stop=1.0, scheme="jacobi")
+    difference = np.abs(one["plant.position[1]"] - two["plant.position[1]"]).max()
+    assert 0.0 < difference < 5e-3

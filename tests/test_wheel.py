@@ -1,0 +1,37 @@
+"""The wheel works by itself, outside the repository, in an empty folder."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+
+pytestmark = pytest.mark.slow
+
+
+def python(*arguments: str, cwd: Path, path: Path | None = None) -> str:
+    environment = {**os.environ, "PYTHONPATH": str(path)} if path else dict(os.environ)
+    done = subprocess.run(
+        [sys.executable, *arguments], cwd=cwd, env=environment, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_wheel_runs_in_an_empty_folder(tmp_path: Path) -> None:
+    dist, site, empty = tmp_path / "dist", tmp_path / "site", tmp_path / "empty"
+    empty.mkdir()
+    python("-m", "build", "--wheel", "--no-isolation", "--outdir", str(dist), str(ROOT), cwd=ROOT)
+    (wheel,) = dist.glob("*.whl")
+    python("-m", "pip", "install", "-q", "--no-deps", "--target", str(site), str(wheel), cwd=empty)
+    where = python("-c", "import grasp_cosim; print(grasp_cosim.__file__)", cwd=empty, path=site)
+    assert Path(where.strip()).is_relative_to(site)
+    out = python("-m", "grasp_cosim", "run", "--stop", "0.2", "--json", cwd=empty, path=site)
+    assert json.loads(out)["steps"] == 2000
+    assert {p.name for p in site.iterdir() if p.is_dir() and "-" not in p.name} == {
+        "bin", "grasp_cosim", "grasp_controller", "grasp_fmus", "gripper_plant", "proximity_sensor",
+    }  # fmt: skip
