@@ -20,7 +20,7 @@ COLOR = {1: BLUE, 2: RED}
 """Finger 1, the right one, is blue and finger 2 red, as in the paper's figures."""
 
 FORCE_LIMIT = 12.0
-"""Top of the force axes in N; an impact that rises above it is marked with its peak."""
+"""Top of the force axes in N; the legend gives the peak of an impact above it."""
 
 
 def plot_run(result: Result, path: Path) -> None:
@@ -46,19 +46,12 @@ def draw_contact_forces(axes: Axes, runs: Sequence[tuple[Result, str, str]]) -> 
     for result, style, label in runs:
         for j in FINGERS:
             force = abs(result[f"{PLANT}.contact_force[{j}]"])
+            peak = float(force.max())
             name = f"{label}, finger {j}" if label else f"finger {j}"
+            if peak > FORCE_LIMIT:
+                name += f", peak {peak:.0f} N"
             axes.plot(result.time, force, style, color=COLOR[j], label=name)
-            highest = max(highest, float(force.max()))
-            if force.max() > FORCE_LIMIT:
-                at = result.time[int(force.argmax())]
-                axes.annotate(
-                    f"{force.max():.0f} N",
-                    (at, FORCE_LIMIT),
-                    (5, -14 * j),
-                    textcoords="offset points",
-                    color=COLOR[j],
-                    fontsize=8,
-                )
+            highest = max(highest, peak)
     axes.set_ylim(-0.03 * min(highest, FORCE_LIMIT), 1.1 * min(max(highest, 1e-3), FORCE_LIMIT))
     _finish(axes, "contact force in N")
 
