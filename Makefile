@@ -33,11 +33,11 @@ cards: .venv/run
 	$(if $(PYTHON),,$(error grasp-cosim needs Python 3.11 or newer; name one with PYTHON=...))
 	$(PYTHON) -m venv .venv
 	$(PIP) --editable '.[plot]'
-	touch $@
+	@touch $@
 
 .venv/dev: .venv/run
 	$(PIP) --editable '.[plot,dev]'
-	touch $@
+	@touch $@
 
 clean:
 	rm -rf .venv fmus/build results dist .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -28,14 +28,18 @@ def substeps(alpha: float, beta: float, h: float) -> int:
 
 
 def time_to_contact(gap: float, rate: float, acceleration: float) -> float:
-    """Seconds until g + g'·t + g''·t^2/2 first reaches zero: 0 if g <= 0, inf if it never does."""
-    if gap <= 0.0:
+    """Seconds until g + g'·t + g''·t^2/2 next reaches zero from above; inf if it never does.
+
+    Zero for a finger that touches: below the surface, or on it and not about to leave.
+    """
+    if gap < 0.0 or (gap == 0.0 and (rate < 0.0 or (rate == 0.0 and acceleration <= 0.0))):
         return 0.0
     discriminant = rate * rate - 2.0 * acceleration * gap
     if discriminant < 0.0:
         return inf
-    approach = sqrt(discriminant) - rate
-    return 2.0 * gap / approach if approach > 0.0 else inf
+    if rate < 0.0:
+        return 2.0 * gap / (sqrt(discriminant) - rate)
+    return (sqrt(discriminant) + rate) / -acceleration if acceleration < 0.0 else inf
 
 
 def advance(
@@ -79,5 +83,23 @@ def _touch(
         1.0 + alpha * d + 0.25 * beta * beta * d * d
     )
     contact_force = max(0.0, m * constrained - f)
-    s, v, _ = _fly(s, v, (f + contact_force) / m, d)
-    return s, v, contact_force
+    acceleration = (f + contact_force) / m
+    after, v_after, _ = _fly(s, v, acceleration, d)
+    if after > surface:
+        return _leave(surface - s, v, acceleration, surface, m, f, d)
+    return after, v_after, contact_force
+
+
+def _leave(
+    depth: float, v: float, acceleration: float, surface: float, m: float, f: float, d: float
+) -> Finger:
+    """The contact lets go where the finger passes the surface, depth m further out.
+
+    A finger that would be back before the end of the sub-step stays: so short a bounce is not
+    resolved, and taking its energy lets a pressed finger come to rest.
+    """
+    leaving = sqrt(max(0.0, v * v + 2.0 * acceleration * depth))
+    rest = d - (2.0 * depth / (v + leaving) if depth > 0.0 else 0.0)
+    if time_to_contact(0.0, leaving, f / m) < rest:
+        return surface, 0.0, max(0.0, -f)
+    return _fly(surface, leaving, f / m, rest)

@@ -1,0 +1,39 @@
+"""What the parameters of a block declare about themselves: names, units and valid ranges."""
+
+from dataclasses import dataclass
+from math import inf, nan, nextafter
+from typing import Any, get_type_hints
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter with a range; default is a number, or a pair with a number per finger."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    default: Any
+
+    def variants(self, value: float) -> list[Any]:
+        """The default with value in place of the number, or of either number of the pair."""
+        if isinstance(self.default, tuple):
+            first, second = self.default
+            return [(value, second), (first, value)]
+        return [value]
+
+    def invalid(self) -> list[tuple[float, Any]]:
+        """Numbers that are not in the range, each with the parameter values that contain it."""
+        outside = (nextafter(self.low, -inf), nextafter(self.high, inf), nan, inf, -inf)
+        return [(number, value) for number in outside for value in self.variants(number)]
+
+
+def parameters(block: type[Any]) -> list[Parameter]:
+    """The parameters of a block that are numbers."""
+    default = block()
+    found = []
+    for name, hint in get_type_hints(block, include_extras=True).items():
+        if hint.__origin__ is not bool:
+            unit, _, (low, high), *_ = hint.__metadata__
+            found.append(Parameter(name, unit, low, high, getattr(default, name)))
+    return found
