@@ -3,7 +3,6 @@
 import re
 import shlex
 import shutil
-import sys
 from pathlib import Path
 
 import pytest
@@ -35,14 +34,11 @@ def test_there_is_something_to_try() -> None:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_command(checkout: Path, monkeypatch: pytest.MonkeyPatch, command: str) -> None:
+def test_command(checkout: Path, command: str) -> None:
     arguments = shlex.split(command)
     if arguments[1] == "run":
         arguments += ["--stop", "0.01"]
-    monkeypatch.setattr(sys, "argv", arguments)
-    with pytest.raises(SystemExit) as exit_:
-        cli.main()
-    assert exit_.value.code == 0
+    assert cli.main(arguments[1:]) == 0
 
 
 @pytest.mark.parametrize("example", EXAMPLES)

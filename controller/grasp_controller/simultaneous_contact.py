@@ -31,10 +31,10 @@ class Params:
 def virtual_force(p: Params, xi: tuple[float, float]) -> float:
     """f_s in N, Eq. (2), from the intensities in V; zero where neither sensor sees anything."""
     xi_1, xi_2 = xi
-    xi_1 = xi_1 if xi_1 > 0.0 else 0.0
-    xi_2 = xi_2 if xi_2 > 0.0 else 0.0
+    xi_1 = 0.0 if xi_1 < 0.0 else xi_1
+    xi_2 = 0.0 if xi_2 < 0.0 else xi_2
     total = xi_1 + xi_2
-    return p.gain * tanh((xi_1 - xi_2) / total) if total > 0.0 else 0.0
+    return 0.0 if total == 0.0 else p.gain * tanh((xi_1 - xi_2) / total)
 
 
 def desired_position(x: tuple[float, float]) -> float:

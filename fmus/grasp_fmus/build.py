@@ -3,6 +3,7 @@ pythonfmu, and rewrites the archive so that the same content gives the same byte
 """
 
 import hashlib
+import os
 import re
 import sys
 import tempfile
@@ -106,7 +107,7 @@ def _restored_imports() -> Iterator[None]:
 
 def _repack(fmu: Path, target: Path) -> None:
     """Write the archive again with sorted entries and one date, then move it into place."""
-    part = target.with_suffix(".fmu.part")
+    part = target.with_name(f"{target.name}.{os.getpid()}.part")
     with zipfile.ZipFile(fmu) as source, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as copy:
         for name in sorted(source.namelist()):
             if name.startswith("resources/pythonfmu/tests"):
@@ -123,5 +124,5 @@ def _built_from(fmu: Path) -> str | None:
     try:
         with zipfile.ZipFile(fmu) as archive:
             return archive.read("resources/slavemodule.txt").decode().rpartition("_")[2]
-    except (FileNotFoundError, KeyError, zipfile.BadZipFile):
+    except (OSError, KeyError, zipfile.BadZipFile):
         return None

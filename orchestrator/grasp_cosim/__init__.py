@@ -1,8 +1,9 @@
 """Fixed-step co-simulation of FMUs, and the grasp of the paper. Card: orchestrator/README.md."""
 
 from .errors import InputError, SimulationError
+from .grasp import grasp_system
 from .recording import Result
 from .simulation import simulate
 from .system import System
 
-__all__ = ["InputError", "Result", "SimulationError", "System", "simulate"]
+__all__ = ["InputError", "Result", "SimulationError", "System", "grasp_system", "simulate"]

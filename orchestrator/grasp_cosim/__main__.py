@@ -1,5 +1,6 @@
 """`python -m grasp_cosim` is `grasp-cosim`."""
 
-from .cli import main
+from .cli import entry
 
-main()
+if __name__ == "__main__":
+    entry()

@@ -3,10 +3,11 @@
 import json
 import os
 import sys
+import tempfile
 import traceback
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import click
 
@@ -14,6 +15,7 @@ from .errors import InputError, SimulationError
 from .evaluate import evaluate as run_evaluation
 from .grasp import CASES, FMU_FOLDER, grasp_system
 from .interface import Value
+from .plot import check_plot
 from .recording import Result
 from .simulation import simulate
 from .system import SCHEMES, System
@@ -24,22 +26,40 @@ NEGATIVE, WRONG, FAILED, INTERRUPTED = 1, 2, 3, 130
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 
 
-def main() -> None:
-    """Run the command line; errors are one line, without a traceback unless --debug is given."""
-    debug = "--debug" in sys.argv
+def entry() -> NoReturn:
+    """The command grasp-cosim.
+
+    It ends the process without its C exit handlers: pythonfmu 0.7.0's uses memory it has freed.
+    """
+    code = main(sys.argv[1:])
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
+
+
+def main(arguments: list[str]) -> int:
+    """Run a command line and return its exit code.
+
+    An error is one line on standard error, without a traceback unless --debug is given.
+    """
+    debug = "--debug" in arguments
     try:
-        code = cli.main(standalone_mode=False)
-    except (InputError, click.ClickException, SimulationError) as error:
-        message = error.format_message() if isinstance(error, click.ClickException) else str(error)
-        code = FAILED if isinstance(error, SimulationError) else WRONG
-        _fail(message, debug)
+        return int(cli.main(arguments, "grasp-cosim", standalone_mode=False) or 0)
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.ctx.get_help(), err=True)
+        return WRONG
+    except click.ClickException as error:
+        return _fail(error.format_message(), WRONG)
+    except InputError as error:
+        return _fail(str(error), WRONG, debug)
+    except OSError as error:
+        return _fail(f"{error.filename}: {error.strerror}", WRONG, debug)
+    except SimulationError as error:
+        return _fail(str(error), FAILED, debug)
     except (KeyboardInterrupt, click.Abort):
-        code = INTERRUPTED
-        _fail("interrupted", False)
+        return _fail("interrupted", INTERRUPTED)
     except Exception as error:
-        code = FAILED
-        _fail(f"{type(error).__name__}: {error} (--debug shows where)", debug)
-    sys.exit(code)
+        return _fail(f"{type(error).__name__}: {error} (--debug shows where)", FAILED, debug)
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -66,6 +86,7 @@ def build(out: Path, as_json: bool) -> int:
     """
     from grasp_fmus.build import build as build_fmus
 
+    check_folder(out)
     paths = [str(path) for path in build_fmus(out)]
     click.echo(json.dumps({"fmus": paths}) if as_json else "\n".join(paths))
     return 0
@@ -100,15 +121,15 @@ def run(
     Example: grasp-cosim run --case 1 --set plant.initial_object_position=0.02 --out results --plot
     """
     chosen = System.load(system) if system else grasp_system()
-    for text in swaps:
-        component, fmu = _pair("--swap", text, "COMPONENT=FMU")
-        chosen = chosen.swap(component, fmu, f"--swap {text}")
-    if case is not None:
-        chosen = chosen.with_values(CASES[case], f"--case {case}:")
-    values: dict[str, Value] = dict(
-        _pair("--set", text, "COMPONENT.VARIABLE=VALUE") for text in settings
-    )
-    chosen = chosen.with_values(values, "--set").with_experiment(step, stop, scheme)
+    fmus = dict(_pair("--swap", text, "COMPONENT=FMU") for text in swaps)
+    values: dict[str, Value] = {} if case is None else dict(CASES[case])
+    values.update(_pair("--set", text, "COMPONENT.VARIABLE=VALUE") for text in settings)
+    chosen = chosen.revised(fmus, values, "--swap or --set").with_experiment(step, stop, scheme)
+    if plot:
+        check_plot(
+            f"{c.name}.{v.name}" for c in chosen.components for v in c.interface.of("output")
+        )
+    check_folder(out or Path())
     try:
         result = simulate(chosen, progress=True)
     except SimulationError as error:
@@ -118,8 +139,9 @@ def run(
     _write(result, out, plot)
     click.echo(json.dumps(dict(result.metrics)) if as_json else _summary(result))
     if not result.complete:
-        _fail(f"interrupted at t = {result.time[-1]:.6g} s; kept what was recorded", False)
-    return 0 if result.complete else INTERRUPTED
+        message = f"interrupted at t = {result.time[-1]:.6g} s; kept what was recorded"
+        return _fail(message, INTERRUPTED)
+    return 0
 
 
 @cli.command()
@@ -132,10 +154,23 @@ def evaluate(out: Path, workers: int, as_json: bool) -> int:
     \b
     Example: grasp-cosim evaluate --out results
     """
+    check_folder(out)
     report = run_evaluation(grasp_system(), out, workers, progress=True)
     holds = all(claim["holds"] for claim in report["claims"])
     click.echo(json.dumps(report) if as_json else _verdict(report, out))
     return 0 if holds else NEGATIVE
+
+
+def check_folder(folder: Path) -> None:
+    """InputError where files could not be written to the folder, which need not exist."""
+    nearest = folder.absolute()
+    while not nearest.exists():
+        nearest = nearest.parent
+    try:
+        with tempfile.TemporaryFile(dir=nearest):
+            pass
+    except OSError as error:
+        raise InputError(f"--out {folder}: cannot write to {nearest}: {error.strerror}") from error
 
 
 def _pair(option: str, text: str, form: str) -> tuple[str, str]:
@@ -195,7 +230,8 @@ def _verdict(report: Mapping[str, Any], out: Path) -> str:
     )
 
 
-def _fail(message: str, debug: bool) -> None:
+def _fail(message: str, code: int, debug: bool = False) -> int:
     if debug:
         traceback.print_exc()
     click.echo(f"grasp-cosim: {message}", err=True)
+    return code

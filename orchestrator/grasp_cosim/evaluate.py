@@ -81,15 +81,21 @@ def _run_all(
 ) -> Iterator[Run]:
     bar = tqdm(total=len(jobs), desc="grasps", unit="run", disable=None if progress else True)
     with bar, ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        for run in pool.map(_run, jobs):
-            bar.update()
-            yield run
+        try:
+            for run in pool.map(_run, jobs):
+                bar.update()
+                yield run
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
 
 
 def _run(job: tuple[System, float, int]) -> Run:
     system, x_m, case = job
     values = {**CASES[case], "plant.initial_object_position": x_m}
     result = simulate(system.with_values(values), stop=STOP)
+    if not result.complete:
+        raise KeyboardInterrupt
     moments = [time_at_gap(result.time, result.signals, j, SENSOR_CONTACT) for j in FINGERS]
     first, second = moments
     if first is None or second is None or None in result.metrics["time_to_contact"]:

@@ -6,9 +6,11 @@ that are parts of the master's vectors.
 """
 
 import ctypes
+import os
 import re
 import sys
 import tempfile
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -37,8 +39,9 @@ STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
 WARNING, ERROR, FATAL = 1, 3, 4
 """FMI statuses. Up to WARNING a simulation goes on; after FATAL no call is allowed."""
 
-_FUNCTION = ctypes.PYFUNCTYPE(ctypes.c_int)
-"""Calls that keep the GIL: a Python FMU would have to take it back at once."""
+_PYTHON_FUNCTION = ctypes.PYFUNCTYPE(ctypes.c_int)
+_NATIVE_FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int)
+"""Calls of a Python FMU keep the GIL, which it would have to take back at once."""
 
 _SETTERS = {"Real": "setReal", "Integer": "setInteger", "Boolean": "setBoolean"}
 
@@ -68,25 +71,30 @@ class FmuInstance:
         """Extract and instantiate; InputError where the FMU does not load."""
         self.name = name
         self.interface = interface
-        self._worst = FATAL
+        self._worst = FATAL  # until it is instantiated
         self._keep: list[Any] = []
+        self._running = False
+        self._logged()  # forgets what an earlier instance of this name said
         self._folder = tempfile.TemporaryDirectory(prefix="grasp_fmu_")
+        self._resources = Path(self._folder.name, "resources")
         try:
             self._slave = self._instantiate(Path(self._folder.name))
         except BaseException:
-            self._folder.cleanup()
+            self.close()
             raise
 
     def _instantiate(self, folder: Path) -> FMU2Slave:
-        fmpy.extract(self.interface.path, folder)
-        self._resources = str(folder / "resources")
-        python_fmu = (folder / "resources" / "slavemodule.txt").exists()
-        plain = self._resources.replace(" ", "")
-        if python_fmu and quote(plain) != plain:
+        try:
+            fmpy.extract(self.interface.path, folder)
+        except Exception as error:  # FMPy and zipfile raise whatever they like
+            raise InputError(f"{self.name}: {self.interface.path} is damaged: {error}") from error
+        plain = str(folder).replace(" ", "")
+        if self._is_python() and quote(plain) != plain:
             raise InputError(
                 f"{self.name}: temporary folder {folder}: a Python FMU crashes on its characters; "
                 "set TMPDIR to a folder of plain ASCII letters"
             )
+        here = Path.cwd()
         try:
             slave = FMU2Slave(
                 guid=self.interface.guid,
@@ -99,20 +107,33 @@ class FmuInstance:
             raise InputError(
                 f"{self.name}: {self.interface.path} does not load: {self._reason(error)}"
             ) from error
+        finally:
+            os.chdir(here)  # where loading fails, FMPy stays in the library's folder
         self._worst = 0
         return slave
+
+    def _is_python(self) -> bool:
+        return (self._resources / "slavemodule.txt").exists()
 
     def __enter__(self) -> "FmuInstance":
         return self
 
     def __exit__(self, *_: object) -> None:
+        """Close the instance."""
+        self.close()
+
+    def close(self) -> None:
         """Terminate and free the FMU as far as it permits; remove what was extracted."""
-        if self._worst < ERROR:
-            self._slave.terminate()
+        if self._running and self._worst < ERROR:
+            try:
+                self._slave.terminate()
+            except FMICallException as error:
+                self._worst = error.status
+                warnings.warn(f"{self.name}: {error}{self._logged()}", stacklevel=2)
         if self._worst < FATAL:
             self._slave.freeInstance()
-        if self._resources in sys.path:  # pythonfmu puts it there and leaves it
-            sys.path.remove(self._resources)
+        if str(self._resources) in sys.path:  # pythonfmu puts it there and leaves it
+            sys.path.remove(str(self._resources))
         self._folder.cleanup()
 
     def enter_initialization(self, values: Mapping[str, Value], stop: float) -> None:
@@ -132,6 +153,7 @@ class FmuInstance:
         """Leave initialisation mode."""
         with self._refusals():
             self._slave.exitInitializationMode()
+        self._running = True
 
     def setters(self, variables: Sequence[Variable], reals: Any, integers: Any) -> list[Call]:
         """Calls that pass reals (float64) and integers (int32) to the given inputs, in order."""
@@ -175,7 +197,8 @@ class FmuInstance:
 
     def _function(self, name: str, *arguments: Any) -> Call:
         component = ctypes.c_void_p(self._slave.component)
-        return partial(_FUNCTION((name, self._slave.dll)), component, *arguments)
+        prototype = _PYTHON_FUNCTION if self._is_python() else _NATIVE_FUNCTION
+        return partial(prototype((name, self._slave.dll)), component, *arguments)
 
     @contextmanager
     def _refusals(self) -> Iterator[None]:

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 
+from .errors import InputError
 from .interface import Value
 from .system import System
 
@@ -35,5 +36,11 @@ def grasp_system() -> System:
     """The built-in grasp; its FMUs are built first where they are missing or out of date."""
     from grasp_fmus.build import build
 
-    build(FMU_FOLDER)
+    try:
+        build(FMU_FOLDER)
+    except OSError as error:
+        raise InputError(
+            f"{error.filename}: {error.strerror}; the FMUs are built into {FMU_FOLDER} below the "
+            "current folder, which must be one that can be written to"
+        ) from error
     return System.load(SYSTEM, FMU_FOLDER)

@@ -46,10 +46,11 @@ class Interface:
         """The variables of the given causalities, in the order of declaration."""
         return [v for v in self.variables if v.causality in causalities]
 
-    def parse(self, place: str, name: str, value: Value) -> Value:
+    def parse(self, place: str, name: str, value: Value, text: bool = False) -> Value:
         """The value for input or parameter name, checked against type, range and finiteness.
 
-        place names where the value comes from. Text is converted to the declared type.
+        place names where the value comes from. With text, a string may stand for a number or a
+        boolean, as on a command line.
         """
         settable = [v.name for v in self.of("input", "parameter")]
         if name not in settable:
@@ -58,7 +59,9 @@ class Interface:
                 f"valid: {choices(settable)}"
             )
         variable = self.by_name[name]
-        converted = _convert(variable, value)
+        converted = None
+        if text or variable.kind == "String" or not isinstance(value, str):
+            converted = _convert(variable, value)
         if converted is None:
             raise InputError(f"{place}: {name} = {value!r}: must be {_expected(variable)}")
         return converted
@@ -67,16 +70,17 @@ class Interface:
 @lru_cache(maxsize=64)
 def _read(path: Path, modified: int) -> Interface:
     try:
+        version = fmpy.read_model_description(path, validate=False).fmiVersion
+        if version != "2.0":
+            raise InputError(f"{path}: FMI {version}; must be an FMI 2.0 co-simulation FMU")
         description = fmpy.read_model_description(path)
+    except InputError:
+        raise
     except Exception as error:  # FMPy raises whatever its XML and ZIP libraries do
         reason = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"{path}: not a readable FMU: {reason}") from error
-    if description.fmiVersion != "2.0" or description.coSimulation is None:
-        raise InputError(
-            f"{path}: FMI {description.fmiVersion}"
-            f"{'' if description.coSimulation else ' without co-simulation'}; "
-            "must be an FMI 2.0 co-simulation FMU"
-        )
+    if description.coSimulation is None:
+        raise InputError(f"{path}: for model exchange only; must be a co-simulation FMU")
     return Interface(
         path,
         description.guid,
@@ -123,7 +127,7 @@ def _convert(variable: Variable, value: Value) -> Value | None:
         return None
     try:
         number = float(value)
-    except ValueError:
+    except (ValueError, OverflowError):
         return None
     if not math.isfinite(number) or not variable.low <= number <= variable.high:
         return None

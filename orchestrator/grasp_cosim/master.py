@@ -73,9 +73,11 @@ class Master:
             listener(self.steps_done)
 
     def _propagate(self) -> None:
-        """Pass values along the wires until they stand still, which takes a pass per component."""
+        """Pass values along the wires until they stand still, a bounded number of times."""
         moved: list[str] = []
-        for _ in range(len(self.plan.links) + 1):
+        for link in self.plan.links:
+            self._run(link, link.receive)
+        for _ in range(len(self.plan.signals) + 2):
             before = self._outputs()
             for link in self.plan.links:
                 for vector, target, source in link.moves:

@@ -1,6 +1,6 @@
 """Figures of merit of a grasp, from the recorded signals of a gripper plant and its controller."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -19,12 +19,11 @@ STEADY_WINDOW = 0.1
 """The steady contact force is the mean over the last so many seconds."""
 
 
-def is_grasp(signals: Signals) -> bool:
-    """Whether the signals are those of a gripper plant and its controller."""
+def is_grasp(signals: Iterable[str]) -> bool:
+    """Whether signals of these names are those of a gripper plant and its controller."""
+    names = set(signals)
     wanted = ["object_position", *(f"{v}[{j}]" for v in _PER_FINGER for j in FINGERS)]
-    return all(f"{PLANT}.{name}" in signals for name in wanted) and (
-        f"{CONTROLLER}.target_position" in signals
-    )
+    return names >= {f"{CONTROLLER}.target_position", *(f"{PLANT}.{name}" for name in wanted)}
 
 
 _PER_FINGER = ("position", "velocity", "gap", "contact_force", "contact")
@@ -42,7 +41,7 @@ def grasp_metrics(time: Times, signals: Signals) -> dict[str, Any]:
     return {
         "time_to_contact": times,
         "time_difference": None if None in times else abs(times[1] - times[0]),  # type: ignore[operator]
-        "impact_velocity": [None if c is None else c[1] for c in contacts],
+        "impact_velocity": [None if c is None or c[1] <= 0.0 else c[1] for c in contacts],
         "peak_contact_force": [float(f.max()) for f in forces],
         "steady_contact_force": [float(f[steady].mean()) for f in forces],
         "object_shift": float(np.abs(shift).max()),

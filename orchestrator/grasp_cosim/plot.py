@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .errors import InputError
 from .metrics import CONTROLLER, FINGERS, PLANT, is_grasp
+from .recording import in_one_piece
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,9 +25,8 @@ FORCE_LIMIT = 12.0
 
 
 def plot_run(result: Result, path: Path) -> None:
-    """Gaps, contact forces, actuator forces and target over time, as a PNG."""
-    if not is_grasp(result.signals):
-        raise InputError(f"{path}: nothing to draw; must be a system with a gripper plant")
+    """Gaps, contact forces and target over time, as a PNG."""
+    check_plot(result.signals)
     figure = new_figure(7.2, 8.0)
     gaps, contact, target = figure.subplots(3, 1, sharex=True)
     for j in FINGERS:
@@ -38,6 +38,13 @@ def plot_run(result: Result, path: Path) -> None:
     draw_targets(target, [(result, "-", "")])
     target.set_xlabel("time in s")
     save(figure, path)
+
+
+def check_plot(signals: Iterable[str]) -> None:
+    """InputError where plot_run() could not draw signals of these names."""
+    new_figure(1.0, 1.0)
+    if not is_grasp(signals):
+        raise InputError("nothing to draw; must be a system with a gripper plant and a controller")
 
 
 def draw_contact_forces(axes: Axes, runs: Sequence[tuple[Result, str, str]]) -> None:
@@ -102,10 +109,8 @@ def new_figure(width: float, height: float) -> Figure:
 
 def save(figure: Figure, path: Path) -> None:
     """Write the figure as a PNG under a temporary name, then rename it."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f"{path.name}.part")
-    figure.savefig(part, format="png", dpi=130, metadata={"Software": None})
-    part.replace(path)
+    with in_one_piece(path) as part:
+        figure.savefig(part, format="png", dpi=130, metadata={"Software": None})
 
 
 def _finish(axes: Axes, label: str) -> None:

@@ -1,7 +1,9 @@
 """What a simulation leaves behind: every output at every communication point."""
 
 import json
+import os
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -10,6 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from .errors import SimulationError
 from .metrics import grasp_metrics
 from .plan import REAL, Plan, Signal
 from .system import NANOSECONDS, System
@@ -33,6 +36,23 @@ class Recorder:
         self._integers[step] = integers
         self.rows = step + 1
 
+    def check_finite(self, since: int) -> None:
+        """SimulationError at the first value that is not finite from step since on; it is the
+        last one kept.
+        """
+        finite = np.isfinite(self._reals[since : self.rows])
+        if finite.all():
+            return
+        row = since + int(finite.all(axis=1).argmin())
+        self.rows = row + 1
+        for s in self._plan.signals:
+            if s.kind in REAL and not np.isfinite(value := self._reals[row, s.slot]):
+                raise SimulationError(f"{s.name} = {value} at step {row}: must be finite")
+
+    def time(self, step_ns: int) -> npt.NDArray[np.float64]:
+        """The recorded communication points in s: k·step, each correctly rounded."""
+        return np.arange(self.rows) * step_ns / NANOSECONDS
+
     def signals(self) -> dict[str, npt.NDArray[Any]]:
         """The recorded values of each output, booleans as bool."""
         return {s.name: self._column(s) for s in self._plan.signals}
@@ -43,11 +63,12 @@ class Recorder:
         return column.astype(bool) if signal.kind == "Boolean" else column
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Result(Mapping[str, npt.NDArray[Any]]):
     """Recorded signals by name, like result["plant.gap[1]"], on result.time in s."""
 
     system: System
+    time: npt.NDArray[np.float64]
     signals: Mapping[str, npt.NDArray[Any]]
     units: Mapping[str, str | None]
     wall_time: float
@@ -62,12 +83,6 @@ class Result(Mapping[str, npt.NDArray[Any]]):
 
     def __len__(self) -> int:
         return len(self.signals)
-
-    @cached_property
-    def time(self) -> npt.NDArray[np.float64]:
-        """The communication points in s: k·step, each correctly rounded."""
-        rows = len(next(iter(self.signals.values())))
-        return np.arange(rows) * self.system.step_ns / NANOSECONDS
 
     @cached_property
     def metrics(self) -> Mapping[str, Any]:
@@ -102,17 +117,27 @@ class Result(Mapping[str, npt.NDArray[Any]]):
 
     def plot(self, path: str | Path) -> None:
         """Draw the grasp as a PNG; InputError without matplotlib or without a gripper plant."""
-        from .plot import plot_run
+        from .plot import plot_run  # which needs this module
 
         plot_run(self, Path(path))
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a file under a temporary name, then rename: there is never half of it."""
+    """Write a file in one piece: there is never half of it."""
+    with in_one_piece(path) as part:
+        part.write_text(text, encoding="utf-8")
+
+
+@contextmanager
+def in_one_piece(path: Path) -> Iterator[Path]:
+    """A temporary name beside path to write to; it takes the place of path at the end."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f"{path.name}.part")
-    part.write_text(text, encoding="utf-8")
-    part.replace(path)
+    part = path.with_name(f"{path.name}.{os.getpid()}.part")
+    try:
+        yield part
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
 
 
 def _text(value: float | int | bool) -> str:

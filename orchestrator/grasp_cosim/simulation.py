@@ -12,10 +12,10 @@ from .errors import InputError, SimulationError
 from .fmu import FmuInstance
 from .master import Master
 from .recording import Recorder, Result
-from .system import System
+from .system import NANOSECONDS, System
 
-CHUNK = 250
-"""Steps between two looks at the progress bar and at Ctrl-C."""
+LOOK = 0.1
+"""s of wall time between two looks at the progress bar, at Ctrl-C and for values not finite."""
 
 
 def simulate(
@@ -45,11 +45,12 @@ def simulate(
         start = time.perf_counter()
         failure: SimulationError | None = None
         try:
-            complete = _drive(master, progress)
+            complete = _drive(master, recorder, progress)
         except SimulationError as error:
             failure, complete = error, False
         result = Result(
             system,
+            recorder.time(system.step_ns),
             recorder.signals(),
             {s.name: s.unit for s in master.plan.signals},
             time.perf_counter() - start,
@@ -71,9 +72,9 @@ def _recorder(master: Master) -> Recorder:
         ) from None
 
 
-def _drive(master: Master, progress: bool) -> bool:
+def _drive(master: Master, recorder: Recorder, progress: bool) -> bool:
     """Step to the end; False where Ctrl-C came first."""
-    unit = master.system.step_ns / 1e9
+    unit = master.system.step_ns / NANOSECONDS
     with (
         _interrupts() as interrupted,
         tqdm(
@@ -84,10 +85,13 @@ def _drive(master: Master, progress: bool) -> bool:
             bar_format="{l_bar}{bar}| {n:.2f}/{total:.2f} s [{elapsed}<{remaining}]",
         ) as bar,
     ):
+        chunk = 1
         while master.steps_done < master.total_steps:
-            done = master.steps_done
-            master.advance(CHUNK)
+            done, start = master.steps_done, time.perf_counter()
+            master.advance(chunk)
             bar.update((master.steps_done - done) * unit)
+            chunk = max(1, min(2 * chunk, int(chunk * LOOK / (time.perf_counter() - start))))
+            recorder.check_finite(done)
             if interrupted.is_set():
                 return False
     return True
@@ -100,7 +104,12 @@ def _interrupts() -> Iterator[threading.Event]:
     if threading.current_thread() is not threading.main_thread():
         yield interrupted
         return
-    previous = signal.signal(signal.SIGINT, lambda *_: interrupted.set())
+
+    def remember(*_: object) -> None:
+        interrupted.set()
+        signal.signal(signal.SIGINT, previous)  # a second Ctrl-C does not wait
+
+    previous = signal.signal(signal.SIGINT, remember)
     try:
         yield interrupted
     finally:

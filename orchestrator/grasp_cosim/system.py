@@ -12,7 +12,6 @@ values = { object_width = 0.07 }
 wires = ["plant.gap[1] -> sensor_1.gap", ...]
 """
 
-import math
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -25,6 +24,8 @@ from .interface import Interface, Value, read_interface
 Scheme = Literal["sequential", "jacobi"]
 SCHEMES: tuple[str, ...] = get_args(Scheme)
 NANOSECONDS = 1_000_000_000
+LONGEST = 1e9
+"""s; a time in nanoseconds then fits into 64 bits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,23 +114,26 @@ class System:
 
     def with_values(self, values: Mapping[str, Value], place: str = "with_values") -> "System":
         """A copy with start values changed; the keys are like 'plant.object_width'."""
-        changed = {c.name: dict(c.values) for c in self.components}
-        for key, value in values.items():
-            component, _, variable = key.partition(".")
-            interface = self.component(component, f"{place} {key}").interface
-            changed[component][variable] = interface.parse(f"{place} {key}", variable, value)
-        return replace(
-            self,
-            components=tuple(replace(c, values=changed[c.name]) for c in self.components),
-        )
+        return self.revised({}, values, place)
 
-    def swap(self, component: str, fmu: str | Path, place: str = "swap") -> "System":
+    def swap(self, component: str, fmu: str | Path) -> "System":
         """A copy with the FMU of one component replaced by another with the same variables."""
-        swapped = replace(self.component(component, place), fmu=Path(fmu))
-        return replace(
-            self,
-            components=tuple(swapped if c.name == component else c for c in self.components),
-        )
+        return self.revised({component: fmu}, {}, "swap")
+
+    def revised(
+        self, fmus: Mapping[str, str | Path], values: Mapping[str, Value], place: str
+    ) -> "System":
+        """A copy with FMUs replaced, then values changed; place says who asks, for messages."""
+        components = {c.name: c for c in self.components}
+        for name, fmu in fmus.items():
+            components[name] = replace(self.component(name, f"{place} {name}"), fmu=Path(fmu))
+        for key, value in values.items():
+            name, _, variable = key.partition(".")
+            self.component(name, f"{place} {key}")
+            component = components[name]
+            parsed = component.interface.parse(f"{place} {key}", variable, value, text=True)
+            components[name] = replace(component, values={**component.values, variable: parsed})
+        return replace(self, components=tuple(components.values()))
 
     def with_experiment(
         self,
@@ -177,7 +181,9 @@ def _component(place: str, name: str, entry: Any, folder: Path) -> Component:
             raise InputError(
                 f"{place}: values.{key} = {value!r}: must be a number, boolean or string"
             )
-    return Component(name, folder / fmu, values)
+    component = Component(name, folder / fmu, {})
+    parsed = {k: component.interface.parse(f"{place}: values", k, v) for k, v in values.items()}
+    return replace(component, values=parsed)
 
 
 def _wire(place: str, text: Any) -> Wire:
@@ -207,6 +213,10 @@ def _check_wires(system: System) -> None:
                 f"{place}: {wire.source} is {kinds[0]} and {wire.target} is {kinds[1]}; "
                 "must be both Real, both Integer or both Boolean"
             )
+        if wire.target.variable in system.component(wire.target.component, place).values:
+            raise InputError(
+                f"{place}: {wire.target} has two sources, the wire and a value; must have one"
+            )
         if wire.target in sources:
             raise InputError(
                 f"{place}: {wire.target} has two sources, {sources[wire.target].source} and "
@@ -222,7 +232,7 @@ def _check_wires(system: System) -> None:
             if port not in sources and variable.name not in component.values:
                 raise InputError(
                     f"{system.name}: input {port} has no source; wire one of {choices(outputs)} "
-                    f"to it, or give it a value in [components.{component.name}] values"
+                    f"to it, or give it a value: --set {port}=VALUE, or in the system file"
                 )
 
 
@@ -236,13 +246,12 @@ def _check_grid(step_ns: int, stop_ns: int) -> None:
 
 
 def _nanoseconds(place: str, seconds: Any) -> int:
-    if (
-        isinstance(seconds, bool)
-        or not isinstance(seconds, float | int)
-        or not math.isfinite(seconds)
-        or seconds <= 0
-    ):
-        raise InputError(f"{place} = {seconds!r} s: must be a number greater than 0")
+    if isinstance(seconds, bool) or not isinstance(seconds, float | int):
+        raise InputError(f"{place} = {seconds!r} s: must be a number")
+    if not 0.0 < seconds <= LONGEST:
+        raise InputError(
+            f"{place} = {seconds!r} s: must be a number greater than 0, at most {LONGEST:g}"
+        )
     nanoseconds = round(seconds * NANOSECONDS)
     if not nanoseconds or abs(nanoseconds / NANOSECONDS - seconds) > 1e-12 * seconds:
         raise InputError(f"{place} = {seconds!r} s: must be a whole number of nanoseconds")
@@ -256,8 +265,8 @@ def _scheme(place: str, scheme: Any) -> Scheme:
 
 
 def _table(place: str, value: Any) -> dict[str, Any]:
-    if not isinstance(value, dict) or (not value and place.endswith("]")):
-        raise InputError(f"{place}: missing or empty; must be a table with entries")
+    if not isinstance(value, dict):
+        raise InputError(f"{place}: missing; must be a table")
     return value
 
 

@@ -26,10 +26,10 @@ class Params:
         float, "m", "x_m, centre of the object at the start", (-10.0, 10.0)
     ] = 0.03
     baumgarte_alpha: Annotated[
-        float, "1/s", "alpha, damping rate of the contact stabilisation", (0.0, 1e5)
+        float, "1/s", "alpha, damping rate of the contact stabilisation", (1.0, 1e5)
     ] = 200.0
     baumgarte_beta: Annotated[
-        float, "1/s", "beta, natural rate of the contact stabilisation", (0.0, 1e5)
+        float, "1/s", "beta, natural rate of the contact stabilisation", (1.0, 1e5)
     ] = 200.0
 
     def __post_init__(self) -> None:
@@ -95,14 +95,14 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     """What the sensors see; no input reaches an output without a step."""
     x_1, x_2 = x.position
-    f_1, f_2 = x.contact_force
     right, left = _surfaces(p)
+    gap_1, gap_2 = x_1 - right, -x_2 - left
     return Outputs(
         x.position,
         x.velocity,
-        (x_1 - right, -x_2 - left),
+        (gap_1, gap_2),
         x.contact_force,
-        (f_1 > 0.0, f_2 < 0.0),
+        (gap_1 <= 0.0, gap_2 <= 0.0),
         p.initial_object_position,
     )
 

@@ -56,5 +56,5 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
 
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     """Eq. (9). The spacer keeps the object off the element: a gap below zero reads as zero."""
-    l = u.gap if u.gap > 0.0 else 0.0
+    l = 0.0 if u.gap < 0.0 else u.gap
     return Outputs(p.gain * p.reflectance / (l + p.offset_distance) ** p.diffusion_exponent)

@@ -1,8 +1,11 @@
 """Gripper, sensors and controller in a loop, called directly."""
 
 from dataclasses import dataclass
+from functools import cache
 from math import tanh
 
+import numpy as np
+import numpy.typing as npt
 import pytest
 from grasp_controller import contact_force as layer_1
 from grasp_controller import impact_reduction as layer_2
@@ -120,16 +123,22 @@ def test_both_fingers_of_a_centred_grasp_do_the_same(case: int) -> None:
 # ------------------------------------------------------------------------ the final grasp
 
 
-@pytest.mark.parametrize("case", [1, 2])
 @pytest.mark.parametrize(
-    ("x_m", "width", "stiffness"),
-    [(0.03, 0.07, 98.0), (-0.05, 0.07, 98.0), (0.01, 0.04, 98.0), (0.03, 0.07, 50.0)],
+    ("case", "x_m", "width", "stiffness"),
+    [
+        (0, 0.03, 0.07, 98.0),
+        (1, 0.03, 0.07, 98.0),
+        (2, 0.03, 0.07, 98.0),
+        (2, -0.05, 0.07, 98.0),
+        (2, 0.01, 0.04, 98.0),
+        (1, 0.03, 0.07, 50.0),
+    ],
 )
 def test_the_grasp_settles_at_the_force_of_half_the_width(
     case: int, x_m: float, width: float, stiffness: float
 ) -> None:
     """K_i·W/2 on each finger, borne by the object, and the target at its centre."""
-    last = Grasp(around(x_m, width), case=case, stiffness=stiffness).run(12.0)[-1]
+    last = Grasp(around(x_m, width), case=case, stiffness=stiffness).run(9.0)[-1]
     force = 0.5 * stiffness * width
     assert last.controller.force == pytest.approx((-force, force), rel=1e-9)
     assert last.gripper.contact_force == pytest.approx((force, -force), rel=1e-9)
@@ -140,7 +149,7 @@ def test_the_grasp_settles_at_the_force_of_half_the_width(
 
 def test_unequal_reflectances_leave_the_target_off_the_centre() -> None:
     """At rest f_s of the two reflectances, borne by K_a2: Eq. (10) with both gaps zero."""
-    last = Grasp(reflectance=(0.86, 1.0)).run(12.0)[-1]
+    last = Grasp(reflectance=(0.86, 1.0)).run(9.0)[-1]
     off = 3.0 * tanh((0.86 - 1.0) / (0.86 + 1.0)) / 36.0
     assert last.controller.target_position == pytest.approx(0.03 + off, abs=1e-10)
     assert last.controller.force == pytest.approx((-3.43 + 98.0 * off, 3.43 + 98.0 * off), rel=1e-6)
@@ -149,27 +158,32 @@ def test_unequal_reflectances_leave_the_target_off_the_centre() -> None:
 # --------------------------------------------------------------------------- reflectance
 
 
+@cache
+def grey(case: int) -> list[Sample]:
+    """The grasp of an object of reflectance 0.9."""
+    return Grasp(case=case, reflectance=(0.9, 0.9)).run(2.5)
+
+
 @pytest.mark.parametrize("case", [0, 1, 2])
-@pytest.mark.parametrize("factor", [0.25, 0.5, 2.0, 8.0])
+@pytest.mark.parametrize("factor", [0.25, 0.5, 8.0])
 def test_twice_the_reflectance_changes_no_force_at_all(case: int, factor: float) -> None:
-    plain = Grasp(case=case, reflectance=(0.9, 0.9)).run(2.5)
     scaled = Grasp(case=case, reflectance=(0.9 * factor, 0.9 * factor)).run(2.5)
-    for a, b in zip(plain, scaled, strict=True):
+    for a, b in zip(grey(case), scaled, strict=True):
         assert b.controller == a.controller
         assert b.gripper == a.gripper
         assert b.intensity == (factor * a.intensity[0], factor * a.intensity[1])
 
 
+def forces_of(samples: list[Sample]) -> npt.NDArray[np.float64]:
+    return np.array([(*s.controller.force, *s.gripper.contact_force) for s in samples])
+
+
 @pytest.mark.parametrize("factor", [0.57, 0.93, 3.0])
 def test_any_reflectance_changes_no_force(factor: float) -> None:
     """But for roundings, relative to the largest force."""
-    plain, scaled = Grasp().run(2.5), Grasp(reflectance=(factor, factor)).run(2.5)
-    peak = max(abs(force) for sample in plain for force in sample.controller.force)
-    for a, b in zip(plain, scaled, strict=True):
-        assert b.controller.force == pytest.approx(a.controller.force, rel=0.0, abs=1e-9 * peak)
-        assert b.gripper.contact_force == pytest.approx(
-            a.gripper.contact_force, rel=0.0, abs=1e-9 * peak
-        )
+    scaled = Grasp(reflectance=(factor, factor)).run(2.5)
+    plain, forces = forces_of(grey(2)), forces_of(scaled)
+    np.testing.assert_allclose(forces, plain, rtol=0.0, atol=1e-9 * abs(plain).max())
 
 
 # ------------------------------------------------------------------------------- the cases

@@ -1,7 +1,7 @@
 """Each of the controller's layers by itself, Eqs. (2) to (7)."""
 
 from collections.abc import Sequence
-from math import isfinite, isnan, nextafter, tanh
+from math import isfinite, isnan, nan, nextafter, tanh
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-QUICK = settings(deadline=None, derandomize=True, max_examples=200)
+QUICK = settings(deadline=None, derandomize=True, max_examples=100)
 
 Pair = tuple[float, float]
 
@@ -71,6 +71,11 @@ def test_all_of_the_virtual_force_where_one_sensor_sees_something(
     assert f_s((xi, nothing)) == 3.0 * tanh(1.0)
     assert f_s((nothing, xi)) == -3.0 * tanh(1.0)
     assert f_s((xi, xi)) == 0.0
+
+
+@pytest.mark.parametrize("xi", [(nan, 0.1), (0.1, nan), (nan, 0.0), (nan, nan)])
+def test_an_intensity_that_is_no_number_is_not_taken_for_darkness(xi: Pair) -> None:
+    assert isnan(f_s(xi))
 
 
 @QUICK

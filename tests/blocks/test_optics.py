@@ -1,6 +1,6 @@
 """The proximity sensor, Eq. (9)."""
 
-from math import exp, log
+from math import exp, isnan, log, nan
 
 import pytest
 from blocks.declared import Parameter, parameters
@@ -11,7 +11,7 @@ from proximity_sensor.optics import Inputs, Params, State
 
 PARAMETERS = parameters(Params)
 
-QUICK = settings(deadline=None, derandomize=True, max_examples=200)
+QUICK = settings(deadline=None, derandomize=True, max_examples=100)
 
 GAPS = st.floats(0.0, 10.0)
 
@@ -74,6 +74,10 @@ def test_a_surface_that_reflects_nothing_is_not_seen(change: dict[str, float]) -
 @given(SENSORS, st.floats(-10.0, 0.0))
 def test_a_gap_below_zero_reads_as_zero(p: Params, gap: float) -> None:
     assert intensity(p, gap) == intensity(p, 0.0)
+
+
+def test_a_gap_that_is_no_number_is_not_taken_for_contact() -> None:
+    assert isnan(intensity(Params(), nan))
 
 
 def test_the_optics_have_no_memory() -> None:

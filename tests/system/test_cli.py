@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 from grasp_cosim import System, cli, simulate
 from grasp_cosim.grasp import CASES
+from grasp_fmus import build as builder
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -35,11 +36,9 @@ def command(
     monkeypatch.setattr(cli, "grasp_system", lambda: grasp)
 
     def run(*arguments: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["grasp-cosim", *arguments])
-        with pytest.raises(SystemExit) as exit_:
-            cli.main()
+        code = cli.main(list(arguments))
         out, err = capsys.readouterr()
-        return int(exit_.value.code or 0), out, err
+        return code, out, err
 
     return run
 
@@ -126,6 +125,9 @@ WRONG = [
     (["--scheme", "euler"], "'euler' is not one of 'sequential', 'jacobi'"),
     (["missing.toml"], "missing.toml: no such system file"),
     (["--fast"], "No such option"),
+    (["--step", "1e300"], "must be a number greater than 0, at most 1e\\+09"),
+    (["--set", "sensor_1.gap=0.01"], "sensor_1.gap has two sources, the wire and a value"),
+    (["--debug"], "No such option"),
 ]
 
 
@@ -139,6 +141,63 @@ def test_wrong_input_is_one_line_and_exit_2(
     assert err.startswith("grasp-cosim: ")
     assert re.search(message, err), err
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("command_", ["run", "build", "evaluate"])
+@pytest.mark.parametrize("out", ["file", "file/below", "/proc/nowhere"])
+def test_a_folder_that_cannot_be_written_is_found_at_once(
+    command: Run, tmp_path: Path, command_: str, out: str
+) -> None:
+    (tmp_path / "file").touch()
+    code, _, err = command(command_, "--out", out)
+    assert code == 2
+    assert err.startswith(f"grasp-cosim: --out {out}: ")
+    assert len(err.splitlines()) == 1
+
+
+def test_nothing_to_draw_is_found_at_once(command: Run, fmus: Path, tmp_path: Path) -> None:
+    fmu = fmus / "ProximitySensor.fmu"
+    (tmp_path / "sensor.toml").write_text(
+        "[experiment]\nstep = 1e-3\nstop = 0.01\n"
+        f'[components.sensor]\nfmu = "{fmu}"\nvalues = {{ gap = 0.02 }}\n'
+    )
+    assert command("run", "sensor.toml", "--out", "ok")[0] == 0
+    code, _, err = command("run", "sensor.toml", "--out", "results", "--plot")
+    assert code == 2
+    assert "nothing to draw" in err
+    assert not (tmp_path / "results").exists()
+
+
+def test_a_vendor_plant_with_one_more_input(
+    command: Run, fmus: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    original = builder._sources
+
+    def extended(script: Path) -> dict[str, bytes]:
+        sources = original(script)
+        plant = sources["gripper_plant/rigid.py"]
+        more = plant.replace(
+            b'actuator force on the finger"] = (0.0, 0.0)\n',
+            b'actuator force on the finger"] = (0.0, 0.0)\n'
+            b'    ambient: Annotated[float, "K", "temperature"] = 300.0\n',
+        )
+        assert more != plant
+        return {**sources, "gripper_plant/rigid.py": more}
+
+    monkeypatch.setattr(builder, "_sources", extended)
+    fmu = builder.build_fmu(builder.SCRIPTS / "GripperPlant.py", tmp_path)
+    code, _, err = command("run", "--stop", "0.01", "--swap", f"plant={fmu}")
+    assert code == 2
+    assert "input plant.ambient has no source" in err
+    assert "--set plant.ambient=VALUE" in err
+    options = ["--swap", f"plant={fmu}", "--set", "plant.ambient=290", "--json"]
+    assert command("run", "--stop", "0.01", *options)[0] == 0
+
+
+def test_no_arguments_show_the_help(command: Run) -> None:
+    code, out, err = command()
+    assert (code, out) == (2, "")
+    assert "Usage: grasp-cosim" in err
 
 
 def test_debug_shows_the_traceback(command: Run) -> None:

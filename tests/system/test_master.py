@@ -46,7 +46,7 @@ class Mock:
 
     def enter_initialization(self, values: Mapping[str, Value], stop: float) -> None:
         self.calls.append("enter")
-        self.u = float(values.get("u", 0.0))
+        self.u = float(values.get("u", self.u))
 
     def exit_initialization(self) -> None:
         self.calls.append("exit")
@@ -174,6 +174,16 @@ def test_an_algebraic_loop_is_refused_by_name() -> None:
     wires = (Wire(Port("a", "y"), Port("b", "u")), Wire(Port("b", "y"), Port("a", "u")))
     with pytest.raises(InputError, match=r"an algebraic loop through a\.y, b\.y"):
         master("sequential", mocks, wires, 10**8, 1).initialise()
+
+
+def test_initialisation_never_sends_what_no_output_has_put_out() -> None:
+    """a runs before its source: what it is sent is the source's value, not a zero."""
+    mock = Mock("a", lambda u, t: 1.0 / u)
+    wires = (Wire(Port("b", "y"), Port("a", "u")),)
+    run = master("sequential", [mock, Mock("b", lambda u, t: 5.0)], wires, 10**8, 1)
+    mock.u = 1.0  # the start value
+    run.initialise()
+    assert mock.u == 5.0
 
 
 def test_an_unwired_input_is_never_sent() -> None:

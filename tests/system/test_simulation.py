@@ -8,8 +8,10 @@ import select
 import signal
 import subprocess
 import sys
+import tempfile
 import termios
 import threading
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -116,6 +118,85 @@ def test_an_fmu_that_fails_on_the_way_leaves_what_was_recorded(
     assert result["plant.gap[1]"][-1] == pytest.approx(0.044, abs=1e-5)
     assert "\n" not in str(caught.value)
     assert simulate(grasp, stop=1e-3).complete  # the process is well
+
+
+def test_a_value_that_is_not_finite_ends_the_run_where_it_arises(
+    grasp: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    original = builder._sources
+
+    def broken(script: Path) -> dict[str, bytes]:
+        sources = original(script)
+        optics = sources["proximity_sensor/optics.py"]
+        nan = b"l = float('nan') if u.gap < 0.044 else u.gap"
+        text = optics.replace(b"l = 0.0 if u.gap < 0.0 else u.gap", nan)
+        assert text != optics
+        return {**sources, "proximity_sensor/optics.py": text}
+
+    monkeypatch.setattr(builder, "_sources", broken)
+    fmu = builder.build_fmu(builder.SCRIPTS / "ProximitySensor.py", tmp_path)
+    with pytest.raises(
+        SimulationError, match=r"intensity = nan at step .*must be finite"
+    ) as caught:
+        simulate(grasp.swap("sensor_1", fmu))
+    result = caught.value.result
+    assert result is not None
+    assert result["plant.gap[1]"][-1] == pytest.approx(0.044, abs=1e-5)
+    assert np.isfinite(result["sensor_1.intensity"][:-1]).all()
+
+
+def test_a_damaged_archive_is_a_wrong_input(grasp: System, fmus: Path, tmp_path: Path) -> None:
+    data = bytearray((fmus / "GripperPlant.fmu").read_bytes())
+    data[len(data) // 4] ^= 0xFF  # in the compressed binary
+    damaged = tmp_path / "damaged.fmu"
+    damaged.write_bytes(data)
+    with pytest.raises(InputError, match=r"^plant: .*damaged.fmu is damaged: "):
+        simulate(grasp.swap("plant", damaged), stop=1e-3)
+
+
+def test_a_library_that_does_not_load_leaves_the_working_folder(
+    grasp: System, fmus: Path, tmp_path: Path
+) -> None:
+    here = Path.cwd()
+    broken = tmp_path / "broken.fmu"
+    with zipfile.ZipFile(fmus / "GripperPlant.fmu") as good, zipfile.ZipFile(broken, "w") as bad:
+        for name in good.namelist():
+            bad.writestr(name, b"no library" if name.endswith(".so") else good.read(name))
+    with pytest.raises(InputError, match=r"^plant: .*broken.fmu does not load"):
+        simulate(grasp.swap("plant", broken), stop=1e-3)
+    assert Path.cwd() == here
+
+
+def test_nothing_stays_in_the_temporary_folder_or_on_the_path(
+    grasp: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    before = sys.path.copy()
+    simulate(grasp, stop=1e-3)
+    with pytest.raises(InputError):
+        simulate(grasp.with_values({"plant.object_width": 0.5}), stop=1e-3)
+    assert list(tmp_path.iterdir()) == []
+    assert sys.path == before
+
+
+def test_a_temporary_folder_that_crashes_pythonfmu_is_refused(
+    grasp: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "a+b"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    with pytest.raises(InputError, match="set TMPDIR to a folder of plain ASCII letters"):
+        simulate(grasp, stop=1e-3)
+    assert list(folder.iterdir()) == []
+
+
+def test_a_temporary_folder_with_a_space_is_fine(
+    grasp: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "a b"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    assert simulate(grasp, stop=1e-3).complete
 
 
 def test_runs_in_another_thread(grasp: System) -> None:
