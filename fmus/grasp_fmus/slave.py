@@ -5,8 +5,11 @@ declaration. Outputs are worked out when they are asked for, from the state and 
 moment, so they agree with the inputs in initialisation mode and after every set.
 """
 
+import atexit
 import ctypes
+import os
 import sys
+from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element
 
@@ -21,6 +24,31 @@ class ParameterError(ValueError):
 
     def __repr__(self) -> str:
         return str(self)
+
+
+_libraries: set[str] = set()
+"""The binaries whose state is put in order when Python ends."""
+
+
+def _finalize_at_exit(resources: str | None) -> None:
+    """See to it that the process can end in peace, if these are the resources of an FMU.
+
+    The binary of pythonfmu 0.7.0 releases its state twice when the process ends, once in freed
+    memory, which corrupts the heap of the host. Its own function, called before, prevents that.
+    """
+    binaries = Path(resources or "").parent / "binaries" / "linux64"
+    for library in map(str, binaries.glob("*.so")):
+        if library not in _libraries:
+            _libraries.add(library)
+            atexit.register(_finalize, library)
+
+
+def _finalize(library: str) -> None:
+    try:
+        loaded = ctypes.CDLL(library, mode=os.RTLD_NOLOAD | os.RTLD_NOW)
+    except OSError:
+        return  # unloaded meanwhile: its state went with it
+    loaded.finalizePythonInterpreter()
 
 
 class BlockSlave(Fmi2Slave):  # type: ignore[misc]
@@ -39,6 +67,7 @@ class BlockSlave(Fmi2Slave):  # type: ignore[misc]
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
+        _finalize_at_exit(kwargs.get("resources"))
         self._fields = declared(self.block)
         self._values: list[Any] = [start for f in self._fields for start in f.starts]
         self._references = list(range(len(self._values)))

@@ -27,14 +27,8 @@ json_option = click.option("--json", "as_json", is_flag=True, help="Print one JS
 
 
 def entry() -> NoReturn:
-    """The command grasp-cosim.
-
-    It ends the process without its C exit handlers: pythonfmu 0.7.0's uses memory it has freed.
-    """
-    code = main(sys.argv[1:])
-    sys.stdout.flush()
-    sys.stderr.flush()
-    os._exit(code)
+    """The command grasp-cosim."""
+    sys.exit(main(sys.argv[1:]))
 
 
 def main(arguments: list[str]) -> int:
