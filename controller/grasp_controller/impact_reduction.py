@@ -39,19 +39,18 @@ class Params:
 
 
 def virtual_forces(p: Params, xi: Pair, xi_before: Pair, h: float) -> Pair:
-    """f_pj in N, Eq. (5), from two samples of the intensities in V, h seconds apart."""
+    """f_pj in N, Eq. (5), from two samples of the intensities in V, h seconds apart.
+
+    Zero unless both samples reach the floor: xi'/xi has no meaning where xi is nothing.
+    """
     xi_1, xi_2 = xi
     was_1, was_2 = xi_before
     d_1, d_2 = p.viscosity
     floor = p.intensity_floor
-    return _virtual_force(d_1, xi_1, was_1, floor, h), _virtual_force(d_2, xi_2, was_2, floor, h)
-
-
-def _virtual_force(d_p: float, xi: float, xi_before: float, floor: float, h: float) -> float:
-    """Zero unless both samples reach the floor: xi'/xi has no meaning where xi is nothing."""
-    if xi < floor or xi_before < floor:
-        return 0.0
-    return d_p * (xi - xi_before) / (h * xi)
+    return (
+        0.0 if xi_1 < floor or was_1 < floor else d_1 * (xi_1 - was_1) / (h * xi_1),
+        0.0 if xi_2 < floor or was_2 < floor else d_2 * (xi_2 - was_2) / (h * xi_2),
+    )
 
 
 def advance(

@@ -36,16 +36,19 @@ class Master:
             raise InputError(str(error)) from error
         for link in self.plan.links:
             link.instance.exit_initialization()
-        self._notify()
+        for listener in self.listeners:
+            listener(0)
 
     def advance(self, steps: int) -> None:
         """Do the given number of communication steps, or fewer where the stop time is nearer."""
         step = self._sequential if self.system.scheme == "sequential" else self._jacobi
-        for _ in range(min(steps, self.total_steps - self.steps_done)):
-            self._time.value = self.steps_done * self.system.step_ns / NANOSECONDS
+        step_ns = self.system.step_ns
+        for done in range(self.steps_done, min(self.steps_done + steps, self.total_steps)):
+            self._time.value = done * step_ns / NANOSECONDS
             step()
-            self.steps_done += 1
-            self._notify()
+            self.steps_done = done + 1
+            for listener in self.listeners:
+                listener(done + 1)
 
     def _sequential(self) -> None:
         for link in self.plan.links:
@@ -67,10 +70,6 @@ class Master:
             status = call()
             if status > WARNING:
                 raise link.instance.failure(status, self._time.value)
-
-    def _notify(self) -> None:
-        for listener in self.listeners:
-            listener(self.steps_done)
 
     def _propagate(self) -> None:
         """Pass values along the wires until they stand still, a bounded number of times."""
