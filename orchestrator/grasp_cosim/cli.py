@@ -118,12 +118,13 @@ def run(
     fmus = dict(_pair("--swap", text, "COMPONENT=FMU") for text in swaps)
     values: dict[str, Value] = {} if case is None else dict(CASES[case])
     values.update(_pair("--set", text, "COMPONENT.VARIABLE=VALUE") for text in settings)
-    chosen = chosen.revised(fmus, values, "--swap or --set").with_experiment(step, stop, scheme)
+    chosen = chosen.revised(fmus, values, ("--swap", "--set")).with_experiment(step, stop, scheme)
     if plot:
         check_plot(
             f"{c.name}.{v.name}" for c in chosen.components for v in c.interface.of("output")
         )
-    check_folder(out or Path())
+    if out or plot:
+        check_folder(out or Path())
     try:
         result = simulate(chosen, progress=True)
     except SimulationError as error:

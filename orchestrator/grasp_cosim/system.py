@@ -114,24 +114,28 @@ class System:
 
     def with_values(self, values: Mapping[str, Value], place: str = "with_values") -> "System":
         """A copy with start values changed; the keys are like 'plant.object_width'."""
-        return self.revised({}, values, place)
+        return self.revised({}, values, ("swap", place))
 
     def swap(self, component: str, fmu: str | Path) -> "System":
         """A copy with the FMU of one component replaced by another with the same variables."""
-        return self.revised({component: fmu}, {}, "swap")
+        return self.revised({component: fmu}, {}, ("swap", "with_values"))
 
     def revised(
-        self, fmus: Mapping[str, str | Path], values: Mapping[str, Value], place: str
+        self,
+        fmus: Mapping[str, str | Path],
+        values: Mapping[str, Value],
+        places: tuple[str, str],
     ) -> "System":
-        """A copy with FMUs replaced, then values changed; place says who asks, for messages."""
+        """A copy with FMUs replaced, then values changed; places name the two, for messages."""
         components = {c.name: c for c in self.components}
         for name, fmu in fmus.items():
-            components[name] = replace(self.component(name, f"{place} {name}"), fmu=Path(fmu))
+            components[name] = replace(self.component(name, f"{places[0]} {name}"), fmu=Path(fmu))
         for key, value in values.items():
             name, _, variable = key.partition(".")
-            self.component(name, f"{place} {key}")
+            place = f"{places[1]} {key}"
+            self.component(name, place)
             component = components[name]
-            parsed = component.interface.parse(f"{place} {key}", variable, value, text=True)
+            parsed = component.interface.parse(place, variable, value, text=True)
             components[name] = replace(component, values={**component.values, variable: parsed})
         return replace(self, components=tuple(components.values()))
 

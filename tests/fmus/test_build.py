@@ -5,6 +5,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from conftest import Altered
 from fmpy import simulate_fmu
 from grasp_fmus import build as builder
 
@@ -49,19 +50,11 @@ def test_every_module_of_ours_carries_the_content_hash(fmus: Path, name: str) ->
 
 
 def test_two_builds_of_one_fmu_in_one_process_run_their_own_code(
-    fmus: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    fmus: Path, altered: Altered
 ) -> None:
-    original = builder._sources
-
-    def doubled(script: Path) -> dict[str, bytes]:
-        sources = original(script)
-        optics = sources["proximity_sensor/optics.py"]
-        changed = optics.replace(b"p.gain * p.reflectance", b"2.0 * p.gain * p.reflectance")
-        assert changed != optics
-        return {**sources, "proximity_sensor/optics.py": changed}
-
-    monkeypatch.setattr(builder, "_sources", doubled)
-    other = builder.build_fmu(builder.SCRIPTS / "ProximitySensor.py", tmp_path)
+    other = altered(
+        "ProximitySensor", "proximity_sensor/optics.py", "p.gain * p.ref", "2.0 * p.gain * p.ref"
+    )
     once = simulate_fmu(fmus / "ProximitySensor.fmu", stop_time=0.001)
     twice = simulate_fmu(other, stop_time=0.001)
     again = simulate_fmu(fmus / "ProximitySensor.fmu", stop_time=0.001)

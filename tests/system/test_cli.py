@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from conftest import Altered
 from grasp_cosim import System, cli, simulate
 from grasp_cosim.grasp import CASES
-from grasp_fmus import build as builder
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -168,24 +168,10 @@ def test_nothing_to_draw_is_found_at_once(command: Run, fmus: Path, tmp_path: Pa
     assert not (tmp_path / "results").exists()
 
 
-def test_a_vendor_plant_with_one_more_input(
-    command: Run, fmus: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    original = builder._sources
-
-    def extended(script: Path) -> dict[str, bytes]:
-        sources = original(script)
-        plant = sources["gripper_plant/rigid.py"]
-        more = plant.replace(
-            b'actuator force on the finger"] = (0.0, 0.0)\n',
-            b'actuator force on the finger"] = (0.0, 0.0)\n'
-            b'    ambient: Annotated[float, "K", "temperature"] = 300.0\n',
-        )
-        assert more != plant
-        return {**sources, "gripper_plant/rigid.py": more}
-
-    monkeypatch.setattr(builder, "_sources", extended)
-    fmu = builder.build_fmu(builder.SCRIPTS / "GripperPlant.py", tmp_path)
+def test_a_vendor_plant_with_one_more_input(command: Run, altered: Altered) -> None:
+    force = 'actuator force on the finger"] = (0.0, 0.0)\n'
+    ambient = '    ambient: Annotated[float, "K", "temperature"] = 300.0\n'
+    fmu = altered("GripperPlant", "gripper_plant/rigid.py", force, force + ambient)
     code, _, err = command("run", "--stop", "0.01", "--swap", f"plant={fmu}")
     assert code == 2
     assert "input plant.ambient has no source" in err

@@ -16,9 +16,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import Altered
 from grasp_cosim import InputError, SimulationError, System, simulate
 from grasp_cosim.grasp import CASES, SYSTEM
-from grasp_fmus import build as builder
 
 SHORT = 0.05
 
@@ -94,19 +94,14 @@ def test_a_refused_parameter_is_one_line_with_the_reason(grasp: System) -> None:
         simulate(wide, stop=SHORT)
 
 
+GAP = "l = 0.0 if u.gap < 0.0 else u.gap"
+
+
 def test_an_fmu_that_fails_on_the_way_leaves_what_was_recorded(
-    grasp: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    grasp: System, altered: Altered
 ) -> None:
-    original = builder._sources
-
-    def failing(script: Path) -> dict[str, bytes]:
-        sources = original(script)
-        optics = sources["proximity_sensor/optics.py"]
-        trap = b"if u.gap < 0.044:\n        raise RuntimeError('the lamp is broken')\n    l = "
-        return {**sources, "proximity_sensor/optics.py": optics.replace(b"l = ", trap, 1)}
-
-    monkeypatch.setattr(builder, "_sources", failing)
-    fmu = builder.build_fmu(builder.SCRIPTS / "ProximitySensor.py", tmp_path)
+    trap = f"if u.gap < 0.044:\n        raise RuntimeError('the lamp is broken')\n    {GAP}"
+    fmu = altered("ProximitySensor", "proximity_sensor/optics.py", GAP, trap)
     with pytest.raises(
         SimulationError, match=r"^sensor_1: .*fatal at t = .*lamp is broken"
     ) as caught:
@@ -121,20 +116,10 @@ def test_an_fmu_that_fails_on_the_way_leaves_what_was_recorded(
 
 
 def test_a_value_that_is_not_finite_ends_the_run_where_it_arises(
-    grasp: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    grasp: System, altered: Altered
 ) -> None:
-    original = builder._sources
-
-    def broken(script: Path) -> dict[str, bytes]:
-        sources = original(script)
-        optics = sources["proximity_sensor/optics.py"]
-        nan = b"l = float('nan') if u.gap < 0.044 else u.gap"
-        text = optics.replace(b"l = 0.0 if u.gap < 0.0 else u.gap", nan)
-        assert text != optics
-        return {**sources, "proximity_sensor/optics.py": text}
-
-    monkeypatch.setattr(builder, "_sources", broken)
-    fmu = builder.build_fmu(builder.SCRIPTS / "ProximitySensor.py", tmp_path)
+    nan = "l = float('nan') if u.gap < 0.044 else u.gap"
+    fmu = altered("ProximitySensor", "proximity_sensor/optics.py", GAP, nan)
     with pytest.raises(
         SimulationError, match=r"intensity = nan at step .*must be finite"
     ) as caught:
