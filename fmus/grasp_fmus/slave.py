@@ -99,15 +99,21 @@ class BlockSlave(Fmi2Slave):  # type: ignore[misc]
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Advance the block by step_size seconds with the inputs as they are."""
-        if self._inputs is None:
-            self._read()
-        self._state = self._step(self._params, self._state, self._inputs, step_size)
-        y = self._evaluate(self._params, self._state, self._inputs)
+        try:
+            if self._inputs is None:
+                self._read()
+            self._state = self._step(self._params, self._state, self._inputs, step_size)
+            y = self._evaluate(self._params, self._state, self._inputs)
+        except Exception:
+            self._outlive_the_exception()
+            raise
         self._values[self._outputs] = self._unpack(y)
         return True
 
     def get_real(self, vrs: list[int]) -> list[Any]:
         """Values of the given references."""
+        if not vrs:
+            return []
         if self._inputs is None:
             self._refresh()
         first = vrs[0]
@@ -120,6 +126,8 @@ class BlockSlave(Fmi2Slave):  # type: ignore[misc]
 
     def set_real(self, vrs: list[int], values: list[Any]) -> None:
         """Set inputs or parameters; outputs follow when they are next asked for."""
+        if not vrs:
+            return
         first = vrs[0]
         stop = first + len(vrs)
         if vrs == self._references[first:stop]:
@@ -136,11 +144,24 @@ class BlockSlave(Fmi2Slave):  # type: ignore[misc]
 
     def _refresh(self) -> None:
         """Work out the outputs; before the end of initialisation the initial state as well."""
-        self._read()
-        if not self._initialised:
-            self._state = self.block.initial_state(self._params, self._inputs)
-        y = self._evaluate(self._params, self._state, self._inputs)
+        try:
+            self._read()
+            if not self._initialised:
+                self._state = self.block.initial_state(self._params, self._inputs)
+            y = self._evaluate(self._params, self._state, self._inputs)
+        except Exception:
+            self._outlive_the_exception()
+            raise
         self._values[self._outputs] = self._unpack(y)
+
+    def _outlive_the_exception(self) -> None:
+        """Keep the host alive.
+
+        pythonfmu 0.7.0 gives up its references to class, instance and log when it reports an
+        exception, but goes on using them, in fmi2Terminate and fmi2FreeInstance at the latest.
+        """
+        for used in (type(self), self, self.log_queue):
+            ctypes.pythonapi.Py_IncRef(ctypes.py_object(used))
 
     def _read(self) -> None:
         """Params and Inputs from the list of values."""

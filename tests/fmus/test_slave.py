@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from fmpy import extract, read_model_description, simulate_fmu
+from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
 from grasp_controller import series
 from gripper_plant import rigid
@@ -98,6 +99,27 @@ def test_many_instances_come_and_go(fmus: Path, tmp_path: Path) -> None:
         with Host(fmus / "ProximitySensor.fmu", tmp_path / str(k % 3)) as host:
             host.slave.enterInitializationMode()
             assert host.get("intensity") > 0.0
+
+
+def test_no_values_at_all(fmus: Path, tmp_path: Path) -> None:
+    with Host(fmus / "ProximitySensor.fmu", tmp_path) as host:
+        host.slave.enterInitializationMode()
+        host.slave.setReal([], [])
+        assert host.slave.getReal([]) == []
+
+
+def test_a_host_outlives_what_a_block_refuses(fmus: Path, tmp_path: Path) -> None:
+    """pythonfmu 0.7.0 alone: terminate or free after an exception crashes the process."""
+    for k in range(20):
+        with Host(fmus / "GripperPlant.fmu", tmp_path / str(k % 3)) as host:
+            host.set(object_width=0.5)
+            for _ in range(3):
+                with pytest.raises(FMICallException, match="EnterInitializationMode"):
+                    host.slave.enterInitializationMode()
+            if k % 2:  # and may even go on, with a value that fits
+                host.set(object_width=0.05)
+                host.slave.enterInitializationMode()
+                assert host.get("gap[1]") == pytest.approx(0.055)
 
 
 def test_instances_are_independent(fmus: Path, tmp_path: Path) -> None:
