@@ -1,7 +1,9 @@
 """Layer 2, impact reduction: the nearer the surface, the more the approach is slowed down.
 
-f_pj = D_pj·xi_j' / xi_j                                                            Eq. (5)
-M_a1·(x_vj1'' - x_v2'') + D_a1·(x_vj1' - x_v2') + K_a1·(x_vj1 - x_v2) = f_pj        Eq. (6)
+    f_pj = D_pj·xi_j' / xi_j                                                            Eq. (5)
+    M_a1·(x_vj1'' - x_v2'') + D_a1·(x_vj1' - x_v2') + K_a1·(x_vj1 - x_v2) = f_pj        Eq. (6)
+
+Each finger has a virtual object of its own; both follow the target of layer 3.
 """
 
 from dataclasses import dataclass

@@ -1,8 +1,10 @@
 """Layer 3, simultaneous contact: moves the target to where both fingers arrive together.
 
-f_s = K_s·tanh((xi_1 - xi_2) / (xi_1 + xi_2))                                       Eq. (2)
-M_a2·(x_v2'' - x_d'') + D_a2·(x_v2' - x_d') + K_a2·(x_v2 - x_d) = f_s               Eq. (3)
-x_d = (x_1 + x_2) / 2,   x_d' = x_d'' = 0                                           Eq. (4)
+    f_s = K_s·tanh((xi_1 - xi_2) / (xi_1 + xi_2))                                       Eq. (2)
+    M_a2·(x_v2'' - x_d'') + D_a2·(x_v2' - x_d') + K_a2·(x_v2 - x_d) = f_s               Eq. (3)
+    x_d = (x_1 + x_2) / 2,   x_d' = x_d'' = 0                                           Eq. (4)
+
+The target starts at x_d and at rest.
 """
 
 from dataclasses import dataclass

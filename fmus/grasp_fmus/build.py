@@ -110,8 +110,6 @@ def _repack(fmu: Path, target: Path) -> None:
     part = target.with_name(f"{target.name}.{os.getpid()}.part")
     with zipfile.ZipFile(fmu) as source, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as copy:
         for name in sorted(source.namelist()):
-            if name.startswith("resources/pythonfmu/tests"):
-                continue
             entry = zipfile.ZipInfo(name, _EPOCH)
             entry.compress_type = zipfile.ZIP_DEFLATED
             entry.external_attr = 0o644 << 16

@@ -75,8 +75,8 @@ class Field:
 def declared(block: Block) -> list[Field]:
     """The fields of a block: inputs, outputs, parameters, each in the order of declaration."""
     return [
-        *_fields(block.Inputs, "input", block.Inputs._field_defaults, ()),
-        *_fields(block.Outputs, "output", {}, ()),
+        *_fields(block.Inputs, "input", block.Inputs._field_defaults),
+        *_fields(block.Outputs, "output", {}),
         *_parameters(block.Params(), ()),
     ]
 
@@ -150,11 +150,9 @@ def _parameters(params: Any, path: tuple[str, ...]) -> Iterator[Field]:
             yield _field((*path, name), "parameter", hint, value)
 
 
-def _fields(
-    cls: type[Any], causality: Causality, starts: dict[str, Any], path: tuple[str, ...]
-) -> Iterator[Field]:
+def _fields(cls: type[Any], causality: Causality, starts: dict[str, Any]) -> Iterator[Field]:
     for name, hint in get_type_hints(cls, include_extras=True).items():
-        yield _field((*path, name), causality, hint, starts.get(name))
+        yield _field((name,), causality, hint, starts.get(name))
 
 
 def _field(path: tuple[str, ...], causality: Causality, hint: Any, start: Any) -> Field:

@@ -51,7 +51,6 @@ def evaluate(system: System, out: Path, workers: int, progress: bool) -> dict[st
         "claims": check_claims(runs, rows, system),
         "runs": [{"condition": r.x_m, "case": r.case, **_steady(r.metrics)} for r in runs.values()],
     }
-    out.mkdir(parents=True, exist_ok=True)
     _draw(runs, rows, out)
     write_text(out / "evaluation.csv", table_csv(rows))
     write_text(out / "evaluation.json", json.dumps(report, indent=2) + "\n")

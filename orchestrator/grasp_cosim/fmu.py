@@ -88,8 +88,9 @@ class FmuInstance:
             fmpy.extract(self.interface.path, folder)
         except Exception as error:  # FMPy and zipfile raise whatever they like
             raise InputError(f"{self.name}: {self.interface.path} is damaged: {error}") from error
+        self._python = (self._resources / "slavemodule.txt").exists()
         plain = str(folder).replace(" ", "")
-        if self._is_python() and quote(plain) != plain:
+        if self._python and quote(plain) != plain:
             raise InputError(
                 f"{self.name}: temporary folder {folder}: a Python FMU crashes on its characters; "
                 "set TMPDIR to a folder of plain ASCII letters"
@@ -111,9 +112,6 @@ class FmuInstance:
             os.chdir(here)  # where loading fails, FMPy stays in the library's folder
         self._worst = 0
         return slave
-
-    def _is_python(self) -> bool:
-        return (self._resources / "slavemodule.txt").exists()
 
     def __enter__(self) -> "FmuInstance":
         return self
@@ -197,7 +195,7 @@ class FmuInstance:
 
     def _function(self, name: str, *arguments: Any) -> Call:
         component = ctypes.c_void_p(self._slave.component)
-        prototype = _PYTHON_FUNCTION if self._is_python() else _NATIVE_FUNCTION
+        prototype = _PYTHON_FUNCTION if self._python else _NATIVE_FUNCTION
         return partial(prototype((name, self._slave.dll)), component, *arguments)
 
     @contextmanager

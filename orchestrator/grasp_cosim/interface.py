@@ -70,15 +70,15 @@ class Interface:
 @lru_cache(maxsize=64)
 def _read(path: Path, modified: int) -> Interface:
     try:
-        version = fmpy.read_model_description(path, validate=False).fmiVersion
-        if version != "2.0":
-            raise InputError(f"{path}: FMI {version}; must be an FMI 2.0 co-simulation FMU")
-        description = fmpy.read_model_description(path)
-    except InputError:
-        raise
+        description = fmpy.read_model_description(path, validate=False)
+        if description.fmiVersion == "2.0":
+            description = fmpy.read_model_description(path)
     except Exception as error:  # FMPy raises whatever its XML and ZIP libraries do
         reason = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"{path}: not a readable FMU: {reason}") from error
+    if description.fmiVersion != "2.0":
+        version = description.fmiVersion
+        raise InputError(f"{path}: FMI {version}; must be an FMI 2.0 co-simulation FMU")
     if description.coSimulation is None:
         raise InputError(f"{path}: for model exchange only; must be a co-simulation FMU")
     return Interface(

@@ -52,23 +52,22 @@ class Master:
 
     def _sequential(self) -> None:
         for link in self.plan.links:
-            for vector, target, source in link.moves:
-                vector[target] = vector[source]
-            for call in link.step:
-                if (status := call()) > WARNING:
-                    raise link.instance.failure(status, self._time.value)
+            self._move(link)
+            self._run(link, link.step)
 
     def _jacobi(self) -> None:
         for link in self.plan.links:
-            for vector, target, source in link.moves:
-                vector[target] = vector[source]
+            self._move(link)
         for link in self.plan.links:
             self._run(link, link.step)
 
+    def _move(self, link: Link) -> None:
+        for vector, target, source in link.moves:
+            vector[target] = vector[source]
+
     def _run(self, link: Link, calls: Sequence[Call]) -> None:
         for call in calls:
-            status = call()
-            if status > WARNING:
+            if (status := call()) > WARNING:
                 raise link.instance.failure(status, self._time.value)
 
     def _propagate(self) -> None:
@@ -79,8 +78,7 @@ class Master:
         for _ in range(len(self.plan.signals) + 2):
             before = self._outputs()
             for link in self.plan.links:
-                for vector, target, source in link.moves:
-                    vector[target] = vector[source]
+                self._move(link)
                 self._run(link, (*link.send, *link.receive))
             moved = [name for name, value in self._outputs().items() if value != before[name]]
             if not moved:

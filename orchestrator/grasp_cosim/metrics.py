@@ -15,6 +15,8 @@ FINGERS = (1, 2)
 CLOSING = {1: -1.0, 2: 1.0}
 """Direction in which a finger closes."""
 
+_PER_FINGER = ("position", "velocity", "gap", "contact_force", "contact")
+
 STEADY_WINDOW = 0.1
 """The steady contact force is the mean over the last so many seconds."""
 
@@ -24,9 +26,6 @@ def is_grasp(signals: Iterable[str]) -> bool:
     names = set(signals)
     wanted = ["object_position", *(f"{v}[{j}]" for v in _PER_FINGER for j in FINGERS)]
     return names >= {f"{CONTROLLER}.target_position", *(f"{PLANT}.{name}" for name in wanted)}
-
-
-_PER_FINGER = ("position", "velocity", "gap", "contact_force", "contact")
 
 
 def grasp_metrics(time: Times, signals: Signals) -> dict[str, Any]:

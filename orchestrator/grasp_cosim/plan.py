@@ -90,8 +90,8 @@ class Plan:
 
 def make_plan(system: System, instances: Sequence[Instance], time: ctypes.c_double) -> Plan:
     """The plan of a system; time is the box the calls read the current time in s from."""
-    reals = _Vector(np.zeros(0), REAL, system, instances)
-    integers = _Vector(np.zeros(0, np.int32), INTEGER, system, instances)
+    reals = _Vector(np.float64, REAL, system, instances)
+    integers = _Vector(np.int32, INTEGER, system, instances)
     return Plan(
         reals.values,
         integers.values,
@@ -105,7 +105,7 @@ class _Vector:
 
     def __init__(
         self,
-        empty: npt.NDArray[Any],
+        dtype: npt.DTypeLike,
         kinds: Sequence[str],
         system: System,
         instances: Sequence[Instance],
@@ -119,7 +119,7 @@ class _Vector:
             for variable in self.exchanged(instance, causality)
         ]
         self.slots = {port: slot for slot, port in enumerate(ports)}
-        self.values = np.zeros(len(ports), empty.dtype)
+        self.values = np.zeros(len(ports), dtype)
 
     def exchanged(self, instance: Instance, causality: str) -> list[Variable]:
         """All outputs, or the wired inputs, of a component that belong into this vector."""

@@ -1,15 +1,17 @@
 """The system description: components, wires and the experiment, from one TOML file.
 
-[experiment]
-step = 1e-4                     # s, communication step
-stop = 3.0                      # s
-scheme = "sequential"           # or "jacobi"
+    wires = ["plant.gap[1] -> sensor_1.gap", ...]   # before the first table, as TOML wants it
 
-[components.plant]              # the order of the components is the order of execution
-fmu = "GripperPlant.fmu"        # relative to the TOML file
-values = { object_width = 0.07 }
+    [experiment]
+    step = 1e-4                     # s, communication step
+    stop = 3.0                      # s
+    scheme = "sequential"           # or "jacobi"
 
-wires = ["plant.gap[1] -> sensor_1.gap", ...]
+    [components.plant]              # the order of the components is the order of execution
+    fmu = "GripperPlant.fmu"        # relative to the TOML file
+    values = { object_width = 0.07 }
+
+Every input has exactly one source: a wire or a value.
 """
 
 import tomllib
@@ -112,9 +114,9 @@ class System:
             raise InputError(f"{key}: {component.fmu.name} declares no such start value")
         return float(component.values.get(variable, declared.start))
 
-    def with_values(self, values: Mapping[str, Value], place: str = "with_values") -> "System":
+    def with_values(self, values: Mapping[str, Value]) -> "System":
         """A copy with start values changed; the keys are like 'plant.object_width'."""
-        return self.revised({}, values, ("swap", place))
+        return self.revised({}, values, ("swap", "with_values"))
 
     def swap(self, component: str, fmu: str | Path) -> "System":
         """A copy with the FMU of one component replaced by another with the same variables."""

@@ -50,10 +50,8 @@ def advance(
     surface is where the object begins, in m; alpha and beta are the stabilisation rates in 1/s.
     Free flight is exact, and so is the moment of contact within a sub-step.
     """
-    acceleration = f / m
-    if time_to_contact(s - surface, v, acceleration) >= h:
-        after = v + acceleration * h
-        return s + 0.5 * h * (v + after), after, 0.0
+    if time_to_contact(s - surface, v, f / m) >= h:
+        return _fly(s, v, f / m, h)
     contact_force = 0.0
     n = substeps(alpha, beta, h)
     d = h / n
