@@ -1,13 +1,20 @@
 """What several tests share: the FMUs, built once per test process, and the built-in system."""
 
-from collections.abc import Callable
+import importlib
+import shutil
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from types import ModuleType
 
 import pytest
+from fmi2 import Fmu
 from grasp_cosim import System
 from grasp_cosim.grasp import SYSTEM
 from grasp_fmus import build as builder
 
+Load = Callable[[str], Fmu]
 Altered = Callable[[str, str, str, str], Path]
 
 
@@ -20,23 +27,59 @@ def fmus(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="session")
+def load(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Load:
+    """An FMU by its name, as an FMI host loads it, once per test process."""
+    loaded: dict[str, Fmu] = {}
+
+    def fmu(name: str) -> Fmu:
+        if name not in loaded:
+            loaded[name] = Fmu(fmus / f"{name}.fmu", tmp_path_factory.mktemp(name))
+        return loaded[name]
+
+    return fmu
+
+
+@pytest.fixture(scope="session")
 def grasp(fmus: Path) -> System:
     """The built-in grasp."""
     return System.load(SYSTEM, fmus)
 
 
 @pytest.fixture
-def altered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Altered:
+def altered(tmp_path: Path) -> Altered:
     """Builds the FMU of a script with one place in one source file changed."""
-    original = builder._sources
 
     def build(script: str, source: str, before: str, after: str) -> Path:
-        def changed(path: Path) -> dict[str, bytes]:
-            sources = original(path)
-            assert sources[source].count(before.encode()) == 1
-            return {**sources, source: sources[source].replace(before.encode(), after.encode())}
-
-        monkeypatch.setattr(builder, "_sources", changed)
-        return builder.build_fmu(builder.SCRIPTS / f"{script}.py", tmp_path / "altered")
+        package = source.partition("/")[0]
+        sources = tmp_path / "sources"
+        shutil.rmtree(sources, ignore_errors=True)
+        original = Path(importlib.import_module(package).__file__ or "").parent
+        shutil.copytree(original, sources / package, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copy(original.parent / "README.md", sources)
+        text = (sources / source).read_text("utf-8")
+        assert text.count(before) == 1
+        (sources / source).write_text(text.replace(before, after), "utf-8")
+        with _imported_from(sources, package):
+            built = builder.build_fmu(builder.SCRIPTS / f"{script}.py", tmp_path / "altered")
+        return built.path
 
     return build
+
+
+@contextmanager
+def _imported_from(folder: Path, package: str) -> Iterator[None]:
+    """The package is the one in the folder."""
+
+    def taken_out() -> dict[str, ModuleType]:
+        names = [n for n in sys.modules if n.partition(".")[0] == package]
+        return {n: sys.modules.pop(n) for n in names}
+
+    ours = taken_out()
+    sys.path.insert(0, str(folder))
+    importlib.invalidate_caches()
+    try:
+        yield
+    finally:
+        sys.path.remove(str(folder))
+        taken_out()
+        sys.modules.update(ours)

@@ -30,12 +30,11 @@ class Params:
 class Inputs(NamedTuple):
     """Samples of the gripper and of its sensors."""
 
-    position: Annotated[Pair, "m", "x_j, position of the fingertip"] = (0.11, -0.11)
-    velocity: Annotated[Pair, "m/s", "x_j', velocity of the fingertip"] = (0.0, 0.0)
-    intensity: Annotated[Pair, "V", "xi_j, offset-compensated output of the proximity sensor"] = (
-        0.03,
-        0.03,
-    )
+    position: Annotated[Pair, "m", "x_j, position of the fingertip", 0.1] = (0.11, -0.11)
+    velocity: Annotated[Pair, "m/s", "x_j', velocity of the fingertip", 0.1] = (0.0, 0.0)
+    intensity: Annotated[
+        Pair, "V", "xi_j, offset-compensated output of the proximity sensor", 0.1
+    ] = (0.03, 0.03)
 
 
 class State(NamedTuple):
@@ -49,13 +48,22 @@ class State(NamedTuple):
 
 
 class Outputs(NamedTuple):
-    """The command to the fingers, and the inner signals of the layers."""
+    """The command to the fingers, and the inner signals of the layers.
 
-    force: Annotated[Pair, "N", "u_j, actuator force on the finger"]
-    target_position: Annotated[float, "m", "x_v,2, target of both fingers"]
-    virtual_position: Annotated[Pair, "m", "x_vj,1, virtual object of the finger"]
-    simultaneous_contact_force: Annotated[float, "N", "f_s, virtual force of layer 3"]
-    impact_reduction_force: Annotated[Pair, "N", "f_pj, virtual force of layer 2"]
+    With layers 3 and 2 off, the middle of the fingers goes straight through to the forces.
+    """
+
+    force: Annotated[
+        Pair, "N", "u_j, actuator force on the finger", 1.0, {"position", "velocity[j]"}
+    ]
+    target_position: Annotated[float, "m", "x_v,2, target of both fingers", 0.1, {"position"}]
+    virtual_position: Annotated[
+        Pair, "m", "x_vj,1, virtual object of the finger", 0.1, {"position"}
+    ]
+    simultaneous_contact_force: Annotated[
+        float, "N", "f_s, virtual force of layer 3", 1.0, set(), {"intensity"}
+    ]
+    impact_reduction_force: Annotated[Pair, "N", "f_pj, virtual force of layer 2", 1.0, set()]
 
 
 def initial_state(p: Params, u: Inputs) -> State:

@@ -1,60 +1,135 @@
-"""Builds the FMUs: stages a script and what it imports under content-hashed names, packs with
-pythonfmu, and rewrites the archive so that the same content gives the same bytes.
+"""Builds the FMUs: a script and what it imports, pythonfmu's binaries, description, documentation.
+
+Everything in an FMU follows from the sources, and the same sources give the same bytes. All Python
+FMUs of a process share one sys.modules, so every module is packed under a name that ends in a hash
+of the whole content; the GUID is that hash.
 """
 
 import hashlib
+import io
 import os
 import re
 import sys
-import tempfile
 import zipfile
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
 from importlib import metadata
-from importlib.util import find_spec
+from importlib.util import find_spec, module_from_spec, spec_from_file_location
 from pathlib import Path
+from typing import Any, Literal
 
-from pythonfmu.builder import FmuBuilder
+import pythonfmu
+
+from .binary import bound, mended, preamble
+from .changes import UNREADABLE, changes
+from .contract import declared
+from .cross_check import cross_check_files
+from .documentation import icon, licences, page
+from .model_description import model_description
 
 SCRIPTS = Path(__file__).parent / "scripts"
-ADAPTER = ("__init__.py", "contract.py", "model_description.py", "slave.py")
+ADAPTER = ("__init__.py", "contract.py", "host_log.py", "loader.py", "slave.py", "snapshot.py")
 """What of this package runs inside an FMU."""
 
+BINARIES = Path(pythonfmu.__file__).parent / "resources" / "binaries"
+HASH = "CONTENT_HASH"
+"""Stands for the content hash until it is known."""
+
 _IMPORT = re.compile(r"^from (\w+)", re.MULTILINE)
-_EPOCH = (1980, 1, 1, 0, 0, 0)
+_DATE = (1980, 1, 1, 0, 0, 0)
 
 
-def build(out: Path) -> list[Path]:
-    """Build the FMUs into the folder out; returns their paths, in alphabetical order.
+@dataclass(frozen=True, slots=True)
+class Built:
+    """An FMU in its folder, and what building it changed there."""
 
-    An FMU that is there already with the same content is left alone.
+    path: Path
+    status: Literal["new", "changed", "unchanged"]
+    changes: tuple[str, ...] = ()
+    """Files in the FMU, and attributes of its variables, that are not what they were."""
+
+
+def build(out: Path, bind_python: str | None = None) -> list[Built]:
+    """Build the FMUs into the folder out, in alphabetical order, with their cross-check files.
+
+    bind_python is a Python executable to whose libpython the FMUs are bound, for hosts that are not
+    Python. An FMU that is there already with the same content is left alone.
     """
-    return [build_fmu(script, out) for script in sorted(SCRIPTS.glob("*.py"))]
+    built = []
+    for script in sorted(SCRIPTS.glob("*.py")):
+        built.append(build_fmu(script, out, bind_python))
+        for name, data in cross_check_files(script.stem, _slave(script).block).items():
+            if not (out / name).is_file() or (out / name).read_bytes() != data:
+                _write(out / name, data)
+    return built
 
 
-def build_fmu(script: Path, out: Path) -> Path:
-    """Build the FMU of one script into the folder out and return its path."""
-    sources = _sources(script)
-    content = _content_hash(sources)
+def build_fmu(script: Path, out: Path, bind_python: str | None = None) -> Built:
+    """Build the FMU of one script into the folder out, like build(), but nothing beside it."""
+    members = _members(script, bind_python)
+    content = _content_hash(members)
     target = out / f"{script.stem}.fmu"
-    if _built_from(target) == content:
-        return target
+    if content == built_from(target):
+        return Built(target, "unchanged")
+    final = {
+        name.replace(HASH, content): data.replace(HASH.encode(), content.encode())
+        for name, data in members.items()
+    }
+    status: Literal["new", "changed"] = "changed" if target.exists() else "new"
+    differences = changes(target, final) if target.exists() else ()
     out.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix="grasp_fmus_") as folder:
-        stage = Path(folder)
-        packages = _stage(sources, stage, content)
-        staged = stage / f"{script.stem}_{content}.py"
-        with _restored_imports():
-            fmu = FmuBuilder.build_FMU(staged, dest=stage, project_files=packages)
-        _repack(fmu, target)
-    return target
+    _write(target, _archive(final))
+    return Built(target, status, differences)
+
+
+def built_from(fmu: Path) -> str | None:
+    """The content hash of an FMU that is there already; None where there is none to be found."""
+    try:
+        with zipfile.ZipFile(fmu) as archive:
+            return archive.read("resources/slavemodule.txt").decode().rpartition("_")[2]
+    except UNREADABLE:
+        return None
+
+
+def _members(script: Path, bind_python: str | None) -> dict[str, bytes]:
+    """The files of the FMU, with HASH in the place of the content hash."""
+    slave = _slave(script)
+    sources = _sources(script)
+    if bind_python:
+        sources[script.name] = preamble(bind_python).encode() + sources[script.name]
+    name = script.stem
+    summary = (slave.__doc__ or "").rstrip(".")
+    fields = declared(slave.block)
+    return {
+        "modelDescription.xml": model_description(name, summary, fields, HASH),
+        "model.png": icon(name),
+        "documentation/index.html": page(
+            name, summary, _card(slave.block), metadata.version("grasp-cosim")
+        ).encode(),
+        **{f"documentation/licenses/{file}": text for file, text in licences().items()},
+        f"binaries/linux64/{name}.so": _linux_binary(bind_python),
+        f"binaries/win64/{name}.dll": _binary("win64/pythonfmu-export.dll"),
+        "resources/slavemodule.txt": f"{name}_{HASH}".encode(),
+        **_packed(sources),
+    }
+
+
+def _slave(script: Path) -> Any:
+    """The class in a script, which has the script's name."""
+    spec = spec_from_file_location(script.stem, script)
+    if spec is None or spec.loader is None:
+        raise ImportError(f"{script}: must be a Python file")
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return getattr(module, script.stem)
 
 
 def _sources(script: Path) -> dict[str, bytes]:
-    """The script and the files of the packages it imports, by their path in the FMU."""
-    text = script.read_text(encoding="utf-8")
-    sources = {script.name: text.encode()}
-    for package in dict.fromkeys(_IMPORT.findall(text)):
+    """The script and the files of the packages it imports, by their path."""
+    text = script.read_bytes()
+    sources = {script.name: text}
+    for package in dict.fromkeys(_IMPORT.findall(text.decode())):
         spec = find_spec(package)
         if spec is None or spec.origin is None:
             raise ModuleNotFoundError(f"{script}: imports {package!r}, which is not installed")
@@ -67,60 +142,58 @@ def _sources(script: Path) -> dict[str, bytes]:
     return sources
 
 
-def _content_hash(sources: dict[str, bytes]) -> str:
-    digest = hashlib.sha256(metadata.version("pythonfmu").encode())
-    for name, data in sorted(sources.items()):
+def _packed(sources: dict[str, bytes]) -> dict[str, bytes]:
+    """The sources as they stand in the FMU, all modules under names with HASH."""
+    packages = {name.partition("/")[0] for name in sources if "/" in name}
+    imports = re.compile(rf"^from ({'|'.join(sorted(packages))})\b", re.MULTILINE)
+    packed = {}
+    for name, data in sources.items():
+        package, _, rest = name.partition("/")
+        if rest:
+            packed[f"resources/{package}_{HASH}/{rest}"] = data
+        else:
+            text = imports.sub(rf"from \1_{HASH}", data.decode())
+            packed[f"resources/{Path(name).stem}_{HASH}.py"] = text.encode()
+    return packed
+
+
+def _card(block: Any) -> str:
+    """The equation card of a block: in the package once installed, beside it in the sources."""
+    folder = Path(sys.modules[block.__package__].__file__ or "").parent
+    inside = folder / "README.md"
+    return (inside if inside.exists() else folder.parent / "README.md").read_text("utf-8")
+
+
+def _binary(name: str) -> bytes:
+    return (BINARIES / name).read_bytes()
+
+
+@cache
+def _linux_binary(bind_python: str | None) -> bytes:
+    binary = mended(_binary("linux64/libpythonfmu-export.so"))
+    return bound(binary, bind_python) if bind_python else binary
+
+
+def _content_hash(members: Mapping[str, bytes]) -> str:
+    digest = hashlib.sha256()
+    for name, data in sorted(members.items()):
         digest.update(f"{name}\0{len(data)}\0".encode() + data)
     return digest.hexdigest()[:16]
 
 
-def _stage(sources: dict[str, bytes], stage: Path, content: str) -> list[Path]:
-    """Write the sources under hashed names: FMUs of one process share one sys.modules."""
-    packages = dict.fromkeys(name.partition("/")[0] for name in sources if "/" in name)
-    for name, data in sources.items():
-        package, _, rest = name.partition("/")
-        if rest:
-            path = stage / f"{package}_{content}" / rest
-        else:
-            text = data.decode()
-            for imported in packages:
-                text = re.sub(rf"\b{imported}\b", f"{imported}_{content}", text)
-            data = text.encode()
-            path = stage / f"{Path(name).stem}_{content}.py"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(data)
-    return [stage / f"{package}_{content}" for package in packages]
-
-
-@contextmanager
-def _restored_imports() -> Iterator[None]:
-    """Pythonfmu's builder imports what it packs; leave sys.path and sys.modules as they were."""
-    path, modules = sys.path.copy(), set(sys.modules)
-    try:
-        yield
-    finally:
-        sys.path[:] = path
-        for name in set(sys.modules) - modules:
-            if re.search(r"_[0-9a-f]{16}\b", name):
-                del sys.modules[name]
-
-
-def _repack(fmu: Path, target: Path) -> None:
-    """Write the archive again with sorted entries and one date, then move it into place."""
-    part = target.with_name(f"{target.name}.{os.getpid()}.part")
-    with zipfile.ZipFile(fmu) as source, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as copy:
-        for name in sorted(source.namelist()):
-            entry = zipfile.ZipInfo(name, _EPOCH)
+def _archive(members: Mapping[str, bytes]) -> bytes:
+    """A ZIP file with sorted entries and one date."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        for name, data in sorted(members.items()):
+            entry = zipfile.ZipInfo(name, _DATE)
             entry.compress_type = zipfile.ZIP_DEFLATED
             entry.external_attr = 0o644 << 16
-            copy.writestr(entry, source.read(name))
+            archive.writestr(entry, data)
+    return buffer.getvalue()
+
+
+def _write(target: Path, data: bytes) -> None:
+    part = target.with_name(f"{target.name}.{os.getpid()}.part")
+    part.write_bytes(data)
     part.replace(target)
-
-
-def _built_from(fmu: Path) -> str | None:
-    """The content hash of an FMU that is there already."""
-    try:
-        with zipfile.ZipFile(fmu) as archive:
-            return archive.read("resources/slavemodule.txt").decode().rpartition("_")[2]
-    except (OSError, KeyError, zipfile.BadZipFile):
-        return None

@@ -24,12 +24,12 @@ def updated(card: str, block: Block) -> str:
 def variable_table(block: Block) -> str:
     """The variables of a block as a Markdown table."""
     lines = [
-        "| variable | causality | unit | start | range | meaning |",
-        "|---|---|---|---|---|---|",
+        "| variable | causality | unit | start | range | feedthrough of | meaning |",
+        "|---|---|---|---|---|---|---|",
     ]
     lines += [
         f"| `{_name(f)}` | {'tunable ' if f.tunable else ''}{f.causality} | {f.unit} "
-        f"| {_start(f)} | {_range(f)} | {f.description} |"
+        f"| {_start(f)} | {_range(f)} | {_feedthrough(f)} | {f.description} |"
         for f in declared(block)
     ]
     return "\n".join(lines) + "\n"
@@ -46,6 +46,12 @@ def _start(f: Field) -> str:
 
 def _range(f: Field) -> str:
     return f"{f.limits[0]:g} to {f.limits[1]:g}" if f.limits else ""
+
+
+def _feedthrough(f: Field) -> str:
+    if f.causality != "output":
+        return ""
+    return ", ".join(f"`{name}`" for name in sorted(f.feedthrough)) or "none"
 
 
 def main(cards: list[str]) -> None:

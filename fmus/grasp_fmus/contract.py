@@ -3,10 +3,16 @@
 A block is a module with Params, Inputs, State, Outputs, initial_state(), step() and outputs().
 Every field of Params, Inputs and Outputs carries
 
-    name: Annotated[type, unit, description, (lowest, highest), "tunable"] = default
+    name: Annotated[type, unit, description, ...] = default
 
-with float, bool, a tuple of them, or (in Params) another such class as its type. The range and
-"tunable" are optional. A tuple becomes name[1], name[2], a nested class name.field.
+with float, bool, a tuple of them, or (in Params) another such class as its type. A tuple becomes
+name[1], name[2], a nested class name.field. After the description follow, in any order,
+
+- for a parameter its range (lowest, highest), and "tunable" if it may change at run time;
+- for a real input or output its nominal value, a float;
+- for an output the set of inputs that reach it without a step, {"gap"}, or {"velocity[j]"} for the
+  one with its own index; set() where there is none. A second set says which reach it during
+  initialisation, when the state itself is made from the inputs; without it they are the same.
 """
 
 from collections.abc import Callable, Iterator
@@ -58,6 +64,9 @@ class Field:
     description: str
     limits: tuple[float, float] | None
     tunable: bool
+    nominal: float | None
+    feedthrough: frozenset[str]
+    initial_feedthrough: frozenset[str]
     start: Any
 
     @property
@@ -84,6 +93,28 @@ def declared(block: Block) -> list[Field]:
 def count(fields: list[Field], *causalities: Causality) -> int:
     """Number of scalar variables of the given causalities."""
     return sum(len(f.names) for f in fields if f.causality in causalities)
+
+
+def feedthrough(fields: list[Field], initially: bool) -> dict[str, list[str]]:
+    """The inputs that reach each output without a step, by name, in the order of declaration.
+
+    initially asks for those that do so in initialisation mode.
+    """
+    inputs = [f for f in fields if f.causality == "input"]
+    reached: dict[str, list[str]] = {}
+    for f in fields:
+        if f.causality == "output":
+            sources = f.initial_feedthrough if initially else f.feedthrough
+            for index, name in enumerate(f.names):
+                reached[name] = [source for i in inputs for source in _chosen(i, sources, index)]
+    return reached
+
+
+def _chosen(f: Field, sources: frozenset[str], index: int) -> list[str]:
+    name = ".".join(f.path)
+    if name in sources:
+        return f.names
+    return [f.names[index]] if f"{name}[j]" in sources else []
 
 
 def packer(cls: type[Any], fields: list[Field]) -> Callable[[list[Any]], Any]:
@@ -156,10 +187,31 @@ def _fields(cls: type[Any], causality: Causality, starts: dict[str, Any]) -> Ite
 
 
 def _field(path: tuple[str, ...], causality: Causality, hint: Any, start: Any) -> Field:
+    name = ".".join(path)
     if get_origin(hint) is not Annotated:
-        raise TypeError(f"{'.'.join(path)}: no unit and description; declare it as Annotated[...]")
+        raise TypeError(f"{name}: no unit and description; declare it as Annotated[...]")
     base, unit, description, *rest = get_args(hint)
-    limits = next((r for r in rest if isinstance(r, tuple)), None)
     size = len(get_args(base)) if get_origin(base) is tuple else None
     kind = get_args(base)[0] if size else base
-    return Field(path, causality, kind, size, unit, description, limits, "tunable" in rest, start)
+    reached_from = [frozenset(r) for r in rest if isinstance(r, (set, frozenset))]
+    if causality == "output" and not reached_from:
+        raise TypeError(f"{name}: must have the set of inputs that reach it without a step")
+    nominal = next((r for r in rest if isinstance(r, float)), None)
+    if causality == "parameter":
+        nominal = abs(start[0] if size else start) or None
+    if kind is float and nominal is None and causality != "parameter":
+        raise TypeError(f"{name}: must have a nominal value, a float")
+    return Field(
+        path,
+        causality,
+        kind,
+        size,
+        unit,
+        description,
+        limits=next((r for r in rest if isinstance(r, tuple)), None),
+        tunable="tunable" in rest,
+        nominal=nominal,
+        feedthrough=reached_from[0] if reached_from else frozenset(),
+        initial_feedthrough=reached_from[-1] if reached_from else frozenset(),
+        start=start,
+    )

@@ -13,7 +13,7 @@ import click
 
 from .errors import InputError, SimulationError
 from .evaluate import evaluate as run_evaluation
-from .grasp import CASES, FMU_FOLDER, grasp_system
+from .grasp import BOUND_FOLDER, CASES, FMU_FOLDER, grasp_system
 from .interface import Value
 from .plot import check_plot
 from .recording import Result
@@ -65,24 +65,44 @@ def cli(debug: bool) -> None:
     \b
     grasp-cosim run                  the published grasp, from FMUs
     grasp-cosim evaluate             the published table and figures, side by side with ours
+    grasp-cosim build                the FMUs
     grasp-cosim COMMAND --help       options and an example
     """
 
 
 @cli.command()
-@click.option("--out", type=click.Path(path_type=Path), default=FMU_FOLDER, show_default=True)
+@click.option("--out", type=click.Path(path_type=Path), help=f"Default: {FMU_FOLDER}")
+@click.option(
+    "--bind-python",
+    is_flag=False,
+    flag_value=sys.executable,
+    metavar="[PYTHON]",
+    help=f"For hosts that are not Python: bind to libpython. Default of --out: {BOUND_FOLDER}",
+)
 @json_option
-def build(out: Path, as_json: bool) -> int:
+def build(out: Path | None, bind_python: str | None, as_json: bool) -> int:
     r"""Build the FMUs: GripperPlant, ProximitySensor, GraspController.
+
+    Says what is not as it was built last. --bind-python adds the libpython of PYTHON, by default
+    of this one, to what the FMUs load.
 
     \b
     Example: grasp-cosim build --out /tmp/fmus
     """
     from grasp_fmus.build import build as build_fmus
 
-    check_folder(out)
-    paths = [str(path) for path in build_fmus(out)]
-    click.echo(json.dumps({"fmus": paths}) if as_json else "\n".join(paths))
+    folder = out or (BOUND_FOLDER if bind_python else FMU_FOLDER)
+    check_folder(folder)
+    try:
+        built = build_fmus(folder, bind_python)
+    except ValueError as error:
+        raise InputError(f"--bind-python {bind_python}: {error}") from error
+    if as_json:
+        report = {str(b.path): {"status": b.status, "changes": list(b.changes)} for b in built}
+        click.echo(json.dumps({"fmus": list(report), "built": report}))
+    else:
+        for b in built:
+            click.echo("\n    ".join((f"{b.path}: {b.status}", *b.changes)))
     return 0
 
 

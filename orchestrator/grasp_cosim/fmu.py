@@ -45,7 +45,10 @@ _NATIVE_FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int)
 
 _SETTERS = {"Real": "setReal", "Integer": "setInteger", "Boolean": "setBoolean"}
 
-_PYTHONFMU_PREFIX = re.compile(r"Fatal py exception encountered: \[\w+\] \w+ ")
+_PYTHONFMU_PREFIX = re.compile(r"Fatal py exception encountered: \[\w+\] \w+\s")
+"""What pythonfmu logs of an exception begins so; nothing else is kept where the FMU said more."""
+
+_TRACEBACK = "Traceback (most recent call last)"
 
 _messages: list[tuple[str, str]] = []
 """What FMUs logged: instance and text. FMPy's logger proxy is one per process, so is this."""
@@ -74,7 +77,7 @@ class FmuInstance:
         self._worst = FATAL  # until it is instantiated
         self._keep: list[Any] = []
         self._running = False
-        self._logged()  # forgets what an earlier instance of this name said
+        self._messages()  # forgets what an earlier instance of this name said
         self._folder = tempfile.TemporaryDirectory(prefix="grasp_fmu_")
         self._resources = Path(self._folder.name, "resources")
         try:
@@ -127,7 +130,8 @@ class FmuInstance:
                 self._slave.terminate()
             except FMICallException as error:
                 self._worst = error.status
-                warnings.warn(f"{self.name}: {error}{self._logged()}", stacklevel=2)
+                said = _as_reason(self._messages())
+                warnings.warn(f"{self.name}: {error}{said}", stacklevel=2)
         if self._worst < FATAL:
             self._slave.freeInstance()
         if str(self._resources) in sys.path:  # pythonfmu puts it there and leaves it
@@ -169,10 +173,14 @@ class FmuInstance:
         """The error for a call that returned status at time in s. The FMU is not used again."""
         self._worst = status
         name = STATUS[status] if status < len(STATUS) else str(status)
-        return SimulationError(
+        said = self._messages()
+        error = SimulationError(
             f"{self.name}: {self.interface.path.name} returned {name} at t = {time:.9g} s"
-            f"{self._logged()}"
+            f"{_as_reason(said)}"
         )
+        for text in said:
+            error.add_note(text)
+        return error
 
     def _bound(
         self, prefix: str, variables: Sequence[Variable], reals: Any, integers: Any
@@ -211,12 +219,19 @@ class FmuInstance:
             ) from error
 
     def _reason(self, error: Exception) -> str:
-        logged = self._logged()
-        return logged.removeprefix(": ") or " ".join(str(error).split())
+        return _as_reason(self._messages()).removeprefix(": ") or " ".join(str(error).split())
 
-    def _logged(self) -> str:
-        """What this instance logged, as one line, and forget it."""
-        lines = [text for instance, text in _messages if instance == self.name]
+    def _messages(self) -> list[str]:
+        """What this instance logged and nobody has read yet."""
+        said = [text for instance, text in _messages if instance == self.name]
         _messages[:] = [m for m in _messages if m[0] != self.name]
-        text = _PYTHONFMU_PREFIX.sub("", " ".join(" ".join(lines).split()))
-        return f": {text}" if text else ""
+        own = re.compile(rf"{re.escape(self.name)}, t = \S+ s: ")  # so our FMUs begin
+        said = [own.sub("", text, count=1) if own.match(text) else text for text in said]
+        return [text for text in said if not _PYTHONFMU_PREFIX.match(text)] or said
+
+
+def _as_reason(said: list[str]) -> str:
+    """Messages as the end of a one-line error; of a traceback only what it comes to."""
+    last = [text.strip().rpartition("\n")[2] if _TRACEBACK in text else text for text in said]
+    text = " ".join(" ".join(last).split())
+    return f": {_PYTHONFMU_PREFIX.sub('', text)}" if text else ""

@@ -13,6 +13,9 @@ SYSTEM = Path(__file__).parent / "grasp.toml"
 FMU_FOLDER = Path("fmus/build")
 """Where the FMUs are built, below the current folder."""
 
+BOUND_FOLDER = Path("fmus/bound")
+"""Where those for hosts that are not Python are built."""
+
 CASES: Mapping[int, Mapping[str, Value]] = MappingProxyType(
     {
         0: {

@@ -52,7 +52,7 @@ class Params:
 class Inputs(NamedTuple):
     """Held over the step."""
 
-    force: Annotated[Pair, "N", "u_j, actuator force on the finger"] = (0.0, 0.0)
+    force: Annotated[Pair, "N", "u_j, actuator force on the finger", 1.0] = (0.0, 0.0)
 
 
 class State(NamedTuple):
@@ -66,12 +66,14 @@ class State(NamedTuple):
 class Outputs(NamedTuple):
     """Measured at the fingers and at the object."""
 
-    position: Annotated[Pair, "m", "x_j, position of the fingertip"]
-    velocity: Annotated[Pair, "m/s", "x_j', velocity of the fingertip"]
-    gap: Annotated[Pair, "m", "l_j, distance from the sensor face to the object surface"]
-    contact_force: Annotated[Pair, "N", "f_cj, force of the object on the finger"]
-    contact: Annotated[tuple[bool, bool], "", "the finger touches the object"]
-    object_position: Annotated[float, "m", "centre of the object"]
+    position: Annotated[Pair, "m", "x_j, position of the fingertip", 0.1, set()]
+    velocity: Annotated[Pair, "m/s", "x_j', velocity of the fingertip", 0.1, set()]
+    gap: Annotated[
+        Pair, "m", "l_j, distance from the sensor face to the object surface", 0.1, set()
+    ]
+    contact_force: Annotated[Pair, "N", "f_cj, force of the object on the finger", 1.0, set()]
+    contact: Annotated[tuple[bool, bool], "", "the finger touches the object", set()]
+    object_position: Annotated[float, "m", "centre of the object", 0.1, set()]
 
 
 def initial_state(p: Params, u: Inputs) -> State:

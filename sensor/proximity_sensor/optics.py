@@ -31,7 +31,7 @@ class Params:
 class Inputs(NamedTuple):
     """What the sensor looks at."""
 
-    gap: Annotated[float, "m", "l, distance from the sensor face to the object surface"] = 0.1
+    gap: Annotated[float, "m", "l, distance from the sensor face to the object surface", 0.1] = 0.1
 
 
 class State(NamedTuple):
@@ -41,7 +41,7 @@ class State(NamedTuple):
 class Outputs(NamedTuple):
     """What the sensor delivers."""
 
-    intensity: Annotated[float, "V", "xi, offset-compensated output"]
+    intensity: Annotated[float, "V", "xi, offset-compensated output", 0.1, {"gap"}]
 
 
 def initial_state(p: Params, u: Inputs) -> State:

@@ -1,62 +1,140 @@
-"""Packing: reproducible, left alone when nothing changed, no name shared between two builds."""
+"""Packing: reproducible, complete, left alone when nothing changed."""
 
+import os
 import shutil
+import subprocess
+import sys
 import zipfile
 from pathlib import Path
 
 import pytest
-from conftest import Altered
-from fmpy import simulate_fmu
 from grasp_fmus import build as builder
+from grasp_fmus.build import Built
 
-NAMES = ["GraspController.fmu", "GripperPlant.fmu", "ProximitySensor.fmu"]
-
-
-def test_builds_the_three_fmus(fmus: Path) -> None:
-    assert sorted(path.name for path in fmus.iterdir()) == NAMES
-
-
-def test_two_builds_give_the_same_bytes(fmus: Path, tmp_path: Path) -> None:
-    for path in builder.build(tmp_path):
-        assert path.read_bytes() == (fmus / path.name).read_bytes()
+NAMES = ["GraspController", "GripperPlant", "ProximitySensor"]
+FMUS = [f"{name}.fmu" for name in NAMES]
+FILES = sorted(
+    f"{name}{end}" for name in NAMES for end in (".fmu", "_in.csv", "_ref.csv", "_ref.opt")
+)
 
 
-def test_an_fmu_with_the_same_content_is_left_alone(fmus: Path, tmp_path: Path) -> None:
-    for name in NAMES:
-        shutil.copy(fmus / name, tmp_path)
-    before = {p.name: p.stat().st_mtime_ns for p in tmp_path.iterdir()}
-    builder.build(tmp_path)
-    assert {p.name: p.stat().st_mtime_ns for p in tmp_path.iterdir()} == before
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
-def test_a_damaged_fmu_is_built_again(fmus: Path, tmp_path: Path) -> None:
-    (tmp_path / "ProximitySensor.fmu").write_bytes(b"half of an archi")
-    builder.build(tmp_path)
-    assert zipfile.is_zipfile(tmp_path / "ProximitySensor.fmu")
-    assert sorted(path.name for path in tmp_path.iterdir()) == NAMES
+def times(folder: Path) -> dict[str, int]:
+    return {path.name: path.stat().st_mtime_ns for path in folder.iterdir()}
+
+
+def test_builds_the_three_fmus_with_their_cross_check_files(fmus: Path) -> None:
+    assert sorted(path.name for path in fmus.iterdir()) == FILES
+
+
+def test_says_what_it_built(tmp_path: Path) -> None:
+    folder = tmp_path / "not" / "there yet"
+    assert builder.build(folder) == [Built(folder / name, "new", ()) for name in FMUS]
+    assert builder.build(folder) == [Built(folder / name, "unchanged", ()) for name in FMUS]
+
+
+def test_another_process_gives_the_same_bytes(fmus: Path, tmp_path: Path) -> None:
+    """From another folder, and with sets in another order."""
+    script = "from pathlib import Path; from grasp_fmus import build; build.build(Path('out'))"
+    for seed in ("1", "2"):
+        subprocess.run(
+            [sys.executable, "-c", script],
+            cwd=tmp_path, check=True,
+            env={**os.environ, "PYTHONHASHSEED": seed, "PYTHONPATH": os.pathsep.join(sys.path)},
+        )  # fmt: skip
+        assert contents(tmp_path / "out") == contents(fmus)
+        shutil.rmtree(tmp_path / "out")
+
+
+@pytest.mark.parametrize("name", FMUS)
+def test_entries_are_sorted_and_dated_alike(fmus: Path, name: str) -> None:
+    with zipfile.ZipFile(fmus / name) as archive:
+        entries = archive.infolist()
+    assert [e.filename for e in entries] == sorted(e.filename for e in entries)
+    assert {e.date_time for e in entries} == {(1980, 1, 1, 0, 0, 0)}
+    assert {e.external_attr >> 16 for e in entries} == {0o644}
+    assert {e.compress_type for e in entries} == {zipfile.ZIP_DEFLATED}
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_module_of_ours_carries_the_content_hash(fmus: Path, name: str) -> None:
-    with zipfile.ZipFile(fmus / name) as archive:
-        script = archive.read("resources/slavemodule.txt").decode()
-        content = script.rpartition("_")[2]
-        packed = {n.split("/")[1] for n in archive.namelist() if n.startswith("resources/")}
-    assert len(content) == 16
-    assert all(
-        name.removesuffix(".py").endswith(f"_{content}")
-        for name in packed - {"pythonfmu", "slavemodule.txt"}
-    )
+def test_everything_an_fmu_should_have(fmus: Path, name: str) -> None:
+    with zipfile.ZipFile(fmus / f"{name}.fmu") as archive:
+        found = {n for n in archive.namelist() if not n.startswith("resources/")}
+    assert found - {n for n in found if n.startswith("documentation/licenses/")} == {
+        "modelDescription.xml",
+        "model.png",
+        "documentation/index.html",
+        f"binaries/linux64/{name}.so",
+        f"binaries/win64/{name}.dll",
+    }
+    assert "documentation/licenses/license.txt" in found
 
 
-def test_two_builds_of_one_fmu_in_one_process_run_their_own_code(
-    fmus: Path, altered: Altered
+def test_no_place_is_left_where_the_hash_belongs(fmus: Path) -> None:
+    for name in FMUS:
+        with zipfile.ZipFile(fmus / name) as archive:
+            for member in archive.namelist():
+                assert builder.HASH not in member
+                assert builder.HASH.encode() not in archive.read(member)
+
+
+def test_an_fmu_with_the_same_content_is_left_alone(fmus: Path, tmp_path: Path) -> None:
+    for path in fmus.iterdir():
+        shutil.copy(path, tmp_path)
+    before = times(tmp_path)
+    builder.build(tmp_path)
+    assert times(tmp_path) == before
+
+
+def test_a_damaged_fmu_is_built_again(fmus: Path, tmp_path: Path) -> None:
+    """The others are not, and nothing is left beside them."""
+    for path in fmus.iterdir():
+        shutil.copy(path, tmp_path)
+    (tmp_path / "ProximitySensor.fmu").write_bytes(b"half of an archi")
+    before = times(tmp_path)
+    statuses = [built.status for built in builder.build(tmp_path)]
+    assert statuses == ["unchanged", "unchanged", "changed"]
+    assert contents(tmp_path) == contents(fmus)
+    after = times(tmp_path)
+    assert [name for name in FILES if before[name] != after[name]] == ["ProximitySensor.fmu"]
+
+
+def test_cross_check_files_are_written_again_where_they_differ(fmus: Path, tmp_path: Path) -> None:
+    for path in fmus.iterdir():
+        shutil.copy(path, tmp_path)
+    (tmp_path / "GripperPlant_in.csv").unlink()
+    (tmp_path / "GraspController_ref.csv").write_text("0\n")
+    before = times(tmp_path)
+    assert {built.status for built in builder.build(tmp_path)} == {"unchanged"}
+    assert contents(tmp_path) == contents(fmus)
+    after = times(tmp_path)
+    assert {n for n in FILES if before.get(n) != after[n]} == {
+        "GripperPlant_in.csv",
+        "GraspController_ref.csv",
+    }
+
+
+def test_one_fmu_alone_is_built_without_cross_check_files(fmus: Path, tmp_path: Path) -> None:
+    builder.build_fmu(builder.SCRIPTS / "GripperPlant.py", tmp_path)
+    assert contents(tmp_path) == {"GripperPlant.fmu": (fmus / "GripperPlant.fmu").read_bytes()}
+
+
+def test_a_build_that_fails_leaves_what_was_there(
+    fmus: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    other = altered(
-        "ProximitySensor", "proximity_sensor/optics.py", "p.gain * p.ref", "2.0 * p.gain * p.ref"
-    )
-    once = simulate_fmu(fmus / "ProximitySensor.fmu", stop_time=0.001)
-    twice = simulate_fmu(other, stop_time=0.001)
-    again = simulate_fmu(fmus / "ProximitySensor.fmu", stop_time=0.001)
-    assert twice["intensity"][-1] == 2.0 * once["intensity"][-1]
-    assert again["intensity"][-1] == once["intensity"][-1]
+    shutil.copy(fmus / "GripperPlant.fmu", tmp_path)
+    monkeypatch.setattr(builder, "icon", lambda name: (_ for _ in ()).throw(OSError("no icon")))
+    with pytest.raises(OSError, match="no icon"):
+        builder.build(tmp_path)
+    assert contents(tmp_path) == {"GripperPlant.fmu": (fmus / "GripperPlant.fmu").read_bytes()}
+
+
+def test_what_an_fmu_was_built_from(fmus: Path, tmp_path: Path) -> None:
+    hashes = {builder.built_from(fmus / name) for name in FMUS}
+    assert len(hashes) == 3
+    assert all(content and len(content) == 16 for content in hashes)
+    assert builder.built_from(tmp_path / "nothing.fmu") is None
+    assert builder.built_from(tmp_path) is None

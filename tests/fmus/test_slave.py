@@ -122,18 +122,6 @@ def test_a_host_outlives_what_a_block_refuses(fmus: Path, tmp_path: Path) -> Non
                 assert host.get("gap[1]") == pytest.approx(0.055)
 
 
-def test_instances_are_independent(fmus: Path, tmp_path: Path) -> None:
-    with (
-        Host(fmus / "ProximitySensor.fmu", tmp_path / "1") as one,
-        Host(fmus / "ProximitySensor.fmu", tmp_path / "2") as two,
-    ):
-        for host in (one, two):
-            host.slave.enterInitializationMode()
-        one.set(gap=0.01)
-        two.set(gap=0.02)
-        assert one.get("intensity") > two.get("intensity")
-
-
 @pytest.mark.parametrize(
     ("name", "block"),
     [("GripperPlant", rigid), ("ProximitySensor", optics), ("GraspController", series)],

@@ -169,8 +169,8 @@ def test_nothing_to_draw_is_found_at_once(command: Run, fmus: Path, tmp_path: Pa
 
 
 def test_a_vendor_plant_with_one_more_input(command: Run, altered: Altered) -> None:
-    force = 'actuator force on the finger"] = (0.0, 0.0)\n'
-    ambient = '    ambient: Annotated[float, "K", "temperature"] = 300.0\n'
+    force = 'actuator force on the finger", 1.0] = (0.0, 0.0)\n'
+    ambient = '    ambient: Annotated[float, "K", "temperature", 300.0] = 300.0\n'
     fmu = altered("GripperPlant", "gripper_plant/rigid.py", force, force + ambient)
     code, _, err = command("run", "--stop", "0.01", "--swap", f"plant={fmu}")
     assert code == 2
@@ -232,6 +232,6 @@ def test_the_built_in_grasp_builds_its_fmus(tmp_path: Path) -> None:
         cwd=tmp_path, capture_output=True, text=True, check=True,
     )  # fmt: skip
     assert json.loads(done.stdout)["steps"] == 100
-    assert sorted(p.name for p in (tmp_path / "fmus/build").iterdir()) == [
+    assert sorted(p.name for p in (tmp_path / "fmus/build").glob("*.fmu")) == [
         "GraspController.fmu", "GripperPlant.fmu", "ProximitySensor.fmu",
     ]  # fmt: skip

@@ -226,3 +226,17 @@ def test_a_failure_in_initialisation_is_a_wrong_input() -> None:
     mock.statuses["receive"] = 3
     with pytest.raises(InputError, match="a: status 3"):
         chain("sequential", clock(), mock).initialise()
+
+
+def test_a_value_that_is_not_finite_is_found_and_is_the_last_one_kept() -> None:
+    lens = Mock("lens", lambda u, time: math.nan if time > 0.15 else time)
+    run = chain("sequential", lens)
+    recorder = Recorder(run.plan, run.total_steps)
+    run.listeners.append(recorder)
+    run.initialise()
+    run.advance(1)
+    recorder.check_finite(0)
+    run.advance(3)
+    with pytest.raises(SimulationError, match=r"lens\.y = nan at step 2: must be finite"):
+        recorder.check_finite(1)
+    assert len(recorder.signals()["lens.y"]) == 3

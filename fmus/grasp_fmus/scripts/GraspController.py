@@ -1,7 +1,5 @@
 from grasp_controller import series
-
-# pythonfmu's loader looks for a class that derives from the name Fmi2Slave.
-from grasp_fmus.slave import BlockSlave as Fmi2Slave
+from grasp_fmus.slave import Fmi2Slave
 
 
 class GraspController(Fmi2Slave):

@@ -1,0 +1,97 @@
+"""Draws the icons of the FMUs.
+
+    python fmus/draw_icons.py [FOLDER]
+
+One picture per FMU, NAME.png, 256 x 256 px with a transparent background, by default into
+grasp_fmus/icons. FMI tools show them small, on white as well as on dark: few shapes, thick lines,
+and colours of middle brightness.
+"""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import FancyArrow, FancyBboxPatch, Polygon
+
+BLUE, RED, AMBER, GREY = "#2f74c0", "#cf4434", "#e09b24", "#7d8893"
+"""Finger 1 is blue and finger 2 red, as in the figures."""
+
+WHITE = "#ffffff"
+SIZE = 256
+"""Width and height in px; the pictures are drawn in these coordinates, y upwards."""
+
+
+def main(folder: Path) -> None:
+    """Draw every icon into the folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, draw in ICONS.items():
+        figure = Figure(figsize=(SIZE / 100, SIZE / 100), dpi=100)
+        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        axes.set(xlim=(0, SIZE), ylim=(0, SIZE))
+        axes.set_axis_off()
+        draw(axes)
+        # Without the version of matplotlib the same drawing gives the same bytes.
+        figure.savefig(folder / f"{name}.png", transparent=True, metadata={"Software": None})
+
+
+def gripper_plant(axes: Axes) -> None:
+    """Two fingers under a wrist, an object between them."""
+    _box(axes, 20, 16, 40, 184, RED)
+    _box(axes, 196, 16, 40, 184, BLUE)
+    _box(axes, 100, 196, 56, 48, GREY)
+    _box(axes, 12, 168, 232, 44, GREY)
+    _box(axes, 84, 24, 88, 108, AMBER)
+    _arrow(axes, 56, 78, 26, 0, RED, 16)
+    _arrow(axes, 200, 78, -26, 0, BLUE, 16)
+
+
+def proximity_sensor(axes: Axes) -> None:
+    """The face of a sensor, its cone of light on a surface, a ray that comes back."""
+    axes.add_patch(Polygon([(62, 178), (210, 236), (210, 84)], color=AMBER, alpha=0.5, lw=0))
+    _box(axes, 202, 16, 40, 224, GREY)
+    _box(axes, 14, 32, 70, 192, BLUE)
+    _box(axes, 34, 156, 36, 44, AMBER)
+    _box(axes, 34, 56, 36, 44, WHITE)
+    axes.plot([84, 198], [172, 140], color=RED, lw=10, solid_capstyle="round")
+    _arrow(axes, 198, 140, -108, -56, RED, 13)
+
+
+def grasp_controller(axes: Axes) -> None:
+    """Three layers, one after the other, each an impedance."""
+    for top in (186, 101):
+        _arrow(axes, 128, top, 0, -28, GREY, 16)
+    for bottom, color in ((184, AMBER), (99, RED), (14, BLUE)):
+        _box(axes, 24, bottom, 208, 58, color)
+        x = [46, 80, 92, 116, 140, 164, 176, 210]
+        y = [0, 0, 15, -15, 15, -15, 0, 0]
+        middle = bottom + 29
+        axes.plot(x, [middle + dy for dy in y], color=WHITE, lw=7, solid_joinstyle="round")
+
+
+ICONS: dict[str, Callable[[Axes], None]] = {
+    "GripperPlant": gripper_plant,
+    "ProximitySensor": proximity_sensor,
+    "GraspController": grasp_controller,
+}
+"""What draws the icon of each FMU."""
+
+
+def _box(axes: Axes, left: float, bottom: float, width: float, height: float, color: str) -> None:
+    style = "round,pad=0,rounding_size=10"
+    axes.add_patch(FancyBboxPatch((left, bottom), width, height, style, color=color, lw=0))
+
+
+def _arrow(axes: Axes, x: float, y: float, dx: float, dy: float, color: str, width: float) -> None:
+    """An arrow from (x, y) that ends at (x + dx, y + dy)."""
+    axes.add_patch(
+        FancyArrow(
+            x, y, dx, dy, width=width, head_width=3 * width, head_length=1.6 * width,
+            length_includes_head=True, color=color, lw=0,
+        )
+    )  # fmt: skip
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) if sys.argv[1:] else Path(__file__).parent / "grasp_fmus" / "icons")

@@ -1,0 +1,80 @@
+"""What differs between an FMU that was built before and one built now."""
+
+import re
+import zipfile
+import zlib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from xml.etree import ElementTree
+
+DESCRIPTION = "modelDescription.xml"
+
+UNREADABLE = (
+    OSError,
+    EOFError,
+    KeyError,
+    ValueError,
+    RuntimeError,
+    zipfile.BadZipFile,
+    zlib.error,
+    ElementTree.ParseError,
+)
+"""What a damaged FMU, or a file that is none, makes zipfile and the XML parser raise."""
+
+_CONTENT_HASH = re.compile(rb"_[0-9a-f]{16}(?![0-9a-f])|guid=.[0-9a-f]{16}")
+
+
+def changes(before: Path, after: Mapping[str, bytes]) -> tuple[str, ...]:
+    """Variables and files that are not what they were in the FMU before; after are all files.
+
+    One line each: what was added, removed, or changed, and for a variable what it was.
+    """
+    try:
+        with zipfile.ZipFile(before) as archive:
+            old = {name: archive.read(name) for name in archive.namelist()}
+        variables = tuple(_variable_changes(old[DESCRIPTION], after[DESCRIPTION]))
+    except UNREADABLE:
+        return ("what was there is no FMU",)
+    return variables + tuple(_file_changes(_plain(old), _plain(after)))
+
+
+def _variable_changes(before: bytes, after: bytes) -> Iterator[str]:
+    old, new = _attributes(before), _attributes(after)
+    for name in sorted({*old, *new}):
+        if name not in old or name not in new:
+            yield f"{name}: {'added' if name in new else 'removed'}"
+            continue
+        for key in sorted({*old[name], *new[name]}):
+            was, now = old[name].get(key), new[name].get(key)
+            if was != now:
+                yield f"{name}: {key} {was or 'none'} -> {now or 'none'}"
+
+
+def _attributes(description: bytes) -> dict[str, dict[str, str]]:
+    """The attributes of every variable, its type's among them."""
+    root = ElementTree.fromstring(description)  # noqa: S314 - of an FMU that was built here
+    return {
+        variable.get("name", ""): {
+            **variable.attrib,
+            **{k: v for t in variable for k, v in t.items()},
+        }
+        for variable in root.iter("ScalarVariable")
+    }
+
+
+def _file_changes(before: Mapping[str, bytes], after: Mapping[str, bytes]) -> Iterator[str]:
+    for name in sorted({*before, *after}):
+        if name not in before or name not in after:
+            yield f"{name}: {'added' if name in after else 'removed'}"
+        elif before[name] != after[name]:
+            yield f"{name}: changed"
+
+
+def _plain(members: Mapping[str, bytes]) -> dict[str, bytes]:
+    """The files without content hashes in their names and texts, which change with everything."""
+    return {
+        _CONTENT_HASH.sub(b"", name.encode()).decode(): data
+        if name.startswith("binaries/")
+        else _CONTENT_HASH.sub(b"", data)
+        for name, data in members.items()
+    }

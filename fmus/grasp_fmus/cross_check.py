@@ -1,0 +1,173 @@
+"""The files of the FMI cross-check beside an FMU: inputs, reference results, options.
+
+The reference is the block itself, run in plain Python, never the FMU: an importer that reproduces
+it has run the FMU as it was meant. Format: FMI cross-check rules 4.1, sections 9.1.4 and 10.
+
+Inputs are applied at the beginning of a step and held, outputs written at its end, before the
+inputs of the next step. Step and times are binary fractions of a second, and whole nanoseconds:
+whether an importer multiplies or adds up, and whatever it does between two rows, it meets each row
+at its very time and sets the very numbers in it.
+"""
+
+import math
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from .contract import Block, Field, build_params, declared, packer, unpacker
+
+STEP_SIZE = 1.0 / 256.0
+STEPS = 768
+"""FMPy's cross-check warns of more than 1,000 rows, the rules refuse more than a megabyte."""
+
+RELATIVE_TOLERANCE = 1e-6
+"""For the comparison alone: mathematical libraries differ in the last digit."""
+
+DIGITS = 9
+"""The inputs are rounded, so that they do not depend on the mathematical library."""
+
+Signal = Callable[[float], float]
+"""An input over the time in s."""
+
+
+def cross_check_files(name: str, block: Block) -> dict[str, bytes]:
+    """NAME_in.csv, NAME_ref.csv and NAME_ref.opt of the FMU name, by file name.
+
+    Without inputs there is no NAME_in.csv. ValueError if an output of the block is not finite.
+    """
+    fields = declared(block)
+    inputs, outputs = _names(fields, "input"), _names(fields, "output")
+    signals = _signals(name, fields)
+    times = [k * STEP_SIZE for k in range(STEPS + 1)]
+    samples = [[signal(t) for signal in signals] for t in times]
+    results = list(_run(block, fields, samples))
+    _check_finite(name, outputs, times, results)
+    files = {
+        f"{name}_ref.csv": _csv(outputs, times, results),
+        f"{name}_ref.opt": _options(times[0], times[-1]),
+    }
+    return {f"{name}_in.csv": _csv(inputs, times, samples), **files} if inputs else files
+
+
+def _names(fields: list[Field], causality: str) -> list[str]:
+    return [name for f in fields if f.causality == causality for name in f.names]
+
+
+def _run(block: Block, fields: list[Field], samples: list[list[Any]]) -> Iterator[list[Any]]:
+    """The outputs after initialisation and after every step."""
+    start = [value for f in fields for value in f.starts]
+    p = build_params(block, fields, start)
+    pack, unpack = packer(block.Inputs, fields), unpacker(fields)
+    inputs = [pack(sample) for sample in samples]
+    x = block.initial_state(p, inputs[0])
+    yield unpack(block.outputs(p, x, inputs[0]))
+    for u in inputs[:-1]:
+        x = block.step(p, x, u, STEP_SIZE)
+        yield unpack(block.outputs(p, x, u))
+
+
+def _check_finite(
+    name: str, variables: list[str], times: list[float], rows: list[list[Any]]
+) -> None:
+    for t, row in zip(times, rows, strict=True):
+        for variable, value in zip(variables, row, strict=True):
+            if not math.isfinite(value):
+                raise ValueError(f"{name}: {variable} = {value!r} at {t} s: must be finite")
+
+
+def _csv(variables: list[str], times: list[float], rows: list[list[Any]]) -> bytes:
+    lines = [",".join(f'"{name}"' for name in ["time", *variables])]
+    lines += [",".join([repr(t), *map(_literal, row)]) for t, row in zip(times, rows, strict=True)]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _literal(value: float | bool) -> str:
+    return str(int(value)) if isinstance(value, bool) else repr(float(value))
+
+
+def _options(start: float, stop: float) -> bytes:
+    """The rules' SolverType is left out: FMPy reads numbers only."""
+    options = {
+        "StartTime": start,
+        "StopTime": stop,
+        "StepSize": STEP_SIZE,
+        "RelTol": RELATIVE_TOLERANCE,
+        "OutputIntervalLength": STEP_SIZE,
+    }
+    return "".join(f"{name}, {value!r}\n" for name, value in options.items()).encode()
+
+
+def _signals(name: str, fields: list[Field]) -> list[Callable[[float], float | bool]]:
+    """A signal per input: from the FMU whose name this one's begins with, or of its own."""
+    known = next((s for of, s in SIGNALS.items() if name.startswith(of)), {})
+    return [
+        _held(start) if f.kind is bool else _rounded(known.get(variable) or _swing(f, start))
+        for f in fields
+        if f.causality == "input"
+        for variable, start in zip(f.names, f.starts, strict=True)
+    ]
+
+
+def _held(start: bool | None) -> Callable[[float], bool]:
+    def signal(t: float) -> bool:
+        return bool(start)
+
+    return signal
+
+
+def _swing(f: Field, start: float | None) -> Signal:
+    """From the start value out by the nominal value and back."""
+    first, width = start or 0.0, f.nominal or 1.0
+    return lambda t: first + width * _rise(t, 0.0, 1.0) - width * _rise(t, 1.5, 2.5)
+
+
+def _rounded(signal: Signal) -> Signal:
+    # + 0.0: interpolation does not keep the sign of -0.0.
+    return lambda t: round(signal(t), DIGITS) + 0.0
+
+
+def _rise(t: float, start: float, stop: float) -> float:
+    """From 0 at start to 1 at stop, level before and after."""
+    s = min(max((t - start) / (stop - start), 0.0), 1.0)
+    return s * s * (3.0 - 2.0 * s)
+
+
+def _rate(t: float, start: float, stop: float) -> float:
+    """The derivative of _rise()."""
+    s = min(max((t - start) / (stop - start), 0.0), 1.0)
+    return 6.0 * s * (1.0 - s) / (stop - start)
+
+
+def _push(t: float, stop: float) -> float:
+    """One way until half of stop, the other way until stop: a body at rest is at rest again."""
+    return math.sin(2.0 * math.pi * t / stop) if t < stop else 0.0
+
+
+SIGNALS: dict[str, dict[str, Signal]] = {
+    # The fingers come near, touch gently one after the other, press, and let go.
+    "GripperPlant": {
+        "force[1]": lambda t: (
+            -0.12 * _push(t, 1.0) - 0.1 * _rise(t, 0.9, 1.1)
+            - 1.9 * _rise(t, 1.6, 1.9) + 2.2 * _rise(t, 2.3, 2.5)
+        ),
+        "force[2]": lambda t: (
+            0.18 * _push(t, 1.3) + 0.1 * _rise(t, 1.2, 1.4)
+            + 2.9 * _rise(t, 1.7, 2.0) - 3.2 * _rise(t, 2.4, 2.6)
+        ),
+    },
+    # From far away until past the surface, and back.
+    "ProximitySensor": {"gap": lambda t: 0.049 + 0.051 * math.cos(2.0 * math.pi * t / 3.0)},
+    # An approach, finger 1 first, and a surface that drifts away again, finger 2 more.
+    "GraspController": {
+        "position[1]": lambda t: 0.11 - 0.045 * _rise(t, 0.0, 1.2),
+        "position[2]": lambda t: -0.11 + 0.105 * _rise(t, 0.0, 1.8),
+        "velocity[1]": lambda t: -0.045 * _rate(t, 0.0, 1.2),
+        "velocity[2]": lambda t: 0.105 * _rate(t, 0.0, 1.8),
+        "intensity[1]": lambda t: (
+            0.075 + 0.9 * _rise(t, 0.2, 1.2) - 0.3 * _rise(t, 2.0, 3.0)
+        ),
+        "intensity[2]": lambda t: (
+            0.03 + 0.9 * _rise(t, 0.6, 1.8) - 0.6 * _rise(t, 2.2, 3.0)
+        ),
+    },
+}  # fmt: skip
+"""What the inputs of each FMU do, by name. A real input that is not here swings out and back."""

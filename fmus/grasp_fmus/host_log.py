@@ -1,0 +1,58 @@
+"""The host's logger, called directly.
+
+pythonfmu 0.7.0 passes messages on only while debug logging is on, and those of a failed call only
+as the bare repr of an exception. What it hands to the slave as "logger" is the address of an object
+that holds the callbacks of the host, from which this module takes the logger.
+"""
+
+import ctypes
+import sys
+from collections.abc import Callable
+
+Log = Callable[[int, str], None]
+"""Logs a message with an FMI status."""
+
+CATEGORIES = {2: "logStatusDiscard", 3: "logStatusError"}
+"""The categories in use, by status; their names are those of the FMI standard."""
+
+_LOGGER = ctypes.CFUNCTYPE(
+    None,
+    ctypes.c_void_p,
+    ctypes.c_char_p,
+    ctypes.c_int,
+    ctypes.c_char_p,
+    ctypes.c_char_p,
+)
+_NAME, _NAME_LENGTH, _CALLBACKS, _ENVIRONMENT = 0x10, 0x18, 0x48, 0x20
+"""Offsets, in the object: the instance name (a std::string of libstdc++) and the address of
+fmi2CallbackFunctions, which begins with the logger; in that: componentEnvironment."""
+
+
+def host_log(address: int, instance: str) -> Log | None:
+    """The logger of the host for an instance; None where it does not stand where it should.
+
+    address is that of pythonfmu's logger. The instance name, found where it is expected, is the
+    proof that the layout is the known one: that of 64 bit Linux.
+    """
+    name = instance.encode()
+    if sys.platform != "linux" or not name:
+        return None
+    if _word(address + _NAME_LENGTH) != len(name):
+        return None
+    if ctypes.string_at(_word(address + _NAME), len(name)) != name:
+        return None
+    callbacks = _word(address + _CALLBACKS)
+    logger, environment = _word(callbacks), _word(callbacks + _ENVIRONMENT)
+    if not logger:
+        return None
+    call = _LOGGER(logger)
+
+    def log(status: int, message: str) -> None:
+        text = message.replace("%", "%%")  # the logger is a printf
+        call(environment, name, status, CATEGORIES[status].encode(), text.encode(errors="replace"))
+
+    return log
+
+
+def _word(address: int) -> int:
+    return ctypes.c_size_t.from_address(address).value

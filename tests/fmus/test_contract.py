@@ -1,0 +1,214 @@
+"""What annotations come to: fields, who reaches whom, and what a declaration must have."""
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Annotated, Any, NamedTuple
+
+import pytest
+from grasp_fmus.contract import (
+    build_params,
+    count,
+    declared,
+    feedthrough,
+    packer,
+    unpacker,
+)
+
+Pair = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Inner:
+    on: Annotated[bool, "", "a switch"] = True
+    rate: Annotated[Pair, "1/s", "rates", (-2.0, 3.0)] = (-0.5, 0.25)
+
+    def __post_init__(self) -> None:
+        if self.rate[0] > 1.0:
+            raise ValueError("rate too high")
+
+
+@dataclass(frozen=True)
+class Params:
+    mass: Annotated[float, "kg", "m, a mass", (0.5, 7.0)] = 2.0
+    inner: Inner = Inner()
+    offset: Annotated[float, "m", "from zero", (-1.0, 1.0), "tunable"] = 0.0
+
+
+class Inputs(NamedTuple):
+    gap: Annotated[float, "m", "a distance", 0.1] = 0.3
+    force: Annotated[Pair, "N", "two forces", 5.0] = (1.0, -1.0)
+    armed: Annotated[tuple[bool, bool], "", "two switches"] = (False, True)
+
+
+class Outputs(NamedTuple):
+    both: Annotated[Pair, "N", "from all forces", 2.0, {"force"}]
+    own: Annotated[Pair, "m", "from its own force", 3.0, {"armed", "force[j]"}]
+    late: Annotated[float, "m", "only at the start", 4.0, set(), {"gap"}]
+    never: Annotated[bool, "", "from no input", set()]
+
+
+def block(params: Any = Params, inputs: Any = Inputs, outputs: Any = Outputs) -> Any:
+    return SimpleNamespace(Params=params, Inputs=inputs, Outputs=outputs)
+
+
+FIELDS = declared(block())
+BY_NAME = {".".join(f.path): f for f in FIELDS}
+NAMES = [name for f in FIELDS for name in f.names]
+
+
+def test_scalars_in_the_order_of_declaration() -> None:
+    assert NAMES == [
+        "gap", "force[1]", "force[2]", "armed[1]", "armed[2]",
+        "both[1]", "both[2]", "own[1]", "own[2]", "late", "never",
+        "mass", "inner.on", "inner.rate[1]", "inner.rate[2]", "offset",
+    ]  # fmt: skip
+
+
+def test_what_a_field_holds() -> None:
+    rate = BY_NAME["inner.rate"]
+    assert (rate.causality, rate.kind, rate.size) == ("parameter", float, 2)
+    assert (rate.unit, rate.description, rate.limits) == ("1/s", "rates", (-2.0, 3.0))
+    armed = BY_NAME["armed"]
+    assert (armed.causality, armed.kind, armed.size) == ("input", bool, 2)
+    never = BY_NAME["never"]
+    assert (never.causality, never.kind, never.size) == ("output", bool, None)
+    assert (BY_NAME["gap"].limits, armed.limits) == (None, None)
+    assert [name for name, f in BY_NAME.items() if f.tunable] == ["offset"]
+
+
+def test_starts_are_the_defaults_and_outputs_have_none() -> None:
+    assert [start for f in FIELDS for start in f.starts] == [
+        0.3, 1.0, -1.0, False, True,
+        None, None, None, None, None, None,
+        2.0, True, -0.5, 0.25, 0.0,
+    ]  # fmt: skip
+
+
+def test_nominal_values() -> None:
+    """Declared for inputs and outputs; for a parameter the size of its start, unless that is 0."""
+    real = {name: f.nominal for name, f in BY_NAME.items() if f.kind is float}
+    assert real == {
+        "gap": 0.1, "force": 5.0,
+        "both": 2.0, "own": 3.0, "late": 4.0,
+        "mass": 2.0, "inner.rate": 0.5, "offset": None,
+    }  # fmt: skip
+
+
+def test_count() -> None:
+    assert count(FIELDS, "input") == 5
+    assert count(FIELDS, "output") == 6
+    assert count(FIELDS, "input", "output") == 11
+    assert count(FIELDS, "parameter") == 5
+    assert count(FIELDS) == 0
+
+
+def test_feedthrough_while_stepping() -> None:
+    assert feedthrough(FIELDS, initially=False) == {
+        "both[1]": ["force[1]", "force[2]"],
+        "both[2]": ["force[1]", "force[2]"],
+        "own[1]": ["force[1]", "armed[1]", "armed[2]"],
+        "own[2]": ["force[2]", "armed[1]", "armed[2]"],
+        "late": [],
+        "never": [],
+    }
+
+
+def test_feedthrough_in_initialisation() -> None:
+    """That of the second set; where there is one only, the same as while stepping."""
+    stepping = feedthrough(FIELDS, initially=False)
+    assert feedthrough(FIELDS, initially=True) == {**stepping, "late": ["gap"]}
+
+
+def test_inputs_and_outputs_to_and_from_the_list_of_values() -> None:
+    values = [0.7, 1.5, 2.5, True, False, *range(50)]
+    u = packer(Inputs, FIELDS)(values)
+    assert u == Inputs(0.7, (1.5, 2.5), (True, False))
+    assert type(u) is Inputs
+    y = Outputs((1.0, 2.0), (3.0, 4.0), 5.0, True)
+    assert unpacker(FIELDS)(y) == [1.0, 2.0, 3.0, 4.0, 5.0, True]
+
+
+def test_params_from_the_list_of_values() -> None:
+    values = [*range(11), 3.0, False, 0.1, 0.2, 0.5]
+    assert build_params(block(), FIELDS, values) == Params(3.0, Inner(False, (0.1, 0.2)), 0.5)
+
+
+def test_what_the_block_refuses_is_passed_on() -> None:
+    with pytest.raises(ValueError, match="rate too high"):
+        build_params(block(), FIELDS, [*range(11), 3.0, False, 1.5, 0.2, 0.5])
+
+
+class BareInput(NamedTuple):
+    force: float = 0.0
+
+
+class BareOutput(NamedTuple):
+    force: float
+
+
+@dataclass(frozen=True)
+class BareParameter:
+    inner: Inner = Inner()
+    force: float = 0.0
+
+
+@dataclass(frozen=True)
+class BareInside:
+    @dataclass(frozen=True)
+    class Layer:
+        force: float = 0.0
+
+    layer: Layer = Layer()
+
+
+@pytest.mark.parametrize(
+    ("parts", "name"),
+    [
+        ({"inputs": BareInput}, "force"),
+        ({"outputs": BareOutput}, "force"),
+        ({"params": BareParameter}, "force"),
+        ({"params": BareInside}, "layer.force"),
+    ],
+)
+def test_a_field_must_be_annotated(parts: dict[str, Any], name: str) -> None:
+    with pytest.raises(TypeError, match=rf"^{name}: .*Annotated\["):
+        declared(block(**parts))
+
+
+class Unreached(NamedTuple):
+    force: Annotated[float, "N", "reached by who knows what", 1.0]
+
+
+class UnreachedSwitch(NamedTuple):
+    force: Annotated[bool, "", "reached by who knows what"]
+
+
+@pytest.mark.parametrize("outputs", [Unreached, UnreachedSwitch])
+def test_an_output_must_say_what_reaches_it(outputs: Any) -> None:
+    with pytest.raises(TypeError, match=r"^force: must have the set of inputs that reach it"):
+        declared(block(outputs=outputs))
+
+
+class InputWithoutNominal(NamedTuple):
+    force: Annotated[float, "N", "how large?"] = 1.0
+
+
+class PairWithoutNominal(NamedTuple):
+    force: Annotated[Pair, "N", "how large?"] = (1.0, 1.0)
+
+
+class OutputWithoutNominal(NamedTuple):
+    force: Annotated[float, "N", "how large?", set()]
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [
+        {"inputs": InputWithoutNominal},
+        {"inputs": PairWithoutNominal},
+        {"outputs": OutputWithoutNominal},
+    ],
+)
+def test_a_real_input_or_output_must_have_a_nominal_value(parts: dict[str, Any]) -> None:
+    with pytest.raises(TypeError, match=r"^force: must have a nominal value, a float"):
+        declared(block(**parts))

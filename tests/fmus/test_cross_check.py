@@ -1,0 +1,237 @@
+"""The cross-check files follow the rules, and an importer reproduces them from the FMU."""
+
+import importlib
+import re
+import shutil
+from dataclasses import dataclass
+from itertools import accumulate, pairwise
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+import pytest
+from conftest import Altered
+from fmpy import read_model_description, simulate_fmu
+from fmpy.cross_check.validate_vendor_repo import read_csv as read_csv_of_the_rules
+from fmpy.cross_check.validate_vendor_repo import validate_test_fmu
+from fmpy.util import read_csv, read_ref_opt_file, validate_result
+from grasp_fmus.contract import declared
+from grasp_fmus.cross_check import SIGNALS, STEP_SIZE, cross_check_files
+
+BLOCKS = {
+    "GripperPlant": "gripper_plant.rigid",
+    "ProximitySensor": "proximity_sensor.optics",
+    "GraspController": "grasp_controller.series",
+}
+LITERAL = re.compile(r"-?\d+(\.\d+)?(e-?\d+)?")
+"""A floating point literal of C."""
+
+
+def block(name: str) -> ModuleType:
+    return importlib.import_module(BLOCKS[name])
+
+
+@pytest.fixture(scope="module", params=sorted(BLOCKS))
+def name(request: pytest.FixtureRequest) -> str:
+    """The FMUs, one after the other."""
+    return str(request.param)
+
+
+@pytest.fixture(scope="module")
+def folder(name: str, fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The files of an FMU, beside it, in a folder as the rules want it."""
+    folder = tmp_path_factory.mktemp("repo") / f"fmus/2.0/cs/linux64/grasp-cosim/1/{name}"
+    folder.mkdir(parents=True)
+    shutil.copy(fmus / f"{name}.fmu", folder)
+    for file, data in cross_check_files(name, block(name)).items():
+        (folder / file).write_bytes(data)
+    return folder
+
+
+def simulated(fmu: Path, folder: Path, name: str, **arguments: Any) -> Any:
+    """The FMU, run by FMPy with the options and inputs in the folder."""
+    options = read_ref_opt_file(folder / f"{name}_ref.opt")
+    arguments = {"output_interval": options["StepSize"], **arguments}
+    return simulate_fmu(
+        fmu,
+        start_time=options["StartTime"],
+        stop_time=options["StopTime"],
+        input=read_csv(folder / f"{name}_in.csv"),
+        **arguments,
+    )
+
+
+def largest_difference(result: Any, reference: Any) -> float:
+    return max(
+        float(np.abs(result[column].astype(float) - reference[column]).max())
+        for column in reference.dtype.names
+    )
+
+
+def test_the_files_are_named_as_the_rules_want(name: str) -> None:
+    files = cross_check_files(name, block(name))
+    assert list(files) == [f"{name}_in.csv", f"{name}_ref.csv", f"{name}_ref.opt"]
+    assert files == cross_check_files(name, block(name))
+
+
+def test_fmpy_finds_no_problem_in_the_submission(folder: Path) -> None:
+    assert validate_test_fmu(str(folder)) == []
+
+
+@pytest.mark.parametrize(("suffix", "causality"), [("in", "input"), ("ref", "output")])
+def test_a_csv_file_follows_the_rules(folder: Path, name: str, suffix: str, causality: str) -> None:
+    description = read_model_description(folder / f"{name}.fmu")
+    variables = [v.name for v in description.modelVariables if v.causality == causality]
+    booleans = {v.name for v in description.modelVariables if v.type == "Boolean"}
+    path = folder / f"{name}_{suffix}.csv"
+    head, *lines = path.read_text("ascii").splitlines()
+    columns = ["time", *variables]
+    assert head == ",".join(f'"{column}"' for column in columns)
+    assert path.stat().st_size < 1e6
+    assert len(lines) <= 1000
+    for line in lines:
+        cells = line.split(",")
+        assert len(cells) == len(columns)
+        assert all(map(LITERAL.fullmatch, cells))
+        assert {c for c, column in zip(cells, columns, strict=True) if column in booleans} <= {
+            "0", "1",
+        }  # fmt: skip
+    table = read_csv(path, variable_names=variables)
+    assert np.array_equal(table, read_csv_of_the_rules(path, variables))
+    assert len(table) == len(lines)
+
+
+def test_the_rows_lie_on_the_communication_points(folder: Path, name: str) -> None:
+    options = read_ref_opt_file(folder / f"{name}_ref.opt")
+    times = read_csv(folder / f"{name}_in.csv")["time"]
+    assert np.array_equal(times, read_csv(folder / f"{name}_ref.csv")["time"])
+    assert times[0] == options["StartTime"]
+    assert times[-1] == options["StopTime"]
+    assert {b - a for a, b in pairwise(times)} == {options["StepSize"]}
+    assert options["OutputIntervalLength"] == options["StepSize"] == STEP_SIZE
+    # Whether a host multiplies, adds up or counts nanoseconds:
+    added_up = accumulate([options["StepSize"]] * (len(times) - 1), initial=0.0)
+    assert list(times) == list(added_up)
+    assert all((1e9 * t).is_integer() for t in map(float, times))
+
+
+def test_every_line_of_the_options_is_read(folder: Path, name: str) -> None:
+    lines = (folder / f"{name}_ref.opt").read_text("ascii").splitlines()
+    assert len(read_ref_opt_file(folder / f"{name}_ref.opt")) == len(lines)
+    assert all(re.fullmatch(r"\w+, [0-9.e-]+", line) for line in lines)
+
+
+def test_the_fmu_gives_the_reference_to_the_last_bit(folder: Path, name: str) -> None:
+    result = simulated(folder / f"{name}.fmu", folder, name)
+    reference = read_csv(folder / f"{name}_ref.csv")
+    assert set(result.dtype.names) == set(reference.dtype.names)
+    for column in reference.dtype.names:
+        assert result[column].astype(float).tobytes() == reference[column].tobytes(), column
+
+
+def test_an_importer_with_a_step_of_its_own_passes(folder: Path, name: str) -> None:
+    options = read_ref_opt_file(folder / f"{name}_ref.opt")
+    result = simulated(
+        folder / f"{name}.fmu", folder, name, step_size=options["StepSize"], output_interval=None
+    )
+    assert result["time"][1] != options["StepSize"]
+    outside = validate_result(result, read_csv(folder / f"{name}_ref.csv"), options["StopTime"])
+    assert outside < 0.002  # the rules allow 0.1; the peak of an impact may lie between two samples
+
+
+@pytest.mark.parametrize(
+    ("name", "source", "before", "after"),
+    [
+        ("ProximitySensor", "proximity_sensor/optics.py", "p.gain *", "1.0001 * p.gain *"),
+        ("GripperPlant", "gripper_plant/rigid.py", "return half + x_m", "return half + x_m + 1e-6"),
+        ("GraspController", "grasp_controller/series.py", "u.position), 0.0", "u.position), 1e-4"),
+    ],
+)
+def test_a_changed_block_is_noticed(
+    altered: Altered, tmp_path: Path, name: str, source: str, before: str, after: str
+) -> None:
+    for file, data in cross_check_files(name, block(name)).items():
+        (tmp_path / file).write_bytes(data)
+    result = simulated(altered(name, source, before, after), tmp_path, name)
+    assert largest_difference(result, read_csv(tmp_path / f"{name}_ref.csv")) > 1e-7
+
+
+def test_signals_are_those_of_the_inputs() -> None:
+    for name, signals in SIGNALS.items():
+        fields = declared(block(name))
+        assert list(signals) == [n for f in fields if f.causality == "input" for n in f.names]
+
+
+def test_the_inputs_put_every_output_to_use(folder: Path, name: str) -> None:
+    reference = read_csv(folder / f"{name}_ref.csv")
+    still = [column for column in reference.dtype.names if len(set(reference[column])) == 1]
+    assert still == (["object_position"] if name == "GripperPlant" else [])
+
+
+def test_both_fingers_touch_press_and_let_go(tmp_path: Path) -> None:
+    (tmp_path / "ref.csv").write_bytes(
+        cross_check_files("GripperPlant", block("GripperPlant"))["GripperPlant_ref.csv"]
+    )
+    reference = read_csv(tmp_path / "ref.csv")
+    for j in (1, 2):
+        contact = reference[f"contact[{j}]"]
+        assert (contact[0], contact[512], contact[-1]) == (0.0, 1.0, 0.0)
+        assert abs(reference[f"contact_force[{j}]"][512]) > 1.5
+
+
+def test_the_sensor_sees_from_far_away_past_the_surface() -> None:
+    signal = SIGNALS["ProximitySensor"]["gap"]
+    assert signal(0.0) == pytest.approx(0.1)
+    assert signal(1.5) == pytest.approx(-0.002)
+
+
+def test_a_variant_is_driven_like_the_fmu_whose_name_it_begins_with() -> None:
+    files = cross_check_files("GripperPlantCompliant", block("GripperPlant"))
+    original = cross_check_files("GripperPlant", block("GripperPlant"))
+    assert list(files.values()) == list(original.values())
+    assert next(iter(files)) == "GripperPlantCompliant_in.csv"
+
+
+@dataclass(frozen=True)
+class Params:
+    """No parameters."""
+
+
+class Inputs(NamedTuple):
+    """A switch and a signal."""
+
+    on: Annotated[bool, "", "a switch"] = True
+    signal: Annotated[float, "1", "a signal", 2.0] = 1.0
+
+
+class Outputs(NamedTuple):
+    """The inverse of something that reaches zero, if it is wanted."""
+
+    value: Annotated[float, "1", "the value", 1.0, {"signal"}]
+
+
+def other(power: float) -> Any:
+    """A block that none of the signals is for."""
+    return SimpleNamespace(
+        Params=Params,
+        Inputs=Inputs,
+        Outputs=Outputs,
+        initial_state=lambda p, u: None,
+        step=lambda p, x, u, h: None,
+        outputs=lambda p, x, u: Outputs(np.float64(3.0 - u.signal) ** power if u.on else 0.0),
+    )
+
+
+def test_another_block_swings_from_the_start_by_the_nominal_value() -> None:
+    files = cross_check_files("Other", other(1.0))
+    rows = [line.split(",") for line in files["Other_in.csv"].decode().splitlines()]
+    assert rows[0] == ['"time"', '"on"', '"signal"']
+    assert {row[1] for row in rows[1:]} == {"1"}
+    assert (rows[1][2], max(row[2] for row in rows[1:]), rows[-1][2]) == ("1.0", "3.0", "1.0")
+
+
+@pytest.mark.filterwarnings("ignore:divide by zero")
+def test_a_reference_that_is_not_finite_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"^Other: value = .*inf.* at 1\.\d* s: must be finite$"):
+        cross_check_files("Other", other(-1.0))

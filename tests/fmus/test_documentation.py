@@ -1,0 +1,230 @@
+"""The page, the licences and the icon that every FMU holds."""
+
+import importlib
+import runpy
+import struct
+import zipfile
+from importlib import metadata
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from grasp_fmus import build as builder
+from grasp_fmus import documentation
+from grasp_fmus.contract import declared
+from grasp_fmus.documentation import icon, licences, page
+
+ROOT = Path(__file__).parents[2]
+
+BLOCKS = {
+    "GripperPlant": ("plant", "gripper_plant.rigid"),
+    "ProximitySensor": ("sensor", "proximity_sensor.optics"),
+    "GraspController": ("controller", "grasp_controller.series"),
+}
+SECTIONS = {
+    "How the host must find Python": [
+        "inside the binary of pythonfmu", "64 bit", "Python 3.11 or newer", "a Python process",
+        "nothing", "LD_PRELOAD=libpython3.x.so.1.0", "grasp-cosim build --bind-python",
+        "PYTHONHOME", "python3.dll", "python3x.dll", "PATH", "No packages need to be installed",
+        "+, #, %", "ASCII", "grasp-cosim doctor {name}.fmu",
+    ],
+    "Errors": [
+        "fmi2Error (on Windows fmi2Fatal)", "has no effect", "even when debug logging is off",
+        "instance, time, variable, value and the allowed range", "not be finite", "fmi2Discard",
+    ],
+    "State": [
+        "Getting, setting, freeing and serialising", "instances of the same FMU", "check sum",
+    ],
+    "Licence": ["MIT", "licenses/license.txt", "licenses/pythonfmu.txt"],
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module", params=sorted(BLOCKS))
+def name(request: pytest.FixtureRequest) -> str:
+    """The FMUs, one after the other."""
+    return str(request.param)
+
+
+@pytest.fixture(scope="module")
+def html(name: str) -> str:
+    """The page of an FMU, from its card in the repository."""
+    card = (ROOT / BLOCKS[name][0] / "README.md").read_text("utf-8")
+    return page(name, "A summary", card, "1.2.3")
+
+
+def parsed(html: str) -> ElementTree.Element:
+    """The page as XML: stricter than any reader of HTML."""
+    return ElementTree.fromstring(html)
+
+
+def text(element: ElementTree.Element) -> str:
+    return " ".join("".join(element.itertext()).split())
+
+
+def sections(html: str) -> dict[str, str]:
+    """The text under each heading of the second level."""
+    found: dict[str, str] = {}
+    title = ""
+    for element in parsed(html).iterfind("body/*"):
+        if element.tag == "h2":
+            title = text(element)
+        found[title] = f"{found.get(title, '')} {text(element)}"
+    return found
+
+
+def links(html: str) -> list[str]:
+    return [
+        element.attrib[attribute]
+        for element in parsed(html).iter()
+        for attribute in ("href", "src")
+        if attribute in element.attrib
+    ]
+
+
+def rendered(markdown: str) -> str:
+    """What a card comes out as: what lies between the head of the page and its first section."""
+    html = page("Name", "Summary", markdown, "1.2.3")
+    return html.partition("grasp-cosim 1.2.3.</p>\n")[2].partition("<h2>How the host")[0].strip()
+
+
+def test_every_fmu_has_a_card_here() -> None:
+    assert {script.stem for script in builder.SCRIPTS.glob("*.py")} == set(BLOCKS)
+
+
+def test_the_page_is_well_formed_and_says_what_it_is(html: str, name: str) -> None:
+    root = parsed(html)
+    assert html.startswith("<!DOCTYPE html>\n")
+    assert root.tag == "html"
+    assert [child.tag for child in root] == ["head", "body"]
+    assert [text(e) for e in root.iter("title")] == [text(e) for e in root.iter("h1")] == [name]
+    assert {e.get("charset") for e in root.iter("meta")} == {"utf-8", None}
+    assert "A summary." in text(root)
+    assert "grasp-cosim 1.2.3." in text(root)
+
+
+def test_every_variable_is_in_the_table(html: str, name: str) -> None:
+    fields = declared(importlib.import_module(BLOCKS[name][1]))
+    rows = [[text(cell) for cell in row] for row in parsed(html).iter("tr")]
+    described = {row[0]: row for row in rows if len(row) == 7}
+    for f in fields:
+        row = described[".".join(f.path) + (f"[1..{f.size}]" if f.size else "")]
+        assert f.causality in row[1]
+        assert row[2] == f.unit
+        assert row[6] == f.description
+    assert len(described) == len(fields) + 1  # and the heading
+
+
+def test_the_equations_are_set_as_they_are_written(html: str, name: str) -> None:
+    card = (ROOT / BLOCKS[name][0] / "README.md").read_text("utf-8")
+    equations = [line.strip() for line in card.splitlines() if line.startswith("    ")]
+    set_as_code = "".join("".join(e.itertext()) for e in parsed(html).iter("pre"))
+    assert equations
+    assert all(equation in set_as_code for equation in equations)
+
+
+@pytest.mark.parametrize("title", SECTIONS)
+def test_a_section_says_what_a_user_must_know(html: str, name: str, title: str) -> None:
+    section = sections(html)[title]
+    for fact in SECTIONS[title]:
+        assert fact.format(name=name) in section
+
+
+def test_the_sections_follow_the_card(html: str) -> None:
+    assert list(sections(html))[-4:] == list(SECTIONS)
+
+
+def test_the_page_stands_alone(html: str) -> None:
+    root = parsed(html)
+    assert not {e.tag for e in root.iter()} & {"script", "link", "iframe", "img", "object"}
+    assert not [a for e in root.iter() for a in e.attrib if a.startswith("on")]
+    assert "http" not in html
+    assert "url(" not in html
+    assert "@import" not in html
+    assert str(ROOT) not in html
+    assert "<!--" not in html
+    assert "&lt;!--" not in html
+    assert set(links(html)) == {f"licenses/{file}" for file in licences()}
+
+
+def test_headings_go_down_a_level() -> None:
+    assert rendered("# One\n\n## Two") == "<h2>One</h2>\n<h3>Two</h3>"
+    assert rendered("###### Six") == "<h6>Six</h6>"
+
+
+def test_links_and_pictures_of_a_card_come_out_as_their_text() -> None:
+    assert rendered("see [*the* plant](../plant/README.md)") == "<p>see <em>the</em> plant</p>"
+    assert rendered("a ![contact <1>](../docs/a.png)") == "<p>a contact &lt;1&gt;</p>"
+
+
+def test_html_in_a_card_is_text_and_its_marks_vanish() -> None:
+    assert rendered("a <b>c</b> & d") == "<p>a &lt;b&gt;c&lt;/b&gt; &amp; d</p>"
+    table = rendered("<!-- variables -->\n| a |\n|---|\n| b |\n<!-- end of variables -->\n")
+    assert table.startswith("<h3>Variables</h3>\n<table>")
+    assert table.endswith("</table>")
+
+
+def test_name_summary_and_version_are_text() -> None:
+    html = page("A<b", "c & d.", "", "<1>")
+    assert [text(e) for e in parsed(html).iter("h1")] == ["A<b"]
+    assert "c & d." in text(parsed(html))
+    assert "grasp-cosim <1>." in text(parsed(html))
+
+
+def test_licences_are_those_of_the_distributions() -> None:
+    found = licences()
+    assert list(found) == ["license.txt", "pythonfmu.txt"]
+    assert found["license.txt"].decode() == (ROOT / "LICENSE").read_text("utf-8")
+    theirs = metadata.distribution("pythonfmu").locate_file(
+        f"pythonfmu-{metadata.version('pythonfmu')}.dist-info/licenses/LICENSE"
+    )
+    assert found["pythonfmu.txt"].decode() == Path(str(theirs)).read_text("utf-8")
+    assert all(b"Permission is hereby granted, free of charge" in text for text in found.values())
+
+
+@pytest.mark.parametrize("distribution", ["no-such-distribution", "grasp-cosim"])
+def test_a_missing_licence_is_named(monkeypatch: pytest.MonkeyPatch, distribution: str) -> None:
+    monkeypatch.setattr(documentation, "_LICENCES", {"license.txt": distribution})
+    monkeypatch.setattr(metadata.PathDistribution, "read_text", lambda self, name: None)
+    with pytest.raises(FileNotFoundError, match=f"^{distribution}: .*licenses/LICENSE.*pip$"):
+        licences()
+
+
+def test_the_icon_is_a_small_picture_with_a_transparent_background(name: str) -> None:
+    png = icon(name)
+    assert png.startswith(b"\x89PNG\r\n\x1a\n")
+    length, kind, width, height, depth, color = struct.unpack(">I4sIIBB", png[8:26])
+    assert (length, kind, width, height, depth) == (13, b"IHDR", 256, 256, 8)
+    assert color == 6  # red, green, blue and alpha
+    assert len(png) < 10_000
+    assert b"tEXt" not in png  # neither program nor date
+
+
+def test_icons_differ_and_there_is_one_per_fmu() -> None:
+    files = list(documentation.ICONS.iterdir())
+    assert {file.name for file in files} == {f"{name}.png" for name in BLOCKS}
+    assert len({file.read_bytes() for file in files}) == len(files)
+
+
+def test_a_missing_icon_is_named() -> None:
+    with pytest.raises(FileNotFoundError, match=r"^Nonesuch: no icon; fmus/draw_icons\.py"):
+        icon("Nonesuch")
+
+
+def test_the_script_draws_the_icons(tmp_path: Path, name: str) -> None:
+    image = pytest.importorskip("matplotlib.image")
+    runpy.run_path(str(ROOT / "fmus" / "draw_icons.py"))["main"](tmp_path)
+    drawn = image.imread(tmp_path / f"{name}.png")
+    kept = image.imread(documentation.ICONS / f"{name}.png")
+    assert drawn.shape == kept.shape == (256, 256, 4)
+    assert abs(drawn - kept).max() < 0.02  # another matplotlib may smooth edges differently
+    assert kept[0, 0, 3] == 0.0
+    assert kept[..., 3].max() == 1.0
+
+
+def test_the_fmu_holds_page_licences_and_icon(fmus: Path, name: str) -> None:
+    with zipfile.ZipFile(fmus / f"{name}.fmu") as archive:
+        html = archive.read("documentation/index.html").decode()
+        assert links(html)
+        for link in links(html):
+            assert archive.read(f"documentation/{link}") == licences()[Path(link).name]
+        assert archive.read("model.png") == icon(name)

@@ -1,0 +1,175 @@
+"""FMU states: complete, exact to the bit, across instances and through bytes."""
+
+import random
+from math import sin
+
+import pytest
+from conftest import Load
+from fmi2 import ERROR, OK, Fmu, Instance
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+H = 1e-3
+NAMES = ("GripperPlant", "ProximitySensor", "GraspController")
+
+
+PARAMETERS = {
+    "GripperPlant": {"finger_mass[1]": 0.7, "object_width": 0.06},
+    "ProximitySensor": {"offset_distance": 0.006},
+    "GraspController": {"contact_force.stiffness": 90.0, "impact_reduction.mass": 1.3},
+}
+
+
+def ready(fmu: Fmu) -> Instance:
+    """An instance in step mode, with parameters that are not those it starts with."""
+    return Instance(fmu).initialise(**PARAMETERS[fmu.name])
+
+
+def drive(instance: Instance, first: int, last: int) -> list[float]:
+    """Steps from first to last with inputs that change; returns all outputs."""
+    seen = []
+    for k in range(first, last):
+        inputs = instance.fmu.names("input")
+        scale = -2.0 if "force[1]" in inputs else 0.05
+        values = {n: scale * sin(0.1 * k + i) + 0.06 for i, n in enumerate(inputs)}
+        assert instance.set(values) == OK
+        assert instance.step(k * H, H) == OK
+        seen += instance.outputs()
+    return seen
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_step_save_step_restore_step(load: Load, name: str) -> None:
+    with ready(load(name)) as instance:
+        drive(instance, 0, 150)
+        state = instance.state()
+        first = drive(instance, 150, 300)
+        assert instance.restore(state) == OK
+        assert drive(instance, 150, 300) == first
+        state.free()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_outputs_are_those_of_the_moment_of_saving(load: Load, name: str) -> None:
+    with ready(load(name)) as instance:
+        drive(instance, 0, 100)
+        saved = instance.state(), instance.outputs()
+        drive(instance, 100, 120)
+        assert instance.restore(saved[0]) == OK
+        assert instance.outputs() == saved[1]
+        saved[0].free()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_state_carries_over_to_another_instance(load: Load, name: str) -> None:
+    with ready(load(name)) as one, Instance(load(name), "two") as two:
+        drive(one, 0, 100)
+        state = one.state()
+        assert two.restore(state) == OK  # even one that was never initialised
+        assert drive(two, 100, 200) == drive(one, 100, 200)
+        state.free()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_state_goes_through_bytes(load: Load, name: str) -> None:
+    with ready(load(name)) as one:
+        drive(one, 0, 100)
+        state = one.state()
+        data = state.to_bytes()
+        state.free()
+        expected = drive(one, 100, 200)
+    with Instance(load(name), "two") as two:
+        status, restored = two.from_bytes(data)
+        assert (status, restored.to_bytes()) == (OK, data)
+        assert two.restore(restored) == OK
+        assert drive(two, 100, 200) == expected
+        restored.free()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_phase_is_part_of_the_state(load: Load, name: str) -> None:
+    with Instance(load(name)) as instance:
+        fresh = instance.state()
+        instance.initialise()
+        stepping = instance.state()
+        drive(instance, 0, 10)
+        assert instance.restore(fresh) == OK
+        assert instance.step(0.0, H) == ERROR
+        instance.initialise()
+        assert instance.call("Terminate") == OK
+        assert instance.restore(stepping) == OK
+        assert instance.step(0.0, H) == OK
+        fresh.free()
+        stepping.free()
+
+
+def test_a_state_frozen_in_time_does_not_follow_the_instance(load: Load) -> None:
+    with ready(load("GripperPlant")) as instance:
+        state = instance.state()
+        data = state.to_bytes()
+        drive(instance, 0, 50)
+        assert state.to_bytes() == data
+        state.free()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_damaged_bytes_are_refused(load: Load, name: str) -> None:
+    """Every byte counts, and so does the length."""
+    with ready(load(name)) as instance:
+        drive(instance, 0, 20)
+        state = instance.state()
+        data = state.to_bytes()
+        outputs = instance.outputs()
+        damaged = [data[:-1], data + b"\0", data[:40], b"", b"\0" * len(data)]
+        damaged += [
+            data[:k] + bytes([data[k] ^ 1 << random.Random(k).randrange(8)]) + data[k + 1 :]
+            for k in range(len(data))
+        ]
+        for bad in damaged:
+            instance.log.clear()
+            assert instance.from_bytes(bad)[0] == ERROR
+            assert "t = 0.02 s: state " in instance.log[0].text
+            assert ": must " in instance.log[0].text
+        assert instance.outputs() == outputs
+        state.free()
+
+
+def test_a_state_of_another_fmu_is_refused(load: Load) -> None:
+    with ready(load("GripperPlant")) as plant, ready(load("ProximitySensor")) as sensor:
+        state = plant.state()
+        assert sensor.restore(state) == ERROR
+        assert "state of another FMU: must be of this one" in sensor.log[0].text
+        assert sensor.from_bytes(state.to_bytes())[0] == ERROR
+        assert "state of the FMU with content" in sensor.log[1].text
+        assert sensor.step(0.0, H) == OK
+        state.free()
+
+
+@given(
+    forces=st.lists(st.floats(-50.0, 50.0), min_size=2, max_size=2),
+    steps=st.integers(0, 60),
+    size=st.sampled_from([1e-4, 1e-3, 7e-3]),
+)
+@settings(max_examples=40, deadline=None)
+def test_any_moment_can_be_restored(
+    load: Load, forces: list[float], steps: int, size: float
+) -> None:
+    """In flight, in contact, leaving: from a drawn moment on, twice the same bits."""
+    with Instance(load("GripperPlant")).initialise() as instance:
+        assert instance.set({"force[1]": forces[0], "force[2]": forces[1]}) == OK
+        time = 0.0
+        for _ in range(steps):
+            assert instance.step(time, size) == OK
+            time += size
+        state = instance.state()
+        runs = []
+        for _ in range(2):
+            assert instance.restore(state) == OK
+            now, seen = time, []
+            for _ in range(20):
+                assert instance.step(now, size) == OK
+                now += size
+                seen += instance.outputs()
+            runs.append(seen)
+        assert runs[0] == runs[1]
+        state.free()
