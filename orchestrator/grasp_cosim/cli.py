@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import sys
 import tempfile
 import traceback
@@ -14,6 +15,8 @@ import click
 from .errors import InputError, SimulationError
 from .evaluate import evaluate as run_evaluation
 from .grasp import BOUND_FOLDER, CASES, FMU_FOLDER, grasp_system
+from .inspection import as_text as inspection_text
+from .inspection import inspect_fmu
 from .interface import Value
 from .plot import check_plot
 from .recording import Result
@@ -66,6 +69,7 @@ def cli(debug: bool) -> None:
     grasp-cosim run                  the published grasp, from FMUs
     grasp-cosim evaluate             the published table and figures, side by side with ours
     grasp-cosim build                the FMUs
+    grasp-cosim inspect FMU          an FMU's interface
     grasp-cosim COMMAND --help       options and an example
     """
 
@@ -103,6 +107,24 @@ def build(out: Path | None, bind_python: str | None, as_json: bool) -> int:
     else:
         for b in built:
             click.echo("\n    ".join((f"{b.path}: {b.status}", *b.changes)))
+    return 0
+
+
+@cli.command()
+@click.argument("fmu", type=click.Path(path_type=Path))
+@json_option
+def inspect(fmu: Path, as_json: bool) -> int:
+    r"""Show the interface of any FMU: variables, units, ranges, dependencies, capabilities.
+
+    \b
+    Example: grasp-cosim inspect fmus/build/GripperPlant.fmu
+    """
+    report = inspect_fmu(fmu)
+    if as_json:
+        click.echo(json.dumps(report))
+    else:
+        width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+        click.echo(inspection_text(report, width))
     return 0
 
 

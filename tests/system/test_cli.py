@@ -235,3 +235,22 @@ def test_the_built_in_grasp_builds_its_fmus(tmp_path: Path) -> None:
     assert sorted(p.name for p in (tmp_path / "fmus/build").glob("*.fmu")) == [
         "GraspController.fmu", "GripperPlant.fmu", "ProximitySensor.fmu",
     ]  # fmt: skip
+
+
+def test_inspect_shows_the_interface(command: Run, fmus: Path) -> None:
+    fmu = str(fmus / "ProximitySensor.fmu")
+    code, out, err = command("inspect", fmu)
+    assert (code, err) == (0, "")
+    assert re.search(r"^intensity +output +continuous +Real +V +gap +xi, ", out, re.MULTILINE)
+    code, out, _ = command("inspect", fmu, "--json")
+    assert code == 0
+    assert json.loads(out)["variables"][0]["name"] == "gap"
+
+
+def test_inspect_of_what_is_no_fmu(command: Run, tmp_path: Path) -> None:
+    text = tmp_path / "notes.fmu"
+    text.write_text("not an archive")
+    code, out, err = command("inspect", str(text))
+    assert (code, out) == (2, "")
+    assert err.startswith(f"grasp-cosim: {text}: not a readable FMU: ")
+    assert err.count("\n") == 1
