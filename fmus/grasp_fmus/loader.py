@@ -3,7 +3,6 @@
 import ctypes
 import sys
 from collections.abc import Callable
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 from weakref import ref
 
@@ -40,21 +39,31 @@ class Component:
         return instance
 
 
-_slaves: "dict[str, type[Fmi2Slave]]" = {}
-"""The class of each script, as it was imported."""
+_made: "dict[str, Once]" = {}
+"""The class of each script that was imported."""
 
 
-def prepare(slave: "type[Fmi2Slave]") -> None:
-    """Make the script of a slave fit to be run again at every instantiation, as pythonfmu does.
+class Once(type):
+    """The type of a slave: its class is made once, however often its script is run.
 
-    It then gives up a reference to the module's dictionary that it only borrowed, which makes the
-    second or third instance crash: paid back here. And it takes the class from the module: what it
-    finds there is a Component of its own.
+    pythonfmu imports the script and then runs it again at every instantiation. It loses what it
+    learns of the classes in it, and so would keep every class that were made. It then gives up a
+    reference to the module's dictionary that it only borrowed, which makes the second or third
+    instance crash: paid back here. And it takes the class from the module: what it finds there is
+    a Component of its own.
     """
-    module: ModuleType | None = sys.modules.get(slave.__module__)
-    if module is not None:
+
+    def __new__(cls, name: str, bases: tuple[type, ...], namespace: dict[str, Any]) -> "Once":
+        """The class of that name in the module that is being run."""
+        script = namespace["__module__"]
+        module = sys.modules.get(script)
+        if not bases or module is None:
+            return super().__new__(cls, name, bases, namespace)
+        made = _made.get(script) or super().__new__(cls, name, bases, namespace)
+        _made[script] = made
         keep(vars(module))
-        setattr(module, slave.__name__, Component(_slaves.setdefault(module.__name__, slave)))
+        setattr(module, name, Component(made))
+        return made
 
 
 def forget(resources: str) -> None:

@@ -14,7 +14,7 @@ from typing import Any, Concatenate, NamedTuple, ParamSpec, TypeVar
 
 from .contract import Block, build_params, count, declared, packer, unpacker
 from .host_log import CATEGORIES, host_log
-from .loader import Component, forget, keep, prepare
+from .loader import Component, Once, forget, keep
 from .snapshot import Snapshot, from_bytes, to_bytes
 
 INSTANTIATED, INITIALISING, STEPPING, TERMINATED = range(4)
@@ -86,17 +86,13 @@ def _reported(call: _Method[_P, _R]) -> _Method[_P, _R]:
     return reported
 
 
-class Fmi2Slave:
+class Fmi2Slave(metaclass=Once):
     """A block as an FMI 2.0 co-simulation slave; a subclass names the block.
 
     pythonfmu's loader looks for a class that derives from one of this name.
     """
 
     block: Block
-
-    def __init_subclass__(cls) -> None:
-        """See to it that pythonfmu's loader can run the script again and again."""
-        prepare(cls)
 
     def __init__(
         self, component: Component, instance_name: str, resources: str, logger: int, visible: int
