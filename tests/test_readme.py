@@ -29,7 +29,7 @@ def checkout(tmp_path: Path, fmus: Path, grasp: System, monkeypatch: pytest.Monk
 
 
 def test_there_is_something_to_try() -> None:
-    assert len(COMMANDS) == 8
+    assert len(COMMANDS) == 9
     assert len(EXAMPLES) == 1
 
 

@@ -12,6 +12,9 @@ from typing import Any, NoReturn
 
 import click
 
+from .doctor import as_json as findings_json
+from .doctor import as_text as findings_text
+from .doctor import examine
 from .errors import InputError, SimulationError
 from .evaluate import evaluate as run_evaluation
 from .grasp import BOUND_FOLDER, CASES, FMU_FOLDER, grasp_system
@@ -70,6 +73,7 @@ def cli(debug: bool) -> None:
     grasp-cosim evaluate             the published table and figures, side by side with ours
     grasp-cosim build                the FMUs
     grasp-cosim inspect FMU          an FMU's interface
+    grasp-cosim doctor FMU           whether this machine will load an FMU
     grasp-cosim COMMAND --help       options and an example
     """
 
@@ -126,6 +130,25 @@ def inspect(fmu: Path, as_json: bool) -> int:
         width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
         click.echo(inspection_text(report, width))
     return 0
+
+
+@cli.command()
+@click.argument("fmu", required=False, type=click.Path(path_type=Path))
+@json_option
+def doctor(fmu: Path | None, as_json: bool) -> int:
+    r"""Find out whether this machine will load FMU, and what to do if not.
+
+    Without FMU: whether it will load Python FMUs at all.
+
+    \b
+    Example: grasp-cosim doctor vendor.fmu
+    """
+    findings = examine(fmu)
+    if as_json:
+        click.echo(json.dumps({"findings": findings_json(findings)}))
+    else:
+        click.echo(findings_text(findings))
+    return NEGATIVE if any(f.status == "problem" for f in findings) else 0
 
 
 @cli.command()

@@ -6,6 +6,7 @@ import math
 import re
 import subprocess
 import sys
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -254,3 +255,31 @@ def test_inspect_of_what_is_no_fmu(command: Run, tmp_path: Path) -> None:
     assert (code, out) == (2, "")
     assert err.startswith(f"grasp-cosim: {text}: not a readable FMU: ")
     assert err.count("\n") == 1
+
+
+def test_doctor_finds_nothing_wrong_with_ours(command: Run, fmus: Path) -> None:
+    code, out, err = command("doctor", str(fmus / "ProximitySensor.fmu"), "--json")
+    assert (code, err) == (0, "")
+    found = {f["check"]: f["status"] for f in json.loads(out)["findings"]}
+    assert found["trial"] == "ok"
+    assert "problem" not in found.values()
+
+
+def test_doctor_finds_what_is_missing(command: Run, fmus: Path, tmp_path: Path) -> None:
+    bare = tmp_path / "bare.fmu"
+    with zipfile.ZipFile(fmus / "ProximitySensor.fmu") as whole, zipfile.ZipFile(bare, "w") as part:
+        for name in whole.namelist():
+            if not name.startswith("binaries/linux64"):
+                part.writestr(name, whole.read(name))
+    code, out, _ = command("doctor", str(bare))
+    assert code == 1
+    assert re.search(
+        r"^problem +binary +no binaries/linux64/ProximitySensor\.so", out, re.MULTILINE
+    )
+    assert "fix: " in out
+
+
+def test_doctor_without_an_fmu_looks_at_the_machine(command: Run) -> None:
+    code, out, _ = command("doctor")
+    assert code == 0
+    assert re.search(r"^ok +python +3\.1\d", out)
