@@ -31,7 +31,7 @@ h2 { margin-top: 2em; padding-bottom: 0.2em; border-bottom: 1px solid #888; }
 pre { padding: 0.6em 1em; border-left: 4px solid #888; overflow: auto; line-height: 1.4; }
 table { border-collapse: collapse; }
 th, td { padding: 0.3em 0.7em; border: 1px solid #888; text-align: left; vertical-align: top; }
-td:first-child, td:nth-child(3) { white-space: nowrap; }
+td:first-child { white-space: nowrap; }
 </style>
 </head>
 <body>
