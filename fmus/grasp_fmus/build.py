@@ -6,6 +6,7 @@ of the whole content; the GUID is that hash.
 """
 
 import hashlib
+import importlib
 import io
 import os
 import re
@@ -15,14 +16,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib import metadata
-from importlib.util import find_spec, module_from_spec, spec_from_file_location
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any, Literal
 
 import pythonfmu
 
 from .binary import bound, mended, preamble
-from .changes import UNREADABLE, changes
+from .changes import changes, read_members
 from .contract import declared
 from .cross_check import cross_check_files
 from .documentation import icon, licences, page
@@ -67,29 +68,22 @@ def build(out: Path, bind_python: str | None = None) -> list[Built]:
 
 def build_fmu(script: Path, out: Path, bind_python: str | None = None) -> Built:
     """Build the FMU of one script into the folder out, like build(), but nothing beside it."""
-    members = _members(script, bind_python)
-    content = _content_hash(members)
-    target = out / f"{script.stem}.fmu"
-    if content == built_from(target):
-        return Built(target, "unchanged")
-    final = {
+    template = _members(script, bind_python)
+    content = _content_hash(template)
+    members = {
         name.replace(HASH, content): data.replace(HASH.encode(), content.encode())
-        for name, data in members.items()
+        for name, data in template.items()
     }
-    status: Literal["new", "changed"] = "changed" if target.exists() else "new"
-    differences = changes(target, final) if target.exists() else ()
+    target = out / f"{script.stem}.fmu"
+    if not target.exists():
+        built = Built(target, "new")
+    elif (before := read_members(target)) == members:
+        return Built(target, "unchanged")
+    else:
+        built = Built(target, "changed", changes(before, members))
     out.mkdir(parents=True, exist_ok=True)
-    _write(target, _archive(final))
-    return Built(target, status, differences)
-
-
-def built_from(fmu: Path) -> str | None:
-    """The content hash of an FMU that is there already; None where there is none to be found."""
-    try:
-        with zipfile.ZipFile(fmu) as archive:
-            return archive.read("resources/slavemodule.txt").decode().rpartition("_")[2]
-    except UNREADABLE:
-        return None
+    _write(target, _archive(members))
+    return built
 
 
 def _members(script: Path, bind_python: str | None) -> dict[str, bytes]:
@@ -130,10 +124,7 @@ def _sources(script: Path) -> dict[str, bytes]:
     text = script.read_bytes()
     sources = {script.name: text}
     for package in dict.fromkeys(_IMPORT.findall(text.decode())):
-        spec = find_spec(package)
-        if spec is None or spec.origin is None:
-            raise ModuleNotFoundError(f"{script}: imports {package!r}, which is not installed")
-        folder = Path(spec.origin).parent
+        folder = Path(importlib.import_module(package).__file__ or "").parent
         files = (
             [folder / name for name in ADAPTER] if package == __package__ else folder.rglob("*.py")
         )

@@ -9,33 +9,31 @@ from xml.etree import ElementTree
 
 DESCRIPTION = "modelDescription.xml"
 
-UNREADABLE = (
-    OSError,
-    EOFError,
-    KeyError,
-    ValueError,
-    RuntimeError,
-    zipfile.BadZipFile,
-    zlib.error,
-    ElementTree.ParseError,
-)
-"""What a damaged FMU, or a file that is none, makes zipfile and the XML parser raise."""
+UNREADABLE = (OSError, EOFError, ValueError, RuntimeError, zipfile.BadZipFile, zlib.error)
+"""What a damaged archive, or a file that is none, makes zipfile raise."""
 
 _CONTENT_HASH = re.compile(rb"_[0-9a-f]{16}(?![0-9a-f])|guid=.[0-9a-f]{16}")
 
 
-def changes(before: Path, after: Mapping[str, bytes]) -> tuple[str, ...]:
-    """Variables and files that are not what they were in the FMU before; after are all files.
+def read_members(fmu: Path) -> dict[str, bytes]:
+    """The files in an FMU; empty where it is damaged or none."""
+    try:
+        with zipfile.ZipFile(fmu) as archive:
+            return {name: archive.read(name) for name in archive.namelist()}
+    except UNREADABLE:
+        return {}
+
+
+def changes(before: Mapping[str, bytes], after: Mapping[str, bytes]) -> tuple[str, ...]:
+    """Variables and files that are not what they were, from the files in an FMU.
 
     One line each: what was added, removed, or changed, and for a variable what it was.
     """
     try:
-        with zipfile.ZipFile(before) as archive:
-            old = {name: archive.read(name) for name in archive.namelist()}
-        variables = tuple(_variable_changes(old[DESCRIPTION], after[DESCRIPTION]))
-    except UNREADABLE:
+        variables = tuple(_variable_changes(before[DESCRIPTION], after[DESCRIPTION]))
+    except (KeyError, ElementTree.ParseError):
         return ("what was there is no FMU",)
-    return variables + tuple(_file_changes(_plain(old), _plain(after)))
+    return variables + tuple(_file_changes(_plain(before), _plain(after)))
 
 
 def _variable_changes(before: bytes, after: bytes) -> Iterator[str]:

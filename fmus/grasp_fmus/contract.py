@@ -83,11 +83,11 @@ class Field:
 
 def declared(block: Block) -> list[Field]:
     """The fields of a block: inputs, outputs, parameters, each in the order of declaration."""
-    return [
-        *_fields(block.Inputs, "input", block.Inputs._field_defaults),
-        *_fields(block.Outputs, "output", {}),
-        *_parameters(block.Params(), ()),
-    ]
+    inputs = list(_fields(block.Inputs, "input", block.Inputs._field_defaults))
+    outputs = list(_fields(block.Outputs, "output", {}))
+    for f in outputs:
+        _check_feedthrough(f, inputs)
+    return [*inputs, *outputs, *_parameters(block.Params(), ())]
 
 
 def count(fields: list[Field], *causalities: Causality) -> int:
@@ -110,6 +110,17 @@ def feedthrough(fields: list[Field], initially: bool) -> dict[str, list[str]]:
     return reached
 
 
+def _check_feedthrough(output: Field, inputs: list[Field]) -> None:
+    valid = {i.path[0] for i in inputs}
+    valid |= {f"{i.path[0]}[j]" for i in inputs if output.size and i.size == output.size}
+    unknown = (output.feedthrough | output.initial_feedthrough) - valid
+    if unknown:
+        raise TypeError(
+            f"{output.path[0]}: depends on {', '.join(sorted(unknown))}; "
+            f"valid: {', '.join(sorted(valid)) or 'nothing, there are no inputs'}"
+        )
+
+
 def _chosen(f: Field, sources: frozenset[str], index: int) -> list[str]:
     name = ".".join(f.path)
     if name in sources:
@@ -129,7 +140,8 @@ def packer(cls: type[Any], fields: list[Field]) -> Callable[[list[Any]], Any]:
             items = ", ".join(f"v[{first + i}]" for i in range(len(f.names)))
             parts.append(items if f.size is None else f"({items},)")
             first += len(f.names)
-    return _compiled(f"lambda v: new(cls, ({', '.join(parts)},))", new=tuple.__new__, cls=cls)
+    items = "".join(f"{part}, " for part in parts)
+    return _compiled(f"lambda v: new(cls, ({items}))", new=tuple.__new__, cls=cls)
 
 
 def unpacker(fields: list[Field]) -> Callable[[Any], list[Any]]:
@@ -197,9 +209,9 @@ def _field(path: tuple[str, ...], causality: Causality, hint: Any, start: Any) -
     if causality == "output" and not reached_from:
         raise TypeError(f"{name}: must have the set of inputs that reach it without a step")
     nominal = next((r for r in rest if isinstance(r, float)), None)
-    if causality == "parameter":
+    if kind is float and causality == "parameter":
         nominal = abs(start[0] if size else start) or None
-    if kind is float and nominal is None and causality != "parameter":
+    elif kind is float and nominal is None:
         raise TypeError(f"{name}: must have a nominal value, a float")
     return Field(
         path,

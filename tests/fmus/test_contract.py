@@ -92,6 +92,7 @@ def test_nominal_values() -> None:
         "both": 2.0, "own": 3.0, "late": 4.0,
         "mass": 2.0, "inner.rate": 0.5, "offset": None,
     }  # fmt: skip
+    assert {f.nominal for f in FIELDS if f.kind is bool} == {None}
 
 
 def test_count() -> None:
@@ -212,3 +213,42 @@ class OutputWithoutNominal(NamedTuple):
 def test_a_real_input_or_output_must_have_a_nominal_value(parts: dict[str, Any]) -> None:
     with pytest.raises(TypeError, match=r"^force: must have a nominal value, a float"):
         declared(block(**parts))
+
+
+class Unreached(NamedTuple):
+    misspelt: Annotated[float, "m", "", 1.0, {"gapp"}]
+
+
+class NoPair(NamedTuple):
+    own: Annotated[Pair, "m", "", 1.0, {"gap[j]"}]
+
+
+class NoSuchAtTheStart(NamedTuple):
+    late: Annotated[float, "m", "", 1.0, set(), {"force[1]"}]
+
+
+@pytest.mark.parametrize(
+    ("outputs", "message"),
+    [
+        (Unreached, "misspelt: depends on gapp; valid: armed, force, gap$"),
+        (NoPair, r"own: depends on gap\[j\]; valid: armed, armed\[j\], force, force\[j\], gap$"),
+        (NoSuchAtTheStart, r"late: depends on force\[1\]; valid: armed, force, gap$"),
+    ],
+)
+def test_an_output_can_only_depend_on_inputs_that_there_are(outputs: Any, message: str) -> None:
+    with pytest.raises(TypeError, match=message):
+        declared(block(outputs=outputs))
+
+
+class NoInputs(NamedTuple):
+    """A source."""
+
+
+class Source(NamedTuple):
+    level: Annotated[float, "m", "", 1.0, set()]
+
+
+def test_a_block_may_have_no_inputs() -> None:
+    fields = declared(block(inputs=NoInputs, outputs=Source))
+    assert packer(NoInputs, fields)([None]) == NoInputs()
+    assert feedthrough(fields, initially=True) == {"level": []}

@@ -1,8 +1,8 @@
 from grasp_controller import series
-from grasp_fmus.slave import Fmi2Slave
+from grasp_fmus import slave
 
 
-class GraspController(Fmi2Slave):
+class GraspController(slave.Fmi2Slave):
     """Multiple impedance control: simultaneous contact, impact reduction, contact force."""
 
     block = series

@@ -1,9 +1,9 @@
 from gripper_plant import rigid
 
-from grasp_fmus.slave import Fmi2Slave
+from grasp_fmus import slave
 
 
-class GripperPlant(Fmi2Slave):
+class GripperPlant(slave.Fmi2Slave):
     """Two-finger gripper and a rigid, fixed object."""
 
     block = rigid

@@ -1,9 +1,9 @@
 from proximity_sensor import optics
 
-from grasp_fmus.slave import Fmi2Slave
+from grasp_fmus import slave
 
 
-class ProximitySensor(Fmi2Slave):
+class ProximitySensor(slave.Fmi2Slave):
     """Optical proximity sensor of the reflected-light-intensity type, one channel."""
 
     block = optics

@@ -1,0 +1,191 @@
+"""A thousand instances come and go, and leave nothing behind in the process.
+
+Measured in a process of its own:  python tests/fmus/test_cycles.py FMU FOLDER
+"""
+
+import atexit
+import ctypes
+import gc
+import json
+import os
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fmi2 import ERROR, OK, Fmu, Instance
+
+NAMES = ("GraspController", "GripperPlant", "ProximitySensor")
+BEFORE, CYCLES = 200, 1000
+"""The first cycles fill caches; growth is counted from there to the last."""
+
+WARM, CALLS = 100, 500
+"""Calls of every kind, in one instance."""
+
+LISTS, BLOCKS = 1, 12
+"""What pythonfmu 0.7.0's binary itself loses at every instantiation.
+
+Of the class in the script it makes a list of the class and its bases (LISTS), and of each of these
+three the repr, as str and as bytes; one more bytes object for the class it settles on, and a str for
+the folder: 10 blocks, where a list has two, or 0.8 kB.
+"""
+
+LOOSE = 40
+"""Objects of one type that may have come, by chance, in any process."""
+
+KEPT = 100
+"""Bytes a cycle that malloc has given out and not got back: all that is not Python's, 0 to 15."""
+
+RESIDENT = 3e6
+"""Bytes: BLOCKS of 70 bytes a cycle, and a megabyte for what Python takes at a time."""
+
+
+class _Malloc(ctypes.Structure):
+    """What glibc says of its heap: mallinfo2."""
+
+    _fields_ = tuple(
+        (name, ctypes.c_size_t)
+        for name in (
+            "arena", "ordblks", "smblks", "hblks", "hblkhd",
+            "usmblks", "fsmblks", "uordblks", "fordblks", "keepcost",
+        )
+    )  # fmt: skip
+
+
+def live(instance: Instance) -> None:
+    """From instantiation or reset into step mode."""
+    instance.initialise()
+    first = instance.fmu.names("input")[0]
+    for k in range(3):
+        assert instance.set({first: 0.01 * k}) == OK
+        assert instance.step(k * 1e-3, 1e-3) == OK
+        instance.outputs()
+
+
+def states(instance: Instance) -> None:
+    """Save, serialise, restore."""
+    state = instance.state()
+    status, copy = instance.from_bytes(state.to_bytes())
+    assert (status, instance.restore(copy), instance.restore(state)) == (OK, OK, OK)
+    state.free()
+    copy.free()
+
+
+def refused(instance: Instance) -> None:
+    """Calls that are refused, each with its message."""
+    assert instance.set_real([4711], [0.0]) == ERROR
+    assert instance.step(5.0, 1e-3) == ERROR
+    assert instance.enter() == ERROR
+    instance.log.clear()
+
+
+def damaged(instance: Instance) -> None:
+    """Bytes that are no state."""
+    assert instance.from_bytes(b"nonsense")[0] == ERROR
+    instance.log.clear()
+
+
+def reset(instance: Instance) -> None:
+    assert instance.call("Reset") == OK
+    live(instance)
+
+
+KINDS: dict[str, Callable[[Instance], None]] = {
+    "states": states,
+    "refused": refused,
+    "damaged": damaged,
+    "reset": reset,
+}
+
+
+def cycle(fmu: Fmu, k: int) -> None:
+    """A life, of a kind that depends on k; a free without a terminate is allowed as well."""
+    with Instance(fmu, f"instance {k % 10}") as instance:
+        live(instance)
+        for act in list(KINDS.values())[k % 5 : k % 5 + 1]:
+            act(instance)
+        if k % 3:
+            assert instance.call("Terminate") == OK
+
+
+def memory() -> dict[str, int]:
+    """What Python's own objects and malloc hold."""
+    gc.collect()
+    libc = ctypes.CDLL(None)
+    libc.mallinfo2.restype = _Malloc
+    malloc = libc.mallinfo2()
+    return {"blocks": sys.getallocatedblocks(), "malloc": malloc.uordblks + malloc.hblkhd}
+
+
+def process() -> dict[str, Any]:
+    """What there is in this process."""
+    held = memory()
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return {
+        "sys.path": list(sys.path),
+        "sys.modules": sorted(sys.modules),
+        "sys.path_importer_cache": sorted(sys.path_importer_cache),
+        "atexit": atexit._ncallbacks(),
+        "objects": Counter(f"{type(o).__module__}.{type(o).__name__}" for o in gc.get_objects()),
+        "resident": pages * os.sysconf("SC_PAGE_SIZE"),
+        **held,
+    }
+
+
+def main(fmu: str, folder: str) -> None:
+    """Prints what there was after BEFORE and after all cycles; two copies of the FMU take turns.
+
+    Then what one instance adds by CALLS calls of every kind.
+    """
+    fmus = [Fmu(Path(fmu), Path(folder, name)) for name in "ab"]
+    at: list[dict[str, Any]] = []
+    for k in range(CYCLES):
+        if k == BEFORE:
+            at.append(process())
+        cycle(fmus[k // 5 % 2], k)
+    at.append(process())
+    added = {}
+    with Instance(fmus[0]) as instance:
+        live(instance)
+        for name, act in KINDS.items():
+            for k in range(CALLS + WARM):
+                if k == WARM:
+                    before = memory()
+                act(instance)
+            after = memory()
+            added[name] = {key: after[key] - before[key] for key in after}
+    json.dump((*at, added), sys.stdout)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="asks Linux and glibc")
+@pytest.mark.parametrize("name", NAMES)
+def test_a_thousand_instances_leave_nothing_behind(fmus: Path, tmp_path: Path, name: str) -> None:
+    done = subprocess.run(
+        [sys.executable, __file__, fmus / f"{name}.fmu", tmp_path],
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])},
+        capture_output=True, text=True,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")
+    before, after, added = json.loads(done.stdout)
+    for key in ("sys.path", "sys.modules", "sys.path_importer_cache", "atexit"):
+        assert after[key] == before[key]
+    ours = {str(tmp_path / folder / "resources") for folder in "ab"}
+    assert not ours & {*after["sys.path"], *after["sys.path_importer_cache"]}
+    grown = Counter(after["objects"])
+    grown.subtract(before["objects"])
+    cycles = CYCLES - BEFORE
+    grown["builtins.list"] -= LISTS * cycles
+    assert {kind: n for kind, n in grown.items() if n > LOOSE} == {}
+    assert after["blocks"] - before["blocks"] < BLOCKS * cycles
+    assert after["malloc"] - before["malloc"] < KEPT * cycles
+    assert after["resident"] - before["resident"] < RESIDENT
+    added["damaged"]["blocks"] -= CALLS  # pythonfmu keeps the bytes of a state that is refused
+    assert {kind: n for kind, n in added.items() if max(n.values()) > CALLS / 2} == {}
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
