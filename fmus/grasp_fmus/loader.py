@@ -31,7 +31,11 @@ class Component:
         return self._alive().state_to_bytes(snapshot)
 
     def _fmu_state_from_bytes(self, data: bytes) -> "Snapshot":
-        return self._alive().state_from_bytes(data)
+        try:
+            return self._alive().state_from_bytes(data)
+        except BaseException:
+            release(data)  # pythonfmu keeps what it could not use
+            raise
 
     def _alive(self) -> "Fmi2Slave":
         instance = self._instance()
@@ -46,36 +50,44 @@ _made: "dict[str, Once]" = {}
 class Once(type):
     """The type of a slave: its class is made once, however often its script is run.
 
-    pythonfmu imports the script and then runs it again at every instantiation. It loses what it
-    learns of the classes in it, and so would keep every class that were made. It then gives up a
-    reference to the module's dictionary that it only borrowed, which makes the second or third
-    instance crash: paid back here. And it takes the class from the module: what it finds there is
-    a Component of its own.
+    pythonfmu imports the script and then runs it again at every instantiation, looks for the class
+    among what that made, and keeps for good all that it learns of the classes there. So it finds
+    none there, but a Component in the module, under the empty name for which it looks then. It also
+    gives up a reference to the module's dictionary that it only borrowed, which makes the second or
+    third instance crash: paid back here.
     """
 
-    def __new__(cls, name: str, bases: tuple[type, ...], namespace: dict[str, Any]) -> "Once":
-        """The class of that name in the module that is being run."""
+    def __new__(cls, name: str, bases: tuple[type, ...], namespace: dict[str, Any]) -> Any:
+        """The class, when the script is imported; when it is run again, a Component."""
         script = namespace["__module__"]
-        module = sys.modules.get(script)
-        if not bases or module is None:
-            return super().__new__(cls, name, bases, namespace)
-        made = _made.get(script) or super().__new__(cls, name, bases, namespace)
-        _made[script] = made
+        if script not in _made:
+            made = super().__new__(cls, name, bases, namespace)
+            if bases and script in sys.modules:
+                _made[script] = made
+            return made
+        component = Component(_made[script])
+        module = sys.modules[script]
+        setattr(module, "", component)
         keep(vars(module))
-        setattr(module, name, Component(made))
-        return made
+        return component
 
 
 def forget(resources: str) -> None:
     """Take the FMU's folder from the import path, where pythonfmu puts it and leaves it.
 
-    Everything packed has been imported by the time there is an instance.
+    Everything packed has been imported by the time there is an instance. pythonfmu does not give up
+    its reference to the folder's name.
     """
-    if resources in sys.path:
-        sys.path.remove(resources)
+    if sys.path[0] == resources:
+        release(sys.path.pop(0))
     sys.path_importer_cache.pop(resources, None)
 
 
 def keep(used: object) -> None:
     """Add the reference to an object that pythonfmu gives up without owning it."""
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(used))
+
+
+def release(unused: object) -> None:
+    """Take away the reference to an object that pythonfmu owns and never gives up."""
+    ctypes.pythonapi.Py_DecRef(ctypes.py_object(unused))

@@ -215,7 +215,7 @@ def test_a_real_input_or_output_must_have_a_nominal_value(parts: dict[str, Any])
         declared(block(**parts))
 
 
-class Unreached(NamedTuple):
+class Misspelt(NamedTuple):
     misspelt: Annotated[float, "m", "", 1.0, {"gapp"}]
 
 
@@ -230,7 +230,7 @@ class NoSuchAtTheStart(NamedTuple):
 @pytest.mark.parametrize(
     ("outputs", "message"),
     [
-        (Unreached, "misspelt: depends on gapp; valid: armed, force, gap$"),
+        (Misspelt, "misspelt: depends on gapp; valid: armed, force, gap$"),
         (NoPair, r"own: depends on gap\[j\]; valid: armed, armed\[j\], force, force\[j\], gap$"),
         (NoSuchAtTheStart, r"late: depends on force\[1\]; valid: armed, force, gap$"),
     ],
