@@ -59,10 +59,13 @@ class Fmu:
 class Instance:
     """An instance; use as a context manager. Calls return the FMI status."""
 
-    def __init__(self, fmu: Fmu, name: str = "instance", logging: bool = False) -> None:
+    def __init__(
+        self, fmu: Fmu, name: str = "instance", logging: bool = False, logger: bool = True
+    ) -> None:
         self.fmu = fmu
         self.log: list[Logged] = []
-        self._callbacks = _Callbacks(_LOGGER(self._logged), _ALLOCATE(), _FREE(), None, None)
+        log = _LOGGER(self._logged) if logger else _LOGGER()
+        self._callbacks = _Callbacks(log, _ALLOCATE(), _FREE(), None, None)
         resources = (fmu.folder / "resources").as_uri().encode()
         self._component = c_void_p(
             fmu.library.fmi2Instantiate(

@@ -1,8 +1,7 @@
 """Mends the Linux binary that pythonfmu 0.7.0 packs, and binds it to a Python for other hosts.
 
-Nothing here touches machine code: one relocation, one entry of the dynamic section and, by the
-program patchelf, the list of the libraries that the loader brings along. The Windows binary stays
-as it is.
+Four places of the binary are rewritten, two of them instructions; and, by the program patchelf, the
+list of the libraries that the loader brings along. The Windows binary stays as it is.
 """
 
 import json
@@ -12,13 +11,9 @@ import subprocess
 import sysconfig
 import tempfile
 from functools import cache
+from hashlib import sha256
 from pathlib import Path
 from typing import NamedTuple
-
-_THROWN = b"_ZTIN9pythonfmu11fatal_errorE"
-_NEVER_THROWN = b"_ZTIN9pythonfmu8PyLoggerE"  # an abstract class: there is no object of it to throw
-_ON_UNLOAD = b"_ZN12_GLOBAL__N_115onLibraryUnloadEv"
-_R_X86_64_64, _R_X86_64_RELATIVE, _DT_FINI_ARRAYSZ = 1, 8, 28
 
 _DEFAULT_FOLDERS = {
     Path(root, folder)
@@ -75,8 +70,41 @@ del prepare
 '''
 
 
+class _Edit(NamedTuple):
+    """Bytes at a place of the file."""
+
+    place: int
+    before: bytes
+    after: bytes
+
+
+_SHA256 = "4be156a552c16f30eb4395805c59855d8d4086056d0f165442565f6c5fbac0c9"
+_EDITS = (
+    # In handle_py_exception: for `call clearLogBuffer` a jump past the clean-up, to PyErr_Fetch.
+    _Edit(0x34089, bytes.fromhex("e83206feff"), bytes.fromhex("e97c000000")),
+    # Further on, from PyObject_Repr to PyBytes_AsString: where there is no repr, on to "unknown
+    # error"; else PyUnicode_AsUTF8String for PyUnicode_AsEncodedString, which takes less space:
+    # test rax; je; mov r13, rax; mov rdi, rax; call; mov r14, rax; mov rdi, rax.
+    _Edit(
+        0x3426F,
+        bytes.fromhex("31d2488d351c6100004889c74989c5e8dd08feff4889c74989c6"),
+        bytes.fromhex("4885c00f84000200004989c54889c7e8fd0bfeff4989c64889c7"),
+    ),
+    # In .rela.dyn, what the catch clauses wait for: for the type info of pythonfmu::fatal_error
+    # that of pythonfmu::PyLogger, an abstract class, of which there is no object to throw.
+    _Edit(0x102C4, struct.pack("<I", 0x22C), struct.pack("<I", 0x1E8)),
+    # In .dynamic: DT_FINI_ARRAYSZ, so that onLibraryUnload, the second of two, is never called.
+    _Edit(0x43950, struct.pack("<Q", 16), struct.pack("<Q", 8)),
+)
+
+
 def mended(binary: bytes) -> bytes:
-    """Pythonfmu's Linux binary without two of its faults; ValueError where it is another binary.
+    """Pythonfmu's Linux binary without four of its faults; ValueError where it is another binary.
+
+    An exception costs no references. pythonfmu gives up its references to class, instance and log
+    when it reports one, but goes on using them, at the latest when the instance is freed.
+
+    Nor does it crash the host for want of a repr, as it does at the end of the stack.
 
     A Python exception gives fmi2Error. pythonfmu answers fmi2Fatal, after which FMI forbids every
     further call to every instance; that clause is made to wait for a type that is never thrown,
@@ -86,36 +114,15 @@ def mended(binary: bytes) -> bytes:
     library's own destructor function, which at the end of the process would do so again in freed
     memory, is taken off the list of those to call.
     """
+    found = sha256(binary).hexdigest()
+    if found != _SHA256:
+        raise ValueError(
+            f"binary to mend: sha256 {found}; must be pythonfmu 0.7.0's for Linux, {_SHA256}"
+        )
     out = bytearray(binary)
-    try:
-        sections = _sections(binary)
-        symbols = _symbols(binary, sections[".dynsym"], sections[".dynstr"])
-        relocations = _relocations(binary, sections[".rela.dyn"])
-        never = [k for k, (name, _) in enumerate(symbols) if name == _NEVER_THROWN]
-        data = sections[".data"]
-        waiting = [
-            r
-            for r in relocations
-            if r.kind == _R_X86_64_64
-            and 0 <= r.address - data.address < data.size
-            and symbols[r.symbol][0] == _THROWN
-        ]
-        local = _symbols(binary, sections[".symtab"], sections[".strtab"])
-        on_unload = [value for name, value in local if name == _ON_UNLOAD]
-        last = sections[".fini_array"].address + 8
-        called = [r.addend for r in relocations
-                  if r.kind == _R_X86_64_RELATIVE and r.address == last]  # fmt: skip
-        sizes = _dynamic(binary, sections[".dynamic"], _DT_FINI_ARRAYSZ)
-    except KeyError as error:
-        raise _refused(f"has no section {error.args[0]}") from error
-    except (IndexError, struct.error) as error:
-        raise _refused("is cut short") from error
-    if len(never) != 1 or len(waiting) != 1:
-        raise _refused(f"{len(waiting)} clauses that catch {_THROWN.decode()}")
-    if [size for _, size in sizes] != [16] or len(on_unload) != 1 or called != on_unload:
-        raise _refused("onLibraryUnload is not the second of two destructor functions")
-    struct.pack_into("<Q", out, waiting[0].offset + 8, never[0] << 32 | _R_X86_64_64)
-    struct.pack_into("<Q", out, sizes[0][0], 8)
+    for place, before, after in _EDITS:
+        assert out[place : place + len(before)] == before  # noqa: S101 - so says the check sum
+        out[place : place + len(after)] = after
     return bytes(out)
 
 
@@ -153,66 +160,6 @@ def preamble(python: str) -> str:
     return _PREAMBLE.format(
         version=answers.version, modules=answers.modules[::-1], library=answers.library.name
     )
-
-
-class _Section(NamedTuple):
-    address: int
-    offset: int
-    size: int
-
-
-class _Relocation(NamedTuple):
-    offset: int
-    """Where in the file it stands."""
-    address: int
-    symbol: int
-    kind: int
-    addend: int
-
-
-def _sections(elf: bytes) -> dict[str, _Section]:
-    """The sections by name."""
-    if elf[:6] != b"\x7fELF\x02\x01":
-        raise _refused("is not a 64-bit ELF file")
-    first, size, number, names = struct.unpack_from("<40xQ10xHHH", elf)
-    rows = [struct.unpack_from("<I12xQQQ24x", elf, first + k * size) for k in range(number)]
-    strings = rows[names][2]
-    return {
-        _string(elf, strings + name).decode(errors="replace"): _Section(*place)
-        for name, *place in rows
-    }
-
-
-def _symbols(elf: bytes, table: _Section, names: _Section) -> list[tuple[bytes, int]]:
-    """Name and value of each symbol of a table."""
-    rows = struct.iter_unpack("<I4xQ8x", _bytes(elf, table))
-    return [(_string(elf, names.offset + name), value) for name, value in rows]
-
-
-def _relocations(elf: bytes, section: _Section) -> list[_Relocation]:
-    rows = struct.iter_unpack("<QIIq", _bytes(elf, section))
-    return [
-        _Relocation(section.offset + 24 * k, address, symbol, kind, addend)
-        for k, (address, kind, symbol, addend) in enumerate(rows)
-    ]
-
-
-def _dynamic(elf: bytes, section: _Section, tag: int) -> list[tuple[int, int]]:
-    """Place in the file and value of the entries with a tag."""
-    rows = struct.iter_unpack("<QQ", _bytes(elf, section))
-    return [(section.offset + 16 * k + 8, value) for k, (t, value) in enumerate(rows) if t == tag]
-
-
-def _bytes(elf: bytes, section: _Section) -> bytes:
-    return elf[section.offset : section.offset + section.size]
-
-
-def _string(elf: bytes, start: int) -> bytes:
-    return elf[start : elf.find(0, start)]
-
-
-def _refused(why: str) -> ValueError:
-    return ValueError(f"binary to mend: {why}; must be pythonfmu 0.7.0's for Linux, as installed")
 
 
 class _Answers(NamedTuple):

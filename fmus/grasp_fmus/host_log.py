@@ -23,7 +23,7 @@ _LOGGER = ctypes.CFUNCTYPE(
     ctypes.c_char_p,
     ctypes.c_char_p,
 )
-_NAME, _NAME_LENGTH, _CALLBACKS, _ENVIRONMENT = 0x10, 0x18, 0x48, 0x20
+_NAME, _NAME_LENGTH, _SHORT_NAME, _CALLBACKS, _ENVIRONMENT = 0x10, 0x18, 0x20, 0x48, 0x20
 """Offsets, in the object: the instance name (a std::string of libstdc++) and the address of
 fmi2CallbackFunctions, which begins with the logger; in that: componentEnvironment."""
 
@@ -32,26 +32,37 @@ def host_log(address: int, instance: str) -> Log | None:
     """The logger of the host for an instance; None where it does not stand where it should.
 
     address is that of pythonfmu's logger. The instance name, found where it is expected, is the
-    proof that the layout is the known one: that of 64 bit Linux.
+    proof that the layout is the known one: that of 64 bit Linux. There a string of up to 15 bytes
+    stands in the object itself. A host without a logger gets none.
     """
     name = instance.encode()
-    if sys.platform != "linux" or not name:
+    if sys.platform != "linux" or _word(address + _NAME_LENGTH) != len(name):
         return None
-    if _word(address + _NAME_LENGTH) != len(name):
+    text_at = _word(address + _NAME)
+    if len(name) <= 15 and text_at != address + _SHORT_NAME:
         return None
-    if ctypes.string_at(_word(address + _NAME), len(name)) != name:
+    if ctypes.string_at(text_at, len(name)) != name:
         return None
     callbacks = _word(address + _CALLBACKS)
     logger, environment = _word(callbacks), _word(callbacks + _ENVIRONMENT)
     if not logger:
-        return None
+        return _silent
     call = _LOGGER(logger)
 
     def log(status: int, message: str) -> None:
-        text = message.replace("%", "%%")  # the logger is a printf
-        call(environment, name, status, CATEGORIES[status].encode(), text.encode(errors="replace"))
+        text = as_format(message).encode(errors="replace")
+        call(environment, name, status, CATEGORIES[status].encode(), text)
 
     return log
+
+
+def _silent(status: int, message: str) -> None:
+    """For a host that has no logger."""
+
+
+def as_format(message: str) -> str:
+    """The message for a host's logger, which is a printf."""
+    return message.replace("%", "%%")
 
 
 def _word(address: int) -> int:

@@ -2,7 +2,9 @@
 
 import ctypes
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from threading import Lock
 from typing import TYPE_CHECKING, Any
 from weakref import ref
 
@@ -72,15 +74,28 @@ class Once(type):
         return component
 
 
+_forgetting = Lock()
+
+
 def forget(resources: str) -> None:
     """Take the FMU's folder from the import path, where pythonfmu puts it and leaves it.
 
     Everything packed has been imported by the time there is an instance. pythonfmu does not give up
-    its reference to the folder's name.
+    its reference to the name either. Other threads of the host may change the path meanwhile.
     """
-    if sys.path[0] == resources:
-        release(sys.path.pop(0))
+    with _forgetting, suppress(StopIteration, ValueError):
+        entry = next(e for e in sys.path if e == resources)
+        sys.path.remove(resources)
+        if not any(e is entry for e in sys.path):
+            release(entry)
     sys.path_importer_cache.pop(resources, None)
+
+
+def survive(used: Iterable[object]) -> None:
+    """Keep what pythonfmu's Windows binary gives up at an exception, but goes on using."""
+    if sys.platform != "linux":  # where it is mended
+        for item in used:
+            keep(item)
 
 
 def keep(used: object) -> None:

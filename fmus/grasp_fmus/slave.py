@@ -13,8 +13,8 @@ from math import inf, isclose, isfinite
 from typing import Any, Concatenate, NamedTuple, ParamSpec, TypeVar
 
 from .contract import Block, build_params, count, declared, packer, unpacker
-from .host_log import CATEGORIES, host_log
-from .loader import Component, Once, forget, keep
+from .host_log import CATEGORIES, as_format, host_log
+from .loader import Component, Once, forget, survive
 from .snapshot import Snapshot, from_bytes, to_bytes
 
 INSTANTIATED, INITIALISING, STEPPING, TERMINATED = range(4)
@@ -40,9 +40,13 @@ TIME_TOLERANCE = 1e-9
 class RefusalError(Exception):
     """A call was refused, for the reason given."""
 
+
+class LoggedError(Exception):
+    """A call failed, for a reason that is in the log of the host."""
+
     def __repr__(self) -> str:
-        """What pythonfmu adds to the log while debug logging is on."""
-        return "refused, for the reason logged before"
+        """What pythonfmu adds while debug logging is on, as a format of printf."""
+        return "failed, for the reason logged before"
 
 
 class Message(NamedTuple):
@@ -80,8 +84,7 @@ def _reported(call: _Method[_P, _R]) -> _Method[_P, _R]:
         try:
             return call(self, *arguments, **named)
         except BaseException as error:
-            self._report(error)
-            raise
+            raise self._reported(error) from None
 
     return reported
 
@@ -103,6 +106,13 @@ class Fmi2Slave(metaclass=Once):
         self.log_queue: list[Message] = []
         self._component = component
         self._host_log = host_log(logger, instance_name)
+        self._time = 0.0
+        try:
+            self._prepare()
+        except BaseException as error:
+            raise self._reported(error) from None
+
+    def _prepare(self) -> None:
         self._fields = declared(self.block)
         self._names = [(f, name) for f in self._fields for name in f.names]
         self._values: list[Any] = [start for f in self._fields for start in f.starts]
@@ -112,7 +122,6 @@ class Fmi2Slave(metaclass=Once):
         self._pack = packer(self.block.Inputs, self._fields)
         self._unpack = unpacker(self._fields)
         self._step, self._evaluate = self.block.step, self.block.outputs
-        self._time = 0.0
         self._params: Any = None
         self._inputs: Any = None  # None: something was set and the outputs are out of date
         self._state = self.block.initial_state(self.block.Params(), self.block.Inputs())
@@ -173,8 +182,7 @@ class Fmi2Slave(metaclass=Once):
             if not isfinite(sum(values)) and (text := self._not_finite(values)):
                 return self._discard(step_size, text)
         except BaseException as error:
-            self._report(error)
-            raise
+            raise self._reported(error) from None
         self._state = state
         self._values[self._outputs] = values
         self._time = current_time + step_size
@@ -193,8 +201,7 @@ class Fmi2Slave(metaclass=Once):
             if self._inputs is None and outputs:
                 self._refresh()
         except BaseException as error:
-            self._report(error)
-            raise
+            raise self._reported(error) from None
         return self._values[where] if where else [self._values[vr] for vr in vrs]
 
     def get_boolean(self, vrs: list[int]) -> list[Any]:
@@ -204,8 +211,7 @@ class Fmi2Slave(metaclass=Once):
             if self._inputs is None and outputs:
                 self._refresh()
         except BaseException as error:
-            self._report(error)
-            raise
+            raise self._reported(error) from None
         return self._values[where] if where else [self._values[vr] for vr in vrs]
 
     def get_integer(self, vrs: list[int]) -> list[Any]:
@@ -224,8 +230,7 @@ class Fmi2Slave(metaclass=Once):
             if limited or not isfinite(sum(values)):
                 self._check_values(vrs, values)
         except BaseException as error:
-            self._report(error)
-            raise
+            raise self._reported(error) from None
         if parameters or not where:
             self._store(vrs, values, access)
         else:
@@ -380,28 +385,24 @@ class Fmi2Slave(metaclass=Once):
         self._log(DISCARD, f"step of {step_size} s: {text}: must be finite")
         return False
 
-    def _report(self, error: BaseException) -> None:
-        """Log an exception that leaves the slave, and keep the host alive.
-
-        pythonfmu 0.7.0 gives up its references to class, instance and log when it reports an
-        exception, but goes on using them, in fmi2Terminate and fmi2FreeInstance at the latest.
-        """
+    def _reported(self, error: BaseException) -> LoggedError:
+        """Log an exception that would leave the slave; what leaves it instead."""
         self._inputs = None  # the outputs may not have been worked out
-        for used in (self._component, self, self.log_queue):
-            keep(used)
         if isinstance(error, RefusalError):
             self._log(ERROR, str(error))
         else:
             from traceback import format_exception  # only a bug in a block needs it
 
             self._log(ERROR, "".join(format_exception(error)).strip())
+        survive((self._component, self, self.log_queue))
+        return LoggedError()
 
     def _log(self, status: int, text: str) -> None:
         message = f"{self.instance_name}, t = {self._time:.9g} s: {text}"
         if self._host_log is not None:
             self._host_log(status, message)
         else:
-            self.log_queue.append(Message(status, CATEGORIES[status], message))
+            self.log_queue.append(Message(status, CATEGORIES[status], as_format(message)))
 
     def _get_log_queue(self) -> list[Message]:
         return self.log_queue

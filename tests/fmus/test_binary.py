@@ -9,6 +9,7 @@ import sys
 import sysconfig
 import zipfile
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -57,9 +58,31 @@ def readelf(option: str, binary: bytes, folder: Path) -> str:
 # Mended
 
 
-def test_mending_changes_two_numbers() -> None:
+def test_mending_changes_four_places() -> None:
     changed = [k for k, (a, b) in enumerate(zip(STOCK, mended(STOCK), strict=True)) if a != b]
-    assert len({k // 8 for k in changed}) == 2
+    assert len(changed) <= 36
+    assert sum(after - before > 64 for before, after in pairwise(changed)) == 3
+
+
+@pytest.mark.skipif(not shutil.which("objdump"), reason="NO objdump")
+def test_the_new_instructions_are_what_they_should_be(tmp_path: Path) -> None:
+    """What an exception does: no clean-up, and no text where there is no repr."""
+    file = tmp_path / "binary.so"
+    file.write_bytes(mended(STOCK))
+    command = ["objdump", "--disassemble", "--no-show-raw-insn", "--no-addresses"]
+    places = ["--start-address=0x34078", "--stop-address=0x34126"]
+    code = subprocess.run([*command, *places, file], capture_output=True, text=True, check=True)
+    calls = re.findall(r"(call|jmp) +.*<(\w+)", code.stdout)
+    assert calls[:2] == [("call", "PyErr_Occurred"), ("jmp", calls[1][1])]
+    places = ["--start-address=0x3425c", "--stop-address=0x3428e"]
+    code = subprocess.run([*command, *places, file], capture_output=True, text=True, check=True)
+    calls = re.findall(r"(call|je) +.*<(\w+)", code.stdout)
+    assert [name for kind, name in calls if kind == "call"] == [
+        "PyObject_Repr",
+        "PyUnicode_AsUTF8String",
+        "PyBytes_AsString",
+    ]
+    assert [kind for kind, _ in calls] == ["je", "call", "je", "call", "call"]
 
 
 @pytest.mark.skipif(not shutil.which("readelf"), reason="NO readelf")
@@ -78,23 +101,11 @@ def test_a_clause_waits_in_vain_and_a_destructor_is_not_called(tmp_path: Path) -
 
 
 @pytest.mark.parametrize(
-    ("binary", "reason"),
-    [
-        (b"", "is not a 64-bit ELF file"),
-        (b"MZ" + STOCK[2:], "is not a 64-bit ELF file"),
-        (STOCK[:6], "is cut short"),
-        (STOCK[:-1], "is cut short"),
-        (STOCK[: len(STOCK) // 2], "is cut short"),
-        (mended(STOCK), "0 clauses that catch _ZTIN9pythonfmu11fatal_errorE"),
-        (STOCK.replace(b"onLibraryUnload", b"onLibraryReload"), "onLibraryUnload is not the"),
-        (STOCK.replace(b".symtab", b".sumtab"), "has no section .symtab"),
-    ],
+    "binary", [b"", STOCK[:-1], mended(STOCK), STOCK.replace(b".symtab", b".sumtab")]
 )
-def test_another_binary_is_refused(binary: bytes, reason: str) -> None:
-    with pytest.raises(ValueError, match=re.escape(f"binary to mend: {reason}")) as raised:
+def test_another_binary_is_refused(binary: bytes) -> None:
+    with pytest.raises(ValueError, match=r"^binary to mend: sha256 \w{64}; must be pythonfmu"):
         mended(binary)
-    assert "must be pythonfmu 0.7.0's for Linux" in str(raised.value)
-    assert "\n" not in str(raised.value)
 
 
 def test_a_program_is_refused() -> None:
@@ -153,7 +164,6 @@ def test_a_library_that_comes_and_goes_leaves_no_trace(fmus: Path, tmp_path: Pat
 def test_a_bound_binary_brings_libpython_along(tmp_path: Path) -> None:
     binary = bound(mended(STOCK), sys.executable)
     assert binary == bound(mended(STOCK), sys.executable)
-    assert binary == mended(bound(STOCK, sys.executable))
     folder, library = sysconfig.get_config_vars("LIBDIR", "INSTSONAME")
     if shutil.which("readelf"):
         dynamic = readelf("--dynamic", binary, tmp_path)

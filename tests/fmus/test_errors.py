@@ -183,7 +183,7 @@ def test_with_debug_logging_pythonfmu_adds_no_second_reason(load: Load) -> None:
         assert instance.set({"force[1]": nan}) == ERROR
         assert [said.text.partition(":")[2].strip() for said in instance.log] == [
             "force[1] = nan N: must be a finite number",
-            "[setReal] PyObject_CallMethod\nrefused, for the reason logged before",
+            "[setReal] PyObject_CallMethod\nfailed, for the reason logged before",
         ]
 
 
@@ -245,6 +245,72 @@ def test_an_output_that_is_not_finite_is_not_given(altered: Altered, tmp_path: P
         assert instance.get_real([1])[0] == ERROR
         assert instance.log[0].text == "eye, t = 0 s: intensity = nan V: must be finite"
         assert instance.step(0.0, 1e-3) == DISCARD
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "raise LookupError('50 %n%s%n%s')",  # pythonfmu would pass it to the host's printf
+        "raise type('Odd', (Exception,), {'__repr__': lambda self: 1 / 0})()",
+        "raise KeyboardInterrupt",
+    ],
+)
+def test_what_pythonfmu_adds_to_an_exception_is_harmless(
+    altered: Altered, tmp_path: Path, statement: str
+) -> None:
+    fmu = faulty(altered, tmp_path, statement)
+    with Instance(fmu, "eye", logging=True) as instance:
+        instance.initialise(gap=0.02)
+        assert instance.set({"gap": 0.005}) == OK
+        assert instance.step(0.0, 1e-3) == ERROR
+        logged, added = instance.log
+        assert "Traceback" in logged.text
+        assert "%" not in logged.text.replace("%%", "")
+        assert added.text.endswith("PyObject_CallMethod\nfailed, for the reason logged before")
+
+
+def test_a_block_that_does_not_start_says_why(altered: Altered, tmp_path: Path) -> None:
+    start = "    return State()\n"
+    broken = "    raise LookupError('no lamp')\n"
+    fmu = Fmu(altered("ProximitySensor", "proximity_sensor/optics.py", start, broken), tmp_path)
+    instance = object.__new__(Instance)
+    with pytest.raises(AssertionError):
+        instance.__init__(fmu, "eye")  # type: ignore[misc]
+    (said,) = instance.log
+    assert said.status == ERROR
+    assert said.text.endswith("LookupError: no lamp")
+
+
+@pytest.mark.parametrize("name", ["", "fifteen letters", "sixteen letters.", "x" * 300, "Größe µ"])
+def test_the_reason_is_logged_whatever_the_name(load: Load, name: str) -> None:
+    with Instance(load("GripperPlant"), name) as instance:
+        assert instance.set({"force[1]": nan}) == ERROR
+        (said,) = instance.log
+        assert said.instance == name
+        assert said.text == f"{name}, t = 0 s: force[1] = nan N: must be a finite number"
+
+
+def test_a_host_without_a_logger(load: Load) -> None:
+    with Instance(load("GripperPlant"), logger=False) as instance:
+        assert instance.set({"force[1]": nan}) == ERROR
+        instance.initialise()
+        assert instance.log == []
+
+
+NOTHING = ctypes.c_void_p()
+FROM_C = [
+    lambda i: i.call("SetFMUstate", NOTHING),
+    lambda i: i.call("SerializedFMUstateSize", NOTHING, ctypes.byref(ctypes.c_size_t())),
+]
+
+
+@pytest.mark.parametrize("act", FROM_C)
+def test_exceptions_that_never_reach_the_slave(load: Load, act: Act) -> None:
+    """They arise in pythonfmu itself; it would give up references that it goes on using."""
+    with plant(load) as instance:
+        instance.initialise()
+        assert [act(instance) for _ in range(20)] == [ERROR] * 20
+        assert instance.step(0.0, 1e-3) == OK
 
 
 def test_sixty_exceptions_in_one_instance(load: Load) -> None:
