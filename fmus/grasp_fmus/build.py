@@ -22,7 +22,7 @@ from typing import Any, Literal
 
 import pythonfmu
 
-from .binary import bound, mended, preamble
+from .binary import bound, libpython, mended, preamble
 from .changes import changes, read_members
 from .contract import declared
 from .cross_check import cross_check_files
@@ -99,7 +99,11 @@ def _members(script: Path, bind_python: str | None) -> dict[str, bytes]:
         "modelDescription.xml": model_description(name, summary, fields, HASH),
         "model.png": icon(name),
         "documentation/index.html": page(
-            name, summary, _card(slave.block), metadata.version("grasp-cosim")
+            name,
+            summary,
+            _card(slave.block),
+            metadata.version("grasp-cosim"),
+            libpython(bind_python) if bind_python else None,
         ).encode(),
         **{f"documentation/licenses/{file}": text for file, text in licences().items()},
         f"binaries/linux64/{name}.so": _linux_binary(bind_python),

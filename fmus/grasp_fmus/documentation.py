@@ -48,23 +48,21 @@ Linux or Windows, Python 3.11 or newer. No packages need to be installed.</p>
 </thead>
 <tbody>
 <tr><td>a Python process</td><td>nothing</td></tr>
-<tr><td>any other process on Linux</td><td>A libpython in the process: start the host with
-<code>LD_PRELOAD=libpython3.x.so.1.0</code>, say <code>libpython3.11.so.1.0</code>, or use an FMU
-built with <code>grasp-cosim build --bind-python</code>. Python's standard library is found through
-<code>PYTHONHOME</code>, or through <code>python3</code> on the <code>PATH</code>.</td></tr>
+<tr><td>any other process on Linux</td><td>$linux</td></tr>
 <tr><td>any other process on Windows</td><td><code>python3.dll</code> and
 <code>python3x.dll</code>, say <code>python311.dll</code>, on the <code>PATH</code></td></tr>
 </tbody>
 </table>
-<p>The folder that the host extracts the FMU to must have no <code>+</code>, <code>#</code>,
-<code>%</code> and no letters beyond ASCII in its path: they crash pythonfmu's loader, and the host
-with it. A space does no harm.</p>
+<p>The path of the folder that the host extracts the FMU to must be made of ASCII letters, digits,
+<code>_ . - ~</code> and spaces: any other character crashes pythonfmu's loader, and the host with
+it. A host that is not Python must have made its first instance before other threads make theirs.
+The GUID is not checked.</p>
 <p><code>grasp-cosim doctor $name.fmu</code> checks all of this on the host's machine and names the
 fix.</p>
 <h2>Errors</h2>
-<p>A refused call returns <code>fmi2Error</code> (on Windows <code>fmi2Fatal</code>) and has no
-effect. The reason is in the log even when debug logging is off: instance, time, variable, value and
-the allowed range.</p>
+<p>A refused call returns <code>fmi2Error</code> and has no effect. The reason is in the log even
+when debug logging is off: instance, time, variable, value and the allowed range. On Windows it
+returns <code>fmi2Fatal</code>, and the log needs debug logging.</p>
 <p>A step whose results would not be finite returns <code>fmi2Discard</code>.</p>
 <h2>State</h2>
 <p>Getting, setting, freeing and serialising the state of the FMU are supported. A state can be
@@ -81,8 +79,19 @@ _LICENCES = {"license.txt": "grasp-cosim", "pythonfmu.txt": "pythonfmu"}
 """Whose licence is in which file of documentation/licenses."""
 
 
-def page(name: str, summary: str, card: str, version: str) -> str:
+_ANY = """A libpython in the process: start the host with
+<code>LD_PRELOAD=libpython3.x.so.1.0</code>, say <code>libpython3.11.so.1.0</code>, or use an FMU
+built with <code>grasp-cosim build --bind-python</code>. Python's standard library is found through
+<code>PYTHONHOME</code>, or through <code>python3</code> on the <code>PATH</code>."""
+_BOUND = """Nothing where there is <code>$library</code>, to which this FMU is bound: it brings it
+along, and knows where its standard library is. On another machine build it there."""
+"""What a host on Linux needs."""
+
+
+def page(name: str, summary: str, card: str, version: str, library: Path | None = None) -> str:
     """documentation/index.html of the FMU name, from its equation card in Markdown.
+
+    library is the libpython to which the FMU is bound, if it is.
 
     The page stands alone: links and pictures of the card point to nothing in an FMU and come out as
     their text, HTML in it as it is written. The result is XML as well.
@@ -92,6 +101,7 @@ def page(name: str, summary: str, card: str, version: str) -> str:
         summary=escape(summary.rstrip(".")),
         card=_rendered(card),
         version=escape(version),
+        linux=Template(_BOUND).substitute(library=escape(str(library))) if library else _ANY,
     )
 
 

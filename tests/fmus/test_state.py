@@ -173,3 +173,24 @@ def test_any_moment_can_be_restored(
             runs.append(seen)
         assert runs[0] == runs[1]
         state.free()
+
+
+def test_parameters_are_part_of_the_state(load: Load) -> None:
+    with Instance(load("GripperPlant")) as heavy, Instance(load("GripperPlant")) as light:
+        heavy.initialise(**{"finger_mass[1]": 0.7})
+        light.initialise(**{"finger_mass[1]": 0.2})
+        drive(light, 0, 5)
+        state = heavy.state()
+        assert light.restore(state) == OK
+        assert light.get("finger_mass[1]") == [0.7]
+        assert drive(light, 0, 50) == drive(heavy, 0, 50)
+        state.free()
+
+
+def test_what_may_be_set_follows_from_the_phase_restored(load: Load) -> None:
+    with Instance(load("GripperPlant")) as stepping, Instance(load("GripperPlant")) as fresh:
+        state = stepping.initialise().state()
+        assert fresh.set({"finger_mass[1]": 0.7}) == OK
+        assert fresh.restore(state) == OK
+        assert fresh.set({"finger_mass[1]": 0.7}) == ERROR
+        state.free()

@@ -15,6 +15,7 @@ import pytest
 from conftest import Altered
 from grasp_cosim import System, cli, simulate
 from grasp_cosim.grasp import CASES
+from grasp_fmus import documentation
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -283,3 +284,24 @@ def test_doctor_without_an_fmu_looks_at_the_machine(command: Run) -> None:
     code, out, _ = command("doctor")
     assert code == 0
     assert re.search(r"^ok +python +3\.1\d", out)
+
+
+def test_an_empty_name_of_a_python_is_no_way_to_leave_the_option_out(command: Run) -> None:
+    code, out, err = command("build", "--bind-python", "")
+    assert (code, out) == (2, "")
+    assert err == "grasp-cosim: --bind-python '': must be a Python program, or left out\n"
+
+
+def test_a_python_that_is_none(command: Run) -> None:
+    code, _, err = command("build", "--bind-python", "no-such-python")
+    assert code == 2
+    assert err.startswith("grasp-cosim: build: Python to bind to: no-such-python: no such program")
+
+
+def test_a_missing_file_without_a_name_is_told(
+    command: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(documentation, "ICONS", Path("nowhere"))
+    code, _, err = command("build")
+    assert code == 2
+    assert "no icon; fmus/draw_icons.py draws one" in err
