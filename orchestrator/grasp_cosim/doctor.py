@@ -1,6 +1,5 @@
 """Whether this machine loads an FMU: what would crash a host, found before, each with its fix."""
 
-import ast
 import os
 import re
 import signal
@@ -8,10 +7,9 @@ import subprocess
 import sys
 import tempfile
 import time
-import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
-from importlib.machinery import ModuleSpec, all_suffixes
+from importlib.machinery import ModuleSpec
 from pathlib import Path
 from shlex import quote
 from shutil import which
@@ -20,7 +18,8 @@ from xml.etree import ElementTree
 
 import fmpy
 
-from .errors import InputError, choices
+from .errors import InputError, check_fmu_file, choices
+from .packed_imports import imports
 
 Status = Literal["ok", "warning", "problem"]
 Verdict = tuple[Status, str, str | None]
@@ -212,8 +211,7 @@ class Unpacked:
 
 def unpack(fmu: Path, folder: Path) -> Unpacked:
     """Unpack an FMU to a folder; InputError where it is none."""
-    if not fmu.is_file():
-        raise InputError(f"{fmu}: no such FMU file")
+    check_fmu_file(fmu)
     try:
         fmpy.extract(fmu, folder)
         # the FMU's code is run, so its XML is no more of a danger
@@ -376,49 +374,6 @@ CHECKS: dict[str, Callable[[Unpacked], Verdict | None]] = {
     "script": script, "modules": modules, "trial": trial,
 }  # fmt: skip
 """The checks of an FMU; None where one does not apply."""
-
-
-def imports(resources: Path, script: str) -> tuple[set[str], list[str]]:
-    """What a script imports at once from outside of the FMU, and what in the FMU does not parse.
-
-    An import that is allowed to fail, under try or if or in a function, does not count.
-    """
-    outside: set[str] = set()
-    errors, names, seen = [], [script], {""}
-    while names:
-        name = names.pop()
-        if name in seen:
-            continue
-        seen.add(name)
-        top, parent = name.partition(".")[0], name.rpartition(".")[0]
-        base = resources.joinpath(*name.split("."))
-        files = [p for p in (base / "__init__.py", base.parent / f"{base.name}.py") if p.is_file()]
-        if not any((resources / f"{top}{suffix}").exists() for suffix in ("", *all_suffixes())):
-            outside.add(top)
-        if not files:
-            continue
-        try:
-            with warnings.catch_warnings(action="ignore"):
-                tree = ast.parse(files[0].read_bytes(), files[0].relative_to(resources))
-        except (SyntaxError, ValueError) as error:
-            errors.append(str(error))
-        else:
-            names += [parent, *_imported(tree, name if files[0].stem == "__init__" else parent)]
-    return outside, errors
-
-
-def _imported(tree: ast.Module | ast.ClassDef, package: str) -> Iterator[str]:
-    """What is imported without a condition, including names that may be modules of a package."""
-    for node in tree.body:
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            above = package.split(".")
-            base = above[: len(above) + 1 - node.level] if node.level else []
-            module = ".".join([*base, *filter(None, [node.module])])
-            yield from (module, *(f"{module}.{alias.name}" for alias in node.names))
-        elif isinstance(node, ast.ClassDef):
-            yield from _imported(node, package)
 
 
 def _spec(name: str) -> ModuleSpec | None:

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 import fmpy
 
-from .errors import InputError, choices
+from .errors import InputError, check_fmu_file, choices
 
 COLUMNS = (
     "name", "causality", "variability", "type", "unit", "start", "range", "dependencies",
@@ -114,8 +114,7 @@ def as_text(report: Mapping[str, Any], width: int | None = None) -> str:
 
 def _read(path: Path) -> tuple[Any, ElementTree.Element, list[str]]:
     """The description as FMPy reads it and, for what FMPy leaves out, as XML; the files' names."""
-    if not path.is_file():
-        raise InputError(f"{path}: no such FMU file")
+    check_fmu_file(path)
     try:
         with zipfile.ZipFile(path) as archive:
             files = [name.replace("\\", "/") for name in archive.namelist()]

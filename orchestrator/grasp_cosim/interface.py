@@ -8,7 +8,7 @@ from typing import Literal
 
 import fmpy
 
-from .errors import InputError, choices
+from .errors import InputError, check_fmu_file, choices
 
 Value = float | int | bool | str
 Kind = Literal["Real", "Integer", "Boolean", "String"]
@@ -91,8 +91,7 @@ def _read(path: Path, modified: int) -> Interface:
 
 def read_interface(path: Path) -> Interface:
     """The interface of the FMU at path; InputError where there is none."""
-    if not path.is_file():
-        raise InputError(f"{path}: no such FMU file")
+    check_fmu_file(path)
     return _read(path.resolve(), path.stat().st_mtime_ns)
 
 

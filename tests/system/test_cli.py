@@ -305,3 +305,10 @@ def test_a_missing_file_without_a_name_is_told(
     code, _, err = command("build")
     assert code == 2
     assert "no icon; fmus/draw_icons.py draws one" in err
+
+
+@pytest.mark.parametrize("verb", ["inspect", "doctor"])
+def test_a_folder_is_no_fmu(command: Run, tmp_path: Path, verb: str) -> None:
+    code, out, err = command(verb, str(tmp_path))
+    assert (code, out) == (2, "")
+    assert err == f"grasp-cosim: {tmp_path}: is a folder; must be an FMU, a file\n"

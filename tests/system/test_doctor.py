@@ -249,7 +249,7 @@ def test_no_fmu_is_wrong_input(
 
 
 def test_a_folder_is_no_fmu(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no such FMU file"):
+    with pytest.raises(InputError, match="is a folder; must be an FMU"):
         examine(tmp_path)
 
 
