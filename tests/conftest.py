@@ -3,6 +3,7 @@
 import importlib
 import shutil
 import sys
+import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,6 +16,7 @@ from grasp_cosim.grasp import SYSTEM
 from grasp_fmus import build as builder
 
 Load = Callable[[str], Fmu]
+UnpackIn = Callable[[str], Path]
 Altered = Callable[[str, str, str, str], Path]
 
 
@@ -43,6 +45,19 @@ def load(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Load:
 def grasp(fmus: Path) -> System:
     """The built-in grasp."""
     return System.load(SYSTEM, fmus)
+
+
+@pytest.fixture
+def unpack_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> UnpackIn:
+    """Has FMUs unpacked in a new folder of the given name; returns it."""
+
+    def choose(name: str) -> Path:
+        folder = tmp_path / name
+        folder.mkdir()
+        monkeypatch.setattr(tempfile, "tempdir", str(folder))
+        return folder
+
+    return choose
 
 
 @pytest.fixture

@@ -269,8 +269,7 @@ class Fmi2Slave(metaclass=Once):
 
     @_reported
     def _set_fmu_state(self, snapshot: Any) -> None:
-        if not isinstance(snapshot, Snapshot):
-            raise RefusalError(f"state of another FMU: must be of this one, {self._content}")
+        self._check_state(snapshot)
         self._values[: self._first_output] = snapshot.settable[: self._first_output]
         self._values[self._first_parameter :] = snapshot.settable[self._first_output :]
         self._time, self._state = snapshot.time, snapshot.state
@@ -280,8 +279,7 @@ class Fmi2Slave(metaclass=Once):
     @_reported
     def state_to_bytes(self, snapshot: Any) -> bytes:
         """A state of this FMU, serialised."""
-        if not isinstance(snapshot, Snapshot):
-            raise RefusalError(f"state of another FMU: must be of this one, {self._content}")
+        self._check_state(snapshot)
         return to_bytes(snapshot, self._content)
 
     @_reported
@@ -301,6 +299,10 @@ class Fmi2Slave(metaclass=Once):
     def _require(self, call: str, phase: int) -> None:
         if self._phase != phase:
             raise RefusalError(f"{call} {PHASES[self._phase]}: must be {PHASES[phase]}")
+
+    def _check_state(self, snapshot: Any) -> None:
+        if not isinstance(snapshot, Snapshot):
+            raise RefusalError(f"state of another FMU: must be of this one, {self._content}")
 
     def _check_step(self, current_time: float, step_size: float) -> None:
         self._require("fmi2DoStep", STEPPING)

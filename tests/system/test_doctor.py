@@ -12,6 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from conftest import UnpackIn
 from fmpy.fmi2 import FMU2Slave
 from grasp_cosim import doctor
 from grasp_cosim.doctor import Finding, Unpacked, Verdict, examine, unpack
@@ -496,11 +497,9 @@ def test_a_module_whose_name_another_has(
 
 
 def test_a_temporary_folder_that_crashes_is_predicted_and_found(
-    stock: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    stock: Path, unpack_in: UnpackIn
 ) -> None:
-    folder = tmp_path / "a#b"
-    folder.mkdir()
-    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    folder = unpack_in("a#b")
     found = {f.check: f for f in examine(stock)}
     assert found["temp folder"].status == found["trial"].status == "problem"
     assert "crashes with SIGSEGV when instantiated" in found["trial"].text

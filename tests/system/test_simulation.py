@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import Altered
+from conftest import Altered, UnpackIn
 from grasp_cosim import InputError, SimulationError, System, simulate
 from grasp_cosim.grasp import CASES, SYSTEM
 
@@ -166,22 +166,16 @@ def test_nothing_stays_in_the_temporary_folder_or_on_the_path(
 
 
 def test_a_temporary_folder_that_crashes_pythonfmu_is_refused(
-    grasp: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    grasp: System, unpack_in: UnpackIn
 ) -> None:
-    folder = tmp_path / "a+b"
-    folder.mkdir()
-    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    folder = unpack_in("a+b")
     with pytest.raises(InputError, match="set TMPDIR to a folder of plain ASCII letters"):
         simulate(grasp, stop=1e-3)
     assert list(folder.iterdir()) == []
 
 
-def test_a_temporary_folder_with_a_space_is_fine(
-    grasp: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    folder = tmp_path / "a b"
-    folder.mkdir()
-    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+def test_a_temporary_folder_with_a_space_is_fine(grasp: System, unpack_in: UnpackIn) -> None:
+    unpack_in("a b")
     assert simulate(grasp, stop=1e-3).complete
 
 
