@@ -14,9 +14,9 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from grasp_cosim import System
-from grasp_cosim.fmu import FmuInstance
+from grasp_cosim.fmi.fmi2 import FmuInstance
 from grasp_cosim.grasp import SYSTEM
-from grasp_cosim.master import Master
+from grasp_cosim.master.fixed_step import Master
 from grasp_fmus.build import build
 
 REPOSITORY = Path(__file__).parent.parent

@@ -10,10 +10,10 @@ from collections.abc import Callable
 from contextlib import ExitStack
 
 from grasp_cosim import simulate
-from grasp_cosim.fmu import FmuInstance
+from grasp_cosim.fmi.fmi2 import FmuInstance
 from grasp_cosim.grasp import grasp_system
-from grasp_cosim.master import Master
-from grasp_cosim.recording import Recorder
+from grasp_cosim.master.fixed_step import Master
+from grasp_cosim.recording.result import Recorder
 
 RUNS = 7
 STEPS = 500

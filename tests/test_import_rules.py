@@ -49,7 +49,7 @@ def test_the_orchestrator_imports_no_physics_and_no_pythonfmu() -> None:
 
 def test_the_orchestrator_builds_the_fmus_at_two_places_only() -> None:
     found = {f for f, n in imports(ROOT / "orchestrator/grasp_cosim") if n == "grasp_fmus"}
-    assert found == {"cli.py", "grasp.py"}
+    assert found == {"fmus.py", "grasp.py"}
 
 
 def test_the_fmu_adapter_knows_no_physics_but_for_the_scripts() -> None:

@@ -2,8 +2,8 @@
 
 from .errors import InputError, SimulationError
 from .grasp import grasp_system
-from .recording import Result
-from .simulation import simulate
-from .system import System
+from .master.simulation import simulate
+from .recording.result import Result
+from .system.description import System
 
 __all__ = ["InputError", "Result", "SimulationError", "System", "grasp_system", "simulate"]

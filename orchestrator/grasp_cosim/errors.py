@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .recording import Result
+    from .recording.result import Result
 
 
 class InputError(Exception):

@@ -5,8 +5,8 @@ from pathlib import Path
 from types import MappingProxyType
 
 from .errors import InputError
-from .interface import Value
-from .system import System
+from .system.description import System
+from .system.interface import Value
 
 SYSTEM = Path(__file__).parent / "grasp.toml"
 

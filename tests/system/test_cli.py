@@ -35,7 +35,8 @@ def command(
 ) -> Run:
     """Runs a command line in an empty folder; exit code, standard output, standard error."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(cli, "grasp_system", lambda: grasp)
+    for command in ("run", "evaluate"):
+        monkeypatch.setattr(f"grasp_cosim.cli.{command}.grasp_system", lambda: grasp)
 
     def run(*arguments: str) -> tuple[int, str, str]:
         code = cli.main(list(arguments))
@@ -195,7 +196,7 @@ def test_debug_shows_the_traceback(command: Run) -> None:
 
 
 def test_a_bug_is_one_line_and_exit_3(command: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cli, "simulate", lambda *_, **__: math.sqrt(-1.0))
+    monkeypatch.setattr("grasp_cosim.cli.run.simulate", lambda *_, **__: math.sqrt(-1.0))
     code, out, err = command("run")
     assert (code, out) == (3, "")
     assert err.startswith("grasp-cosim: ValueError: ")

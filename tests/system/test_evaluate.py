@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from grasp_cosim import System
-from grasp_cosim.evaluate import evaluate
+from grasp_cosim.published.evaluate import evaluate
 
 pytestmark = pytest.mark.slow
 

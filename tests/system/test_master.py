@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 from grasp_cosim import InputError, SimulationError, System
-from grasp_cosim.fmu import Call
-from grasp_cosim.interface import Interface, Value, Variable
-from grasp_cosim.master import Master
-from grasp_cosim.recording import Recorder
-from grasp_cosim.system import Component, Port, Wire
+from grasp_cosim.fmi.fmi2 import Call
+from grasp_cosim.master.fixed_step import Master
+from grasp_cosim.recording.result import Recorder
+from grasp_cosim.system.description import Component, Port, Wire
+from grasp_cosim.system.interface import Interface, Value, Variable
 
 Function = Callable[[float, float], float]
 

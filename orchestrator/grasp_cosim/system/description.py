@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, get_args
 
-from .errors import InputError, choices
+from ..errors import InputError, choices
 from .interface import Interface, Value, read_interface
 
 Scheme = Literal["sequential", "jacobi"]

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 import fmpy
 
-from .errors import InputError, check_fmu_file, choices
+from ..errors import InputError, check_fmu_file, choices
 
 COLUMNS = (
     "name", "causality", "variability", "type", "unit", "start", "range", "dependencies",

@@ -4,7 +4,7 @@ import csv
 import io
 from typing import Any
 
-from .system import NANOSECONDS, System
+from ..system.description import NANOSECONDS, System
 
 
 def table_csv(rows: list[dict[str, Any]]) -> str:

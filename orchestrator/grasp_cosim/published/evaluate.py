@@ -13,15 +13,15 @@ from typing import Any
 
 from tqdm import tqdm
 
+from ..errors import InputError
+from ..figures.plot import draw_contact_forces, draw_contact_times, draw_targets, new_figure, save
+from ..grasp import CASES
+from ..master.simulation import simulate
+from ..recording.result import write_text
+from ..study.metrics import FINGERS, time_at_gap
+from ..system.description import System
 from .claims import Run, Runs, check_claims
-from .errors import InputError
-from .grasp import CASES
-from .metrics import FINGERS, time_at_gap
-from .plot import draw_contact_forces, draw_contact_times, draw_targets, new_figure, save
-from .recording import write_text
 from .report import markdown, table_csv
-from .simulation import simulate
-from .system import System
 
 STOP = 4.5
 """s; the slowest contact is at 2.7 s and the layers settle with a time constant of 0.2 s."""
@@ -60,7 +60,7 @@ def evaluate(system: System, out: Path, workers: int, progress: bool) -> dict[st
 
 def _published() -> Iterator[dict[str, Any]]:
     """The simulated half of the published position table: a row per finger, one per difference."""
-    text = files(__package__).joinpath("published/table_position.csv").read_text("utf-8")
+    text = files(__package__).joinpath("table_position.csv").read_text("utf-8")
     for line in csv.DictReader(io.StringIO(text)):
         if line["source"] != "simulation":
             continue

@@ -29,8 +29,8 @@ from fmpy.fmi2 import (
 )
 from fmpy.logging import addLoggerProxy
 
-from .errors import InputError, SimulationError
-from .interface import Interface, Value, Variable
+from ..errors import InputError, SimulationError
+from ..system.interface import Interface, Value, Variable
 
 Call = Callable[[], int]
 """A bound FMI call; returns the FMI status."""

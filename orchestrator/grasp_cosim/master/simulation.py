@@ -8,11 +8,11 @@ from contextlib import ExitStack, contextmanager
 
 from tqdm import tqdm
 
-from .errors import InputError, SimulationError
-from .fmu import FmuInstance
-from .master import Master
-from .recording import Recorder, Result
-from .system import NANOSECONDS, System
+from ..errors import InputError, SimulationError
+from ..fmi.fmi2 import FmuInstance
+from ..recording.result import Recorder, Result
+from ..system.description import NANOSECONDS, System
+from .fixed_step import Master
 
 LOOK = 0.1
 """s of wall time between two looks at the progress bar, at Ctrl-C and for values not finite."""

@@ -6,15 +6,15 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .errors import InputError
-from .metrics import CONTROLLER, FINGERS, PLANT, is_grasp
-from .recording import in_one_piece
+from ..errors import InputError
+from ..recording.result import in_one_piece
+from ..study.metrics import CONTROLLER, FINGERS, PLANT, is_grasp
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from .recording import Result
+    from ..recording.result import Result
 
 BLUE, RED, GREY = "#1f5fa8", "#c0392b", "#7f7f7f"
 COLOR = {1: BLUE, 2: RED}

@@ -18,7 +18,7 @@ from xml.etree import ElementTree
 
 import fmpy
 
-from .errors import InputError, check_fmu_file, choices
+from ..errors import InputError, check_fmu_file, choices
 from .packed_imports import imports
 
 Status = Literal["ok", "warning", "problem"]

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .errors import SimulationError
-from .metrics import grasp_metrics
-from .plan import REAL, Plan, Signal
-from .system import NANOSECONDS, System
+from ..errors import SimulationError
+from ..master.plan import REAL, Plan, Signal
+from ..study.metrics import grasp_metrics
+from ..system.description import NANOSECONDS, System
 
 
 class Recorder:
@@ -117,7 +117,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
 
     def plot(self, path: str | Path) -> None:
         """Draw the grasp as a PNG; InputError without matplotlib or without a gripper plant."""
-        from .plot import plot_run  # which needs this module
+        from ..figures.plot import plot_run  # which needs this module
 
         plot_run(self, Path(path))
 

@@ -8,10 +8,10 @@ with the values of the last communication point. Time is an integer number of na
 import ctypes
 from collections.abc import Callable, Sequence
 
-from .errors import InputError, SimulationError, choices
-from .fmu import WARNING, Call
+from ..errors import InputError, SimulationError, choices
+from ..fmi.fmi2 import WARNING, Call
+from ..system.description import NANOSECONDS, System
 from .plan import REAL, Instance, Link, make_plan
-from .system import NANOSECONDS, System
 
 
 class Master:

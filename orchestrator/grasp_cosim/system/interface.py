@@ -8,7 +8,7 @@ from typing import Literal
 
 import fmpy
 
-from .errors import InputError, check_fmu_file, choices
+from ..errors import InputError, check_fmu_file, choices
 
 Value = float | int | bool | str
 Kind = Literal["Real", "Integer", "Boolean", "String"]

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import Any
 
-from .recording import Result
-from .system import System
+from ..recording.result import Result
+from ..system.description import System
 
 TIME_BAND = 0.10
 DIFFERENCE_BAND = 0.03

@@ -13,10 +13,10 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from .errors import SimulationError
-from .fmu import Call
-from .interface import Interface, Value, Variable
-from .system import NANOSECONDS, Port, System
+from ..errors import SimulationError
+from ..fmi.fmi2 import Call
+from ..system.description import NANOSECONDS, Port, System
+from ..system.interface import Interface, Value, Variable
 
 REAL = ("Real",)
 INTEGER = ("Integer", "Boolean")

@@ -14,9 +14,9 @@ from pathlib import Path
 import pytest
 from conftest import UnpackIn
 from fmpy.fmi2 import FMU2Slave
-from grasp_cosim import doctor
-from grasp_cosim.doctor import Finding, Unpacked, Verdict, examine, unpack
 from grasp_cosim.errors import InputError
+from grasp_cosim.host import doctor
+from grasp_cosim.host.doctor import Finding, Unpacked, Verdict, examine, unpack
 
 Changes = dict[str, bytes | None]
 Opened = Callable[..., Unpacked]

@@ -1,0 +1,5 @@
+"""The command line, grasp-cosim."""
+
+from .entry import entry, main
+
+__all__ = ["entry", "main"]

@@ -1,0 +1,92 @@
+"""The commands about single FMUs: build, inspect, doctor."""
+
+import json
+import shutil
+import sys
+from pathlib import Path
+
+import click
+
+from ..errors import InputError
+from ..grasp import BOUND_FOLDER, FMU_FOLDER
+from ..host.doctor import as_json as findings_json
+from ..host.doctor import as_text as findings_text
+from ..host.doctor import examine
+from ..host.inspection import as_text as inspection_text
+from ..host.inspection import inspect_fmu
+from .frame import NEGATIVE, check_folder, json_option
+
+
+@click.command()
+@click.option("--out", type=click.Path(path_type=Path), help=f"Default: {FMU_FOLDER}")
+@click.option(
+    "--bind-python",
+    is_flag=False,
+    flag_value=sys.executable,
+    metavar="[PYTHON]",
+    help=f"For hosts that are not Python: bind to libpython. Default of --out: {BOUND_FOLDER}",
+)
+@json_option
+def build(out: Path | None, bind_python: str | None, as_json: bool) -> int:
+    r"""Build the FMUs: GripperPlant, ProximitySensor, GraspController.
+
+    Says what is not as it was built last. --bind-python adds the libpython of PYTHON, by default
+    of this one, to what the FMUs load.
+
+    \b
+    Example: grasp-cosim build --out /tmp/fmus
+    """
+    from grasp_fmus.build import build as build_fmus
+
+    if bind_python == "":
+        raise InputError("--bind-python '': must be a Python program, or left out")
+    folder = out or (BOUND_FOLDER if bind_python else FMU_FOLDER)
+    check_folder(folder)
+    try:
+        built = build_fmus(folder, bind_python)
+    except ValueError as error:
+        raise InputError(f"build: {error}") from error
+    if as_json:
+        report = {str(b.path): {"status": b.status, "changes": list(b.changes)} for b in built}
+        click.echo(json.dumps({"fmus": list(report), "built": report}))
+    else:
+        for b in built:
+            click.echo("\n    ".join((f"{b.path}: {b.status}", *b.changes)))
+    return 0
+
+
+@click.command()
+@click.argument("fmu", type=click.Path(path_type=Path))
+@json_option
+def inspect(fmu: Path, as_json: bool) -> int:
+    r"""Show the interface of any FMU: variables, units, ranges, dependencies, capabilities.
+
+    \b
+    Example: grasp-cosim inspect fmus/build/GripperPlant.fmu
+    """
+    report = inspect_fmu(fmu)
+    if as_json:
+        click.echo(json.dumps(report))
+    else:
+        width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+        click.echo(inspection_text(report, width))
+    return 0
+
+
+@click.command()
+@click.argument("fmu", required=False, type=click.Path(path_type=Path))
+@json_option
+def doctor(fmu: Path | None, as_json: bool) -> int:
+    r"""Find out whether this machine will load FMU, and what to do if not.
+
+    Without FMU: whether it will load Python FMUs at all.
+
+    \b
+    Example: grasp-cosim doctor vendor.fmu
+    """
+    findings = examine(fmu)
+    if as_json:
+        click.echo(json.dumps({"findings": findings_json(findings)}))
+    else:
+        click.echo(findings_text(findings))
+    return NEGATIVE if any(f.status == "problem" for f in findings) else 0

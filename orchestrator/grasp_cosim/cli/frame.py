@@ -1,0 +1,58 @@
+"""What the commands share: the group, exit codes, errors as one line."""
+
+import tempfile
+import traceback
+from pathlib import Path
+
+import click
+
+from ..errors import InputError
+
+NEGATIVE, WRONG, FAILED, INTERRUPTED = 1, 2, 3, 130
+"""Exit codes beside 0: result negative, input wrong, failure on the way, Ctrl-C."""
+
+json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="grasp-cosim")
+@click.option("--debug", is_flag=True, help="Show the traceback of an error.")
+def cli(debug: bool) -> None:
+    r"""FMI co-simulation of a delicate grasp.
+
+    \b
+    grasp-cosim run                  the published grasp, from FMUs
+    grasp-cosim evaluate             the published table and figures, side by side with ours
+    grasp-cosim build                the FMUs
+    grasp-cosim inspect FMU          an FMU's interface
+    grasp-cosim doctor FMU           whether this machine will load an FMU
+    grasp-cosim COMMAND --help       options and an example
+    """
+
+
+def check_folder(folder: Path) -> None:
+    """InputError where files could not be written to the folder, which need not exist."""
+    nearest = folder.absolute()
+    while not nearest.exists():
+        nearest = nearest.parent
+    try:
+        with tempfile.TemporaryFile(dir=nearest):
+            pass
+    except OSError as error:
+        raise InputError(f"--out {folder}: cannot write to {nearest}: {error.strerror}") from error
+
+
+def pair(option: str, text: str, form: str) -> tuple[str, str]:
+    """Both sides of 'LEFT=RIGHT'; InputError, naming the form, where text is not like that."""
+    left, equals, right = text.partition("=")
+    if not (left and equals and right):
+        raise InputError(f"{option} {text!r}: must be {form}")
+    return left, right
+
+
+def fail(message: str, code: int, debug: bool = False) -> int:
+    """Print the message as one line on standard error; return the exit code."""
+    if debug:
+        traceback.print_exc()
+    click.echo(f"grasp-cosim: {message}", err=True)
+    return code

@@ -1,0 +1,106 @@
+"""The command run."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ..errors import SimulationError
+from ..figures.plot import check_plot
+from ..grasp import CASES, grasp_system
+from ..master.simulation import simulate
+from ..recording.result import Result
+from ..system.description import SCHEMES, System
+from ..system.interface import Value
+from .frame import INTERRUPTED, check_folder, fail, json_option, pair
+
+
+@click.command()
+@click.argument("system", required=False, type=click.Path(path_type=Path))
+@click.option("--case", type=click.IntRange(0, 2), help="0 and 1: without layers 3 and 2, 3.")
+@click.option("--set", "settings", multiple=True, metavar="COMPONENT.VARIABLE=VALUE")
+@click.option("--swap", "swaps", multiple=True, metavar="COMPONENT=FMU")
+@click.option("--step", type=float, help="Communication step in s.")
+@click.option("--stop", type=float, help="Stop time in s.")
+@click.option("--scheme", type=click.Choice(SCHEMES))
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for signals.csv and run.json.")
+@click.option("--plot", is_flag=True, help="Draw grasp.png, in --out or the current folder.")
+@json_option
+def run(
+    system: Path | None,
+    case: int | None,
+    settings: tuple[str, ...],
+    swaps: tuple[str, ...],
+    step: float | None,
+    stop: float | None,
+    scheme: str | None,
+    out: Path | None,
+    plot: bool,
+    as_json: bool,
+) -> int:
+    r"""Run SYSTEM, a .toml file; by default the built-in grasp.
+
+    \b
+    Example: grasp-cosim run --case 1 --set plant.initial_object_position=0.02 --out results --plot
+    """
+    chosen = System.load(system) if system else grasp_system()
+    fmus = dict(pair("--swap", text, "COMPONENT=FMU") for text in swaps)
+    values: dict[str, Value] = {} if case is None else dict(CASES[case])
+    values.update(pair("--set", text, "COMPONENT.VARIABLE=VALUE") for text in settings)
+    chosen = chosen.revised(fmus, values, ("--swap", "--set")).with_experiment(step, stop, scheme)
+    if plot:
+        check_plot(
+            f"{c.name}.{v.name}" for c in chosen.components for v in c.interface.of("output")
+        )
+    if out or plot:
+        check_folder(out or Path())
+    try:
+        result = simulate(chosen, progress=True)
+    except SimulationError as error:
+        if error.result:
+            _write(error.result, out, plot)
+        raise
+    _write(result, out, plot)
+    click.echo(json.dumps(dict(result.metrics)) if as_json else _summary(result))
+    if not result.complete:
+        message = f"interrupted at t = {result.time[-1]:.6g} s; kept what was recorded"
+        return fail(message, INTERRUPTED)
+    return 0
+
+
+def _write(result: Result, out: Path | None, plot: bool) -> None:
+    if out:
+        result.to_csv(out / "signals.csv")
+        result.to_json(out / "run.json")
+    if plot:
+        path = (out or Path()) / "grasp.png"
+        result.plot(path)
+        click.echo(f"drew {path}", err=True)
+
+
+def _summary(result: Result) -> str:
+    m = result.metrics
+    lines = [
+        f"{m['steps']} steps of {1e3 * m['step']:g} ms, {m['scheme']}, "
+        f"{m['real_time_factor']:.2f} times as fast as real time"
+    ]
+    if "time_to_contact" in m:
+        lines += [
+            f"{label:22s}{_numbers(m[key], factor)} {unit}"
+            for label, key, factor, unit in (
+                ("time to contact", "time_to_contact", 1.0, "s"),
+                ("time difference", "time_difference", 1.0, "s"),
+                ("impact velocity", "impact_velocity", 1e3, "mm/s"),
+                ("peak contact force", "peak_contact_force", 1.0, "N"),
+                ("steady contact force", "steady_contact_force", 1.0, "N"),
+                ("target position", "target_position", 1e3, "mm"),
+                ("object shift", "object_shift", 1e3, "mm"),
+            )
+        ]
+    return "\n".join(lines)
+
+
+def _numbers(value: Any, factor: float) -> str:
+    values = value if isinstance(value, list) else [value]
+    return "  ".join("    none" if v is None else f"{factor * v:8.3f}" for v in values)

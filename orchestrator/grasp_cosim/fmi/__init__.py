@@ -1,0 +1,1 @@
+"""FMU instances behind calls that are bound once."""

@@ -1,0 +1,1 @@
+"""The fixed-step master: plan, loop, session."""

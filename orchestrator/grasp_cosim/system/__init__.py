@@ -1,0 +1,1 @@
+"""The system description: what is connected, with which values, over which time."""
