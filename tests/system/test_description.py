@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from grasp_cosim import InputError, System
 from grasp_cosim.grasp import SYSTEM
-from grasp_cosim.system.description import Port
+from grasp_cosim.system.parts import Port
 
 TEXT = SYSTEM.read_text("utf-8")
 

@@ -12,8 +12,8 @@ from grasp_cosim import InputError, SimulationError, System
 from grasp_cosim.fmi.fmi2 import Call
 from grasp_cosim.master.fixed_step import Master
 from grasp_cosim.recording.result import Recorder
-from grasp_cosim.system.description import Component, Port, Wire
 from grasp_cosim.system.interface import Interface, Value, Variable
+from grasp_cosim.system.parts import Component, Port, Wire
 
 Function = Callable[[float, float], float]
 

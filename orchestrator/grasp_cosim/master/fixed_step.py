@@ -10,7 +10,8 @@ from collections.abc import Callable, Sequence
 
 from ..errors import InputError, SimulationError, choices
 from ..fmi.fmi2 import WARNING, Call
-from ..system.description import NANOSECONDS, System
+from ..system.description import System
+from ..system.parts import NANOSECONDS
 from .plan import REAL, Instance, Link, make_plan
 
 

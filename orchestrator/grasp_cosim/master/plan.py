@@ -15,8 +15,9 @@ import numpy.typing as npt
 
 from ..errors import SimulationError
 from ..fmi.fmi2 import Call
-from ..system.description import NANOSECONDS, Port, System
+from ..system.description import System
 from ..system.interface import Interface, Value, Variable
+from ..system.parts import NANOSECONDS, Port
 
 REAL = ("Real",)
 INTEGER = ("Integer", "Boolean")

@@ -11,7 +11,8 @@ from tqdm import tqdm
 from ..errors import InputError, SimulationError
 from ..fmi.fmi2 import FmuInstance
 from ..recording.result import Recorder, Result
-from ..system.description import NANOSECONDS, System
+from ..system.description import System
+from ..system.parts import NANOSECONDS
 from .fixed_step import Master
 
 LOOK = 0.1

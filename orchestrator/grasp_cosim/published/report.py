@@ -4,7 +4,8 @@ import csv
 import io
 from typing import Any
 
-from ..system.description import NANOSECONDS, System
+from ..system.description import System
+from ..system.parts import NANOSECONDS
 
 
 def table_csv(rows: list[dict[str, Any]]) -> str:

@@ -15,7 +15,8 @@ import numpy.typing as npt
 from ..errors import SimulationError
 from ..master.plan import REAL, Plan, Signal
 from ..study.metrics import grasp_metrics
-from ..system.description import NANOSECONDS, System
+from ..system.description import System
+from ..system.parts import NANOSECONDS
 
 
 class Recorder:

@@ -1,73 +1,27 @@
-"""The system description: components, wires and the experiment, from one TOML file.
+"""The system description: components, wires and the experiment, checked once."""
 
-    wires = ["plant.gap[1] -> sensor_1.gap", ...]   # before the first table, as TOML wants it
-
-    [experiment]
-    step = 1e-4                     # s, communication step
-    stop = 3.0                      # s
-    scheme = "sequential"           # or "jacobi"
-
-    [components.plant]              # the order of the components is the order of execution
-    fmu = "GripperPlant.fmu"        # relative to the TOML file
-    values = { object_width = 0.07 }
-
-Every input has exactly one source: a wire or a value.
-"""
-
-import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, get_args
 
 from ..errors import InputError, choices
-from .interface import Interface, Value, read_interface
+from .checks import check_steps, check_wires
+from .interface import Value
+from .parts import NANOSECONDS, Component, Event, Fault, Initialisation, Wire
 
 Scheme = Literal["sequential", "jacobi"]
 SCHEMES: tuple[str, ...] = get_args(Scheme)
-NANOSECONDS = 1_000_000_000
 LONGEST = 1e9
 """s; a time in nanoseconds then fits into 64 bits."""
-
-
-@dataclass(frozen=True, slots=True)
-class Component:
-    """An instance of an FMU and the values that differ from the FMU's own start values."""
-
-    name: str
-    fmu: Path
-    values: Mapping[str, Value]
-
-    @property
-    def interface(self) -> Interface:
-        """What the FMU declares."""
-        return read_interface(self.fmu)
-
-
-@dataclass(frozen=True, slots=True)
-class Port:
-    """A variable of a component."""
-
-    component: str
-    variable: str
-
-    def __str__(self) -> str:
-        return f"{self.component}.{self.variable}"
-
-
-@dataclass(frozen=True, slots=True)
-class Wire:
-    """From an output to an input of the same type."""
-
-    source: Port
-    target: Port
 
 
 @dataclass(frozen=True, slots=True)
 class System:
     """A checked system: every name exists, every input has one source or keeps a value.
 
-    step_ns and stop_ns are in nanoseconds; stop_ns is a whole multiple of step_ns.
+    step_ns and stop_ns are in nanoseconds; stop_ns is a whole multiple of step_ns, and so is the
+    step of each component.
     """
 
     name: str
@@ -76,25 +30,23 @@ class System:
     step_ns: int
     stop_ns: int
     scheme: Scheme
+    events: tuple[Event, ...] = ()
+    faults: tuple[Fault, ...] = ()
+    initialisation: Initialisation = Initialisation()
 
     def __post_init__(self) -> None:
-        _check_grid(self.step_ns, self.stop_ns)
+        check_steps(self)
         for component in self.components:
             for name, value in component.values.items():
                 component.interface.parse(f"{self.name}: {component.name}.{name}", name, value)
-        _check_wires(self)
+        check_wires(self)
 
     @classmethod
     def load(cls, path: str | Path, fmus: str | Path | None = None) -> "System":
         """The system of a TOML file; fmus is where its FMUs are, by default beside the file."""
-        path = Path(path)
-        try:
-            table = tomllib.loads(path.read_text(encoding="utf-8"))
-        except FileNotFoundError:
-            raise InputError(f"{path}: no such system file") from None
-        except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-            raise InputError(f"{path}: not readable as TOML: {error}") from error
-        return _from_table(path.name, table, Path(fmus) if fmus else path.parent)
+        from .toml import read_toml  # which needs this module
+
+        return read_toml(Path(path), Path(fmus) if fmus else None)
 
     def component(self, name: str, place: str) -> Component:
         """The component of that name; place says who asks, for the error message."""
@@ -150,108 +102,14 @@ class System:
         """A copy with another communication step or stop time in seconds, or another scheme."""
         return replace(
             self,
-            step_ns=self.step_ns if step is None else _nanoseconds("step", step),
-            stop_ns=self.stop_ns if stop is None else _nanoseconds("stop", stop),
-            scheme=self.scheme if scheme is None else _scheme("scheme", scheme),
+            step_ns=self.step_ns if step is None else in_nanoseconds("step", step),
+            stop_ns=self.stop_ns if stop is None else in_nanoseconds("stop", stop),
+            scheme=self.scheme if scheme is None else as_scheme("scheme", scheme),
         )
 
 
-def _from_table(place: str, table: dict[str, Any], folder: Path) -> System:
-    _check_keys(place, table, {"experiment", "components", "wires"})
-    experiment = _table(f"{place}: [experiment]", table.get("experiment"))
-    _check_keys(f"{place}: [experiment]", experiment, {"step", "stop", "scheme"})
-    components = _table(f"{place}: [components]", table.get("components"))
-    wires = table.get("wires", [])
-    if not isinstance(wires, list):
-        raise InputError(f"{place}: wires = {wires!r}: must be a list of 'output -> input'")
-    return System(
-        place,
-        tuple(_component(place, name, entry, folder) for name, entry in components.items()),
-        tuple(_wire(f"{place}: wires[{i}]", text) for i, text in enumerate(wires)),
-        _nanoseconds(f"{place}: experiment.step", experiment.get("step")),
-        _nanoseconds(f"{place}: experiment.stop", experiment.get("stop")),
-        _scheme(f"{place}: experiment.scheme", experiment.get("scheme", "sequential")),
-    )
-
-
-def _component(place: str, name: str, entry: Any, folder: Path) -> Component:
-    place = f"{place}: [components.{name}]"
-    entry = _table(place, entry)
-    _check_keys(place, entry, {"fmu", "values"})
-    fmu = entry.get("fmu")
-    if not isinstance(fmu, str):
-        raise InputError(f"{place}: fmu = {fmu!r}: must be the path of an FMU, as a string")
-    values = _table(f"{place}: values", entry.get("values", {}))
-    for key, value in values.items():
-        if not isinstance(value, float | int | bool | str):
-            raise InputError(
-                f"{place}: values.{key} = {value!r}: must be a number, boolean or string"
-            )
-    component = Component(name, folder / fmu, {})
-    parsed = {k: component.interface.parse(f"{place}: values", k, v) for k, v in values.items()}
-    return replace(component, values=parsed)
-
-
-def _wire(place: str, text: Any) -> Wire:
-    parts = [part.strip() for part in text.split("->")] if isinstance(text, str) else []
-    ports = [Port(*part.split(".", 1)) for part in parts if "." in part]
-    if len(parts) != 2 or len(ports) != 2:
-        raise InputError(f"{place}: {text!r}: must be 'component.output -> component.input'")
-    return Wire(*ports)
-
-
-def _check_wires(system: System) -> None:
-    sources: dict[Port, Wire] = {}
-    for i, wire in enumerate(system.wires):
-        place = f"{system.name}: wires[{i}] '{wire.source} -> {wire.target}'"
-        kinds = []
-        for port, causality in ((wire.source, "output"), (wire.target, "input")):
-            interface = system.component(port.component, place).interface
-            valid = [v.name for v in interface.of(causality)]
-            if port.variable not in valid:
-                raise InputError(
-                    f"{place}: {port.component} has no {causality} {port.variable!r}; "
-                    f"valid: {choices(valid)}"
-                )
-            kinds.append(interface.by_name[port.variable].kind)
-        if kinds[0] != kinds[1] or kinds[0] == "String":
-            raise InputError(
-                f"{place}: {wire.source} is {kinds[0]} and {wire.target} is {kinds[1]}; "
-                "must be both Real, both Integer or both Boolean"
-            )
-        if wire.target.variable in system.component(wire.target.component, place).values:
-            raise InputError(
-                f"{place}: {wire.target} has two sources, the wire and a value; must have one"
-            )
-        if wire.target in sources:
-            raise InputError(
-                f"{place}: {wire.target} has two sources, {sources[wire.target].source} and "
-                f"{wire.source}; must have one"
-            )
-        sources[wire.target] = wire
-    outputs = [
-        str(Port(c.name, v.name)) for c in system.components for v in c.interface.of("output")
-    ]
-    for component in system.components:
-        for variable in component.interface.of("input"):
-            port = Port(component.name, variable.name)
-            if port not in sources and variable.name not in component.values:
-                raise InputError(
-                    f"{system.name}: input {port} has no source; wire one of {choices(outputs)} "
-                    f"to it, or give it a value: --set {port}=VALUE, or in the system file"
-                )
-
-
-def _check_grid(step_ns: int, stop_ns: int) -> None:
-    if stop_ns % step_ns:
-        count = max(1, round(stop_ns / step_ns))
-        raise InputError(
-            f"step = {step_ns / NANOSECONDS:.9g} s does not divide stop = "
-            f"{stop_ns / NANOSECONDS:.9g} s; stop could be {count * step_ns / NANOSECONDS:.9g} s"
-        )
-
-
-def _nanoseconds(place: str, seconds: Any) -> int:
+def in_nanoseconds(place: str, seconds: Any) -> int:
+    """A time in s as a whole number of nanoseconds; InputError where it is none."""
     if isinstance(seconds, bool) or not isinstance(seconds, float | int):
         raise InputError(f"{place} = {seconds!r} s: must be a number")
     if not 0.0 < seconds <= LONGEST:
@@ -264,19 +122,8 @@ def _nanoseconds(place: str, seconds: Any) -> int:
     return nanoseconds
 
 
-def _scheme(place: str, scheme: Any) -> Scheme:
-    if scheme not in SCHEMES:
-        raise InputError(f"{place} = {scheme!r}: must be one of {choices(SCHEMES)}")
-    return scheme  # type: ignore[no-any-return]
-
-
-def _table(place: str, value: Any) -> dict[str, Any]:
-    if not isinstance(value, dict):
-        raise InputError(f"{place}: missing; must be a table")
-    return value
-
-
-def _check_keys(place: str, table: Mapping[str, Any], valid: Iterable[str]) -> None:
-    for key in table:
-        if key not in valid:
-            raise InputError(f"{place}: unknown entry {key!r}; valid: {choices(sorted(valid))}")
+def as_scheme(place: str, name: Any) -> Scheme:
+    """The scheme of that name; InputError where there is none."""
+    if name not in SCHEMES:
+        raise InputError(f"{place} = {name!r}: must be one of {choices(SCHEMES)}")
+    return name  # type: ignore[no-any-return]

@@ -1,7 +1,8 @@
 """What an FMU declares: its variables, as FMPy reads and validates them."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Literal
@@ -9,6 +10,7 @@ from typing import Literal
 import fmpy
 
 from ..errors import InputError, check_fmu_file, choices
+from .units import Unit
 
 Value = float | int | bool | str
 Kind = Literal["Real", "Integer", "Boolean", "String"]
@@ -16,7 +18,12 @@ Kind = Literal["Real", "Integer", "Boolean", "String"]
 
 @dataclass(frozen=True, slots=True)
 class Variable:
-    """A scalar variable; unit is None and start, low, high are absent where none is declared."""
+    """A variable; unit is None and start, low, high are absent where none is declared.
+
+    type is the FMI type (Real, Float32, Int8, ...), kind what the system makes of it. dependencies
+    are the inputs an output depends on directly, None where that is not declared, which means all;
+    initial_dependencies the same in initialisation mode. shape is () but for an array.
+    """
 
     name: str
     kind: Kind
@@ -26,16 +33,29 @@ class Variable:
     start: str | None
     low: float
     high: float
+    type: str = "Real"
+    variability: str = "continuous"
+    dependencies: tuple[str, ...] | None = None
+    initial_dependencies: tuple[str, ...] | None = None
+    shape: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
 class Interface:
-    """The interface of an FMI 2.0 co-simulation FMU."""
+    """The interface of a co-simulation FMU of FMI 2.0 or 3.0; guid is the instantiation token."""
 
     path: Path
     guid: str
     identifier: str
     variables: tuple[Variable, ...]
+    version: str = "2.0"
+    units: Mapping[str, Unit] = field(default_factory=dict)
+    can_save_state: bool = False
+    """Whether states can be saved and restored."""
+    can_vary_step: bool = False
+    """Whether the communication step may vary."""
+    python: bool = False
+    """Whether it was made with pythonfmu: its binary calls Python, and keeps the GIL."""
 
     @cached_property
     def by_name(self) -> dict[str, Variable]:
@@ -45,6 +65,26 @@ class Interface:
     def of(self, *causalities: str) -> list[Variable]:
         """The variables of the given causalities, in the order of declaration."""
         return [v for v in self.variables if v.causality in causalities]
+
+    def renamed(self, rename: Mapping[str, str]) -> "Interface":
+        """The same under other names: rename maps a new name to the FMU's own."""
+        if not rename:
+            return self
+        names = {own: new for new, own in rename.items()}
+
+        def new_names(listed: tuple[str, ...] | None) -> tuple[str, ...] | None:
+            return None if listed is None else tuple(names.get(name, name) for name in listed)
+
+        variables = (
+            replace(
+                v,
+                name=names.get(v.name, v.name),
+                dependencies=new_names(v.dependencies),
+                initial_dependencies=new_names(v.initial_dependencies),
+            )
+            for v in self.variables
+        )
+        return replace(self, variables=tuple(variables))
 
     def parse(self, place: str, name: str, value: Value, text: bool = False) -> Value:
         """The value for input or parameter name, checked against type, range and finiteness.

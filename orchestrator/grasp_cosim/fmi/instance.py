@@ -1,0 +1,130 @@
+"""What the master needs of a component, whichever FMI version or process it lives in."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import SimulationError
+from ..system.interface import Interface, Value, Variable
+
+STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
+OK, WARNING, DISCARD, ERROR, FATAL = 0, 1, 2, 3, 4
+"""FMI statuses. Up to WARNING a simulation goes on; after FATAL no call is allowed."""
+
+TRANSFER_2, TRANSFER_3, STEP_2, STEP_3, PYTHON = range(5)
+"""The shapes of a call, as the compiled loop makes it: see master/compiled.py."""
+
+
+class Native(NamedTuple):
+    """A C function with its arguments, all of them addresses or sizes but for the time.
+
+    TRANSFER_2: f(instance, references, n, data). TRANSFER_3: the same and n again.
+    STEP_2: f(instance, time, step, 1). STEP_3: f(instance, time, step, 1, &event, &terminate,
+    &early, &last), where flags is the address of three bytes for the first three, last that of a
+    double for the last.
+    """
+
+    shape: int
+    function: int
+    instance: int
+    references: int = 0
+    count: int = 0
+    data: int = 0
+    step: float = 0.0
+    flags: int = 0
+    last: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """A bound call that returns an FMI status: as a Python function, and natively if possible."""
+
+    python: Callable[[], int]
+    native: Native | None = None
+
+
+class Instance(Protocol):
+    """One instance of a component, in the order of its life."""
+
+    @property
+    def name(self) -> str:
+        """The component's name in the system."""
+
+    @property
+    def interface(self) -> Interface:
+        """What it declares, under the system's names."""
+
+    def enter_initialization(self, values: Mapping[str, Value], stop: float) -> None:
+        """Set start values and enter initialisation mode; the experiment ends at stop in s.
+
+        InputError where the FMU refuses.
+        """
+
+    def exit_initialization(self) -> None:
+        """Leave initialisation mode."""
+
+    def get(self, variables: Sequence[Variable]) -> list[Value]:
+        """The values of the variables now, one by one. For use outside the loop.
+
+        SimulationError where the FMU fails.
+        """
+
+    def set(self, variables: Sequence[Variable], values: Sequence[Value]) -> None:
+        """Set inputs or tunable parameters. For use outside the loop."""
+
+    def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:
+        """The call that passes data to inputs ("set") or fetches outputs into it ("get").
+
+        The variables are all of one FMI type; data has the type of DTYPES and their order.
+        """
+
+    def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
+        """The call that advances by step seconds from the time in clock[0]."""
+
+    def ended_early(self) -> bool:
+        """Whether the last step, though it returned OK, ended before its end (FMI 3)."""
+
+    def last_successful_time(self) -> float | None:
+        """Where a discarded or shortened step ended, in s; None where the FMU does not say."""
+
+    def save(self) -> None:
+        """Save the state, for one restore. Only where interface.can_save_state."""
+
+    def restore(self) -> None:
+        """Go back to the state saved last."""
+
+    def failure(self, status: int, time: float) -> SimulationError:
+        """The error for a call that returned a bad status at time in s."""
+
+    def close(self) -> None:
+        """End and free the instance as far as FMI permits after what it returned."""
+
+
+DTYPES: Mapping[str, npt.DTypeLike] = {
+    "Real": np.float64,
+    "Float64": np.float64,
+    "Float32": np.float32,
+    "Integer": np.int32,
+    "Boolean": np.int32,  # of FMI 2.0; that of 3.0 has one byte, see dtype()
+    "Int8": np.int8,
+    "UInt8": np.uint8,
+    "Int16": np.int16,
+    "UInt16": np.uint16,
+    "Int32": np.int32,
+    "UInt32": np.uint32,
+    "Int64": np.int64,
+    "UInt64": np.uint64,
+}
+"""FMI types to element types. An Enumeration is an Integer in FMI 2.0, an Int64 in 3.0."""
+
+
+def dtype(version: str, fmi_type: str) -> npt.DTypeLike:
+    """The element type of an FMI type in a version; KeyError for String, Binary and Clock."""
+    if fmi_type == "Boolean" and version.startswith("3"):
+        return np.bool_
+    if fmi_type == "Enumeration":
+        return np.int64 if version.startswith("3") else np.int32
+    return DTYPES[fmi_type]

@@ -1,0 +1,111 @@
+"""The parts of a system description: components, ports, wires, events and faults."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal, get_args
+
+from .interface import Interface, Value, read_interface
+
+Isolation = Literal["none", "process"]
+ISOLATIONS: tuple[str, ...] = get_args(Isolation)
+Relation = Literal["<", "<=", ">", ">="]
+RELATIONS: tuple[str, ...] = get_args(Relation)
+FaultKind = Literal["stuck", "dropout", "bias", "noise", "delay", "saturation", "quantisation"]
+FAULTS: tuple[str, ...] = get_args(FaultKind)
+NANOSECONDS = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Component:
+    """An instance of an FMU and what it is given: the system's names, values, step and process.
+
+    values differ from the FMU's own start values, by the system's names. rename maps the system's
+    name of a variable to the FMU's, where they differ. step_ns is the component's own communication
+    step in nanoseconds, None for the system's. With isolation "process" it runs in a process of its
+    own.
+    """
+
+    name: str
+    fmu: Path
+    values: Mapping[str, Value]
+    rename: Mapping[str, str] = field(default_factory=dict)
+    step_ns: int | None = None
+    isolation: Isolation = "none"
+
+    @property
+    def interface(self) -> Interface:
+        """What the FMU declares, under the system's names."""
+        return read_interface(self.fmu).renamed(self.rename)
+
+
+@dataclass(frozen=True, slots=True)
+class Port:
+    """A variable of a component."""
+
+    component: str
+    variable: str
+
+    def __str__(self) -> str:
+        return f"{self.component}.{self.variable}"
+
+
+@dataclass(frozen=True, slots=True)
+class Wire:
+    """From an output to an input: target = factor * source + offset.
+
+    factor and offset are None where the units decide: the identity, or the conversion between them.
+    """
+
+    source: Port
+    target: Port
+    factor: float | None = None
+    offset: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """An output compared with a constant, like plant.gap[1] < 0.01."""
+
+    port: Port
+    relation: Relation
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Sets tunable parameters or unwired inputs, once.
+
+    At the first communication point at or after at_ns, or the first one where the condition holds.
+    Exactly one of the two is given.
+    """
+
+    set: Mapping[Port, Value]
+    at_ns: int | None = None
+    when: Condition | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """What a wire does to the values it passes on, from start_ns until end_ns (None: the end).
+
+    The wire is named by its target. parameters depend on the kind, seed is that of a random one.
+    """
+
+    target: Port
+    kind: FaultKind
+    parameters: Mapping[str, float]
+    start_ns: int = 0
+    end_ns: int | None = None
+    seed: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Initialisation:
+    """How algebraic loops at t = 0 are solved: refused, or iterated to a relative tolerance."""
+
+    loops: Literal["iterate", "refuse"] = "iterate"
+    tolerance: float = 1e-10
+    iterations: int = 50

@@ -1,0 +1,92 @@
+"""The system description: components, wires and the experiment, from one TOML file.
+
+    wires = ["plant.gap[1] -> sensor_1.gap", ...]   # before the first table, as TOML wants it
+
+    [experiment]
+    step = 1e-4                     # s, communication step
+    stop = 3.0                      # s
+    scheme = "sequential"           # or "jacobi"
+
+    [components.plant]              # the order of the components is the order of execution
+    fmu = "GripperPlant.fmu"        # relative to the TOML file
+    values = { object_width = 0.07 }
+
+Every input has exactly one source: a wire or a value.
+"""
+
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError, choices
+from .description import System, as_scheme, in_nanoseconds
+from .parts import Component, Port, Wire
+
+
+def read_toml(path: Path, fmus: Path | None = None) -> System:
+    """The system of a TOML file; fmus is where its FMUs are, by default beside the file."""
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such system file") from None
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"{path}: not readable as TOML: {error}") from error
+    return _from_table(path.name, table, fmus or path.parent)
+
+
+def _from_table(place: str, table: dict[str, Any], folder: Path) -> System:
+    _check_keys(place, table, {"experiment", "components", "wires"})
+    experiment = _table(f"{place}: [experiment]", table.get("experiment"))
+    _check_keys(f"{place}: [experiment]", experiment, {"step", "stop", "scheme"})
+    components = _table(f"{place}: [components]", table.get("components"))
+    wires = table.get("wires", [])
+    if not isinstance(wires, list):
+        raise InputError(f"{place}: wires = {wires!r}: must be a list of 'output -> input'")
+    return System(
+        place,
+        tuple(_component(place, name, entry, folder) for name, entry in components.items()),
+        tuple(_wire(f"{place}: wires[{i}]", text) for i, text in enumerate(wires)),
+        in_nanoseconds(f"{place}: experiment.step", experiment.get("step")),
+        in_nanoseconds(f"{place}: experiment.stop", experiment.get("stop")),
+        as_scheme(f"{place}: experiment.scheme", experiment.get("scheme", "sequential")),
+    )
+
+
+def _component(place: str, name: str, entry: Any, folder: Path) -> Component:
+    place = f"{place}: [components.{name}]"
+    entry = _table(place, entry)
+    _check_keys(place, entry, {"fmu", "values"})
+    fmu = entry.get("fmu")
+    if not isinstance(fmu, str):
+        raise InputError(f"{place}: fmu = {fmu!r}: must be the path of an FMU, as a string")
+    values = _table(f"{place}: values", entry.get("values", {}))
+    for key, value in values.items():
+        if not isinstance(value, float | int | bool | str):
+            raise InputError(
+                f"{place}: values.{key} = {value!r}: must be a number, boolean or string"
+            )
+    component = Component(name, folder / fmu, {})
+    parsed = {k: component.interface.parse(f"{place}: values", k, v) for k, v in values.items()}
+    return replace(component, values=parsed)
+
+
+def _wire(place: str, text: Any) -> Wire:
+    parts = [part.strip() for part in text.split("->")] if isinstance(text, str) else []
+    ports = [Port(*part.split(".", 1)) for part in parts if "." in part]
+    if len(parts) != 2 or len(ports) != 2:
+        raise InputError(f"{place}: {text!r}: must be 'component.output -> component.input'")
+    return Wire(ports[0], ports[1])
+
+
+def _table(place: str, value: Any) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise InputError(f"{place}: missing; must be a table")
+    return value
+
+
+def _check_keys(place: str, table: Mapping[str, Any], valid: Iterable[str]) -> None:
+    for key in table:
+        if key not in valid:
+            raise InputError(f"{place}: unknown entry {key!r}; valid: {choices(sorted(valid))}")
