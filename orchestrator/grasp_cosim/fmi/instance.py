@@ -31,7 +31,7 @@ class Native(NamedTuple):
     function: int
     instance: int
     references: int = 0
-    count: int = 0
+    size: int = 0
     data: int = 0
     step: float = 0.0
     flags: int = 0
