@@ -39,7 +39,8 @@ class MdfListener:
 
     The header has the settings() of the system: all of them as JSON in its comment, and the main
     ones as properties, with "complete" besides. asammdf keeps the rows in a compressed temporary
-    file beside path; the file at path is made from it when the run ends, in whatever way.
+    file beside path; the file at path is made from it when the run ends, in whatever way. There is
+    no file where nothing was recorded.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -86,9 +87,10 @@ class MdfListener:
         """Make the file; SimulationError where that fails, and there is none."""
         try:
             self._flush()
-            self._mdf.header.comment = _comment(self._system, complete)
-            with in_one_piece(self._path) as part, part.open("wb+") as file:
-                self._mdf.save(file, compression=TRANSPOSED_DEFLATE)
+            if self._mdf.groups[0].channel_group.cycles_nr:
+                self._mdf.header.comment = _comment(self._system, complete)
+                with in_one_piece(self._path) as part, part.open("wb+") as file:
+                    self._mdf.save(file, compression=TRANSPOSED_DEFLATE)
         except OSError as error:
             raise SimulationError(unwritable(self._path, error)) from error
         finally:

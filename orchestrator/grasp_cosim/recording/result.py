@@ -137,7 +137,9 @@ class Result(Mapping[str, npt.NDArray[Any]]):
             self._play(MdfListener(part))
 
     def to_json(self, path: str | Path) -> None:
-        """Write the metrics, and the settings that led to them, see recording/README.md."""
+        """Write the metrics and the settings() that led to them, then what is known by signal
+        (units, types, descriptions), the log, and the rejections by component.
+        """
         report = {
             **self.metrics,
             **settings(self.system),
