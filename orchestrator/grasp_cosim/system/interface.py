@@ -151,7 +151,8 @@ def _variable(v: fmpy.model_description.ScalarVariable) -> Variable:
         v.start,
         -math.inf if low is None else float(low),
         math.inf if high is None else float(high),
-        variability=v.variability,
+        v.type,
+        v.variability,
     )
 
 
