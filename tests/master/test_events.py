@@ -7,7 +7,7 @@ from typing import cast
 
 import numpy as np
 import pytest
-from grasp_cosim import SimulationError, System
+from grasp_cosim import InputError, SimulationError, System
 from grasp_cosim.fmi.instance import Instance
 from grasp_cosim.master.scenario import Scenario
 from grasp_cosim.system import parts
@@ -300,3 +300,28 @@ def test_asked_only_where_it_says_so_it_does_the_same(rise: int) -> None:
     assert needed.scenario.pending() == every.scenario.pending()
     if rise == 0:
         assert asked == [0, 2, 3, 4, 6, 8, 9, 20]
+
+
+def test_what_is_set_by_hand_is_noted_with_the_events() -> None:
+    rig = Rig([at(0.2, p=1.0)])
+    rig.run(4)
+    rig.scenario.set("a.n", 3.0, 7)
+    assert repr(rig.mocks["a"].given) == "[('p', 1.0), ('n', 3)]"
+    assert rig.scenario.log == ["t = 0.2 s: a.p = 1.0", "t = 0.7 s: a.n = 3.0"]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("a.u", 1.0, r"^set: a\.u: has a wire, from a\.y; put a fault of kind 'stuck' on it"),
+        ("a.w", 1.0, r"^set: a\.w: not there; must be a tunable parameter or an input without"),
+        ("c.p", 1.0, r"^set: c\.p: no component 'c'; valid: a, b, slow$"),
+        ("p", 1.0, r"^set: p: no component 'p'"),
+        ("a.p", "1", r"^set: a\.p: p = '1': must be a finite number"),
+    ],
+)
+def test_what_cannot_be_set_by_hand(name: str, value: Value, message: str) -> None:
+    rig = Rig()
+    with pytest.raises(InputError, match=message):
+        rig.scenario.set(name, value, 0)
+    assert not rig.mocks["a"].given

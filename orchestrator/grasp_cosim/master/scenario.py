@@ -9,7 +9,10 @@ from ..fmi.instance import Instance
 from ..system.description import System
 from ..system.interface import Value, Variable
 from ..system.parts import NANOSECONDS, Condition, Event, Port, literal
-from .faults import FaultFunction, Window, fault_functions, first_step
+from ..system.scenario_checks import check_setting
+from .faults import INITIAL, FaultFunction, Window, fault_functions, first_step
+
+__all__ = ["INITIAL", "FaultFunction", "Scenario"]
 
 _COMPARE: Mapping[str, Callable[[float, float], bool]] = {
     "<": operator.lt,
@@ -47,6 +50,7 @@ class Scenario:
     ) -> None:
         """Values holds the outputs of now whenever a method is called, at the places in slots."""
         self.log = []
+        self._system, self._instances = system, instances
         self._step_ns = system.step_ns
         self._slots, self._values = slots, values
         self._events = [
@@ -66,20 +70,30 @@ class Scenario:
         """
         if self._due is None or step < self._due:
             return
-        moment = f"t = {step * self._step_ns / NANOSECONDS:.9g} s: "
         for event in self._events[:]:
             if event.next_step(step) == step and self._holds(event.event.when):
                 self._events.remove(event)
-                event.happen()
-                self.log += [moment + line for line in event.lines()]
+                self._note(step, event.happen())
         for window in self._windows:
             if window.may_begin(step) and self._holds(window.fault.when):
                 window.begin(step)
-                self.log.append(f"{moment}{window} begins")
+                self._note(step, [f"{window} begins"])
             elif window.must_end(step):
                 window.end()
-                self.log.append(f"{moment}{window} ends")
+                self._note(step, [f"{window} ends"])
         self._due = self.next_step(step + 1)
+
+    def set(self, name: str, value: Value, step: int) -> None:
+        """Set what an event could set, now, at communication point step.
+
+        InputError where there is none of that name, or where the value does not fit;
+        SimulationError where the component refuses it.
+        """
+        component, _, variable = name.partition(".")
+        port, place = Port(component, variable), f"set: {name}"
+        check_setting(self._system, port, value, place)
+        event = _PendingEvent(place, Event({port: value}), self._system, self._instances)
+        self._note(step, event.happen())
 
     def next_step(self, step: int) -> int | None:
         """The first step from this one on that needs before_step, as things are; None: none does.
@@ -95,6 +109,10 @@ class Scenario:
         events = [f"{event.name} did not happen: {event.reason()}" for event in self._events]
         faults = [f"{w.name} did not begin: {w}" for w in self._windows if not w.begun]
         return events + faults
+
+    def _note(self, step: int, lines: Sequence[str]) -> None:
+        moment = f"t = {step * self._step_ns / NANOSECONDS:.9g} s: "
+        self.log += [moment + line for line in lines]
 
     def _holds(self, condition: Condition | None) -> bool:
         if condition is None:
@@ -127,13 +145,10 @@ class _PendingEvent:
         """The first step from this one on at which it can happen."""
         return -(-max(step, self._first) // self._period) * self._period
 
-    def happen(self) -> None:
-        """Set what it sets."""
+    def happen(self) -> list[str]:
+        """Set what it sets; lines for the log that say so."""
         for instance, variables, values in self._calls.values():
             instance.set(variables, values)
-
-    def lines(self) -> list[str]:
-        """What it did, for the log."""
         reason = f" ({self.event.when})" if self.event.when else ""
         return [f"{port} = {literal(value)}{reason}" for port, value in self.event.set.items()]
 

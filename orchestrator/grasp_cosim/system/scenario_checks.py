@@ -77,7 +77,7 @@ def _check_event(system: System, event: Event, place: str) -> None:
     if event.when is not None:
         _check_condition(system, event.when, f"{place}: when = '{event.when}'")
     for port, value in event.set.items():
-        _check_setting(system, port, value, f"{place}: set.{port}")
+        check_setting(system, port, value, f"{place}: set.{port}")
 
 
 def _settable(system: System) -> list[Port]:
@@ -92,7 +92,8 @@ def _settable(system: System) -> list[Port]:
     ]
 
 
-def _check_setting(system: System, port: Port, value: Value, place: str) -> None:
+def check_setting(system: System, port: Port, value: Value, place: str) -> None:
+    """InputError where the value cannot be set at the port during a run."""
     interface = system.component(port.component, place).interface
     for wire in system.wires:
         if wire.target == port:
