@@ -18,8 +18,9 @@ MARKERS = ("o", "s", "^", "D", "v", "P")
 
 
 def draw_step_study(study: StepStudy, path: Path) -> None:
-    """Errors of the contact times, and energies where there are any, over the step, as a PNG."""
-    names = list(dict.fromkeys(name for run in study.runs for name in run.energies))
+    """Errors of the contact times over the step, below them energies if there are any; a PNG."""
+    # A logarithmic axis has no place for 0.
+    names = list(dict.fromkeys(n for run in study.runs for n, e in run.energies.items() if e))
     figure = new_figure(7.2, 7.6 if names else 4.4)
     if names:
         errors, energies = figure.subplots(2, 1, sharex=True)
@@ -84,7 +85,7 @@ def _draw_energies(axes: Axes, study: StepStudy, names: list[str]) -> None:
     for i, name in enumerate(names):
         color = colors[i % len(colors)]
         ends = [(1e3 * run.step, 1e6 * run.energies.get(name, 0.0)) for run in study.runs]
-        found = [(h, e) for h, e in ends if e]  # a logarithmic axis has no place for 0
+        found = [(h, e) for h, e in ends if e]
         axes.plot([h for h, _ in found], [abs(e) for _, e in found], color=color, label=name)
         for h, e in found:
             face = color if e > 0.0 else "none"
