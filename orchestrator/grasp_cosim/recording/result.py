@@ -113,7 +113,13 @@ class Result(Mapping[str, npt.NDArray[Any]]):
         settings = {
             c.name: {"fmu": c.fmu.name, "values": dict(c.values)} for c in self.system.components
         }
-        report = {**self.metrics, "units": dict(self.units), "components": settings}
+        types = {name: str(column.dtype) for name, column in self.signals.items()}
+        report = {
+            **self.metrics,
+            "units": dict(self.units),
+            "types": types,
+            "components": settings,
+        }
         write_text(Path(path), json.dumps(report, indent=2) + "\n")
 
     def plot(self, path: str | Path) -> None:

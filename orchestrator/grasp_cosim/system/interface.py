@@ -151,6 +151,8 @@ def _variable(v: fmpy.model_description.ScalarVariable) -> Variable:
         v.start,
         -math.inf if low is None else float(low),
         math.inf if high is None else float(high),
+        v.type,
+        v.variability,
     )
 
 
