@@ -54,6 +54,23 @@ def check_wires(system: System) -> None:
                 )
 
 
+def check_initialisation(system: System) -> None:
+    """InputError where an option of the initialisation is not as it must be."""
+    place, chosen = f"{system.name}: [initialisation]", system.initialisation
+    if chosen.loops not in LOOPS:
+        raise InputError(f"{place}: loops = {chosen.loops!r}: must be one of {choices(LOOPS)}")
+    number = isinstance(chosen.tolerance, float | int) and not isinstance(chosen.tolerance, bool)
+    if not number or not 0.0 < chosen.tolerance < 1.0:
+        raise InputError(
+            f"{place}: tolerance = {chosen.tolerance!r}: must be a number between 0 and 1"
+        )
+    whole = isinstance(chosen.iterations, int) and not isinstance(chosen.iterations, bool)
+    if not whole or chosen.iterations < 1:
+        raise InputError(
+            f"{place}: iterations = {chosen.iterations!r}: must be a whole number, at least 1"
+        )
+
+
 def check_steps(system: System) -> None:
     """InputError where a step does not divide what it must."""
     step, stop = system.step_ns / NANOSECONDS, system.stop_ns / NANOSECONDS
@@ -77,20 +94,3 @@ def check_steps(system: System) -> None:
                 f"{system.name}: {component.name}: step = {own / NANOSECONDS:.9g} s does not "
                 f"divide stop = {stop:.9g} s; must end with a whole step"
             )
-
-
-def check_initialisation(system: System) -> None:
-    """InputError where an option of the initialisation is not as it must be."""
-    place, chosen = f"{system.name}: [initialisation]", system.initialisation
-    if chosen.loops not in LOOPS:
-        raise InputError(f"{place}: loops = {chosen.loops!r}: must be one of {choices(LOOPS)}")
-    number = isinstance(chosen.tolerance, float | int) and not isinstance(chosen.tolerance, bool)
-    if not number or not 0.0 < chosen.tolerance < 1.0:
-        raise InputError(
-            f"{place}: tolerance = {chosen.tolerance!r}: must be a number between 0 and 1"
-        )
-    whole = isinstance(chosen.iterations, int) and not isinstance(chosen.iterations, bool)
-    if not whole or chosen.iterations < 1:
-        raise InputError(
-            f"{place}: iterations = {chosen.iterations!r}: must be a whole number, at least 1"
-        )
