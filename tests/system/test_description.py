@@ -52,7 +52,11 @@ WRONG = [
     (" -> sensor_1.gap", " sensor_1.gap", "must be 'component.output -> component.input'"),
     ("GripperPlant.fmu", "Gripper.fmu", "Gripper.fmu: no such FMU file"),
     ('fmu = "GripperPlant.fmu"', "fmu = 7", r"\[components.plant\]: fmu = 7: must be the path"),
-    ('fmu = "GripperPlant.fmu"', 'fnu = "x"', "unknown entry 'fnu'; valid: fmu, values"),
+    (
+        'fmu = "GripperPlant.fmu"',
+        'fnu = "x"',
+        "unknown entry 'fnu'; valid: fmu, isolation, rename, step, values",
+    ),
     ("object_width = 0.07", "width = 0.07", "no input or parameter 'width'; valid: force"),
     ("object_width = 0.07", "object_width = -1.0", "must be a finite number from 0 to 10 m"),
     ("object_width = 0.07", "object_width = nan", "object_width = nan: must be a finite number"),

@@ -48,7 +48,7 @@ class Component:
     @property
     def interface(self) -> Interface:
         """What the FMU declares, under the system's names."""
-        return read_interface(self.fmu).renamed(self.rename)
+        return read_interface(self.fmu).renamed(self.rename, f"{self.name}: rename")
 
 
 @dataclass(frozen=True, slots=True)

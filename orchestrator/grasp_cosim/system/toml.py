@@ -10,6 +10,12 @@
     [components.plant]              # the order of the components is the order of execution
     fmu = "GripperPlant.fmu"        # relative to the TOML file
     values = { object_width = 0.07 }
+    step = 5e-4                     # s, where it differs: a whole multiple of the experiment's step
+    rename = { "gap[1]" = "Gap1" }  # the system's name = the FMU's, where they differ
+    isolation = "process"           # in a process of its own; or "none"
+
+A wire that scales is a table: { from = "a.x", to = "b.y", factor = 1000.0, offset = 0.0 }. Without
+factor and offset, units that differ are converted.
 
     [initialisation]                # may be left out, as each of its entries
     loops = "iterate"               # what to do with an algebraic loop at t = 0; or "refuse"
@@ -24,9 +30,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError
+from ..errors import InputError, choices
 from .description import System, as_scheme, in_nanoseconds
-from .parts import Component, Initialisation, Port, Wire
+from .interface import read_interface
+from .parts import ISOLATIONS, Component, Initialisation, Isolation, Port, Wire
 from .scenario import read_events, read_faults
 from .tables import as_table, check_keys
 
@@ -76,7 +83,7 @@ def read_initialisation(place: str, table: Any) -> Initialisation:
 def _component(place: str, name: str, entry: Any, folder: Path) -> Component:
     place = f"{place}: [components.{name}]"
     entry = as_table(place, entry)
-    check_keys(place, entry, {"fmu", "values"})
+    check_keys(place, entry, {"fmu", "values", "step", "rename", "isolation"})
     fmu = entry.get("fmu")
     if not isinstance(fmu, str):
         raise InputError(f"{place}: fmu = {fmu!r}: must be the path of an FMU, as a string")
@@ -86,14 +93,52 @@ def _component(place: str, name: str, entry: Any, folder: Path) -> Component:
             raise InputError(
                 f"{place}: values.{key} = {value!r}: must be a number, boolean or string"
             )
-    component = Component(name, folder / fmu, {})
+    own = entry.get("step")
+    component = Component(
+        name,
+        folder / fmu,
+        {},
+        _rename(f"{place}: rename", folder / fmu, entry.get("rename", {})),
+        None if own is None else in_nanoseconds(f"{place}: step", own),
+        _isolation(f"{place}: isolation", entry.get("isolation", "none")),
+    )
     parsed = {k: component.interface.parse(f"{place}: values", k, v) for k, v in values.items()}
     return replace(component, values=parsed)
 
 
-def _wire(place: str, text: Any) -> Wire:
-    parts = [part.strip() for part in text.split("->")] if isinstance(text, str) else []
-    ports = [Port(*part.split(".", 1)) for part in parts if "." in part]
-    if len(parts) != 2 or len(ports) != 2:
-        raise InputError(f"{place}: {text!r}: must be 'component.output -> component.input'")
-    return Wire(ports[0], ports[1])
+def _rename(place: str, fmu: Path, table: Any) -> dict[str, str]:
+    """The table of names, each of which the FMU knows."""
+    names = as_table(place, table)
+    for new, own in names.items():
+        if not isinstance(own, str):
+            raise InputError(f"{place}: {new!r} = {own!r}: must be a variable of the FMU, a string")
+    read_interface(fmu).renamed(names, place)
+    return names
+
+
+def _isolation(place: str, name: Any) -> Isolation:
+    if name not in ISOLATIONS:
+        raise InputError(f"{place} = {name!r}: must be one of {choices(ISOLATIONS)}")
+    return name  # type: ignore[no-any-return]
+
+
+def _wire(place: str, entry: Any) -> Wire:
+    if not isinstance(entry, dict):
+        parts = [part.strip() for part in entry.split("->")] if isinstance(entry, str) else []
+        ports = [Port(*part.split(".", 1)) for part in parts if "." in part]
+        if len(parts) != 2 or len(ports) != 2:
+            raise InputError(f"{place}: {entry!r}: must be 'component.output -> component.input'")
+        return Wire(ports[0], ports[1])
+    check_keys(place, entry, {"from", "to", "factor", "offset"})
+    for key in ("factor", "offset"):
+        number = entry.get(key, 0.0)
+        if isinstance(number, bool) or not isinstance(number, float | int):
+            raise InputError(f"{place}: {key} = {number!r}: must be a number")
+    source, target = (_port(f"{place}: {key}", entry.get(key)) for key in ("from", "to"))
+    return Wire(source, target, entry.get("factor"), entry.get("offset"))
+
+
+def _port(place: str, text: Any) -> Port:
+    if not isinstance(text, str) or "." not in text:
+        raise InputError(f"{place} = {text!r}: must be 'component.variable'")
+    return Port(*text.split(".", 1))
