@@ -45,8 +45,8 @@ def test_what_is_special_in_a_system(grasp: System) -> None:
             ),
         ),
         faults=(
-            Fault(Port("controller", "intensity[1]"), "bias", {"value": 0.1}, 1, 2_000_000),
-            Fault(Port("controller", "intensity[2]"), "dropout", {"probability": 0.5}, seed=7),
+            Fault(Port("controller", "intensity[1]"), "bias", {"value": 0.1}, 100_000, 300_000),
+            Fault(Port("controller", "intensity[2]"), "stuck", {}),
         ),
     )
     found: dict[str, Any] = json.loads(json.dumps(settings(system)))
@@ -62,14 +62,8 @@ def test_what_is_special_in_a_system(grasp: System) -> None:
             "wire": "controller.intensity[1]",
             "kind": "bias",
             "value": 0.1,
-            "from": 1e-9,
-            "until": 2e-3,
+            "from": 1e-4,
+            "until": 3e-4,
         },
-        {
-            "wire": "controller.intensity[2]",
-            "kind": "dropout",
-            "probability": 0.5,
-            "from": 0.0,
-            "seed": 7,
-        },
+        {"wire": "controller.intensity[2]", "kind": "stuck", "from": 0.0},
     ]
