@@ -2,7 +2,7 @@
 
 The bit patterns of the doubles are taken as whole numbers. Of a smooth signal their second
 differences are small, so that most of their high bytes are equal; these are put together and
-deflated. Of the published grasp 2 characters per value are left, where base64 of doubles takes 10.7.
+deflated. The published grasp takes 2 characters per value, where base64 of doubles takes 10.7.
 """
 
 import base64
