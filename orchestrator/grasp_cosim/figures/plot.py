@@ -59,7 +59,7 @@ def plot_run(run: Recorded, path: Path) -> None:
     for axes in rows[:, 0]:
         axes.sharex(rows[2, 0])
     _gaps(gaps, run, slice(None), FINGERS)
-    _finish(gaps, "gap to the object in mm")
+    finish(gaps, "gap to the object in mm")
     draw_contact_forces(contact, [(run, "-", "")])
     draw_targets(target, [(run, "-", "")])
     target.set_xlabel("time in s")
@@ -80,7 +80,7 @@ def plot_signals(run: Recorded, path: Path) -> None:
         names = [name for name in run.signals if (run.units[name] or "") == unit]
         for name in names:
             axes.plot(run.time, run.signals[name], linewidth=1.0, label=name)
-        _finish(axes, f"in {unit}" if unit else "no unit", len(names) <= MOST_NAMED)
+        finish(axes, f"in {unit}" if unit else "no unit", len(names) <= MOST_NAMED)
     figure.axes[-1].set_xlabel("time in s")
     save(figure, path)
 
@@ -118,7 +118,7 @@ def _around(
         axes.sharex(speeds)
         axes.set_xlim(begin, end)
         axes.locator_params(axis="x", nbins=4)
-        _finish(axes, label)
+        finish(axes, label)
 
 
 def _gaps(axes: Axes, run: Recorded, rows: slice, fingers: Sequence[int]) -> None:
@@ -147,7 +147,7 @@ def draw_contact_forces(axes: Axes, runs: Sequence[tuple[Recorded, str, str]]) -
             axes.plot(result.time, force, style, color=COLOR[j], label=name)
             highest = max(highest, peak)
     axes.set_ylim(-0.03 * min(highest, FORCE_LIMIT), 1.1 * min(max(highest, 1e-3), FORCE_LIMIT))
-    _finish(axes, "contact force in N")
+    finish(axes, "contact force in N")
 
 
 def draw_targets(axes: Axes, runs: Sequence[tuple[Recorded, str, str]]) -> None:
@@ -159,7 +159,7 @@ def draw_targets(axes: Axes, runs: Sequence[tuple[Recorded, str, str]]) -> None:
     result = runs[0][0]
     centre = 1e3 * result.signals[f"{PLANT}.object_position"]
     axes.plot(result.time, centre, ":", color=GREY, label="centre of the object")
-    _finish(axes, "position in mm")
+    finish(axes, "position in mm")
 
 
 def draw_contact_times(axes: Axes, rows: Sequence[Mapping[str, Any]], case: int) -> None:
@@ -179,7 +179,7 @@ def draw_contact_times(axes: Axes, rows: Sequence[Mapping[str, Any]], case: int)
     axes.set_title(f"Case {case}", fontsize=10)
     axes.set_xlabel("object position in mm")
     axes.set_ylim(0.0, 3.0)
-    _finish(axes, "time to contact in s")
+    finish(axes, "time to contact in s")
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -200,7 +200,8 @@ def save(figure: Figure, path: Path) -> None:
         figure.savefig(part, format="png", dpi=130, metadata={"Software": None})
 
 
-def _finish(axes: Axes, label: str, legend: bool = True) -> None:
+def finish(axes: Axes, label: str, legend: bool = True) -> None:
+    """Label the upright axis of a finished diagram; a grid, a legend, no frame."""
     axes.set_ylabel(label)
     axes.grid(True, color="#dddddd", linewidth=0.6)
     if legend:

@@ -8,7 +8,17 @@ from typing import Any
 
 from ..study.metrics import FINGERS, LABELS
 
-EXPERIMENT = ("step", "stop", "scheme", "steps", "wall_time", "real_time_factor", "complete")
+EXPERIMENT = (
+    "system",
+    "step",
+    "stop",
+    "scheme",
+    "initialisation",
+    "steps",
+    "wall_time",
+    "real_time_factor",
+    "complete",
+)
 """Entries of run.json that say how the run was made, in the order in which they are shown."""
 
 SETTINGS = ("components", "wires", "events", "faults", "log", "rejections")
@@ -56,7 +66,7 @@ def settings_html(run: Mapping[str, Any]) -> str:
     heads = "<th>component</th><th>FMU</th><th>start values given</th><th></th>"
     experiment = [
         f"<td>{escape(key.replace('_', ' '))}</td>"
-        f"<td>{escape(number(run[key]))} {_UNITS.get(key, '')}</td>"
+        f"<td>{escape(_plain(run[key]))} {_UNITS.get(key, '')}</td>"
         for key in EXPERIMENT
     ]
     lists = [
@@ -86,7 +96,7 @@ def table(heads: str, rows: Iterable[str]) -> str:
 def entries(values: Mapping[str, Any]) -> str:
     """Like a = 1, b = 2; a mapping within in brackets."""
     return ", ".join(
-        f"{key} = " + (f"({entries(v)})" if isinstance(v, Mapping) else number(v))
+        f"{key} = " + (f"({_plain(v)})" if isinstance(v, Mapping) else number(v))
         for key, v in values.items()
     )
 
@@ -119,6 +129,10 @@ def _metric(label: str, value: Any, factor: float, unit: str) -> str:
 def _scaled(value: Any, factor: float) -> str:
     if isinstance(value, float):
         return f"{factor * value:.4f}" if factor * abs(value) < 1e4 else number(factor * value)
+    return _plain(value)
+
+
+def _plain(value: Any) -> str:
     return entries(value) if isinstance(value, Mapping) else number(value)
 
 
