@@ -11,6 +11,7 @@ from ..figures.plot import check_plot
 from ..grasp import CASES, grasp_system
 from ..master.simulation import simulate
 from ..recording.result import Result
+from ..study.metrics import LABELS
 from ..system.description import SCHEMES, System
 from ..system.interface import Value
 from .frame import INTERRUPTED, check_folder, fail, json_option, pair
@@ -98,16 +99,7 @@ def _summary(result: Result) -> str:
     ]
     if "time_to_contact" in m:
         lines += [
-            f"{label:22s}{_numbers(m[key], factor)} {unit}"
-            for label, key, factor, unit in (
-                ("time to contact", "time_to_contact", 1.0, "s"),
-                ("time difference", "time_difference", 1.0, "s"),
-                ("impact velocity", "impact_velocity", 1e3, "mm/s"),
-                ("peak contact force", "peak_contact_force", 1.0, "N"),
-                ("steady contact force", "steady_contact_force", 1.0, "N"),
-                ("target position", "target_position", 1e3, "mm"),
-                ("object shift", "object_shift", 1e3, "mm"),
-            )
+            f"{label:22s}{_numbers(m[key], factor)} {unit}" for label, key, factor, unit in LABELS
         ]
     return "\n".join(lines)
 
