@@ -1,0 +1,109 @@
+"""How far two curves are apart where a shift in time is allowed: a tube around each.
+
+A moment like a first contact may come a few steps earlier or later without anything being wrong;
+sample by sample the contact force is then off by its whole size. So a curve is not compared with
+the other's sample but with what the other takes within +-shift of that time, as the reference
+results of the Modelica libraries are compared (csv-compare, pyfunnel: a rectangle moved along the
+reference). Those look only whether the candidate is in the tube of the reference, and miss that an
+impact is lacking altogether. Here both directions count, so the deviation is symmetric.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+ROUNDING = 0.5e-9
+"""s; times are whole nanoseconds, so a sample this close to the end of a window is at its end."""
+
+
+class Curve(NamedTuple):
+    """Samples values over time in s, rising; between them linear, or held where held is true."""
+
+    time: Array
+    values: Array
+    held: bool = False
+
+    def at(self, time: Array) -> Array:
+        """The values at other times; before the first and after the last sample those of it."""
+        if not self.held:
+            return np.interp(time, self.time, self.values)
+        before = np.searchsorted(self.time, time + ROUNDING, side="right") - 1
+        return self.values[np.clip(before, 0, None)]
+
+    def until(self, end: float) -> "Curve":
+        """What there is up to the time end in s."""
+        count = int(np.searchsorted(self.time, end + ROUNDING, side="right"))
+        return Curve(self.time[:count], self.values[:count], self.held)
+
+
+def curve(time: Array, values: npt.NDArray[Any]) -> Curve:
+    """The curve of a recorded signal; Booleans and integers are held between samples."""
+    return Curve(time, values.astype(np.float64), not np.issubdtype(values.dtype, np.floating))
+
+
+class Tube(NamedTuple):
+    """The least and the largest value of a curve within a shift of each time in s."""
+
+    time: Array
+    low: Array
+    high: Array
+
+
+class Deviation(NamedTuple):
+    """How far apart two curves are at each time in s, at least 0."""
+
+    time: Array
+    values: Array
+
+
+def tube(around: Curve, time: Array, shift: float) -> Tube:
+    """The tube around a curve: what it takes from time - shift to time + shift, both in s."""
+    start, end = time - shift - ROUNDING, time + shift + ROUNDING
+    edges = around.at(time - shift), around.at(time + shift)
+    low, high = np.minimum(*edges), np.maximum(*edges)
+    first = np.searchsorted(around.time, start, side="left")
+    last = np.searchsorted(around.time, end, side="right")
+    some = last > first
+    least = _least(around.values, first[some], last[some])
+    largest = -_least(-around.values, first[some], last[some])
+    low[some] = np.minimum(low[some], least)
+    high[some] = np.maximum(high[some], largest)
+    return Tube(time, low, high)
+
+
+def deviation(reference: Curve, candidate: Curve, shift: float) -> Deviation:
+    """How far the curves are from each other's tubes, the larger of the two, at all their times.
+
+    0 where the one is, but for a shift of up to shift in s, the other. Symmetric.
+    """
+    time = np.union1d(reference.time, candidate.time)
+    distances = [
+        _outside(tube(one, time, shift), other.at(time))
+        for one, other in ((reference, candidate), (candidate, reference))
+    ]
+    return Deviation(time, np.maximum(*distances))
+
+
+def _outside(allowed: Tube, values: Array) -> Array:
+    return np.maximum(np.maximum(allowed.low - values, values - allowed.high), 0.0)
+
+
+def _least(values: Array, first: npt.NDArray[np.intp], last: npt.NDArray[np.intp]) -> Array:
+    """The least of values[first:last] for each pair; no pair is empty.
+
+    From the least of every 1, 2, 4, 8, ... values in a row: two of those cover any range.
+    """
+    result = np.empty(len(first))
+    length = last - first
+    least, span = values, 1
+    while len(result):
+        here = (span <= length) & (length < 2 * span)
+        result[here] = np.minimum(least[first[here]], least[last[here] - span])
+        if not (length >= 2 * span).any():
+            break
+        least = np.minimum(least[:-span], least[span:])
+        span *= 2
+    return result
