@@ -6,9 +6,10 @@ order p, the result with twice the step is (2^p - 1) times as far from that with
 from the exact one, which is at least its own error; the scheme adds or removes a delay of one step
 at each wire. The candidate has such an error of its own, so the band is twice the larger deviation.
 
-Nothing smaller than SHARE of the range of a signal matters, and of one that hardly moves SMALL of
-its size, or of its nominal value where it is about 0. That a moment like a first contact shifts by
-SHARE of the duration is allowed, too (see tube.py). csv-compare takes 0.002 for both shares.
+Nothing smaller than SHARE of the range of a signal, or of a metric, matters, and of a signal that
+hardly moves SMALL of its size, or of its nominal value where it is about 0: the rounding of a
+balance is no difference. That a moment like a first contact shifts by SHARE of the duration is
+allowed, too (see tube.py). csv-compare takes 0.002 for both shares.
 
 A file overrides that where it names a signal or metric, in the unit of the original:
 
@@ -126,9 +127,7 @@ def signal_band(
     time in s is the shift allowed unless given says otherwise, nominal the declared nominal value;
     None stands for 1, as in FMI. A held curve (Booleans, integers) has the derived width 0.
     """
-    derived = Band(
-        0.0 if reference.held else _width(reference, again, nominal, time), time, "derived"
-    )
+    derived = Band(_width(reference, again, nominal, time), time, "derived")
     return given.band(float(np.ptp(reference.values)), derived) if given else derived
 
 
@@ -145,16 +144,18 @@ def metric_band(
     """
     size = abs(value or 0.0)
     apart = [abs(other - value) for other in again if other is not None and value is not None]
-    derived = Band(max(shift, SHARE * size, BOTH * max(apart, default=0.0)), 0.0, "derived")
+    width = max(shift, SHARE * size, SMALL, BOTH * max(apart, default=0.0))
+    derived = Band(width, 0.0, "derived")
     return given.band(size, derived) if given else derived
 
 
 def _width(reference: Curve, again: Iterable[Curve], nominal: float | None, time: float) -> float:
-    size = max(float(np.abs(reference.values).max()), 1.0 if nominal is None else abs(nominal))
     apart = [float(deviation(reference, other, time).values.max()) for other in again]
-    return max(
-        SHARE * float(np.ptp(reference.values)), SMALL * size, BOTH * max(apart, default=0.0)
-    )
+    numerical = BOTH * max(apart, default=0.0)
+    if reference.held:
+        return numerical
+    size = max(float(np.abs(reference.values).max()), 1.0 if nominal is None else abs(nominal))
+    return max(SHARE * float(np.ptp(reference.values)), SMALL * size, numerical)
 
 
 def _fits(pattern: str, name: str) -> bool:

@@ -75,6 +75,7 @@ class Use:
     are those that events set. loops is what is done with an algebraic loop.
     """
 
+    component: str
     wired: frozenset[str]
     values: Mapping[str, Value]
     stated: frozenset[str]
@@ -114,6 +115,7 @@ def use_of(system: System, name: str) -> Use:
         return frozenset(p.variable for p in ports if p.component == name)
 
     return Use(
+        name,
         own([port for port, _ in ends]),
         component.values,
         own([*scaled, *through, *tuned, *asked]),
@@ -157,7 +159,7 @@ def interface_differences(
         else:
             found.append(_missing(variable, use, theirs.values()))
     found += [
-        _extra(variable, given)
+        _extra(variable, use, given)
         for name, variable in theirs.items()
         if name not in ours and variable["causality"] in COMPARED
     ]
@@ -170,22 +172,20 @@ def _missing(old: Described, use: Use, theirs: Iterable[Described]) -> Differenc
         alike = [v["name"] for v in theirs if v["causality"] == causality]
         how = "wired" if name in use.wired else "set" if name in use.values else "used"
         text = (
-            f"{causality} {name} is {how} in the system, but missing; --rename {name}=ITS_NAME "
-            f"could give one of: {choices(alike)}"
+            f"{causality} is {how} in the system, but missing; if it has another name: "
+            f"--rename '{name}=NAME'; its {causality}s: {choices(alike, 8)}"
         )
         return Difference("blocks", "missing", name, text)
     severity: Severity = "warns" if causality == "output" else "notes"
-    return Difference(severity, "missing", name, f"{causality} {name} is missing")
+    return Difference(severity, "missing", name, f"{causality} is missing")
 
 
-def _extra(new: Described, given: Mapping[str, Value]) -> Difference:
+def _extra(new: Described, use: Use, given: Mapping[str, Value]) -> Difference:
     name, causality = new["name"], new["causality"]
     if causality == "input" and name not in given:
-        text = (
-            f"input {name} is new and has no source; give it a value: --set COMPONENT.{name}=VALUE"
-        )
+        text = f"new input without a source; give it a value: --set '{use.component}.{name}=VALUE'"
         return Difference("blocks", "extra", name, text)
-    return Difference("notes", "extra", name, f"{causality} {name} is new")
+    return Difference("notes", "extra", name, f"new {causality}")
 
 
 def _changed(
@@ -223,7 +223,7 @@ def _causality(old: Described, new: Described, use: Use) -> Difference:
     lonely = now == "input" and name not in use.wired and name not in use.values
     value_only = settable(old) and settable(new) and name not in use.wired
     severity: Severity = "blocks" if lonely or (use.uses(name) and not value_only) else "warns"
-    more = "; it has no source: give it a value with --set" if lonely else ""
+    more = f", or have a value: --set '{use.component}.{name}=VALUE'" if lonely else ""
     text = f"is {_a(now)}, must be {_a(was)}{more}"
     return Difference(severity, "causality", name, text, was, now)
 

@@ -21,16 +21,13 @@ from ..system.interface import Value
 from ..system.parts import NANOSECONDS, Isolation
 from .bands import SHARE, Band, Bands, check_patterns, entry_for, metric_band, signal_band
 from .interface_difference import Difference
-from .metrics import grasp_metrics
+from .metrics import UNITS, grasp_metrics
 from .swap import Swap, prepare_swap
 from .tube import Curve, curve, deviation
 from .unit_conversion import IDENTITY
 
 FEWEST_STEPS = 2
 """The least shift in time a derived band allows, in steps: one for the step, one for the scheme."""
-
-TIMES = ("time_to_contact", "time_difference")
-"""The metrics that are times: the shift that is allowed for signals is allowed for them."""
 
 Curves = Mapping[str, Curve]
 
@@ -40,8 +37,9 @@ class Compared:
     """A signal or metric of both runs, in the unit of the original.
 
     deviation is the largest (inf where only one run has a value of a metric), time in s when that
-    is, original and candidate are the values then. span is the range of the original's signal.
-    Metrics have no unit, time or span.
+    is, original and candidate are the values then, of one the nearest within the shift that its
+    band allows. span is the range of the original's signal.
+    Metrics have no time and span.
     """
 
     name: str
@@ -232,7 +230,7 @@ class _Judge:
         others = [_values(run) for run in self.again]
         found = []
         for name, value in values.items():
-            shift = self.shift if _plain(name) in TIMES else 0.0
+            shift = self.shift if UNITS[_plain(name)] == "s" else 0.0
             given = entry_for(self.bands.metrics, name, _plain(name))
             band = metric_band(value, [run.get(name) for run in others], shift, given)
             found.append(_metric(name, band, value, theirs.get(name)))
@@ -245,15 +243,14 @@ class _Judge:
         band = signal_band(reference, others, self.swap.nominals.get(name), self.shift, given)
         apart = deviation(reference.until(float(candidate.time[-1])), candidate, band.time)
         worst = int(apart.values.argmax())
-        when = apart.time[worst : worst + 1]
         return Compared(
             name,
             self.units[name],
             band,
             float(apart.values[worst]),
-            float(reference.at(when)[0]),
-            float(candidate.at(when)[0]),
-            float(when[0]),
+            float(apart.reference[worst]),
+            float(apart.candidate[worst]),
+            float(apart.time[worst]),
             float(np.ptp(reference.values)),
         )
 
@@ -263,7 +260,7 @@ def _metric(name: str, band: Band, original: float | None, candidate: float | No
         apart = 0.0 if original is candidate else inf
     else:
         apart = abs(candidate - original)
-    return Compared(name, None, band, apart, original, candidate)
+    return Compared(name, UNITS[_plain(name)], band, apart, original, candidate)
 
 
 def _values(curves: Curves) -> dict[str, float | None]:

@@ -53,10 +53,16 @@ class Tube(NamedTuple):
 
 
 class Deviation(NamedTuple):
-    """How far apart two curves are at each time in s, at least 0."""
+    """How far apart two curves are at each time in s, at least 0.
+
+    The distance is that between reference and candidate: the value of the one that is further out,
+    and the nearest that the other takes within the shift.
+    """
 
     time: Array
     values: Array
+    reference: Array
+    candidate: Array
 
 
 def tube(around: Curve, time: Array, shift: float) -> Tube:
@@ -80,15 +86,22 @@ def deviation(reference: Curve, candidate: Curve, shift: float) -> Deviation:
     0 where the one is, but for a shift of up to shift in s, the other. Symmetric.
     """
     time = np.union1d(reference.time, candidate.time)
-    distances = [
-        _outside(tube(one, time, shift), other.at(time))
-        for one, other in ((reference, candidate), (candidate, reference))
-    ]
-    return Deviation(time, np.maximum(*distances))
+    ours, theirs = reference.at(time), candidate.at(time)
+    near_theirs = _nearest(tube(reference, time, shift), theirs)
+    near_ours = _nearest(tube(candidate, time, shift), ours)
+    theirs_out, ours_out = np.abs(theirs - near_theirs), np.abs(ours - near_ours)
+    first = theirs_out >= ours_out
+    return Deviation(
+        time,
+        np.where(first, theirs_out, ours_out),
+        np.where(first, near_theirs, ours),
+        np.where(first, theirs, near_ours),
+    )
 
 
-def _outside(allowed: Tube, values: Array) -> Array:
-    return np.maximum(np.maximum(allowed.low - values, values - allowed.high), 0.0)
+def _nearest(allowed: Tube, values: Array) -> Array:
+    """What is allowed and nearest to the values."""
+    return np.clip(values, allowed.low, allowed.high)
 
 
 def _least(values: Array, first: npt.NDArray[np.intp], last: npt.NDArray[np.intp]) -> Array:
