@@ -208,7 +208,7 @@ def _changed(
         yield Difference("warns", "type", name, text, old["type"], new["type"])
     if old["causality"] != new["causality"]:
         yield _causality(old, new, use)
-    if old["variability"] != new["variability"]:
+    elif old["variability"] != new["variability"]:
         yield _variability(old, new, use)
     if old["unit"] != new["unit"]:
         yield _unit(old, new, use, change)

@@ -6,6 +6,9 @@ the other's sample but with what the other takes within +-shift of that time, as
 results of the Modelica libraries are compared (csv-compare, pyfunnel: a rectangle moved along the
 reference). Those look only whether the candidate is in the tube of the reference, and miss that an
 impact is lacking altogether. Here both directions count, so the deviation is symmetric.
+
+At the end of a run, what a curve would take next is not known. A linear one is taken to go on as it
+came, point by point mirrored at its last sample; else one that is late there would always be out.
 """
 
 from typing import Any, NamedTuple
@@ -38,6 +41,17 @@ class Curve(NamedTuple):
         count = int(np.searchsorted(self.time, end + ROUNDING, side="right"))
         return Curve(self.time[:count], self.values[:count], self.held)
 
+    def continued(self, shift: float) -> "Curve":
+        """The curve and how it goes on for a shift in s; a held one stays."""
+        end, last = self.time[-1], self.values[-1]
+        before = (self.time < end) & (self.time >= end - shift - ROUNDING)
+        if self.held or not before.any():
+            return self
+        return Curve(
+            np.concatenate([self.time, 2.0 * end - self.time[before][::-1]]),
+            np.concatenate([self.values, 2.0 * last - self.values[before][::-1]]),
+        )
+
 
 def curve(time: Array, values: npt.NDArray[Any]) -> Curve:
     """The curve of a recorded signal; Booleans and integers are held between samples."""
@@ -67,6 +81,7 @@ class Deviation(NamedTuple):
 
 def tube(around: Curve, time: Array, shift: float) -> Tube:
     """The tube around a curve: what it takes from time - shift to time + shift, both in s."""
+    around = around.continued(shift)
     start, end = time - shift - ROUNDING, time + shift + ROUNDING
     edges = around.at(time - shift), around.at(time + shift)
     low, high = np.minimum(*edges), np.maximum(*edges)
