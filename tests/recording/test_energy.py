@@ -6,15 +6,19 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 import pytest
+from grasp_controller import series
 from grasp_cosim import System
 from grasp_cosim.recording.energy import Bond, ExchangeEnergy, bonds
 from grasp_cosim.system import parts
 from grasp_cosim.system.interface import Interface, read_interface
 from grasp_cosim.system.parts import Component, Port, Wire
 from grasp_cosim.system.units import Unit
+from gripper_plant import rigid
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
+from proximity_sensor import optics
+from reference.direct import closed_loop
 
 Array = npt.NDArray[np.float64]
 
@@ -195,6 +199,26 @@ def test_blocks_of_any_size_give_the_same_bits(rows: Array, cuts: list[int], per
     energy = ExchangeEnergy(both, COLUMN)
     parts = [energy(part.copy()) for part in np.split(rows, sorted(cuts))]
     assert np.concatenate(parts).tobytes() == whole.tobytes()
+
+
+@pytest.mark.parametrize("j", [1, 2])
+def test_on_the_way_to_contact_it_is_kinetic_energy_less_what_the_controller_gave(j: int) -> None:
+    """The fingers, moved by their blocks: free of contact, they keep all the work they get."""
+    sensor = optics.Params()
+    signals = closed_loop(
+        rigid.Params(), (sensor, sensor), series.Params(), 1e-3, 3000, until_contact=True
+    )
+    free = ~signals[f"plant.contact[{j}]"]
+    force, x, v = (
+        signals[name][free]
+        for name in (f"controller.force[{j}]", f"plant.position[{j}]", f"plant.velocity[{j}]")
+    )
+    held = np.concatenate([force[:1], force[:-1]])
+    kinetic = 0.5 * rigid.Params().finger_mass[j - 1] * v**2
+    given = np.concatenate([[0.0], np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(x))])
+    energy = _energy(np.column_stack([force, x, held, x]))
+    assert abs(energy).max() > 1e-6
+    assert energy == pytest.approx(kinetic - given, abs=1e-12)
 
 
 def test_the_grasp_has_a_bond_per_finger(grasp: System) -> None:

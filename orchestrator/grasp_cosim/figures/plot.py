@@ -33,7 +33,7 @@ def plot_run(result: Result, path: Path) -> None:
         gaps.plot(
             result.time, 1e3 * result[f"{PLANT}.gap[{j}]"], color=COLOR[j], label=f"finger {j}"
         )
-    _finish(gaps, "gap to the object in mm")
+    finish(gaps, "gap to the object in mm")
     draw_contact_forces(contact, [(result, "-", "")])
     draw_targets(target, [(result, "-", "")])
     target.set_xlabel("time in s")
@@ -60,7 +60,7 @@ def draw_contact_forces(axes: Axes, runs: Sequence[tuple[Result, str, str]]) -> 
             axes.plot(result.time, force, style, color=COLOR[j], label=name)
             highest = max(highest, peak)
     axes.set_ylim(-0.03 * min(highest, FORCE_LIMIT), 1.1 * min(max(highest, 1e-3), FORCE_LIMIT))
-    _finish(axes, "contact force in N")
+    finish(axes, "contact force in N")
 
 
 def draw_targets(axes: Axes, runs: Sequence[tuple[Result, str, str]]) -> None:
@@ -72,7 +72,7 @@ def draw_targets(axes: Axes, runs: Sequence[tuple[Result, str, str]]) -> None:
     result = runs[0][0]
     centre = 1e3 * result[f"{PLANT}.object_position"]
     axes.plot(result.time, centre, ":", color=GREY, label="centre of the object")
-    _finish(axes, "position in mm")
+    finish(axes, "position in mm")
 
 
 def draw_contact_times(axes: Axes, rows: Sequence[Mapping[str, Any]], case: int) -> None:
@@ -92,7 +92,7 @@ def draw_contact_times(axes: Axes, rows: Sequence[Mapping[str, Any]], case: int)
     axes.set_title(f"Case {case}", fontsize=10)
     axes.set_xlabel("object position in mm")
     axes.set_ylim(0.0, 3.0)
-    _finish(axes, "time to contact in s")
+    finish(axes, "time to contact in s")
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -113,7 +113,8 @@ def save(figure: Figure, path: Path) -> None:
         figure.savefig(part, format="png", dpi=130, metadata={"Software": None})
 
 
-def _finish(axes: Axes, label: str) -> None:
+def finish(axes: Axes, label: str) -> None:
+    """What all axes have: a label of the values, a grid, a legend."""
     axes.set_ylabel(label)
     axes.grid(True, color="#dddddd", linewidth=0.6)
     axes.legend(fontsize=8, framealpha=0.9)

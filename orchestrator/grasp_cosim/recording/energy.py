@@ -199,24 +199,22 @@ class _Ledger:
         self._source, self._seen = column[bond.source], column[bond.seen or bond.position]
         self._of_force = transforms.get(bond.force, IDENTITY)
         self._of_seen = transforms.get(bond.seen, IDENTITY) if bond.seen else IDENTITY
-        self._moved = self._answered = np.empty((0, 2))
+        self._moved = self._answered = (np.empty(0), np.empty(0))
         self._total = 0.0
 
     def add(self, first: int, rows: Floats) -> Floats:
         """The energy at each of the rows, which are those of the steps from first on."""
         earned = np.zeros(len(rows))
-        moved = np.concatenate([self._moved, rows[:, [self._held, self._position]]])
-        held, position = moved.T
-        work = held[1:] * np.diff(position)
-        earned[len(rows) - len(work) :] += work
+        held = np.concatenate([self._moved[0], rows[:, self._held]])
+        position = np.concatenate([self._moved[1], rows[:, self._position]])
+        _add_last(earned, held[1:] * np.diff(position))
         # A source with a step of its own answers for what it saw at the ends of that step.
-        steps = np.arange(-first % self._period, len(rows), self._period)
-        answers = np.column_stack([self._forces(rows[steps]), self._positions(rows[steps])])
-        answered = np.concatenate([self._answered, answers])
-        force, seen = answered.T
-        work = 0.5 * (force[1:] + force[:-1]) * np.diff(seen)
-        earned[steps[len(steps) - len(work) :]] -= work
-        self._moved, self._answered = moved[-1:], answered[-1:]
+        ends = slice(-first % self._period, None, self._period)
+        force = np.concatenate([self._answered[0], self._forces(rows[ends])])
+        seen = np.concatenate([self._answered[1], self._positions(rows[ends])])
+        _add_last(earned[ends], -0.5 * (force[1:] + force[:-1]) * np.diff(seen))
+        self._moved = held[-1:], position[-1:]
+        self._answered = force[-1:], seen[-1:]
         # One sum after the other from the carried total on: the same bits for any blocks.
         total = np.cumsum(np.concatenate([[self._total], self._scale * earned]))
         self._total = float(total[-1])
@@ -231,3 +229,8 @@ class _Ledger:
         """What the source has seen, in the unit of the position; a factor of 0 hides all motion."""
         factor, offset = self._of_seen
         return (rows[:, self._seen] - offset) / factor if factor else np.zeros(len(rows))
+
+
+def _add_last(sums: Floats, changes: Floats) -> None:
+    """Add the changes in place; the first row of a run has none."""
+    sums[len(sums) - len(changes) :] += changes
