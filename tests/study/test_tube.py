@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from grasp_cosim.study.tube import Curve, curve, deviation, tube
+from grasp_cosim.study.tube import Array, Curve, curve, deviation, tube
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
@@ -14,8 +14,13 @@ HELD = st.booleans()
 SHIFT = st.integers(0, 12)
 
 
-def sampled(values: np.ndarray, held: bool = False) -> Curve:
-    return Curve(np.arange(len(values)) * 1_000_000 / 1e9, values, held)
+def times(count: int, step_ns: int = 1_000_000) -> Array:
+    """s, from 0 on."""
+    return (np.arange(count) * step_ns / 1e9).astype(np.float64)
+
+
+def sampled(values: Array, held: bool = False) -> Curve:
+    return Curve(times(len(values)), values, held)
 
 
 def by_hand(one: Curve, other: Curve, shift: int) -> float:
@@ -23,10 +28,14 @@ def by_hand(one: Curve, other: Curve, shift: int) -> float:
     n = len(one.values)
     windows = [slice(max(i - shift, 0), i + shift + 1) for i in range(n)]
     after = min(shift, n - 1)
-    mode = {"mode": "edge"} if one.held else {"mode": "reflect", "reflect_type": "odd"}
-    one, other = (sampled(np.pad(c.values, (0, after), **mode)) for c in (one, other))
+
+    def padded(values: Array) -> Array:
+        if one.held:
+            return np.pad(values, (0, after), mode="edge")
+        return np.pad(values, (0, after), mode="reflect", reflect_type="odd")
+
     apart = [
-        max(a.values[w].min() - b.values[i], b.values[i] - a.values[w].max(), 0.0)
+        max(padded(a.values)[w].min() - b.values[i], b.values[i] - padded(a.values)[w].max(), 0.0)
         for a, b in ((one, other), (other, one))
         for i, w in enumerate(windows)
     ]
@@ -34,14 +43,14 @@ def by_hand(one: Curve, other: Curve, shift: int) -> float:
 
 
 @given(SAMPLES, SHIFT, HELD)
-def test_a_curve_is_in_its_own_tube(values: np.ndarray, shift: int, held: bool) -> None:
+def test_a_curve_is_in_its_own_tube(values: Array, shift: int, held: bool) -> None:
     same = sampled(values, held)
     assert deviation(same, same, shift * STEP).values.max() == 0.0
 
 
 @given(SAMPLES, SHIFT, SHIFT, HELD)
 def test_a_curve_that_comes_later_is_inside_up_to_the_shift(
-    values: np.ndarray, later: int, more: int, held: bool
+    values: Array, later: int, more: int, held: bool
 ) -> None:
     early = sampled(np.concatenate([values, np.full(later, values[-1])]), held)
     late = sampled(np.concatenate([np.full(later, values[0]), values]), held)
@@ -50,7 +59,7 @@ def test_a_curve_that_comes_later_is_inside_up_to_the_shift(
 
 @given(SAMPLES, st.floats(1e-3, 1e3), SHIFT, HELD)
 def test_an_offset_is_found_at_its_size(
-    values: np.ndarray, offset: float, shift: int, held: bool
+    values: Array, offset: float, shift: int, held: bool
 ) -> None:
     """At the largest value, no shift helps: the offset is the deviation."""
     values = np.concatenate([values, np.full(shift + 1, values[-1])])
@@ -95,7 +104,7 @@ def test_more_shift_allows_more(both: tuple[Curve, Curve], shift: int) -> None:
 @settings(max_examples=50)
 @given(SAMPLES, st.floats(0.0, 0.02), HELD)
 def test_the_tube_holds_the_curve_between_samples_too(
-    values: np.ndarray, shift: float, held: bool
+    values: Array, shift: float, held: bool
 ) -> None:
     """Anywhere within the shift of any time the curve is in the tube of that time."""
     whole = sampled(values, held)
@@ -108,7 +117,7 @@ def test_the_tube_holds_the_curve_between_samples_too(
 
 
 def test_an_impact_that_comes_a_step_later_is_no_deviation_but_a_higher_one_is() -> None:
-    time = np.arange(200) * STEP
+    time = times(200)
     impact = np.where(time < 0.1, 0.0, np.exp(-(time - 0.1) / 0.02))
     late = np.concatenate([np.zeros(2), impact[:-2]])
     assert np.abs(impact - late).max() == 1.0
@@ -125,13 +134,13 @@ def test_an_impact_that_is_lacking_is_found() -> None:
     spike = np.zeros(100)
     spike[50] = 1.0
     for pair in ((spike, np.zeros(100)), (np.zeros(100), spike)):
-        found = deviation(*map(sampled, pair), 5 * STEP)
+        found = deviation(sampled(pair[0]), sampled(pair[1]), 5 * STEP)
         assert found.values.max() == 1.0
         assert found.time[found.values.argmax()] == 0.05
 
 
 def test_curves_of_different_steps_are_compared_at_the_times_of_both() -> None:
-    fine, coarse = (np.arange(n) * h / 1e9 for n, h in ((101, 1_000_000), (51, 2_000_000)))
+    fine, coarse = times(101), times(51, 2_000_000)
     found = deviation(Curve(fine, np.sin(fine)), Curve(coarse, np.sin(coarse)), 0.0)
     assert found.time.tolist() == fine.tolist()
     assert found.values[::2].max() == 0.0
@@ -151,7 +160,7 @@ def test_a_curve_until_a_time() -> None:
 
 
 def test_a_late_curve_that_still_moves_at_the_end_is_inside() -> None:
-    time = np.arange(100) * STEP
+    time = times(100)
     ramp = Curve(time, 5.0 * time)
     late = Curve(time, 5.0 * np.maximum(time - 0.002, 0.0))
     assert deviation(ramp, late, 0.002).values.max() == pytest.approx(0.0, abs=1e-12)

@@ -109,7 +109,7 @@ def use_of(system: System, name: str) -> Use:
     faulty = {fault.target for fault in system.faults}
     through = [p for p, wire in ends if wire.target in faulty]
     tuned = [port for event in system.events for port in event.set]
-    asked = [event.when.port for event in system.events if event.when]
+    asked = [e.when.port for e in (*system.events, *system.faults) if e.when]
 
     def own(ports: Sequence[Port]) -> frozenset[str]:
         return frozenset(p.variable for p in ports if p.component == name)
