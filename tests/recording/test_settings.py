@@ -45,7 +45,7 @@ def test_what_is_special_in_a_system(grasp: System) -> None:
             ),
         ),
         faults=(
-            Fault(Port("controller", "intensity[1]"), "bias", {"value": 0.1}, 1, 2_000, 7),
+            Fault(Port("controller", "intensity[1]"), "bias", {"value": 0.1}, 100_000, 300_000),
             Fault(Port("controller", "intensity[2]"), "stuck", {}),
         ),
     )
@@ -54,24 +54,16 @@ def test_what_is_special_in_a_system(grasp: System) -> None:
     assert found["components"]["plant"]["isolation"] == "process"
     assert (found["wires"][0]["factor"], found["wires"][0]["offset"]) == (2.0, -0.5)
     assert found["events"] == [
-        {"at": 0.5, "when": None, "set": {"sensor_1.reflectance": 0.5}},
-        {"at": None, "when": "plant.gap[1] < 0.01", "set": {"sensor_2.reflectance": 0.25}},
+        {"at": 0.5, "set": {"sensor_1.reflectance": 0.5}},
+        {"when": "plant.gap[1] < 0.01", "set": {"sensor_2.reflectance": 0.25}},
     ]
     assert found["faults"] == [
         {
             "wire": "controller.intensity[1]",
             "kind": "bias",
-            "parameters": {"value": 0.1},
-            "start": 1e-9,
-            "end": 2e-6,
-            "seed": 7,
+            "value": 0.1,
+            "from": 1e-4,
+            "until": 3e-4,
         },
-        {
-            "wire": "controller.intensity[2]",
-            "kind": "stuck",
-            "parameters": {},
-            "start": 0.0,
-            "end": None,
-            "seed": 0,
-        },
+        {"wire": "controller.intensity[2]", "kind": "stuck", "from": 0.0},
     ]

@@ -12,9 +12,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..errors import SimulationError
-from ..master.plan import REAL, Plan
-from ..master.plan import Signal as Slot
 from ..study.metrics import grasp_metrics
 from ..system.description import System
 from ..system.parts import NANOSECONDS
@@ -26,51 +23,6 @@ KINDS = {"f": "Real", "i": "Integer", "b": "Boolean"}
 
 PIECE = 8192
 """Rows written at once."""
-
-
-class Recorder:
-    """A listener that copies the outputs at every step into tables of their final size."""
-
-    def __init__(self, plan: Plan, steps: int) -> None:
-        self._plan = plan
-        reals = sum(s.kind in REAL for s in plan.signals)
-        self._reals = np.empty((steps + 1, reals))
-        self._integers = np.empty((steps + 1, len(plan.signals) - reals), np.int32)
-        self._sources = plan.reals[:reals], plan.integers[: len(plan.signals) - reals]
-        self.rows = 0
-
-    def __call__(self, step: int) -> None:
-        """Record the values of the given step."""
-        reals, integers = self._sources
-        self._reals[step] = reals
-        self._integers[step] = integers
-        self.rows = step + 1
-
-    def check_finite(self, since: int) -> None:
-        """SimulationError at the first value that is not finite from step since on; it is the
-        last one kept.
-        """
-        finite = np.isfinite(self._reals[since : self.rows])
-        if finite.all():
-            return
-        row = since + int(finite.all(axis=1).argmin())
-        self.rows = row + 1
-        for s in self._plan.signals:
-            if s.kind in REAL and not np.isfinite(value := self._reals[row, s.slot]):
-                raise SimulationError(f"{s.name} = {value} at step {row}: must be finite")
-
-    def time(self, step_ns: int) -> npt.NDArray[np.float64]:
-        """The recorded communication points in s: k·step, each correctly rounded."""
-        return np.arange(self.rows) * step_ns / NANOSECONDS
-
-    def signals(self) -> dict[str, npt.NDArray[Any]]:
-        """The recorded values of each output, booleans as bool."""
-        return {s.name: self._column(s) for s in self._plan.signals}
-
-    def _column(self, signal: Slot) -> npt.NDArray[Any]:
-        table = self._reals if signal.kind in REAL else self._integers
-        column = table[: self.rows, signal.slot]
-        return column.astype(bool) if signal.kind == "Boolean" else column
 
 
 @dataclass(frozen=True, slots=True)

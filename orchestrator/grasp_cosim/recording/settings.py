@@ -1,10 +1,10 @@
 """What a run was asked to do, as plain data for run.json and for the header of an MDF file."""
 
-from collections.abc import Mapping
 from typing import Any
 
 from ..system.description import System
-from ..system.parts import NANOSECONDS, Component, Event, Fault, Port, Wire
+from ..system.parts import NANOSECONDS, Component, Wire
+from ..system.scenario import event_entry, fault_entry
 
 
 def settings(system: System) -> dict[str, Any]:
@@ -22,8 +22,8 @@ def settings(system: System) -> dict[str, Any]:
         },
         "components": {c.name: _component(c) for c in system.components},
         "wires": [_wire(w) for w in system.wires],
-        "events": [_event(e) for e in system.events],
-        "faults": [_fault(f) for f in system.faults],
+        "events": [event_entry(e) for e in system.events],
+        "faults": [fault_entry(f) for f in system.faults],
     }
 
 
@@ -48,27 +48,3 @@ def _wire(wire: Wire) -> dict[str, Any]:
         "factor": wire.factor,
         "offset": wire.offset,
     }
-
-
-def _event(event: Event) -> dict[str, Any]:
-    when = event.when
-    return {
-        "at": _seconds(event.at_ns),
-        "when": None if when is None else f"{when.port} {when.relation} {when.value!r}",
-        "set": _by_name(event.set),
-    }
-
-
-def _fault(fault: Fault) -> dict[str, Any]:
-    return {
-        "wire": str(fault.target),
-        "kind": fault.kind,
-        "parameters": dict(fault.parameters),
-        "start": _seconds(fault.start_ns),
-        "end": _seconds(fault.end_ns),
-        "seed": fault.seed,
-    }
-
-
-def _by_name(values: Mapping[Port, Any]) -> dict[str, Any]:
-    return {str(port): value for port, value in values.items()}

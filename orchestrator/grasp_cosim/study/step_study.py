@@ -201,8 +201,9 @@ def step_study(
     """Repeat a grasp over steps in s, its own always among them, and compare the contact times.
 
     By default the steps are FACTORS of the system's own, as far as they divide the stop time and
-    the steps of the components, which stay as they are. tolerance in s. Each of the workers is a process; the results are
-    the same for any number of them. A run in which an FMU fails is one of the findings.
+    the steps of the components, which stay as they are. tolerance in s. Each of the workers is a
+    process; the results are the same for any number of them. A run in which an FMU fails is one of
+    the findings.
     InputError where the system is no grasp, the tolerance is not positive, a given step does not
     fit, or fewer than three steps do. KeyboardInterrupt at Ctrl-C.
     """
