@@ -27,6 +27,7 @@ def cli(debug: bool) -> None:
     grasp-cosim build                the FMUs
     grasp-cosim inspect FMU          an FMU's interface
     grasp-cosim doctor FMU           whether this machine will load an FMU
+    grasp-cosim qualify FMU --as C   whether an FMU may take the place of component C
     grasp-cosim COMMAND --help       options and an example
     """
 
