@@ -6,10 +6,10 @@ from typing import NoReturn
 import click
 
 from ..errors import InputError, SimulationError
-from . import evaluate, fmus, run
+from . import evaluate, fmus, run, ssp
 from .frame import FAILED, INTERRUPTED, WRONG, cli, fail
 
-for command in (run.run, evaluate.evaluate, fmus.build, fmus.inspect, fmus.doctor):
+for command in (run.run, evaluate.evaluate, fmus.build, fmus.inspect, fmus.doctor, ssp.ssp):
     cli.add_command(command)
 
 

@@ -26,6 +26,7 @@ def cli(debug: bool) -> None:
     grasp-cosim build                the FMUs
     grasp-cosim inspect FMU          an FMU's interface
     grasp-cosim doctor FMU           whether this machine will load an FMU
+    grasp-cosim ssp SYSTEM -o FILE   a system as an SSP archive
     grasp-cosim COMMAND --help       options and an example
     """
 

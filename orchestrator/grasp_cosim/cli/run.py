@@ -39,12 +39,14 @@ def run(
     plot: bool,
     as_json: bool,
 ) -> int:
-    r"""Run SYSTEM, a .toml file; by default the built-in grasp.
+    r"""Run SYSTEM, a .toml or .ssp file; by default the built-in grasp.
 
     \b
     Example: grasp-cosim run --case 1 --set plant.initial_object_position=0.02 --out results --plot
     """
-    chosen = System.load(system) if system else grasp_system()
+    chosen = System.load(system, step=step, stop=stop) if system else grasp_system()
+    for note in chosen.notes:
+        click.echo(note, err=True)
     fmus = dict(pair("--swap", text, "COMPONENT=FMU") for text in swaps)
     values: dict[str, Value] = {} if case is None else dict(CASES[case])
     values.update(pair("--set", text, "COMPONENT.VARIABLE=VALUE") for text in settings)
