@@ -109,6 +109,11 @@ class Network:
             node = hop.source
         return hops
 
+    def output(self, node: Node) -> Node | None:
+        """The output of a component that a node gets its values from in the end, if any."""
+        hops = self.trace(node)
+        return hops[0].source if hops and hops[0].source.path in self.parts else None
+
     def unit(self, node: Node) -> Unit | None:
         """The unit of a node: that of its connector, of a component that of the variable."""
         part = self.parts.get(node.path)

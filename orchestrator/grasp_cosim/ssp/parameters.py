@@ -35,12 +35,14 @@ class Parameter:
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
-    """A line of a mapping: from the name in the set to that of the target."""
+class Given:
+    """A parameter for what is called name at the binding's system or component.
 
-    place: str
-    source: str
-    target: str
+    With suppress its unit is not converted. change is its transformation, or None.
+    """
+
+    name: str
+    parameter: Parameter
     suppress: bool
     change: Any
 
@@ -59,48 +61,58 @@ def read_settings(
     """All values that the bindings give, the one that holds for each variable."""
     values: dict[Path, dict[str, Value]] = {}
     notes: list[str] = []
-    components = [(path, part.element.bindings) for path, part in network.parts.items()]
-    systems = [(path, system.bindings) for path, system in network.systems.items()]
-    for path, bindings in components + sorted(systems, key=lambda entry: -len(entry[0])):
-        for binding in bindings:
-            for name, parameter, suppress, change in _named(archive, file, binding, units, notes):
-                nodes = list(_nodes(network, path, name))
-                if not nodes:
-                    notes.append(f"{parameter.place}: fits no {name!r}; not applied")
-                for node in nodes:
-                    first = _adapted(network, node, parameter, suppress, change)
-                    for end, given in _spread(network, node, first):
-                        value = _value(network, end, given)
-                        if end in network.into:
-                            source = network.into[end].source
-                            notes.append(f"{given.place}: {end} is connected to {source}; not used")
-                        else:
-                            values.setdefault(end.path, {})[end.name] = value
+    for path, binding in _bindings(network):
+        for given in _given(archive, file, binding, units, notes):
+            ends = list(_ends(network, path, given))
+            if not ends:
+                notes.append(f"{given.parameter.place}: no {given.name!r} to give it to; not used")
+            for end, parameter in ends:
+                value, source = _value(network, end, parameter), network.output(end)
+                if source:
+                    notes.append(f"{parameter.place}: {end} is connected to {source}; not used")
+                else:
+                    values.setdefault(end.path, {})[end.name] = value
     return Settings(values, tuple(notes))
 
 
-def _named(
+def _bindings(network: Network) -> Iterator[tuple[Path, Binding]]:
+    """All bindings with the path of what they are at; who goes before another comes after it."""
+    for path, part in network.parts.items():
+        for binding in part.element.bindings:
+            yield path, binding
+    for path in sorted(network.systems, key=len, reverse=True):
+        for binding in network.systems[path].bindings:
+            yield path, binding
+
+
+def _given(
     archive: Archive, file: str, binding: Binding, units: Mapping[str, Unit], notes: list[str]
-) -> Iterator[tuple[str, Parameter, bool, Any]]:
-    """What a binding gives: name, parameter, whether units are not converted, transformation."""
-    given = {
+) -> Iterator[Given]:
+    """What a binding gives; notes get what is not mapped."""
+    parameters = {
         binding.prefix + name: parameter
         for name, parameter in _set(archive, file, binding, units).items()
     }
     if not binding.mapped:
-        for name, parameter in given.items():
-            yield name, parameter, False, None
+        for name, parameter in parameters.items():
+            yield Given(name, parameter, False, None)
         return
-    entries = list(_mapping(archive, file, binding))
-    for entry in entries:
-        if entry.source in given:
-            yield entry.target, given[entry.source], entry.suppress, entry.change
+    mapped = set()
+    for place, source, given in _mapping(archive, file, binding, parameters):
+        mapped.add(source)
+        if given:
+            yield given
         else:
-            notes.append(f"{entry.place}: no parameter {entry.source!r}; not applied")
-    mapped = {entry.source for entry in entries}
-    for name, parameter in given.items():
+            notes.append(f"{place}: no parameter {source!r}; not used")
+    for name, parameter in parameters.items():
         if name not in mapped:
-            notes.append(f"{parameter.place}: not in the mapping; not applied")
+            notes.append(f"{parameter.place}: not in the mapping; not used")
+
+
+def _ends(network: Network, path: Path, given: Given) -> Iterator[tuple[Node, Parameter]]:
+    """The variables of components that a value arrives at, and what of it does."""
+    for node in _nodes(network, path, given.name):
+        yield from _spread(network, node, _adapted(network, node, given))
 
 
 def _set(
@@ -141,7 +153,10 @@ def _parameter(place: str, element: Any, units: Mapping[str, Unit]) -> Parameter
     return Parameter(place, kind, readers[kind](text), units[name] if name else None)
 
 
-def _mapping(archive: Archive, file: str, binding: Binding) -> Iterator[Entry]:
+def _mapping(
+    archive: Archive, file: str, binding: Binding, parameters: Mapping[str, Parameter]
+) -> Iterator[tuple[str, str, Given | None]]:
+    """The entries of a mapping: place, source, and what is given, None without such a source."""
     if binding.mapping_source is None:
         place, root = file, checked(file, binding.mapping_inline, "ssm")
     else:
@@ -155,13 +170,9 @@ def _mapping(archive: Archive, file: str, binding: Binding) -> Iterator[Entry]:
         if target in targets:
             raise InputError(f"{where}: {target!r} has two sources; must have one")
         targets.add(target)
-        yield Entry(
-            where,
-            source,
-            target,
-            is_true(element, "suppressUnitConversion"),
-            transformation(where, element),
-        )
+        parameter = parameters.get(source)
+        suppress, change = is_true(element, "suppressUnitConversion"), transformation(element)
+        yield where, source, Given(target, parameter, suppress, change) if parameter else None
 
 
 def _nodes(network: Network, path: Path, name: str) -> Iterator[Node]:
@@ -202,18 +213,16 @@ def _spread(network: Network, node: Node, given: Parameter) -> Iterator[tuple[No
         yield from _spread(network, hop.target, passed)
 
 
-def _adapted(
-    network: Network, node: Node, given: Parameter, suppress: bool, change: Any
-) -> Parameter:
+def _adapted(network: Network, node: Node, given: Given) -> Parameter:
     """The parameter in the unit of the node, transformed."""
-    unit = network.unit(node)
-    if given.unit and unit and not suppress:
-        factor, offset = conversion(given.place, given.unit, unit)
-        given = replace(given, value=_linear(given.value, factor, offset))
-    if change is not None:
-        given = _transformed(given, change)
-    settled = unit is not None or change is None
-    return replace(given, unit=unit or given.unit, settled=settled)
+    unit, parameter = network.unit(node), given.parameter
+    if parameter.unit and unit and not given.suppress:
+        factor, offset = conversion(parameter.place, parameter.unit, unit)
+        parameter = replace(parameter, value=_linear(parameter.value, factor, offset))
+    if given.change is not None:
+        parameter = _transformed(parameter, given.change)
+    settled = unit is not None or given.change is None
+    return replace(parameter, unit=unit or parameter.unit, settled=settled)
 
 
 def _transformed(given: Parameter, change: Any) -> Parameter:

@@ -112,9 +112,9 @@ def _wires(network: Network, names: Mapping[Path, str], extras: Extras | None) -
     for target in network.into:
         if target.path not in network.parts:
             continue
-        hops = network.trace(target)
-        if hops[0].source.path not in network.parts:
+        if network.output(target) is None:
             continue
+        hops = network.trace(target)
         carried = _carried(network, hops)
         source, sink = (
             Port(names[node.path], _new_names(names[node.path], extras).get(node.name, node.name))

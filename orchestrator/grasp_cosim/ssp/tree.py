@@ -118,7 +118,7 @@ def read_system(file: str, element: Any, units: Mapping[str, Unit]) -> SystemEle
     )
 
 
-def transformation(place: str, element: Any) -> Any:
+def transformation(element: Any) -> Any:
     """The element of a transformation below a connection or mapping entry, or None."""
     for name in ("Linear", "BooleanMapping", "IntegerMapping", "EnumerationMapping"):
         found = child(element, f"ssc:{name}Transformation")
@@ -205,7 +205,7 @@ def _connection(file: str, entry: Any) -> Connection:
         for side in ("start", "end")
     )
     place = f"{at(file, entry)}: connection '{ends[0]} - {ends[1]}'"
-    change = transformation(place, entry)
+    change = transformation(entry)
     if change is not None and not short(change.tag).endswith("LinearTransformation"):
         raise InputError(
             f"{place}: {short(change.tag)} is not supported on a connection; "
