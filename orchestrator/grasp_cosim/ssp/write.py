@@ -28,6 +28,9 @@ from .declared import declared
 from .document import VERSION, add, new, to_bytes
 from .units import conversion, same, write_units
 
+SET = "initialValues"
+"""The name of all parameter sets: Ecos takes those of one name, EcosSimulation.init(...)."""
+
 _CAUSALITIES = ("input", "output", "parameter", "calculatedParameter")
 _TOOL = f"grasp-cosim {version('grasp-cosim')}"
 
@@ -79,7 +82,7 @@ def _values_entry(component: Component, entries: dict[str, bytes]) -> str:
     """The entry of the values of a component, under the names of its FMU."""
     interface = component.interface
     units = _units([component])
-    root = new("ssv:ParameterSet", version=VERSION, name=component.name, generationTool=_TOOL)
+    root = new("ssv:ParameterSet", version=VERSION, name=SET, generationTool=_TOOL)
     parameters = add(root, "ssv:Parameters")
     used: dict[str, Unit] = {}
     for name, value in component.values.items():
