@@ -89,6 +89,11 @@ def _values_entry(component: Component, entries: dict[str, bytes]) -> str:
         variable = interface.by_name[name]
         own = component.rename.get(name, name)
         element = add(parameters, "ssv:Parameter", name=own)
+        items = declared(component.fmu).items.get(own, {})
+        labels = [label for label, number in items.items() if number == value]
+        if labels:
+            add(element, "ssv:Enumeration", value=labels[0])
+            continue
         typed = add(element, f"ssv:{variable.kind}", value=_text(variable, value))
         unit = _unit(component, variable, units)
         if unit:
@@ -145,8 +150,8 @@ def _write_component(
     connectors = add(element, "ssd:Connectors") if variables else None
     for variable in variables:
         connector = add(connectors, "ssd:Connector", name=variable.name, kind=variable.causality)
-        if variable.type == "Enumeration":
-            continue  # its items would have to be written again; the FMU has them
+        if variable.name in declared(component.fmu).items:
+            continue  # an enumeration: its items are in the FMU, so that the type may be left out
         unit = _unit(component, variable, units)
         add(connector, f"ssc:{variable.kind}", **({"unit": unit.name} if unit else {}))
     if component.name in bindings:
