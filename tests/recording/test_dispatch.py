@@ -57,3 +57,14 @@ def test_where_the_run_does_not_begin_no_file_is_left(grasp: System, tmp_path: P
     with pytest.raises(InputError, match=r"object_width = 0\.5 m"):
         simulate(wide, stop=0.1, listeners=[CsvListener(tmp_path / "s.csv")])
     assert list(tmp_path.iterdir()) == []
+
+
+def test_where_a_listener_does_not_end_the_others_do(grasp: System, tmp_path: Path) -> None:
+    paths = [tmp_path / name for name in ("1.csv", "2.csv", "3.csv")]
+    session = simulate.session(grasp, stop=0.1, listeners=[*map(CsvListener, paths)])
+    session.step(10)
+    paths[1].mkdir()
+    with pytest.raises(SimulationError, match=r"2\.csv: cannot be written: Is a directory"):
+        session.close()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["1.csv", "2.csv", "3.csv"]
+    assert [len(path.read_text().splitlines()) for path in (paths[0], paths[2])] == [12, 12]
