@@ -29,7 +29,11 @@ def test_every_input_is_wired(grasp: System) -> None:
 
 
 WRONG = [
-    ("[experiment]", "[experment]", "unknown entry 'experment'; valid: components, experiment"),
+    (
+        "[experiment]",
+        "[experment]",
+        "unknown entry 'experment'; valid: components, events, experiment, faults",
+    ),
     ("step = 1e-4", "stepp = 1e-4", r"\[experiment\]: unknown entry 'stepp'; valid: scheme, step"),
     ("step = 1e-4", "step = 0", r"experiment.step = 0 s: must be a number greater than 0"),
     ("step = 1e-4", "step = nan", "must be a number greater than 0"),

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import InputError, choices
 from .interface import SUPPORTED, Variable, limits
-from .parts import NANOSECONDS, Port, Wire
+from .parts import LOOPS, NANOSECONDS, Port, Wire
 from .units import conversion
 
 if TYPE_CHECKING:
@@ -200,3 +200,20 @@ def check_steps(system: System) -> None:
                 f"{system.name}: {component.name}: step = {own / NANOSECONDS:.9g} s does not "
                 f"divide stop = {stop:.9g} s; must end with a whole step"
             )
+
+
+def check_initialisation(system: System) -> None:
+    """InputError where an option of the initialisation is not as it must be."""
+    place, chosen = f"{system.name}: [initialisation]", system.initialisation
+    if chosen.loops not in LOOPS:
+        raise InputError(f"{place}: loops = {chosen.loops!r}: must be one of {choices(LOOPS)}")
+    number = isinstance(chosen.tolerance, float | int) and not isinstance(chosen.tolerance, bool)
+    if not number or not 0.0 < chosen.tolerance < 1.0:
+        raise InputError(
+            f"{place}: tolerance = {chosen.tolerance!r}: must be a number between 0 and 1"
+        )
+    whole = isinstance(chosen.iterations, int) and not isinstance(chosen.iterations, bool)
+    if not whole or chosen.iterations < 1:
+        raise InputError(
+            f"{place}: iterations = {chosen.iterations!r}: must be a whole number, at least 1"
+        )

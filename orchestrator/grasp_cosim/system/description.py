@@ -1,14 +1,15 @@
 """The system description: components, wires and the experiment, checked once."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, get_args
 
 from ..errors import InputError, choices
-from .checks import check_steps, check_wires
+from .checks import check_initialisation, check_steps, check_wires
 from .interface import Value
 from .parts import NANOSECONDS, Component, Event, Fault, Initialisation, Wire
+from .scenario_checks import check_scenario
 
 Scheme = Literal["sequential", "jacobi"]
 SCHEMES: tuple[str, ...] = get_args(Scheme)
@@ -21,7 +22,7 @@ class System:
     """A checked system: every name exists, every input has one source or keeps a value.
 
     step_ns and stop_ns are in nanoseconds; stop_ns is a whole multiple of step_ns, and so is the
-    step of each component.
+    step of each component. notes are what its reader decided or did not use, one line each.
     """
 
     name: str
@@ -33,6 +34,7 @@ class System:
     events: tuple[Event, ...] = ()
     faults: tuple[Fault, ...] = ()
     initialisation: Initialisation = Initialisation()
+    notes: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
         check_steps(self)
@@ -40,13 +42,34 @@ class System:
             for name, value in component.values.items():
                 component.interface.parse(f"{self.name}: {component.name}.{name}", name, value)
         check_wires(self)
+        check_scenario(self)
+        check_initialisation(self)
 
     @classmethod
-    def load(cls, path: str | Path, fmus: str | Path | None = None) -> "System":
-        """The system of a TOML file; fmus is where its FMUs are, by default beside the file."""
+    def load(
+        cls,
+        path: str | Path,
+        fmus: str | Path | None = None,
+        *,
+        step: float | None = None,
+        stop: float | None = None,
+    ) -> "System":
+        """The system of a TOML file or SSP archive; step and stop in s go before what it says.
+
+        fmus is where the FMUs of a TOML file are, by default beside it; an archive has its own.
+        """
+        path = Path(path)
+        if path.suffix.lower() == ".ssp":
+            from ..ssp.read import read_ssp  # which needs this module
+
+            if fmus is not None:
+                raise InputError(
+                    f"{path}: has its own FMUs; those in {fmus} cannot take their place"
+                )
+            return read_ssp(path, step, stop)
         from .toml import read_toml  # which needs this module
 
-        return read_toml(Path(path), Path(fmus) if fmus else None)
+        return read_toml(path, Path(fmus) if fmus else None).with_experiment(step, stop)
 
     def component(self, name: str, place: str) -> Component:
         """The component of that name; place says who asks, for the error message."""
@@ -108,10 +131,17 @@ class System:
         )
 
 
-def in_nanoseconds(place: str, seconds: Any) -> int:
-    """A time in s as a whole number of nanoseconds; InputError where it is none."""
+def in_nanoseconds(place: str, seconds: Any, zero: bool = False) -> int:
+    """A time in s as a whole number of nanoseconds; InputError where it is none.
+
+    With zero, it may be 0.
+    """
     if isinstance(seconds, bool) or not isinstance(seconds, float | int):
         raise InputError(f"{place} = {seconds!r} s: must be a number")
+    if zero and seconds == 0.0:
+        return 0
+    if zero and not 0.0 < seconds <= LONGEST:
+        raise InputError(f"{place} = {seconds!r} s: must be a number from 0 to {LONGEST:g}")
     if not 0.0 < seconds <= LONGEST:
         raise InputError(
             f"{place} = {seconds!r} s: must be a number greater than 0, at most {LONGEST:g}"

@@ -17,11 +17,15 @@
 A wire that scales is a table: { from = "a.x", to = "b.y", factor = 1000.0, offset = 0.0 }. Without
 factor and offset, units that differ are converted.
 
-Every input has exactly one source: a wire or a value.
+    [initialisation]                # may be left out, as each of its entries
+    loops = "iterate"               # what to do with an algebraic loop at t = 0; or "refuse"
+    tolerance = 1e-10               # relative, of the iteration
+    iterations = 50                 # at most
+
+Every input has exactly one source: a wire or a value. [[events]] and [[faults]]: see scenario.py.
 """
 
 import tomllib
-from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -29,7 +33,9 @@ from typing import Any
 from ..errors import InputError, choices
 from .description import System, as_scheme, in_nanoseconds
 from .interface import read_interface
-from .parts import ISOLATIONS, Component, Isolation, Port, Wire
+from .parts import ISOLATIONS, Component, Initialisation, Isolation, Port, Wire
+from .scenario import read_events, read_faults
+from .tables import as_table, check_keys
 
 
 def read_toml(path: Path, fmus: Path | None = None) -> System:
@@ -44,31 +50,44 @@ def read_toml(path: Path, fmus: Path | None = None) -> System:
 
 
 def _from_table(place: str, table: dict[str, Any], folder: Path) -> System:
-    _check_keys(place, table, {"experiment", "components", "wires"})
-    experiment = _table(f"{place}: [experiment]", table.get("experiment"))
-    _check_keys(f"{place}: [experiment]", experiment, {"step", "stop", "scheme"})
-    components = _table(f"{place}: [components]", table.get("components"))
-    wires = table.get("wires", [])
-    if not isinstance(wires, list):
-        raise InputError(f"{place}: wires = {wires!r}: must be a list of 'output -> input'")
+    check_keys(
+        place, table, {"experiment", "components", "wires", "initialisation", "events", "faults"}
+    )
+    experiment = as_table(f"{place}: [experiment]", table.get("experiment"))
+    check_keys(f"{place}: [experiment]", experiment, {"step", "stop", "scheme"})
+    components = as_table(f"{place}: [components]", table.get("components"))
+    texts = table.get("wires", [])
+    if not isinstance(texts, list):
+        raise InputError(f"{place}: wires = {texts!r}: must be a list of 'output -> input'")
+    wires = tuple(_wire(f"{place}: wires[{i}]", text) for i, text in enumerate(texts))
     return System(
         place,
         tuple(_component(place, name, entry, folder) for name, entry in components.items()),
-        tuple(_wire(f"{place}: wires[{i}]", text) for i, text in enumerate(wires)),
+        wires,
         in_nanoseconds(f"{place}: experiment.step", experiment.get("step")),
         in_nanoseconds(f"{place}: experiment.stop", experiment.get("stop")),
         as_scheme(f"{place}: experiment.scheme", experiment.get("scheme", "sequential")),
+        read_events(place, table.get("events", [])),
+        read_faults(place, table.get("faults", []), wires),
+        read_initialisation(f"{place}: [initialisation]", table.get("initialisation", {})),
     )
+
+
+def read_initialisation(place: str, table: Any) -> Initialisation:
+    """The options of the initialisation; a System checks their values."""
+    table = as_table(place, table)
+    check_keys(place, table, Initialisation.__slots__)
+    return Initialisation(**table)
 
 
 def _component(place: str, name: str, entry: Any, folder: Path) -> Component:
     place = f"{place}: [components.{name}]"
-    entry = _table(place, entry)
-    _check_keys(place, entry, {"fmu", "values", "step", "rename", "isolation"})
+    entry = as_table(place, entry)
+    check_keys(place, entry, {"fmu", "values", "step", "rename", "isolation"})
     fmu = entry.get("fmu")
     if not isinstance(fmu, str):
         raise InputError(f"{place}: fmu = {fmu!r}: must be the path of an FMU, as a string")
-    values = _table(f"{place}: values", entry.get("values", {}))
+    values = as_table(f"{place}: values", entry.get("values", {}))
     for key, value in values.items():
         if not isinstance(value, float | int | bool | str):
             raise InputError(
@@ -89,7 +108,7 @@ def _component(place: str, name: str, entry: Any, folder: Path) -> Component:
 
 def _rename(place: str, fmu: Path, table: Any) -> dict[str, str]:
     """The table of names, each of which the FMU knows."""
-    names = _table(place, table)
+    names = as_table(place, table)
     for new, own in names.items():
         if not isinstance(own, str):
             raise InputError(f"{place}: {new!r} = {own!r}: must be a variable of the FMU, a string")
@@ -110,7 +129,7 @@ def _wire(place: str, entry: Any) -> Wire:
         if len(parts) != 2 or len(ports) != 2:
             raise InputError(f"{place}: {entry!r}: must be 'component.output -> component.input'")
         return Wire(ports[0], ports[1])
-    _check_keys(place, entry, {"from", "to", "factor", "offset"})
+    check_keys(place, entry, {"from", "to", "factor", "offset"})
     for key in ("factor", "offset"):
         number = entry.get(key, 0.0)
         if isinstance(number, bool) or not isinstance(number, float | int):
@@ -123,15 +142,3 @@ def _port(place: str, text: Any) -> Port:
     if not isinstance(text, str) or "." not in text:
         raise InputError(f"{place} = {text!r}: must be 'component.variable'")
     return Port(*text.split(".", 1))
-
-
-def _table(place: str, value: Any) -> dict[str, Any]:
-    if not isinstance(value, dict):
-        raise InputError(f"{place}: missing; must be a table")
-    return value
-
-
-def _check_keys(place: str, table: Mapping[str, Any], valid: Iterable[str]) -> None:
-    for key in table:
-        if key not in valid:
-            raise InputError(f"{place}: unknown entry {key!r}; valid: {choices(sorted(valid))}")
