@@ -118,6 +118,7 @@ class Session:
         """What was recorded until now."""
         self._dispatch.flush()
         master, signals = self._master, self._dispatch.signals
+        missed = master.scenario.pending() if self.complete else ()
         return Result(
             self.system,
             self._memory.time,
@@ -127,7 +128,7 @@ class Session:
             self.complete,
             descriptions={s.name: s.description for s in signals},
             rejections=dict(master.rejections),
-            log=(*master.log, *master.scenario.log),
+            log=(*master.log, *master.scenario.log, *missed),
         )
 
 
