@@ -8,13 +8,13 @@ import click
 
 from ..errors import InputError, SimulationError
 from ..figures.plot import check_plot
-from ..grasp import CASES, grasp_system
+from ..grasp import CASES
 from ..master.simulation import simulate
 from ..recording.result import Result
 from ..study.metrics import LABELS
-from ..system.description import SCHEMES, System
+from ..system.description import SCHEMES
 from ..system.interface import Value
-from .frame import INTERRUPTED, check_folder, fail, json_option, pair
+from .frame import INTERRUPTED, check_folder, fail, json_option, load_system, pair
 from .step_study import run_step_study
 
 
@@ -54,9 +54,7 @@ def run(
     """
     if tolerance is not None and not step_study:
         raise InputError(f"--tolerance {tolerance!r}: must come with --step-study")
-    chosen = System.load(system, step=step, stop=stop) if system else grasp_system()
-    for note in chosen.notes:
-        click.echo(note, err=True)
+    chosen = load_system(system, step, stop)
     fmus = dict(pair("--swap", text, "COMPONENT=FMU") for text in swaps)
     values: dict[str, Value] = {} if case is None else dict(CASES[case])
     values.update(pair("--set", text, "COMPONENT.VARIABLE=VALUE") for text in settings)
