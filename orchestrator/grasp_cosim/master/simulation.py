@@ -26,7 +26,7 @@ LOOK = 0.1
 
 
 class Session:
-    """A run that its user advances. Use as a context manager: leaving it ends and frees the FMUs."""
+    """A run that its user advances. A context manager: leaving it ends and frees the FMUs."""
 
     def __init__(
         self,
@@ -127,8 +127,18 @@ class Session:
             self.complete,
             descriptions={s.name: s.description for s in signals},
             rejections=dict(master.rejections),
-            log=(*master.log, *master.scenario.log),
+            log=self._log(),
         )
+
+    def _log(self) -> tuple[str, ...]:
+        master = self._master
+        rejected = (
+            f"{name}: {r.count} steps were rejected and taken in parts, the first at "
+            f"t = {r.first:.9g} s"
+            for name, r in master.rejections.items()
+        )
+        pending = master.scenario.pending() if self.complete else ()
+        return (*self.system.notes, *master.log, *master.scenario.log, *rejected, *pending)
 
 
 class Simulate:

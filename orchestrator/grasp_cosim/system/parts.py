@@ -117,8 +117,8 @@ class Fault:
     parameters: Mapping[str, float]
     start_ns: int = 0
     end_ns: int | None = None
-    when: Condition | None = None
     seed: int = 0
+    when: Condition | None = None
 
 
 @dataclass(frozen=True, slots=True)
