@@ -86,7 +86,13 @@ def hand(folder: Path, *wires: Wire, rename: bool = False) -> System:
         file.writestr("modelDescription.xml", fmu(*variables))
     names = {"in put": "u", "out": "y", "text": "label"} if rename else {}
     label = "text" if rename else "label"
-    values = {"n": -4, "start": 2, "active": True, label: 'a "<b>" & ü', "plain": 0.1 + 0.2}
+    values: dict[str, float | int | str] = {
+        "n": -4,
+        "start": 2,
+        "active": True,
+        label: 'a "<b>" & ü',
+        "plain": 0.1 + 0.2,
+    }
     target = "in put" if rename else "u"
     free = [name for name in ("a", "b") if name not in {w.target.component for w in wires}]
     components = tuple(

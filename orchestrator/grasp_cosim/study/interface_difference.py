@@ -110,7 +110,7 @@ def use_of(system: System, name: str) -> Use:
     through = [p for p, wire in ends if wire.target in faulty]
     tuned = [port for event in system.events for port in event.set]
     conditions = [*(e.when for e in system.events), *(f.when for f in system.faults)]
-    asked = [when.port for when in conditions if when]
+    asked = [condition.port for condition in conditions if condition]
 
     def own(ports: Sequence[Port]) -> frozenset[str]:
         return frozenset(p.variable for p in ports if p.component == name)
