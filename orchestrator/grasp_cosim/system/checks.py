@@ -85,7 +85,7 @@ def remarks(system: System) -> tuple[str, ...]:
     for wire in system.wires:
         source, target = (_end(system, wire, causality) for causality in ("output", "input"))
         arrow = f"{wire.source} -> {wire.target}"
-        if target.type == "Float32" and source.type != "Float32":
+        if target.type == "Float32" and source.type in ("Real", "Float64"):
             lines.append(f"{arrow}: from {source.type} to Float32, rounded to 7 digits")
         if target.kind == "Real" and wire.factor is None and wire.offset is None:
             missing = [
