@@ -1,5 +1,6 @@
 """Components in a process of their own: what happens there stays there."""
 
+import gc
 import json
 import os
 import signal
@@ -7,13 +8,14 @@ import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from fmi.instances import Bound, real, running
 from grasp_cosim import InputError, SimulationError, System, simulate
-from grasp_cosim.fmi import child
+from grasp_cosim.fmi import child, process
 from grasp_cosim.fmi.instance import OK
 from native_fmus import TYPES, build, needs_gcc
 
@@ -34,6 +36,12 @@ def workers() -> set[int]:
             if b"grasp_cosim.fmi.worker" in line and parent == os.getpid():
                 found.add(int(entry.name))
     return found
+
+
+def open_files() -> int:
+    """How many this process has, but for what it merely has not collected."""
+    gc.collect()
+    return len(list(Path("/proc/self/fd").iterdir()))
 
 
 def system_file(folder: Path, version: str, values: str, isolation: str = "process") -> Path:
@@ -127,7 +135,7 @@ def test_nothing_stays_behind(
     folder = tmp_path / "temporary"
     folder.mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(folder))
-    files = len(os.listdir("/proc/self/fd"))  # noqa: PTH208
+    files = open_files()
     for values in ({}, {"crash_at": 0.1}):
         with running(tmp_path, "3.0", "process", values) as part:
             assert len(workers()) == 1
@@ -137,8 +145,37 @@ def test_nothing_stays_behind(
         del part
         assert not workers()
         assert list(folder.iterdir()) == []
-    assert len(os.listdir("/proc/self/fd")) == files  # noqa: PTH208
+    assert open_files() == files
     assert capfd.readouterr() == ("", "")  # of what the FMU prints
+
+
+def test_without_posix_it_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(process, "POSIX", False)
+    with (
+        pytest.raises(InputError, match=r"^part: isolation = 'process' needs Linux or macOS"),
+        running(tmp_path, "3.0", "process"),
+    ):
+        pass
+
+
+def test_the_grasp_has_the_same_bits(grasp: System) -> None:
+    """Also with FMUs that are written in Python, each in a Python of its own."""
+    alone = tuple(replace(component, isolation="process") for component in grasp.components)
+    here = simulate(grasp, stop=0.01)
+    there = simulate(replace(grasp, components=alone), stop=0.01)
+    assert all((here[name] == there[name]).all() for name in here)
+
+
+def test_an_fmu_that_a_process_can_have_once(tmp_path: Path) -> None:
+    for isolation in ("process", "none"):
+        path = system_file(tmp_path, "2.0", "", isolation)
+        build(tmp_path, version="2.0", capabilities={"canBeInstantiatedOnlyOncePerProcess": "true"})
+        if isolation == "process":
+            assert simulate(System.load(path)).complete
+        else:
+            message = "second and first are both native.fmu, of which a process can have one only"
+            with pytest.raises(InputError, match=message):
+                System.load(path)
 
 
 def test_what_the_fmu_prints_does_not_get_into_json(tmp_path: Path) -> None:
