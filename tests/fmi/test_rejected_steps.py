@@ -58,6 +58,18 @@ def test_a_wish_to_end_keeps_the_recording(
 def test_a_step_that_must_not_vary_ends_the_run(tmp_path: Path, version: str) -> None:
     system = alone(tmp_path, version, "none", discard_at=0.35)
     build(tmp_path, version=version, capabilities={})
-    message = r"^part: native.fmu returned discard at t = 0.3 s: the step is too long"
+    message = r"^part: native.fmu returned discard at t = 0.3 s: the step is too long(\n|$)"
     with pytest.raises(SimulationError, match=message):
         simulate(system)
+
+
+@both
+def test_a_step_that_no_part_of_can_be_taken_ends_the_run(
+    tmp_path: Path, version: str, isolation: Isolation
+) -> None:
+    """A step is halved at most ten times; so close to its start none of them is short enough."""
+    system = alone(tmp_path, version, isolation, discard_at=0.3 + 1e-6)
+    message = r"^part: native.fmu returned discard at t = 0.3 s: the step is too long(\n|$)"
+    with pytest.raises(SimulationError, match=message) as caught:
+        simulate(system)
+    assert len(caught.value.__notes__) == 11

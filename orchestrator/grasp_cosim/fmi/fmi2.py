@@ -100,8 +100,6 @@ class FmuInstance(LoadedInstance):
         return Call(bound, Native(STEP_2, address, self._slave.component, step=step))
 
     def _wants_the_end(self) -> bool:
-        if self._python:  # pythonfmu says so of every discard
-            return False
         return bool(self._status(self._slave.getBooleanStatus, fmi2Terminated))
 
     def _reached(self) -> float | None:
