@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from math import inf, isfinite
 from typing import Any
 
+from ..errors import choices
 from ..system.parts import NANOSECONDS
 from .interface_difference import SEVERITIES, Difference
 from .qualify import Compared, Qualification
@@ -70,9 +71,8 @@ def as_bands(q: Qualification) -> str:
 def reason(q: Qualification) -> str:
     """Why the verdict is what it is, in one line."""
     if q.blocks:
-        first = q.blocks[0]
-        more = f", and {len(q.blocks) - 1} more" if len(q.blocks) > 1 else ""
-        return f"not run, the interface does not fit: {first.variable}: {first.text}{more}"
+        names = choices((d.variable for d in q.blocks), FEW)
+        return f"not run, the interface does not fit: {names}"
     if q.failure:
         return f"the candidate failed: {q.failure}"
     counts = [
