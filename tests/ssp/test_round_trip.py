@@ -9,6 +9,7 @@ import pytest
 from grasp_cosim import InputError, System, simulate
 from grasp_cosim.ssp.document import parse
 from grasp_cosim.ssp.write import SET, write_ssp
+from grasp_cosim.system.interface import Value
 from grasp_cosim.system.parts import (
     Component,
     Condition,
@@ -51,7 +52,7 @@ def test_the_grasp_runs_the_same_to_the_bit(grasp: System, tmp_path: Path) -> No
 
 def test_what_ssp_has_no_form_for_comes_back(grasp: System, tmp_path: Path) -> None:
     plant, *others = grasp.components
-    gap = Port("plant", "gap[1]")
+    gap, contact = Port("plant", "gap[1]"), Port("plant", "contact[1]")
     full = replace(
         grasp,
         components=(replace(plant, step_ns=300_000, isolation="process"), *others),
@@ -60,10 +61,12 @@ def test_what_ssp_has_no_form_for_comes_back(grasp: System, tmp_path: Path) -> N
         events=(
             Event({Port("sensor_1", "reflectance"): 0.5}, at_ns=1_000_000),
             Event({Port("sensor_2", "reflectance"): 0.1}, when=Condition(gap, "<", 0.01)),
+            Event({Port("sensor_2", "reflectance"): 1}, when=Condition(contact, "!=", False)),
         ),
         faults=(
             Fault(Port("sensor_1", "gap"), "bias", {"value": 0.001}, 5, None, seed=3),
             Fault(Port("sensor_2", "gap"), "stuck", {}, 0, 1_000_000_000),
+            Fault(Port("sensor_2", "gap"), "delay", {"time": 1e-3}, when=Condition(gap, ">", 0.0)),
         ),
     )
     assert round_trip(full, tmp_path) == full
@@ -86,7 +89,7 @@ def hand(folder: Path, *wires: Wire, rename: bool = False) -> System:
         file.writestr("modelDescription.xml", fmu(*variables))
     names = {"in put": "u", "out": "y", "text": "label"} if rename else {}
     label = "text" if rename else "label"
-    values: dict[str, float | int | str] = {
+    values: dict[str, Value] = {
         "n": -4,
         "start": 2,
         "active": True,
@@ -204,6 +207,22 @@ def test_one_name_for_two_units_is_written_for_the_first_only(tmp_path: Path) ->
     other = Component("c", path, {"u": 1.0})
     mixed = replace(original, components=(*original.components, other))
     assert round_trip(mixed, tmp_path) == mixed
+
+
+def test_a_whole_number_that_ssp_does_not_hold_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "wide.fmu"
+    description = b"""<fmiModelDescription fmiVersion="3.0" modelName="w" instantiationToken="{}">
+      <CoSimulation modelIdentifier="w"/><ModelVariables><Int64 name="n" valueReference="1"
+      causality="parameter" variability="fixed" start="1"/></ModelVariables><ModelStructure/>
+      </fmiModelDescription>"""
+    with zipfile.ZipFile(path, "w") as file:
+        file.writestr("modelDescription.xml", description)
+    parts = (Component("c", path, {"n": 2**31}),)
+    wide = System("wide.toml", parts, (), 1_000_000, 1_000_000_000, "sequential")
+    with pytest.raises(InputError, match=r"c\.n = 2147483648: must fit into 32 bits"):
+        write_ssp(wide, tmp_path / "wide.ssp")
+    narrow = wide.with_values({"c.n": 2**31 - 1})
+    assert round_trip(narrow, tmp_path) == narrow
 
 
 def test_only_an_ssp_file_is_written(grasp: System, tmp_path: Path) -> None:

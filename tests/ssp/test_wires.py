@@ -164,10 +164,10 @@ def test_connections_in_a_circle_are_refused(tmp_path: Path) -> None:
     ("a", "b", "content", "message"),
     [
         (
-            fmu("output Integer y -"),
+            fmu("output Boolean y -"),
             fmu("input Real u 0.0"),
             "",
-            "from Integer to Real at b.u; must be the same",
+            "from Boolean to Real at b.u; must be the same, or from Integer to Real",
         ),
         (
             fmu("output Boolean y -"),
@@ -198,3 +198,23 @@ def test_an_enumeration_goes_to_an_enumeration(tmp_path: Path) -> None:
     assert wires(tmp_path, system("top", elements, connect("a/y", "b/u")), *ends) == (
         Wire(*A_TO_B),
     )
+
+
+def test_an_integer_goes_to_a_real_and_may_be_transformed_there(tmp_path: Path) -> None:
+    ends = {"a": fmu("output Integer y -"), "b": fmu("input Real u 0.0")}
+    elements = component("a", "output y Integer") + component("b", "input u Real")
+    top = system("top", elements, connect("a/y", "b/u", linear(0.5)))
+    assert wires(tmp_path, top, **ends) == (Wire(*A_TO_B, 0.5, 0.0),)
+
+
+def test_units_that_no_one_defines_are_refused(tmp_path: Path) -> None:
+    a = fmu("output Real y - m").replace(b'<BaseUnit m="1"/>', b"")
+    with pytest.raises(InputError, match="which their FMUs do not define in SI units"):
+        one(tmp_path, a=a)
+
+
+def test_units_that_the_archive_defines_in_place_of_the_fmu(tmp_path: Path) -> None:
+    a = fmu("output Real y - m").replace(b'<BaseUnit m="1"/>', b"")
+    elements = component("a", "output y Real m") + component("b", "input u Real")
+    (wire,) = wires(tmp_path, system("top", elements, connect("a/y", "b/u")), a)
+    assert wire == Wire(*A_TO_B, 1000.0, 0.0)

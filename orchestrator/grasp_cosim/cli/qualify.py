@@ -8,16 +8,15 @@ import click
 
 from ..figures.plot import new_figure
 from ..figures.qualification import draw_qualification
-from ..grasp import grasp_system
 from ..recording.result import write_text
 from ..study import verdict
 from ..study.bands import read_bands
 from ..study.qualify import Qualification
 from ..study.qualify import qualify as run_qualification
-from ..system.description import SCHEMES, System
+from ..system.description import SCHEMES
 from ..system.interface import Value
 from ..system.parts import ISOLATIONS, Isolation
-from .frame import NEGATIVE, check_folder, json_option, pair
+from .frame import NEGATIVE, check_folder, json_option, load_system, pair
 
 
 @click.command()
@@ -68,7 +67,7 @@ def qualify(
     if out:
         check_folder(out)
         new_figure(1.0, 1.0)  # tells that matplotlib is missing before the runs, not after
-    chosen = System.load(system) if system else grasp_system()
+    chosen = load_system(system, step, stop)
     values: dict[str, Value] = dict(
         pair("--set", text, "COMPONENT.VARIABLE=VALUE") for text in settings
     )

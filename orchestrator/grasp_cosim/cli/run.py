@@ -8,14 +8,15 @@ import click
 
 from ..errors import InputError, SimulationError
 from ..figures.plot import check_plot
-from ..grasp import CASES, grasp_system
+from ..grasp import CASES
 from ..master.engine import ENGINES, Engine
 from ..master.simulation import simulate
+from ..recording.mdf import check_mdf
 from ..recording.result import Result
 from ..study.metrics import LABELS
-from ..system.description import SCHEMES, System
+from ..system.description import SCHEMES
 from ..system.interface import Value
-from .frame import INTERRUPTED, check_folder, fail, json_option, pair
+from .frame import INTERRUPTED, check_folder, fail, json_option, load_system, pair
 from .step_study import run_step_study
 
 
@@ -63,9 +64,9 @@ def run(
         raise InputError(f"--tolerance {tolerance!r}: must come with --step-study")
     if mdf and not out:
         raise InputError("--mdf: must come with --out, the folder for signals.mf4")
-    chosen = System.load(system, step=step, stop=stop) if system else grasp_system()
-    for note in chosen.notes:
-        click.echo(note, err=True)
+    if mdf:
+        check_mdf()
+    chosen = load_system(system, step, stop)
     fmus = dict(pair("--swap", text, "COMPONENT=FMU") for text in swaps)
     values: dict[str, Value] = {} if case is None else dict(CASES[case])
     values.update(pair("--set", text, "COMPONENT.VARIABLE=VALUE") for text in settings)

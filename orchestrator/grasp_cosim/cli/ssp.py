@@ -5,9 +5,7 @@ from pathlib import Path
 
 import click
 
-from ..grasp import grasp_system
-from ..system.description import System
-from .frame import check_folder, json_option
+from .frame import check_folder, json_option, load_system
 
 
 @click.command()
@@ -28,22 +26,20 @@ def ssp(
     """
     from ..ssp.write import write_ssp  # only here: its libraries take time to load
 
-    chosen = System.load(system, step=step, stop=stop) if system else grasp_system()
-    chosen = chosen.with_experiment(step, stop)
+    chosen = load_system(system, step, stop).with_experiment(step, stop)
     check_folder(out.parent)
     written = write_ssp(chosen, out)
-    notes = [*chosen.notes, *written.notes]
     if as_json:
         report = {
             "ssp": str(out),
             "entries": list(written.entries),
             "components": [c.name for c in chosen.components],
             "connections": len(chosen.wires),
-            "notes": notes,
+            "notes": [*chosen.notes, *written.notes],
         }
         click.echo(json.dumps(report))
     else:
         click.echo("\n    ".join((f"{out}: written", *written.entries)))
-        for note in notes:
+        for note in written.notes:
             click.echo(note, err=True)
     return 0

@@ -59,8 +59,8 @@ class Archive:
 
     def resolve(self, place: str, uri: str) -> str:
         """The entry that a source names, a relative path; InputError where there is none."""
-        parts = urlsplit(uri)
-        if parts.scheme or parts.netloc or parts.query or parts.fragment or not parts.path:
+        parts = urlsplit(uri)  # a valid URI by the schema
+        if tuple(parts) != ("", "", parts.path, "", "") or not parts.path:
             raise InputError(f"{place}: source {uri!r}: must be the path of a file in the archive")
         for name in (unquote(parts.path), uri):
             entry = posixpath.normpath(name)

@@ -1,42 +1,29 @@
-"""What SSP needs of an FMU beyond its interface: units, names of enumeration items, step size."""
+"""What SSP needs of an FMU beyond its interface: names of enumeration items, and a step size."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-import fmpy
-
-from ..system.units import BASE, Unit
+from ..system.model_description import read_description
 
 
 @dataclass(frozen=True, slots=True)
 class Declared:
-    """units by name, without those that no base unit defines; items by variable; step in s."""
+    """The items of each enumeration variable with their numbers; step in s, None without one."""
 
-    units: Mapping[str, Unit]
     items: Mapping[str, Mapping[str, int]]
     step: float | None
 
 
 def declared(path: Path) -> Declared:
-    """What the FMU at path declares; its interface has been read before, so that it is readable."""
+    """What the FMU at path declares."""
     return _declared(path.resolve(), path.stat().st_mtime_ns)
 
 
 @lru_cache(maxsize=64)
 def _declared(path: Path, modified: int) -> Declared:
-    description = fmpy.read_model_description(path, validate=False)
-    units = {
-        unit.name: Unit(
-            unit.name,
-            tuple(getattr(unit.baseUnit, base) for base in BASE),
-            unit.baseUnit.factor,
-            unit.baseUnit.offset,
-        )
-        for unit in description.unitDefinitions
-        if unit.baseUnit
-    }
+    description, _, _ = read_description(path)
     items = {
         v.name: {item.name: int(item.value) for item in v.declaredType.items}
         for v in description.modelVariables
@@ -44,4 +31,4 @@ def _declared(path: Path, modified: int) -> Declared:
     }
     experiment = description.defaultExperiment
     step = experiment.stepSize if experiment else None
-    return Declared(units, items, None if step is None else float(step))
+    return Declared(items, None if step is None else float(step))

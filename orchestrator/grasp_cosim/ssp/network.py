@@ -19,7 +19,7 @@ from ..system.interface import Interface, Variable
 from ..system.units import Unit
 from .declared import Declared
 from .tree import ComponentElement, Connection, Connector, End, SystemElement
-from .units import conversion, same
+from .units import change, same
 
 Path = tuple[str, ...]
 """The names of the elements from the top system, () itself, down to an element."""
@@ -52,6 +52,10 @@ class Part:
     element: ComponentElement
     interface: Interface
     declared: Declared
+
+    def unit(self, name: str) -> Unit | None:
+        """The unit that the FMU declares for a variable and defines."""
+        return self.interface.units.get(self.interface.by_name[name].unit or "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,10 +123,8 @@ class Network:
         part = self.parts.get(node.path)
         if part is None:
             return self.systems[node.path].connectors[node.name].unit
-        variable = part.interface.by_name[node.name]
-        declared = part.declared.units.get(variable.unit or "")
         connector = part.element.connectors.get(node.name)
-        return declared or (connector.unit if connector else None)
+        return part.unit(node.name) or (connector.unit if connector else None)
 
     def variable(self, node: Node) -> Variable:
         """The variable of a node of a component."""
@@ -138,25 +140,26 @@ class Network:
                     f"{place}: the unit at {hop.source} is not clear, {unit.name} or "
                     f"{target.name}; give that connector a unit"
                 )
-            factor, offset = _after(factor, offset, conversion(place, unit, target))
-        change = hop.connection.transformation
-        if change is not None:
-            factor, offset = _after(factor, offset, change)
-        settled = target is not None or (carried.settled and change is None)
+            factor, offset = _after(factor, offset, change(place, unit, target))
+        transformation = hop.connection.transformation
+        if transformation is not None:
+            factor, offset = _after(factor, offset, transformation)
+        settled = target is not None or (carried.settled and transformation is None)
         return Carried(target or unit, factor, offset, settled)
 
     def decided_by_units(self, hops: list[Hop], carried: Carried) -> bool:
         """Whether the units that the two FMUs declare say all about the way along the hops."""
         if any(h.connection.suppress or h.connection.transformation for h in hops):
             return False
-        source, target = (self._declared(node) for node in (hops[0].source, hops[-1].target))
-        place = hops[-1].connection.place
-        direct = conversion(place, source, target) if source and target else (1.0, 0.0)
+        nodes = hops[0].source, hops[-1].target
+        names = [self.variable(node).unit for node in nodes]
+        units = [self.parts[node.path].unit(node.name) for node in nodes]
+        direct = (1.0, 0.0)
+        if None not in names and names[0] != names[1]:
+            if units[0] is None or units[1] is None:  # a wire is refused, unless the archive
+                return None in (self.unit(node) for node in nodes)  # says what they are
+            direct = change(hops[-1].connection.place, units[0], units[1])
         return direct == (carried.factor, carried.offset)
-
-    def _declared(self, node: Node) -> Unit | None:
-        part = self.parts[node.path]
-        return part.declared.units.get(part.interface.by_name[node.name].unit or "")
 
     def _directed(self, path: Path, system: SystemElement, connection: Connection) -> Hop:
         (a, gives_a), (b, gives_b) = (
@@ -221,7 +224,7 @@ def _check_connectors(part: Part) -> None:
         kind = kind_of(connector)
         if kind is not None and kind != variable.kind:
             raise InputError(f"{place}: {connector.type}; the FMU has {variable.kind}")
-        declared = part.declared.units.get(variable.unit or "")
+        declared = part.unit(connector.name)
         if declared and connector.unit and not same(declared, connector.unit):
             raise InputError(
                 f"{place}: unit {connector.unit.name} is not what the FMU declares, "

@@ -14,13 +14,22 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ..errors import InputError, choices
-from ..system.interface import Value, Variable
+from ..system.interface import SETTABLE, Value, Variable
 from ..system.units import Unit
 from .archive import Archive
 from .document import at, checked, children, is_true, parse, short
 from .network import Carried, Network, Node, Path, kind_of
 from .tree import Binding, linear, transformation
-from .units import conversion, read_units
+from .units import change, read_units
+
+_READERS: Mapping[str, Callable[[str], Value]] = {
+    "Real": float,
+    "Integer": int,
+    "Boolean": lambda text: text.strip() in ("true", "1"),
+    "String": str,
+    "Enumeration": str,
+}
+"""From the text of a value to the value, by SSP type; an enumeration by name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,13 +47,13 @@ class Parameter:
 class Given:
     """A parameter for what is called name at the binding's system or component.
 
-    With suppress its unit is not converted. change is its transformation, or None.
+    With suppress its unit is not converted. transformation is its element, or None.
     """
 
     name: str
     parameter: Parameter
     suppress: bool
-    change: Any
+    transformation: Any
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,19 +147,12 @@ def _set(
 
 def _parameter(place: str, element: Any, units: Mapping[str, Unit]) -> Parameter:
     kind, text = short(element.tag).removeprefix("ssv:"), element.get("value")
-    readers: Mapping[str, Callable[[str], Value]] = {
-        "Real": float,
-        "Integer": int,
-        "Boolean": lambda text: text.strip() in ("true", "1"),
-        "String": str,
-        "Enumeration": str,
-    }
-    if kind not in readers:
-        raise InputError(f"{place}: type {kind} is not supported; valid: {choices(readers)}")
+    if kind not in _READERS:
+        raise InputError(f"{place}: type {kind} is not supported; valid: {choices(_READERS)}")
     name = element.get("unit")
     if name is not None and name not in units:
         raise InputError(f"{place}: unit {name!r} is not defined; valid: {choices(units)}")
-    return Parameter(place, kind, readers[kind](text), units[name] if name else None)
+    return Parameter(place, kind, _READERS[kind](text), units[name] if name else None)
 
 
 def _mapping(
@@ -171,8 +173,8 @@ def _mapping(
             raise InputError(f"{where}: {target!r} has two sources; must have one")
         targets.add(target)
         parameter = parameters.get(source)
-        suppress, change = is_true(element, "suppressUnitConversion"), transformation(element)
-        yield where, source, Given(target, parameter, suppress, change) if parameter else None
+        suppress, element = is_true(element, "suppressUnitConversion"), transformation(element)
+        yield where, source, Given(target, parameter, suppress, element) if parameter else None
 
 
 def _nodes(network: Network, path: Path, name: str) -> Iterator[Node]:
@@ -217,22 +219,22 @@ def _adapted(network: Network, node: Node, given: Given) -> Parameter:
     """The parameter in the unit of the node, transformed."""
     unit, parameter = network.unit(node), given.parameter
     if parameter.unit and unit and not given.suppress:
-        factor, offset = conversion(parameter.place, parameter.unit, unit)
+        factor, offset = change(parameter.place, parameter.unit, unit)
         parameter = replace(parameter, value=_linear(parameter.value, factor, offset))
-    if given.change is not None:
-        parameter = _transformed(parameter, given.change)
-    settled = unit is not None or given.change is None
+    if given.transformation is not None:
+        parameter = _transformed(parameter, given.transformation)
+    settled = unit is not None or given.transformation is None
     return replace(parameter, unit=unit or parameter.unit, settled=settled)
 
 
-def _transformed(given: Parameter, change: Any) -> Parameter:
-    kind = short(change.tag).removeprefix("ssc:").removesuffix("Transformation")
+def _transformed(given: Parameter, element: Any) -> Parameter:
+    kind = short(element.tag).removeprefix("ssc:").removesuffix("Transformation")
     if kind == "Linear":
         if given.type not in ("Real", "Integer"):
             raise InputError(
                 f"{given.place}: {given.type} has a linear transformation; must be Real"
             )
-        return replace(given, type="Real", value=_linear(given.value, *linear(change)))
+        return replace(given, type="Real", value=_linear(given.value, *linear(element)))
     readers: Mapping[str, tuple[tuple[str, ...], Callable[[str], Value]]] = {
         "BooleanMapping": (("Boolean",), lambda text: text.strip() in ("true", "1")),
         "IntegerMapping": (("Integer",), int),
@@ -240,14 +242,16 @@ def _transformed(given: Parameter, change: Any) -> Parameter:
     }
     types, read = readers[kind]
     if given.type not in types:
-        raise InputError(f"{given.place}: {given.type} has {short(change.tag)}; must be {types[0]}")
+        raise InputError(
+            f"{given.place}: {given.type} has {short(element.tag)}; must be {types[0]}"
+        )
     table = {
         read(entry.get("source")): read(entry.get("target"))
-        for entry in children(change, "ssc:MapEntry")
+        for entry in children(element, "ssc:MapEntry")
     }
     if given.value not in table:
         raise InputError(
-            f"{given.place}: {given.value!r} is not in its {short(change.tag)}; "
+            f"{given.place}: {given.value!r} is not in its {short(element.tag)}; "
             f"valid: {choices(map(repr, table))}"
         )
     return replace(given, value=table[given.value])
@@ -262,7 +266,7 @@ def _value(network: Network, node: Node, given: Parameter) -> Value:
     """The value for a variable of a component, checked."""
     part = network.parts[node.path]
     variable = part.interface.by_name[node.name]
-    if variable.causality not in ("input", "parameter"):
+    if variable.causality not in SETTABLE:
         raise InputError(
             f"{given.place}: {node} is {variable.causality}; only inputs and parameters are set"
         )

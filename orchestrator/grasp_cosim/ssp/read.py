@@ -130,6 +130,7 @@ def _carried(network: Network, hops: list[Hop]) -> Carried:
     """What the way from component to component makes of a value; InputError where it must not."""
     carried = Carried(network.unit(hops[0].source))
     variable = network.variable(hops[0].source)
+    kind: str = variable.kind
     for hop in hops:
         place = hop.connection.place
         if variable.causality != "output" or _causality(network, hop.target) == "parameter":
@@ -137,13 +138,15 @@ def _carried(network: Network, hops: list[Hop]) -> Carried:
                 f"{place}: leads from {hops[0].source} to a parameter, or from one; "
                 "only outputs are passed on to inputs, give the parameter a value"
             )
-        kind = _kind(network, hop.target)
-        if kind not in (None, variable.kind):
+        reached = _kind(network, hop.target) or kind
+        if reached != kind and (kind, reached) != ("Integer", "Real"):
             raise InputError(
-                f"{place}: from {variable.kind} to {kind} at {hop.target}; must be the same"
+                f"{place}: from {kind} to {reached} at {hop.target}; must be the same, "
+                "or from Integer to Real"
             )
-        if hop.connection.transformation and variable.kind != "Real":
-            raise InputError(f"{place}: transforms a {variable.kind}; must be Real")
+        kind = reached
+        if hop.connection.transformation and kind != "Real":
+            raise InputError(f"{place}: transforms a {kind}; must be Real")
         carried = network.carry(hop, carried)
     return carried
 
@@ -186,7 +189,8 @@ def _components(
         )
         for variable in component.interface.of("input"):
             port, start = Port(name, variable.name), variable.start
-            if port not in wired and variable.name not in values and start is not None:
+            given = port in wired or variable.name in values
+            if variable.supported and not given and start is not None:
                 values[variable.name] = component.interface.parse(
                     f"{part.element.place}: start", variable.name, start, text=True
                 )

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from ..errors import InputError
-from ..system.units import BASE, Unit
+from ..system.units import BASE, Unit, conversion
 from .document import add, child, children
 
 
@@ -36,19 +36,18 @@ def same(a: Unit, b: Unit) -> bool:
     return (a.exponents, a.factor, a.offset) == (b.exponents, b.factor, b.offset)
 
 
-def conversion(place: str, source: Unit, target: Unit) -> tuple[float, float]:
+def change(place: str, source: Unit, target: Unit) -> tuple[float, float]:
     """(factor, offset) such that target value = factor * source value + offset.
 
-    Exactly (1.0, 0.0) where they mean the same; InputError where they are of different kinds.
+    Exactly (1.0, 0.0) where they mean the same; InputError where they are of different quantities.
     """
-    if same(source, target):
-        return 1.0, 0.0
-    if source.exponents != target.exponents:
+    found = conversion(source, target)
+    if found is None:
         raise InputError(
             f"{place}: {source.name} cannot be converted to {target.name}; "
             "units must be of the same quantity, or suppressUnitConversion set"
         )
-    return source.factor / target.factor, (source.offset - target.offset) / target.factor
+    return found
 
 
 def _unit(element: Any) -> Unit:

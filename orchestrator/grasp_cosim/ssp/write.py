@@ -26,7 +26,7 @@ from .annotation import extras_of, write_extras
 from .archive import RESOURCES, STRUCTURE, write_archive
 from .declared import declared
 from .document import VERSION, add, new, to_bytes
-from .units import conversion, same, write_units
+from .units import change, same, write_units
 
 SET = "initialValues"
 """The name of all parameter sets: Ecos takes those of one name, EcosSimulation.init(...)."""
@@ -94,7 +94,8 @@ def _values_entry(component: Component, entries: dict[str, bytes]) -> str:
         if labels:
             add(element, "ssv:Enumeration", value=labels[0])
             continue
-        typed = add(element, f"ssv:{variable.kind}", value=_text(variable, value))
+        text = _text(f"{component.name}.{name}", variable, value)
+        typed = add(element, f"ssv:{variable.kind}", value=text)
         unit = _unit(component, variable, units)
         if unit:
             typed.set("unit", unit.name)
@@ -146,7 +147,7 @@ def _write_component(
         source=sources[component.name],
         implementation="CoSimulation",
     )
-    variables = read_interface(component.fmu).of(*_CAUSALITIES)
+    variables = _connected(component)
     connectors = add(element, "ssd:Connectors") if variables else None
     for variable in variables:
         connector = add(connectors, "ssd:Connector", name=variable.name, kind=variable.causality)
@@ -157,6 +158,12 @@ def _write_component(
     if component.name in bindings:
         held = add(element, "ssd:ParameterBindings")
         add(held, "ssd:ParameterBinding", source=bindings[component.name])
+
+
+def _connected(component: Component) -> list[Variable]:
+    """The variables that get a connector: those of a kind and causality that SSP has, too."""
+    variables = read_interface(component.fmu).of(*_CAUSALITIES)
+    return [variable for variable in variables if variable.supported]
 
 
 def _write_connection(connections: Any, system: System, wire: Wire) -> None:
@@ -175,7 +182,7 @@ def _write_connection(connections: Any, system: System, wire: Wire) -> None:
     factor = 1.0 if wire.factor is None else wire.factor
     offset = 0.0 if wire.offset is None else wire.offset
     if not given and start_unit and end_unit and not same(start_unit, end_unit):
-        factor, offset = conversion(str(wire.target), start_unit, end_unit)
+        factor, offset = change(str(wire.target), start_unit, end_unit)
     if given or (factor, offset) != (1.0, 0.0):
         element.set("suppressUnitConversion", "true")
         add(element, "ssc:LinearTransformation", factor=repr(factor), offset=repr(offset))
@@ -186,14 +193,14 @@ def _own(system: System, port: Port) -> tuple[Port, Unit | None]:
     component = system.component(port.component, str(port))
     variable = component.interface.by_name[port.variable]
     own = component.rename.get(port.variable, port.variable)
-    return Port(port.component, own), declared(component.fmu).units.get(variable.unit or "")
+    return Port(port.component, own), component.interface.units.get(variable.unit or "")
 
 
 def _units(components: Iterable[Component]) -> dict[str, Unit]:
     """The units of all variables by name; of two that mean something else the first."""
     units: dict[str, Unit] = {}
     for component in components:
-        known = declared(component.fmu).units
+        known = component.interface.units
         for variable in component.interface.variables:
             unit = known.get(variable.unit or "")
             if unit:
@@ -203,13 +210,15 @@ def _units(components: Iterable[Component]) -> dict[str, Unit]:
 
 def _unit(component: Component, variable: Variable, units: Mapping[str, Unit]) -> Unit | None:
     """The unit to write at a variable; none where its name means something else in the archive."""
-    unit = declared(component.fmu).units.get(variable.unit or "")
+    unit = component.interface.units.get(variable.unit or "")
     return unit if unit and same(unit, units[unit.name]) else None
 
 
-def _text(variable: Variable, value: Value) -> str:
+def _text(place: str, variable: Variable, value: Value) -> str:
     if variable.kind == "Real":
         return repr(float(value))
+    if variable.kind == "Integer" and not -(2**31) <= int(value) < 2**31:
+        raise InputError(f"{place} = {value}: must fit into 32 bits, as an Integer of SSP 1.0")
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
