@@ -2,6 +2,7 @@
 
 import json
 import re
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -27,7 +28,7 @@ def qualify(
     folder = tmp_path / "here"
     folder.mkdir()
     monkeypatch.chdir(folder)
-    monkeypatch.setattr("grasp_cosim.cli.qualify.grasp_system", lambda: grasp)
+    monkeypatch.setattr("grasp_cosim.cli.frame.grasp_system", lambda: grasp)
 
     def run(*arguments: str | Path) -> tuple[int, str, str]:
         code = cli.main(["qualify", *map(str, arguments)])
@@ -101,6 +102,19 @@ def test_bands_and_values_are_taken(qualify: Run, altered: Altered, tmp_path: Pa
     code, out, _ = qualify(heavy, "--as", "plant", *SHORT, *same)
     assert code == 0
     assert "interface: no difference" in out
+
+
+def test_a_candidate_that_does_not_load_is_no_wrong_input(
+    qualify: Run, fmus: Path, tmp_path: Path
+) -> None:
+    bare = tmp_path / "bare.fmu"
+    with zipfile.ZipFile(fmus / "GripperPlant.fmu") as whole, zipfile.ZipFile(bare, "w") as file:
+        file.writestr("modelDescription.xml", whole.read("modelDescription.xml"))
+    code, out, _ = qualify(bare, "--as", "plant", *SHORT)
+    assert code == 1
+    lines = out.splitlines()
+    assert lines[1].startswith("the candidate failed: plant: ")
+    assert lines[-1] == f"whether this machine loads it: grasp-cosim doctor {bare}"
 
 
 WRONG = [

@@ -31,6 +31,8 @@ def as_text(q: Qualification) -> str:
     parts.append("\n".join(_differences(q.swap.differences)))
     if q.signals:
         parts.append("\n".join(_basis(q)))
+    elif q.failure:
+        parts.append(f"whether this machine loads it: grasp-cosim doctor {q.swap.candidate}")
     return "\n\n".join(parts)
 
 
