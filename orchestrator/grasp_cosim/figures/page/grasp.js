@@ -26,7 +26,7 @@ class Grasp {
     return valueAt(this.recording.time, this.series.get(name), t);
   }
 
-  // speed: simulated seconds per second, by which a glow lasts a while for the eye.
+  // speed: simulated seconds per second at a contact, by which a glow lasts a while for the eye.
   draw(t, speed) {
     const { pen, width, height } = fitted(this.canvas), plan = this.plan;
     const room = THICK + 70, scale = (width - 2 * room) / Math.max(this.high - this.low, 1e-6);
