@@ -55,11 +55,6 @@ def test_close_ups_of_the_contacts(
     tmp_path: Path,
     saved: list[Figure],
 ) -> None:
-    saved = []
-    save = plot.save
-    monkeypatch.setattr(
-        plot, "save", lambda figure, path: saved.append(figure) or save(figure, path)
-    )
     plot.plot_run(touching_from(grasp_run(), moments), tmp_path / "grasp.png")
     axes = saved[0].axes
     assert len(axes) == 3 * (1 + len(close_ups))
@@ -84,16 +79,11 @@ def test_a_close_up_shows_the_samples_around_the_contact(
     rows = (run.time >= TOUCH[1] - 0.015) & (run.time < TOUCH[1] + 0.03)
     np.testing.assert_array_equal(time, run.time[rows])
     np.testing.assert_array_equal(shown, 1e3 * run.signals["plant.gap[1]"][rows])
-    assert force.lines[0].get_ydata().max() == 3.4
-    assert speed.lines[0].get_ydata().max() == pytest.approx(65.0)
+    assert np.max(force.lines[0].get_ydata()) == 3.4
+    assert np.max(speed.lines[0].get_ydata()) == pytest.approx(65.0)
 
 
 def test_all_signals_by_unit(tmp_path: Path, saved: list[Figure]) -> None:
-    saved = []
-    save = plot.save
-    monkeypatch.setattr(
-        plot, "save", lambda figure, path: saved.append(figure) or save(figure, path)
-    )
     run = ring_run([f"c{k}" for k in range(15)])
     units = {name: "m" if name < "c1" else None for name in run.signals}
     plot.plot_signals(replace(run, units=units), tmp_path / "signals.png")
