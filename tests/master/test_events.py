@@ -226,7 +226,7 @@ def test_faults_are_logged_where_they_begin_and_end() -> None:
 )
 def test_a_condition_begins_a_fault_within_its_window(y: list[float], first: int) -> None:
     condition = Condition(Port("a", "y"), ">", 0.5)
-    fault = Fault(Port("b", "u"), "bias", {"value": 1.0}, 2 * STEP, 7 * STEP, condition)
+    fault = Fault(Port("b", "u"), "bias", {"value": 1.0}, 2 * STEP, 7 * STEP, when=condition)
     rig = Rig(faults=[fault])
     function = rig.scenario.fault_functions[Port("b", "u")]
     shifts = [function(0.0, -1)]
@@ -243,7 +243,7 @@ def test_a_condition_begins_a_fault_within_its_window(y: list[float], first: int
 
 def test_a_condition_that_comes_too_late_begins_no_fault() -> None:
     condition = Condition(Port("a", "y"), ">", 0.5)
-    fault = Fault(Port("b", "u"), "bias", {"value": 1.0}, 0, 3 * STEP, condition)
+    fault = Fault(Port("b", "u"), "bias", {"value": 1.0}, 0, 3 * STEP, when=condition)
     rig = Rig(faults=[fault])
     assert rig.run(8, [0, 0, 0, 1, 1]) == []
     assert rig.scenario.next_step(8) is None
@@ -254,7 +254,7 @@ def test_what_did_not_happen_is_said() -> None:
     rig = Rig([at(0.1, p=1.0), at(5.0, p=2.0), when("<", -1.0, p=3.0)])
     rig.run(8)
     assert rig.scenario.pending() == [
-        "events[1] did not happen: t = 5 s was not reached",
+        "events[1] did not happen: no step began at or after t = 5 s",
         "events[2] did not happen: a.y < -1.0 never held",
     ]
 
@@ -275,7 +275,7 @@ FULL = (
     [
         Fault(Port("b", "u"), "bias", {"value": 1.0}, 2 * STEP, 4 * STEP),
         Fault(Port("a", "u"), "stuck", {}, 8 * STEP),
-        Fault(Port("b", "u"), "stuck", {}, 0, 20 * STEP, Condition(Port("a", "y"), ">", 0.9)),
+        Fault(Port("b", "u"), "stuck", {}, 0, 20 * STEP, when=Condition(Port("a", "y"), ">", 0.9)),
     ],
 )
 

@@ -69,8 +69,8 @@ def test_faults_are_read(fmus: Path, tmp_path: Path) -> None:
             {"standard_deviation": 0.002},
             500_000_000,
             1_000_000_000,
-            Condition(Port("plant", "contact[2]"), "==", True),
             1,
+            Condition(Port("plant", "contact[2]"), "==", True),
         ),
         Fault(INTENSITY, "saturation", {"high": 0.4}),
     )
@@ -336,8 +336,8 @@ FAULT_LISTS = st.lists(
             st.just(ANY[kind]),
             TIMES,
             st.none() | st.integers(1, 10**15),
-            st.none() | CONDITIONS,
             st.integers(0, 2**64) if kind in parts.RANDOM else st.just(0),
+            st.none() | CONDITIONS,
         )
     )
 )

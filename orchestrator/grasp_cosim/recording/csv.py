@@ -1,10 +1,9 @@
 """Writes a run as CSV while it goes on, in the form of the FMI cross-check."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import ExitStack, suppress
 from io import FileIO
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -32,7 +31,7 @@ class CsvListener:
     def begin(self, system: System, signals: Sequence[Signal]) -> None:
         """Write the line of names; InputError where the file cannot be written."""
         self._step_ns = system.step_ns
-        self._types = [np.float64 if s.kind == "Real" else np.int64 for s in signals]
+        self._whole = [i for i, s in enumerate(signals, 1) if s.kind != "Real"]
         names = ("time", *(s.name.replace('"', '""') for s in signals))
         try:
             with ExitStack() as stack:
@@ -49,9 +48,11 @@ class CsvListener:
         try:
             for first in range(0, len(steps), PIECE):
                 piece = slice(first, first + PIECE)
-                table = zip(rows[piece].T, self._types, strict=True)
-                columns = [column.astype(element) for column, element in table]
-                self._append(lines([times(steps[piece], self._step_ns), *columns]))
+                time = times(steps[piece], self._step_ns)
+                columns = [time.tolist(), *rows[piece].T.tolist()]
+                for i in self._whole:
+                    columns[i] = [*map(int, columns[i])]
+                self._append(lines(columns))
                 self._empty = False
         except OSError as error:
             raise SimulationError(unwritable(self._path, error)) from error
@@ -81,13 +82,10 @@ class _NothingRecordedError(Exception):
     """Has the temporary file removed."""
 
 
-def lines(columns: Sequence[npt.NDArray[Any]]) -> str:
-    """The columns, float64 or int64, as text: a line per row, each value as Python's repr has it.
-
-    The repr of one big list takes two thirds of the time of one repr per value.
-    """
-    rows = zip(*(column.tolist() for column in columns), strict=True)
-    return repr([*map(list, rows)])[2:-2].replace("], [", "\n").replace(", ", ",") + "\n"
+def lines(columns: Iterable[Iterable[float]]) -> str:
+    """A line per row of the columns, each value as Python's repr has it."""
+    texts = (map(repr, column) for column in columns)
+    return "\n".join(map(",".join, zip(*texts, strict=True))) + "\n"
 
 
 def unwritable(path: Path, error: OSError) -> str:

@@ -8,7 +8,10 @@ from ..system.scenario import event_entry, fault_entry
 
 
 def settings(system: System) -> dict[str, Any]:
-    """The settings of a system, of types that JSON has. Times are in s."""
+    """The settings of a system, of types that JSON has. Times are in s.
+
+    Events and faults are as a system file has them.
+    """
     loops = system.initialisation
     return {
         "system": system.name,

@@ -204,6 +204,7 @@ def step_study(
     the steps of the components, which stay as they are. tolerance in s. Each of the workers is a
     process; the results are the same for any number of them. A run in which an FMU fails is one of
     the findings.
+
     InputError where the system is no grasp, the tolerance is not positive, a given step does not
     fit, or fewer than three steps do. KeyboardInterrupt at Ctrl-C.
     """

@@ -130,8 +130,8 @@ def _fault(place: str, entry: Any, wires: Sequence[Wire]) -> Fault:
         {key: value for key, value in entry.items() if key not in common},
         in_nanoseconds(f"{place}: from", entry.get("from", 0.0), zero=True),
         None if until is None else in_nanoseconds(f"{place}: until", until),
-        _condition(place, entry.get("when")),
         entry.get("seed", 0) if kind in RANDOM else 0,
+        _condition(place, entry.get("when")),
     )
 
 

@@ -87,7 +87,8 @@ def _settable(system: System) -> list[Port]:
         port
         for component in system.components
         for v in component.interface.of("input", "parameter")
-        if (port := Port(component.name, v.name)) not in wired
+        if v.supported
+        and (port := Port(component.name, v.name)) not in wired
         and (v.causality == "input" or v.variability == "tunable")
     ]
 
@@ -114,7 +115,7 @@ def check_setting(system: System, port: Port, value: Value, place: str) -> None:
 
 def _check_condition(system: System, condition: Condition, place: str) -> None:
     interface = system.component(condition.port.component, place).interface
-    valid = [v.name for v in interface.of("output") if v.kind != "String" and not v.shape]
+    valid = [v.name for v in interface.of("output") if v.supported and v.kind != "String"]
     if condition.port.variable not in valid:
         raise InputError(
             f"{place}: {condition.port.component} has no numeric output "
@@ -142,7 +143,7 @@ def _check_fault(system: System, fault: Fault, place: str) -> None:
         raise InputError(f"{place}: kind = {fault.kind!r}: must be one of {choices(FAULTS)}")
     interface = system.component(fault.target.component, place).interface
     kind = interface.by_name[fault.target.variable].kind
-    possible = {"Real": FAULTS, "String": ()}.get(kind, DISCRETE)
+    possible = {"Real": FAULTS, "Integer": DISCRETE, "Boolean": DISCRETE}.get(kind, ())
     if fault.kind not in possible:
         raise InputError(
             f"{place}: kind = {fault.kind!r}: {fault.target} is {kind}; "

@@ -1,0 +1,327 @@
+"""Archives that are wrong or ask for more than this master does: one line says what, and where."""
+
+import subprocess
+import sys
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from grasp_cosim import InputError, System
+from grasp_cosim.ssp.write import write_ssp
+from ssp.hand_made import archive, bind, component, connect, fmu, parameter_set, structure, system
+
+A = fmu("output Real y - m", "input Real u 0.0 m")
+ELEMENT = component("a", "output y Real; input u Real")
+TOP = system("top", ELEMENT)
+
+
+def message_of(path: Path) -> str:
+    """The error at loading the archive, without what holds on to its files."""
+    try:
+        System.load(path)
+    except InputError as error:
+        return str(error)
+    pytest.fail(f"{path} loads")
+
+
+def refused(folder: Path, ssd: str, **more: bytes) -> str:
+    text = message_of(archive(folder, ssd, {"a": A, **more}))
+    assert "\n" not in text
+    assert text.startswith("hand.ssp")
+    return text
+
+
+DICTIONARY = (
+    '<ssd:SignalDictionaries><ssd:SignalDictionary name="d" source="resources/d.ssb"/>'
+    "</ssd:SignalDictionaries></ssd:System>"
+)
+REFUSED = [
+    (structure(TOP, version="2.0"), "SystemStructure.ssd:2: SSP version '2.0'; must be '1.0'"),
+    (structure(TOP).replace("ssd:Elements", "ssd:Element"), "against the schema: Element 'ssd:El"),
+    (structure(TOP)[:-9], "SystemStructure.ssd: not readable as XML: "),
+    (structure(TOP).replace("?>\n", "?>\n<!DOCTYPE x []>"), "has a document type; SSP has none"),
+    ("<a/>", "SystemStructure.ssd:1: a: must be ssd:SystemStructureDescription"),
+    (structure('<ssd:System name="top"/>'), "system 'top' has no components; must have some"),
+    (
+        structure(TOP.replace("</ssd:System>", DICTIONARY)),
+        "system 'top': signal dictionaries are not supported; connect the components directly",
+    ),
+    (
+        structure(system("top", '<ssd:SignalDictionaryReference name="r" dictionary="d"/>')),
+        "ssd:SignalDictionaryReference 'r' is not supported; must be a Component or System",
+    ),
+    (
+        structure(system("top", component("a", type="application/x-ssp-package"))),
+        "component 'a': type 'application/x-ssp-package' is not supported; must be application/x-f",
+    ),
+    (
+        structure(system("top", component("a", implementation="ModelExchange"))),
+        "component 'a': implementation 'ModelExchange' is not supported; must be CoSimulation",
+    ),
+    (structure(system("top", ELEMENT + ELEMENT)), "system 'top': two elements 'a'; must differ"),
+    (
+        structure(system("top", component("a", "output y; output y"))),
+        "a: two connectors 'y'; must differ",
+    ),
+    (
+        structure(system("top", component("a", "inout y"))),
+        "connector 'y': kind 'inout' is not supported",
+    ),
+    (
+        structure(system("top", component("a", "output y Binary"))),
+        "connector 'y': type 'Binary' is not supported; valid: Real, Integer",
+    ),
+    (
+        structure(system("top", component("a", "output y Integer"))),
+        "a: connector 'y': Integer; the FMU has Real",
+    ),
+    (
+        structure(system("top", component("a", "output z Real"))),
+        "a: connector 'z': a.fmu has no output of that name; valid: y",
+    ),
+    (
+        structure(system("top", component("a", "input y Real"))),
+        "a: connector 'y': a.fmu has no input of that name; valid: u",
+    ),
+    (
+        structure(system("top", component("a", "output y Real mm"))),
+        "a: connector 'y': unit mm is not what the FMU declares, m; must mean the same",
+    ),
+    (
+        structure(system("top", component("a", "output y Real cm"))),
+        "'y': unit 'cm' is not defined; valid: m, mm",
+    ),
+    (
+        structure(TOP, '<ssd:DefaultExperiment startTime="1" stopTime="2"/>'),
+        "startTime = 1 s is not supported; must be 0",
+    ),
+    (
+        structure(TOP, '<ssd:DefaultExperiment stopTime="-2"/>'),
+        "stopTime = -2.0 s: must be a number greater than 0",
+    ),
+    (structure(TOP, ""), "no stopTime in a DefaultExperiment; give one: --stop"),
+    (
+        structure(TOP, '<ssd:DefaultExperiment stopTime="0.00025"/>'),
+        "none divides the stop of 0.00025 s; give one: --step",
+    ),
+    (
+        structure(
+            system("top", "".join(component(n, source="resources/a.fmu") for n in ("a.b", "a_b")))
+        ),
+        "components a.b, a_b would all be 'a_b' here; must differ",
+    ),
+    (
+        structure(system("top", component("b"))),
+        "source 'resources/b.fmu': not in the archive; valid: resources/a.fmu",
+    ),
+    *(
+        (
+            structure(system("top", component("a", source=source))),
+            f"component 'a': source '{source}': ",
+        )
+        for source in (
+            "../a.fmu",
+            "/etc/passwd",
+            "file:///a.fmu",
+            "resources/a.fmu#x",
+            "C:/a.fmu",
+            "http:///a.fmu",
+        )
+    ),
+]
+
+
+@pytest.mark.parametrize(("ssd", "message"), REFUSED)
+def test_what_is_refused(tmp_path: Path, ssd: str, message: str) -> None:
+    assert message in refused(tmp_path, ssd)
+
+
+def test_an_error_names_the_line(tmp_path: Path) -> None:
+    text = structure(TOP).replace("<ssd:Component", "\n\n<ssd:Component").replace("kind=", "kid=")
+    assert "SystemStructure.ssd:4: against the schema: Element 'ssd:Connector'" in refused(
+        tmp_path, text
+    )
+
+
+def test_an_fmu_that_is_none(tmp_path: Path) -> None:
+    text = refused(tmp_path, structure(TOP), a=b"<x/>")
+    assert "component 'a': resources/a.fmu: not a readable FMU: " in text
+
+
+def test_a_model_exchange_fmu(tmp_path: Path) -> None:
+    exchange = A.replace(b"CoSimulation", b"ModelExchange")
+    assert "must be a co-simulation FMU" in refused(tmp_path, structure(TOP), a=exchange)
+
+
+def truncated(path: Path) -> None:
+    data = path.read_bytes()
+    path.write_bytes(data[: len(data) // 2])
+
+
+def not_a_zip(path: Path) -> None:
+    path.write_text("[experiment]")
+
+
+def without_structure(path: Path) -> None:
+    with zipfile.ZipFile(path, "w") as file:
+        file.writestr("resources/a.fmu", b"")
+
+
+def damaged(path: Path) -> None:
+    data = bytearray(path.read_bytes())
+    data[data.index(b"ssd:System ")] ^= 1  # inside the content, which is stored as it is
+    path.write_bytes(data)
+
+
+def missing(path: Path) -> None:
+    path.unlink()
+
+
+def folder(path: Path) -> None:
+    path.unlink()
+    path.mkdir()
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (truncated, "not readable as an SSP archive"),
+        (not_a_zip, "not readable as an SSP archive"),
+        (without_structure, "no SystemStructure.ssd in it; must be an SSP archive"),
+        (damaged, "SystemStructure.ssd: not readable: Bad CRC-32"),
+        (missing, "no such system file"),
+        (folder, "is a folder; must be an .ssp file"),
+    ],
+)
+def test_wrong_files(tmp_path: Path, spoil: Callable[[Path], None], message: str) -> None:
+    path = archive(tmp_path, structure(TOP), {"a": A})
+    spoil(path)
+    text = message_of(path)
+    assert text.startswith(str(path))
+    assert message in text
+
+
+def test_an_archive_has_its_own_fmus(grasp: System, fmus: Path, tmp_path: Path) -> None:
+    write_ssp(grasp, tmp_path / "grasp.ssp")
+    with pytest.raises(InputError, match="has its own FMUs"):
+        System.load(tmp_path / "grasp.ssp", fmus)
+
+
+def test_an_entity_is_not_followed(tmp_path: Path) -> None:
+    secret = tmp_path / "secret"
+    secret.write_text("told")
+    entity = f'<!DOCTYPE x [<!ENTITY e SYSTEM "{secret.as_uri()}">]>'
+    text = structure(TOP).replace("?>\n", f"?>\n{entity}").replace('name="top"', 'name="&e;"')
+    assert "told" not in refused(tmp_path, text)
+
+
+def test_an_entry_that_leads_out_of_the_archive_is_not_written(tmp_path: Path) -> None:
+    path = archive(tmp_path, structure(TOP), {"a": A}, {"../evil": "x", "/tmp/evil": "x"})
+    assert System.load(path).components[0].fmu.name == "a.fmu"
+    assert not (tmp_path.parent / "evil").exists()
+
+
+def test_extracted_fmus_are_gone_when_the_process_ends(grasp: System, tmp_path: Path) -> None:
+    write_ssp(grasp, tmp_path / "grasp.ssp")
+    program = (
+        "import sys; from grasp_cosim import System; "
+        "s = System.load(sys.argv[1]); t = System.load(sys.argv[1]); assert s == t; "
+        "print(s.components[0].fmu, s.components[0].fmu.exists())"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program, str(tmp_path / "grasp.ssp")],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    path, existed = done.stdout.split()
+    assert existed == "True"
+    assert not Path(path).parents[1].exists()
+
+
+def step_of(folder: Path, *steps: str, stop: str = "1") -> int:
+    names = "abc"[: len(steps)]
+    fmus = {n: fmu("parameter Real p 1.0", step=s) for n, s in zip(names, steps, strict=True)}
+    experiment = f'<ssd:DefaultExperiment stopTime="{stop}"/>'
+    ssd = structure(system("top", "".join(map(component, names))), experiment)
+    return System.load(archive(folder, ssd, fmus)).step_ns
+
+
+def test_the_step_is_the_smallest_of_the_fmus_that_divides_the_stop(tmp_path: Path) -> None:
+    assert step_of(tmp_path, "0.01", "0.001", "") == 1_000_000
+    assert step_of(tmp_path, "0.01", "0.0003") == 10_000_000
+
+
+def test_a_step_and_a_stop_can_be_given(tmp_path: Path) -> None:
+    path = archive(
+        tmp_path, structure(TOP, ""), {"a": fmu("output Real y -", "input Real u 0.0", step="")}
+    )
+    loaded = System.load(path, step=0.25, stop=2.0)
+    assert (loaded.step_ns, loaded.stop_ns) == (250_000_000, 2_000_000_000)
+
+
+def test_execution_follows_the_flow_of_the_data(tmp_path: Path) -> None:
+    elements = "".join(component(n, "input u; output y") for n in ("sink", "twin", "mid", "source"))
+    links = connect("source/y", "mid/u") + connect("mid/y", "twin/u") + connect("twin/y", "sink/u")
+    fmus = dict.fromkeys(("sink", "twin", "mid", "source"), A)
+    loaded = System.load(archive(tmp_path, structure(system("top", elements, links)), fmus))
+    assert [c.name for c in loaded.components] == ["source", "mid", "twin", "sink"]
+    assert "order of execution: source, mid, twin, sink" in loaded.notes
+
+
+def test_in_a_loop_the_order_of_the_file_holds(tmp_path: Path) -> None:
+    names = ("after", "x", "y", "before")
+    elements = "".join(component(n, "input u; output y") for n in names)
+    links = connect("before/y", "after/u") + connect("x/y", "y/u") + connect("y/y", "x/u")
+    loaded = System.load(
+        archive(tmp_path, structure(system("top", elements, links)), dict.fromkeys(names, A))
+    )
+    assert [c.name for c in loaded.components] == ["x", "y", "before", "after"]
+
+
+def test_what_has_no_bearing_is_said(tmp_path: Path) -> None:
+    annotation = '<ssd:Annotations><ssc:Annotation type="com.maker"/></ssd:Annotations>'
+    ssd = structure(TOP, annotations=annotation)
+    notes = System.load(archive(tmp_path, ssd, {"a": A}, {"VariantB.ssd": ssd})).notes
+    assert "variant VariantB.ssd is not used; SystemStructure.ssd is" in notes
+    assert "annotations of type 'com.maker' are not used (1)" in notes
+
+
+def test_notes_are_no_part_of_what_a_system_is(tmp_path: Path) -> None:
+    quiet = archive(tmp_path, structure(TOP), {"a": A})
+    first = System.load(quiet)
+    loud = bind(parameter_set("none Real 1"))
+    second = System.load(
+        archive(tmp_path, structure(system("top", ELEMENT, bindings=loud)), {"a": A})
+    )
+    assert first.notes != second.notes
+    assert first == second
+
+
+ANNOTATED = [
+    ('"scheme": "sequential"', '"scheme": "best"', "'best': must be one of sequential, jacobi"),
+    ('"step_ns": 100000', '"step_ns": "fast"', "'fast': must be of type int"),
+    ('"step_ns": 100000', '"step": 100000', "unknown entry 'step'; valid: step_ns, scheme"),
+    ('"events": []', '"events": [', "not as it was written: Expecting"),
+    ('"sensor_1": {', '"sensor_3": {', "annotation 'grasp-cosim' is about other components"),
+    ('"step_ns": 100000', '"step_ns": 700000', "step = 0.0007 s does not divide stop = 3 s"),
+]
+
+
+@pytest.mark.parametrize(("before", "after", "message"), ANNOTATED)
+def test_a_spoilt_annotation(
+    grasp: System, tmp_path: Path, before: str, after: str, message: str
+) -> None:
+    write_ssp(grasp, tmp_path / "grasp.ssp")
+    with zipfile.ZipFile(tmp_path / "grasp.ssp") as file:
+        entries = {name: file.read(name) for name in file.namelist()}
+    text = entries["SystemStructure.ssd"].decode()
+    assert before in text
+    entries["SystemStructure.ssd"] = text.replace(before, after, 1).encode()
+    with zipfile.ZipFile(tmp_path / "spoilt.ssp", "w") as file:
+        for name, data in entries.items():
+            file.writestr(name, data)
+    text = message_of(tmp_path / "spoilt.ssp")
+    assert message in text
+    assert "\n" not in text
