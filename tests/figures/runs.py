@@ -85,10 +85,8 @@ def grasp_run(rows: int = 2001) -> Run:
             *(wire(f"controller.force[{j}]", f"plant.force[{j}]") for j in (1, 2)),
         ],
         "events": [{"at": 0.5, "set": {"sensor_1.reflectance": 0.6}}],
-        "faults": [
-            {"wire": "sensor_1.intensity -> controller.intensity[1]", "kind": "bias", "value": 0.1}
-        ],
-        "log": ["0.5 s: sensor_1.reflectance = 0.6"],
+        "faults": [{"wire": "controller.intensity[1]", "kind": "bias", "value": 0.1}],
+        "log": ["t = 0.5 s: sensor_1.reflectance = 0.6"],
         "rejections": {"sensor_2": {"count": 3, "first": 0.25}},
     }
     return Run(time, signals, units, {"plant.gap[1]": "l_1, distance"}, settings)

@@ -118,7 +118,8 @@ def test_metrics_and_settings_are_there() -> None:
         "object_width = 0.07",
         "at = 0.5, set = (sensor_1.reflectance = 0.6)",
         "kind = bias, value = 0.1",
-        "0.5 s: sensor_1.reflectance = 0.6",
+        "sensor_1.intensity → controller.intensity[1], bias",
+        "t = 0.5 s: sensor_1.reflectance = 0.6",
         "sensor_2: count = 3, first = 0.25",
         "loops = iterate",
     ):
@@ -158,6 +159,16 @@ def test_contacts_begin_where_the_metrics_say_and_again_after_each_release() -> 
     found = [(c["finger"], c["t"]) for c in json.loads(page.texts["page"])["grasp"]["contacts"]]
     assert [finger for finger, _ in found] == [1, 2, 1]
     np.testing.assert_allclose([t for _, t in found], [1.0, 1.2, 1.6], atol=1e-9)
+
+
+def test_contacts_and_lines_of_the_log_with_a_time_are_marked() -> None:
+    run = grasp_run()
+    log = ["t = 0.25 s: a.u = 1", "b: 3 steps rejected, first at t = 0.7 s", "t = 1e-3 s: fault"]
+    logged = replace(run, settings={**run.settings, "log": log})
+    page = Elements(page_html(logged, "results"))
+    marks = [(m["color"], m["t"]) for m in json.loads(page.texts["page"])["marks"]]
+    assert [color for color, _ in marks] == ["--finger1", "--finger2", "--fault", "--fault"]
+    np.testing.assert_allclose([t for _, t in marks], [1.0, 1.2, 0.25, 0.001], atol=1e-9)
 
 
 def test_the_actuator_force_comes_from_the_wires() -> None:
