@@ -134,6 +134,9 @@ def test_the_animation_shows_fingers_and_object_where_they_are(
     assert scene["finger2"] == pytest.approx(position(2, t), abs=pixel)
     surfaces = [CENTRE - WIDTH / 2, CENTRE + WIDTH / 2]
     assert scene["object"] == pytest.approx(surfaces, abs=pixel)
+    number, unit = scene["gap"].replace("−", "-").split()
+    assert float(number) == pytest.approx(1e3 * (position(1, t) - CENTRE - WIDTH / 2), abs=1e-3)
+    assert unit == "mm"
 
 
 def test_a_new_contact_glows(html: str, tmp_path: Path) -> None:

@@ -177,7 +177,9 @@ class Grasp {
   readings(t) {
     for (const cell of document.querySelectorAll("#readings output")) {
       const series = this.series.get(cell.dataset.signal), value = this.at(series.name, t);
-      const { factor, unit } = scaled(series.unit, Math.abs(value));
+      const top = series.levels.at(-1); // of the whole run, so that the unit stays the same
+      const { factor, unit } = scaled(
+        series.unit, Math.max(...top.high.map(Math.abs), ...top.low.map(Math.abs)));
       cell.textContent = series.steps ? (value ? "yes" : "no") : `${text(value * factor)} ${unit}`;
     }
   }
