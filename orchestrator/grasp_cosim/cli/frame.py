@@ -7,7 +7,6 @@ from pathlib import Path
 import click
 
 from ..errors import InputError
-from ..grasp import grasp_system
 from ..system.description import System
 
 NEGATIVE, WRONG, FAILED, INTERRUPTED = 1, 2, 3, 130
@@ -35,10 +34,8 @@ def cli(debug: bool) -> None:
     """
 
 
-def load_system(path: Path | None, step: float | None, stop: float | None) -> System:
-    """The system of a file, by default the built-in grasp; what its reader notes is printed."""
-    if path is None:
-        return grasp_system()
+def load_system(path: Path, step: float | None, stop: float | None) -> System:
+    """The system of a file; what its reader notes goes to standard error."""
     system = System.load(path, step=step, stop=stop)
     for note in system.notes:
         click.echo(note, err=True)

@@ -8,7 +8,7 @@ import click
 
 from ..errors import InputError, SimulationError
 from ..figures.plot import check_plot
-from ..grasp import CASES
+from ..grasp import CASES, grasp_system
 from ..master.simulation import simulate
 from ..recording.result import Result
 from ..study.metrics import LABELS
@@ -54,7 +54,7 @@ def run(
     """
     if tolerance is not None and not step_study:
         raise InputError(f"--tolerance {tolerance!r}: must come with --step-study")
-    chosen = load_system(system, step, stop)
+    chosen = load_system(system, step, stop) if system else grasp_system()
     fmus = dict(pair("--swap", text, "COMPONENT=FMU") for text in swaps)
     values: dict[str, Value] = {} if case is None else dict(CASES[case])
     values.update(pair("--set", text, "COMPONENT.VARIABLE=VALUE") for text in settings)
