@@ -100,6 +100,10 @@ REFUSED = [
         structure(TOP, '<ssd:DefaultExperiment stopTime="-2"/>'),
         "stopTime = -2.0 s: must be a number greater than 0",
     ),
+    (
+        structure(TOP).replace('factor="0.001"', 'factor="0"'),
+        "unit 'mm': factor = 0, offset = 0: must be finite, and the factor other than 0",
+    ),
     (structure(TOP, ""), "no stopTime in a DefaultExperiment; give one: --stop"),
     (
         structure(TOP, '<ssd:DefaultExperiment stopTime="0.00025"/>'),

@@ -124,12 +124,12 @@ def _set(
 ) -> dict[str, Parameter]:
     if binding.source is None:
         place, root = file, checked(file, binding.inline, "ssv")
-        known = {**units, **read_units(root, "ssv")}
+        known = {**units, **read_units(place, root, "ssv")}
     else:
         entry = archive.resolve(binding.place, binding.source)
         place = f"{archive.place}: {entry}"
         root = parse(place, archive.read(entry), "ssv")
-        known = dict(read_units(root, "ssv"))
+        known = dict(read_units(place, root, "ssv"))
     parameters: dict[str, Parameter] = {}
     for element in children(root, "ssv:Parameters", "ssv:Parameter"):
         name = element.get("name")

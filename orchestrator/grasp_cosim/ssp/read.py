@@ -48,7 +48,7 @@ def read_ssp(path: FilePath, step: float | None = None, stop: float | None = Non
     archive = Archive(path)
     file = f"{archive.place}: {STRUCTURE}"
     root = parse(file, archive.read(STRUCTURE), "ssd")
-    units = read_units(root, "ssd")
+    units = read_units(file, root, "ssd")
     top = read_system(file, child(root, "ssd:System"), units)
     parts = {p: _part(archive, element) for p, element in components_of(top)}
     if not parts:
