@@ -257,6 +257,7 @@ def test_the_step_is_the_smallest_of_the_fmus_that_divides_the_stop(tmp_path: Pa
     assert step_of(tmp_path, "0.01", "0.0003") == 10_000_000
     assert step_of(tmp_path, "0.01", "0.0003", stop="0.9") == 300_000
     assert step_of(tmp_path, "-1", "1e-20", "0.5") == 500_000_000
+    assert step_of(tmp_path, "1.4e-9", "0.5") == 500_000_000  # no whole nanosecond
 
 
 def test_a_step_and_a_stop_can_be_given(tmp_path: Path) -> None:

@@ -42,7 +42,8 @@ def nested() -> str:
     controller = component(
         "controller",
         "; ".join(
-            f"input position[{j}] Real; input velocity[{j}]; input intensity[{j}]; output force[{j}]"
+            f"input position[{j}] Real; input velocity[{j}]; input intensity[{j}]; "
+            f"output force[{j}]"
             for j in two
         ),
         source="resources/GraspController.fmu",
