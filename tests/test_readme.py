@@ -24,8 +24,8 @@ def checkout(tmp_path: Path, fmus: Path, grasp: System, monkeypatch: pytest.Monk
     text = SYSTEM.read_text("utf-8").replace('fmu = "', 'fmu = "fmus/build/')
     (tmp_path / "my_system.toml").write_text(text, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    for command in ("run", "evaluate"):
-        monkeypatch.setattr(f"grasp_cosim.cli.{command}.grasp_system", lambda: grasp)
+    for module in ("frame", "evaluate"):
+        monkeypatch.setattr(f"grasp_cosim.cli.{module}.grasp_system", lambda: grasp)
     return tmp_path
 
 

@@ -52,7 +52,7 @@ def test_the_grasp_runs_the_same_to_the_bit(grasp: System, tmp_path: Path) -> No
 
 def test_what_ssp_has_no_form_for_comes_back(grasp: System, tmp_path: Path) -> None:
     plant, *others = grasp.components
-    gap = Port("plant", "gap[1]")
+    gap, contact = Port("plant", "gap[1]"), Port("plant", "contact[1]")
     full = replace(
         grasp,
         components=(replace(plant, step_ns=300_000, isolation="process"), *others),
@@ -61,10 +61,12 @@ def test_what_ssp_has_no_form_for_comes_back(grasp: System, tmp_path: Path) -> N
         events=(
             Event({Port("sensor_1", "reflectance"): 0.5}, at_ns=1_000_000),
             Event({Port("sensor_2", "reflectance"): 0.1}, when=Condition(gap, "<", 0.01)),
+            Event({Port("sensor_2", "reflectance"): 1}, when=Condition(contact, "!=", False)),
         ),
         faults=(
             Fault(Port("sensor_1", "gap"), "bias", {"value": 0.001}, 5, None, seed=3),
             Fault(Port("sensor_2", "gap"), "stuck", {}, 0, 1_000_000_000),
+            Fault(Port("sensor_2", "gap"), "delay", {"time": 1e-3}, when=Condition(gap, ">", 0.0)),
         ),
     )
     assert round_trip(full, tmp_path) == full

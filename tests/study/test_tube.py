@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
+QUICK = settings(deadline=None, derandomize=True, max_examples=100)
 STEP = 1e-3
 NUMBERS = st.floats(-1e3, 1e3, width=32)
 SAMPLES = arrays.arrays(np.float64, st.integers(1, 60), elements=NUMBERS)
@@ -42,12 +43,14 @@ def by_hand(one: Curve, other: Curve, shift: int) -> float:
     return float(max(apart))
 
 
+@QUICK
 @given(SAMPLES, SHIFT, HELD)
 def test_a_curve_is_in_its_own_tube(values: Array, shift: int, held: bool) -> None:
     same = sampled(values, held)
     assert deviation(same, same, shift * STEP).values.max() == 0.0
 
 
+@QUICK
 @given(SAMPLES, SHIFT, SHIFT, HELD)
 def test_a_curve_that_comes_later_is_inside_up_to_the_shift(
     values: Array, later: int, more: int, held: bool
@@ -57,6 +60,7 @@ def test_a_curve_that_comes_later_is_inside_up_to_the_shift(
     assert deviation(early, late, (later + more) * STEP).values.max() == 0.0
 
 
+@QUICK
 @given(SAMPLES, st.floats(1e-3, 1e3), SHIFT, HELD)
 def test_an_offset_is_found_at_its_size(
     values: Array, offset: float, shift: int, held: bool
@@ -76,6 +80,7 @@ def pairs(draw: st.DrawFn) -> tuple[Curve, Curve]:
     return sampled(draw(values), held), sampled(draw(values), held)
 
 
+@QUICK
 @given(pairs(), SHIFT)
 def test_it_is_symmetric_and_what_its_definition_says(
     both: tuple[Curve, Curve], shift: int
@@ -87,6 +92,7 @@ def test_it_is_symmetric_and_what_its_definition_says(
     assert there.values.max() == pytest.approx(by_hand(one, other, shift), abs=1e-9)
 
 
+@QUICK
 @given(pairs(), SHIFT)
 def test_the_values_it_names_are_as_far_apart_as_it_says(
     both: tuple[Curve, Curve], shift: int
@@ -95,13 +101,14 @@ def test_the_values_it_names_are_as_far_apart_as_it_says(
     assert np.abs(found.reference - found.candidate).tolist() == found.values.tolist()
 
 
+@QUICK
 @given(pairs(), SHIFT)
 def test_more_shift_allows_more(both: tuple[Curve, Curve], shift: int) -> None:
     tight, loose = (deviation(*both, n * STEP).values for n in (shift, shift + 1))
     assert (loose <= tight + 1e-9).all()
 
 
-@settings(max_examples=50)
+@QUICK
 @given(SAMPLES, st.floats(0.0, 0.02), HELD)
 def test_the_tube_holds_the_curve_between_samples_too(
     values: Array, shift: float, held: bool

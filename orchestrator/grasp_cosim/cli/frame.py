@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from ..errors import InputError
+from ..grasp import grasp_system
 from ..system.description import System
 
 NEGATIVE, WRONG, FAILED, INTERRUPTED = 1, 2, 3, 130
@@ -22,20 +23,22 @@ def cli(debug: bool) -> None:
     r"""FMI co-simulation of a delicate grasp.
 
     \b
-    grasp-cosim run                  the published grasp, from FMUs
-    grasp-cosim report RUN           a page of a run: traces, animation, wiring
+    grasp-cosim run [SYSTEM]         a closed loop; by default the published grasp, from FMUs
+    grasp-cosim report RUN           a page and figures of a run that was recorded
     grasp-cosim evaluate             the published table and figures, side by side with ours
+    grasp-cosim qualify FMU --as C   whether an FMU may take the place of component C
+    grasp-cosim ssp SYSTEM -o FILE   a system as an SSP archive
     grasp-cosim build                the FMUs
     grasp-cosim inspect FMU          an FMU's interface
     grasp-cosim doctor FMU           whether this machine will load an FMU
-    grasp-cosim qualify FMU --as C   whether an FMU may take the place of component C
-    grasp-cosim ssp SYSTEM -o FILE   a system as an SSP archive
     grasp-cosim COMMAND --help       options and an example
     """
 
 
-def load_system(path: Path, step: float | None, stop: float | None) -> System:
-    """The system of a file; what its reader notes goes to standard error."""
+def load_system(path: Path | None, step: float | None, stop: float | None) -> System:
+    """The system of a file, by default the built-in grasp; what its reader notes is printed."""
+    if path is None:
+        return grasp_system()
     system = System.load(path, step=step, stop=stop)
     for note in system.notes:
         click.echo(note, err=True)

@@ -8,7 +8,6 @@ import click
 
 from ..figures.plot import new_figure
 from ..figures.qualification import draw_qualification
-from ..grasp import grasp_system
 from ..recording.result import write_text
 from ..study import verdict
 from ..study.bands import read_bands
@@ -68,7 +67,7 @@ def qualify(
     if out:
         check_folder(out)
         new_figure(1.0, 1.0)  # tells that matplotlib is missing before the runs, not after
-    chosen = load_system(system, step, stop) if system else grasp_system()
+    chosen = load_system(system, step, stop)
     values: dict[str, Value] = dict(
         pair("--set", text, "COMPONENT.VARIABLE=VALUE") for text in settings
     )

@@ -8,8 +8,10 @@ import click
 
 from ..errors import InputError, SimulationError
 from ..figures.plot import check_plot
-from ..grasp import CASES, grasp_system
+from ..grasp import CASES
+from ..master.engine import ENGINES, Engine
 from ..master.simulation import simulate
+from ..recording.mdf import check_mdf
 from ..recording.result import Result
 from ..study.metrics import LABELS
 from ..system.description import SCHEMES
@@ -28,6 +30,9 @@ from .step_study import run_step_study
 @click.option("--scheme", type=click.Choice(SCHEMES))
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for signals.csv and run.json.")
 @click.option("--plot", is_flag=True, help="Draw grasp.png, in --out or the current folder.")
+@click.option("--mdf", is_flag=True, help="Write signals.mf4 (ASAM MDF 4) too; needs --out.")
+@click.option("--every", type=click.IntRange(1), default=1, help="Record each N-th step only.")
+@click.option("--engine", type=click.Choice(ENGINES), default="auto", show_default=True)
 @click.option(
     "--step-study", is_flag=True, help="Repeat the run over steps: is --step small enough?"
 )
@@ -43,6 +48,9 @@ def run(
     scheme: str | None,
     out: Path | None,
     plot: bool,
+    mdf: bool,
+    every: int,
+    engine: Engine,
     step_study: bool,
     tolerance: float | None,
     as_json: bool,
@@ -54,7 +62,11 @@ def run(
     """
     if tolerance is not None and not step_study:
         raise InputError(f"--tolerance {tolerance!r}: must come with --step-study")
-    chosen = load_system(system, step, stop) if system else grasp_system()
+    if mdf and not out:
+        raise InputError("--mdf: must come with --out, the folder for signals.mf4")
+    if mdf:
+        check_mdf()
+    chosen = load_system(system, step, stop)
     fmus = dict(pair("--swap", text, "COMPONENT=FMU") for text in swaps)
     values: dict[str, Value] = {} if case is None else dict(CASES[case])
     values.update(pair("--set", text, "COMPONENT.VARIABLE=VALUE") for text in settings)
@@ -68,12 +80,14 @@ def run(
     if out or plot:
         check_folder(out or Path())
     try:
-        result = simulate(chosen, progress=True)
+        result = simulate(chosen, progress=True, every=every, engine=engine)
     except SimulationError as error:
         if error.result:
-            _write(error.result, out, plot)
+            _write(error.result, out, plot, mdf)
         raise
-    _write(result, out, plot)
+    _write(result, out, plot, mdf)
+    for line in result.log[len(chosen.notes) :]:
+        click.echo(line, err=True)
     click.echo(json.dumps(dict(result.metrics)) if as_json else _summary(result))
     if not result.complete:
         message = f"interrupted at t = {result.time[-1]:.6g} s; kept what was recorded"
@@ -81,10 +95,12 @@ def run(
     return 0
 
 
-def _write(result: Result, out: Path | None, plot: bool) -> None:
+def _write(result: Result, out: Path | None, plot: bool, mdf: bool) -> None:
     if out:
         result.to_csv(out / "signals.csv")
         result.to_json(out / "run.json")
+    if out and mdf:
+        result.to_mdf(out / "signals.mf4")
     if plot:
         path = (out or Path()) / "grasp.png"
         result.plot(path)

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import click
 
-from ..grasp import grasp_system
 from .frame import check_folder, json_option, load_system
 
 
@@ -27,8 +26,7 @@ def ssp(
     """
     from ..ssp.write import write_ssp  # only here: its libraries take time to load
 
-    chosen = load_system(system, step, stop) if system else grasp_system()
-    chosen = chosen.with_experiment(step, stop)
+    chosen = load_system(system, step, stop).with_experiment(step, stop)
     check_folder(out.parent)
     written = write_ssp(chosen, out)
     if as_json:

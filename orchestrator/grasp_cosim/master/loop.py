@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from ctypes import c_float
 from typing import Any, NamedTuple
 
-COPY, SCALE, STORE, LOAD, LOAD_LONG, CALL, STEP = range(7)
+COPY, SCALE, STORE, LOAD, LOAD_LONG, CALL, STEP = range(7)  # calls last
 """Operations: over wires COPY and SCALE; over casts STORE into a buffer of another type, LOAD from
 one, LOAD_LONG with a check; over calls CALL and STEP, which sets the clock before it.
 """
@@ -84,7 +84,7 @@ def run(
         while operation < size:
             if k % period[operation] == phase[operation]:
                 what, begin = kind[operation], first[operation]
-                if what == CALL or what == STEP:
+                if what >= CALL:
                     if what == STEP:
                         clock[0] = (k + 1 - period[operation]) * step_ns / 1e9
                     status = invoke(calls, begin, clock)

@@ -115,9 +115,7 @@ class Master:
             raise SimulationError(self._too_long(step, operation))
         if status == loop.RAISED:
             raise self.plan.raised.pop()
-        owner = self.plan.owners[call]
-        assert owner is not None
-        instance = self.instances[owner]
+        instance = self.instances[self.plan.owners[call]]
         begin = (step + 1 - period) * self.system.step_ns / NANOSECONDS
         if kind != loop.STEP or status not in (DISCARD, EARLY):
             raise instance.failure(status, begin)

@@ -1,8 +1,8 @@
 """The flat plan: a system turned into one vector of values and a program for the loop.
 
-In the vector the outputs come first, then the inputs that have a wire. The Real values of a component
-stand together, so that one FMI call moves them all; values of another type have a buffer of their
-type beside the vector. Strings are no numbers: a wire between them is a call.
+In the vector the outputs come first, then the inputs that have a wire. The Real values of a
+component stand together, so that one FMI call moves them all; values of another type have a
+buffer of their type beside the vector. Strings are no numbers: a wire between them is a call.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -34,7 +34,7 @@ class Plan:
     """Everything the loop works on.
 
     slots gives the place of each output and wired input in values. operations refer to wires
-    (source, target, factor, offset), casts (buffer, index, slot) and calls. clock is that of the loop.
+    (source, target, factor, offset), casts (buffer, index, slot) and calls. clock is the loop's.
     """
 
     values: npt.NDArray[np.float64]
@@ -45,8 +45,8 @@ class Plan:
     casts: tuple[tuple[int, int, int], ...]
     buffers: tuple[npt.NDArray[Any], ...]
     calls: tuple[Call, ...]
-    owners: tuple[int | None, ...]
-    """By call, the index of the component that it is made to."""
+    owners: tuple[int, ...]
+    """By call, the index of the component that it is made to; -1 for a call of the master's own."""
     raised: list[BaseException]
     """What Python calls raised that returned RAISED: it must not pass through compiled code."""
 
@@ -106,7 +106,7 @@ class _Builder:
         self.casts: list[tuple[int, int, int]] = []
         self.buffers: list[npt.NDArray[Any]] = []
         self.calls: list[Call] = []
-        self.owners: list[int | None] = []
+        self.owners: list[int] = []
         self.raised: list[BaseException] = []
 
     def plan(self) -> Plan:
@@ -221,7 +221,7 @@ class _Builder:
         self._operation(kind, len(self.calls), len(self.calls) + 1, period, phase)
         self.calls.append(call if call.native else Call(self._guarded(call.python)))
         names = [component.name for component in self.system.components]
-        self.owners.append(None if name is None else names.index(name))
+        self.owners.append(-1 if name is None else names.index(name))
 
     def _guarded(self, function: Callable[[], int]) -> Callable[[], int]:
         def call() -> int:

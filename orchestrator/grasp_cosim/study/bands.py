@@ -67,10 +67,15 @@ class Given:
     relative: float | None = None
     time: float | None = None
 
+    @property
+    def wide(self) -> bool:
+        """Whether it gives a width; else that is derived."""
+        return self.absolute is not None or self.relative is not None
+
     def band(self, scale: float, derived: Band) -> Band:
         """The band it makes where relative is of scale; what it does not give stays derived."""
         time = derived.time if self.time is None else self.time
-        if self.absolute is None and self.relative is None:
+        if not self.wide:
             return Band(derived.width, time, "given")
         width = (self.absolute or 0.0) + (self.relative * scale if self.relative else 0.0)
         return Band(width, time, "given")

@@ -109,7 +109,8 @@ def use_of(system: System, name: str) -> Use:
     faulty = {fault.target for fault in system.faults}
     through = [p for p, wire in ends if wire.target in faulty]
     tuned = [port for event in system.events for port in event.set]
-    asked = [e.when.port for e in (*system.events, *system.faults) if e.when]
+    conditions = [*(e.when for e in system.events), *(f.when for f in system.faults)]
+    asked = [condition.port for condition in conditions if condition]
 
     def own(ports: Sequence[Port]) -> frozenset[str]:
         return frozenset(p.variable for p in ports if p.component == name)

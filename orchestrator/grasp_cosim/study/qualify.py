@@ -70,7 +70,8 @@ class Qualification:
 
     failure is why the candidate did not run to the end, None where it did or was not run. numerics
     are the other runs of the original that derived bands are from. runs are the signals of the
-    original and of the candidate, by name and in the original's units.
+    original and of the candidate, by name and in the original's units. log is what the candidate's
+    run tells and the original's does not.
     """
 
     swap: Swap
@@ -79,6 +80,7 @@ class Qualification:
     failure: str | None = None
     numerics: tuple[str, ...] = ()
     runs: tuple[Curves, Curves] = ({}, {})
+    log: tuple[str, ...] = ()
 
     @property
     def blocks(self) -> tuple[Difference, ...]:
@@ -128,9 +130,11 @@ def qualify(
     original = _curves(reference)
     _check(bands, original)
     result, failure = _attempt(swap.swapped, progress)
-    again, numerics = _other_numerics(swap.system, progress)
+    again, numerics = (
+        _other_numerics(swap.system, progress) if _derives(bands, original) else ((), ())
+    )
     candidate_curves = _converted(_curves(result), swap) if result else {}
-    judge = _Judge(swap, bands, reference.units, original, tuple(again))
+    judge = _Judge(swap, bands, reference.units, original, again)
     return Qualification(
         swap,
         judge.signals(candidate_curves),
@@ -138,6 +142,7 @@ def qualify(
         failure,
         numerics,
         (original, candidate_curves),
+        tuple(line for line in result.log if line not in reference.log) if result else (),
     )
 
 
@@ -158,7 +163,16 @@ def _attempt(system: System, progress: bool) -> tuple[Result | None, str | None]
         return None, str(error)
 
 
-def _other_numerics(system: System, progress: bool) -> tuple[list[Curves], tuple[str, ...]]:
+def _derives(bands: Bands, original: Curves) -> bool:
+    """Whether a width is left to be derived."""
+    given = [
+        *(entry_for(bands.signals, name) for name in original),
+        *(entry_for(bands.metrics, name, _plain(name)) for name in _values(original)),
+    ]
+    return not all(entry and entry.wide for entry in given)
+
+
+def _other_numerics(system: System, progress: bool) -> tuple[tuple[Curves, ...], tuple[str, ...]]:
     """The original with twice the step and in the other scheme, as far as it runs so."""
     runs: list[Curves] = []
     said: list[str] = []
@@ -168,7 +182,7 @@ def _other_numerics(system: System, progress: bool) -> tuple[list[Curves], tuple
             said.append(name)
         except (InputError, SimulationError) as error:
             said.append(f"not {name}: {error}")
-    return runs, tuple(said)
+    return tuple(runs), tuple(said)
 
 
 def _variants(system: System) -> Iterator[tuple[str, System]]:

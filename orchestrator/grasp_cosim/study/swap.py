@@ -9,7 +9,7 @@ from pathlib import Path
 from ..errors import InputError, choices
 from ..host.inspection import inspect_fmu
 from ..system.description import System
-from ..system.interface import Value
+from ..system.interface import Value, check_rename
 from ..system.parts import Component, Isolation
 from .feedthrough import Reports, feedthrough_differences
 from .interface_difference import (
@@ -88,20 +88,13 @@ def prepare_swap(
 
 def _candidate(path: Path, rename: Mapping[str, str], ours: Declared) -> Declared:
     report = inspect_fmu(path)
-    names = [v["name"] for v in report["variables"]]
+    check_rename(rename, [v["name"] for v in report["variables"]], path, "--rename")
     for new, own in rename.items():
-        place = f"--rename {new}={own}"
-        if own not in names:
-            raise InputError(f"{place}: {path.name} has no {own!r}; valid: {choices(names)}")
         if new not in ours.variables:
             raise InputError(
-                f"{place}: nothing of the original is called {new!r}; "
+                f"--rename: {new!r} = {own!r}: the original has no variable {new!r}; "
                 f"valid: {choices(ours.variables)}"
             )
-        if new in names and new not in rename.values():
-            raise InputError(f"{place}: {path.name} has another variable {new!r}; rename it, too")
-        if list(rename.values()).count(own) > 1:
-            raise InputError(f"{place}: {own!r} is renamed twice; must have one name")
     return Declared(renamed(report, rename), units_of(path))
 
 

@@ -4,11 +4,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
-import fmpy
 import numpy as np
 import numpy.typing as npt
 
-from ..system.units import BASE, Unit
+from ..errors import InputError
+from ..system import units
+from ..system.interface import read_units
+from ..system.model_description import read_description
+from ..system.units import Unit
 
 Units = Mapping[str, Unit]
 Number = TypeVar("Number", float, npt.NDArray[np.float64])
@@ -31,25 +34,21 @@ IDENTITY = Conversion(1.0, 0.0)
 def conversion(
     source_units: Units, source: str | None, target_units: Units, target: str | None
 ) -> Conversion | None:
-    """From one unit to another; None where there is none. No unit is taken as the other one."""
+    """From one unit to another, each as its FMU defines it; None where there is none.
+
+    A unit that is not declared is taken as the other one.
+    """
     if source is None or target is None or source == target:
         return IDENTITY
-    a, b = source_units.get(source), target_units.get(target)
-    if a is None or b is None or a.exponents != b.exponents:
-        return None
-    return Conversion(a.factor / b.factor, (a.offset - b.offset) / b.factor)
+    start, end = source_units.get(source), target_units.get(target)
+    found = units.conversion(start, end) if start and end else None
+    return None if found is None else Conversion(*found)
 
 
 def units_of(path: Path) -> Units:
-    """The units that an FMU defines."""
-    found = fmpy.read_model_description(path, validate=False).unitDefinitions
-    return {
-        u.name: Unit(
-            u.name,
-            tuple(getattr(u.baseUnit, base) for base in BASE),
-            u.baseUnit.factor,
-            u.baseUnit.offset,
-        )
-        for u in found
-        if u.baseUnit is not None
-    }
+    """The units that the FMU at path defines, whether the master would take it or not."""
+    _, root, _ = read_description(path)
+    try:
+        return {unit.name: unit for unit in read_units(root)}
+    except ValueError as error:
+        raise InputError(f"{path}: not a readable FMU: {error}") from error

@@ -52,6 +52,7 @@ def as_json(q: Qualification) -> dict[str, Any]:
         "metrics": [_compared_json(c) for c in q.metrics],
         "uncompared": list(q.uncompared),
         "numerics": list(q.numerics),
+        "log": list(q.log),
     }
 
 
@@ -163,6 +164,9 @@ def _basis(q: Qualification) -> list[str]:
         lines.append(
             f"not compared, as the candidate has no such output: {', '.join(q.uncompared)}"
         )
+    lines += [f"the candidate's run: {line}" for line in q.log[:ROWS]]
+    if len(q.log) > ROWS:
+        lines.append(f"the candidate's run: {len(q.log) - ROWS} lines more; --json has all")
     return lines
 
 

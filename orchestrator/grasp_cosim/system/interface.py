@@ -1,7 +1,7 @@
 """What an FMU declares: its variables, units and capabilities."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -111,7 +111,7 @@ class Interface:
         """
         if not rename:
             return self
-        self._check_names(rename, place)
+        check_rename(rename, self.by_name, self.path, place)
         names = {own: new for new, own in rename.items()}
 
         def new_names(listed: tuple[str, ...] | None) -> tuple[str, ...] | None:
@@ -127,27 +127,6 @@ class Interface:
             for v in self.variables
         )
         return replace(self, variables=tuple(variables))
-
-    def _check_names(self, rename: Mapping[str, str], place: str) -> None:
-        first: dict[str, str] = {}
-        for new, own in rename.items():
-            entry = f"{place}: {new!r} = {own!r}"
-            if own not in self.by_name:
-                raise InputError(
-                    f"{entry}: {self.path.name} has no variable {own!r}; "
-                    f"valid: {choices(self.by_name)}"
-                )
-            if own in first:
-                raise InputError(
-                    f"{entry}: {own!r} is renamed to {first[own]!r} already; must have one name"
-                )
-            first[own] = new
-        for new, own in rename.items():
-            if new in self.by_name and new not in first:
-                raise InputError(
-                    f"{place}: {new!r} = {own!r}: {self.path.name} has a variable {new!r} itself; "
-                    "must be a name that is free, or rename that one, too"
-                )
 
     def parse(self, place: str, name: str, value: Value, text: bool = False) -> Value:
         """The value for input or parameter name, checked against type, range and finiteness.
@@ -175,6 +154,32 @@ class Interface:
         return converted
 
 
+def check_rename(rename: Mapping[str, str], names: Collection[str], path: Path, place: str) -> None:
+    """InputError where rename, new names to own, does not fit the names in the FMU at path.
+
+    An own name must exist and be renamed once, a new one must be free. place says where rename
+    comes from.
+    """
+    first: dict[str, str] = {}
+    for new, own in rename.items():
+        entry = f"{place}: {new!r} = {own!r}"
+        if own not in names:
+            raise InputError(
+                f"{entry}: {path.name} has no variable {own!r}; valid: {choices(names)}"
+            )
+        if own in first:
+            raise InputError(
+                f"{entry}: {own!r} is renamed to {first[own]!r} already; must have one name"
+            )
+        first[own] = new
+    for new, own in rename.items():
+        if new in names and new not in first:
+            raise InputError(
+                f"{place}: {new!r} = {own!r}: {path.name} has a variable {new!r} itself; "
+                "must be a name that is free, or rename that one, too"
+            )
+
+
 @lru_cache(maxsize=64)
 def _read(path: Path, modified: int) -> Interface:
     model, root, files = read_description(path)
@@ -185,7 +190,7 @@ def _read(path: Path, modified: int) -> Interface:
         kind = "model exchange" if model.modelExchange else "scheduled execution"
         raise InputError(f"{path}: for {kind} only; must be a co-simulation FMU")
     try:
-        variables, units = tuple(_variables(model, root)), tuple(_units(root))
+        variables, units = tuple(_variables(model, root)), tuple(read_units(root))
     except ValueError as error:
         raise InputError(f"{path}: not a readable FMU: {error}") from error
     return Interface(
@@ -208,8 +213,8 @@ def read_interface(path: Path) -> Interface:
     return _read(path.resolve(), path.stat().st_mtime_ns)
 
 
-def _units(root: ElementTree.Element) -> Iterator[Unit]:
-    """The units that are defined in terms of the SI base units."""
+def read_units(root: ElementTree.Element) -> Iterator[Unit]:
+    """The units that are defined in terms of the SI base units; ValueError for one that is none."""
     for element in root.iterfind("UnitDefinitions/Unit"):
         base = element.find("BaseUnit")
         if base is None:
