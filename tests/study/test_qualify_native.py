@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 from grasp_cosim import System
 from grasp_cosim.study.qualify import qualify
-from grasp_cosim.study.verdict import as_text
 from native_fmus import build, needs_gcc
 
 pytestmark = needs_gcc
@@ -52,9 +51,7 @@ def test_millimetres_are_converted_on_the_wire_and_back(loop: System, tmp_path: 
     assert not same.qualified  # it integrates in m, and calls that mm
     values = same.runs[1]["plant.x"].values
     assert values[1] == pytest.approx(0.03e-3, rel=1e-12)
-    right = qualify(
-        loop, "plant", scaled(candidate, tmp_path / "scaled.fmu"), isolation="none"
-    )
+    right = qualify(loop, "plant", scaled(candidate, tmp_path / "scaled.fmu"), isolation="none")
     assert right.qualified
 
 
