@@ -8,6 +8,7 @@ A call that is refused has no effect and leaves its reason in the log of the hos
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import wraps
 from math import inf, isclose, isfinite
 from typing import Any, Concatenate, NamedTuple, ParamSpec, TypeVar
@@ -57,9 +58,11 @@ class Message(NamedTuple):
     msg: str
 
 
-class Access(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Access:
     """How a list of value references is read or written; worked out once per list and phase."""
 
+    vrs: list[int]
     where: slice | None
     """None: not in a row."""
     outputs: bool
@@ -69,6 +72,9 @@ class Access(NamedTuple):
 
 Accesses = dict[tuple[int, ...], Access]
 """By the list of value references."""
+
+_NONE = Access([], None, False, False, False)
+"""How to read or write nothing, which is always allowed."""
 
 
 _P = ParamSpec("_P")
@@ -133,6 +139,8 @@ class Fmi2Slave(metaclass=Once):
         self._boolean_reads: Accesses = {}
         self._real_writes: Accesses = {}
         self._boolean_writes: Accesses = {}
+        # The last of each: the host nearly always asks for the same again
+        self._real_read = self._boolean_read = self._real_write = _NONE
 
     # The life cycle
 
@@ -197,21 +205,29 @@ class Fmi2Slave(metaclass=Once):
     def get_real(self, vrs: list[int]) -> list[Any]:
         """Values of the given references."""
         try:
-            where, outputs, _, _ = self._real_reads.get(tuple(vrs)) or self._readable(vrs, float)
-            if self._inputs is None and outputs:
+            access = self._real_read
+            if vrs != access.vrs:
+                access = self._real_reads.get(tuple(vrs)) or self._readable(vrs, float)
+                self._real_read = access
+            if self._inputs is None and access.outputs:
                 self._refresh()
         except BaseException as error:
             raise self._reported(error) from None
+        where = access.where
         return self._values[where] if where else [self._values[vr] for vr in vrs]
 
     def get_boolean(self, vrs: list[int]) -> list[Any]:
         """Values of the given references."""
         try:
-            where, outputs, _, _ = self._boolean_reads.get(tuple(vrs)) or self._readable(vrs, bool)
-            if self._inputs is None and outputs:
+            access = self._boolean_read
+            if vrs != access.vrs:
+                access = self._boolean_reads.get(tuple(vrs)) or self._readable(vrs, bool)
+                self._boolean_read = access
+            if self._inputs is None and access.outputs:
                 self._refresh()
         except BaseException as error:
             raise self._reported(error) from None
+        where = access.where
         return self._values[where] if where else [self._values[vr] for vr in vrs]
 
     def get_integer(self, vrs: list[int]) -> list[Any]:
@@ -225,16 +241,18 @@ class Fmi2Slave(metaclass=Once):
     def set_real(self, vrs: list[int], values: list[Any]) -> None:
         """Set inputs or parameters, all or none; outputs follow when they are next asked for."""
         try:
-            access = self._real_writes.get(tuple(vrs)) or self._writable(vrs, float)
-            where, _, parameters, limited = access
-            if limited or not isfinite(sum(values)):
+            access = self._real_write
+            if vrs != access.vrs:
+                access = self._real_writes.get(tuple(vrs)) or self._writable(vrs, float)
+                self._real_write = access
+            if access.limited or not isfinite(sum(values)):
                 self._check_values(vrs, values)
         except BaseException as error:
             raise self._reported(error) from None
-        if parameters or not where:
+        if access.parameters or not access.where:
             self._store(vrs, values, access)
         else:
-            self._values[where] = values
+            self._values[access.where] = values
             self._inputs = None
 
     @_reported
@@ -337,6 +355,7 @@ class Fmi2Slave(metaclass=Once):
         stop = first + len(vrs)
         fields = [self._names[vr][0] for vr in vrs]
         access = Access(
+            list(vrs),
             slice(first, stop) if vrs == list(range(first, stop)) else None,
             any(f.causality == "output" for f in fields),
             any(f.causality == "parameter" for f in fields),
