@@ -125,9 +125,12 @@ class Fmi2Slave(metaclass=Once):
         self._first_output = count(self._fields, "input")
         self._first_parameter = count(self._fields, "input", "output")
         self._outputs = slice(self._first_output, self._first_parameter)
-        self._pack = packer(self.block.Inputs, self._fields)
-        self._unpack = unpacker(self._fields)
-        self._step, self._evaluate = self.block.step, self.block.outputs
+        self._functions = (
+            self.block.step,
+            self.block.outputs,
+            packer(self.block.Inputs, self._fields),
+            unpacker(self._fields),
+        )
         self._params: Any = None
         self._inputs: Any = None  # None: something was set and the outputs are out of date
         self._state = self.block.initial_state(self.block.Params(), self.block.Inputs())
@@ -180,11 +183,15 @@ class Fmi2Slave(metaclass=Once):
                 and -TIME_TOLERANCE <= current_time - self._time <= TIME_TOLERANCE
             ):
                 self._check_step(current_time, step_size)
-            if self._inputs is None:
-                self._read()
+            step, evaluate, pack, unpack = self._functions
+            params, inputs = self._params, self._inputs
+            if inputs is None:
+                if params is None:
+                    params = self._read_params()
+                self._inputs = inputs = pack(self._values)
             try:
-                state = self._step(self._params, self._state, self._inputs, step_size)
-                values = self._unpack(self._evaluate(self._params, state, self._inputs))
+                state = step(params, self._state, inputs, step_size)
+                values = unpack(evaluate(params, state, inputs))
             except ArithmeticError as error:
                 return self._discard(step_size, f"{type(error).__name__}: {error}")
             if not isfinite(sum(values)) and (text := self._not_finite(values)):
@@ -435,7 +442,8 @@ class Fmi2Slave(metaclass=Once):
         self._read()
         if self._phase < STEPPING:
             self._state = self.block.initial_state(self._params, self._inputs)
-        values = self._unpack(self._evaluate(self._params, self._state, self._inputs))
+        _, evaluate, _, unpack = self._functions
+        values = unpack(evaluate(self._params, self._state, self._inputs))
         if not isfinite(sum(values)) and (text := self._not_finite(values)):
             raise RefusalError(f"{text}: must be finite")
         self._values[self._outputs] = values
@@ -443,8 +451,13 @@ class Fmi2Slave(metaclass=Once):
     def _read(self) -> None:
         """Params and Inputs from the list of values."""
         if self._params is None:
-            try:
-                self._params = build_params(self.block, self._fields, self._values)
-            except ValueError as error:
-                raise RefusalError(str(error)) from error
-        self._inputs = self._pack(self._values)
+            self._read_params()
+        _, _, pack, _ = self._functions
+        self._inputs = pack(self._values)
+
+    def _read_params(self) -> Any:
+        try:
+            self._params = build_params(self.block, self._fields, self._values)
+        except ValueError as error:
+            raise RefusalError(str(error)) from error
+        return self._params
