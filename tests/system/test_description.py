@@ -29,7 +29,11 @@ def test_every_input_is_wired(grasp: System) -> None:
 
 
 WRONG = [
-    ("[experiment]", "[experment]", "unknown entry 'experment'; valid: components, experiment"),
+    (
+        "[experiment]",
+        "[experment]",
+        "unknown entry 'experment'; valid: components, events, experiment, faults",
+    ),
     ("step = 1e-4", "stepp = 1e-4", r"\[experiment\]: unknown entry 'stepp'; valid: scheme, step"),
     ("step = 1e-4", "step = 0", r"experiment.step = 0 s: must be a number greater than 0"),
     ("step = 1e-4", "step = nan", "must be a number greater than 0"),
@@ -48,7 +52,11 @@ WRONG = [
     (" -> sensor_1.gap", " sensor_1.gap", "must be 'component.output -> component.input'"),
     ("GripperPlant.fmu", "Gripper.fmu", "Gripper.fmu: no such FMU file"),
     ('fmu = "GripperPlant.fmu"', "fmu = 7", r"\[components.plant\]: fmu = 7: must be the path"),
-    ('fmu = "GripperPlant.fmu"', 'fnu = "x"', "unknown entry 'fnu'; valid: fmu, values"),
+    (
+        'fmu = "GripperPlant.fmu"',
+        'fnu = "x"',
+        "unknown entry 'fnu'; valid: fmu, isolation, rename, step, values",
+    ),
     ("object_width = 0.07", "width = 0.07", "no input or parameter 'width'; valid: force"),
     ("object_width = 0.07", "object_width = -1.0", "must be a finite number from 0 to 10 m"),
     ("object_width = 0.07", "object_width = nan", "object_width = nan: must be a finite number"),

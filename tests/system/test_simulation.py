@@ -27,7 +27,7 @@ def test_every_output_is_recorded_with_its_unit(grasp: System) -> None:
     result = simulate(grasp, stop=SHORT)
     outputs = {
         f"{c.name}.{v.name}": v.unit for c in grasp.components for v in c.interface.of("output")
-    }
+    } | {f"plant.exchange_energy[{j}]": "J" for j in (1, 2)}
     assert dict(result.units) == outputs
     assert set(result) == set(outputs)
     assert all(len(result[name]) == len(result.time) == 501 for name in outputs)

@@ -6,10 +6,10 @@ from typing import NoReturn
 import click
 
 from ..errors import InputError, SimulationError
-from . import evaluate, fmus, run
+from . import evaluate, fmus, report, run
 from .frame import FAILED, INTERRUPTED, WRONG, cli, fail
 
-for command in (run.run, evaluate.evaluate, fmus.build, fmus.inspect, fmus.doctor):
+for command in (run.run, report.report, evaluate.evaluate, fmus.build, fmus.inspect, fmus.doctor):
     cli.add_command(command)
 
 

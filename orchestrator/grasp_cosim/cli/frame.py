@@ -22,6 +22,7 @@ def cli(debug: bool) -> None:
 
     \b
     grasp-cosim run                  the published grasp, from FMUs
+    grasp-cosim report RUN           a page of a run: traces, animation, wiring
     grasp-cosim evaluate             the published table and figures, side by side with ours
     grasp-cosim build                the FMUs
     grasp-cosim inspect FMU          an FMU's interface

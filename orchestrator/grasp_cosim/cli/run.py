@@ -6,14 +6,16 @@ from typing import Any
 
 import click
 
-from ..errors import SimulationError
+from ..errors import InputError, SimulationError
 from ..figures.plot import check_plot
 from ..grasp import CASES, grasp_system
 from ..master.simulation import simulate
 from ..recording.result import Result
+from ..study.metrics import LABELS
 from ..system.description import SCHEMES, System
 from ..system.interface import Value
 from .frame import INTERRUPTED, check_folder, fail, json_option, pair
+from .step_study import run_step_study
 
 
 @click.command()
@@ -26,6 +28,10 @@ from .frame import INTERRUPTED, check_folder, fail, json_option, pair
 @click.option("--scheme", type=click.Choice(SCHEMES))
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for signals.csv and run.json.")
 @click.option("--plot", is_flag=True, help="Draw grasp.png, in --out or the current folder.")
+@click.option(
+    "--step-study", is_flag=True, help="Repeat the run over steps: is --step small enough?"
+)
+@click.option("--tolerance", type=float, help="Of contact times in a step study, s.")
 @json_option
 def run(
     system: Path | None,
@@ -37,6 +43,8 @@ def run(
     scheme: str | None,
     out: Path | None,
     plot: bool,
+    step_study: bool,
+    tolerance: float | None,
     as_json: bool,
 ) -> int:
     r"""Run SYSTEM, a .toml file; by default the built-in grasp.
@@ -44,11 +52,15 @@ def run(
     \b
     Example: grasp-cosim run --case 1 --set plant.initial_object_position=0.02 --out results --plot
     """
+    if tolerance is not None and not step_study:
+        raise InputError(f"--tolerance {tolerance!r}: must come with --step-study")
     chosen = System.load(system) if system else grasp_system()
     fmus = dict(pair("--swap", text, "COMPONENT=FMU") for text in swaps)
     values: dict[str, Value] = {} if case is None else dict(CASES[case])
     values.update(pair("--set", text, "COMPONENT.VARIABLE=VALUE") for text in settings)
     chosen = chosen.revised(fmus, values, ("--swap", "--set")).with_experiment(step, stop, scheme)
+    if step_study:
+        return run_step_study(chosen, tolerance, out, plot, as_json)
     if plot:
         check_plot(
             f"{c.name}.{v.name}" for c in chosen.components for v in c.interface.of("output")
@@ -87,16 +99,7 @@ def _summary(result: Result) -> str:
     ]
     if "time_to_contact" in m:
         lines += [
-            f"{label:22s}{_numbers(m[key], factor)} {unit}"
-            for label, key, factor, unit in (
-                ("time to contact", "time_to_contact", 1.0, "s"),
-                ("time difference", "time_difference", 1.0, "s"),
-                ("impact velocity", "impact_velocity", 1e3, "mm/s"),
-                ("peak contact force", "peak_contact_force", 1.0, "N"),
-                ("steady contact force", "steady_contact_force", 1.0, "N"),
-                ("target position", "target_position", 1e3, "mm"),
-                ("object shift", "object_shift", 1e3, "mm"),
-            )
+            f"{label:22s}{_numbers(m[key], factor)} {unit}" for label, key, factor, unit in LABELS
         ]
     return "\n".join(lines)
 

@@ -1,24 +1,13 @@
-"""An FMU instance behind calls that are bound once, before the first step.
-
-FMPy loads the binary and runs the life cycle. In the loop its wrappers would allocate and convert
-at every call (2.5 us instead of 0.5 us), so the loop calls the FMI functions directly, on buffers
-that are parts of the master's vectors.
-"""
+"""An instance of an FMI 2.0 co-simulation FMU."""
 
 import ctypes
-import os
-import re
-import sys
-import tempfile
-import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from functools import partial
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
-from urllib.parse import quote
+from typing import Any, overload
 
 import fmpy
+import numpy as np
+import numpy.typing as npt
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import (
     FMU2Slave,
@@ -26,29 +15,21 @@ from fmpy.fmi2 import (
     fmi2CallbackFreeMemoryTYPE,
     fmi2CallbackFunctions,
     fmi2CallbackLoggerTYPE,
+    fmi2LastSuccessfulTime,
+    fmi2Terminated,
 )
 from fmpy.logging import addLoggerProxy
 
-from ..errors import InputError, SimulationError
-from ..system.interface import Interface, Value, Variable
+from ..errors import SimulationError
+from ..system.interface import Value, Variable
+from . import instance
+from .instance import STEP_2, TRANSFER_2, WARNING, Native
+from .loaded import LoadedInstance
+
+__all__ = ["WARNING", "Call", "FmuInstance"]
 
 Call = Callable[[], int]
 """A bound FMI call; returns the FMI status."""
-
-STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
-WARNING, ERROR, FATAL = 1, 3, 4
-"""FMI statuses. Up to WARNING a simulation goes on; after FATAL no call is allowed."""
-
-_PYTHON_FUNCTION = ctypes.PYFUNCTYPE(ctypes.c_int)
-_NATIVE_FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int)
-"""Calls of a Python FMU keep the GIL, which it would have to take back at once."""
-
-_SETTERS = {"Real": "setReal", "Integer": "setInteger", "Boolean": "setBoolean"}
-
-_PYTHONFMU_PREFIX = re.compile(r"Fatal py exception encountered: \[\w+\] \w+\s")
-"""What pythonfmu logs of an exception begins so; nothing else is kept where the FMU said more."""
-
-_TRACEBACK = "Traceback (most recent call last)"
 
 _messages: list[tuple[str, str]] = []
 """What FMUs logged: instance and text. FMPy's logger proxy is one per process, so is this."""
@@ -67,171 +48,123 @@ _callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(fmpy.free)
 addLoggerProxy(ctypes.byref(_callbacks))
 
 
-class FmuInstance:
+class FmuInstance(LoadedInstance):
     """One instance of an FMI 2.0 co-simulation FMU. Use as a context manager."""
 
-    def __init__(self, name: str, interface: Interface) -> None:
-        """Extract and instantiate; InputError where the FMU does not load."""
-        self.name = name
-        self.interface = interface
-        self._worst = FATAL  # until it is instantiated
-        self._keep: list[Any] = []
-        self._running = False
-        self._messages()  # forgets what an earlier instance of this name said
-        self._folder = tempfile.TemporaryDirectory(prefix="grasp_fmu_")
-        self._resources = Path(self._folder.name, "resources")
-        try:
-            self._slave = self._instantiate(Path(self._folder.name))
-        except BaseException:
-            self.close()
-            raise
+    PREFIX = "fmi2"
 
     def _instantiate(self, folder: Path) -> FMU2Slave:
-        try:
-            fmpy.extract(self.interface.path, folder)
-        except Exception as error:  # FMPy and zipfile raise whatever they like
-            raise InputError(f"{self.name}: {self.interface.path} is damaged: {error}") from error
-        self._python = (self._resources / "slavemodule.txt").exists()
-        plain = str(folder).replace(" ", "")
-        if self._python and quote(plain) != plain:
-            raise InputError(
-                f"{self.name}: temporary folder {folder}: a Python FMU crashes on its characters; "
-                "set TMPDIR to a folder of plain ASCII letters"
-            )
-        here = Path.cwd()
-        try:
-            slave = FMU2Slave(
-                guid=self.interface.guid,
-                unzipDirectory=folder,
-                modelIdentifier=self.interface.identifier,
-                instanceName=self.name,
-            )
-            slave.instantiate(callbacks=_callbacks, loggingOn=True)
-        except Exception as error:  # FMPy raises plain Exception
-            raise InputError(
-                f"{self.name}: {self.interface.path} does not load: {self._reason(error)}"
-            ) from error
-        finally:
-            os.chdir(here)  # where loading fails, FMPy stays in the library's folder
-        self._worst = 0
+        slave = FMU2Slave(
+            guid=self.interface.guid,
+            unzipDirectory=folder,
+            modelIdentifier=self.interface.identifier,
+            instanceName=self.name,
+        )
+        slave.instantiate(callbacks=_callbacks, loggingOn=True)
         return slave
 
-    def __enter__(self) -> "FmuInstance":
-        return self
+    def _read_log(self) -> list[str]:
+        said = [text for instance, text in _messages if instance == self.name]
+        _messages[:] = [m for m in _messages if m[0] != self.name]
+        return said
 
-    def __exit__(self, *_: object) -> None:
-        """Close the instance."""
-        self.close()
+    def _start(self, values: Mapping[str, Value], stop: float) -> None:
+        for name, value in values.items():
+            self._set(self.interface.by_name[name], value)
+        self._slave.setupExperiment(startTime=0.0, stopTime=stop)
+        self._slave.enterInitializationMode()
 
-    def close(self) -> None:
-        """Terminate and free the FMU as far as it permits; remove what was extracted."""
-        if self._running and self._worst < ERROR:
-            try:
-                self._slave.terminate()
-            except FMICallException as error:
-                self._worst = error.status
-                said = _as_reason(self._messages())
-                warnings.warn(f"{self.name}: {error}{said}", stacklevel=2)
-        if self._worst < FATAL:
-            self._slave.freeInstance()
-        if str(self._resources) in sys.path:  # pythonfmu puts it there and leaves it
-            sys.path.remove(str(self._resources))
-        self._folder.cleanup()
+    def _suffix(self, fmi_type: str) -> str:
+        return "Integer" if fmi_type == "Enumeration" else fmi_type
 
-    def enter_initialization(self, values: Mapping[str, Value], stop: float) -> None:
-        """Set start values, set up the experiment (stop in s) and enter initialisation mode."""
-        with self._refusals():
-            for name, value in values.items():
-                variable = self.interface.by_name[name]
-                if variable.kind == "String":
-                    self._slave.setString([variable.reference], [value])
-                else:
-                    setter = getattr(self._slave, _SETTERS[variable.kind])
-                    setter([variable.reference], [value])
-            self._slave.setupExperiment(startTime=0.0, stopTime=stop)
-            self._slave.enterInitializationMode()
+    def transfer(
+        self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]
+    ) -> instance.Call:
+        """The call that passes data to inputs ("set") or fetches outputs into it ("get")."""
+        count = len(variables)
+        references = (ctypes.c_uint * count)(*(v.reference for v in variables))
+        self._keep += [references, data]
+        bound, address = self._function(
+            action.capitalize() + self._suffix(variables[0].type),
+            ctypes.byref(references),
+            ctypes.c_size_t(count),
+            ctypes.c_void_p(data.ctypes.data),
+        )
+        native = Native(
+            TRANSFER_2,
+            address,
+            self._slave.component,
+            ctypes.addressof(references),
+            count,
+            data.ctypes.data,
+        )
+        return instance.Call(bound, native)
 
-    def exit_initialization(self) -> None:
-        """Leave initialisation mode."""
-        with self._refusals():
-            self._slave.exitInitializationMode()
-        self._running = True
+    @overload
+    def stepper(self, clock: npt.NDArray[np.float64], step: float) -> instance.Call: ...
+    @overload
+    def stepper(self, clock: ctypes.c_double, step: float) -> Call: ...
+    def stepper(
+        self, clock: npt.NDArray[np.float64] | ctypes.c_double, step: float
+    ) -> instance.Call | Call:
+        """The call that advances by step seconds from the time in clock[0]."""
+        if isinstance(clock, ctypes.c_double):
+            return self._function("DoStep", clock, ctypes.c_double(step), ctypes.c_int(1))[0]
+        self._clock = clock
+        box = ctypes.c_double.from_buffer(clock)  # type: ignore[arg-type]  # numpy's 3.11 stubs
+        bound, address = self._function("DoStep", box, ctypes.c_double(step), ctypes.c_int(1))
+        return instance.Call(bound, Native(STEP_2, address, self._slave.component, step=step))
+
+    def ended_early(self) -> bool:
+        """Never: a step that ends early is discarded in FMI 2.0."""
+        return False
+
+    def last_successful_time(self) -> float | None:
+        """Where a discarded step ended, in s; None where the FMU does not say.
+
+        SimulationError where it was discarded because the FMU wants the simulation to end.
+        """
+        try:
+            if self._slave.getBooleanStatus(fmi2Terminated):
+                raise SimulationError(
+                    f"{self.name}: {self.interface.path.name} asked for the end of the simulation "
+                    f"in the step from t = {float(self._clock[0]):.9g} s"
+                )
+        except FMICallException:
+            pass  # it does not say
+        try:
+            return float(self._slave.getRealStatus(fmi2LastSuccessfulTime))
+        except FMICallException:
+            return None
+
+    def save(self) -> None:
+        """Save the state, for one restore. Only where interface.can_save_state."""
+        with self._failures():
+            self._slave.fmi2GetFMUstate(self._slave.component, ctypes.byref(self._state))
+
+    def restore(self) -> None:
+        """Go back to the state saved last."""
+        with self._failures():
+            self._slave.fmi2SetFMUstate(self._slave.component, self._state)
 
     def setters(self, variables: Sequence[Variable], reals: Any, integers: Any) -> list[Call]:
         """Calls that pass reals (float64) and integers (int32) to the given inputs, in order."""
-        return self._bound("fmi2Set", variables, reals, integers)
+        return self._bound("set", variables, reals, integers)
 
     def getters(self, variables: Sequence[Variable], reals: Any, integers: Any) -> list[Call]:
         """Calls that fetch outputs into reals (float64) and integers (int32), in order."""
-        return self._bound("fmi2Get", variables, reals, integers)
-
-    def stepper(self, time: ctypes.c_double, step: float) -> Call:
-        """The call that advances by step seconds from the time in the given box."""
-        return self._function("fmi2DoStep", time, ctypes.c_double(step), ctypes.c_int(1))
-
-    def failure(self, status: int, time: float) -> SimulationError:
-        """The error for a call that returned status at time in s. The FMU is not used again."""
-        self._worst = status
-        name = STATUS[status] if status < len(STATUS) else str(status)
-        said = self._messages()
-        error = SimulationError(
-            f"{self.name}: {self.interface.path.name} returned {name} at t = {time:.9g} s"
-            f"{_as_reason(said)}"
-        )
-        for text in said:
-            error.add_note(text)
-        return error
+        return self._bound("get", variables, reals, integers)
 
     def _bound(
-        self, prefix: str, variables: Sequence[Variable], reals: Any, integers: Any
+        self, action: str, variables: Sequence[Variable], reals: Any, integers: Any
     ) -> list[Call]:
         """One call per kind; the buffers' values follow the order of the variables of the kind."""
-        calls = []
+        calls: list[Call] = []
         offset = 0
         for kind, buffer in (("Real", reals), ("Integer", integers), ("Boolean", integers)):
-            references = [v.reference for v in variables if v.kind == kind]
-            if not references:
-                continue
-            part = buffer[: len(references)] if kind == "Real" else buffer[offset:]
-            offset += len(references) if kind == "Integer" else 0
-            pointer = part.ctypes.data_as(ctypes.c_void_p)
-            vector = (ctypes.c_uint * len(references))(*references)
-            size = ctypes.c_size_t(len(references))
-            calls.append(self._function(prefix + kind, ctypes.byref(vector), size, pointer))
-            self._keep += [vector, buffer]
+            own = [v for v in variables if v.kind == kind]
+            if own:
+                part = buffer if kind == "Real" else buffer[offset:]
+                offset += len(own) if kind == "Integer" else 0
+                calls.append(self.transfer(action, own, part).python)
         return calls
-
-    def _function(self, name: str, *arguments: Any) -> Call:
-        component = ctypes.c_void_p(self._slave.component)
-        prototype = _PYTHON_FUNCTION if self._python else _NATIVE_FUNCTION
-        return partial(prototype((name, self._slave.dll)), component, *arguments)
-
-    @contextmanager
-    def _refusals(self) -> Iterator[None]:
-        """Turns a failed call of the life cycle into an InputError."""
-        try:
-            yield
-        except FMICallException as error:
-            self._worst = error.status
-            raise InputError(
-                f"{self.name}: {self.interface.path.name} refused its initialisation: "
-                f"{self._reason(error)}"
-            ) from error
-
-    def _reason(self, error: Exception) -> str:
-        return _as_reason(self._messages()).removeprefix(": ") or " ".join(str(error).split())
-
-    def _messages(self) -> list[str]:
-        """What this instance logged and nobody has read yet."""
-        said = [text for instance, text in _messages if instance == self.name]
-        _messages[:] = [m for m in _messages if m[0] != self.name]
-        own = re.compile(rf"{re.escape(self.name)}, t = \S+ s: ")  # so our FMUs begin
-        said = [own.sub("", text, count=1) if own.match(text) else text for text in said]
-        return [text for text in said if not _PYTHONFMU_PREFIX.match(text)] or said
-
-
-def _as_reason(said: list[str]) -> str:
-    """Messages as the end of a one-line error; of a traceback only what it comes to."""
-    last = [text.strip().rpartition("\n")[2] if _TRACEBACK in text else text for text in said]
-    text = " ".join(" ".join(last).split())
-    return f": {_PYTHONFMU_PREFIX.sub('', text)}" if text else ""

@@ -14,6 +14,9 @@ STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
 OK, WARNING, DISCARD, ERROR, FATAL = 0, 1, 2, 3, 4
 """FMI statuses. Up to WARNING a simulation goes on; after FATAL no call is allowed."""
 
+EARLY = 6
+"""No FMI status: a step that returned OK, but before its end (FMI 3.0)."""
+
 TRANSFER_2, TRANSFER_3, STEP_2, STEP_3, PYTHON = range(5)
 """The shapes of a call, as the compiled loop makes it: see master/compiled.py."""
 
@@ -82,19 +85,10 @@ class Instance(Protocol):
         """
 
     def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
-        """The call that advances by step seconds from the time in clock[0]."""
-
-    def ended_early(self) -> bool:
-        """Whether the last step, though it returned OK, ended before its end (FMI 3)."""
+        """The call that advances by step seconds from the time in clock[0]; EARLY is a status too."""
 
     def last_successful_time(self) -> float | None:
         """Where a discarded or shortened step ended, in s; None where the FMU does not say."""
-
-    def save(self) -> None:
-        """Save the state, for one restore. Only where interface.can_save_state."""
-
-    def restore(self) -> None:
-        """Go back to the state saved last."""
 
     def failure(self, status: int, time: float) -> SimulationError:
         """The error for a call that returned a bad status at time in s."""

@@ -1,17 +1,13 @@
 """What any FMU says about itself: FMI 1.0, 2.0 or 3.0, from whichever tool."""
 
-import io
 import math
-import zipfile
 from collections.abc import Mapping
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-import fmpy
-
-from ..errors import InputError, check_fmu_file, choices
+from ..errors import choices
+from ..system.model_description import FROM_TYPE, read_description
 
 COLUMNS = (
     "name", "causality", "variability", "type", "unit", "start", "range", "dependencies",
@@ -21,9 +17,6 @@ EXPERIMENT = {
     "start_time": "startTime", "stop_time": "stopTime", "tolerance": "tolerance",
     "step_size": "stepSize",
 }  # fmt: skip
-FROM_TYPE = ("unit", "displayUnit", "min", "max", "nominal")
-"""What a variable has from its declared type where it says nothing itself."""
-
 WIDEST = 32
 """Between name and description, the width of a column where the width of the table is limited."""
 
@@ -65,7 +58,7 @@ def inspect_fmu(path: Path) -> dict[str, Any]:
 
     `dependencies` is null where an output declares none, which means all inputs in FMI.
     """
-    model, root, files = _read(path)
+    model, root, files = read_description(path)
     kinds = [key for key in KINDS if getattr(model, key[0].lower() + key[1:])]
     return {
         "fmu": str(path),
@@ -110,58 +103,6 @@ def as_text(report: Mapping[str, Any], width: int | None = None) -> str:
     }
     lines = [f"{label:20s}{text}" for label, text in head.items()]
     return "\n".join([*lines, "", *_table([_row(v) for v in report["variables"]], width)])
-
-
-def _read(path: Path) -> tuple[Any, ElementTree.Element, list[str]]:
-    """The description as FMPy reads it and, for what FMPy leaves out, as XML; the files' names."""
-    check_fmu_file(path)
-    try:
-        with zipfile.ZipFile(path) as archive:
-            files = [name.replace("\\", "/") for name in archive.namelist()]
-            if "modelDescription.xml" not in files:
-                raise ValueError("no modelDescription.xml at the top of the archive")
-            xml = archive.read("modelDescription.xml")
-        root = ElementTree.fromstring(xml)  # noqa: S314
-        if not root.get("fmiVersion"):
-            raise ValueError("no fmiVersion in modelDescription.xml")
-        return _described(xml, root), root, files
-    except Exception as error:  # FMPy raises whatever its XML and ZIP libraries do
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise InputError(f"{path}: not a readable FMU: {reason}") from error
-
-
-def _described(xml: bytes, root: ElementTree.Element) -> Any:
-    try:
-        return _by_fmpy(xml)
-    except Exception:
-        with suppress(Exception):
-            return _by_fmpy(_mended(root))
-        raise
-
-
-def _by_fmpy(xml: bytes) -> Any:
-    archive = io.BytesIO()  # with a file, FMPy would leave it open after an error
-    with zipfile.ZipFile(archive, "w") as file:
-        file.writestr("modelDescription.xml", xml)
-    return fmpy.read_model_description(archive, validate=False)
-
-
-def _mended(root: ElementTree.Element) -> bytes:
-    """Without what FMPy refuses even where it need not validate; root is changed, too."""
-    types = {
-        t.get("name"): {k: v for e in (t, *t) for k, v in e.attrib.items() if k in FROM_TYPE}
-        for t in root.iterfind("TypeDefinitions/*")
-    }
-    for element in root.iterfind("ModelVariables//*"):
-        declared = types.get(element.attrib.pop("declaredType", None), {})
-        element.attrib.update({**declared, **element.attrib})
-    for definitions in (*root.findall("TypeDefinitions"), *root.findall("UnitDefinitions")):
-        root.remove(definitions)
-    for element in root.iterfind("ModelVariables/*"):
-        element.attrib.setdefault("initial", "")  # causality and variability do not match
-    for element in root.iterfind("ModelStructure//*[@dependencies]"):
-        element.set("dependencies", " ".join(element.get("dependencies", "").split()))
-    return ElementTree.tostring(root)
 
 
 def _platforms(files: list[str]) -> list[str]:

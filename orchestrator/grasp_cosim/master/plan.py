@@ -1,178 +1,247 @@
-"""The flat plan: a system turned into vectors of values and bound calls.
+"""The flat plan: a system turned into one vector of values and a program for the loop.
 
-One vector holds the Real values, one the Integer and Boolean ones. In each, all outputs come first
-(they are recorded), then the inputs that have a wire. The values of a component stand together, so
-that one FMI call moves them all.
+In the vector the outputs come first, then the inputs that have a wire. The Real values of a component
+stand together, so that one FMI call moves them all; values of another type have a buffer of their
+type beside the vector. Strings are no numbers: a wire between them is a call.
 """
 
-import ctypes
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from ..errors import SimulationError
-from ..fmi.fmi2 import Call
+from ..fmi.instance import Call, Instance, dtype
+from ..system.checks import wire_transform
 from ..system.description import System
-from ..system.interface import Interface, Value, Variable
-from ..system.parts import NANOSECONDS, Port
+from ..system.interface import Variable
+from ..system.parts import NANOSECONDS, Port, Wire
+from .loop import CALL, COPY, LOAD, LOAD_LONG, RAISED, SCALE, STEP, STORE
 
-REAL = ("Real",)
-INTEGER = ("Integer", "Boolean")
-"""The kinds of variables that share a vector, in their order in it."""
+NUMBERS = ("Real", "Integer", "Boolean")
+"""The kinds of variables that have a slot in the vector."""
 
-Move = tuple[memoryview, int, int]
-"""A vector, the place of a wired input in it and that of its source."""
+Operation = tuple[int, int, int, int, int]
+"""Kind, first and last of its range, period and phase."""
 
-
-class Instance(Protocol):
-    """What the master needs of a component; FmuInstance is one, a test's mock another."""
-
-    @property
-    def name(self) -> str:
-        """The component's name in the system."""
-
-    @property
-    def interface(self) -> Interface:
-        """What it declares."""
-
-    def enter_initialization(self, values: Mapping[str, Value], stop: float) -> None:
-        """Set start values and enter initialisation mode; the experiment ends at stop in s."""
-
-    def exit_initialization(self) -> None:
-        """Leave initialisation mode."""
-
-    def setters(self, variables: Sequence[Variable], reals: Any, integers: Any) -> list[Call]:
-        """Calls that pass float64 and int32 buffers to inputs, in the order of their kinds."""
-
-    def getters(self, variables: Sequence[Variable], reals: Any, integers: Any) -> list[Call]:
-        """Calls that fetch outputs into such buffers."""
-
-    def stepper(self, time: ctypes.c_double, step: float) -> Call:
-        """The call that advances by step seconds from the time in the box."""
-
-    def failure(self, status: int, time: float) -> SimulationError:
-        """The error for a call that returned a bad status at time in s."""
-
-
-@dataclass(frozen=True, slots=True)
-class Signal:
-    """A recorded output: name, unit (None without one), kind and place in its vector."""
-
-    name: str
-    unit: str | None
-    kind: str
-    slot: int
-
-
-@dataclass(frozen=True, slots=True)
-class Link:
-    """A component in the plan: where its inputs come from, and its calls."""
-
-    instance: Instance
-    moves: tuple[Move, ...]
-    send: tuple[Call, ...]
-    receive: tuple[Call, ...]
-    step: tuple[Call, ...]
-    """Send, advance and receive, in one go."""
+FaultFunction = Callable[[float, int], float]
+"""What a wire makes of a value at a step number."""
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """The vectors, what is recorded of them, and the components in their order of execution."""
+    """Everything the loop works on.
 
-    reals: npt.NDArray[np.float64]
-    integers: npt.NDArray[np.int32]
-    signals: tuple[Signal, ...]
-    links: tuple[Link, ...]
+    slots gives the place of each output and wired input in values. operations refer to wires
+    (source, target, factor, offset), casts (buffer, index, slot) and calls. clock is that of the loop.
+    """
+
+    values: npt.NDArray[np.float64]
+    clock: npt.NDArray[np.float64]
+    slots: Mapping[Port, int]
+    operations: tuple[Operation, ...]
+    wires: tuple[tuple[int, int, float, float], ...]
+    casts: tuple[tuple[int, int, int], ...]
+    buffers: tuple[npt.NDArray[Any], ...]
+    calls: tuple[Call, ...]
+    owners: tuple[int | None, ...]
+    """By call, the index of the component that it is made to."""
+    raised: list[BaseException]
+    """What Python calls raised that returned RAISED: it must not pass through compiled code."""
 
 
-def make_plan(system: System, instances: Sequence[Instance], time: ctypes.c_double) -> Plan:
-    """The plan of a system; time is the box the calls read the current time in s from."""
-    reals = _Vector(np.float64, REAL, system, instances)
-    integers = _Vector(np.int32, INTEGER, system, instances)
-    return Plan(
-        reals.values,
-        integers.values,
-        tuple(_signals(instances, reals, integers)),
-        tuple(_link(system, instance, reals, integers, time) for instance in instances),
-    )
+def slots_of(system: System, instances: Sequence[Instance]) -> dict[Port, int]:
+    """The place of each output and each wired input that is a number."""
+    wired = {wire.target for wire in system.wires}
+    ports = [
+        Port(instance.name, v.name)
+        for causality in ("output", "input")
+        for instance in instances
+        for _, variables in _by_type(instance, causality)
+        for v in variables
+        if causality == "output" or Port(instance.name, v.name) in wired
+    ]
+    return {port: slot for slot, port in enumerate(ports)}
 
 
-class _Vector:
-    """The values of some kinds, and the place of each port."""
+def make_plan(
+    system: System,
+    instances: Sequence[Instance],
+    slots: Mapping[Port, int],
+    values: npt.NDArray[np.float64],
+    faults: Mapping[Port, FaultFunction],
+    before_step: Callable[[int], None] | None,
+) -> Plan:
+    """The plan of a system over the given vector of values.
+
+    faults act on wires, by target. before_step is called at the start of each macro step with its
+    number.
+    """
+    return _Builder(system, instances, slots, values, faults, before_step).plan()
+
+
+class _Builder:
+    """Collects the parts of a plan in the order of execution."""
 
     def __init__(
         self,
-        dtype: npt.DTypeLike,
-        kinds: Sequence[str],
         system: System,
         instances: Sequence[Instance],
+        slots: Mapping[Port, int],
+        values: npt.NDArray[np.float64],
+        faults: Mapping[Port, FaultFunction],
+        before_step: Callable[[int], None] | None,
     ) -> None:
-        self.kinds = kinds
-        self._sources = {wire.target: wire.source for wire in system.wires}
-        ports = [
-            Port(instance.name, variable.name)
-            for causality in ("output", "input")
-            for instance in instances
-            for variable in self.exchanged(instance, causality)
-        ]
-        self.slots = {port: slot for slot, port in enumerate(ports)}
-        self.values = np.zeros(len(ports), dtype)
+        self.system = system
+        self.instances = {instance.name: instance for instance in instances}
+        self.slots = slots
+        self.values = values
+        self.view: Any = memoryview(values)  # type: ignore[arg-type]  # numpy's stubs for 3.11
+        self.faults = faults
+        self.before_step = before_step
+        self.clock = np.zeros(2)
+        self.operations: list[Operation] = []
+        self.wires: list[tuple[int, int, float, float]] = []
+        self.casts: list[tuple[int, int, int]] = []
+        self.buffers: list[npt.NDArray[Any]] = []
+        self.calls: list[Call] = []
+        self.owners: list[int | None] = []
+        self.raised: list[BaseException] = []
 
-    def exchanged(self, instance: Instance, causality: str) -> list[Variable]:
-        """All outputs, or the wired inputs, of a component that belong into this vector."""
-        return [
-            v
-            for kind in self.kinds
-            for v in instance.interface.of(causality)
-            if v.kind == kind
-            and (causality == "output" or Port(instance.name, v.name) in self._sources)
-        ]
-
-    def part(self, instance: Instance, causality: str) -> npt.NDArray[Any]:
-        """The view of the vector that holds these variables."""
-        variables = self.exchanged(instance, causality)
-        first = self.slots[Port(instance.name, variables[0].name)] if variables else 0
-        return self.values[first : first + len(variables)]
-
-    def moves(self, instance: Instance) -> list[Move]:
-        """How the sources of the wired inputs get into their places."""
-        view = memoryview(self.values)  # type: ignore[arg-type]  # numpy's stubs for 3.11
-        targets = [Port(instance.name, v.name) for v in self.exchanged(instance, "input")]
-        return [(view, self.slots[port], self.slots[self._sources[port]]) for port in targets]
-
-
-def _link(
-    system: System, instance: Instance, reals: _Vector, integers: _Vector, time: ctypes.c_double
-) -> Link:
-    calls = {}
-    for causality, bind in (("input", instance.setters), ("output", instance.getters)):
-        variables = [
-            *reals.exchanged(instance, causality),
-            *integers.exchanged(instance, causality),
-        ]
-        calls[causality] = bind(
-            variables, reals.part(instance, causality), integers.part(instance, causality)
+    def plan(self) -> Plan:
+        if self.before_step is not None:
+            self._python(self.before_step, 1, 0)
+        names = [component.name for component in self.system.components]
+        if self.system.scheme == "sequential":
+            for name in names:
+                last = self._period(name) - 1
+                self._move(name, last)
+                self._transfer(name, "input", last)
+                self._step(name)
+        else:
+            for name in names:
+                self._move(name, 0)
+            for name in names:
+                self._transfer(name, "input", 0)
+            for name in names:
+                self._step(name)
+        return Plan(
+            self.values,
+            self.clock,
+            self.slots,
+            tuple(self.operations),
+            tuple(self.wires),
+            tuple(self.casts),
+            tuple(self.buffers),
+            tuple(self.calls),
+            tuple(self.owners),
+            self.raised,
         )
-    advance = instance.stepper(time, system.step_ns / NANOSECONDS)
-    return Link(
-        instance,
-        (*reals.moves(instance), *integers.moves(instance)),
-        tuple(calls["input"]),
-        tuple(calls["output"]),
-        (*calls["input"], advance, *calls["output"]),
-    )
+
+    def _period(self, name: str) -> int:
+        own = self.system.component(name, name).step_ns
+        return 1 if own is None else own // self.system.step_ns
+
+    def _move(self, name: str, phase: int) -> None:
+        """The wires that end at a component, then their faults."""
+        period = self._period(name)
+        wires = [wire for wire in self.system.wires if wire.target.component == name]
+        numbers = [wire for wire in wires if wire.target in self.slots]
+        transforms = {wire.target: wire_transform(self.system, wire) for wire in numbers}
+        for kind in (COPY, SCALE):
+            first = len(self.wires)
+            for wire in numbers:
+                transform = transforms[wire.target]
+                if (transform == (1.0, 0.0)) == (kind == COPY):
+                    ends = self.slots[wire.source], self.slots[wire.target]
+                    self.wires.append((*ends, *transform))
+            self._operation(kind, first, len(self.wires), period, phase)
+        for wire in wires:
+            if wire.target in self.faults:
+                self._fault(wire.target, period, phase)
+            if wire.target not in self.slots:
+                self._text(wire, period, phase)
+
+    def _fault(self, target: Port, period: int, phase: int) -> None:
+        fault, slot, view = self.faults[target], self.slots[target], self.view
+
+        def act(step: int) -> None:
+            view[slot] = fault(view[slot], step)
+
+        self._python(act, period, phase)
+
+    def _text(self, wire: Wire, period: int, phase: int) -> None:
+        source, target = (self.instances[port.component] for port in (wire.source, wire.target))
+        put_out = source.interface.by_name[wire.source.variable]
+        taken_in = target.interface.by_name[wire.target.variable]
+        self._python(lambda _: target.set([taken_in], source.get([put_out])), period, phase)
+
+    def _python(self, function: Callable[[int], None], period: int, phase: int) -> None:
+        clock = memoryview(self.clock)  # type: ignore[arg-type]
+
+        def call() -> int:
+            function(int(clock[1]))
+            return 0
+
+        self._call(CALL, Call(call), None, period, phase)
+
+    def _step(self, name: str) -> None:
+        """Advance a component and fetch its outputs, at the end of its own step."""
+        period = self._period(name)
+        step = period * self.system.step_ns / NANOSECONDS
+        call = self.instances[name].stepper(self.clock, step)
+        self._call(STEP, call, name, period, period - 1)
+        self._transfer(name, "output", period - 1)
+
+    def _transfer(self, name: str, causality: str, phase: int) -> None:
+        """Pass all wired inputs, or fetch all outputs, a call per FMI type."""
+        instance, period = self.instances[name], self._period(name)
+        for fmi_type, variables in _by_type(instance, causality):
+            taken = [v for v in variables if Port(name, v.name) in self.slots]
+            if not taken:
+                continue
+            first = self.slots[Port(name, taken[0].name)]
+            data: npt.NDArray[Any] = self.values[first : first + len(taken)]
+            element = np.dtype(dtype(instance.interface.version, fmi_type))
+            casts = (len(self.casts), len(self.casts) + len(taken))
+            if element != np.float64:
+                data = np.zeros(len(taken), element)
+                self.casts += [(len(self.buffers), i, first + i) for i in range(len(taken))]
+                self.buffers.append(data)
+            if element != np.float64 and causality == "input":
+                self._operation(STORE, *casts, period, phase)
+            action = "set" if causality == "input" else "get"
+            self._call(CALL, instance.transfer(action, taken, data), name, period, phase)
+            if element != np.float64 and causality == "output":
+                long = element.kind in "iu" and element.itemsize == 8
+                self._operation(LOAD_LONG if long else LOAD, *casts, period, phase)
+
+    def _call(self, kind: int, call: Call, name: str | None, period: int, phase: int) -> None:
+        self._operation(kind, len(self.calls), len(self.calls) + 1, period, phase)
+        self.calls.append(call if call.native else Call(self._guarded(call.python)))
+        names = [component.name for component in self.system.components]
+        self.owners.append(None if name is None else names.index(name))
+
+    def _guarded(self, function: Callable[[], int]) -> Callable[[], int]:
+        def call() -> int:
+            try:
+                return function()
+            except BaseException as error:
+                self.raised.append(error)
+                return RAISED
+
+        return call
+
+    def _operation(self, kind: int, first: int, last: int, period: int, phase: int) -> None:
+        if last > first:
+            self.operations.append((kind, first, last, period, phase))
 
 
-def _signals(instances: Sequence[Instance], reals: _Vector, integers: _Vector) -> list[Signal]:
-    signals = []
-    for instance in instances:
-        for variable in instance.interface.of("output"):
-            port = Port(instance.name, variable.name)
-            vector = reals if variable.kind in REAL else integers
-            if port in vector.slots:
-                signals.append(Signal(str(port), variable.unit, variable.kind, vector.slots[port]))
-    return signals
+def _by_type(instance: Instance, causality: str) -> list[tuple[str, list[Variable]]]:
+    """The scalar numbers of a causality, by FMI type, those of float64 first."""
+    found: dict[str, list[Variable]] = {}
+    for v in instance.interface.of(causality):
+        if v.kind in NUMBERS and not v.shape:
+            found.setdefault(v.type, []).append(v)
+    return sorted(found.items(), key=lambda item: item[0] not in ("Real", "Float64"))

@@ -1,101 +1,203 @@
-"""Runs a system: loads the FMUs, drives the master, keeps what was recorded."""
+"""Runs a system: to its end with simulate(), or step by step with simulate.session()."""
 
 import signal
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 
 from tqdm import tqdm
 
-from ..errors import InputError, SimulationError
-from ..fmi.fmi2 import FmuInstance
-from ..recording.result import Recorder, Result
+from ..errors import InputError, SimulationError, choices
+from ..fmi.instance import Instance
+from ..fmi.load import load
+from ..recording.dispatch import Dispatcher
+from ..recording.listener import Listener
+from ..recording.memory import MemoryListener
+from ..recording.result import Result
 from ..system.description import System
-from ..system.parts import NANOSECONDS
-from .fixed_step import Master
+from ..system.interface import Value
+from ..system.parts import NANOSECONDS, Component, Port
+from .engine import Engine
+from .master import Master
 
 LOOK = 0.1
-"""s of wall time between two looks at the progress bar, at Ctrl-C and for values not finite."""
+"""s of wall time between two looks at the progress bar and at Ctrl-C."""
 
 
-def simulate(
-    system: System,
-    *,
-    step: float | None = None,
-    stop: float | None = None,
-    scheme: str | None = None,
-    progress: bool = False,
-) -> Result:
-    """Run a system to its stop time and return every output at every communication point.
+class Session:
+    """A run that its user advances. Use as a context manager: leaving it ends and frees the FMUs."""
 
-    step and stop in s and the scheme replace those of the system. progress shows a bar on standard
-    error if that is a terminal. Ctrl-C ends the run early: the result is what was recorded, with
-    complete = False. InputError where an FMU does not load or refuses its parameters;
-    SimulationError, with what was recorded as its result, where one fails on the way.
-    """
-    system = system.with_experiment(step, stop, scheme)
-    with ExitStack() as stack:
-        instances = [
-            stack.enter_context(FmuInstance(c.name, c.interface)) for c in system.components
-        ]
-        master = Master(system, instances)
-        recorder = _recorder(master)
-        master.listeners.append(recorder)
-        master.initialise()
-        start = time.perf_counter()
-        failure: SimulationError | None = None
+    def __init__(
+        self,
+        system: System,
+        every: int = 1,
+        listeners: Sequence[Listener] = (),
+        engine: Engine = "auto",
+    ) -> None:
+        """Load and initialise; see simulate() for the arguments and errors."""
+        if isinstance(every, bool) or not isinstance(every, int) or every < 1:
+            raise InputError(f"every = {every!r}: must be a whole number from 1 on")
+        self.system = system
+        self._memory = MemoryListener(every)
+        self._wall_time = 0.0
+        self._stack = ExitStack()
         try:
-            complete = _drive(master, recorder, progress)
+            instances = [self._loaded(component) for component in system.components]
+            self._master = Master(system, instances, lambda *rows: self._dispatch(*rows), engine)
+            self._dispatch = Dispatcher(
+                system, self._master.slots, (self._memory, *listeners), every
+            )
+            self._stack.callback(lambda: self._dispatch.end(self.complete))
+            self._master.initialise()
+        except BaseException:
+            self._stack.close()
+            raise
+
+    def _loaded(self, component: Component) -> Instance:
+        instance = load(component)
+        self._stack.callback(instance.close)
+        return instance
+
+    def __enter__(self) -> "Session":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the session."""
+        self.close()
+
+    def close(self) -> None:
+        """End the listeners, terminate and free the FMUs. A closed session cannot step."""
+        self._stack.close()
+
+    @property
+    def time(self) -> float:
+        """The communication point reached, in s."""
+        return self._master.steps_done * self.system.step_ns / NANOSECONDS
+
+    @property
+    def complete(self) -> bool:
+        """Whether the stop time is reached."""
+        return self._master.steps_done == self._master.total_steps
+
+    def step(self, steps: int = 1) -> bool:
+        """Do a number of communication steps, fewer at the end; False if none was left to do.
+
+        SimulationError, with what was recorded as its result, where an FMU fails.
+        """
+        start = time.perf_counter()
+        try:
+            return self._master.advance(steps) > 0
         except SimulationError as error:
-            failure, complete = error, False
-        result = Result(
-            system,
-            recorder.time(system.step_ns),
-            recorder.signals(),
-            {s.name: s.unit for s in master.plan.signals},
-            time.perf_counter() - start,
-            complete,
+            self._wall_time += time.perf_counter() - start
+            start = time.perf_counter()
+            error.result = self.result()
+            raise
+        finally:
+            self._wall_time += time.perf_counter() - start
+
+    def __getitem__(self, name: str) -> float:
+        """The value now of an output or a wired input, by a name like 'plant.gap[1]'.
+
+        Booleans are 0.0 or 1.0. InputError where there is no such signal.
+        """
+        slots = self._master.slots
+        port = Port(*name.split(".", 1)) if "." in name else None
+        if port not in slots:
+            raise InputError(f"{name!r}: no such signal; valid: {choices(slots)}")
+        return float(self._master.values[slots[port]])
+
+    def set(self, name: str, value: Value) -> None:
+        """Set a tunable parameter or an input without a wire, from now on.
+
+        InputError where there is none of that name, or where the value does not fit.
+        """
+        self._master.scenario.set(name, value, self._master.steps_done)
+
+    def result(self) -> Result:
+        """What was recorded until now."""
+        self._dispatch.flush()
+        master, signals = self._master, self._dispatch.signals
+        return Result(
+            self.system,
+            self._memory.time,
+            self._memory.signals,
+            {s.name: s.unit for s in signals},
+            self._wall_time,
+            self.complete,
+            descriptions={s.name: s.description for s in signals},
+            rejections=dict(master.rejections),
+            log=(*master.log, *master.scenario.log),
         )
-    if failure:
-        failure.result = result
-        raise failure
-    return result
 
 
-def _recorder(master: Master) -> Recorder:
-    try:
-        return Recorder(master.plan, master.total_steps)
-    except MemoryError:
-        raise InputError(
-            f"{master.system.name}: {master.total_steps} steps do not fit into memory; "
-            "must have a longer step or an earlier stop"
-        ) from None
+class Simulate:
+    """simulate(): a whole run; simulate.session(): the same, step by step."""
+
+    def __call__(
+        self,
+        system: System,
+        *,
+        step: float | None = None,
+        stop: float | None = None,
+        scheme: str | None = None,
+        progress: bool = False,
+        every: int = 1,
+        listeners: Sequence[Listener] = (),
+        engine: Engine = "auto",
+    ) -> Result:
+        """Run a system to its stop time and return every output at every communication point.
+
+        step and stop in s and the scheme replace those of the system. progress shows a bar on
+        standard error if that is a terminal. every keeps only each n-th communication point, and
+        the last. listeners get what is kept while it is recorded. engine is "python", "compiled"
+        (needs numba) or "auto", compiled where numba is installed; the results have the same bits.
+        Ctrl-C ends the run early: the result is what was recorded, with complete = False.
+        InputError where an FMU does not load or refuses its parameters; SimulationError, with what
+        was recorded as its result, where one fails on the way.
+        """
+        system = system.with_experiment(step, stop, scheme)
+        with Session(system, every, listeners, engine) as session:
+            _drive(session, progress)
+            return session.result()
+
+    @staticmethod
+    def session(
+        system: System,
+        *,
+        step: float | None = None,
+        stop: float | None = None,
+        scheme: str | None = None,
+        every: int = 1,
+        listeners: Sequence[Listener] = (),
+        engine: Engine = "auto",
+    ) -> Session:
+        """A run that its user advances, for `with`; the arguments are those of simulate()."""
+        return Session(system.with_experiment(step, stop, scheme), every, listeners, engine)
 
 
-def _drive(master: Master, recorder: Recorder, progress: bool) -> bool:
-    """Step to the end; False where Ctrl-C came first."""
-    unit = master.system.step_ns / NANOSECONDS
+simulate = Simulate()
+
+
+def _drive(session: Session, progress: bool) -> None:
+    """Step to the end, or until Ctrl-C."""
+    total = session.system.stop_ns / NANOSECONDS
     with (
         _interrupts() as interrupted,
         tqdm(
-            total=round(master.total_steps * unit, 9),
+            total=total,
             unit="s",
             desc="simulated",
             disable=None if progress else True,
             bar_format="{l_bar}{bar}| {n:.2f}/{total:.2f} s [{elapsed}<{remaining}]",
         ) as bar,
     ):
-        chunk = 1
-        while master.steps_done < master.total_steps:
-            done, start = master.steps_done, time.perf_counter()
-            master.advance(chunk)
-            bar.update((master.steps_done - done) * unit)
-            chunk = max(1, min(2 * chunk, int(chunk * LOOK / (time.perf_counter() - start))))
-            recorder.check_finite(done)
-            if interrupted.is_set():
-                return False
-    return True
+        steps, start = 1, time.perf_counter()
+        while not interrupted.is_set() and session.step(steps):
+            bar.update(session.time - bar.n)
+            now = time.perf_counter()
+            steps = max(1, min(2 * steps, int(steps * LOOK / (now - start))))
+            start = now
 
 
 @contextmanager

@@ -4,14 +4,10 @@ import csv
 import io
 import json
 import math
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Iterator
 from importlib.resources import files
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
-
-from tqdm import tqdm
 
 from ..errors import InputError
 from ..figures.plot import draw_contact_forces, draw_contact_times, draw_targets, new_figure, save
@@ -19,6 +15,7 @@ from ..grasp import CASES
 from ..master.simulation import simulate
 from ..recording.result import write_text
 from ..study.metrics import FINGERS, time_at_gap
+from ..study.parallel import run_all
 from ..system.description import System
 from .claims import Run, Runs, check_claims
 from .report import markdown, table_csv
@@ -43,7 +40,7 @@ def evaluate(system: System, out: Path, workers: int, progress: bool) -> dict[st
     published = list(_published())
     conditions = sorted({row["condition"] for row in published})
     jobs = [(system, x_m, case) for x_m in conditions for case in CASES]
-    runs = {(r.x_m, r.case): r for r in _run_all(jobs, workers, progress)}
+    runs = {(r.x_m, r.case): r for r in run_all(_run, jobs, workers, progress, "grasps")}
     rows = [_row(row, runs) for row in published]
     report = {
         "rows": rows,
@@ -73,20 +70,6 @@ def _published() -> Iterator[dict[str, Any]]:
                     "published": float(line[f"case{case}_t{finger}"]),
                 }
             yield {**common, "finger": None, "published": float(line[f"case{case}_dt"])}
-
-
-def _run_all(
-    jobs: Sequence[tuple[System, float, int]], workers: int, progress: bool
-) -> Iterator[Run]:
-    bar = tqdm(total=len(jobs), desc="grasps", unit="run", disable=None if progress else True)
-    with bar, ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        try:
-            for run in pool.map(_run, jobs):
-                bar.update()
-                yield run
-        except BaseException:
-            pool.shutdown(cancel_futures=True)
-            raise
 
 
 def _run(job: tuple[System, float, int]) -> Run:

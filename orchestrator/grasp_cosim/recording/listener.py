@@ -1,18 +1,22 @@
 """What listens to a run: blocks of rows, one row per recorded communication point."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from ..system.description import System
+from ..system.parts import NANOSECONDS
 
 
 @dataclass(frozen=True, slots=True)
 class Signal:
-    """A recorded column: name like plant.gap[1], unit (None without one), kind, description."""
+    """A recorded column: name like plant.gap[1], unit (None without one), kind, description.
+
+    The kind is Real, Integer or Boolean.
+    """
 
     name: str
     unit: str | None
@@ -34,3 +38,26 @@ class Listener(Protocol):
 
     def end(self, complete: bool) -> None:
         """Called once after the last row, also after a failure (complete is then False)."""
+
+
+COLUMN: Mapping[str, type[np.generic]] = {
+    "Real": np.float64,
+    "Integer": np.int64,
+    "Boolean": np.bool_,
+}
+"""The element type of a column by its signal's kind."""
+
+
+def times(steps: npt.NDArray[np.int64], step_ns: int) -> npt.NDArray[np.float64]:
+    """The communication points in s: k * step_ns / 1e9."""
+    return steps * step_ns / NANOSECONDS
+
+
+def columns(
+    signals: Sequence[Signal], rows: npt.NDArray[np.float64]
+) -> dict[str, npt.NDArray[Any]]:
+    """The columns of rows by name, each of its signal's element type.
+
+    Real ones are views. An Integer is exact up to 2**53, as the rows are float64.
+    """
+    return {s.name: rows[:, i].astype(COLUMN[s.kind], copy=False) for i, s in enumerate(signals)}

@@ -4,7 +4,7 @@ import json
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -12,56 +12,25 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..errors import SimulationError
-from ..master.plan import REAL, Plan, Signal
 from ..study.metrics import grasp_metrics
 from ..system.description import System
 from ..system.parts import NANOSECONDS
+from .listener import Listener, Signal
+from .settings import settings
+
+KINDS = {"f": "Real", "i": "Integer", "b": "Boolean"}
+"""The kind of a signal by the kind of its column's element type."""
+
+PIECE = 8192
+"""Rows written at once."""
 
 
-class Recorder:
-    """A listener that copies the outputs at every step into tables of their final size."""
+@dataclass(frozen=True, slots=True)
+class Rejection:
+    """Steps of a component that its FMU discarded or ended early: how many, the first in s."""
 
-    def __init__(self, plan: Plan, steps: int) -> None:
-        self._plan = plan
-        reals = sum(s.kind in REAL for s in plan.signals)
-        self._reals = np.empty((steps + 1, reals))
-        self._integers = np.empty((steps + 1, len(plan.signals) - reals), np.int32)
-        self._sources = plan.reals[:reals], plan.integers[: len(plan.signals) - reals]
-        self.rows = 0
-
-    def __call__(self, step: int) -> None:
-        """Record the values of the given step."""
-        reals, integers = self._sources
-        self._reals[step] = reals
-        self._integers[step] = integers
-        self.rows = step + 1
-
-    def check_finite(self, since: int) -> None:
-        """SimulationError at the first value that is not finite from step since on; it is the
-        last one kept.
-        """
-        finite = np.isfinite(self._reals[since : self.rows])
-        if finite.all():
-            return
-        row = since + int(finite.all(axis=1).argmin())
-        self.rows = row + 1
-        for s in self._plan.signals:
-            if s.kind in REAL and not np.isfinite(value := self._reals[row, s.slot]):
-                raise SimulationError(f"{s.name} = {value} at step {row}: must be finite")
-
-    def time(self, step_ns: int) -> npt.NDArray[np.float64]:
-        """The recorded communication points in s: k·step, each correctly rounded."""
-        return np.arange(self.rows) * step_ns / NANOSECONDS
-
-    def signals(self) -> dict[str, npt.NDArray[Any]]:
-        """The recorded values of each output, booleans as bool."""
-        return {s.name: self._column(s) for s in self._plan.signals}
-
-    def _column(self, signal: Signal) -> npt.NDArray[Any]:
-        table = self._reals if signal.kind in REAL else self._integers
-        column = table[: self.rows, signal.slot]
-        return column.astype(bool) if signal.kind == "Boolean" else column
+    count: int
+    first: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +44,11 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     wall_time: float
     complete: bool
     """False where the run was interrupted or an FMU failed."""
+    descriptions: Mapping[str, str] = field(default_factory=dict)
+    rejections: Mapping[str, Rejection] = field(default_factory=dict)
+    """By component; only those that rejected steps."""
+    log: tuple[str, ...] = ()
+    """What is worth knowing about the run, a line each."""
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
         return self.signals[name]
@@ -93,7 +67,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
             **grasp_metrics(self.time, self.signals),
             "wall_time": self.wall_time,
             "real_time_factor": simulated / self.wall_time,
-            "steps": len(self.time) - 1,
+            "steps": int(self._steps[-1]),
             "scheme": self.system.scheme,
             "step": self.system.step_ns / NANOSECONDS,
             "stop": self.system.stop_ns / NANOSECONDS,
@@ -102,19 +76,57 @@ class Result(Mapping[str, npt.NDArray[Any]]):
 
     def to_csv(self, path: str | Path) -> None:
         """Write time and signals with full precision, a line per communication point."""
-        columns = [self.time, *self.signals.values()]
-        names = ",".join(f'"{name}"' for name in ("time", *self.signals))
-        rows = zip(*(column.tolist() for column in columns), strict=True)
-        lines = (",".join(map(_text, row)) for row in rows)
-        write_text(Path(path), "\n".join((names, *lines)) + "\n")
+        from .csv import CsvListener  # which needs this module
+
+        with in_one_piece(Path(path)) as part:
+            self._play(CsvListener(part))
+
+    def to_mdf(self, path: str | Path) -> None:
+        """Write an ASAM MDF 4 file with the units and the settings; InputError without asammdf."""
+        from .mdf import MdfListener  # which needs this module
+
+        with in_one_piece(Path(path)) as part:
+            self._play(MdfListener(part))
 
     def to_json(self, path: str | Path) -> None:
-        """Write the metrics, the units and the settings that led to them."""
-        settings = {
-            c.name: {"fmu": c.fmu.name, "values": dict(c.values)} for c in self.system.components
+        """Write the metrics and the settings() that led to them, then what is known by signal
+        (units, types, descriptions), the log, and the rejections by component.
+        """
+        report = {
+            **self.metrics,
+            **settings(self.system),
+            "units": dict(self.units),
+            "types": {name: str(column.dtype) for name, column in self.signals.items()},
+            "descriptions": dict(self.descriptions),
+            "log": list(self.log),
+            "rejections": {name: asdict(r) for name, r in self.rejections.items()},
         }
-        report = {**self.metrics, "units": dict(self.units), "components": settings}
         write_text(Path(path), json.dumps(report, indent=2) + "\n")
+
+    @cached_property
+    def _steps(self) -> npt.NDArray[np.int64]:
+        """The numbers of the recorded communication points."""
+        return np.rint(self.time * (NANOSECONDS / self.system.step_ns)).astype(np.int64)
+
+    def _play(self, listener: Listener) -> None:
+        """Have a listener hear the recorded run again."""
+        signals = [
+            Signal(
+                name, self.units[name], KINDS[column.dtype.kind], self.descriptions.get(name, "")
+            )
+            for name, column in self.signals.items()
+        ]
+        listener.begin(self.system, signals)
+        try:
+            for first in range(0, len(self.time), PIECE):
+                piece = slice(first, first + PIECE)
+                steps = self._steps[piece]
+                rows = np.empty((len(steps), len(signals)))
+                for i, column in enumerate(self.signals.values()):
+                    rows[:, i] = column[piece]
+                listener.block(steps, rows)
+        finally:
+            listener.end(self.complete)
 
     def plot(self, path: str | Path) -> None:
         """Draw the grasp as a PNG; InputError without matplotlib or without a gripper plant."""
@@ -139,7 +151,3 @@ def in_one_piece(path: Path) -> Iterator[Path]:
         part.replace(path)
     finally:
         part.unlink(missing_ok=True)
-
-
-def _text(value: float | int | bool) -> str:
-    return repr(value) if isinstance(value, float) else str(int(value))

@@ -20,6 +20,17 @@ _PER_FINGER = ("position", "velocity", "gap", "contact_force", "contact")
 STEADY_WINDOW = 0.1
 """The steady contact force is the mean over the last so many seconds."""
 
+LABELS = (
+    ("time to contact", "time_to_contact", 1.0, "s"),
+    ("time difference", "time_difference", 1.0, "s"),
+    ("impact velocity", "impact_velocity", 1e3, "mm/s"),
+    ("peak contact force", "peak_contact_force", 1.0, "N"),
+    ("steady contact force", "steady_contact_force", 1.0, "N"),
+    ("target position", "target_position", 1e3, "mm"),
+    ("object shift", "object_shift", 1e3, "mm"),
+)
+"""The metrics as they are shown: label, name, factor and unit."""
+
 
 def is_grasp(signals: Iterable[str]) -> bool:
     """Whether signals of these names are those of a gripper plant and its controller."""

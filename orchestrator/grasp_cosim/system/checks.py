@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from ..errors import InputError, choices
-from .parts import NANOSECONDS, Port, Wire
+from .interface import SUPPORTED, Variable, limits
+from .parts import LOOPS, NANOSECONDS, Port, Wire
+from .units import conversion
 
 if TYPE_CHECKING:
     from .description import System
@@ -14,23 +17,9 @@ if TYPE_CHECKING:
 def check_wires(system: System) -> None:
     """InputError at the first wire or input that is not as it must be."""
     sources: dict[Port, Wire] = {}
-    for i, wire in enumerate(system.wires):
-        place = f"{system.name}: wires[{i}] '{wire.source} -> {wire.target}'"
-        kinds = []
-        for port, causality in ((wire.source, "output"), (wire.target, "input")):
-            interface = system.component(port.component, place).interface
-            valid = [v.name for v in interface.of(causality)]
-            if port.variable not in valid:
-                raise InputError(
-                    f"{place}: {port.component} has no {causality} {port.variable!r}; "
-                    f"valid: {choices(valid)}"
-                )
-            kinds.append(interface.by_name[port.variable].kind)
-        if kinds[0] != kinds[1] or kinds[0] == "String":
-            raise InputError(
-                f"{place}: {wire.source} is {kinds[0]} and {wire.target} is {kinds[1]}; "
-                "must be both Real, both Integer or both Boolean"
-            )
+    for wire in system.wires:
+        place = _place(system, wire)
+        wire_transform(system, wire)
         if wire.target.variable in system.component(wire.target.component, place).values:
             raise InputError(
                 f"{place}: {wire.target} has two sources, the wire and a value; must have one"
@@ -47,11 +36,145 @@ def check_wires(system: System) -> None:
     for component in system.components:
         for variable in component.interface.of("input"):
             port = Port(component.name, variable.name)
-            if port not in sources and variable.name not in component.values:
+            given = port in sources or variable.name in component.values
+            if variable.supported and not given:
                 raise InputError(
                     f"{system.name}: input {port} has no source; wire one of {choices(outputs)} "
                     f"to it, or give it a value: --set {port}=VALUE, or in the system file"
                 )
+
+
+def wire_transform(system: System, wire: Wire) -> tuple[float, float]:
+    """Factor and offset of a wire, (1.0, 0.0) for the identity.
+
+    What the wire declares, or else the conversion between the units of its ends. InputError where
+    an end does not exist, and where values cannot be passed from one end to the other.
+    """
+    place = _place(system, wire)
+    source, target = (_end(system, wire, causality) for causality in ("output", "input"))
+    _check_types(system, wire, source, target)
+    if wire.factor is not None or wire.offset is not None:
+        return _declared(place, wire, target)
+    if source.unit is None or target.unit is None or source.unit == target.unit:
+        return 1.0, 0.0
+    units = [
+        system.component(port.component, place).interface.units.get(v.unit or "")
+        for port, v in ((wire.source, source), (wire.target, target))
+    ]
+    ends = f"{place}: {wire.source} is in {source.unit} and {wire.target} in {target.unit}"
+    advice = (
+        f'{{ from = "{wire.source}", to = "{wire.target}", factor = ... }} '
+        f"gives the factor from {source.unit} to {target.unit}"
+    )
+    if units[0] is None or units[1] is None:
+        raise InputError(f"{ends}, which their FMUs do not define in SI units; {advice}")
+    found = conversion(units[0], units[1])
+    if found is None:
+        raise InputError(
+            f"{ends}, which cannot be converted; must be the same quantity, or {advice}"
+        )
+    return found
+
+
+def remarks(system: System) -> tuple[str, ...]:
+    """What a user should know of a system that is valid, a line each.
+
+    Values that lose digits, units that cannot be compared, variables that are left alone.
+    """
+    lines = []
+    for wire in system.wires:
+        source, target = (_end(system, wire, causality) for causality in ("output", "input"))
+        arrow = f"{wire.source} -> {wire.target}"
+        if target.type == "Float32" and source.type != "Float32":
+            lines.append(f"{arrow}: from {source.type} to Float32, rounded to 7 digits")
+        if target.kind == "Real" and wire.factor is None and wire.offset is None:
+            missing = [
+                str(port)
+                for port, v in ((wire.source, source), (wire.target, target))
+                if v.unit is None
+            ]
+            if len(missing) == 1:
+                unit = source.unit or target.unit
+                lines.append(f"{arrow}: {missing[0]} has no unit, taken to be in {unit}")
+    for component in system.components:
+        for variable in component.interface.of("input", "output"):
+            if not variable.supported:
+                port = Port(component.name, variable.name)
+                left = "keeps its start value" if variable.causality == "input" else "not recorded"
+                lines.append(f"{port} is of type {variable.nature}: {left}")
+    return tuple(lines)
+
+
+def _place(system: System, wire: Wire) -> str:
+    return f"{system.name}: wires[{system.wires.index(wire)}] '{wire.source} -> {wire.target}'"
+
+
+def _end(system: System, wire: Wire, causality: str) -> Variable:
+    """The variable at the end of a wire that has the causality."""
+    place = _place(system, wire)
+    port = wire.source if causality == "output" else wire.target
+    interface = system.component(port.component, place).interface
+    valid = [v.name for v in interface.of(causality)]
+    if port.variable not in valid:
+        raise InputError(
+            f"{place}: {port.component} has no {causality} {port.variable!r}; "
+            f"valid: {choices(valid)}"
+        )
+    return interface.by_name[port.variable]
+
+
+def _check_types(system: System, wire: Wire, source: Variable, target: Variable) -> None:
+    """InputError where the target's type does not hold what the source puts out."""
+    place = _place(system, wire)
+    for port, variable in ((wire.source, source), (wire.target, target)):
+        if not variable.supported:
+            raise InputError(
+                f"{place}: {port} is of type {variable.nature}, which is not supported; "
+                f"must be {choices(SUPPORTED)}, no array"
+            )
+    types = f"{place}: {wire.source} is {source.type} and {wire.target} is {target.type}"
+    if (source.kind, target.kind) == ("Integer", "Real"):
+        if target.type == "Float32" and not _holds_singles(system, wire, source):
+            raise InputError(f"{types}, which does not hold all its values; must be Float64")
+    elif source.kind != target.kind:
+        raise InputError(
+            f"{types}; must be both Real, both Integer, both Boolean or both String, "
+            "or from Integer to Real"
+        )
+    elif source.kind == "Integer":
+        low, high = _limits(system, wire.target, target)
+        least, most = _limits(system, wire.source, source)
+        if not low <= least <= most <= high:
+            raise InputError(
+                f"{types}, which does not hold all its values; must be a type that holds "
+                f"{least} to {most}"
+            )
+
+
+def _limits(system: System, port: Port, variable: Variable) -> tuple[float, float]:
+    version = system.component(port.component, str(port)).interface.version
+    return limits(variable.type, version)
+
+
+def _holds_singles(system: System, wire: Wire, source: Variable) -> bool:
+    """Whether a Float32 holds every value of an integer exactly."""
+    low, high = _limits(system, wire.source, source)
+    return -(2**24) <= low <= high <= 2**24
+
+
+def _declared(place: str, wire: Wire, target: Variable) -> tuple[float, float]:
+    factor = 1.0 if wire.factor is None else float(wire.factor)
+    offset = 0.0 if wire.offset is None else float(wire.offset)
+    if not factor or not math.isfinite(factor):
+        raise InputError(f"{place}: factor = {factor!r}: must be a finite number other than 0")
+    if not math.isfinite(offset):
+        raise InputError(f"{place}: offset = {offset!r}: must be a finite number")
+    if target.kind != "Real" and (factor, offset) != (1.0, 0.0):
+        raise InputError(
+            f"{place}: factor = {factor!r}, offset = {offset!r}: {wire.target} is {target.type}; "
+            "must be Real to be scaled"
+        )
+    return factor, offset
 
 
 def check_steps(system: System) -> None:
@@ -77,3 +200,20 @@ def check_steps(system: System) -> None:
                 f"{system.name}: {component.name}: step = {own / NANOSECONDS:.9g} s does not "
                 f"divide stop = {stop:.9g} s; must end with a whole step"
             )
+
+
+def check_initialisation(system: System) -> None:
+    """InputError where an option of the initialisation is not as it must be."""
+    place, chosen = f"{system.name}: [initialisation]", system.initialisation
+    if chosen.loops not in LOOPS:
+        raise InputError(f"{place}: loops = {chosen.loops!r}: must be one of {choices(LOOPS)}")
+    number = isinstance(chosen.tolerance, float | int) and not isinstance(chosen.tolerance, bool)
+    if not number or not 0.0 < chosen.tolerance < 1.0:
+        raise InputError(
+            f"{place}: tolerance = {chosen.tolerance!r}: must be a number between 0 and 1"
+        )
+    whole = isinstance(chosen.iterations, int) and not isinstance(chosen.iterations, bool)
+    if not whole or chosen.iterations < 1:
+        raise InputError(
+            f"{place}: iterations = {chosen.iterations!r}: must be a whole number, at least 1"
+        )

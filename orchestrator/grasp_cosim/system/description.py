@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from ..errors import InputError, choices
-from .checks import check_steps, check_wires
+from .checks import check_initialisation, check_steps, check_wires
 from .interface import Value
 from .parts import NANOSECONDS, Component, Event, Fault, Initialisation, Wire
+from .scenario_checks import check_scenario
 
 Scheme = Literal["sequential", "jacobi"]
 SCHEMES: tuple[str, ...] = get_args(Scheme)
@@ -40,6 +41,8 @@ class System:
             for name, value in component.values.items():
                 component.interface.parse(f"{self.name}: {component.name}.{name}", name, value)
         check_wires(self)
+        check_scenario(self)
+        check_initialisation(self)
 
     @classmethod
     def load(cls, path: str | Path, fmus: str | Path | None = None) -> "System":
@@ -108,10 +111,17 @@ class System:
         )
 
 
-def in_nanoseconds(place: str, seconds: Any) -> int:
-    """A time in s as a whole number of nanoseconds; InputError where it is none."""
+def in_nanoseconds(place: str, seconds: Any, zero: bool = False) -> int:
+    """A time in s as a whole number of nanoseconds; InputError where it is none.
+
+    With zero, it may be 0.
+    """
     if isinstance(seconds, bool) or not isinstance(seconds, float | int):
         raise InputError(f"{place} = {seconds!r} s: must be a number")
+    if zero and seconds == 0.0:
+        return 0
+    if zero and not 0.0 < seconds <= LONGEST:
+        raise InputError(f"{place} = {seconds!r} s: must be a number from 0 to {LONGEST:g}")
     if not 0.0 < seconds <= LONGEST:
         raise InputError(
             f"{place} = {seconds!r} s: must be a number greater than 0, at most {LONGEST:g}"

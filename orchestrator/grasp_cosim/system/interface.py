@@ -1,19 +1,42 @@
-"""What an FMU declares: its variables, as FMPy reads and validates them."""
+"""What an FMU declares: its variables, units and capabilities."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Literal
-
-import fmpy
+from typing import Any, Literal, get_args
+from xml.etree import ElementTree
 
 from ..errors import InputError, check_fmu_file, choices
-from .units import Unit
+from .model_description import FROM_TYPE, read_description
+from .units import BASE, Unit
 
 Value = float | int | bool | str
-Kind = Literal["Real", "Integer", "Boolean", "String"]
+Kind = Literal["Real", "Integer", "Boolean", "String", "Binary", "Clock"]
+KINDS: tuple[str, ...] = get_args(Kind)
+SUPPORTED = ("Real", "Integer", "Boolean", "String")
+"""The kinds a master can set, wire and record; it leaves the others alone."""
+
+SETTABLE = ("input", "parameter", "structuralParameter")
+_WHOLE = {
+    f"{prefix}Int{bits}": (
+        (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) if not prefix else (0, 2**bits - 1)
+    )
+    for prefix in ("", "U")
+    for bits in (8, 16, 32, 64)
+}
+LARGEST_SINGLE = (2.0 - 2.0**-23) * 2.0**127
+"""The largest finite Float32."""
+
+
+def limits(fmi_type: str, version: str) -> tuple[float, float]:
+    """The smallest and largest value of a numeric FMI type in a version; exact for integers."""
+    if fmi_type in ("Integer", "Enumeration"):
+        return _WHOLE["Int64" if version.startswith("3") else "Int32"]
+    if fmi_type == "Float32":
+        return -LARGEST_SINGLE, LARGEST_SINGLE
+    return _WHOLE.get(fmi_type, (-math.inf, math.inf))
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +45,8 @@ class Variable:
 
     type is the FMI type (Real, Float32, Int8, ...), kind what the system makes of it. dependencies
     are the inputs an output depends on directly, None where that is not declared, which means all;
-    initial_dependencies the same in initialisation mode. shape is () but for an array.
+    initial_dependencies the same in initialisation mode. shape is () but for an array. low and high
+    are what is declared; beyond that a value must fit into its type.
     """
 
     name: str
@@ -38,6 +62,17 @@ class Variable:
     dependencies: tuple[str, ...] | None = None
     initial_dependencies: tuple[str, ...] | None = None
     shape: tuple[int, ...] = ()
+    description: str = ""
+
+    @property
+    def supported(self) -> bool:
+        """Whether a master can set, wire and record it."""
+        return self.kind in SUPPORTED and not self.shape
+
+    @property
+    def nature(self) -> str:
+        """Its type in words, as of what is not supported: array of Float64, Binary, Clock."""
+        return f"array of {self.type}" if self.shape else self.type
 
 
 @dataclass(frozen=True)
@@ -56,6 +91,8 @@ class Interface:
     """Whether the communication step may vary."""
     python: bool = False
     """Whether it was made with pythonfmu: its binary calls Python, and keeps the GIL."""
+    early_return: bool = False
+    """Whether a step may end early, FMI 3.0."""
 
     @cached_property
     def by_name(self) -> dict[str, Variable]:
@@ -66,10 +103,15 @@ class Interface:
         """The variables of the given causalities, in the order of declaration."""
         return [v for v in self.variables if v.causality in causalities]
 
-    def renamed(self, rename: Mapping[str, str]) -> "Interface":
-        """The same under other names: rename maps a new name to the FMU's own."""
+    def renamed(self, rename: Mapping[str, str], place: str = "rename") -> "Interface":
+        """The same under other names: rename maps a new name to the FMU's own.
+
+        place says where the table comes from. InputError where an own name does not exist or is
+        renamed twice, or a new one is taken.
+        """
         if not rename:
             return self
+        self._check_names(rename, place)
         names = {own: new for new, own in rename.items()}
 
         def new_names(listed: tuple[str, ...] | None) -> tuple[str, ...] | None:
@@ -86,22 +128,48 @@ class Interface:
         )
         return replace(self, variables=tuple(variables))
 
+    def _check_names(self, rename: Mapping[str, str], place: str) -> None:
+        first: dict[str, str] = {}
+        for new, own in rename.items():
+            entry = f"{place}: {new!r} = {own!r}"
+            if own not in self.by_name:
+                raise InputError(
+                    f"{entry}: {self.path.name} has no variable {own!r}; "
+                    f"valid: {choices(self.by_name)}"
+                )
+            if own in first:
+                raise InputError(
+                    f"{entry}: {own!r} is renamed to {first[own]!r} already; must have one name"
+                )
+            first[own] = new
+        for new, own in rename.items():
+            if new in self.by_name and new not in first:
+                raise InputError(
+                    f"{place}: {new!r} = {own!r}: {self.path.name} has a variable {new!r} itself; "
+                    "must be a name that is free, or rename that one, too"
+                )
+
     def parse(self, place: str, name: str, value: Value, text: bool = False) -> Value:
         """The value for input or parameter name, checked against type, range and finiteness.
 
         place names where the value comes from. With text, a string may stand for a number or a
         boolean, as on a command line.
         """
-        settable = [v.name for v in self.of("input", "parameter")]
+        settable = [v.name for v in self.of(*SETTABLE)]
         if name not in settable:
             raise InputError(
                 f"{place}: {self.path.name} has no input or parameter {name!r}; "
                 f"valid: {choices(settable)}"
             )
         variable = self.by_name[name]
+        if not variable.supported:
+            raise InputError(
+                f"{place}: {name} = {value!r}: {name} is of type {variable.nature}, which cannot "
+                "be set; must be left out, it keeps the start value of its FMU"
+            )
         converted = None
         if text or variable.kind == "String" or not isinstance(value, str):
-            converted = _convert(variable, value)
+            converted = _convert(variable, value, self.version)
         if converted is None:
             raise InputError(f"{place}: {name} = {value!r}: must be {_expected(variable)}")
         return converted
@@ -109,23 +177,28 @@ class Interface:
 
 @lru_cache(maxsize=64)
 def _read(path: Path, modified: int) -> Interface:
+    model, root, files = read_description(path)
+    version = model.fmiVersion
+    if version.partition(".")[0] not in ("2", "3"):
+        raise InputError(f"{path}: FMI {version}; must be an FMI 2.0 or 3.0 co-simulation FMU")
+    if model.coSimulation is None:
+        kind = "model exchange" if model.modelExchange else "scheduled execution"
+        raise InputError(f"{path}: for {kind} only; must be a co-simulation FMU")
     try:
-        description = fmpy.read_model_description(path, validate=False)
-        if description.fmiVersion == "2.0":
-            description = fmpy.read_model_description(path)
-    except Exception as error:  # FMPy raises whatever its XML and ZIP libraries do
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise InputError(f"{path}: not a readable FMU: {reason}") from error
-    if description.fmiVersion != "2.0":
-        version = description.fmiVersion
-        raise InputError(f"{path}: FMI {version}; must be an FMI 2.0 co-simulation FMU")
-    if description.coSimulation is None:
-        raise InputError(f"{path}: for model exchange only; must be a co-simulation FMU")
+        variables, units = tuple(_variables(model, root)), tuple(_units(root))
+    except ValueError as error:
+        raise InputError(f"{path}: not a readable FMU: {error}") from error
     return Interface(
         path,
-        description.guid,
-        description.coSimulation.modelIdentifier,
-        tuple(_variable(v) for v in description.modelVariables),
+        model.guid or "",
+        model.coSimulation.modelIdentifier,
+        variables,
+        version,
+        {unit.name: unit for unit in units},
+        model.coSimulation.canGetAndSetFMUstate,
+        model.coSimulation.canHandleVariableCommunicationStepSize,
+        "resources/slavemodule.txt" in files,
+        model.coSimulation.mightReturnEarlyFromDoStep,
     )
 
 
@@ -135,26 +208,84 @@ def read_interface(path: Path) -> Interface:
     return _read(path.resolve(), path.stat().st_mtime_ns)
 
 
-def _variable(v: fmpy.model_description.ScalarVariable) -> Variable:
-    declared = v.declaredType
-    kind: Kind = "Integer" if v.type == "Enumeration" else v.type
-    low, high, unit = (
-        getattr(v, key) or (getattr(declared, key, None) if declared else None)
-        for key in ("min", "max", "unit")
-    )
+def _units(root: ElementTree.Element) -> Iterator[Unit]:
+    """The units that are defined in terms of the SI base units."""
+    for element in root.iterfind("UnitDefinitions/Unit"):
+        base = element.find("BaseUnit")
+        if base is None:
+            continue
+        name = element.get("name", "")
+        factor, offset = float(base.get("factor", "1")), float(base.get("offset", "0"))
+        if not factor or not math.isfinite(factor) or not math.isfinite(offset):
+            raise ValueError(f"unit {name!r}: factor = {factor:g}, offset = {offset:g}")
+        yield Unit(name, tuple(int(base.get(key, "0")) for key in BASE), factor, offset)
+
+
+def _variables(model: Any, root: ElementTree.Element) -> Iterator[Variable]:
+    """The variables; of an input's alias names none, as an input has one source."""
+    elements = {e.get("name"): e for e in root.iterfind("ModelVariables/*")}
+    inputs = tuple(v.name for v in model.modelVariables if v.causality == "input" and not v.alias)
+    now = _dependencies(model.outputs, inputs, None)
+    initially = _dependencies(model.initialUnknowns, inputs, inputs)
+    for v in model.modelVariables:
+        if v.alias is None or v.causality != "input":
+            own = (v.alias or v).name
+            yield _variable(v, elements[own], now.get(own), initially.get(own))
+
+
+def _dependencies(
+    unknowns: Any, inputs: tuple[str, ...], undeclared: tuple[str, ...] | None
+) -> dict[str, tuple[str, ...] | None]:
+    """By name of an unknown, the inputs it depends on; undeclared where the FMU does not say."""
+    found = {}
+    for unknown in unknowns:
+        names = {v.name for v in unknown.dependencies or ()}
+        declared = tuple(name for name in inputs if name in names)
+        found[unknown.variable.name] = undeclared if unknown.dependencies is None else declared
+    return found
+
+
+def _variable(
+    v: Any,
+    element: ElementTree.Element,
+    dependencies: tuple[str, ...] | None,
+    initial_dependencies: tuple[str, ...] | None,
+) -> Variable:
+    declared = {
+        key: getattr(v, key) or element.get(key) or getattr(v.declaredType, key, None)
+        for key in FROM_TYPE
+    }
+    kind = _kind(v.type)
+    numeric = kind in ("Real", "Integer")
+    low, high = (declared[key] if numeric else None for key in ("min", "max"))
     return Variable(
         v.name,
         kind,
         v.causality or "local",
         v.valueReference,
-        unit,
+        declared["unit"],
         v.start,
         -math.inf if low is None else float(low),
         math.inf if high is None else float(high),
+        v.type,
+        v.variability,
+        dependencies,
+        initial_dependencies,
+        tuple(v.shape or ()),
+        v.description or "",
     )
 
 
-def _convert(variable: Variable, value: Value) -> Value | None:
+def _kind(fmi_type: str) -> Kind:
+    """What the system makes of an FMI type."""
+    if fmi_type in ("Real", "Float64", "Float32"):
+        return "Real"
+    if fmi_type in KINDS:
+        return fmi_type  # type: ignore[return-value]
+    return "Integer"
+
+
+def _convert(variable: Variable, value: Value, version: str) -> Value | None:
     """The value in the variable's type, or None where it does not fit."""
     if variable.kind == "String":
         return value if isinstance(value, str) else None
@@ -164,15 +295,32 @@ def _convert(variable: Variable, value: Value) -> Value | None:
         return value if isinstance(value, bool) else None
     if isinstance(value, bool):
         return None
+    number = _whole(value) if variable.kind == "Integer" else _real(value)
+    if number is None or not math.isfinite(number):
+        return None
+    low, high = limits(variable.type, version)
+    fits = low <= number <= high and variable.low <= number <= variable.high
+    return number if fits else None
+
+
+def _real(value: float | int | str) -> float | None:
     try:
-        number = float(value)
+        return float(value)
     except (ValueError, OverflowError):
         return None
-    if not math.isfinite(number) or not variable.low <= number <= variable.high:
-        return None
-    if variable.kind == "Integer":
-        return int(number) if number == int(number) else None
-    return number
+
+
+def _whole(value: float | int | str) -> int | None:
+    """Exact, also where a float is not; 3.0 and "3.0" are whole, too."""
+    try:
+        return int(value) if isinstance(value, int | str) else _whole_float(value)
+    except ValueError:
+        number = _real(value)
+        return None if number is None else _whole_float(number)
+
+
+def _whole_float(number: float) -> int | None:
+    return int(number) if number.is_integer() else None
 
 
 def _expected(variable: Variable) -> str:
@@ -181,6 +329,8 @@ def _expected(variable: Variable) -> str:
     if variable.kind == "String":
         return "a string"
     noun = "a whole number" if variable.kind == "Integer" else "a finite number"
+    if variable.type not in ("Real", "Float64", "Integer"):
+        noun = f"{noun} of type {variable.type}"
     unit = f" {variable.unit}" if variable.unit else ""
     if math.isinf(variable.low) and math.isinf(variable.high):
         return f"{noun}{f' in{unit}' if unit else ''}"

@@ -11,11 +11,21 @@ from .interface import Interface, Value, read_interface
 
 Isolation = Literal["none", "process"]
 ISOLATIONS: tuple[str, ...] = get_args(Isolation)
-Relation = Literal["<", "<=", ">", ">="]
+Relation = Literal["<", "<=", ">", ">=", "==", "!="]
 RELATIONS: tuple[str, ...] = get_args(Relation)
 FaultKind = Literal["stuck", "dropout", "bias", "noise", "delay", "saturation", "quantisation"]
 FAULTS: tuple[str, ...] = get_args(FaultKind)
+RANDOM = ("dropout", "noise")
+Loops = Literal["iterate", "refuse"]
+LOOPS: tuple[str, ...] = get_args(Loops)
 NANOSECONDS = 1_000_000_000
+
+
+def literal(value: Value) -> str:
+    """A value as the system file writes it."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return float.__repr__(value) if isinstance(value, float) else repr(value)
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +48,7 @@ class Component:
     @property
     def interface(self) -> Interface:
         """What the FMU declares, under the system's names."""
-        return read_interface(self.fmu).renamed(self.rename)
+        return read_interface(self.fmu).renamed(self.rename, f"{self.name}: rename")
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,19 +77,25 @@ class Wire:
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """An output compared with a constant, like plant.gap[1] < 0.01."""
+    """An output compared with a constant, like plant.gap[1] < 0.01 or plant.contact[1] == true.
+
+    value is in the output's unit. It holds or not at a communication point, by the outputs there.
+    """
 
     port: Port
     relation: Relation
     value: float
 
+    def __str__(self) -> str:
+        return f"{self.port} {self.relation} {literal(self.value)}"
+
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Sets tunable parameters or unwired inputs, once.
+    """Sets tunable parameters or unwired inputs, once, before the step from a communication point.
 
-    At the first communication point at or after at_ns, or the first one where the condition holds.
-    Exactly one of the two is given.
+    That is the first one at or after at_ns, or the first one where the condition holds; exactly one
+    of the two is given. Of components with a step of their own only their own points count.
     """
 
     set: Mapping[Port, Value]
@@ -89,9 +105,11 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """What a wire does to the values it passes on, from start_ns until end_ns (None: the end).
+    """What a wire does to the values it passes on, in the steps from t >= start_ns to t < end_ns.
 
-    The wire is named by its target. parameters depend on the kind, seed is that of a random one.
+    end_ns is None where there is no end. With a condition it begins where that holds first in this
+    window, and stays. The wire is named by its target. What the kinds do and their parameters:
+    scenario.py. seed is that of a random kind.
     """
 
     target: Port
@@ -100,12 +118,13 @@ class Fault:
     start_ns: int = 0
     end_ns: int | None = None
     seed: int = 0
+    when: Condition | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Initialisation:
     """How algebraic loops at t = 0 are solved: refused, or iterated to a relative tolerance."""
 
-    loops: Literal["iterate", "refuse"] = "iterate"
+    loops: Loops = "iterate"
     tolerance: float = 1e-10
     iterations: int = 50

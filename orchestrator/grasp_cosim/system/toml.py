@@ -10,19 +10,32 @@
     [components.plant]              # the order of the components is the order of execution
     fmu = "GripperPlant.fmu"        # relative to the TOML file
     values = { object_width = 0.07 }
+    step = 5e-4                     # s, where it differs: a whole multiple of the experiment's step
+    rename = { "gap[1]" = "Gap1" }  # the system's name = the FMU's, where they differ
+    isolation = "process"           # in a process of its own; or "none"
 
-Every input has exactly one source: a wire or a value.
+A wire that scales is a table: { from = "a.x", to = "b.y", factor = 1000.0, offset = 0.0 }. Without
+factor and offset, units that differ are converted.
+
+    [initialisation]                # may be left out, as each of its entries
+    loops = "iterate"               # what to do with an algebraic loop at t = 0; or "refuse"
+    tolerance = 1e-10               # relative, of the iteration
+    iterations = 50                 # at most
+
+Every input has exactly one source: a wire or a value. [[events]] and [[faults]]: see scenario.py.
 """
 
 import tomllib
-from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from ..errors import InputError, choices
 from .description import System, as_scheme, in_nanoseconds
-from .parts import Component, Port, Wire
+from .interface import read_interface
+from .parts import ISOLATIONS, Component, Initialisation, Isolation, Port, Wire
+from .scenario import read_events, read_faults
+from .tables import as_table, check_keys
 
 
 def read_toml(path: Path, fmus: Path | None = None) -> System:
@@ -37,56 +50,95 @@ def read_toml(path: Path, fmus: Path | None = None) -> System:
 
 
 def _from_table(place: str, table: dict[str, Any], folder: Path) -> System:
-    _check_keys(place, table, {"experiment", "components", "wires"})
-    experiment = _table(f"{place}: [experiment]", table.get("experiment"))
-    _check_keys(f"{place}: [experiment]", experiment, {"step", "stop", "scheme"})
-    components = _table(f"{place}: [components]", table.get("components"))
-    wires = table.get("wires", [])
-    if not isinstance(wires, list):
-        raise InputError(f"{place}: wires = {wires!r}: must be a list of 'output -> input'")
+    check_keys(
+        place, table, {"experiment", "components", "wires", "initialisation", "events", "faults"}
+    )
+    experiment = as_table(f"{place}: [experiment]", table.get("experiment"))
+    check_keys(f"{place}: [experiment]", experiment, {"step", "stop", "scheme"})
+    components = as_table(f"{place}: [components]", table.get("components"))
+    texts = table.get("wires", [])
+    if not isinstance(texts, list):
+        raise InputError(f"{place}: wires = {texts!r}: must be a list of 'output -> input'")
+    wires = tuple(_wire(f"{place}: wires[{i}]", text) for i, text in enumerate(texts))
     return System(
         place,
         tuple(_component(place, name, entry, folder) for name, entry in components.items()),
-        tuple(_wire(f"{place}: wires[{i}]", text) for i, text in enumerate(wires)),
+        wires,
         in_nanoseconds(f"{place}: experiment.step", experiment.get("step")),
         in_nanoseconds(f"{place}: experiment.stop", experiment.get("stop")),
         as_scheme(f"{place}: experiment.scheme", experiment.get("scheme", "sequential")),
+        read_events(place, table.get("events", [])),
+        read_faults(place, table.get("faults", []), wires),
+        read_initialisation(f"{place}: [initialisation]", table.get("initialisation", {})),
     )
+
+
+def read_initialisation(place: str, table: Any) -> Initialisation:
+    """The options of the initialisation; a System checks their values."""
+    table = as_table(place, table)
+    check_keys(place, table, Initialisation.__slots__)
+    return Initialisation(**table)
 
 
 def _component(place: str, name: str, entry: Any, folder: Path) -> Component:
     place = f"{place}: [components.{name}]"
-    entry = _table(place, entry)
-    _check_keys(place, entry, {"fmu", "values"})
+    entry = as_table(place, entry)
+    check_keys(place, entry, {"fmu", "values", "step", "rename", "isolation"})
     fmu = entry.get("fmu")
     if not isinstance(fmu, str):
         raise InputError(f"{place}: fmu = {fmu!r}: must be the path of an FMU, as a string")
-    values = _table(f"{place}: values", entry.get("values", {}))
+    values = as_table(f"{place}: values", entry.get("values", {}))
     for key, value in values.items():
         if not isinstance(value, float | int | bool | str):
             raise InputError(
                 f"{place}: values.{key} = {value!r}: must be a number, boolean or string"
             )
-    component = Component(name, folder / fmu, {})
+    own = entry.get("step")
+    component = Component(
+        name,
+        folder / fmu,
+        {},
+        _rename(f"{place}: rename", folder / fmu, entry.get("rename", {})),
+        None if own is None else in_nanoseconds(f"{place}: step", own),
+        _isolation(f"{place}: isolation", entry.get("isolation", "none")),
+    )
     parsed = {k: component.interface.parse(f"{place}: values", k, v) for k, v in values.items()}
     return replace(component, values=parsed)
 
 
-def _wire(place: str, text: Any) -> Wire:
-    parts = [part.strip() for part in text.split("->")] if isinstance(text, str) else []
-    ports = [Port(*part.split(".", 1)) for part in parts if "." in part]
-    if len(parts) != 2 or len(ports) != 2:
-        raise InputError(f"{place}: {text!r}: must be 'component.output -> component.input'")
-    return Wire(ports[0], ports[1])
+def _rename(place: str, fmu: Path, table: Any) -> dict[str, str]:
+    """The table of names, each of which the FMU knows."""
+    names = as_table(place, table)
+    for new, own in names.items():
+        if not isinstance(own, str):
+            raise InputError(f"{place}: {new!r} = {own!r}: must be a variable of the FMU, a string")
+    read_interface(fmu).renamed(names, place)
+    return names
 
 
-def _table(place: str, value: Any) -> dict[str, Any]:
-    if not isinstance(value, dict):
-        raise InputError(f"{place}: missing; must be a table")
-    return value
+def _isolation(place: str, name: Any) -> Isolation:
+    if name not in ISOLATIONS:
+        raise InputError(f"{place} = {name!r}: must be one of {choices(ISOLATIONS)}")
+    return name  # type: ignore[no-any-return]
 
 
-def _check_keys(place: str, table: Mapping[str, Any], valid: Iterable[str]) -> None:
-    for key in table:
-        if key not in valid:
-            raise InputError(f"{place}: unknown entry {key!r}; valid: {choices(sorted(valid))}")
+def _wire(place: str, entry: Any) -> Wire:
+    if not isinstance(entry, dict):
+        parts = [part.strip() for part in entry.split("->")] if isinstance(entry, str) else []
+        ports = [Port(*part.split(".", 1)) for part in parts if "." in part]
+        if len(parts) != 2 or len(ports) != 2:
+            raise InputError(f"{place}: {entry!r}: must be 'component.output -> component.input'")
+        return Wire(ports[0], ports[1])
+    check_keys(place, entry, {"from", "to", "factor", "offset"})
+    for key in ("factor", "offset"):
+        number = entry.get(key, 0.0)
+        if isinstance(number, bool) or not isinstance(number, float | int):
+            raise InputError(f"{place}: {key} = {number!r}: must be a number")
+    source, target = (_port(f"{place}: {key}", entry.get(key)) for key in ("from", "to"))
+    return Wire(source, target, entry.get("factor"), entry.get("offset"))
+
+
+def _port(place: str, text: Any) -> Port:
+    if not isinstance(text, str) or "." not in text:
+        raise InputError(f"{place} = {text!r}: must be 'component.variable'")
+    return Port(*text.split(".", 1))

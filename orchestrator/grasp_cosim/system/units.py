@@ -13,3 +13,13 @@ class Unit:
     exponents: tuple[int, ...]
     factor: float = 1.0
     offset: float = 0.0
+
+
+def conversion(source: Unit, target: Unit) -> tuple[float, float] | None:
+    """Factor and offset so that target value = factor * source value + offset.
+
+    None where the dimensions differ.
+    """
+    if source.exponents != target.exponents:
+        return None
+    return source.factor / target.factor, (source.offset - target.offset) / target.factor

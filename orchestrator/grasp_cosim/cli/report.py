@@ -1,0 +1,48 @@
+"""The command report."""
+
+import json
+from pathlib import Path
+
+import click
+
+from ..errors import InputError
+from ..figures.page import write_page
+from ..figures.plot import plot_run, plot_signals
+from ..recording.load import load_run
+from ..study.metrics import is_grasp
+from .frame import check_folder, json_option
+
+
+@click.command()
+@click.argument("run", type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), help="The page. Default: RUN/report.html")
+@json_option
+def report(run: Path, out: Path | None, as_json: bool) -> int:
+    r"""Make a page of RUN, a folder that `run --out` wrote: traces, animation, wiring, settings.
+
+    The page is one file that needs nothing else. A picture is drawn beside it with matplotlib, the
+    extra plot; without it there is the page alone.
+
+    \b
+    Example: grasp-cosim report results
+    """
+    recorded = load_run(run)
+    page = out or run / "report.html"
+    check_folder(page.parent)
+    write_page(recorded, run.resolve().name, page)
+    picture = page.parent / ("grasp.png" if is_grasp(recorded.signals) else "signals.png")
+    draw = plot_run if is_grasp(recorded.signals) else plot_signals
+    pictures = []
+    try:
+        draw(recorded, picture)
+        pictures.append(picture)
+    except InputError as error:
+        click.echo(f"no picture: {error}", err=True)
+    if as_json:
+        written = {"page": str(page), "bytes": page.stat().st_size}
+        click.echo(json.dumps({**written, "pictures": [str(p) for p in pictures]}))
+    else:
+        click.echo(f"{page}: {page.stat().st_size / 1e6:.1f} MB")
+        for path in pictures:
+            click.echo(path)
+    return 0

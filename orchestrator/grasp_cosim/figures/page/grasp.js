@@ -1,0 +1,184 @@
+// The two fingers and the object at one moment, seen from the side; below, each contact magnified.
+"use strict";
+
+const THICK = 24, TALL = 96, MIDDLE = 92, FLOOR = 168; // px of the side view
+const LENS = 2e-3; // m across a magnified contact
+const FLASH = 0.25; // s of real time that a new contact glows
+const SIDE = { 1: 1, 2: -1 }; // where the finger is, seen from the object
+
+class Grasp {
+  constructor(recording, plan, series) {
+    this.recording = recording;
+    this.plan = plan; // names of signals, contacts: [{t, finger}]
+    this.series = series; // by name
+    this.canvas = document.getElementById("scene");
+    const reach = (name) => {
+      const top = series.get(name).levels.at(-1);
+      return [Math.min(...top.low), Math.max(...top.high)];
+    };
+    const ends = [...reach(plan.position[1]), ...reach(plan.position[2])];
+    [this.low, this.high] = [Math.min(...ends), Math.max(...ends)];
+    this.strongest = Math.max(1e-9, ...[...Object.values(plan.actuator),
+      ...Object.values(plan.contact_force)].flatMap((name) => reach(name).map(Math.abs)));
+  }
+
+  at(name, t) {
+    return valueAt(this.recording.time, this.series.get(name), t);
+  }
+
+  // speed: simulated seconds per second, by which a glow lasts a while for the eye.
+  draw(t, speed) {
+    const { pen, width, height } = fitted(this.canvas), plan = this.plan;
+    const room = THICK + 70, scale = (width - 2 * room) / Math.max(this.high - this.low, 1e-6);
+    const x = (metres) => room + (metres - this.low) * scale;
+    this.axis(pen, x, width, scale);
+    const face = {}, surface = {};
+    for (const j of [1, 2]) {
+      face[j] = this.at(plan.position[j], t);
+      surface[j] = face[j] - SIDE[j] * this.at(plan.gap[j], t);
+    }
+    pen.fillStyle = color("--object");
+    const left = x(surface[2]), right = x(surface[1]);
+    pen.beginPath();
+    pen.roundRect(left, MIDDLE - TALL / 2 + 10, right - left, TALL - 20, 5);
+    pen.fill();
+    this.target(pen, x, t);
+    for (const j of [1, 2]) {
+      const glow = this.glow(j, t, speed);
+      if (glow > 0) this.flash(pen, x(surface[j]), glow);
+      this.finger(pen, x(face[j]), j);
+      if (plan.actuator[j]) {
+        this.arrow(pen, x(face[j]) + SIDE[j] * THICK, MIDDLE - 22,
+          this.at(plan.actuator[j], t), j, "outer");
+      }
+      this.arrow(pen, x(face[j]), MIDDLE + 22, this.at(plan.contact_force[j], t), j, "inner");
+      this.lens(pen, width, height, j, t, face[j] - surface[j], glow);
+      this.canvas.dataset[`finger${j}`] = face[j];
+      this.canvas.dataset[`surface${j}`] = surface[j];
+    }
+    this.canvas.dataset.origin = x(0);
+    this.canvas.dataset.scale = scale;
+    this.canvas.dataset.glow = [1, 2].map((j) => this.glow(j, t, speed).toFixed(3));
+    this.readings(t);
+  }
+
+  glow(j, t, speed) {
+    const since = this.plan.contacts.filter((c) => c.finger === j && c.t <= t).map((c) => t - c.t);
+    return since.length ? Math.max(0, 1 - Math.min(...since) / (FLASH * speed)) : 0;
+  }
+
+  axis(pen, x, width, scale) {
+    pen.strokeStyle = color("--rule");
+    pen.fillStyle = color("--muted");
+    pen.lineWidth = 1;
+    pen.textAlign = "center";
+    pen.textBaseline = "middle";
+    pen.beginPath();
+    pen.moveTo(0, FLOOR + 0.5);
+    pen.lineTo(width, FLOOR + 0.5);
+    for (const mark of ticks(1e3 * (this.low - 70 / scale), 1e3 * (this.high + 70 / scale),
+      width / 90)) {
+      const at = Math.round(x(1e-3 * mark.at)) + 0.5;
+      pen.moveTo(at, FLOOR);
+      pen.lineTo(at, FLOOR + 5);
+      pen.fillText(mark.label.replace("-", "−"), at, FLOOR + 15);
+    }
+    pen.stroke();
+    pen.textAlign = "right";
+    pen.fillText("x in mm", width - 4, FLOOR - 9);
+  }
+
+  target(pen, x, t) {
+    if (!this.plan.target) return;
+    const at = x(this.at(this.plan.target, t));
+    pen.strokeStyle = pen.fillStyle = color("--ink");
+    pen.setLineDash([4, 4]);
+    pen.beginPath();
+    pen.moveTo(at, MIDDLE - TALL / 2 - 8);
+    pen.lineTo(at, FLOOR);
+    pen.stroke();
+    pen.setLineDash([]);
+    pen.textAlign = "center";
+    pen.fillText("target", at, MIDDLE - TALL / 2 - 18);
+  }
+
+  finger(pen, face, j) {
+    const left = j === 1 ? face : face - THICK;
+    pen.fillStyle = color(`--finger${j}`);
+    pen.beginPath();
+    pen.roundRect(left, MIDDLE - TALL / 2, THICK, TALL, j === 1 ? [0, 8, 8, 0] : [8, 0, 0, 8]);
+    pen.fill();
+    pen.fillStyle = color("--on-finger");
+    pen.textAlign = "center";
+    pen.textBaseline = "middle";
+    pen.fillText(`${j}`, left + THICK / 2, MIDDLE);
+  }
+
+  flash(pen, at, glow) {
+    const light = pen.createRadialGradient(at, MIDDLE, 0, at, MIDDLE, 60);
+    light.addColorStop(0, color("--flash"));
+    light.addColorStop(1, `${color("--flash")}00`);
+    pen.save();
+    pen.globalAlpha = glow;
+    pen.fillStyle = light;
+    pen.fillRect(at - 60, MIDDLE - 60, 120, 120);
+    pen.fillStyle = color("--flash");
+    pen.fillRect(at - 2, MIDDLE - TALL / 2, 4, TALL);
+    pen.restore();
+  }
+
+  // The actuator's force points to the finger's back or from it, the object's from the surface on.
+  arrow(pen, at, y, force, j, where) {
+    const length = 62 * Math.sqrt(Math.abs(force) / this.strongest) * Math.sign(force);
+    if (Math.abs(length) < 2) return;
+    const pushes = where === "outer" && Math.sign(force) === -SIDE[j];
+    const from = pushes ? at - length : at, to = from + length, tip = Math.sign(force);
+    pen.strokeStyle = pen.fillStyle = color(where === "outer" ? `--finger${j}` : "--ink");
+    pen.lineWidth = 2.5;
+    pen.beginPath();
+    pen.moveTo(from, y);
+    pen.lineTo(to - 4 * tip, y);
+    pen.stroke();
+    pen.beginPath();
+    pen.moveTo(to, y);
+    pen.lineTo(to - 8 * tip, y - 4.5);
+    pen.lineTo(to - 8 * tip, y + 4.5);
+    pen.fill();
+    pen.lineWidth = 1;
+  }
+
+  lens(pen, width, height, j, t, apart, glow) {
+    const wide = Math.min(220, width / 2 - 24), tall = 92, top = height - tall - 22;
+    const left = j === 2 ? width / 2 - wide - 12 : width / 2 + 12, scale = wide / LENS;
+    const middle = left + wide / 2;
+    pen.save();
+    pen.beginPath();
+    pen.roundRect(left, top, wide, tall, 8);
+    pen.fillStyle = color("--lens");
+    pen.fill();
+    pen.clip();
+    pen.fillStyle = color("--object");
+    pen.fillRect(j === 2 ? middle : left, top, wide / 2, tall);
+    pen.fillStyle = color(`--finger${j}`);
+    const face = middle + apart * scale;
+    if (j === 1) pen.fillRect(face, top + 16, wide, tall - 32);
+    else pen.fillRect(left, top + 16, face - left, tall - 32);
+    if (glow > 0) {
+      pen.globalAlpha = glow;
+      pen.fillStyle = color("--flash");
+      pen.fillRect(middle - 3, top, 6, tall);
+    }
+    pen.restore();
+    pen.fillStyle = color("--muted");
+    pen.textAlign = "center";
+    pen.fillText(`contact of finger ${j}, ${1e3 * LENS} mm wide`, middle, top + tall + 12);
+  }
+
+  readings(t) {
+    for (const cell of document.querySelectorAll("#readings output")) {
+      const series = this.series.get(cell.dataset.signal), value = this.at(series.name, t);
+      const { factor, unit } = scaled(series.unit, Math.abs(value));
+      cell.textContent = series.steps ? (value ? "yes" : "no") : `${text(value * factor)} ${unit}`;
+    }
+  }
+}

@@ -1,0 +1,156 @@
+// The page at work: which signals, what time, what zoom; all of it in the address after the #.
+"use strict";
+
+const page = JSON.parse(document.getElementById("page").textContent);
+const state = document.documentElement.dataset;
+const find = (id) => document.getElementById(id);
+const SLOW = 0.02, AROUND = [0.015, 0.06]; // simulated s per s, and s before and after a contact
+
+const recording = new Recording(page);
+let view = null, cursor = 0, hover = null, panels = [], grasp = null, chosen = [...page.shown];
+let playing = false, before = 0, due = false, asked = 0;
+
+const clamp = (v, low, high) => Math.min(Math.max(v, low), high);
+const whole = () => ({ from: recording.first, to: Math.max(recording.last, recording.first + 1e-9) });
+
+function zoom(from, to) {
+  const all = whole(), shortest = 1e-9 * Math.max(1, Math.abs(all.to));
+  const span = clamp(to - from, Math.min(shortest, all.to - all.from), all.to - all.from);
+  const begin = clamp((from + to - span) / 2, all.from, all.to - span);
+  view = { from: begin, to: begin + span };
+  redraw();
+}
+
+function seek(t) {
+  cursor = clamp(t, recording.first, recording.last);
+  redraw();
+}
+
+function redraw() {
+  if (!due) requestAnimationFrame(draw);
+  due = true;
+}
+
+function draw() {
+  due = false;
+  for (const panel of panels) panel.draw(view, page.marks, cursor, hover);
+  overview();
+  find("span").textContent = `${clock(view.from)} to ${clock(view.to)}`;
+  if (grasp) {
+    grasp.draw(cursor, speed());
+    find("scrub").value = cursor;
+    find("clock").textContent = clock(cursor);
+    find("pace").textContent = playing || find("speed").value === "auto"
+      ? `${Number(speed().toPrecision(3))} × real time` : "";
+  }
+  remember();
+}
+
+const clock = (t) => `${t.toFixed(Math.max(3, Math.min(9, 2 - Math.floor(Math.log10(view.to - view.from)))))} s`;
+
+// The whole run as a strip, with the part in view.
+function overview() {
+  const { pen, width, height } = fitted(find("overview")), all = whole();
+  const x = (t) => GUTTER + (t - all.from) / (all.to - all.from) * (width - GUTTER - RIGHT);
+  pen.fillStyle = color("--lens");
+  pen.fillRect(GUTTER, 4, width - GUTTER - RIGHT, height - 8);
+  for (const mark of page.marks) {
+    pen.fillStyle = color(mark.color);
+    pen.fillRect(x(mark.t) - 0.75, 4, 1.5, height - 8);
+  }
+  pen.fillStyle = color("--window");
+  pen.strokeStyle = color("--muted");
+  const wide = Math.max(x(view.to) - x(view.from), 3);
+  pen.fillRect(x(view.from), 2, wide, height - 4);
+  pen.strokeRect(x(view.from) + 0.5, 2.5, wide - 1, height - 5);
+  pen.fillStyle = color("--ink");
+  pen.fillRect(x(cursor) - 0.5, 0, 1, height);
+}
+
+// Panels -------------------------------------------------------------------------------------
+const stem = (name) => name.slice(name.indexOf(".") + 1).replace(/\[[^\]]*\]$/, "");
+
+function styles(series) { // blue and red for the fingers of a grasp, else colours in turn
+  const kinds = [...new Set(series.map((one) => stem(one.name)))];
+  return series.map((one, i) => {
+    const finger = page.grasp && /(?:\[([12])\]|_([12])\..*)$/.exec(one.name);
+    const dash = find("by").value === "unit" ? kinds.indexOf(stem(one.name)) % DASHES.length : 0;
+    if (finger) return { ...one, style: { color: `--finger${finger[1] || finger[2]}`, dash } };
+    return { ...one, style: { color: PALETTE[i % PALETTE.length], dash: 0 } };
+  });
+}
+
+async function show() {
+  const order = ++asked;
+  const series = await Promise.all(chosen.map((name) => recording.series(name)));
+  if (order !== asked) return; // the choice has changed meanwhile
+  const groups = new Map();
+  for (const one of series) {
+    const unit = one.unit ? ` in ${one.unit}` : "";
+    const name = stem(one.name).replaceAll("_", " ");
+    const title = find("by").value === "unit" ? one.unit || "no unit" : name + unit;
+    groups.set(title, [...(groups.get(title) || []), one]);
+  }
+  find("plots").replaceChildren();
+  panels = [...groups].map(([title, group]) => new Panel(
+    recording, title.replace(/ in \S*$/, ""), styles(group), find("plots")));
+  find("none").hidden = panels.length > 0;
+  redraw();
+}
+
+function choose(names) {
+  chosen = names;
+  for (const box of document.querySelectorAll("#signals input[data-signal]")) {
+    box.checked = names.includes(box.dataset.signal);
+  }
+  return show();
+}
+
+// The address --------------------------------------------------------------------------------
+function remember() {
+  clearTimeout(remember.later);
+  remember.later = setTimeout(() => {
+    const parts = [`t=${view.from},${view.to}`, `at=${cursor}`];
+    if (chosen.join() !== page.shown.join()) {
+      parts.push(`show=${chosen.map(encodeURIComponent).join(",")}`);
+    }
+    history.replaceState(null, "", `#${parts.join("&")}`);
+  }, 300);
+}
+
+function recall() { // what the address asks for; what it does not say stays
+  const asks = new URLSearchParams(location.hash.slice(1).replaceAll("+", "%2B"));
+  const [from, to] = (asks.get("t") || "").split(",").map(Number);
+  view = view || whole();
+  if (to > from) zoom(from, to);
+  if (asks.get("at")) cursor = clamp(Number(asks.get("at")) || 0, recording.first, recording.last);
+  const names = asks.has("show") ? asks.get("show").split(",") : chosen;
+  return choose(names.filter((name) => recording.byName.has(name)));
+}
+
+// The animation ------------------------------------------------------------------------------
+function speed() {
+  const value = find("speed").value;
+  if (value !== "auto") return Number(value);
+  const near = page.grasp.contacts.some((c) => cursor > c.t - AROUND[0] && cursor < c.t + AROUND[1]);
+  return near ? SLOW : 1;
+}
+
+function play(on) {
+  playing = on;
+  find("play").textContent = on ? "Pause" : "Play";
+  if (on && cursor >= recording.last) cursor = recording.first;
+  before = performance.now();
+  if (on) requestAnimationFrame(advance);
+}
+
+function advance(now) {
+  if (!playing) return;
+  // A frame ends at the next change of speed at the latest, so that no contact is jumped over.
+  const edges = page.grasp.contacts.flatMap((c) => [c.t - AROUND[0], c.t + AROUND[1]]);
+  const next = cursor + speed() * Math.min((now - before) / 1000, 0.1);
+  seek(Math.min(next, ...edges.filter((t) => t > cursor + 1e-9)));
+  before = now;
+  if (cursor >= recording.last) play(false);
+  else requestAnimationFrame(advance);
+}

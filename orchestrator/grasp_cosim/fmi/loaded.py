@@ -1,0 +1,226 @@
+"""What an instance in this process is, whichever version of FMI it speaks.
+
+FMPy loads the binary and runs the life cycle. In the loop its wrappers would allocate and convert
+at every call (2.5 us instead of 0.5 us), so the loop calls the FMI functions directly, on buffers
+that are parts of the master's vectors.
+"""
+
+import ctypes
+import os
+import re
+import sys
+import tempfile
+import warnings
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import Any, ClassVar, Self
+from urllib.parse import quote
+
+import fmpy
+import numpy as np
+import numpy.typing as npt
+from fmpy.fmi1 import FMICallException
+
+from ..errors import InputError, SimulationError
+from ..system.interface import Interface, Value, Variable
+from .instance import ERROR, FATAL, STATUS, Call
+
+_PYTHON_FUNCTION = ctypes.PYFUNCTYPE(ctypes.c_int)
+_NATIVE_FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int)
+"""Calls of a Python FMU keep the GIL, which it would have to take back at once."""
+
+_PYTHONFMU_PREFIX = re.compile(r"Fatal py exception encountered: \[\w+\] \w+\s")
+"""What pythonfmu logs of an exception begins so; nothing else is kept where the FMU said more."""
+
+_TRACEBACK = "Traceback (most recent call last)"
+_OF_KIND: Mapping[str, Callable[[Any], Value]] = {
+    "Real": float,
+    "Integer": int,
+    "Boolean": bool,
+    "String": lambda value: value.decode(errors="replace") if isinstance(value, bytes) else value,
+}
+
+
+class LoadedInstance(ABC):
+    """One instance of a co-simulation FMU in this process. Use as a context manager."""
+
+    PREFIX: ClassVar[str]
+    """What its FMI functions begin with."""
+
+    def __init__(self, name: str, interface: Interface) -> None:
+        """Extract and instantiate; InputError where the FMU does not load."""
+        self.name = name
+        self.interface = interface
+        self._worst = FATAL  # until it is instantiated
+        self._keep: list[Any] = []
+        self._running = False
+        self._clock: npt.NDArray[np.float64] = np.zeros(1)
+        self._state = ctypes.c_void_p()
+        self._read_log()  # forgets what an earlier instance of this name said
+        self._folder = tempfile.TemporaryDirectory(prefix="grasp_fmu_")
+        self._resources = Path(self._folder.name, "resources")
+        try:
+            self._slave = self._load(Path(self._folder.name))
+        except BaseException:
+            self.close()
+            raise
+
+    @abstractmethod
+    def _instantiate(self, folder: Path) -> Any:
+        """FMPy's slave, instantiated from the folder it was extracted to."""
+
+    @abstractmethod
+    def _read_log(self) -> list[str]:
+        """What this instance logged since the last call."""
+
+    @abstractmethod
+    def _start(self, values: Mapping[str, Value], stop: float) -> None:
+        """Set the values and enter initialisation mode."""
+
+    @abstractmethod
+    def _suffix(self, fmi_type: str) -> str:
+        """The end of the names of the functions that set and get an FMI type."""
+
+    @abstractmethod
+    def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:
+        """The call that passes data to inputs ("set") or fetches outputs into it ("get").
+
+        The variables are all of one FMI type; data is contiguous, in their order and of dtype().
+        """
+
+    def _load(self, folder: Path) -> Any:
+        try:
+            fmpy.extract(self.interface.path, folder)
+        except Exception as error:  # FMPy and zipfile raise whatever they like
+            raise InputError(f"{self.name}: {self.interface.path} is damaged: {error}") from error
+        self._python = (self._resources / "slavemodule.txt").exists()
+        plain = str(folder).replace(" ", "")
+        if self._python and quote(plain) != plain:
+            raise InputError(
+                f"{self.name}: temporary folder {folder}: a Python FMU crashes on its characters; "
+                "set TMPDIR to a folder of plain ASCII letters"
+            )
+        here = Path.cwd()
+        try:
+            slave = self._instantiate(folder)
+        except Exception as error:  # FMPy raises plain Exception
+            raise InputError(
+                f"{self.name}: {self.interface.path} does not load: {self._reason(error)}"
+            ) from error
+        finally:
+            os.chdir(here)  # where loading fails, FMPy stays in the library's folder
+        self._worst = 0
+        return slave
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the instance."""
+        self.close()
+
+    def close(self) -> None:
+        """Terminate and free the FMU as far as it permits; remove what was extracted."""
+        if self._running and self._worst < ERROR:
+            try:
+                self._slave.terminate()
+            except FMICallException as error:
+                self._worst = error.status
+                said = as_reason(self._messages())
+                warnings.warn(f"{self.name}: {error}{said}", stacklevel=2)
+        if self._worst < FATAL:
+            if self._state:
+                self._slave.freeFMUState(self._state)
+            self._slave.freeInstance()
+        if str(self._resources) in sys.path:  # pythonfmu puts it there and leaves it
+            sys.path.remove(str(self._resources))
+        self._folder.cleanup()
+
+    def enter_initialization(self, values: Mapping[str, Value], stop: float) -> None:
+        """Set start values, set up the experiment (stop in s) and enter initialisation mode."""
+        with self._refusals():
+            self._start(values, stop)
+
+    def exit_initialization(self) -> None:
+        """Leave initialisation mode."""
+        with self._refusals():
+            self._slave.exitInitializationMode()
+        self._running = True
+
+    def get(self, variables: Sequence[Variable]) -> list[Value]:
+        """The values of the variables now, one by one. For use outside the loop."""
+        with self._failures():
+            return [self._get(variable) for variable in variables]
+
+    def set(self, variables: Sequence[Variable], values: Sequence[Value]) -> None:
+        """Set inputs or tunable parameters. For use outside the loop."""
+        with self._failures():
+            for variable, value in zip(variables, values, strict=True):
+                self._set(variable, value)
+
+    def _get(self, variable: Variable) -> Value:
+        getter = getattr(self._slave, f"get{self._suffix(variable.type)}")
+        return _OF_KIND[variable.kind](getter([variable.reference])[0])
+
+    def _set(self, variable: Variable, value: Value) -> None:
+        setter = getattr(self._slave, f"set{self._suffix(variable.type)}")
+        setter([variable.reference], [_OF_KIND[variable.kind](value)])
+
+    def failure(self, status: int, time: float) -> SimulationError:
+        """The error for a call that returned status at time in s. The FMU is not used again."""
+        self._worst = status
+        name = STATUS[status] if status < len(STATUS) else str(status)
+        said = self._messages()
+        error = SimulationError(
+            f"{self.name}: {self.interface.path.name} returned {name} at t = {time:.9g} s"
+            f"{as_reason(said)}"
+        )
+        for text in said:
+            error.add_note(text)
+        return error
+
+    def _function(self, name: str, *arguments: Any) -> tuple[Callable[[], int], int]:
+        """The bound function for Python, and its address."""
+        prototype = _PYTHON_FUNCTION if self._python else _NATIVE_FUNCTION
+        function = prototype((self.PREFIX + name, self._slave.dll))
+        bound = partial(function, ctypes.c_void_p(self._slave.component), *arguments)
+        return bound, ctypes.cast(function, ctypes.c_void_p).value or 0
+
+    @contextmanager
+    def _refusals(self) -> Iterator[None]:
+        """Turns a failed call of the life cycle into an InputError."""
+        try:
+            yield
+        except FMICallException as error:
+            self._worst = error.status
+            raise InputError(
+                f"{self.name}: {self.interface.path.name} refused its initialisation: "
+                f"{self._reason(error)}"
+            ) from error
+
+    @contextmanager
+    def _failures(self) -> Iterator[None]:
+        """Turns a failed call in the run into a SimulationError."""
+        try:
+            yield
+        except FMICallException as error:
+            raise self.failure(error.status, float(self._clock[0])) from error
+
+    def _reason(self, error: Exception) -> str:
+        return as_reason(self._messages()).removeprefix(": ") or " ".join(str(error).split())
+
+    def _messages(self) -> list[str]:
+        """What this instance logged and nobody has read yet."""
+        own = re.compile(rf"{re.escape(self.name)}, t = \S+ s: ")  # so our FMUs begin
+        said = [own.sub("", text, count=1) for text in self._read_log()]
+        return [text for text in said if not _PYTHONFMU_PREFIX.match(text)] or said
+
+
+def as_reason(said: list[str]) -> str:
+    """Messages as the end of a one-line error; of a traceback only what it comes to."""
+    last = [text.strip().rpartition("\n")[2] if _TRACEBACK in text else text for text in said]
+    text = " ".join(" ".join(last).split())
+    return f": {_PYTHONFMU_PREFIX.sub('', text)}" if text else ""

@@ -1,0 +1,232 @@
+"""Values at t = 0: passed on along the dependencies, algebraic loops found and solved.
+
+The ports and what depends on what make a graph. Where it has a loop, the loop is cut at the input
+it is entered by, and the values of the inputs that were cut are found by Newton's method.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from graphlib import CycleError, TopologicalSorter
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import InputError, choices
+from ..fmi.instance import Instance
+from ..system.checks import wire_transform
+from ..system.description import System
+from ..system.interface import Value
+from ..system.parts import Initialisation, Port, Wire
+from .scenario import INITIAL
+
+DIFFERENCE = 1e-7
+"""Relative change of an input for the derivatives of Newton's method."""
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """The ports in an order in which each is known when it is needed.
+
+    cuts are the inputs at which loops were cut, loops the paths of port names, first = last.
+    """
+
+    ports: tuple[Port, ...]
+    cuts: tuple[Port, ...]
+    loops: tuple[tuple[Port, ...], ...]
+
+
+def order_ports(system: System, instances: Sequence[Instance]) -> Order:
+    """The order in which values are passed on in initialisation mode.
+
+    An output depends on the inputs that its FMU declares for the initialisation, or else in
+    general, or else on all.
+    """
+    graph = _graph(system, instances)
+    inputs = {wire.target for wire in system.wires}
+    cuts: list[Port] = []
+    loops: list[tuple[Port, ...]] = []
+    while True:
+        try:
+            ports = tuple(TopologicalSorter(graph).static_order())
+        except CycleError as error:
+            path = tuple(error.args[1])
+            entry = next(port for port in path if port in inputs)
+            at = path.index(entry)
+            loops.append((*path[at:-1], *path[: at + 1]))
+            cuts.append(entry)
+            graph[entry] = []
+        else:
+            return Order(ports, tuple(cuts), tuple(loops))
+
+
+def _graph(system: System, instances: Sequence[Instance]) -> dict[Port, list[Port]]:
+    """For each port those it depends on, in the order of the system: the same in every process."""
+    sources = {wire.target: wire.source for wire in system.wires}
+    graph: dict[Port, list[Port]] = {}
+    for instance in instances:
+        inputs = [v.name for v in instance.interface.of("input")]
+        for name in inputs:
+            port = Port(instance.name, name)
+            if port in sources:
+                graph[port] = [sources[port]]
+        for v in instance.interface.of("output"):
+            declared = v.dependencies if v.initial_dependencies is None else v.initial_dependencies
+            needed = inputs if declared is None else declared
+            ports = [Port(instance.name, name) for name in needed]
+            graph[Port(instance.name, v.name)] = [port for port in ports if port in sources]
+    return graph
+
+
+class Propagation:
+    """Passes values on between instances in initialisation mode, in a given order."""
+
+    def __init__(
+        self,
+        system: System,
+        instances: Sequence[Instance],
+        order: Order,
+        faults: Mapping[Port, Callable[[float, int], float]],
+    ) -> None:
+        self.system = system
+        self.order = order
+        self.values: dict[Port, Value] = {}
+        self._instances = {instance.name: instance for instance in instances}
+        self._wires = {wire.target: wire for wire in system.wires}
+        self._transforms = {
+            wire.target: wire_transform(system, wire)
+            for wire in system.wires
+            if self._kind(wire.target) != "String"
+        }
+        self._faults = faults
+
+    def run(self) -> list[str]:
+        """Settle all values; a line for each algebraic loop that was iterated.
+
+        InputError where a loop does not converge, or where loops are to be refused.
+        """
+        order, choice = self.order, self.system.initialisation
+        if order.loops and choice.loops == "refuse":
+            raise InputError(f"{_described(self.system, order.loops)}; {_advice()}")
+        if not order.cuts:
+            self._pass_on({})
+            return self._check_dependencies()
+        for port in order.cuts:
+            if self._kind(port) != "Real":
+                raise InputError(
+                    f"{_described(self.system, order.loops)}, and {port} is {self._kind(port)}: "
+                    f"only loops of Real values can be iterated; {_advice()}"
+                )
+        count, residual = self._solve(choice)
+        lines = [
+            f"{_described(self.system, [path])}: iterated {count} times at t = 0, to a relative "
+            f"residual of {residual:.1e}"
+            for path in order.loops
+        ]
+        return lines + self._check_dependencies()
+
+    def _solve(self, choice: Initialisation) -> tuple[int, float]:
+        """Newton's method for the inputs that were cut; iterations and relative residual."""
+        cuts = self.order.cuts
+        x = np.array([self._start(port) for port in cuts])
+        for count in range(1, choice.iterations + 1):
+            g = self._evaluate(x)
+            residual = float(np.max(np.abs(g - x) / np.maximum(1.0, np.abs(g))))
+            if not np.isfinite(residual):
+                break
+            if residual <= choice.tolerance:
+                return count, residual
+            try:
+                x = x - np.linalg.solve(self._slope(x, g) - np.eye(len(x)), g - x)
+            except np.linalg.LinAlgError:
+                break
+        raise InputError(
+            f"{_described(self.system, self.order.loops)}: does not converge to a relative "
+            f"residual of {choice.tolerance:g} in {choice.iterations} iterations; {_advice()}"
+        )
+
+    def _slope(
+        self, x: npt.NDArray[np.float64], g: npt.NDArray[np.float64]
+    ) -> npt.NDArray[np.float64]:
+        """The derivatives of what comes back at the cuts, by what is put in there."""
+        columns = []
+        for i in range(len(x)):
+            moved = x.copy()
+            moved[i] += DIFFERENCE * max(1.0, abs(x[i]))
+            columns.append((self._evaluate(moved) - g) / (moved[i] - x[i]))
+        return np.array(columns).T
+
+    def _evaluate(self, x: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """What comes back at the cuts when x is put in there."""
+        cuts = self.order.cuts
+        self._pass_on(dict(zip(cuts, x.tolist(), strict=True)))
+        return np.array([self._arriving(self._wires[port]) for port in cuts], np.float64)
+
+    def _pass_on(self, given: Mapping[Port, Value]) -> None:
+        for port in self.order.ports:
+            instance = self._instances[port.component]
+            variable = instance.interface.by_name[port.variable]
+            if port in self._wires:
+                value = given[port] if port in given else self._arriving(self._wires[port])
+                instance.set([variable], [value])
+            elif variable.kind in ("Real", "Integer", "Boolean", "String") and not variable.shape:
+                value = instance.get([variable])[0]
+            else:
+                continue
+            self.values[port] = value
+
+    def _arriving(self, wire: Wire) -> Value:
+        """The value that a wire hands over."""
+        value = self.values[wire.source]
+        if self._kind(wire.target) == "String":
+            return value
+        factor, offset = self._transforms[wire.target]
+        number = float(value)
+        if (factor, offset) != (1.0, 0.0):
+            number = factor * number + offset
+        if wire.target in self._faults:
+            number = self._faults[wire.target](number, INITIAL)
+        kind = self._kind(wire.target)
+        return number if kind == "Real" else int(number) if kind == "Integer" else number != 0.0
+
+    def _check_dependencies(self) -> list[str]:
+        """Pass on again while outputs change: a line for each that depends on more than declared."""
+        given = {port: self.values[port] for port in self.order.cuts}
+        found: list[Port] = []
+        for _ in range(len(self.order.ports) + 1):
+            before = dict(self.values)
+            self._pass_on(given)
+            moved = [
+                port
+                for port, value in self.values.items()
+                if port not in self._wires and value != before[port] and value == value
+            ]
+            if not moved:
+                return [
+                    f"{port} changed at t = 0 with an input that it does not declare to depend on; "
+                    "values were passed on again"
+                    for port in dict.fromkeys(found)
+                ]
+            found.append(moved[0])  # the others may follow from it
+        raise InputError(
+            f"{self.system.name}: the values at t = 0 do not settle, a loop through "
+            f"{choices(dict.fromkeys(found))} that the FMUs' dependencies do not show; {_advice()}"
+        )
+
+    def _kind(self, port: Port) -> str:
+        return self._instances[port.component].interface.by_name[port.variable].kind
+
+    def _start(self, port: Port) -> float:
+        instance = self._instances[port.component]
+        return float(instance.get([instance.interface.by_name[port.variable]])[0])
+
+
+def _described(system: System, loops: Sequence[Sequence[Port]]) -> str:
+    paths = "; ".join(" -> ".join(map(str, path)) for path in loops)
+    return f"{system.name}: algebraic loop at t = 0: {paths}"
+
+
+def _advice() -> str:
+    return (
+        "must have a component without direct feedthrough in it, or [initialisation] "
+        'loops = "iterate" with a tolerance that can be reached'
+    )

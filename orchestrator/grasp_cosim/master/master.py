@@ -1,0 +1,139 @@
+"""The fixed-step master: initialise, then run the loop in chunks and hand its rows on.
+
+In the sequential scheme (Gauss-Seidel) a component steps with what the components before it have
+just put out, which adds no delay beyond sample and hold. In the Jacobi scheme all components step
+with the values of the last communication point. A component with a longer step of its own steps at
+the end of that step: what it puts out is never from the future. Time is an integer number of
+nanoseconds.
+"""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import InputError, SimulationError
+from ..fmi.instance import DISCARD, EARLY, Instance
+from ..recording.result import Rejection
+from ..system.description import System
+from ..system.parts import NANOSECONDS
+from . import loop
+from .engine import Engine, make_loop
+from .initialisation import Propagation, order_ports
+from .plan import make_plan, slots_of
+from .rejection import finish_step
+from .scenario import Scenario
+
+CHUNK = 1024
+"""The most steps between two times that rows are handed on."""
+
+RowReceiver = Callable[[npt.NDArray[np.int64], npt.NDArray[np.float64]], None]
+"""Takes step numbers and rows of all values; the rows are reused afterwards."""
+
+
+class Master:
+    """Runs a system's instances, which are in the order of its components."""
+
+    def __init__(
+        self,
+        system: System,
+        instances: Sequence[Instance],
+        receive: RowReceiver,
+        engine: Engine = "auto",
+    ) -> None:
+        self.system = system
+        self.instances = tuple(instances)
+        self.total_steps = system.stop_ns // system.step_ns
+        self.steps_done = 0
+        self.rejections: dict[str, Rejection] = {}
+        self.log: list[str] = []
+        self.slots = slots_of(system, instances)
+        self.values = np.zeros(len(self.slots))
+        self.scenario = Scenario(system, instances, self.slots, self.values)
+        self._receive = receive
+        self.plan = make_plan(
+            system,
+            instances,
+            self.slots,
+            self.values,
+            self.scenario.fault_functions,
+            self.scenario.before_step if system.events or system.faults else None,
+        )
+        self._loop = make_loop(self.plan, engine)
+        self._rows = np.empty((CHUNK, len(self.values)))
+
+    def initialise(self) -> None:
+        """Start values in, then outputs at t = 0 that agree with the inputs at t = 0."""
+        stop = self.system.stop_ns / NANOSECONDS
+        for component, instance in zip(self.system.components, self.instances, strict=True):
+            instance.enter_initialization(component.values, stop)
+        order = order_ports(self.system, self.instances)
+        propagation = Propagation(self.system, self.instances, order, self.scenario.fault_functions)
+        try:
+            self.log += propagation.run()
+        except SimulationError as error:
+            raise InputError(str(error)) from error
+        for instance in self.instances:
+            instance.exit_initialization()
+        for port, slot in self.slots.items():
+            self.values[slot] = float(propagation.values[port])
+        self._receive(np.zeros(1, np.int64), self.values[np.newaxis])
+
+    def advance(self, steps: int) -> int:
+        """Do the given number of steps, or fewer where the stop time is nearer; how many it were.
+
+        SimulationError where an FMU fails; the rows until then have been handed on.
+        """
+        first = self.steps_done
+        end = min(first + steps, self.total_steps)
+        while self.steps_done < end:
+            self._chunk(self.steps_done, min(self.steps_done + CHUNK, end))
+        return self.steps_done - first
+
+    def _chunk(self, start: int, stop: int) -> None:
+        """Run the loop from start to stop, and hand the rows on whatever happens."""
+        step, operation = start, 0
+        try:
+            while step < stop:
+                rows = self._rows[step - start :]
+                step, operation, status = self._loop(
+                    rows, operation, step, stop, self.system.step_ns
+                )
+                if status:
+                    self.steps_done = step
+                    self._resolve(step, operation, status)
+                    operation += 1
+        finally:
+            self.steps_done = step
+            if step > start:
+                self._receive(np.arange(start + 1, step + 1), self._rows[: step - start])
+
+    def _resolve(self, step: int, operation: int, status: int) -> None:
+        """Make good for a step that was rejected; any other bad status ends the run."""
+        kind, call, _, period, _ = self.plan.operations[operation]
+        if status == loop.TOO_LONG:
+            raise SimulationError(self._too_long(step, operation))
+        if status == loop.RAISED:
+            raise self.plan.raised.pop()
+        owner = self.plan.owners[call]
+        assert owner is not None
+        instance = self.instances[owner]
+        begin = (step + 1 - period) * self.system.step_ns / NANOSECONDS
+        if kind != loop.STEP or status not in (DISCARD, EARLY):
+            raise instance.failure(status, begin)
+        end = (step + 1) * self.system.step_ns / NANOSECONDS
+        finish_step(instance, status, begin, end)
+        known = self.rejections.get(instance.name, Rejection(0, begin))
+        self.rejections[instance.name] = Rejection(known.count + 1, known.first)
+
+    def _too_long(self, step: int, operation: int) -> str:
+        _, first, last, _, _ = self.plan.operations[operation]
+        buffers = self.plan.buffers
+        for buffer, index, slot in self.plan.casts[first:last]:
+            if abs(int(value := buffers[buffer][index])) >= loop.EXACT:
+                port = next(p for p, s in self.slots.items() if s == slot)
+                return (
+                    f"{port} = {value} at step {step}: must be smaller than 2**53 in magnitude, "
+                    "to be exact as a float64"
+                )
+        raise AssertionError("no value is too long")  # pragma: no cover

@@ -1,0 +1,41 @@
+"""Steps that an FMU rejects: it discards them, or ends them early."""
+
+import numpy as np
+
+from ..fmi.instance import DISCARD, EARLY, WARNING, Instance
+
+SMALLEST = 1024
+"""A step that is rejected is divided down to this part of it, then the run fails."""
+
+
+def finish_step(instance: Instance, status: int, begin: float, end: float) -> None:
+    """Bring an instance to end, in s, that rejected the step from begin to there.
+
+    Goes on from where the step got to. Where it got nowhere, the rest is halved, at most down to
+    1/1024 of the step. SimulationError where that does not help.
+    """
+    if not instance.interface.can_vary_step:
+        raise instance.failure(status, begin)
+    clock = np.array([begin])
+    smallest = (end - begin) / SMALLEST
+    length = end - begin
+    for _ in range(2 * SMALLEST):
+        reached = instance.last_successful_time()
+        if reached is None:
+            raise instance.failure(status, float(clock[0]))
+        if reached > clock[0]:
+            clock[0] = min(reached, end)
+            length = end - float(clock[0])
+        elif (length := length / 2) < smallest:
+            raise instance.failure(status, float(clock[0]))
+        while clock[0] < end:
+            length = min(length, end - float(clock[0]))
+            status = instance.stepper(clock, length).python()
+            if status > WARNING:
+                break
+            clock[0] = end if clock[0] + length >= end - smallest / 2 else clock[0] + length
+        else:
+            return
+        if status not in (DISCARD, EARLY):
+            raise instance.failure(status, float(clock[0]))
+    raise instance.failure(status, float(clock[0]))

@@ -1,0 +1,159 @@
+"""Events at run time: what happens at which communication point. Meaning: system/scenario.py."""
+
+import math
+import operator
+from collections.abc import Callable, Mapping, Sequence
+from typing import Protocol
+
+from ..fmi.instance import Instance
+from ..system.description import System
+from ..system.interface import Value, Variable
+from ..system.parts import NANOSECONDS, Condition, Event, Port, literal
+from ..system.scenario_checks import check_setting
+from .faults import INITIAL, FaultFunction, Window, fault_functions, first_step
+
+__all__ = ["INITIAL", "FaultFunction", "Scenario"]
+
+_COMPARE: Mapping[str, Callable[[float, float], bool]] = {
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+    "==": operator.eq,
+    "!=": operator.ne,
+}
+
+
+class Values(Protocol):
+    """The vector of values: an array or a memory view of float64."""
+
+    def __getitem__(self, slot: int, /) -> float:
+        """The value at a place."""
+
+
+class Scenario:
+    """The events and faults of one run.
+
+    log says what happened, a line each, in order. fault_functions are those of the wires that have
+    faults, by target: see faults.py.
+    """
+
+    log: list[str]
+    fault_functions: Mapping[Port, FaultFunction]
+
+    def __init__(
+        self,
+        system: System,
+        instances: Sequence[Instance],
+        slots: Mapping[Port, int],
+        values: Values,
+    ) -> None:
+        """Values holds the outputs of now whenever a method is called, at the places in slots."""
+        self.log = []
+        self._system, self._instances = system, instances
+        self._step_ns = system.step_ns
+        self._slots, self._values = slots, values
+        self._events = [
+            _PendingEvent(f"events[{i}]", event, system, instances)
+            for i, event in enumerate(system.events)
+        ]
+        self._windows = [
+            Window(f"faults[{i}]", fault, system.step_ns) for i, fault in enumerate(system.faults)
+        ]
+        self.fault_functions = fault_functions(self._windows, system.step_ns)
+        self._due = self.next_step(0)
+
+    def before_step(self, step: int) -> None:
+        """What happens at communication point step, before the step that begins there.
+
+        Steps come in order. SimulationError where a component refuses a value.
+        """
+        if self._due is None or step < self._due:
+            return
+        for event in self._events[:]:
+            if event.next_step(step) == step and self._holds(event.event.when):
+                self._events.remove(event)
+                self._note(step, event.happen())
+        for window in self._windows:
+            if window.may_begin(step) and self._holds(window.fault.when):
+                window.begin(step)
+                self._note(step, [f"{window} begins"])
+            elif window.must_end(step):
+                window.end()
+                self._note(step, [f"{window} ends"])
+        self._due = self.next_step(step + 1)
+
+    def set(self, name: str, value: Value, step: int) -> None:
+        """Set what an event could set, now, at communication point step.
+
+        InputError where there is none of that name, or where the value does not fit;
+        SimulationError where the component refuses it.
+        """
+        component, _, variable = name.partition(".")
+        port, place = Port(component, variable), f"set: {name}"
+        check_setting(self._system, port, value, place)
+        event = _PendingEvent(place, Event({port: value}), self._system, self._instances)
+        self._note(step, event.happen())
+
+    def next_step(self, step: int) -> int | None:
+        """The first step from this one on that needs before_step, as things are; None: none does.
+
+        That is the step itself while a condition is pending there.
+        """
+        steps = [event.next_step(step) for event in self._events]
+        steps += [k for w in self._windows if (k := w.next_step(step)) is not None]
+        return min(steps, default=None)
+
+    def pending(self) -> list[str]:
+        """A line for each event that has not happened and each fault that has not begun."""
+        events = [f"{event.name} did not happen: {event.reason()}" for event in self._events]
+        faults = [f"{w.name} did not begin: {w}" for w in self._windows if not w.begun]
+        return events + faults
+
+    def _note(self, step: int, lines: Sequence[str]) -> None:
+        moment = f"t = {step * self._step_ns / NANOSECONDS:.9g} s: "
+        self.log += [moment + line for line in lines]
+
+    def _holds(self, condition: Condition | None) -> bool:
+        if condition is None:
+            return True
+        value = float(self._values[self._slots[condition.port]])
+        return _COMPARE[condition.relation](value, condition.value)
+
+
+class _PendingEvent:
+    """An event that has not happened yet, with the calls that it makes."""
+
+    def __init__(
+        self, name: str, event: Event, system: System, instances: Sequence[Instance]
+    ) -> None:
+        self.name = name
+        self.event = event
+        components = [system.component(port.component, name) for port in event.set]
+        self._period = math.lcm(*((c.step_ns or system.step_ns) for c in components))
+        self._period //= system.step_ns
+        self._first = first_step(event.at_ns or 0, system.step_ns)
+        self._calls: dict[str, tuple[Instance, list[Variable], list[Value]]] = {}
+        by_name = {instance.name: instance for instance in instances}
+        for port, value in event.set.items():
+            instance = by_name[port.component]
+            _, variables, values = self._calls.setdefault(port.component, (instance, [], []))
+            variables.append(instance.interface.by_name[port.variable])
+            values.append(instance.interface.parse(name, port.variable, value))
+
+    def next_step(self, step: int) -> int:
+        """The first step from this one on at which it can happen."""
+        return -(-max(step, self._first) // self._period) * self._period
+
+    def happen(self) -> list[str]:
+        """Set what it sets; lines for the log that say so."""
+        for instance, variables, values in self._calls.values():
+            instance.set(variables, values)
+        reason = f" ({self.event.when})" if self.event.when else ""
+        return [f"{port} = {literal(value)}{reason}" for port, value in self.event.set.items()]
+
+    def reason(self) -> str:
+        """What it waits for."""
+        if self.event.when is not None:
+            return f"{self.event.when} never held"
+        return f"t = {(self.event.at_ns or 0) / NANOSECONDS:.9g} s was not reached"

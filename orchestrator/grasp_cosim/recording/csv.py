@@ -1,0 +1,93 @@
+"""Writes a run as CSV while it goes on, in the form of the FMI cross-check."""
+
+from collections.abc import Iterable, Sequence
+from contextlib import ExitStack, suppress
+from io import FileIO
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import InputError, SimulationError
+from ..system.description import System
+from .listener import Signal, times
+from .result import in_one_piece
+
+PIECE = 1024
+"""Rows turned into text at once; a block may be long."""
+
+
+class CsvListener:
+    """Writes time and signals with full precision, a line per recorded communication point.
+
+    The file has a temporary name beside path until the run ends, in whatever way: what was
+    recorded is kept, in whole lines. There is no file where nothing was. A Real is the shortest
+    text that reads back as the same number, a Boolean is 0 or 1.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self._path = Path(path)
+
+    def begin(self, system: System, signals: Sequence[Signal]) -> None:
+        """Write the line of names; InputError where the file cannot be written."""
+        self._step_ns = system.step_ns
+        self._whole = [i for i, s in enumerate(signals, 1) if s.kind != "Real"]
+        names = ("time", *(s.name.replace('"', '""') for s in signals))
+        try:
+            with ExitStack() as stack:
+                part = stack.enter_context(in_one_piece(self._path))
+                self._file = stack.enter_context(FileIO(part, "w"))
+                self._append(",".join(f'"{name}"' for name in names) + "\n")
+                self._finish = stack.pop_all()
+                self._empty = True
+        except OSError as error:
+            raise InputError(unwritable(self._path, error)) from error
+
+    def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
+        """Append the rows; SimulationError where that fails, the lines until then are whole."""
+        try:
+            for first in range(0, len(steps), PIECE):
+                piece = slice(first, first + PIECE)
+                time = times(steps[piece], self._step_ns)
+                columns = [time.tolist(), *rows[piece].T.tolist()]
+                for i in self._whole:
+                    columns[i] = [*map(int, columns[i])]
+                self._append(lines(columns))
+                self._empty = False
+        except OSError as error:
+            raise SimulationError(unwritable(self._path, error)) from error
+
+    def end(self, complete: bool) -> None:
+        """Give the file its name; SimulationError where that fails."""
+        try:
+            with suppress(_NothingRecordedError), self._finish:
+                if self._empty:
+                    raise _NothingRecordedError
+        except OSError as error:
+            raise SimulationError(unwritable(self._path, error)) from error
+
+    def _append(self, text: str) -> None:
+        """Write all of the text, or none of it and raise OSError."""
+        written = self._file.tell()
+        data = memoryview(text.encode())
+        try:
+            while data:
+                data = data[self._file.write(data) :]
+        except OSError:
+            self._file.truncate(written)
+            raise
+
+
+class _NothingRecordedError(Exception):
+    """Has the temporary file removed."""
+
+
+def lines(columns: Iterable[Iterable[float]]) -> str:
+    """A line per row of the columns, each value as Python's repr has it."""
+    texts = (map(repr, column) for column in columns)
+    return "\n".join(map(",".join, zip(*texts, strict=True))) + "\n"
+
+
+def unwritable(path: Path, error: OSError) -> str:
+    """The message for a file that cannot be written."""
+    return f"{path}: cannot be written: {error.strerror}"

@@ -1,0 +1,86 @@
+"""From the rows of the master's loop to the listeners: checked, extended, decimated."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import SimulationError
+from ..system.checks import wire_transform
+from ..system.description import System
+from ..system.parts import Port
+from .energy import ExchangeEnergy, bonds
+from .listener import Listener, Signal
+
+
+class Dispatcher:
+    """Takes rows of all values and hands every n-th one on, and the last.
+
+    What listeners get are the outputs in the order of the system, then the derived signals, which
+    are computed from every row.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        slots: Mapping[Port, int],
+        listeners: Sequence[Listener],
+        every: int = 1,
+    ) -> None:
+        self._listeners = tuple(listeners)
+        self._every = every
+        self._outputs = _outputs(system, slots)
+        self._columns = np.array([slots[port] for port in self._outputs], np.intp)
+        transforms = {
+            wire.target: wire_transform(system, wire)
+            for wire in system.wires
+            if wire.target in slots
+        }
+        self._energy = ExchangeEnergy(bonds(system), slots, transforms)
+        self.signals = (*self._outputs.values(), *self._energy.signals)
+        self._pending: tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]] | None = None
+        for listener in self._listeners:
+            listener.begin(system, self.signals)
+
+    def __call__(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
+        """Hand rows on; SimulationError at the first value not finite, which is the last kept."""
+        finite = np.isfinite(rows[:, self._columns])
+        good = bool(finite.all())
+        if not good:
+            bad = int(finite.all(axis=1).argmin())
+            steps, rows = steps[: bad + 1], rows[: bad + 1]
+        columns = np.hstack((rows[:, self._columns], self._energy(rows)))
+        wanted = steps % self._every == 0
+        if wanted.any():
+            self._hand_on(steps[wanted], columns[wanted])
+        self._pending = None if wanted[-1] else (steps[-1:].copy(), columns[-1:].copy())
+        if not good:
+            name = self.signals[int(finite[bad].argmin())].name
+            value = rows[bad, self._columns[finite[bad].argmin()]]
+            raise SimulationError(f"{name} = {value} at step {steps[bad]}: must be finite")
+
+    def flush(self) -> None:
+        """Hand the last row on, where decimation has left it out."""
+        if self._pending is not None:
+            self._hand_on(*self._pending)
+            self._pending = None
+
+    def end(self, complete: bool) -> None:
+        """Hand the last row on and end the listeners."""
+        self.flush()
+        for listener in self._listeners:
+            listener.end(complete)
+
+    def _hand_on(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
+        for listener in self._listeners:
+            listener.block(steps, rows)
+
+
+def _outputs(system: System, slots: Mapping[Port, int]) -> dict[Port, Signal]:
+    """The outputs that are numbers, in the order of components and declarations."""
+    return {
+        port: Signal(str(port), v.unit, v.kind, v.description)
+        for component in system.components
+        for v in component.interface.of("output")
+        if (port := Port(component.name, v.name)) in slots
+    }

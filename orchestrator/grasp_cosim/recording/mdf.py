@@ -1,0 +1,133 @@
+"""Writes a run as ASAM MDF 4 while it goes on, with asammdf (the optional extra `mdf`)."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+from xml.etree import ElementTree
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import InputError, SimulationError
+from ..system.description import System
+from .csv import unwritable
+from .listener import Signal, times
+from .result import in_one_piece
+from .settings import settings
+
+if TYPE_CHECKING:
+    import asammdf
+
+VERSION = "4.10"
+"""The first MDF version with compressed blocks; every tool of today reads it."""
+
+TYPES = {"Real": np.float64, "Integer": np.int64, "Boolean": np.uint8}
+"""The element type of a channel by its signal's kind."""
+
+TRANSPOSED_DEFLATE: Final = 2
+"""The compression of the file; a column's values stand together, so that they compress well."""
+
+PIECE = 8192
+"""Rows handed to asammdf at once: it keeps a few hundred bytes about each piece."""
+
+
+class MdfListener:
+    """Writes time and signals as one channel group, with units and descriptions.
+
+    The header has the settings() of the system: all of them as JSON in its comment, and the main
+    ones as properties, with "complete" besides. asammdf keeps the rows in a compressed temporary
+    file beside path; the file at path is made from it when the run ends, in whatever way. There is
+    no file where nothing was recorded.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        """InputError without asammdf."""
+        try:
+            import asammdf  # noqa: F401
+        except ImportError as error:
+            raise InputError(
+                "asammdf is not installed, it writes MDF files; "
+                "install it with: pip install 'grasp-cosim[mdf]'"
+            ) from error
+        self._path = Path(path)
+
+    def begin(self, system: System, signals: Sequence[Signal]) -> None:
+        """Describe the channels; InputError where there are none or the folder is not writable."""
+        from asammdf import MDF
+
+        if not signals:
+            raise InputError(f"{self._path}: nothing to record; must be a system with outputs")
+        self._system = system
+        self._types = [TYPES[s.kind] for s in signals]
+        self._steps, self._rows = np.empty(PIECE, np.int64), np.empty((PIECE, len(signals)))
+        self._filled = 0
+        folder = self._path.parent
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            self._mdf = MDF(version=VERSION, temporary_folder=str(folder))
+        except OSError as error:
+            raise InputError(unwritable(self._path, error)) from error
+        self._mdf.append([_channel(s) for s in signals], comment="", common_timebase=True)
+
+    def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
+        """Take the rows; SimulationError where they cannot be written."""
+        first = 0
+        while first < len(steps):
+            last = min(len(steps), first + PIECE - self._filled)
+            piece = slice(self._filled, self._filled + last - first)
+            self._steps[piece], self._rows[piece] = steps[first:last], rows[first:last]
+            self._filled, first = piece.stop, last
+            if self._filled == PIECE:
+                self._flush()
+
+    def end(self, complete: bool) -> None:
+        """Make the file; SimulationError where that fails, and there is none."""
+        try:
+            self._flush()
+            if self._mdf.groups[0].channel_group.cycles_nr:
+                self._mdf.header.comment = _comment(self._system, complete)
+                with in_one_piece(self._path) as part, part.open("wb+") as file:
+                    self._mdf.save(file, compression=TRANSPOSED_DEFLATE)
+        except OSError as error:
+            raise SimulationError(unwritable(self._path, error)) from error
+        finally:
+            self._mdf.close()
+
+    def _flush(self) -> None:
+        """Hand what has come together to asammdf."""
+        rows = self._rows[: self._filled].T
+        time = times(self._steps[: self._filled], self._system.step_ns)
+        channels = [c.astype(element) for c, element in zip(rows, self._types, strict=True)]
+        try:
+            self._mdf.extend(0, [(samples, None) for samples in (time, *channels)])
+        except OSError as error:
+            raise SimulationError(unwritable(self._path, error)) from error
+        self._filled = 0
+
+
+def _channel(signal: Signal) -> asammdf.Signal:
+    """A channel without samples."""
+    from asammdf import Signal as Channel
+
+    return Channel(
+        samples=np.empty(0, TYPES[signal.kind]),
+        timestamps=np.empty(0),
+        name=signal.name,
+        unit=signal.unit or "",
+        comment=signal.description,
+    )
+
+
+def _comment(system: System, complete: bool) -> str:
+    """The header's comment, in the XML that MDF 4 asks for."""
+    described = settings(system)
+    root = ElementTree.Element("HDcomment")
+    ElementTree.SubElement(root, "TX").text = json.dumps(described)
+    properties = ElementTree.SubElement(root, "common_properties")
+    for name, value in {**described, "complete": complete}.items():
+        if not isinstance(value, dict | list):
+            ElementTree.SubElement(properties, "e", name=name).text = json.dumps(value)
+    return ElementTree.tostring(root, encoding="unicode")

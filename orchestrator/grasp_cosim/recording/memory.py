@@ -1,0 +1,74 @@
+"""Keeps a run in memory, as NumPy columns."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import InputError, SimulationError
+from ..system.description import System
+from .listener import Signal, columns, times
+
+
+class MemoryListener:
+    """Copies the rows into one table, which has room for the whole run from the start.
+
+    every is the decimation of the run, from 1 on. The table takes up memory only as far as it is
+    filled.
+    """
+
+    def __init__(self, every: int = 1) -> None:
+        self._every = every
+        self._rows = 0
+
+    def begin(self, system: System, signals: Sequence[Signal]) -> None:
+        """Make room; InputError where the run does not fit into memory."""
+        self._system, self._signals = system, tuple(signals)
+        self._steps = np.empty(0, np.int64)
+        self._table = np.empty((0, len(signals)))
+        total = system.stop_ns // system.step_ns
+        try:
+            self._grow(total // self._every + 2)  # t = 0, and the last one besides every n-th
+        except MemoryError:
+            raise InputError(
+                f"{system.name}: {total} steps do not fit into memory; "
+                "must have a longer step or an earlier stop, or record fewer of them"
+            ) from None
+
+    def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
+        """Copy the rows; SimulationError where there are more than fit into memory."""
+        end = self._rows + len(steps)
+        if end > len(self._steps):
+            try:
+                self._grow(max(end, 2 * len(self._steps)))
+            except MemoryError:
+                raise SimulationError(
+                    f"{self._system.name}: {end} recorded rows do not fit into memory"
+                ) from None
+        self._steps[self._rows : end] = steps
+        self._table[self._rows : end] = rows
+        self._rows = end
+
+    def end(self, complete: bool) -> None:
+        """Nothing is left to do."""
+
+    @property
+    def time(self) -> npt.NDArray[np.float64]:
+        """The recorded communication points in s, so far."""
+        return times(self._steps[: self._rows], self._system.step_ns)
+
+    @property
+    def signals(self) -> dict[str, npt.NDArray[Any]]:
+        """The recorded columns by name, so far. Rows that come later do not change them."""
+        return columns(self._signals, self._table[: self._rows])
+
+    def _grow(self, rows: int) -> None:
+        """Have room for so many rows; MemoryError where there is none."""
+        try:
+            steps, table = np.empty(rows, np.int64), np.empty((rows, len(self._signals)))
+        except ValueError as error:  # more bytes than an address can count
+            raise MemoryError from error
+        steps[: self._rows] = self._steps[: self._rows]
+        table[: self._rows] = self._table[: self._rows]
+        self._steps, self._table = steps, table

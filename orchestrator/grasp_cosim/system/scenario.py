@@ -1,0 +1,180 @@
+"""Events and faults as entries of the system file, and back.
+
+    [[events]]
+    at = 0.5                                          # s
+    set = { "sensor_1.reflectance" = 0.6 }
+
+    [[events]]
+    when = "plant.gap[1] < 0.01"                      # once, where it holds for the first time
+    set = { "sensor_1.reflectance" = 0.4, "sensor_2.reflectance" = 0.4 }
+
+    [[faults]]
+    wire = "sensor_1.intensity -> controller.intensity[1]"    # or its target alone
+    kind = "noise"
+    standard_deviation = 0.002
+    from = 0.5                                        # s, 0 where it is left out
+    until = 1.0                                       # s, the end where it is left out
+    when = "plant.contact[2] == true"                 # may be left out
+    seed = 1                                          # 0 where it is left out
+
+An event sets tunable parameters, and inputs without a wire, at a communication point: the first one
+at or after its time, or the first one where its condition holds. Of components with a step of their
+own only their own points count. It acts on the step that begins there.
+
+A fault acts on the values that its wire passes in the steps that begin at from <= t < until; one
+from 0 acts in the initialisation too. With a condition it begins at the first communication point
+in that window where the condition holds, and stays. It gets values as the input would, with units
+converted; of several faults on a wire, each gets what the one before it in the file has made.
+
+| kind | makes of a value | parameters |
+|---|---|---|
+| stuck | `value`, or the first value since the fault began | value |
+| dropout | the last value that got through, where this one is lost | probability, from 0 to 1 |
+| bias | value + `value` | value |
+| noise | value + a Gaussian random number of mean 0 | standard_deviation |
+| delay | the value of `time` ago, at first the first one | time in s, a whole number of steps |
+| saturation | low, or high, where it is below or above | low, high, or one of them |
+| quantisation | the nearest whole multiple of `step`, of two the even one | step |
+
+Integer and Boolean wires can be stuck, lose values and delay them. Dropout and noise are random:
+whether a value is lost, or the number added, follows from seed, wire, and step number alone. So it
+is the same in every engine, and neither a window nor another fault shifts it.
+"""
+
+import re
+from collections.abc import Sequence
+from typing import Any
+
+from ..errors import InputError, choices
+from .description import in_nanoseconds
+from .parts import NANOSECONDS, RANDOM, Condition, Event, Fault, Port, Wire
+from .tables import as_table, check_keys
+
+_CONDITION = re.compile(r"(.+?\S)\s*(<=|>=|==|!=|<|>)\s*([^<>=!\s]+)")
+
+
+def read_events(place: str, entries: Any) -> tuple[Event, ...]:
+    """The events of a list of entries; a System checks them. InputError where one is malformed."""
+    return tuple(
+        _event(f"{place}: events[{i}]", entry)
+        for i, entry in enumerate(_entries(place, "events", entries))
+    )
+
+
+def read_faults(place: str, entries: Any, wires: Sequence[Wire]) -> tuple[Fault, ...]:
+    """The faults of a list of entries on wires; a System checks them.
+
+    InputError where one is malformed.
+    """
+    return tuple(
+        _fault(f"{place}: faults[{i}]", entry, wires)
+        for i, entry in enumerate(_entries(place, "faults", entries))
+    )
+
+
+def event_entry(event: Event) -> dict[str, Any]:
+    """The entry that reads as this event; it fits into JSON."""
+    moment: dict[str, Any] = {}
+    if event.at_ns is not None:
+        moment["at"] = event.at_ns / NANOSECONDS
+    if event.when is not None:
+        moment["when"] = str(event.when)
+    return {**moment, "set": {str(port): value for port, value in event.set.items()}}
+
+
+def fault_entry(fault: Fault) -> dict[str, Any]:
+    """The entry that reads as this fault; it fits into JSON."""
+    entry = {"wire": str(fault.target), "kind": fault.kind, **fault.parameters}
+    entry["from"] = fault.start_ns / NANOSECONDS
+    if fault.end_ns is not None:
+        entry["until"] = fault.end_ns / NANOSECONDS
+    if fault.when is not None:
+        entry["when"] = str(fault.when)
+    if fault.kind in RANDOM:
+        entry["seed"] = fault.seed
+    return entry
+
+
+def _entries(place: str, key: str, entries: Any) -> list[Any]:
+    if not isinstance(entries, list):
+        raise InputError(f"{place}: {key} = {entries!r}: must be a list of tables, [[{key}]]")
+    return entries
+
+
+def _event(place: str, entry: Any) -> Event:
+    entry = as_table(place, entry)
+    check_keys(place, entry, {"at", "when", "set"})
+    values = as_table(f"{place}: set", entry.get("set"))
+    for name, value in values.items():
+        if not isinstance(value, float | int | bool | str):
+            raise InputError(
+                f"{place}: set.{name} = {value!r}: must be a number, boolean or string; "
+                'a name stands in quotes, like "sensor_1.reflectance" = 0.6'
+            )
+    at = entry.get("at")
+    return Event(
+        {_port(f"{place}: set", name): value for name, value in values.items()},
+        None if at is None else in_nanoseconds(f"{place}: at", at, zero=True),
+        _condition(place, entry.get("when")),
+    )
+
+
+def _fault(place: str, entry: Any, wires: Sequence[Wire]) -> Fault:
+    entry = as_table(place, entry)
+    kind = entry.get("kind")
+    until = entry.get("until")
+    common = {"wire", "kind", "from", "until", "when", *(["seed"] if kind in RANDOM else [])}
+    return Fault(
+        _target(place, entry.get("wire"), wires),
+        kind,
+        {key: value for key, value in entry.items() if key not in common},
+        in_nanoseconds(f"{place}: from", entry.get("from", 0.0), zero=True),
+        None if until is None else in_nanoseconds(f"{place}: until", until),
+        entry.get("seed", 0) if kind in RANDOM else 0,
+        _condition(place, entry.get("when")),
+    )
+
+
+def _target(place: str, text: Any, wires: Sequence[Wire]) -> Port:
+    """The target of the wire that the text names, by both of its ends or the target alone."""
+    parts = [part.strip() for part in text.split("->")] if isinstance(text, str) else []
+    if len(parts) not in (1, 2) or not all("." in part for part in parts):
+        raise InputError(
+            f"{place}: wire = {text!r}: must be 'component.output -> component.input', or "
+            "'component.input' alone"
+        )
+    ends = [_port(place, part) for part in parts]
+    if len(ends) == 2 and not any([wire.source, wire.target] == ends for wire in wires):
+        valid = choices(f"{wire.source} -> {wire.target}" for wire in wires)
+        raise InputError(f"{place}: wire = {text!r}: no such wire; valid: {valid}")
+    return ends[-1]
+
+
+def _condition(place: str, text: Any) -> Condition | None:
+    if text is None:
+        return None
+    found = _CONDITION.fullmatch(text.strip()) if isinstance(text, str) else None
+    value = _number(found[3]) if found else None
+    if found is None or value is None:
+        raise InputError(
+            f"{place}: when = {text!r}: must be like 'plant.gap[1] < 0.01' or "
+            "'plant.contact[1] == true'"
+        )
+    return Condition(_port(f"{place}: when", found[1]), found[2], value)  # type: ignore[arg-type]
+
+
+def _number(text: str) -> float | None:
+    """The value that a condition compares with."""
+    if text in ("true", "false"):
+        return text == "true"
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
+def _port(place: str, text: str) -> Port:
+    component, _, variable = text.partition(".")
+    if not component or not variable:
+        raise InputError(f"{place}: {text!r}: must be 'component.variable'")
+    return Port(component, variable)

@@ -1,0 +1,327 @@
+"""Events and faults at communication points, with components that only note what they are given."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+import pytest
+from grasp_cosim import InputError, SimulationError, System
+from grasp_cosim.fmi.instance import Instance
+from grasp_cosim.master.scenario import Scenario
+from grasp_cosim.system import parts
+from grasp_cosim.system.interface import Interface, Value, Variable
+from grasp_cosim.system.parts import Component, Condition, Event, Fault, Port, Relation, Wire
+
+STEP = 100_000_000
+"""ns"""
+
+
+def interface(path: Path) -> Interface:
+    """Outputs y and on, a wired input u, a free one v, tunable parameters p, n and label."""
+    variables = [
+        ("y", "Real", "output"),
+        ("on", "Boolean", "output"),
+        ("u", "Real", "input"),
+        ("v", "Real", "input"),
+        ("p", "Real", "parameter"),
+        ("n", "Integer", "parameter"),
+        ("label", "String", "parameter"),
+    ]
+    return Interface(
+        path,
+        "",
+        "mock",
+        tuple(
+            Variable(
+                name,
+                kind,  # type: ignore[arg-type]
+                causality,
+                k,
+                None,
+                None,
+                -math.inf,
+                math.inf,
+                kind,
+                "tunable" if causality == "parameter" else "continuous",
+            )
+            for k, (name, kind, causality) in enumerate(variables)
+        ),
+    )
+
+
+@pytest.fixture(autouse=True)
+def _no_files(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(parts, "read_interface", interface)
+
+
+class Mock:
+    """A component that notes what is set."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.interface = interface(Path("mock.fmu"))
+        self.given: list[tuple[str, Value]] = []
+
+    def set(self, variables: Sequence[Variable], values: Sequence[Value]) -> None:
+        for variable, value in zip(variables, values, strict=True):
+            if value == -1.0:
+                raise SimulationError(f"{self.name}: {variable.name}")
+            self.given.append((variable.name, value))
+
+
+class Rig:
+    """A scenario of components a, b and slow, which steps every third base step."""
+
+    def __init__(self, events: Sequence[Event] = (), faults: Sequence[Fault] = ()) -> None:
+        names = ("a", "b", "slow")
+        system = System(
+            "mock.toml",
+            tuple(
+                Component(n, Path("m.fmu"), {"v": 0.0}, step_ns=3 * STEP if n == "slow" else None)
+                for n in names
+            ),
+            tuple(Wire(Port("a", "y"), Port(n, "u")) for n in names),
+            STEP,
+            30 * STEP,
+            "sequential",
+            tuple(events),
+            tuple(faults),
+        )
+        self.mocks = {name: Mock(name) for name in names}
+        self.values = np.zeros(2)
+        self.scenario = Scenario(
+            system,
+            cast(list[Instance], list(self.mocks.values())),
+            {Port("a", "y"): 0, Port("a", "on"): 1},
+            memoryview(self.values),  # type: ignore[arg-type]  # numpy's stubs for 3.11
+        )
+
+    def run(self, steps: int, y: Sequence[float] = ()) -> list[str]:
+        """Ask before every step; y are the values of a.y. The log."""
+        for step in range(steps):
+            self.values[0] = y[step] if step < len(y) else 0.0
+            self.scenario.before_step(step)
+        return self.scenario.log
+
+
+def at(seconds: float, **values: Value) -> Event:
+    """Sets a's variables at a time."""
+    settings = {Port("a", name): value for name, value in values.items()}
+    return Event(settings, at_ns=round(seconds * 1e9))
+
+
+def when(relation: Relation, value: float, port: str = "y", **values: Value) -> Event:
+    settings = {Port("a", name): value for name, value in values.items()}
+    return Event(settings, when=Condition(Port("a", port), relation, value))
+
+
+def test_an_event_happens_once_at_its_time() -> None:
+    rig = Rig([at(0.5, p=0.6)])
+    assert rig.run(5) == []
+    assert rig.run(10) == ["t = 0.5 s: a.p = 0.6"]
+    assert rig.mocks["a"].given == [("p", 0.6)]
+
+
+@pytest.mark.parametrize(("seconds", "step"), [(0.0, 0), (0.5, 5), (0.500000001, 6), (0.41, 5)])
+def test_an_event_happens_at_the_first_point_at_or_after_its_time(
+    seconds: float, step: int
+) -> None:
+    rig = Rig([at(seconds, p=1.0)])
+    rig.run(step)
+    assert not rig.mocks["a"].given
+    rig.run(step + 1)
+    assert rig.mocks["a"].given
+
+
+def test_events_at_one_time_happen_in_the_order_of_the_file() -> None:
+    rig = Rig([at(0.2, p=1.0), at(0.1, p=2.0, v=3.0), at(0.2, p=4.0)])
+    assert rig.run(4) == [
+        "t = 0.1 s: a.p = 2.0",
+        "t = 0.1 s: a.v = 3.0",
+        "t = 0.2 s: a.p = 1.0",
+        "t = 0.2 s: a.p = 4.0",
+    ]
+    assert rig.mocks["a"].given == [("p", 2.0), ("v", 3.0), ("p", 1.0), ("p", 4.0)]
+
+
+def test_values_arrive_in_the_declared_type() -> None:
+    rig = Rig([at(0.0, p=1, n=2.0, label="x")])
+    rig.run(1)
+    assert repr(rig.mocks["a"].given) == "[('p', 1.0), ('n', 2), ('label', 'x')]"
+
+
+def test_an_event_may_set_several_components() -> None:
+    event = Event({Port("a", "p"): 1.0, Port("b", "p"): 2.0}, at_ns=0)
+    rig = Rig([event])
+    rig.run(1)
+    assert [rig.mocks[name].given for name in "ab"] == [[("p", 1.0)], [("p", 2.0)]]
+
+
+def test_a_condition_is_looked_at_until_it_holds_and_then_no_more() -> None:
+    rig = Rig([when("<", 0.01, p=1.0)])
+    log = rig.run(8, [1.0, 0.5, 0.01, 0.005, 0.5, 0.001])
+    assert log == ["t = 0.3 s: a.p = 1.0 (a.y < 0.01)"]
+
+
+@pytest.mark.parametrize(
+    ("relation", "steps"),
+    [("<", [0]), ("<=", [0, 1]), (">", [2]), (">=", [1, 2])],
+)
+def test_relations(relation: Relation, steps: list[int]) -> None:
+    logs = [Rig([when(relation, 1.0, p=1.0)]).run(1, [y]) for y in (0.5, 1.0, 1.5)]
+    assert [k for k, log in enumerate(logs) if log] == steps
+
+
+@pytest.mark.parametrize("relation", ["==", "!="])
+@pytest.mark.parametrize("value", [False, True])
+@pytest.mark.parametrize("now", [0.0, 1.0])
+def test_conditions_on_a_boolean(relation: Relation, value: bool, now: float) -> None:
+    rig = Rig([when(relation, value, "on", p=1.0)])
+    rig.values[1] = now
+    rig.scenario.before_step(0)
+    assert bool(rig.scenario.log) is ((bool(now) == value) == (relation == "=="))
+
+
+def test_no_condition_holds_for_what_is_no_number() -> None:
+    relations: list[Relation] = ["<", "<=", ">", ">="]
+    for relation in relations:
+        assert not Rig([when(relation, 1.0, p=1.0)]).run(1, [math.nan])
+
+
+@pytest.mark.parametrize(("seconds", "expected"), [(0.0, 0.0), (0.1, 0.3), (0.3, 0.3), (0.4, 0.6)])
+def test_a_slow_component_is_set_at_its_own_points(seconds: float, expected: float) -> None:
+    """In between it stands elsewhere in time."""
+    event = Event({Port("slow", "p"): 1.0}, at_ns=round(seconds * 1e9))
+    assert Rig([event]).run(10) == [f"t = {expected:g} s: slow.p = 1.0"]
+
+
+def test_a_condition_counts_at_the_points_of_what_it_sets() -> None:
+    event = Event({Port("slow", "p"): 1.0}, when=Condition(Port("a", "y"), ">", 0.5))
+    assert Rig([event]).run(6, [0, 1, 0, 0]) == []
+    assert Rig([event]).run(6, [0, 1, 1, 1]) == ["t = 0.3 s: slow.p = 1.0 (a.y > 0.5)"]
+
+
+def test_a_refusal_ends_the_run() -> None:
+    with pytest.raises(SimulationError, match="a: p"):
+        Rig([at(0.1, p=-1.0)]).run(2)
+
+
+def test_faults_are_logged_where_they_begin_and_end() -> None:
+    fault = Fault(Port("b", "u"), "bias", {"value": 1.0}, 2 * STEP, 4 * STEP)
+    assert Rig(faults=[fault]).run(8) == [
+        "t = 0.2 s: b.u: bias begins",
+        "t = 0.4 s: b.u: bias ends",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("y", "first"),
+    [
+        ([0, 0, 0, 1, 0], 3),
+        ([1, 0, 0, 0, 0, 1], 5),  # the condition counts in the window only
+        ([0, 0, 1, 0], 2),
+    ],
+)
+def test_a_condition_begins_a_fault_within_its_window(y: list[float], first: int) -> None:
+    condition = Condition(Port("a", "y"), ">", 0.5)
+    fault = Fault(Port("b", "u"), "bias", {"value": 1.0}, 2 * STEP, 7 * STEP, when=condition)
+    rig = Rig(faults=[fault])
+    function = rig.scenario.fault_functions[Port("b", "u")]
+    shifts = [function(0.0, -1)]
+    for step in range(10):
+        rig.values[0] = y[step] if step < len(y) else 0.0
+        rig.scenario.before_step(step)
+        shifts.append(function(0.0, step))
+    assert [step for step, shift in enumerate(shifts, -1) if shift] == list(range(first, 7))
+    assert rig.scenario.log == [
+        f"t = 0.{first} s: b.u: bias begins",
+        "t = 0.7 s: b.u: bias ends",
+    ]
+
+
+def test_a_condition_that_comes_too_late_begins_no_fault() -> None:
+    condition = Condition(Port("a", "y"), ">", 0.5)
+    fault = Fault(Port("b", "u"), "bias", {"value": 1.0}, 0, 3 * STEP, when=condition)
+    rig = Rig(faults=[fault])
+    assert rig.run(8, [0, 0, 0, 1, 1]) == []
+    assert rig.scenario.next_step(8) is None
+    assert rig.scenario.pending() == ["faults[0] did not begin: b.u: bias"]
+
+
+def test_what_did_not_happen_is_said() -> None:
+    rig = Rig([at(0.1, p=1.0), at(5.0, p=2.0), when("<", -1.0, p=3.0)])
+    rig.run(8)
+    assert rig.scenario.pending() == [
+        "events[1] did not happen: t = 5 s was not reached",
+        "events[2] did not happen: a.y < -1.0 never held",
+    ]
+
+
+def test_without_a_scenario_no_step_needs_it() -> None:
+    rig = Rig()
+    assert rig.scenario.next_step(0) is None
+    assert (rig.run(3), rig.scenario.pending(), rig.scenario.fault_functions) == ([], [], {})
+
+
+FULL = (
+    [
+        at(0.25, p=1.0),
+        Event({Port("slow", "p"): 1.0}, at_ns=4 * STEP),
+        when(">", 0.5, v=1.0),
+        Event({Port("slow", "v"): 1.0}, when=Condition(Port("a", "y"), "<", -0.5)),
+    ],
+    [
+        Fault(Port("b", "u"), "bias", {"value": 1.0}, 2 * STEP, 4 * STEP),
+        Fault(Port("a", "u"), "stuck", {}, 8 * STEP),
+        Fault(Port("b", "u"), "stuck", {}, 0, 20 * STEP, when=Condition(Port("a", "y"), ">", 0.9)),
+    ],
+)
+
+
+@pytest.mark.parametrize("rise", [0, 3, 7, 25, 40])
+def test_asked_only_where_it_says_so_it_does_the_same(rise: int) -> None:
+    """So that a compiled loop can run freely in between."""
+    y = [-0.6 if k % 5 == 4 else float(k >= rise) for k in range(30)]
+    every, needed = Rig(*FULL), Rig(*FULL)
+    every.run(30, y)
+    asked, step = [], needed.scenario.next_step(0)
+    while step is not None and step < 30:
+        asked.append(step)
+        needed.values[0] = y[step]
+        needed.scenario.before_step(step)
+        following = needed.scenario.next_step(step + 1)
+        assert following is None or following > step
+        step = following
+    assert needed.scenario.log == every.scenario.log
+    assert len(every.scenario.log) >= 5
+    assert [m.given for m in needed.mocks.values()] == [m.given for m in every.mocks.values()]
+    assert needed.scenario.pending() == every.scenario.pending()
+    if rise == 0:
+        assert asked == [0, 2, 3, 4, 6, 8, 9, 20]
+
+
+def test_what_is_set_by_hand_is_noted_with_the_events() -> None:
+    rig = Rig([at(0.2, p=1.0)])
+    rig.run(4)
+    rig.scenario.set("a.n", 3.0, 7)
+    assert repr(rig.mocks["a"].given) == "[('p', 1.0), ('n', 3)]"
+    assert rig.scenario.log == ["t = 0.2 s: a.p = 1.0", "t = 0.7 s: a.n = 3.0"]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("a.u", 1.0, r"^set: a\.u: has a wire, from a\.y; put a fault of kind 'stuck' on it"),
+        ("a.w", 1.0, r"^set: a\.w: not there; must be a tunable parameter or an input without"),
+        ("c.p", 1.0, r"^set: c\.p: no component 'c'; valid: a, b, slow$"),
+        ("p", 1.0, r"^set: p: no component 'p'"),
+        ("a.p", "1", r"^set: a\.p: p = '1': must be a finite number"),
+    ],
+)
+def test_what_cannot_be_set_by_hand(name: str, value: Value, message: str) -> None:
+    rig = Rig()
+    with pytest.raises(InputError, match=message):
+        rig.scenario.set(name, value, 0)
+    assert not rig.mocks["a"].given

@@ -1,0 +1,291 @@
+"""Faults on a wire, each against NumPy; seeds, windows, and being asked more than once."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from grasp_cosim.master.faults import INITIAL, FaultFunction, Window, fault_functions
+from grasp_cosim.system.parts import Fault, FaultKind, Port
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import stats
+
+QUICK = settings(deadline=None, derandomize=True, max_examples=100)
+STEP = 1_000_000
+WIRE, OTHER = Port("controller", "intensity[1]"), Port("controller", "intensity[2]")
+SIGNAL = np.sin(0.1 * np.arange(100)) + 1e-3 * np.arange(100)
+"""No two values are equal."""
+
+
+def fault(
+    kind: FaultKind,
+    start: float = 0,
+    end: float | None = None,
+    *,
+    target: Port = WIRE,
+    seed: int = 0,
+    **parameters: float,
+) -> Fault:
+    """A fault with a window in steps."""
+    until = None if end is None else round(end * STEP)
+    return Fault(target, kind, parameters, round(start * STEP), until, seed=seed)
+
+
+def on_wire(*faults: Fault) -> FaultFunction:
+    """What a wire with these faults makes of a value."""
+    windows = [Window(f"faults[{i}]", f, STEP) for i, f in enumerate(faults)]
+    return fault_functions(windows, STEP)[faults[0].target]
+
+
+def passed(
+    function: FaultFunction, values: npt.ArrayLike, steps: Sequence[int] | None = None
+) -> npt.NDArray[Any]:
+    """What becomes of values at steps, by default 0, 1, 2, ..."""
+    listed = np.asarray(values).tolist()
+    numbers = range(len(listed)) if steps is None else steps
+    return np.array([function(v, k) for v, k in zip(listed, numbers, strict=True)])
+
+
+def test_stuck_holds_the_value_where_it_begins() -> None:
+    expected = SIGNAL.copy()
+    expected[20:50] = SIGNAL[20]
+    assert (passed(on_wire(fault("stuck", 20, 50)), SIGNAL) == expected).all()
+
+
+def test_stuck_at_a_value() -> None:
+    expected = SIGNAL.copy()
+    expected[20:50] = -3.0
+    assert (passed(on_wire(fault("stuck", 20, 50, value=-3.0)), SIGNAL) == expected).all()
+
+
+def test_a_boolean_is_stuck_as_a_number() -> None:
+    assert repr(on_wire(fault("stuck", value=True))(0.0, 3)) == "1.0"
+
+
+def test_bias() -> None:
+    expected = np.where(np.arange(100) < 30, SIGNAL, SIGNAL + 0.25)
+    assert (passed(on_wire(fault("bias", 30, value=0.25)), SIGNAL) == expected).all()
+
+
+@pytest.mark.parametrize("limits", [{"low": -0.5}, {"high": 0.5}, {"low": -0.2, "high": 0.3}])
+def test_saturation(limits: dict[str, float]) -> None:
+    expected = np.clip(SIGNAL, limits.get("low"), limits.get("high"))
+    assert (passed(on_wire(Fault(WIRE, "saturation", limits)), SIGNAL) == expected).all()
+
+
+@QUICK
+@given(st.floats(-1e6, 1e6), st.floats(1e-6, 1e3))
+def test_quantisation(value: float, width: float) -> None:
+    """The nearest level; NumPy rounds to even as well."""
+    result = on_wire(fault("quantisation", step=width))(value, 0)
+    assert result == np.rint(value / width) * width
+    assert abs(result - value) <= 0.5 * width * (1 + 1e-9) + 1e-9 * abs(value)
+
+
+def test_quantisation_between_two_levels_takes_the_even_one() -> None:
+    values = np.array([-1.5, -0.5, 0.5, 1.5, 2.5]) * 0.25
+    expected = [-0.5, 0.0, 0.0, 0.5, 0.5]
+    assert passed(on_wire(fault("quantisation", step=0.25)), values).tolist() == expected
+
+
+@pytest.mark.parametrize("steps", [0, 1, 7, 40])
+def test_delay_is_exact(steps: int) -> None:
+    expected = SIGNAL[np.maximum(np.arange(100) - steps, 0)]
+    assert (passed(on_wire(fault("delay", time=steps / 1000)), SIGNAL) == expected).all()
+
+
+def test_a_delay_knows_what_was_passed_before_it_began() -> None:
+    expected = SIGNAL.copy()
+    expected[20:50] = SIGNAL[13:43]
+    assert (passed(on_wire(fault("delay", 20, 50, time=0.007)), SIGNAL) == expected).all()
+
+
+@pytest.mark.parametrize("delay", [1, 2, 5, 7])
+@pytest.mark.parametrize(("period", "phase"), [(1, 0), (3, 0), (3, 2)])
+def test_a_delay_counts_base_steps_on_a_slow_wire_too(delay: int, period: int, phase: int) -> None:
+    """The value is the one that was the newest so many base steps ago."""
+    steps = np.arange(phase, 100, period)
+    newest = np.searchsorted(steps, steps - delay, side="right") - 1
+    values = SIGNAL[steps]
+    function = on_wire(fault("delay", time=delay / 1000))
+    assert (passed(function, values, steps.tolist()) == values[np.maximum(newest, 0)]).all()
+
+
+def test_a_delay_starts_with_the_value_of_the_initialisation() -> None:
+    function = on_wire(fault("delay", time=0.002))
+    assert passed(function, [5.0, 1.0, 2.0, 3.0], [INITIAL, 0, 1, 2]).tolist() == [5, 5, 5, 1]
+
+
+def lost(result: npt.NDArray[Any], values: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
+    """Where a dropout made another value of one; no two neighbours in values are equal."""
+    return np.asarray(result != values)
+
+
+def test_a_dropout_holds_the_last_value_that_got_through() -> None:
+    result = passed(on_wire(fault("dropout", probability=0.6, seed=4)), SIGNAL)
+    through = ~lost(result, SIGNAL)
+    assert 10 < through.sum() < 90
+    assert through[0]
+    newest = np.maximum.accumulate(np.where(through, np.arange(100), 0))
+    assert (result == SIGNAL[newest]).all()
+
+
+@pytest.mark.parametrize(("probability", "share"), [(0.0, 0.0), (1.0, 1.0), (0.3, 0.3)])
+def test_how_many_a_dropout_loses(probability: float, share: float) -> None:
+    n = 20_000
+    values = np.arange(n, dtype=float)
+    hits = lost(passed(on_wire(fault("dropout", probability=probability)), values), values)[1:]
+    assert abs(hits.mean() - share) <= 5 * math.sqrt(share * (1 - share) / n)
+    pairs = (hits[1:] & hits[:-1]).mean()  # of neighbours; those that overlap are correlated
+    variance = share**2 * (1 - share**2) + 2 * (share**3 - share**4)
+    assert abs(pairs - share**2) <= 5 * math.sqrt(variance / n)
+
+
+def test_a_dropout_holds_what_was_passed_before_its_window() -> None:
+    result = passed(on_wire(fault("dropout", 20, 50, probability=1.0)), SIGNAL)
+    expected = SIGNAL.copy()
+    expected[20:50] = SIGNAL[19]
+    assert (result == expected).all()
+
+
+def noise(seed: int = 1, target: Port = WIRE, n: int = 20_000) -> npt.NDArray[Any]:
+    function = on_wire(fault("noise", target=target, seed=seed, standard_deviation=2.0))
+    return passed(function, np.zeros(n))
+
+
+def test_noise_is_gaussian_and_white() -> None:
+    """Bounds of five standard errors of the mean, the deviation and the correlations."""
+    x = noise() / 2.0
+    n = len(x)
+    assert abs(x.mean()) < 5 / math.sqrt(n)
+    assert abs(x.std() - 1) < 5 / math.sqrt(2 * n)
+    assert stats.kstest(x, "norm").pvalue > 1e-3
+    for lag in (1, 2, 3, 64):
+        assert abs((x[lag:] * x[:-lag]).mean()) < 5 / math.sqrt(n)
+
+
+def test_noise_of_another_seed_or_wire_is_independent() -> None:
+    x = noise()
+    for y in (noise(seed=2), noise(target=OTHER)):
+        assert abs(np.corrcoef(x, y)[0, 1]) < 5 / math.sqrt(len(x))
+
+
+def test_two_noises_on_a_wire_are_independent() -> None:
+    """Their variances add up; the same numbers twice would add up to four times one of them."""
+    twice = on_wire(*2 * [fault("noise", standard_deviation=1.0)])
+    variance = passed(twice, np.zeros(20_000)).var()
+    assert abs(variance - 2.0) < 5 * 2.0 * math.sqrt(2 / 20_000)
+
+
+@pytest.mark.parametrize(
+    "one",
+    [
+        fault("noise", seed=3, standard_deviation=1.0),
+        fault("dropout", seed=3, probability=0.5),
+    ],
+)
+def test_a_random_number_depends_on_the_step_alone(one: Fault) -> None:
+    """Not on the window, on other faults, on the steps asked before, nor on their order."""
+    whole = on_wire(one)
+    part = on_wire(
+        Fault(WIRE, one.kind, one.parameters, 40 * STEP, 60 * STEP, seed=one.seed),
+    )
+    beside = on_wire(fault("bias", value=0.0), one)
+    expected = passed(whole, SIGNAL)[41:60]
+    hit = expected != SIGNAL[41:60]
+    assert ((passed(part, SIGNAL)[41:60] != SIGNAL[41:60]) == hit).all()
+    assert (passed(beside, SIGNAL)[41:60] == expected).all()
+    if one.kind == "noise":
+        assert (passed(part, SIGNAL)[41:60] == expected).all()
+        steps = list(range(99, -1, -1))
+        assert (passed(on_wire(one), SIGNAL[::-1], steps)[::-1][41:60] == expected).all()
+
+
+def test_random_numbers_stay_the_same_from_release_to_release() -> None:
+    function = on_wire(fault("noise", seed=7, standard_deviation=1.0))
+    kept = [-0.7353820911792353, 0.8132515606280434, 0.7269561280503712, 0.6529768198539552]
+    result = passed(function, np.zeros(4), [INITIAL, 0, 1, 1000])
+    assert result == pytest.approx(kept, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "acts"),
+    [
+        (0, None, range(100)),
+        (10, 20, range(10, 20)),
+        (9.000001, 19.000001, range(10, 20)),
+        (9.999999, 19.999999, range(10, 20)),
+        (10.000001, 20.000001, range(11, 21)),
+        (0, 1, range(1)),
+        (99, 200, range(99, 100)),
+    ],
+)
+def test_a_window_is_exact_to_the_step(
+    start: float, end: float | None, acts: Sequence[int]
+) -> None:
+    result = passed(on_wire(fault("bias", start, end, value=1.0)), np.zeros(100))
+    assert np.flatnonzero(result).tolist() == list(acts)
+
+
+@pytest.mark.parametrize(("start", "acts"), [(0, True), (1, False), (1e-6, False)])
+def test_only_a_fault_from_0_acts_in_initialisation(start: float, acts: bool) -> None:
+    assert on_wire(fault("bias", start, value=1.0))(0.0, INITIAL) == float(acts)
+
+
+def test_faults_of_a_wire_act_in_the_order_of_the_file() -> None:
+    bias, limit = fault("bias", value=1.0), fault("saturation", high=0.5)
+    assert on_wire(bias, limit)(0.0, 0) == 0.5
+    assert on_wire(limit, bias)(0.0, 0) == 1.0
+    assert on_wire(limit, bias)(2.0, 1) == 1.5
+
+
+def test_each_wire_has_its_own_faults() -> None:
+    faults = (fault("bias", value=1.0), fault("bias", value=2.0, target=OTHER))
+    functions = fault_functions([Window("", f, STEP) for f in faults], STEP)
+    assert {port: f(0.0, 0) for port, f in functions.items()} == {WIRE: 1.0, OTHER: 2.0}
+
+
+ALL = (
+    fault("stuck", 3, 6),
+    fault("stuck", 3, 6, value=2.0),
+    fault("dropout", 2, 9, probability=0.5, seed=1),
+    fault("bias", 2, 9, value=1.0),
+    fault("noise", standard_deviation=1.0),
+    fault("delay", time=0.003),
+    fault("delay", 2, 8, time=0.001),
+    fault("saturation", low=-5.0, high=5.0),
+    fault("quantisation", step=0.5),
+)
+VALUES = st.lists(st.floats(-10.0, 10.0), min_size=13, max_size=13)
+
+
+@QUICK
+@given(
+    st.lists(st.sampled_from(ALL), min_size=1, max_size=4),
+    VALUES,
+    st.lists(st.lists(st.floats(-10.0, 10.0), max_size=3), min_size=13, max_size=13),
+)
+def test_asked_again_at_a_step_it_answers_the_same(
+    faults: list[Fault], values: list[float], before: list[list[float]]
+) -> None:
+    """And what it was asked before at the same step leaves no trace."""
+    once, often = on_wire(*faults), on_wire(*faults)
+    for step, (value, others) in enumerate(zip(values, before, strict=True), INITIAL):
+        for other in others:
+            often(other, step)
+        answers = {often(value, step) for _ in range(3)}
+        assert answers == {once(value, step)}
+
+
+@pytest.mark.parametrize("value", [math.inf, -math.inf, math.nan])
+@pytest.mark.parametrize("one", ALL, ids=lambda f: f.kind)
+def test_what_is_not_finite_is_not_hidden_by_an_exception(one: Fault, value: float) -> None:
+    function = on_wire(one)
+    results = [function(value, step) for step in range(12)]
+    if one.kind not in ("saturation", "stuck"):
+        assert not any(map(math.isfinite, results))
+    if math.isnan(value) and one.kind == "saturation":
+        assert all(map(math.isnan, results))

@@ -1,0 +1,134 @@
+"""Values at t = 0: the order they are passed on in, algebraic loops, wrong declarations."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+from grasp_cosim import InputError, SimulationError
+from grasp_cosim.system.parts import Initialisation, Port, Wire
+from mocks import Mock, Run, make_system
+
+Make = Callable[..., Mock]
+
+
+@pytest.fixture
+def mock(tmp_path: Path) -> Make:
+    return lambda *args, **kwargs: Mock(tmp_path, *args, **kwargs)
+
+
+def through(u: float, t: float) -> float:
+    return u
+
+
+def run(mocks: Sequence[Mock], pairs: Sequence[str], **more: Any) -> Run:
+    """Each pair 'ab' is a wire from a's y to b's u."""
+    wires = [Wire(Port(a, "y"), Port(b, "u")) for a, b in map(tuple, pairs)]
+    return Run(make_system(mocks, wires, **more), mocks)
+
+
+def test_values_propagate_against_the_order_of_execution(mock: Make) -> None:
+    mocks = [mock("c", through), mock("b", through), mock("a", lambda u, t: 7.0)]
+    started = run(mocks, ["ab", "bc"])
+    started.master.initialise()
+    assert [started.signals()[f"{name}.y"] for name in "abc"] == [[7.0]] * 3
+
+
+def test_each_port_is_passed_on_in_initialisation_mode(mock: Make) -> None:
+    b = mock("b", through)
+    run([mock("a", lambda u, t: 1.0), b], ["ab"]).master.initialise()
+    assert b.calls[0] == "enter"
+    assert set(b.calls[1 : b.calls.index("exit")]) == {"send", "receive"}
+
+
+def test_nothing_is_sent_that_no_output_has_put_out(mock: Make) -> None:
+    """a runs before its source: what it is sent is the source's value, not a zero."""
+    a = mock("a", lambda u, t: 1.0 / u)
+    a.u = 1.0  # the start value
+    run([a, mock("b", lambda u, t: 5.0)], ["ba"]).master.initialise()
+    assert a.u == 5.0
+
+
+def test_a_ring_without_direct_feedthrough_is_no_loop(mock: Make) -> None:
+    mocks = [mock("a", lambda u, t: 3.0 + t, direct=False), mock("b", through)]
+    started = run(mocks, ["ab", "ba"], initialisation=Initialisation("refuse"))
+    started.master.initialise()
+    assert mocks[0].u == mocks[1].u == 3.0
+    assert started.master.log == []
+
+
+def test_a_linear_loop_is_solved_and_said(mock: Make) -> None:
+    """y = 1 - 5 u, u = y: y = 1/6, where repeating it would diverge."""
+    mocks = [mock("a", lambda u, t: 1.0 - 5.0 * u), mock("b", through)]
+    started = run(mocks, ["ab", "ba"])
+    started.master.initialise()
+    assert started.signals()["b.y"][0] == pytest.approx(1.0 / 6.0, rel=1e-9)
+    (line,) = started.master.log
+    assert "algebraic loop at t = 0: a.u -> a.y -> b.u -> b.y -> a.u: iterated" in line
+
+
+def test_a_nonlinear_loop_is_solved(mock: Make) -> None:
+    """y = 2 - u^3, u = y has the solution 1."""
+    started = run([mock("a", lambda u, t: 2.0 - u**3), mock("b", through)], ["ab", "ba"])
+    started.master.initialise()
+    assert started.signals()["a.y"][0] == pytest.approx(1.0, abs=1e-9)
+
+
+def test_two_loops_are_solved_together(mock: Make) -> None:
+    mocks = [
+        mock("a", lambda u, t: 1.0 - 2.0 * u), mock("b", through),
+        mock("c", lambda u, t: 3.0 + 0.5 * u), mock("d", through),
+    ]  # fmt: skip
+    started = run(mocks, ["ab", "ba", "cd", "dc"])
+    started.master.initialise()
+    signals = started.signals()
+    assert signals["a.y"][0] == pytest.approx(1.0 / 3.0, rel=1e-9)
+    assert signals["c.y"][0] == pytest.approx(6.0, rel=1e-9)
+    assert len(started.master.log) == 2
+
+
+def test_a_loop_is_refused_by_its_path_where_that_is_chosen(mock: Make) -> None:
+    mocks = [mock("a", lambda u, t: 1.0 - 0.5 * u), mock("b", through)]
+    with pytest.raises(InputError, match=r"a\.u -> a\.y -> b\.u -> b\.y -> a\.u; must have"):
+        run(mocks, ["ab", "ba"], initialisation=Initialisation("refuse")).master.initialise()
+
+
+def test_a_loop_without_a_solution_is_refused(mock: Make) -> None:
+    with pytest.raises(InputError, match=r"a\.u -> .* does not converge to a relative residual of"):
+        run([mock("a", lambda u, t: u + 1.0), mock("b", through)], ["ab", "ba"]).master.initialise()
+
+
+def test_a_loop_of_booleans_is_refused(mock: Make) -> None:
+    mocks = [mock("a", lambda u, t: not u, "Boolean"), mock("b", through, "Boolean")]
+    with pytest.raises(InputError, match=r"a\.u is Boolean: only loops of Real values"):
+        run(mocks, ["ab", "ba"]).master.initialise()
+
+
+def test_undeclared_dependencies_count_as_all(mock: Make) -> None:
+    mocks = [mock("a", lambda u, t: 1.0 - 0.5 * u, direct=None), mock("b", through)]
+    started = run(mocks, ["ab", "ba"])
+    started.master.initialise()
+    assert started.signals()["a.y"][0] == pytest.approx(2.0 / 3.0, rel=1e-9)
+
+
+def test_a_dependency_that_is_not_declared_is_found_and_said(mock: Make) -> None:
+    liar = mock("a", lambda u, t: 2.0 * u, direct=False)
+    started = run([liar, mock("b", through), mock("s", lambda u, t: 4.0)], ["sa", "ab"])
+    started.master.initialise()
+    assert started.signals()["b.y"] == [8.0]
+    (line,) = started.master.log
+    assert line.startswith("a.y changed at t = 0 with an input that it does not declare")
+
+
+def test_a_loop_that_no_declaration_shows_is_refused(mock: Make) -> None:
+    mocks = [mock("a", lambda u, t: u + 1.0, direct=False), mock("b", through)]
+    with pytest.raises(InputError, match="do not settle, a loop through"):
+        run(mocks, ["ab", "ba"]).master.initialise()
+
+
+def test_a_failure_in_initialisation_is_a_wrong_input(mock: Make) -> None:
+    a = mock("a", through)
+    a.statuses["receive"] = 3
+    with pytest.raises(InputError, match="a: status 3") as caught:
+        run([mock("b", lambda u, t: 1.0), a], ["ba"]).master.initialise()
+    assert isinstance(caught.value.__cause__, SimulationError)

@@ -1,0 +1,168 @@
+"""Components without any binary: input u, output y, tunable p; they do what they are told."""
+
+import zipfile
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from grasp_cosim import SimulationError, System
+from grasp_cosim.fmi.instance import DISCARD, Call
+from grasp_cosim.master.engine import Engine
+from grasp_cosim.master.master import Master
+from grasp_cosim.recording.dispatch import Dispatcher
+from grasp_cosim.recording.memory import MemoryListener
+from grasp_cosim.system.interface import Interface, Value, Variable, read_interface
+from grasp_cosim.system.parts import Component, Wire
+
+Function = Callable[[float, float], float]
+
+DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="2.0" modelName="{name}" guid="{name}">
+  <CoSimulation modelIdentifier="{name}" canHandleVariableCommunicationStepSize="{vary}"/>
+  <ModelVariables>
+    <ScalarVariable name="u" valueReference="0" causality="input" variability="{variability}">
+      <{kind} start="{zero}"/></ScalarVariable>
+    <ScalarVariable name="y" valueReference="1" causality="output" variability="{variability}">
+      <{kind}/></ScalarVariable>
+    <ScalarVariable name="p" valueReference="2" causality="parameter" variability="tunable">
+      <Real start="1"/></ScalarVariable>
+  </ModelVariables>
+  <ModelStructure>
+    <Outputs><Unknown index="2"{depends}/></Outputs>
+    <InitialUnknowns><Unknown index="2"{depends}/></InitialUnknowns>
+  </ModelStructure>
+</fmiModelDescription>
+"""
+
+
+class Mock:
+    """y = output(u, time), where time only moves with a step.
+
+    direct says whether y is declared to depend on u. rejects, if given, is asked at each step for
+    the time reached: the step is discarded where that is before its end.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        name: str,
+        output: Function,
+        kind: str = "Real",
+        direct: bool | None = True,
+        vary: bool = True,
+        rejects: Callable[[float, float], float] | None = None,
+    ) -> None:
+        self.name = name
+        self.output = output
+        self.rejects = rejects
+        self.u: Any = {"Integer": 0, "Boolean": False, "String": ""}.get(kind, 0.0)
+        self.p = 1.0
+        self.time = 0.0
+        self.calls: list[str] = []
+        self.statuses = {"send": 0, "step": 0, "receive": 0}
+        self.path = folder / f"{name}.fmu"
+        depends = {True: ' dependencies="1"', False: ' dependencies=""', None: ""}[direct]
+        text = DESCRIPTION.format(
+            name=name, kind=kind, depends=depends, vary=str(vary).lower(),
+            variability="continuous" if kind == "Real" else "discrete",
+            zero={"Boolean": "false", "String": ""}.get(kind, "0"),
+        )  # fmt: skip
+        with zipfile.ZipFile(self.path, "w") as archive:
+            archive.writestr("modelDescription.xml", text)
+
+    @property
+    def interface(self) -> Interface:
+        return read_interface(self.path)
+
+    def enter_initialization(self, values: Mapping[str, Value], stop: float) -> None:
+        self.calls.append("enter")
+        self.u = values.get("u", self.u)
+
+    def exit_initialization(self) -> None:
+        self.calls.append("exit")
+
+    def get(self, variables: Sequence[Variable]) -> list[Value]:
+        self.calls.append("receive")
+        if self.statuses["receive"] > 1:
+            raise self.failure(self.statuses["receive"], self.time)
+        values = {"u": self.u, "p": self.p, "y": self.output(self.u, self.time)}
+        return [values[v.name] for v in variables]
+
+    def set(self, variables: Sequence[Variable], values: Sequence[Value]) -> None:
+        self.calls.append("send")
+        for v, value in zip(variables, values, strict=True):
+            setattr(self, v.name, value if v.kind == "String" else float(value))
+
+    def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:
+        def send() -> int:
+            self.calls.append("send")
+            self.u = float(data[0])
+            return self.statuses["send"]
+
+        def receive() -> int:
+            self.calls.append("receive")
+            data[0] = self.output(self.u, self.time)
+            return self.statuses["receive"]
+
+        return Call(send if action == "set" else receive)
+
+    def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
+        def advance() -> int:
+            begin = float(clock[0])
+            self.calls.append(f"step {begin!r} {step!r}")
+            self.time = begin + step
+            if self.rejects and (reached := self.rejects(begin, begin + step)) < begin + step:
+                self.time = reached
+                return DISCARD
+            return self.statuses["step"]
+
+        return Call(advance)
+
+    def last_successful_time(self) -> float | None:
+        return self.time
+
+    def failure(self, status: int, time: float) -> SimulationError:
+        return SimulationError(f"{self.name}: status {status} at {time!r}")
+
+    def close(self) -> None:
+        self.calls.append("close")
+
+
+def make_system(
+    mocks: Sequence[Mock],
+    wires: Sequence[Wire],
+    steps: int = 4,
+    step_ns: int = 100_000_000,
+    **more: Any,
+) -> System:
+    """A system of mocks; more are other fields of System, and `own`: steps by name.
+
+    An input without a wire is given what the mock has there.
+    """
+    own = more.pop("own", {})
+    wired = {wire.target.component for wire in wires}
+    components = tuple(
+        Component(m.name, m.path, {} if m.name in wired else {"u": m.u}, step_ns=own.get(m.name))
+        for m in mocks
+    )
+    more.setdefault("scheme", "sequential")
+    return System("mock.toml", components, tuple(wires), step_ns, step_ns * steps, **more)
+
+
+class Run:
+    """A master over mocks and what it recorded."""
+
+    def __init__(self, system: System, mocks: Sequence[Mock], engine: Engine = "python") -> None:
+        self.memory = MemoryListener()
+        self.master = Master(system, mocks, lambda *rows: self.dispatch(*rows), engine)
+        self.dispatch = Dispatcher(system, self.master.slots, [self.memory])
+
+    def to_the_end(self) -> dict[str, list[float]]:
+        self.master.initialise()
+        self.master.advance(self.master.total_steps)
+        return self.signals()
+
+    def signals(self) -> dict[str, list[float]]:
+        return {name: column.tolist() for name, column in self.memory.signals.items()}

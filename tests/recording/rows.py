@@ -1,0 +1,70 @@
+"""What the tests of the listeners share: signals of each kind, and a run that is only rows."""
+
+import tracemalloc
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from resource import RLIMIT_FSIZE, getrlimit, setrlimit
+
+import numpy as np
+import numpy.typing as npt
+from grasp_cosim import System
+from grasp_cosim.recording.listener import Listener, Signal
+
+SYSTEM = System("bare", (), (), 100_000, 1_000_000_000, "sequential")
+SIGNALS = (
+    Signal("a.x[1]", "m", "Real", "Where it is"),
+    Signal("a.n", None, "Integer"),
+    Signal("a.on", None, "Boolean", "Whether <it> is & was"),
+)
+
+
+def rows(count: int, seed: int = 1) -> npt.NDArray[np.float64]:
+    """Values for SIGNALS."""
+    random = np.random.default_rng(seed)
+    return np.column_stack(
+        (
+            random.standard_normal(count) * 10.0 ** random.integers(-300, 300, count),
+            random.integers(-(2**53), 2**53, count),
+            random.integers(0, 2, count),
+        )
+    )
+
+
+def play(
+    listener: Listener,
+    table: npt.NDArray[np.float64],
+    steps: npt.NDArray[np.int64] | None = None,
+    block: int = 1000,
+    signals: tuple[Signal, ...] = SIGNALS,
+    complete: bool = True,
+) -> None:
+    """A run of these rows. Like the master, it reuses the arrays that it hands on."""
+    numbers = np.arange(len(table)) if steps is None else steps
+    listener.begin(SYSTEM, signals)
+    for first in range(0, len(table), block):
+        part = numbers[first : first + block].copy(), table[first : first + block].copy()
+        listener.block(*part)
+        for array in part:
+            array.fill(-1)
+    listener.end(complete)
+
+
+def peak(work: Callable[[], None]) -> int:
+    """The most bytes that Python and NumPy had at once for the work."""
+    tracemalloc.start()
+    try:
+        work()
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+@contextmanager
+def full_disk(size: int) -> Iterator[None]:
+    """No file can grow beyond size bytes."""
+    before = getrlimit(RLIMIT_FSIZE)
+    setrlimit(RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        setrlimit(RLIMIT_FSIZE, before)

@@ -1,0 +1,118 @@
+"""Reads back what a run left behind."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from grasp_cosim import InputError, System, simulate
+from grasp_cosim.recording.load import load_run
+
+CSV = '"time","a.x","a.on"\n0.0,1.5,1\n0.1,2.5e-300,0\n'
+JSON = {"units": {"a.x": "m", "a.on": None}, "types": {"a.on": "bool"}}
+
+
+def folder(path: Path, csv: str | bytes = CSV, settings: object = JSON) -> Path:
+    (path / "signals.csv").write_bytes(csv if isinstance(csv, bytes) else csv.encode())
+    text = settings if isinstance(settings, str) else json.dumps(settings)
+    (path / "run.json").write_text(text, encoding="utf-8")
+    return path
+
+
+def test_a_run_comes_back_as_it_was(grasp: System, tmp_path: Path) -> None:
+    result = simulate(grasp, stop=0.01)
+    result.to_csv(tmp_path / "signals.csv")
+    result.to_json(tmp_path / "run.json")
+    run = load_run(tmp_path)
+    assert run.time.tolist() == result.time.tolist()
+    assert list(run.signals) == list(result)
+    for name, column in result.items():
+        assert run.signals[name].dtype == column.dtype
+        assert run.signals[name].tobytes() == column.tobytes()
+    assert run.units == dict(result.units)
+    assert run.settings["scheme"] == "sequential"
+    assert run.settings["components"]["plant"]["fmu"] == "GripperPlant.fmu"
+
+
+def test_columns_have_their_types_and_real_is_the_default(tmp_path: Path) -> None:
+    run = load_run(folder(tmp_path))
+    assert run.signals["a.x"].tolist() == [1.5, 2.5e-300]
+    assert run.signals["a.on"].dtype == np.bool_
+    assert run.signals["a.on"].tolist() == [True, False]
+    assert run.descriptions == {}
+
+
+def test_values_that_are_not_finite_are_kept(tmp_path: Path) -> None:
+    """A run that failed ends with them."""
+    run = load_run(folder(tmp_path, CSV + "0.2,nan,1\n0.3,-inf,1\n"))
+    np.testing.assert_array_equal(run.signals["a.x"][2:], [np.nan, -np.inf])
+
+
+def test_a_single_row_and_a_run_without_signals_are_runs(tmp_path: Path) -> None:
+    run = load_run(folder(tmp_path, '"time"\n0.0\n', {"units": {}}))
+    assert run.time.tolist() == [0.0]
+    assert run.signals == {}
+
+
+@pytest.mark.parametrize("name", ["signals.csv", "run.json"])
+def test_a_missing_file_is_named(tmp_path: Path, name: str) -> None:
+    (folder(tmp_path) / name).unlink()
+    with pytest.raises(InputError, match=rf"^.*{name}: No such file or directory; must be a fold"):
+        load_run(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("csv", "reason"),
+    [
+        ("", "the first column is 'nothing'; must be \"time\""),
+        ('"t","a.x","a.on"\n0.0,1.5,1\n', "the first column is 't'; must be \"time\""),
+        ('"time","a.x","a.on"\n', "the last row is cut off, or there is none"),
+        ('"time","a.x","a.on"', "the last row is cut off, or there is none"),
+        (CSV[:-2], "the last row is cut off"),
+        (CSV + "0.2,", "the last row is cut off"),
+        (CSV + "0.2,1\n", "damaged: the number of columns changed from 3 to 2"),
+        (CSV + "0.2,1,0,1\n", "damaged: the number of columns changed from 3 to 4"),
+        (CSV + "0.2,1,x\n", "damaged: could not convert string 'x' to float64"),
+        (CSV + "0.1,1,1\n", "the time must grow from row to row"),
+        (CSV + "nan,1,1\n", "the time must grow from row to row"),
+        (CSV.replace("a.on", "a.x"), "two columns have the same name"),
+        ('"time","a.x\n0.0,1\n', "the first line names no columns"),
+        ('"time","a.x","a.on","b"\n0.0,1,1\n', "3 values in a row, 4 names"),
+        (CSV.encode("utf-16"), "the first line names no columns"),
+        (CSV.encode() + b"0.2,\xff,1\n", "damaged: "),
+    ],
+)
+def test_damaged_signals_are_refused_in_one_line(
+    tmp_path: Path, csv: str | bytes, reason: str
+) -> None:
+    with pytest.raises(InputError) as caught:
+        load_run(folder(tmp_path, csv))
+    message = str(caught.value)
+    assert message.startswith(f"{tmp_path / 'signals.csv'}: ")
+    assert reason in message
+    assert "\n" not in message
+
+
+@pytest.mark.parametrize(
+    ("settings", "reason"),
+    [
+        ("{", "is damaged, no JSON: "),
+        ([], "is list; must be a JSON object"),
+        ({}, "no units; must be what"),
+        ({"units": 1}, "units = 1; must be a JSON object"),
+        ({**JSON, "types": []}, "types = []; must be a JSON object"),
+        ({**JSON, "types": {"a.on": "x"}}, "type of a.on = 'x': must be one of float64, int32, "),
+        ({**JSON, "types": {"a.on": []}}, "type of a.on = []: must be one of float64, int32, "),
+        ({**JSON, "types": {"a.x": "int64"}}, "type of a.x = int64: must be a type of its values"),
+        ({"units": {"a.x": "m"}}, "must be those of the columns of signals.csv: a.x, a.on"),
+    ],
+)
+def test_damaged_settings_are_refused_in_one_line(
+    tmp_path: Path, settings: object, reason: str
+) -> None:
+    with pytest.raises(InputError) as caught:
+        load_run(folder(tmp_path, settings=settings))
+    message = str(caught.value)
+    assert message.startswith(f"{tmp_path / 'run.json'}: ")
+    assert reason in message
+    assert "\n" not in message

@@ -1,0 +1,127 @@
+"""Writes ASAM MDF 4, read back with asammdf."""
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from grasp_cosim import InputError, SimulationError, System
+from grasp_cosim.recording.listener import Signal
+from grasp_cosim.recording.mdf import PIECE, MdfListener
+from grasp_cosim.recording.settings import settings
+from recording.rows import SIGNALS, SYSTEM, full_disk, peak, play, rows
+
+asammdf = pytest.importorskip("asammdf")
+
+
+def channels(path: Path) -> dict[str, Any]:
+    with asammdf.MDF(path) as file:
+        return {channel.name: file.get(channel.name) for channel in file.groups[0].channels}
+
+
+@pytest.mark.parametrize(("count", "block"), [(100, 1), (100, 7), (PIECE, 100), (20_001, 5000)])
+def test_values_come_back_with_their_types(tmp_path: Path, count: int, block: int) -> None:
+    table, path = rows(count), tmp_path / "new" / "s.mf4"
+    play(MdfListener(path), table, block=block)
+    assert list(path.parent.iterdir()) == [path]
+    found = channels(path)
+    assert list(found) == ["time", "a.x[1]", "a.n", "a.on"]
+    assert found["time"].samples.tolist() == [k * 100_000 / 1e9 for k in range(count)]
+    types = {"a.x[1]": np.float64, "a.n": np.int64, "a.on": np.uint8}
+    for (name, element), column in zip(types.items(), table.T, strict=True):
+        assert found[name].samples.dtype == element
+        assert found[name].samples.tolist() == column.tolist()
+        assert found[name].timestamps.tolist() == found["time"].samples.tolist()
+
+
+def test_time_is_that_of_the_step_numbers(tmp_path: Path) -> None:
+    play(MdfListener(tmp_path / "s.mf4"), rows(4), np.array([0, 30_000, 60_000, 70_001]))
+    assert channels(tmp_path / "s.mf4")["a.n"].timestamps.tolist() == [0.0, 3.0, 6.0, 7.0001]
+
+
+def test_channels_have_units_and_descriptions(tmp_path: Path) -> None:
+    play(MdfListener(tmp_path / "s.mf4"), rows(4))
+    found = channels(tmp_path / "s.mf4")
+    assert [c.unit for c in found.values()] == ["s", "m", "", ""]
+    assert [c.comment for c in found.values()] == ["", "Where it is", "", "Whether <it> is & was"]
+
+
+@pytest.mark.parametrize("complete", [True, False])
+def test_the_header_has_the_settings(grasp: System, tmp_path: Path, complete: bool) -> None:
+    """An interrupted run is kept all the same."""
+    listener = MdfListener(tmp_path / "s.mf4")
+    listener.begin(grasp, SIGNALS)
+    listener.block(np.arange(4), rows(4))
+    listener.end(complete)
+    with asammdf.MDF(tmp_path / "s.mf4") as file:
+        assert file.version == "4.10"
+        assert file.groups[0].channel_group.cycles_nr == 4
+        comment = ElementTree.fromstring(file.header.comment)
+    assert json.loads(comment.findtext("TX") or "") == settings(grasp)
+    assert {e.get("name"): json.loads(e.text or "") for e in comment.iter("e")} == {
+        "system": "grasp.toml",
+        "scheme": "sequential",
+        "step": 1e-4,
+        "stop": 3.0,
+        "complete": complete,
+    }
+
+
+def test_a_run_without_a_row_leaves_no_file(tmp_path: Path) -> None:
+    """Where initialisation fails, a file that was there stays."""
+    (tmp_path / "s.mf4").write_text("before")
+    play(MdfListener(tmp_path / "s.mf4"), rows(0), complete=False)
+    assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("s.mf4", "before")]
+
+
+def test_a_run_without_signals_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"s.mf4: nothing to record; must be a system with out"):
+        MdfListener(tmp_path / "s.mf4").begin(SYSTEM, ())
+
+
+def test_memory_does_not_grow_with_the_run(tmp_path: Path) -> None:
+    """asammdf writes a file in fragments of 4 MB; both runs have more than that."""
+    signals = tuple(Signal(f"a.x[{i}]", "m", "Real") for i in range(64))
+    table = np.random.default_rng(1).integers(0, 9, (1000, 64)).astype(np.float64)
+
+    def run(blocks: int) -> None:
+        listener = MdfListener(tmp_path / f"{blocks}.mf4")
+        listener.begin(SYSTEM, signals)
+        for k in range(blocks):
+            listener.block(np.arange(1000 * k, 1000 * (k + 1)), table)
+        listener.end(True)
+
+    run(1)  # imports
+    one, ten = peak(lambda: run(15)), peak(lambda: run(150))
+    assert ten < 1.1 * one
+    with asammdf.MDF(tmp_path / "150.mf4") as file:
+        last = file.get("a.x[63]")
+    assert last.samples.tolist() == 150 * table[:, 63].tolist()
+    assert last.timestamps.tolist() == [k * 100_000 / 1e9 for k in range(150_000)]
+
+
+def test_a_full_disk_leaves_nothing(tmp_path: Path) -> None:
+    listener = MdfListener(tmp_path / "s.mf4")
+    listener.begin(SYSTEM, SIGNALS)
+    with full_disk(5_000):
+        listener.block(np.arange(1000), rows(1000))
+        with pytest.raises(SimulationError, match=r"^.*s.mf4: cannot be written: File too large$"):
+            listener.end(True)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_place_that_cannot_be_written_is_a_wrong_input(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError, match=r"^.*file/s.mf4: cannot be written: "):
+        MdfListener(tmp_path / "file" / "s.mf4").begin(SYSTEM, SIGNALS)
+
+
+def test_without_asammdf_the_message_says_how_to_get_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "asammdf", None)
+    with pytest.raises(InputError, match=r"^asammdf is not .*pip install 'grasp-cosim\[mdf\]'$"):
+        MdfListener(tmp_path / "s.mf4")

@@ -1,0 +1,64 @@
+"""Keeps a run in memory."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from grasp_cosim import InputError
+from grasp_cosim.recording.listener import Signal
+from grasp_cosim.recording.memory import MemoryListener
+from recording.rows import SIGNALS, SYSTEM, peak, play, rows
+
+
+@pytest.mark.parametrize("block", [1, 7, 1000])
+def test_columns_have_the_values_and_the_types_of_their_signals(block: int) -> None:
+    table, memory = rows(100), MemoryListener()
+    play(memory, table, block=block)
+    assert list(memory.signals) == ["a.x[1]", "a.n", "a.on"]
+    types = [np.float64, np.int64, np.bool_]
+    for column, expected, element in zip(memory.signals.values(), table.T, types, strict=True):
+        assert column.dtype == element
+        assert column.tolist() == expected.tolist()
+
+
+def test_time_is_that_of_the_step_numbers() -> None:
+    """Decimated to every third point and the last."""
+    steps, memory = np.array([0, 3, 6, 9, 10]), MemoryListener(every=3)
+    play(memory, rows(5), steps)
+    assert memory.time.tolist() == [k * 100_000 / 1e9 for k in (0, 3, 6, 9, 10)]
+
+
+def test_there_are_no_rows_before_the_first() -> None:
+    memory = MemoryListener()
+    memory.begin(SYSTEM, SIGNALS)
+    assert memory.time.shape == (0,)
+    assert [column.shape for column in memory.signals.values()] == [(0,)] * 3
+
+
+def test_more_rows_than_the_run_has_steps_are_kept_as_well() -> None:
+    """Whoever looks at a decimated run on its way gets a row more each time."""
+    table, memory = rows(10_500), MemoryListener(every=1000)
+    play(memory, table)
+    assert memory.signals["a.x[1]"].tolist() == table[:, 0].tolist()
+
+
+def test_what_was_read_on_the_way_stays_as_it_was() -> None:
+    table, memory = rows(100), MemoryListener(every=1000)
+    memory.begin(SYSTEM, SIGNALS)
+    memory.block(np.arange(10), table[:10])
+    early = memory.signals
+    memory.block(np.arange(10, 100), table[10:])
+    assert early["a.x[1]"].tolist() == table[:10, 0].tolist()
+
+
+@pytest.mark.parametrize("stop", [10**18, 10**13])
+def test_a_run_that_does_not_fit_is_refused_at_the_start(stop: int) -> None:
+    long = replace(SYSTEM, step_ns=1, stop_ns=stop)
+    many = [Signal(f"a.x[{i}]", None, "Real") for i in range(1000)]
+    with pytest.raises(InputError, match=rf"^bare: {stop} steps do not fit into memory; must"):
+        MemoryListener().begin(long, many)
+
+
+def test_a_decimated_run_takes_memory_for_what_is_kept_only() -> None:
+    long = replace(SYSTEM, step_ns=1, stop_ns=10**13)
+    assert peak(lambda: MemoryListener(every=10**9).begin(long, SIGNALS)) < 2e6

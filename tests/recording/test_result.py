@@ -1,0 +1,103 @@
+"""What a run leaves behind, and the files that it writes."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from grasp_cosim import Result, SimulationError, System, simulate
+from grasp_cosim.recording.load import load_run
+from grasp_cosim.recording.result import Rejection
+from grasp_cosim.recording.settings import settings
+from recording.rows import full_disk
+
+
+@pytest.fixture(scope="module")
+def result(grasp: System) -> Result:
+    """A short run."""
+    return simulate(grasp, stop=0.1)
+
+
+def decimated(result: Result, every: int) -> Result:
+    """Every n-th communication point, and the last."""
+    kept = sorted({*range(0, len(result.time), every), len(result.time) - 1})
+    return replace(
+        result,
+        time=result.time[kept],
+        signals={name: column[kept] for name, column in result.items()},
+    )
+
+
+def test_csv_is_each_value_as_python_prints_it(result: Result, tmp_path: Path) -> None:
+    result.to_csv(tmp_path / "s.csv")
+    columns = [result.time, *result.signals.values()]
+    expected = [",".join(f'"{name}"' for name in ("time", *result))]
+    for row in zip(*(column.tolist() for column in columns), strict=True):
+        expected.append(",".join(repr(v) if isinstance(v, float) else str(int(v)) for v in row))
+    assert (tmp_path / "s.csv").read_text() == "\n".join(expected) + "\n"
+
+
+def test_a_decimated_result_keeps_its_times(result: Result, tmp_path: Path) -> None:
+    few = decimated(result, 300)
+    assert few.metrics["steps"] == result.metrics["steps"] == 1000
+    few.to_csv(tmp_path / "signals.csv")
+    few.to_json(tmp_path / "run.json")
+    run = load_run(tmp_path)
+    assert run.time.tolist() == [0.0, 0.03, 0.06, 0.09, 0.1]
+    assert run.signals["plant.gap[1]"].tolist() == few["plant.gap[1]"].tolist()
+
+
+def test_mdf_has_the_columns_and_whether_the_run_was_complete(
+    result: Result, tmp_path: Path
+) -> None:
+    asammdf = pytest.importorskip("asammdf")
+    described = replace(result, complete=False, descriptions={"plant.gap[1]": "to the object"})
+    described.to_mdf(tmp_path / "s.mf4")
+    assert [path.name for path in tmp_path.iterdir()] == ["s.mf4"]
+    with asammdf.MDF(tmp_path / "s.mf4") as file:
+        assert [c.name for c in file.groups[0].channels] == ["time", *result]
+        for name, column in result.items():
+            channel = file.get(name)
+            assert channel.samples.tolist() == column.tolist()
+            assert channel.timestamps.tolist() == result.time.tolist()
+            assert channel.unit == (result.units[name] or "")
+        assert file.get("plant.gap[1]").comment == "to the object"
+        assert '<e name="complete">false</e>' in file.header.comment
+
+
+def test_json_has_the_metrics_and_what_led_to_them(result: Result, tmp_path: Path) -> None:
+    told = replace(
+        result,
+        descriptions={"plant.gap[1]": "to the object"},
+        log=("the plant rejected a step",),
+        rejections={"plant": Rejection(3, 0.25)},
+    )
+    told.to_json(tmp_path / "run.json")
+    found = json.loads((tmp_path / "run.json").read_text())
+    assert found == {
+        **json.loads(json.dumps(dict(result.metrics))),
+        **settings(result.system),
+        "units": dict(result.units),
+        "types": {
+            name: {"f": "float64", "b": "bool"}[column.dtype.kind]
+            for name, column in result.items()
+        },
+        "descriptions": {"plant.gap[1]": "to the object"},
+        "log": ["the plant rejected a step"],
+        "rejections": {"plant": {"count": 3, "first": 0.25}},
+    }
+
+
+def test_a_full_disk_leaves_the_file_that_was_there(result: Result, tmp_path: Path) -> None:
+    path = tmp_path / "s.csv"
+    path.write_text("before")
+    with full_disk(10_000), pytest.raises(SimulationError, match="cannot be written: File too"):
+        result.to_csv(path)
+    assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("s.csv", "before")]
+
+
+def test_a_result_of_integers_is_written_as_integers(result: Result, tmp_path: Path) -> None:
+    counts = np.arange(len(result.time), dtype=np.int64)
+    replace(result, signals={"a.n": counts}, units={"a.n": None}).to_csv(tmp_path / "s.csv")
+    assert (tmp_path / "s.csv").read_text().splitlines()[-1] == "0.1,1000"

@@ -1,0 +1,69 @@
+"""What a run was asked to do, as plain data."""
+
+import json
+from dataclasses import replace
+from typing import Any
+
+from grasp_cosim import System
+from grasp_cosim.recording.settings import settings
+from grasp_cosim.system.parts import Condition, Event, Fault, Port, Wire
+
+
+def test_the_settings_of_the_grasp(grasp: System) -> None:
+    found = settings(grasp)
+    assert found["scheme"] == "sequential"
+    assert (found["step"], found["stop"]) == (1e-4, 3.0)
+    assert found["components"]["plant"] == {
+        "fmu": "GripperPlant.fmu",
+        "values": {"object_width": 0.07, "initial_object_position": 0.03},
+        "step": None,
+        "isolation": "none",
+        "rename": {},
+    }
+    assert found["wires"][0] == {
+        "from": "plant.gap[1]",
+        "to": "sensor_1.gap",
+        "factor": None,
+        "offset": None,
+    }
+    assert len(found["wires"]) == 10
+    assert found["events"] == found["faults"] == []
+
+
+def test_what_is_special_in_a_system(grasp: System) -> None:
+    plant, *others = grasp.components
+    gap = grasp.wires[0]
+    system = replace(
+        grasp,
+        components=(replace(plant, step_ns=200_000, isolation="process"), *others),
+        wires=(Wire(gap.source, gap.target, 2.0, -0.5), *grasp.wires[1:]),
+        events=(
+            Event({Port("sensor_1", "reflectance"): 0.5}, at_ns=500_000_000),
+            Event(
+                {Port("sensor_2", "reflectance"): 0.25},
+                when=Condition(Port("plant", "gap[1]"), "<", 0.01),
+            ),
+        ),
+        faults=(
+            Fault(Port("controller", "intensity[1]"), "bias", {"value": 0.1}, 100_000, 300_000),
+            Fault(Port("controller", "intensity[2]"), "stuck", {}),
+        ),
+    )
+    found: dict[str, Any] = json.loads(json.dumps(settings(system)))
+    assert found["components"]["plant"]["step"] == 2e-4
+    assert found["components"]["plant"]["isolation"] == "process"
+    assert (found["wires"][0]["factor"], found["wires"][0]["offset"]) == (2.0, -0.5)
+    assert found["events"] == [
+        {"at": 0.5, "set": {"sensor_1.reflectance": 0.5}},
+        {"when": "plant.gap[1] < 0.01", "set": {"sensor_2.reflectance": 0.25}},
+    ]
+    assert found["faults"] == [
+        {
+            "wire": "controller.intensity[1]",
+            "kind": "bias",
+            "value": 0.1,
+            "from": 1e-4,
+            "until": 3e-4,
+        },
+        {"wire": "controller.intensity[2]", "kind": "stuck", "from": 0.0},
+    ]
