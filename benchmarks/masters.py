@@ -2,10 +2,10 @@
 
     python benchmarks/masters.py [--cofmupy-python PYTHON]
 
-Runs the loop of four instances and ten wires at 10 kHz with the Jacobi scheme, everything recorded,
-first on our Python FMUs and then on native ones of the same shape, in short chunks, one master after
-the other. Prints the table of README.md. A master that is not installed is skipped by name; cofmupy
-pins an FMPy and a matplotlib of its own, so it may live in an environment of its own.
+Runs the loop of four instances and ten wires at 10 kHz with the Jacobi scheme, everything
+recorded, first on our Python FMUs and then on native ones of the same shape, in short chunks, one
+master after the other. Prints the table of README.md. A master that is not installed is skipped by
+name; cofmupy pins an FMPy and a matplotlib of its own, so it may be in an environment of its own.
 """
 
 import argparse
@@ -35,9 +35,9 @@ RECORDING = {
 REFERENCE = "grasp-cosim compiled"
 
 MODULES = {"ecospy": "ecospy", "libcosimpy": "libcosimpy", "cofmupy": "cofmupy"}
-"""What must be installed for a master; for ours see _available()."""
+"""What must be installed for a master."""
 
-KINDS = {"Python FMUs": 300, "native FMUs": 3000}
+KINDS = {"Python FMUs": 300, "native FMUs": 1000}
 """Macro steps in a chunk, for each kind of FMU."""
 
 ROUNDS = 60

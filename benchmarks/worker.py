@@ -3,8 +3,8 @@
     worker.py MASTER FOLDER
 
 runs the grasp with the FMUs of FOLDER. It answers every number of macro steps on standard input
-with the time they took, in s, and an empty line with the value of plant.position[1] reached. Masters
-are in processes of their own because their C++ libraries and their pins of FMPy collide.
+with the time they took, in s, and an empty line with the value of plant.position[1] reached.
+Masters are in processes of their own because their C++ libraries and their pins of FMPy collide.
 
 Every master runs the Jacobi scheme, the one they share, and records every output its own way.
 """
