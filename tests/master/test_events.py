@@ -254,7 +254,7 @@ def test_what_did_not_happen_is_said() -> None:
     rig = Rig([at(0.1, p=1.0), at(5.0, p=2.0), when("<", -1.0, p=3.0)])
     rig.run(8)
     assert rig.scenario.pending() == [
-        "events[1] did not happen: t = 5 s was not reached",
+        "events[1] did not happen: no step began at or after t = 5 s",
         "events[2] did not happen: a.y < -1.0 never held",
     ]
 

@@ -189,10 +189,13 @@ def test_the_energies_of_a_run_are_those_at_its_end(
 ) -> None:
     result = simulate(grasp, step=1e-3, stop=0.01)
     column = np.linspace(0.0, 1e-6, len(result.time))
-    recorded = replace(result, signals={**result.signals, "plant.exchange_energy[1]": column})
+    energies = {f"plant.exchange_energy[{j}]": j * column for j in (1, 2)}
+    recorded = replace(result, signals={**result.signals, **energies})
     monkeypatch.setattr(f"{MODULE}.simulate", lambda system: recorded)
     run = run_step(grasp)
-    assert run == StepRun(grasp.step_ns, (None, None), {"plant.exchange_energy[1]": 1e-6})
+    assert run == StepRun(
+        grasp.step_ns, (None, None), {name: e[-1] for name, e in energies.items()}
+    )
 
 
 def test_a_run_that_breaks_off_is_a_finding(grasp: System, monkeypatch: pytest.MonkeyPatch) -> None:

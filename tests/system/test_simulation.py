@@ -122,7 +122,8 @@ def test_a_value_that_is_not_finite_ends_the_run_where_it_arises(
     nan = "l = float('nan') if u.gap < 0.044 else u.gap"
     fmu = altered("ProximitySensor", "proximity_sensor/optics.py", GAP, nan)
     with pytest.raises(
-        SimulationError, match=r"^sensor_1: .*discard at t = .*intensity = nan V: must be finite"
+        SimulationError,
+        match=r"^sensor_1: .* asked for the end .*intensity = nan V: must be finite",
     ) as caught:
         simulate(grasp.swap("sensor_1", fmu))
     result = caught.value.result

@@ -6,10 +6,20 @@ from typing import NoReturn
 import click
 
 from ..errors import InputError, SimulationError
-from . import evaluate, fmus, report, run
+from . import evaluate, fmus, qualify, report, run, ssp
 from .frame import FAILED, INTERRUPTED, WRONG, cli, fail
 
-for command in (run.run, report.report, evaluate.evaluate, fmus.build, fmus.inspect, fmus.doctor):
+COMMANDS = (
+    run.run,
+    report.report,
+    evaluate.evaluate,
+    qualify.qualify,
+    ssp.ssp,
+    fmus.build,
+    fmus.inspect,
+    fmus.doctor,
+)
+for command in COMMANDS:
     cli.add_command(command)
 
 

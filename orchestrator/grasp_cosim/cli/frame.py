@@ -21,9 +21,11 @@ def cli(debug: bool) -> None:
     r"""FMI co-simulation of a delicate grasp.
 
     \b
-    grasp-cosim run                  the published grasp, from FMUs
-    grasp-cosim report RUN           a page of a run: traces, animation, wiring
+    grasp-cosim run [SYSTEM]         a closed loop; by default the published grasp, from FMUs
+    grasp-cosim report RUN           a page and figures of a run that was recorded
     grasp-cosim evaluate             the published table and figures, side by side with ours
+    grasp-cosim qualify FMU --as C   whether an FMU may take the place of component C
+    grasp-cosim ssp SYSTEM -o FILE   a system as an SSP archive
     grasp-cosim build                the FMUs
     grasp-cosim inspect FMU          an FMU's interface
     grasp-cosim doctor FMU           whether this machine will load an FMU

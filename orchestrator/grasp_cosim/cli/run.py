@@ -9,6 +9,7 @@ import click
 from ..errors import InputError, SimulationError
 from ..figures.plot import check_plot
 from ..grasp import CASES, grasp_system
+from ..master.engine import ENGINES, Engine
 from ..master.simulation import simulate
 from ..recording.result import Result
 from ..study.metrics import LABELS
@@ -28,6 +29,9 @@ from .step_study import run_step_study
 @click.option("--scheme", type=click.Choice(SCHEMES))
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for signals.csv and run.json.")
 @click.option("--plot", is_flag=True, help="Draw grasp.png, in --out or the current folder.")
+@click.option("--mdf", is_flag=True, help="Write signals.mf4 (ASAM MDF 4) too; needs --out.")
+@click.option("--every", type=click.IntRange(1), default=1, help="Record each N-th step only.")
+@click.option("--engine", type=click.Choice(ENGINES), default="auto", show_default=True)
 @click.option(
     "--step-study", is_flag=True, help="Repeat the run over steps: is --step small enough?"
 )
@@ -43,18 +47,25 @@ def run(
     scheme: str | None,
     out: Path | None,
     plot: bool,
+    mdf: bool,
+    every: int,
+    engine: Engine,
     step_study: bool,
     tolerance: float | None,
     as_json: bool,
 ) -> int:
-    r"""Run SYSTEM, a .toml file; by default the built-in grasp.
+    r"""Run SYSTEM, a .toml or .ssp file; by default the built-in grasp.
 
     \b
     Example: grasp-cosim run --case 1 --set plant.initial_object_position=0.02 --out results --plot
     """
     if tolerance is not None and not step_study:
         raise InputError(f"--tolerance {tolerance!r}: must come with --step-study")
-    chosen = System.load(system) if system else grasp_system()
+    if mdf and not out:
+        raise InputError("--mdf: must come with --out, the folder for signals.mf4")
+    chosen = System.load(system, step=step, stop=stop) if system else grasp_system()
+    for note in chosen.notes:
+        click.echo(note, err=True)
     fmus = dict(pair("--swap", text, "COMPONENT=FMU") for text in swaps)
     values: dict[str, Value] = {} if case is None else dict(CASES[case])
     values.update(pair("--set", text, "COMPONENT.VARIABLE=VALUE") for text in settings)
@@ -68,12 +79,14 @@ def run(
     if out or plot:
         check_folder(out or Path())
     try:
-        result = simulate(chosen, progress=True)
+        result = simulate(chosen, progress=True, every=every, engine=engine)
     except SimulationError as error:
         if error.result:
-            _write(error.result, out, plot)
+            _write(error.result, out, plot, mdf)
         raise
-    _write(result, out, plot)
+    _write(result, out, plot, mdf)
+    for line in result.log[len(chosen.notes) :]:
+        click.echo(line, err=True)
     click.echo(json.dumps(dict(result.metrics)) if as_json else _summary(result))
     if not result.complete:
         message = f"interrupted at t = {result.time[-1]:.6g} s; kept what was recorded"
@@ -81,10 +94,12 @@ def run(
     return 0
 
 
-def _write(result: Result, out: Path | None, plot: bool) -> None:
+def _write(result: Result, out: Path | None, plot: bool, mdf: bool) -> None:
     if out:
         result.to_csv(out / "signals.csv")
         result.to_json(out / "run.json")
+    if out and mdf:
+        result.to_mdf(out / "signals.mf4")
     if plot:
         path = (out or Path()) / "grasp.png"
         result.plot(path)

@@ -3,7 +3,7 @@
 import ctypes
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, overload
+from typing import Any
 
 import fmpy
 import numpy as np
@@ -20,16 +20,9 @@ from fmpy.fmi2 import (
 )
 from fmpy.logging import addLoggerProxy
 
-from ..errors import SimulationError
 from ..system.interface import Value, Variable
-from . import instance
-from .instance import STEP_2, TRANSFER_2, WARNING, Native
-from .loaded import LoadedInstance
-
-__all__ = ["WARNING", "Call", "FmuInstance"]
-
-Call = Callable[[], int]
-"""A bound FMI call; returns the FMI status."""
+from .instance import STEP_2, TRANSFER_2, Call, Native
+from .loaded import LOGGER, LoadedInstance
 
 _messages: list[tuple[str, str]] = []
 """What FMUs logged: instance and text. FMPy's logger proxy is one per process, so is this."""
@@ -38,6 +31,7 @@ _messages: list[tuple[str, str]] = []
 def _log(_: Any, instance: bytes | None, status: int, category: Any, message: bytes | None) -> None:
     if status > 0:
         text = (message or b"").decode(errors="replace")
+        LOGGER.info(" ".join(text.split()))
         _messages.append(((instance or b"").decode(errors="replace"), text))
 
 
@@ -77,9 +71,7 @@ class FmuInstance(LoadedInstance):
     def _suffix(self, fmi_type: str) -> str:
         return "Integer" if fmi_type == "Enumeration" else fmi_type
 
-    def transfer(
-        self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]
-    ) -> instance.Call:
+    def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:
         """The call that passes data to inputs ("set") or fetches outputs into it ("get")."""
         count = len(variables)
         references = (ctypes.c_uint * count)(*(v.reference for v in variables))
@@ -98,73 +90,27 @@ class FmuInstance(LoadedInstance):
             count,
             data.ctypes.data,
         )
-        return instance.Call(bound, native)
+        return Call(bound, native)
 
-    @overload
-    def stepper(self, clock: npt.NDArray[np.float64], step: float) -> instance.Call: ...
-    @overload
-    def stepper(self, clock: ctypes.c_double, step: float) -> Call: ...
-    def stepper(
-        self, clock: npt.NDArray[np.float64] | ctypes.c_double, step: float
-    ) -> instance.Call | Call:
+    def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
         """The call that advances by step seconds from the time in clock[0]."""
-        if isinstance(clock, ctypes.c_double):
-            return self._function("DoStep", clock, ctypes.c_double(step), ctypes.c_int(1))[0]
-        self._clock = clock
+        self._clock = clock if self._clock is None else self._clock
         box = ctypes.c_double.from_buffer(clock)  # type: ignore[arg-type]  # numpy's 3.11 stubs
         bound, address = self._function("DoStep", box, ctypes.c_double(step), ctypes.c_int(1))
-        return instance.Call(bound, Native(STEP_2, address, self._slave.component, step=step))
+        return Call(bound, Native(STEP_2, address, self._slave.component, step=step))
 
-    def ended_early(self) -> bool:
-        """Never: a step that ends early is discarded in FMI 2.0."""
-        return False
+    def _wants_the_end(self) -> bool:
+        return bool(self._status(self._slave.getBooleanStatus, fmi2Terminated))
 
-    def last_successful_time(self) -> float | None:
-        """Where a discarded step ended, in s; None where the FMU does not say.
+    def _reached(self) -> float | None:
+        return self._status(self._slave.getRealStatus, fmi2LastSuccessfulTime)
 
-        SimulationError where it was discarded because the FMU wants the simulation to end.
-        """
+    def _status(self, inquire: Callable[[int], float], kind: int) -> float | None:
+        """The status of that kind; None where the FMU does not say. It may log that it does not."""
+        self._unread += self._read_log()
         try:
-            if self._slave.getBooleanStatus(fmi2Terminated):
-                raise SimulationError(
-                    f"{self.name}: {self.interface.path.name} asked for the end of the simulation "
-                    f"in the step from t = {float(self._clock[0]):.9g} s"
-                )
-        except FMICallException:
-            pass  # it does not say
-        try:
-            return float(self._slave.getRealStatus(fmi2LastSuccessfulTime))
+            return inquire(kind)
         except FMICallException:
             return None
-
-    def save(self) -> None:
-        """Save the state, for one restore. Only where interface.can_save_state."""
-        with self._failures():
-            self._slave.fmi2GetFMUstate(self._slave.component, ctypes.byref(self._state))
-
-    def restore(self) -> None:
-        """Go back to the state saved last."""
-        with self._failures():
-            self._slave.fmi2SetFMUstate(self._slave.component, self._state)
-
-    def setters(self, variables: Sequence[Variable], reals: Any, integers: Any) -> list[Call]:
-        """Calls that pass reals (float64) and integers (int32) to the given inputs, in order."""
-        return self._bound("set", variables, reals, integers)
-
-    def getters(self, variables: Sequence[Variable], reals: Any, integers: Any) -> list[Call]:
-        """Calls that fetch outputs into reals (float64) and integers (int32), in order."""
-        return self._bound("get", variables, reals, integers)
-
-    def _bound(
-        self, action: str, variables: Sequence[Variable], reals: Any, integers: Any
-    ) -> list[Call]:
-        """One call per kind; the buffers' values follow the order of the variables of the kind."""
-        calls: list[Call] = []
-        offset = 0
-        for kind, buffer in (("Real", reals), ("Integer", integers), ("Boolean", integers)):
-            own = [v for v in variables if v.kind == kind]
-            if own:
-                part = buffer if kind == "Real" else buffer[offset:]
-                offset += len(own) if kind == "Integer" else 0
-                calls.append(self.transfer(action, own, part).python)
-        return calls
+        finally:
+            self._read_log()

@@ -85,7 +85,7 @@ class Instance(Protocol):
         """
 
     def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
-        """The call that advances by step seconds from the time in clock[0]; EARLY is a status too."""
+        """The call that advances by step seconds from the time in clock[0]; EARLY is a status."""
 
     def last_successful_time(self) -> float | None:
         """Where a discarded or shortened step ended, in s; None where the FMU does not say."""

@@ -6,6 +6,7 @@ that are parts of the master's vectors.
 """
 
 import ctypes
+import logging
 import os
 import re
 import sys
@@ -26,7 +27,7 @@ from fmpy.fmi1 import FMICallException
 
 from ..errors import InputError, SimulationError
 from ..system.interface import Interface, Value, Variable
-from .instance import ERROR, FATAL, STATUS, Call
+from .instance import DISCARD, EARLY, ERROR, FATAL, OK, STATUS, Call
 
 _PYTHON_FUNCTION = ctypes.PYFUNCTYPE(ctypes.c_int)
 _NATIVE_FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int)
@@ -44,6 +45,10 @@ _OF_KIND: Mapping[str, Callable[[Any], Value]] = {
 }
 
 
+LOGGER = logging.getLogger(__name__)
+"""Gets what FMUs log, too; the process of a component prints it."""
+
+
 class LoadedInstance(ABC):
     """One instance of a co-simulation FMU in this process. Use as a context manager."""
 
@@ -57,8 +62,8 @@ class LoadedInstance(ABC):
         self._worst = FATAL  # until it is instantiated
         self._keep: list[Any] = []
         self._running = False
-        self._clock: npt.NDArray[np.float64] = np.zeros(1)
-        self._state = ctypes.c_void_p()
+        self._clock: npt.NDArray[np.float64] | None = None
+        self._unread: list[str] = []
         self._read_log()  # forgets what an earlier instance of this name said
         self._folder = tempfile.TemporaryDirectory(prefix="grasp_fmu_")
         self._resources = Path(self._folder.name, "resources")
@@ -85,11 +90,23 @@ class LoadedInstance(ABC):
         """The end of the names of the functions that set and get an FMI type."""
 
     @abstractmethod
+    def _wants_the_end(self) -> bool:
+        """Whether the step that was discarded or ended early asks for the end of the simulation."""
+
+    @abstractmethod
+    def _reached(self) -> float | None:
+        """Where that step ended, in s; None where the FMU does not say."""
+
+    @abstractmethod
     def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:
         """The call that passes data to inputs ("set") or fetches outputs into it ("get").
 
         The variables are all of one FMI type; data is contiguous, in their order and of dtype().
         """
+
+    @abstractmethod
+    def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
+        """The call that advances by step seconds from the time in clock[0]."""
 
     def _load(self, folder: Path) -> Any:
         try:
@@ -132,8 +149,6 @@ class LoadedInstance(ABC):
                 said = as_reason(self._messages())
                 warnings.warn(f"{self.name}: {error}{said}", stacklevel=2)
         if self._worst < FATAL:
-            if self._state:
-                self._slave.freeFMUState(self._state)
             self._slave.freeInstance()
         if str(self._resources) in sys.path:  # pythonfmu puts it there and leaves it
             sys.path.remove(str(self._resources))
@@ -169,14 +184,27 @@ class LoadedInstance(ABC):
         setter = getattr(self._slave, f"set{self._suffix(variable.type)}")
         setter([variable.reference], [_OF_KIND[variable.kind](value)])
 
+    def last_successful_time(self) -> float | None:
+        """Where a discarded or shortened step ended, in s; None where the FMU does not say.
+
+        SimulationError where the FMU asks for the end of the simulation.
+        """
+        if self._wants_the_end():
+            raise self.failure(DISCARD, self._time())
+        return self._reached()
+
     def failure(self, status: int, time: float) -> SimulationError:
         """The error for a call that returned status at time in s. The FMU is not used again."""
-        self._worst = status
-        name = STATUS[status] if status < len(STATUS) else str(status)
+        self._worst = OK if status == EARLY else status
+        if status in (DISCARD, EARLY) and self._wants_the_end():
+            what = "asked for the end of the simulation"
+        elif status == EARLY:
+            what = "ended a step early"
+        else:
+            what = f"returned {STATUS[status] if status < len(STATUS) else status}"
         said = self._messages()
         error = SimulationError(
-            f"{self.name}: {self.interface.path.name} returned {name} at t = {time:.9g} s"
-            f"{as_reason(said)}"
+            f"{self.name}: {self.interface.path.name} {what} at t = {time:.9g} s{as_reason(said)}"
         )
         for text in said:
             error.add_note(text)
@@ -207,15 +235,20 @@ class LoadedInstance(ABC):
         try:
             yield
         except FMICallException as error:
-            raise self.failure(error.status, float(self._clock[0])) from error
+            raise self.failure(error.status, self._time()) from error
+
+    def _time(self) -> float:
+        """The time in s of the step that was begun last."""
+        return 0.0 if self._clock is None else float(self._clock[0])
 
     def _reason(self, error: Exception) -> str:
         return as_reason(self._messages()).removeprefix(": ") or " ".join(str(error).split())
 
     def _messages(self) -> list[str]:
         """What this instance logged and nobody has read yet."""
-        own = re.compile(rf"{re.escape(self.name)}, t = \S+ s: ")  # so our FMUs begin
-        said = [own.sub("", text, count=1) for text in self._read_log()]
+        own = re.compile(rf"\A{re.escape(self.name)}, t = \S+ s: ")  # so our FMUs begin
+        said = [own.sub("", text, count=1) for text in self._unread + self._read_log()]
+        self._unread.clear()
         return [text for text in said if not _PYTHONFMU_PREFIX.match(text)] or said
 
 

@@ -161,9 +161,7 @@ class _Dropout:
 
     def __call__(self, value: float, step: int) -> float:
         if step != self._step:
-            self._step = step
-            self._held = self._held if self._passed is None else self._passed
-            self._passed = None
+            self._step, self._held = step, self._passed
         if self._held is not None and self._lost(step):
             return self._held
         self._passed = value

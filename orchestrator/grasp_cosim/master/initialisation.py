@@ -189,7 +189,7 @@ class Propagation:
         return number if kind == "Real" else int(number) if kind == "Integer" else number != 0.0
 
     def _check_dependencies(self) -> list[str]:
-        """Pass on again while outputs change: a line for each that depends on more than declared."""
+        """Pass on again while outputs change: a line for each that hides a dependency."""
         given = {port: self.values[port] for port in self.order.cuts}
         found: list[Port] = []
         for _ in range(len(self.order.ports) + 1):

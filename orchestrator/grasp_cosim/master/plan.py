@@ -1,7 +1,7 @@
 """The flat plan: a system turned into one vector of values and a program for the loop.
 
-In the vector the outputs come first, then the inputs that have a wire. The Real values of a component
-stand together, so that one FMI call moves them all; values of another type have a buffer of their
+In the vector the outputs come first, then the inputs that have a wire. The Real values of a
+component stand together, so that one FMI call moves them all; values of another type have a buffer of their
 type beside the vector. Strings are no numbers: a wire between them is a call.
 """
 
@@ -34,7 +34,7 @@ class Plan:
     """Everything the loop works on.
 
     slots gives the place of each output and wired input in values. operations refer to wires
-    (source, target, factor, offset), casts (buffer, index, slot) and calls. clock is that of the loop.
+    (source, target, factor, offset), casts (buffer, index, slot) and calls. clock is the loop's.
     """
 
     values: npt.NDArray[np.float64]

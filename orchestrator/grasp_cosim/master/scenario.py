@@ -156,4 +156,4 @@ class _PendingEvent:
         """What it waits for."""
         if self.event.when is not None:
             return f"{self.event.when} never held"
-        return f"t = {(self.event.at_ns or 0) / NANOSECONDS:.9g} s was not reached"
+        return f"no step began at or after t = {(self.event.at_ns or 0) / NANOSECONDS:.9g} s"

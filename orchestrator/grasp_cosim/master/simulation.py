@@ -26,7 +26,7 @@ LOOK = 0.1
 
 
 class Session:
-    """A run that its user advances. Use as a context manager: leaving it ends and frees the FMUs."""
+    """A run that its user advances. A context manager: leaving it ends and frees the FMUs."""
 
     def __init__(
         self,
@@ -41,6 +41,7 @@ class Session:
         self.system = system
         self._memory = MemoryListener(every)
         self._wall_time = 0.0
+        self._failed = False
         self._stack = ExitStack()
         try:
             instances = [self._loaded(component) for component in system.components]
@@ -67,8 +68,16 @@ class Session:
         self.close()
 
     def close(self) -> None:
-        """End the listeners, terminate and free the FMUs. A closed session cannot step."""
-        self._stack.close()
+        """End the listeners, terminate and free the FMUs. A closed session cannot step.
+
+        SimulationError, with the result, where a listener fails at its end.
+        """
+        try:
+            self._stack.close()
+        except SimulationError as error:
+            self._failed = True
+            error.result = error.result or self.result()
+            raise
 
     @property
     def time(self) -> float:
@@ -77,8 +86,8 @@ class Session:
 
     @property
     def complete(self) -> bool:
-        """Whether the stop time is reached."""
-        return self._master.steps_done == self._master.total_steps
+        """Whether the stop time is reached, without a failure."""
+        return self._master.steps_done == self._master.total_steps and not self._failed
 
     def step(self, steps: int = 1) -> bool:
         """Do a number of communication steps, fewer at the end; False if none was left to do.
@@ -89,8 +98,7 @@ class Session:
         try:
             return self._master.advance(steps) > 0
         except SimulationError as error:
-            self._wall_time += time.perf_counter() - start
-            start = time.perf_counter()
+            self._failed = True
             error.result = self.result()
             raise
         finally:
@@ -127,8 +135,18 @@ class Session:
             self.complete,
             descriptions={s.name: s.description for s in signals},
             rejections=dict(master.rejections),
-            log=(*master.log, *master.scenario.log),
+            log=self._log(),
         )
+
+    def _log(self) -> tuple[str, ...]:
+        master = self._master
+        rejected = (
+            f"{name}: {r.count} steps were rejected and taken in parts, the first at "
+            f"t = {r.first:.9g} s"
+            for name, r in master.rejections.items()
+        )
+        pending = master.scenario.pending() if self.complete else ()
+        return (*self.system.notes, *master.log, *master.scenario.log, *rejected, *pending)
 
 
 class Simulate:

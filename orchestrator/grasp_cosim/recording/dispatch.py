@@ -1,6 +1,7 @@
 """From the rows of the master's loop to the listeners: checked, extended, decimated."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 
 import numpy as np
 import numpy.typing as npt
@@ -39,8 +40,11 @@ class Dispatcher:
         self._energy = ExchangeEnergy(bonds(system), slots, transforms)
         self.signals = (*self._outputs.values(), *self._energy.signals)
         self._pending: tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]] | None = None
-        for listener in self._listeners:
-            listener.begin(system, self.signals)
+        with ExitStack() as begun:
+            for listener in self._listeners:
+                listener.begin(system, self.signals)
+                begun.callback(listener.end, False)
+            begun.pop_all()  # whoever has begun is ended here only where the next one fails
 
     def __call__(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
         """Hand rows on; SimulationError at the first value not finite, which is the last kept."""
@@ -51,9 +55,11 @@ class Dispatcher:
             steps, rows = steps[: bad + 1], rows[: bad + 1]
         columns = np.hstack((rows[:, self._columns], self._energy(rows)))
         wanted = steps % self._every == 0
+        self._pending = None
         if wanted.any():
             self._hand_on(steps[wanted], columns[wanted])
-        self._pending = None if wanted[-1] else (steps[-1:].copy(), columns[-1:].copy())
+        if not wanted[-1]:
+            self._pending = steps[-1:].copy(), columns[-1:].copy()
         if not good:
             name = self.signals[int(finite[bad].argmin())].name
             value = rows[bad, self._columns[finite[bad].argmin()]]
@@ -61,15 +67,16 @@ class Dispatcher:
 
     def flush(self) -> None:
         """Hand the last row on, where decimation has left it out."""
-        if self._pending is not None:
-            self._hand_on(*self._pending)
-            self._pending = None
+        pending, self._pending = self._pending, None
+        if pending is not None:
+            self._hand_on(*pending)
 
     def end(self, complete: bool) -> None:
-        """Hand the last row on and end the listeners."""
-        self.flush()
-        for listener in self._listeners:
-            listener.end(complete)
+        """Hand the last row on and end the listeners, each of them even where another fails."""
+        with ExitStack() as stack:
+            for listener in reversed(self._listeners):
+                stack.callback(listener.end, complete)
+            self.flush()
 
     def _hand_on(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
         for listener in self._listeners:

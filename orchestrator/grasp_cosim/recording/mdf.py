@@ -45,13 +45,7 @@ class MdfListener:
 
     def __init__(self, path: str | Path) -> None:
         """InputError without asammdf."""
-        try:
-            import asammdf  # noqa: F401
-        except ImportError as error:
-            raise InputError(
-                "asammdf is not installed, it writes MDF files; "
-                "install it with: pip install 'grasp-cosim[mdf]'"
-            ) from error
+        check_mdf()
         self._path = Path(path)
 
     def begin(self, system: System, signals: Sequence[Signal]) -> None:
@@ -106,6 +100,17 @@ class MdfListener:
         except OSError as error:
             raise SimulationError(unwritable(self._path, error)) from error
         self._filled = 0
+
+
+def check_mdf() -> None:
+    """InputError without asammdf."""
+    try:
+        import asammdf  # noqa: F401
+    except ImportError as error:
+        raise InputError(
+            "asammdf is not installed, it writes MDF files; "
+            "install it with: pip install 'grasp-cosim[mdf]'"
+        ) from error
 
 
 def _channel(signal: Signal) -> asammdf.Signal:

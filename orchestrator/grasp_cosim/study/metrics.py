@@ -17,6 +17,17 @@ CLOSING = {1: -1.0, 2: 1.0}
 
 _PER_FINGER = ("position", "velocity", "gap", "contact_force", "contact")
 
+UNITS: Mapping[str, str] = {
+    "time_to_contact": "s",
+    "time_difference": "s",
+    "impact_velocity": "m/s",
+    "peak_contact_force": "N",
+    "steady_contact_force": "N",
+    "object_shift": "m",
+    "target_position": "m",
+}
+"""The units of the metrics of a grasp."""
+
 STEADY_WINDOW = 0.1
 """The steady contact force is the mean over the last so many seconds."""
 

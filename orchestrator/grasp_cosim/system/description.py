@@ -1,7 +1,7 @@
 """The system description: components, wires and the experiment, checked once."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -22,7 +22,7 @@ class System:
     """A checked system: every name exists, every input has one source or keeps a value.
 
     step_ns and stop_ns are in nanoseconds; stop_ns is a whole multiple of step_ns, and so is the
-    step of each component.
+    step of each component. notes are what its reader decided or did not use, one line each.
     """
 
     name: str
@@ -34,6 +34,7 @@ class System:
     events: tuple[Event, ...] = ()
     faults: tuple[Fault, ...] = ()
     initialisation: Initialisation = Initialisation()
+    notes: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
         check_steps(self)
@@ -45,11 +46,30 @@ class System:
         check_initialisation(self)
 
     @classmethod
-    def load(cls, path: str | Path, fmus: str | Path | None = None) -> "System":
-        """The system of a TOML file; fmus is where its FMUs are, by default beside the file."""
+    def load(
+        cls,
+        path: str | Path,
+        fmus: str | Path | None = None,
+        *,
+        step: float | None = None,
+        stop: float | None = None,
+    ) -> "System":
+        """The system of a TOML file or SSP archive; step and stop in s go before what it says.
+
+        fmus is where the FMUs of a TOML file are, by default beside it; an archive has its own.
+        """
+        path = Path(path)
+        if path.suffix.lower() == ".ssp":
+            from ..ssp.read import read_ssp  # which needs this module
+
+            if fmus is not None:
+                raise InputError(
+                    f"{path}: has its own FMUs; those in {fmus} cannot take their place"
+                )
+            return read_ssp(path, step, stop)
         from .toml import read_toml  # which needs this module
 
-        return read_toml(Path(path), Path(fmus) if fmus else None)
+        return read_toml(path, Path(fmus) if fmus else None).with_experiment(step, stop)
 
     def component(self, name: str, place: str) -> Component:
         """The component of that name; place says who asks, for the error message."""

@@ -84,7 +84,7 @@ class Condition:
 
     port: Port
     relation: Relation
-    value: float
+    value: float | bool
 
     def __str__(self) -> str:
         return f"{self.port} {self.relation} {literal(self.value)}"
@@ -114,7 +114,7 @@ class Fault:
 
     target: Port
     kind: FaultKind
-    parameters: Mapping[str, float]
+    parameters: Mapping[str, float | bool]
     start_ns: int = 0
     end_ns: int | None = None
     seed: int = 0

@@ -1,0 +1,97 @@
+"""The command qualify."""
+
+import json
+from pathlib import Path
+from typing import cast
+
+import click
+
+from ..figures.plot import new_figure
+from ..figures.qualification import draw_qualification
+from ..grasp import grasp_system
+from ..recording.result import write_text
+from ..study import verdict
+from ..study.bands import read_bands
+from ..study.qualify import Qualification
+from ..study.qualify import qualify as run_qualification
+from ..system.description import SCHEMES, System
+from ..system.interface import Value
+from ..system.parts import ISOLATIONS, Isolation
+from .frame import NEGATIVE, check_folder, json_option, pair
+
+
+@click.command()
+@click.argument("candidate", type=click.Path(path_type=Path))
+@click.option("--as", "component", required=True, metavar="COMPONENT", help="Whose place it takes.")
+@click.option("--system", type=click.Path(path_type=Path), help="Default: the built-in grasp.")
+@click.option("--bands", type=click.Path(path_type=Path), help="TOML; default: derived.")
+@click.option("--rename", "renames", multiple=True, metavar="VARIABLE=CANDIDATES_VARIABLE")
+@click.option("--set", "settings", multiple=True, metavar="COMPONENT.VARIABLE=VALUE")
+@click.option("--step", type=float, help="Communication step in s.")
+@click.option("--stop", type=float, help="Stop time in s.")
+@click.option("--scheme", type=click.Choice(SCHEMES))
+@click.option(
+    "--isolation",
+    type=click.Choice(ISOLATIONS),
+    default="process",
+    show_default=True,
+    help="Where the candidate runs.",
+)
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    help="Folder for qualification.json, qualification.png and the bands.toml that were used.",
+)
+@json_option
+def qualify(
+    candidate: Path,
+    component: str,
+    system: Path | None,
+    bands: Path | None,
+    renames: tuple[str, ...],
+    settings: tuple[str, ...],
+    step: float | None,
+    stop: float | None,
+    scheme: str | None,
+    isolation: str,
+    out: Path | None,
+    as_json: bool,
+) -> int:
+    r"""Find out whether CANDIDATE, an FMU, may take the place of COMPONENT.
+
+    Compares the interfaces, then the closed loops with the original and with the candidate, signal
+    by signal and metric by metric. Exit code 0: qualified; 1: not.
+
+    \b
+    Example: grasp-cosim qualify vendor_plant.fmu --as plant --out qualification
+    """
+    if out:
+        check_folder(out)
+        new_figure(1.0, 1.0)  # tells that matplotlib is missing before the runs, not after
+    chosen = System.load(system) if system else grasp_system()
+    values: dict[str, Value] = dict(
+        pair("--set", text, "COMPONENT.VARIABLE=VALUE") for text in settings
+    )
+    found = run_qualification(
+        chosen.with_experiment(step, stop, scheme),
+        component,
+        candidate,
+        rename=dict(pair("--rename", text, "VARIABLE=CANDIDATES_VARIABLE") for text in renames),
+        values=values,
+        bands=read_bands(bands) if bands else None,
+        isolation=cast(Isolation, isolation),
+        progress=True,
+    )
+    if out:
+        _write(found, out)
+    click.echo(json.dumps(verdict.as_json(found)) if as_json else verdict.as_text(found))
+    return 0 if found.qualified else NEGATIVE
+
+
+def _write(found: Qualification, out: Path) -> None:
+    """What there is: without a run, there is neither a figure nor a band."""
+    write_text(out / "qualification.json", json.dumps(verdict.as_json(found), indent=2) + "\n")
+    if found.signals:
+        write_text(out / "bands.toml", verdict.as_bands(found))
+        draw_qualification(found, out / "qualification.png")
+        click.echo(f"drew {out / 'qualification.png'}", err=True)

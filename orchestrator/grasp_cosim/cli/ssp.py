@@ -1,0 +1,49 @@
+"""The command ssp."""
+
+import json
+from pathlib import Path
+
+import click
+
+from ..grasp import grasp_system
+from ..system.description import System
+from .frame import check_folder, json_option
+
+
+@click.command()
+@click.argument("system", required=False, type=click.Path(path_type=Path))
+@click.option(
+    "-o", "--out", type=click.Path(path_type=Path), required=True, help="The archive to write."
+)
+@click.option("--step", type=float, help="Communication step in s, for an .ssp that names none.")
+@click.option("--stop", type=float, help="Stop time in s.")
+@json_option
+def ssp(
+    system: Path | None, out: Path, step: float | None, stop: float | None, as_json: bool
+) -> int:
+    r"""Write SYSTEM, a .toml or .ssp file, as an SSP 1.0 archive; by default the built-in grasp.
+
+    \b
+    Example: grasp-cosim ssp my_system.toml -o my_system.ssp
+    """
+    from ..ssp.write import write_ssp  # only here: its libraries take time to load
+
+    chosen = System.load(system, step=step, stop=stop) if system else grasp_system()
+    chosen = chosen.with_experiment(step, stop)
+    check_folder(out.parent)
+    written = write_ssp(chosen, out)
+    notes = [*chosen.notes, *written.notes]
+    if as_json:
+        report = {
+            "ssp": str(out),
+            "entries": list(written.entries),
+            "components": [c.name for c in chosen.components],
+            "connections": len(chosen.wires),
+            "notes": notes,
+        }
+        click.echo(json.dumps(report))
+    else:
+        click.echo("\n    ".join((f"{out}: written", *written.entries)))
+        for note in notes:
+            click.echo(note, err=True)
+    return 0

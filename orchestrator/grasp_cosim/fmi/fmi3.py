@@ -1,0 +1,133 @@
+"""An instance of an FMI 3.0 co-simulation FMU.
+
+Without event mode and intermediate update. A step may end early where the FMU declares that it
+might and that its step may vary; the master then does the rest. Clocks, binaries and arrays are
+left alone.
+"""
+
+import ctypes
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from fmpy.fmi3 import FMU3Slave
+
+from ..system.interface import Interface, Value, Variable
+from .instance import EARLY, STEP_3, TRANSFER_3, WARNING, Call, Native
+from .loaded import LOGGER, LoadedInstance
+
+TERMINATE, SHORT = 1, 2
+"""Places in the flags of a step, after that of an event."""
+
+
+class _Slave(FMU3Slave):  # type: ignore[misc]  # FMPy has no types
+    """FMPy's, but for an FMU without the functions of other kinds of FMUs."""
+
+    def __dir__(self) -> Iterable[str]:
+        """FMPy loads the functions by these names; it raises where one is missing."""
+        return [n for n in super().__dir__() if n[:4] != "fmi3" or hasattr(self.dll, n)]
+
+
+class Fmi3Instance(LoadedInstance):
+    """One instance of an FMI 3.0 co-simulation FMU. Use as a context manager."""
+
+    PREFIX = "fmi3"
+
+    def __init__(self, name: str, interface: Interface) -> None:
+        """Extract and instantiate; InputError where the FMU does not load."""
+        self._said: list[str] = []
+        self._flags = np.zeros(3, np.bool_)
+        self._last = np.zeros(1)
+        super().__init__(name, interface)
+
+    def _instantiate(self, folder: Path) -> FMU3Slave:
+        slave = _Slave(
+            guid=self.interface.guid,
+            unzipDirectory=str(folder),
+            modelIdentifier=self.interface.identifier,
+            instanceName=self.name,
+        )
+        slave.instantiate(
+            loggingOn=True,
+            earlyReturnAllowed=self.interface.early_return and self.interface.can_vary_step,
+            logMessage=self._log,
+        )
+        return slave
+
+    def _log(self, _: Any, status: int, category: Any, message: bytes | None) -> None:
+        if status > 0:
+            text = (message or b"").decode(errors="replace")
+            LOGGER.info(" ".join(text.split()))
+            self._said.append(text)
+
+    def _read_log(self) -> list[str]:
+        said, self._said[:] = self._said.copy(), []
+        return said
+
+    def _start(self, values: Mapping[str, Value], stop: float) -> None:
+        variables = {self.interface.by_name[name]: value for name, value in values.items()}
+        structural = {v: x for v, x in variables.items() if v.causality == "structuralParameter"}
+        if structural:
+            self._slave.enterConfigurationMode()
+            for variable, value in structural.items():
+                self._set(variable, value)
+            self._slave.exitConfigurationMode()
+        for variable, value in variables.items():
+            if variable not in structural:
+                self._set(variable, value)
+        self._slave.enterInitializationMode(startTime=0.0, stopTime=stop)
+
+    def _suffix(self, fmi_type: str) -> str:
+        return "Int64" if fmi_type == "Enumeration" else fmi_type
+
+    def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:
+        """The call that passes data to inputs ("set") or fetches outputs into it ("get")."""
+        count = len(variables)
+        references = (ctypes.c_uint * count)(*(v.reference for v in variables))
+        self._keep += [references, data]
+        bound, address = self._function(
+            action.capitalize() + self._suffix(variables[0].type),
+            ctypes.byref(references),
+            ctypes.c_size_t(count),
+            ctypes.c_void_p(data.ctypes.data),
+            ctypes.c_size_t(count),
+        )
+        native = Native(
+            TRANSFER_3,
+            address,
+            self._slave.component,
+            ctypes.addressof(references),
+            count,
+            data.ctypes.data,
+        )
+        return Call(bound, native)
+
+    def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
+        """The call that advances by step seconds from the time in clock[0]; EARLY is a status."""
+        self._clock = clock if self._clock is None else self._clock
+        flags, last = self._flags.ctypes.data, self._last.ctypes.data
+        bound, address = self._function(
+            "DoStep",
+            ctypes.c_double.from_buffer(clock),  # type: ignore[arg-type]  # numpy's stubs for 3.11
+            ctypes.c_double(step),
+            ctypes.c_bool(True),
+            *(ctypes.c_void_p(flags + place) for place in range(3)),
+            ctypes.c_void_p(last),
+        )
+        said = memoryview(self._flags)  # type: ignore[arg-type]
+
+        def advance() -> int:
+            status = bound()
+            return EARLY if status <= WARNING and (said[TERMINATE] or said[SHORT]) else status
+
+        native = Native(STEP_3, address, self._slave.component, step=step, flags=flags, last=last)
+        return Call(advance, native)
+
+    def _wants_the_end(self) -> bool:
+        return bool(self._flags[TERMINATE])
+
+    def _reached(self) -> float | None:
+        """A step that was discarded did nothing; what the flags say is then of an earlier one."""
+        return float(self._last[0]) if self._flags[SHORT] else self._time()

@@ -1,0 +1,121 @@
+"""What SSP 1.0 has no form for, as one annotation of the archive, so that our own run is the same.
+
+The communication step, the scheme, the components' own steps, processes and renamed variables, the
+initialisation, events and faults. Where it is, the elements are in the order of execution. Its
+content is JSON: the dataclasses of the system as objects, a port as a string.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, is_dataclass
+from types import UnionType
+from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+
+from lxml import etree  # type: ignore[import-untyped]
+
+from ..errors import InputError, choices
+from ..system.description import Scheme, System
+from ..system.parts import Event, Fault, Initialisation, Isolation, Port
+from .document import add
+
+TYPE = "grasp-cosim"
+_TAG = "{grasp-cosim:system}System"
+
+
+@dataclass(frozen=True, slots=True)
+class Beside:
+    """What a component has beside FMU and values."""
+
+    rename: Mapping[str, str]
+    step_ns: int | None
+    isolation: Isolation
+
+
+@dataclass(frozen=True, slots=True)
+class Extras:
+    """What a system has beside components, wires and stop."""
+
+    step_ns: int
+    scheme: Scheme
+    components: Mapping[str, Beside]
+    initialisation: Initialisation
+    events: tuple[Event, ...]
+    faults: tuple[Fault, ...]
+
+
+def extras_of(system: System) -> Extras:
+    """The extras of a system."""
+    return Extras(
+        system.step_ns,
+        system.scheme,
+        {c.name: Beside(dict(c.rename), c.step_ns, c.isolation) for c in system.components},
+        system.initialisation,
+        system.events,
+        system.faults,
+    )
+
+
+def write_extras(annotations: Any, extras: Extras) -> None:
+    """Add the annotation."""
+    element = etree.SubElement(
+        add(annotations, "ssc:Annotation", type=TYPE), _TAG, nsmap={"grasp": "grasp-cosim:system"}
+    )
+    element.text = json.dumps(_plain(extras), indent=1)
+
+
+def read_extras(place: str, annotation: Any) -> Extras:
+    """The extras of our annotation; InputError where it is not as we write it."""
+    element = annotation.find(_TAG)
+    try:
+        extras: Extras = _typed(Extras, json.loads("" if element is None else element.text or ""))
+    except (ValueError, TypeError) as error:
+        raise InputError(f"{place}: annotation {TYPE!r}: not as it was written: {error}") from error
+    return extras
+
+
+def _plain(value: Any) -> Any:
+    """A value of the system as JSON has it."""
+    if isinstance(value, Port):
+        return str(value)
+    if is_dataclass(value):
+        return {f.name: _plain(getattr(value, f.name)) for f in fields(value)}
+    if isinstance(value, Mapping):
+        return {_plain(key): _plain(entry) for key, entry in value.items()}
+    if isinstance(value, tuple | list):
+        return [_plain(entry) for entry in value]
+    return value
+
+
+def _typed(kind: Any, value: Any) -> Any:
+    """The reverse: a value of the given type; ValueError or TypeError where it is none."""
+    origin, arguments = get_origin(kind), get_args(kind)
+    if kind is Port:
+        return Port(*_typed(str, value).split(".", 1))
+    if is_dataclass(kind) and isinstance(kind, type):
+        hints = get_type_hints(kind)
+        unknown = [key for key in _typed(dict, value) if key not in hints]
+        if unknown:
+            raise ValueError(f"unknown entry {unknown[0]!r}; valid: {choices(hints)}")
+        return kind(**{key: _typed(hints[key], entry) for key, entry in value.items()})
+    if origin is not None and isinstance(origin, type) and issubclass(origin, Mapping):
+        return {
+            _typed(arguments[0], key): _typed(arguments[1], entry)
+            for key, entry in _typed(dict, value).items()
+        }
+    if origin is tuple:
+        return tuple(_typed(arguments[0], entry) for entry in _typed(list, value))
+    if origin in (Union, UnionType):
+        return None if value is None and type(None) in arguments else _one_of(arguments, value)
+    if origin is Literal:
+        if value not in arguments:
+            raise ValueError(f"{value!r}: must be one of {choices(arguments)}")
+        return value
+    if type(value) is not kind and (kind, type(value)) != (float, int):
+        raise ValueError(f"{value!r}: must be of type {kind.__name__}")
+    return value
+
+
+def _one_of(kinds: tuple[Any, ...], value: Any) -> Any:
+    """The value as the first of the types that it fits."""
+    fitting = [kind for kind in kinds if kind is type(value)]
+    return _typed(fitting[0] if fitting else kinds[0], value)

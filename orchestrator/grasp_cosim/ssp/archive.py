@@ -1,0 +1,104 @@
+"""The archive: entries read, FMUs extracted for as long as the process lives, written in one piece.
+
+The interface and the instances of an FMU need a file. Extracted FMUs go to a folder of this process
+that is removed at its end, so that runs side by side do not meet. There they are filed by the hash
+of their content, under their own last name: no path in an archive can lead out of the folder, and
+an archive read twice is extracted once.
+"""
+
+import atexit
+import hashlib
+import os
+import posixpath
+import shutil
+import tempfile
+import zipfile
+import zlib
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from threading import Lock
+from urllib.parse import unquote, urlsplit
+
+from ..errors import InputError, choices
+from ..recording.result import in_one_piece
+
+STRUCTURE = "SystemStructure.ssd"
+RESOURCES = "resources/"
+_DATE = (1980, 1, 1, 0, 0, 0)
+_MODE = 0o644 << 16
+_extracting = Lock()
+
+
+class Archive:
+    """The entries of an .ssp file; InputError where it is none."""
+
+    def __init__(self, path: Path) -> None:
+        self.place = path.name
+        if path.is_dir():
+            raise InputError(f"{path}: is a folder; must be an .ssp file")
+        try:
+            with zipfile.ZipFile(path) as file:
+                self.names = tuple(file.namelist())
+        except FileNotFoundError:
+            raise InputError(f"{path}: no such system file") from None
+        except (OSError, zipfile.BadZipFile) as error:
+            raise InputError(f"{path}: not readable as an SSP archive: {error}") from error
+        self._path = path
+        if STRUCTURE not in self.names:
+            raise InputError(f"{path}: no {STRUCTURE} in it; must be an SSP archive")
+
+    def read(self, entry: str) -> bytes:
+        """The content of an entry; InputError where it is damaged."""
+        try:
+            with zipfile.ZipFile(self._path) as file:
+                return file.read(entry)
+        except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, OSError) as error:
+            # RuntimeError: encrypted, or a compression that zipfile does not know
+            raise InputError(f"{self._path}: {entry}: not readable: {error}") from error
+
+    def resolve(self, place: str, uri: str) -> str:
+        """The entry that a source names, a relative path; InputError where there is none."""
+        parts = urlsplit(uri)
+        if parts.scheme or parts.netloc or parts.query or parts.fragment or not parts.path:
+            raise InputError(f"{place}: source {uri!r}: must be the path of a file in the archive")
+        for name in (unquote(parts.path), uri):
+            entry = posixpath.normpath(name)
+            if entry in self.names:
+                return entry
+        suffix = posixpath.splitext(parts.path)[1]
+        valid = [n for n in self.names if n.endswith(suffix) and not n.endswith("/")]
+        raise InputError(f"{place}: source {uri!r}: not in the archive; valid: {choices(valid)}")
+
+    def extract(self, entry: str) -> Path:
+        """The entry as a file, until the process ends."""
+        data = self.read(entry)
+        path = _folder() / hashlib.sha256(data).hexdigest() / posixpath.basename(entry)
+        with _extracting:
+            if not path.exists():
+                with in_one_piece(path) as part:
+                    part.write_bytes(data)
+        return path
+
+
+def write_archive(path: Path, entries: Mapping[str, bytes]) -> None:
+    """Write the entries in the order given; the same entries give the same bytes."""
+    with in_one_piece(path) as part, zipfile.ZipFile(part, "w") as file:
+        for name, data in entries.items():
+            info = zipfile.ZipInfo(name, _DATE)
+            info.external_attr = _MODE
+            info.create_system = 3  # Unix, on any system
+            file.writestr(info, data)
+
+
+@cache
+def _folder() -> Path:
+    """The folder of this process; a forked one does not remove its parent's."""
+    folder, owner = Path(tempfile.mkdtemp(prefix="grasp-cosim-ssp-")), os.getpid()
+
+    def remove() -> None:
+        if os.getpid() == owner:
+            shutil.rmtree(folder, ignore_errors=True)
+
+    atexit.register(remove)
+    return folder

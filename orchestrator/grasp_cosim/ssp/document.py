@@ -1,0 +1,117 @@
+"""XML of SSP: read without entities and network, checked against the official schemas."""
+
+import re
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import fmpy
+from lxml import etree  # type: ignore[import-untyped]
+
+from ..errors import InputError
+
+_BASE = "http://ssp-standard.org/SSP1/SystemStructure"
+NAMESPACES = {
+    "ssc": f"{_BASE}Common",
+    "ssd": f"{_BASE}Description",
+    "ssv": f"{_BASE}ParameterValues",
+    "ssm": f"{_BASE}ParameterMapping",
+}
+ROOTS = {
+    "ssd": "ssd:SystemStructureDescription",
+    "ssv": "ssv:ParameterSet",
+    "ssm": "ssm:ParameterMapping",
+}
+"""The root element of each format."""
+
+VERSION = "1.0"
+
+
+def qualified(name: str) -> str:
+    """A prefixed name like ssd:System as lxml writes it, {namespace}System."""
+    prefix, _, local = name.partition(":")
+    return f"{{{NAMESPACES[prefix]}}}{local}"
+
+
+def short(name: str) -> str:
+    """The reverse: a readable name."""
+    for prefix, namespace in NAMESPACES.items():
+        name = name.replace(f"{{{namespace}}}", f"{prefix}:")
+    return name
+
+
+def parse(place: str, data: bytes, form: str) -> Any:
+    """The root of a document of the given form, valid by its schema.
+
+    InputError where it is not; place names the file.
+    """
+    parser = etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True)
+    try:
+        root = etree.fromstring(data, parser)
+    except etree.XMLSyntaxError as error:
+        raise InputError(f"{place}: not readable as XML: {error}") from error
+    if root.getroottree().docinfo.doctype:
+        raise InputError(f"{place}: has a document type; SSP has none")
+    return checked(place, root, form)
+
+
+def checked(place: str, root: Any, form: str) -> Any:
+    """The root, valid by the schema of its form; InputError with the line where it is not."""
+    if root.tag != qualified(ROOTS[form]):
+        raise InputError(f"{at(place, root)}: {short(root.tag)}: must be {ROOTS[form]}")
+    version = root.get("version")
+    if version != VERSION:
+        raise InputError(f"{at(place, root)}: SSP version {version!r}; must be {VERSION!r}")
+    schema = _schema(form)
+    if not schema.validate(root):
+        error = schema.error_log[0]
+        raise InputError(f"{place}:{error.line}: against the schema: {short(error.message)}")
+    return root
+
+
+def at(place: str, element: Any) -> str:
+    """Where an element is: file and line."""
+    return f"{place}:{element.sourceline}"
+
+
+def child(element: Any, name: str) -> Any:
+    """The child of that prefixed name, or None."""
+    return element.find(qualified(name))
+
+
+def children(element: Any, *path: str) -> list[Any]:
+    """The elements at the end of a path of prefixed names."""
+    return list(element.findall("/".join(qualified(name) for name in path)))
+
+
+def is_true(element: Any, attribute: str) -> bool:
+    """An xs:boolean that is false where it is left out."""
+    return element.get(attribute, "false").strip() in ("true", "1")
+
+
+def to_bytes(root: Any) -> bytes:
+    """The document, indented; the same for the same content."""
+    etree.indent(root)
+    return bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8") + b"\n")
+
+
+def new(name: str, /, **attributes: str) -> Any:
+    """A root element; the prefixes are those of the standard."""
+    return etree.Element(qualified(name), attributes, nsmap=_prefixes(name))
+
+
+def add(parent: Any, name: str, /, **attributes: str) -> Any:
+    """A new child at the end of parent."""
+    return etree.SubElement(parent, qualified(name), attributes)
+
+
+def _prefixes(name: str) -> dict[str, str]:
+    used = {"ssc", name.partition(":")[0]}
+    return {prefix: NAMESPACES[prefix] for prefix in sorted(used)}
+
+
+@lru_cache(maxsize=len(ROOTS))
+def _schema(form: str) -> Any:
+    """The official schema, version 1.0, as FMPy brings it along."""
+    name = re.sub(".*/", "", NAMESPACES[form])
+    return etree.XMLSchema(file=str(Path(fmpy.__file__).parent / "ssp/schema" / f"{name}.xsd"))

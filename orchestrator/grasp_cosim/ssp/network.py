@@ -1,0 +1,247 @@
+"""The connections of nested systems as one net, in which a value is followed from hop to hop.
+
+A hop leads from one connector to another along a connection. Inside a system its inputs and
+parameters give values and its outputs take them; of its elements, outputs give and inputs take. The
+two ends of a connection are in no order, so the direction of the hop comes from that.
+
+Along a hop a value is first converted to the unit of the connector it reaches, then transformed:
+target = factor * converted + offset. With suppressUnitConversion the transformation, if any, is
+all. So the standard has it: schema of SSP 1.0, LinearTransformation and suppressUnitConversion.
+A connector of a system without a unit passes on that of the value.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+from ..errors import InputError, choices
+from ..system.interface import Interface, Variable
+from ..system.units import Unit
+from .declared import Declared
+from .tree import ComponentElement, Connection, Connector, End, SystemElement
+from .units import conversion, same
+
+Path = tuple[str, ...]
+"""The names of the elements from the top system, () itself, down to an element."""
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """A connector, or a variable of a component."""
+
+    path: Path
+    name: str
+
+    def __str__(self) -> str:
+        return ".".join((*self.path, self.name))
+
+
+@dataclass(frozen=True, slots=True)
+class Hop:
+    """The connection that leads from source to target."""
+
+    connection: Connection
+    source: Node
+    target: Node
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A component: its element, its interface under the FMU's own names, and what is beyond."""
+
+    element: ComponentElement
+    interface: Interface
+    declared: Declared
+
+
+@dataclass(frozen=True, slots=True)
+class Carried:
+    """What hops make of a number x: factor * x + offset, in unit.
+
+    unit is None where it is not known. settled is False where a transformation has led to a
+    connector without a unit, so that the unit is a guess.
+    """
+
+    unit: Unit | None
+    factor: float = 1.0
+    offset: float = 0.0
+    settled: bool = True
+
+
+@dataclass(frozen=True)
+class Network:
+    """All systems and components by path, and the hops between their connectors."""
+
+    systems: Mapping[Path, SystemElement]
+    parts: Mapping[Path, Part]
+
+    @cached_property
+    def into(self) -> dict[Node, Hop]:
+        """The hop that leads to a node; InputError where there are two."""
+        into: dict[Node, Hop] = {}
+        for path, system in self.systems.items():
+            for connection in system.connections:
+                hop = self._directed(path, system, connection)
+                if hop.target in into:
+                    raise InputError(
+                        f"{connection.place}: {hop.target} has two sources, "
+                        f"{into[hop.target].source} and {hop.source}; must have one"
+                    )
+                into[hop.target] = hop
+        return into
+
+    @cached_property
+    def out_of(self) -> dict[Node, list[Hop]]:
+        """The hops that lead away from a node."""
+        out_of: dict[Node, list[Hop]] = {}
+        for hop in self.into.values():
+            out_of.setdefault(hop.source, []).append(hop)
+        return out_of
+
+    def trace(self, node: Node) -> list[Hop]:
+        """The hops that lead to a node, from where its value comes first."""
+        hops: list[Hop] = []
+        while node in self.into:
+            hop = self.into[node]
+            if hop in hops:
+                raise InputError(f"{hop.connection.place}: leads back to itself")
+            hops.insert(0, hop)
+            node = hop.source
+        return hops
+
+    def output(self, node: Node) -> Node | None:
+        """The output of a component that a node gets its values from in the end, if any."""
+        hops = self.trace(node)
+        return hops[0].source if hops and hops[0].source.path in self.parts else None
+
+    def unit(self, node: Node) -> Unit | None:
+        """The unit of a node: that of its connector, of a component that of the variable."""
+        part = self.parts.get(node.path)
+        if part is None:
+            return self.systems[node.path].connectors[node.name].unit
+        variable = part.interface.by_name[node.name]
+        declared = part.declared.units.get(variable.unit or "")
+        connector = part.element.connectors.get(node.name)
+        return declared or (connector.unit if connector else None)
+
+    def variable(self, node: Node) -> Variable:
+        """The variable of a node of a component."""
+        return self.parts[node.path].interface.by_name[node.name]
+
+    def carry(self, hop: Hop, carried: Carried) -> Carried:
+        """What the hop makes of what it is given; InputError where units do not fit."""
+        place, target = hop.connection.place, self.unit(hop.target)
+        factor, offset, unit = carried.factor, carried.offset, carried.unit
+        if unit and target and not hop.connection.suppress:
+            if not carried.settled and not same(unit, target):
+                raise InputError(
+                    f"{place}: the unit at {hop.source} is not clear, {unit.name} or "
+                    f"{target.name}; give that connector a unit"
+                )
+            factor, offset = _after(factor, offset, conversion(place, unit, target))
+        change = hop.connection.transformation
+        if change is not None:
+            factor, offset = _after(factor, offset, change)
+        settled = target is not None or (carried.settled and change is None)
+        return Carried(target or unit, factor, offset, settled)
+
+    def decided_by_units(self, hops: list[Hop], carried: Carried) -> bool:
+        """Whether the units that the two FMUs declare say all about the way along the hops."""
+        if any(h.connection.suppress or h.connection.transformation for h in hops):
+            return False
+        source, target = (self._declared(node) for node in (hops[0].source, hops[-1].target))
+        place = hops[-1].connection.place
+        direct = conversion(place, source, target) if source and target else (1.0, 0.0)
+        return direct == (carried.factor, carried.offset)
+
+    def _declared(self, node: Node) -> Unit | None:
+        part = self.parts[node.path]
+        return part.declared.units.get(part.interface.by_name[node.name].unit or "")
+
+    def _directed(self, path: Path, system: SystemElement, connection: Connection) -> Hop:
+        (a, gives_a), (b, gives_b) = (
+            self._end(path, system, end, connection.place) for end in connection.ends
+        )
+        if gives_a == gives_b:
+            raise InputError(
+                f"{connection.place}: both {'give' if gives_a else 'take'} a value; "
+                "must lead from one that gives to one that takes"
+            )
+        return Hop(connection, a, b) if gives_a else Hop(connection, b, a)
+
+    def _end(self, path: Path, system: SystemElement, end: End, place: str) -> tuple[Node, bool]:
+        """The node of an end, and whether it gives a value in the system."""
+        if end.element is None:
+            connector = _connector(place, system.name, system.connectors, end.connector)
+            return Node(path, end.connector), not connector.gives
+        if end.element not in system.elements:
+            raise InputError(
+                f"{place}: no element {end.element!r}; valid: {choices(system.elements)}"
+            )
+        connectors = system.elements[end.element].connectors
+        connector = _connector(place, end.element, connectors, end.connector)
+        return Node((*path, end.element), end.connector), connector.gives
+
+
+def read_network(top: SystemElement, part: Mapping[Path, Part]) -> Network:
+    """The net of a system and of those in it; InputError at a connector that its FMU lacks."""
+    for component in part.values():
+        _check_connectors(component)
+    return Network(dict(systems_of(top)), part)
+
+
+def systems_of(system: SystemElement, path: Path = ()) -> Iterator[tuple[Path, SystemElement]]:
+    """The system and those in it, with their paths."""
+    yield path, system
+    for name, element in system.elements.items():
+        if isinstance(element, SystemElement):
+            yield from systems_of(element, (*path, name))
+
+
+def components_of(
+    system: SystemElement, path: Path = ()
+) -> Iterator[tuple[Path, ComponentElement]]:
+    """The components of the system and of those in it, in the order of the file."""
+    for name, element in system.elements.items():
+        if isinstance(element, SystemElement):
+            yield from components_of(element, (*path, name))
+        else:
+            yield (*path, name), element
+
+
+def _check_connectors(part: Part) -> None:
+    for connector in part.element.connectors.values():
+        place = f"{connector.place}: {part.element.name}: connector {connector.name!r}"
+        variable = part.interface.by_name.get(connector.name)
+        if variable is None or variable.causality != connector.kind:
+            raise InputError(
+                f"{place}: {part.interface.path.name} has no {connector.kind} of that name; "
+                f"valid: {choices(v.name for v in part.interface.of(connector.kind))}"
+            )
+        kind = kind_of(connector)
+        if kind is not None and kind != variable.kind:
+            raise InputError(f"{place}: {connector.type}; the FMU has {variable.kind}")
+        declared = part.declared.units.get(variable.unit or "")
+        if declared and connector.unit and not same(declared, connector.unit):
+            raise InputError(
+                f"{place}: unit {connector.unit.name} is not what the FMU declares, "
+                f"{declared.name}; must mean the same"
+            )
+
+
+def kind_of(connector: Connector) -> str | None:
+    """The kind of value, as an interface has it; None where the type is left out."""
+    return "Integer" if connector.type == "Enumeration" else connector.type
+
+
+def _connector(place: str, owner: str, connectors: Mapping[str, Connector], name: str) -> Connector:
+    if name not in connectors:
+        raise InputError(
+            f"{place}: {owner} has no connector {name!r}; valid: {choices(connectors)}"
+        )
+    return connectors[name]
+
+
+def _after(factor: float, offset: float, step: tuple[float, float]) -> tuple[float, float]:
+    """First factor and offset, then the step; exactly the same where one of them does nothing."""
+    return step[0] * factor, step[0] * offset + step[1]

@@ -1,0 +1,41 @@
+"""The order of execution of an archive that names none: along the flow of the data."""
+
+from collections.abc import Iterable, Mapping, Sequence
+
+
+def flow_order(names: Sequence[str], wires: Iterable[tuple[str, str]]) -> tuple[str, ...]:
+    """The names such that who gives goes before who takes; within a loop, and else, as given.
+
+    wires lead from name to name. The elements of an SSD are in no order of execution, often sorted
+    by name, and a sequential scheme against the flow delays a value by a step. Inside a loop no
+    order is better than that of the file.
+    """
+    after: dict[str, set[str]] = {name: set() for name in names}
+    for source, target in wires:
+        after[source].add(target)
+    behind = {name: _reachable(after, name) for name in names}
+    order: list[str] = []
+    while len(order) < len(names):
+        order.append(
+            next(
+                name
+                for name in names
+                if name not in order
+                and not any(
+                    name in behind[other] and other not in behind[name]
+                    for other in names
+                    if other not in order
+                )
+            )
+        )
+    return tuple(order)
+
+
+def _reachable(after: Mapping[str, set[str]], start: str) -> set[str]:
+    found: set[str] = set()
+    ahead = [start]
+    while ahead:
+        new = after[ahead.pop()] - found
+        found |= new
+        ahead += sorted(new)
+    return found

@@ -1,0 +1,285 @@
+"""Start values: parameter sets (SSV), mapped (SSM) and bound to a system or component.
+
+As the standard has it: names in the sets are those of variables, after those of the elements they
+are in and a dot, or those of connectors of a system, from which the value follows the connections.
+With a mapping only what is mapped is applied. Later bindings go before earlier ones, those of an
+outer system before those of an inner one. What fits nothing is not applied, and said.
+
+A value is converted to the unit of its target, then transformed, as on a connection. Types must be
+the same, but a whole number may be given to a Real, and an enumeration by number.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from ..errors import InputError, choices
+from ..system.interface import Value, Variable
+from ..system.units import Unit
+from .archive import Archive
+from .document import at, checked, children, is_true, parse, short
+from .network import Carried, Network, Node, Path, kind_of
+from .tree import Binding, linear, transformation
+from .units import conversion, read_units
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A value of a set with its SSP type; place says where it is from."""
+
+    place: str
+    type: str
+    value: Value
+    unit: Unit | None
+    settled: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """A parameter for what is called name at the binding's system or component.
+
+    With suppress its unit is not converted. change is its transformation, or None.
+    """
+
+    name: str
+    parameter: Parameter
+    suppress: bool
+    change: Any
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """values by the path of the component and the FMU's name of the variable; what was not used."""
+
+    values: Mapping[Path, Mapping[str, Value]]
+    notes: tuple[str, ...]
+
+
+def read_settings(
+    archive: Archive, file: str, network: Network, units: Mapping[str, Unit]
+) -> Settings:
+    """All values that the bindings give, the one that holds for each variable."""
+    values: dict[Path, dict[str, Value]] = {}
+    notes: list[str] = []
+    for path, binding in _bindings(network):
+        for given in _given(archive, file, binding, units, notes):
+            ends = list(_ends(network, path, given))
+            if not ends:
+                notes.append(f"{given.parameter.place}: no {given.name!r} to give it to; not used")
+            for end, parameter in ends:
+                value, source = _value(network, end, parameter), network.output(end)
+                if source:
+                    notes.append(f"{parameter.place}: {end} is connected to {source}; not used")
+                else:
+                    values.setdefault(end.path, {})[end.name] = value
+    return Settings(values, tuple(notes))
+
+
+def _bindings(network: Network) -> Iterator[tuple[Path, Binding]]:
+    """All bindings with the path of what they are at; who goes before another comes after it."""
+    for path, part in network.parts.items():
+        for binding in part.element.bindings:
+            yield path, binding
+    for path in sorted(network.systems, key=len, reverse=True):
+        for binding in network.systems[path].bindings:
+            yield path, binding
+
+
+def _given(
+    archive: Archive, file: str, binding: Binding, units: Mapping[str, Unit], notes: list[str]
+) -> Iterator[Given]:
+    """What a binding gives; notes get what is not mapped."""
+    parameters = {
+        binding.prefix + name: parameter
+        for name, parameter in _set(archive, file, binding, units).items()
+    }
+    if not binding.mapped:
+        for name, parameter in parameters.items():
+            yield Given(name, parameter, False, None)
+        return
+    mapped = set()
+    for place, source, given in _mapping(archive, file, binding, parameters):
+        mapped.add(source)
+        if given:
+            yield given
+        else:
+            notes.append(f"{place}: no parameter {source!r}; not used")
+    for name, parameter in parameters.items():
+        if name not in mapped:
+            notes.append(f"{parameter.place}: not in the mapping; not used")
+
+
+def _ends(network: Network, path: Path, given: Given) -> Iterator[tuple[Node, Parameter]]:
+    """The variables of components that a value arrives at, and what of it does."""
+    for node in _nodes(network, path, given.name):
+        yield from _spread(network, node, _adapted(network, node, given))
+
+
+def _set(
+    archive: Archive, file: str, binding: Binding, units: Mapping[str, Unit]
+) -> dict[str, Parameter]:
+    if binding.source is None:
+        place, root = file, checked(file, binding.inline, "ssv")
+        known = {**units, **read_units(root, "ssv")}
+    else:
+        entry = archive.resolve(binding.place, binding.source)
+        place = f"{archive.place}: {entry}"
+        root = parse(place, archive.read(entry), "ssv")
+        known = dict(read_units(root, "ssv"))
+    parameters: dict[str, Parameter] = {}
+    for element in children(root, "ssv:Parameters", "ssv:Parameter"):
+        name = element.get("name")
+        where = f"{at(place, element)}: parameter {name!r}"
+        if name in parameters:
+            raise InputError(f"{where}: there are two; must be one")
+        parameters[name] = _parameter(where, element[0], known)
+    return parameters
+
+
+def _parameter(place: str, element: Any, units: Mapping[str, Unit]) -> Parameter:
+    kind, text = short(element.tag).removeprefix("ssv:"), element.get("value")
+    readers: Mapping[str, Callable[[str], Value]] = {
+        "Real": float,
+        "Integer": int,
+        "Boolean": lambda text: text.strip() in ("true", "1"),
+        "String": str,
+        "Enumeration": str,
+    }
+    if kind not in readers:
+        raise InputError(f"{place}: type {kind} is not supported; valid: {choices(readers)}")
+    name = element.get("unit")
+    if name is not None and name not in units:
+        raise InputError(f"{place}: unit {name!r} is not defined; valid: {choices(units)}")
+    return Parameter(place, kind, readers[kind](text), units[name] if name else None)
+
+
+def _mapping(
+    archive: Archive, file: str, binding: Binding, parameters: Mapping[str, Parameter]
+) -> Iterator[tuple[str, str, Given | None]]:
+    """The entries of a mapping: place, source, and what is given, None without such a source."""
+    if binding.mapping_source is None:
+        place, root = file, checked(file, binding.mapping_inline, "ssm")
+    else:
+        entry = archive.resolve(binding.place, binding.mapping_source)
+        place = f"{archive.place}: {entry}"
+        root = parse(place, archive.read(entry), "ssm")
+    targets: set[str] = set()
+    for element in children(root, "ssm:MappingEntry"):
+        source, target = element.get("source"), element.get("target")
+        where = f"{at(place, element)}: mapping '{source} -> {target}'"
+        if target in targets:
+            raise InputError(f"{where}: {target!r} has two sources; must have one")
+        targets.add(target)
+        parameter = parameters.get(source)
+        suppress, change = is_true(element, "suppressUnitConversion"), transformation(element)
+        yield where, source, Given(target, parameter, suppress, change) if parameter else None
+
+
+def _nodes(network: Network, path: Path, name: str) -> Iterator[Node]:
+    """What a name means at a system or component: variables and connectors, maybe several."""
+    part = network.parts.get(path)
+    if part is not None:
+        if name in part.interface.by_name:
+            yield Node(path, name)
+        return
+    system = network.systems[path]
+    if name in system.connectors:
+        yield Node(path, name)
+    for element in system.elements:
+        if name.startswith(f"{element}."):
+            yield from _nodes(network, (*path, element), name[len(element) + 1 :])
+
+
+def _spread(network: Network, node: Node, given: Parameter) -> Iterator[tuple[Node, Parameter]]:
+    """Where a value at a node arrives: there, or at the components that its system passes it to."""
+    if node.path in network.parts:
+        yield node, given
+        return
+    connector = network.systems[node.path].connectors[node.name]
+    if kind_of(connector) not in (None, given.type) and (connector.type, given.type) != (
+        "Real",
+        "Integer",
+    ):
+        raise InputError(f"{given.place}: {given.type}; {node} is {connector.type}")
+    for hop in network.out_of.get(node, ()):
+        if given.type in ("Real", "Integer"):
+            carried = network.carry(hop, Carried(given.unit, settled=given.settled))
+            number = _linear(given.value, carried.factor, carried.offset)
+            passed = replace(given, value=number, unit=carried.unit, settled=carried.settled)
+        elif hop.connection.transformation:
+            raise InputError(f"{hop.connection.place}: transforms a {given.type}; must be Real")
+        else:
+            passed = given
+        yield from _spread(network, hop.target, passed)
+
+
+def _adapted(network: Network, node: Node, given: Given) -> Parameter:
+    """The parameter in the unit of the node, transformed."""
+    unit, parameter = network.unit(node), given.parameter
+    if parameter.unit and unit and not given.suppress:
+        factor, offset = conversion(parameter.place, parameter.unit, unit)
+        parameter = replace(parameter, value=_linear(parameter.value, factor, offset))
+    if given.change is not None:
+        parameter = _transformed(parameter, given.change)
+    settled = unit is not None or given.change is None
+    return replace(parameter, unit=unit or parameter.unit, settled=settled)
+
+
+def _transformed(given: Parameter, change: Any) -> Parameter:
+    kind = short(change.tag).removeprefix("ssc:").removesuffix("Transformation")
+    if kind == "Linear":
+        if given.type not in ("Real", "Integer"):
+            raise InputError(
+                f"{given.place}: {given.type} has a linear transformation; must be Real"
+            )
+        return replace(given, type="Real", value=_linear(given.value, *linear(change)))
+    readers: Mapping[str, tuple[tuple[str, ...], Callable[[str], Value]]] = {
+        "BooleanMapping": (("Boolean",), lambda text: text.strip() in ("true", "1")),
+        "IntegerMapping": (("Integer",), int),
+        "EnumerationMapping": (("Enumeration",), str),
+    }
+    types, read = readers[kind]
+    if given.type not in types:
+        raise InputError(f"{given.place}: {given.type} has {short(change.tag)}; must be {types[0]}")
+    table = {
+        read(entry.get("source")): read(entry.get("target"))
+        for entry in children(change, "ssc:MapEntry")
+    }
+    if given.value not in table:
+        raise InputError(
+            f"{given.place}: {given.value!r} is not in its {short(change.tag)}; "
+            f"valid: {choices(map(repr, table))}"
+        )
+    return replace(given, value=table[given.value])
+
+
+def _linear(value: Value, factor: float, offset: float) -> Value:
+    """The value times factor plus offset; the value itself where they do nothing."""
+    return value if (factor, offset) == (1.0, 0.0) else factor * float(value) + offset
+
+
+def _value(network: Network, node: Node, given: Parameter) -> Value:
+    """The value for a variable of a component, checked."""
+    part = network.parts[node.path]
+    variable = part.interface.by_name[node.name]
+    if variable.causality not in ("input", "parameter"):
+        raise InputError(
+            f"{given.place}: {node} is {variable.causality}; only inputs and parameters are set"
+        )
+    items = part.declared.items.get(node.name, {})
+    if given.type == "Enumeration" and items:
+        if given.value not in items:
+            raise InputError(
+                f"{given.place}: {node} = {given.value!r}: must be one of {choices(items)}"
+            )
+        return items[str(given.value)]
+    _check_type(given, node, variable)
+    return part.interface.parse(given.place, node.name, given.value)
+
+
+def _check_type(given: Parameter, node: Node, variable: Variable) -> None:
+    exact = given.type == variable.kind
+    if not exact and (given.type, variable.kind) != ("Integer", "Real"):
+        raise InputError(
+            f"{given.place}: {given.type}; {node} is {variable.kind}, must be the same"
+        )

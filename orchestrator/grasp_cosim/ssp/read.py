@@ -1,0 +1,252 @@
+"""From an SSP 1.0 archive to a system.
+
+What the archive holds is run or refused by name; what the standard lets a tool decide is decided
+here and said in the notes of the system.
+
+- Execution follows the flow of the data, see order.py, in the sequential scheme.
+- SSP has no communication step. It is given (--step), or the smallest step of the FMUs' default
+  experiments that divides the stop time.
+- An input that nothing is connected to keeps its start value.
+- Components in nested systems are named after all systems they are in, joined by an underscore.
+- An archive of ours has an annotation with all that, see annotation.py; then it holds.
+"""
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path as FilePath
+from typing import Any
+
+from ..errors import InputError, choices
+from ..system.description import System, in_nanoseconds
+from ..system.interface import read_interface
+from ..system.parts import NANOSECONDS, Component, Initialisation, Port, Wire
+from .annotation import TYPE, Beside, Extras, read_extras
+from .archive import STRUCTURE, Archive
+from .declared import declared
+from .document import at, child, children, parse, qualified
+from .network import (
+    Carried,
+    Hop,
+    Network,
+    Node,
+    Part,
+    Path,
+    components_of,
+    kind_of,
+    read_network,
+)
+from .order import flow_order
+from .parameters import Settings, read_settings
+from .tree import ComponentElement, read_system
+from .units import read_units
+
+
+def read_ssp(path: FilePath, step: float | None = None, stop: float | None = None) -> System:
+    """The system of an archive; step and stop in s go before what it names."""
+    archive = Archive(path)
+    file = f"{archive.place}: {STRUCTURE}"
+    root = parse(file, archive.read(STRUCTURE), "ssd")
+    units = read_units(root, "ssd")
+    top = read_system(file, child(root, "ssd:System"), units)
+    parts = {p: _part(archive, element) for p, element in components_of(top)}
+    if not parts:
+        raise InputError(f"{top.place}: system {top.name!r} has no components; must have some")
+    network = read_network(top, parts)
+    extras = _extras(file, root)
+    names = _names(file, parts, extras)
+    wires = tuple(_wires(network, names, extras))
+    settings = read_settings(archive, file, network, units)
+    components, kept = _components(network, names, settings, wires, extras)
+    stop_ns = _stop(file, root, stop)
+    step_ns, chosen = _step(file, parts.values(), stop_ns, step, extras)
+    return System(
+        archive.place,
+        components,
+        wires,
+        step_ns,
+        stop_ns,
+        extras.scheme if extras else "sequential",
+        extras.events if extras else (),
+        extras.faults if extras else (),
+        extras.initialisation if extras else Initialisation(),
+        (*_unused(archive, root), *_renamed(names), *settings.notes, *kept, *chosen),
+    )
+
+
+def _part(archive: Archive, element: ComponentElement) -> Part:
+    place = f"{element.place}: component {element.name!r}"
+    path = archive.extract(archive.resolve(place, element.source))
+    try:
+        interface = read_interface(path)
+    except InputError as error:
+        reason = str(error).removeprefix(f"{path}: ")
+        raise InputError(f"{place}: {element.source}: {reason}") from error
+    return Part(element, interface, declared(path))
+
+
+def _extras(file: str, root: Any) -> Extras | None:
+    for annotation in children(root, "ssd:Annotations", "ssc:Annotation"):
+        if annotation.get("type") == TYPE:
+            return read_extras(at(file, annotation), annotation)
+    return None
+
+
+def _names(file: str, parts: Iterable[Path], extras: Extras | None) -> dict[Path, str]:
+    """The components' names in the system, where a dot parts component and variable."""
+    names = {path: "_".join(path).replace(".", "_") for path in parts}
+    for name, count in Counter(names.values()).items():
+        if count > 1:
+            same = choices(".".join(path) for path in names if names[path] == name)
+            raise InputError(f"{file}: components {same} would all be {name!r} here; must differ")
+    if extras and set(extras.components) != set(names.values()):
+        raise InputError(
+            f"{file}: annotation {TYPE!r} is about other components, "
+            f"{choices(extras.components)}; valid: {choices(names.values())}; remove it"
+        )
+    return names
+
+
+def _wires(network: Network, names: Mapping[Path, str], extras: Extras | None) -> Iterator[Wire]:
+    """The wires, in the order of the connections that reach the inputs."""
+    for target in network.into:
+        if target.path not in network.parts:
+            continue
+        if network.output(target) is None:
+            continue
+        hops = network.trace(target)
+        carried = _carried(network, hops)
+        source, sink = (
+            Port(names[node.path], _new_names(names[node.path], extras).get(node.name, node.name))
+            for node in (hops[0].source, target)
+        )
+        if network.decided_by_units(hops, carried):
+            yield Wire(source, sink)
+        else:
+            yield Wire(source, sink, carried.factor, carried.offset)
+
+
+def _carried(network: Network, hops: list[Hop]) -> Carried:
+    """What the way from component to component makes of a value; InputError where it must not."""
+    carried = Carried(network.unit(hops[0].source))
+    variable = network.variable(hops[0].source)
+    for hop in hops:
+        place = hop.connection.place
+        if variable.causality != "output" or _causality(network, hop.target) == "parameter":
+            raise InputError(
+                f"{place}: leads from {hops[0].source} to a parameter, or from one; "
+                "only outputs are passed on to inputs, give the parameter a value"
+            )
+        kind = _kind(network, hop.target)
+        if kind not in (None, variable.kind):
+            raise InputError(
+                f"{place}: from {variable.kind} to {kind} at {hop.target}; must be the same"
+            )
+        if hop.connection.transformation and variable.kind != "Real":
+            raise InputError(f"{place}: transforms a {variable.kind}; must be Real")
+        carried = network.carry(hop, carried)
+    return carried
+
+
+def _causality(network: Network, node: Node) -> str:
+    if node.path in network.parts:
+        return network.variable(node).causality
+    return network.systems[node.path].connectors[node.name].kind
+
+
+def _kind(network: Network, node: Node) -> str | None:
+    if node.path in network.parts:
+        return network.variable(node).kind
+    return kind_of(network.systems[node.path].connectors[node.name])
+
+
+def _new_names(component: str, extras: Extras | None) -> dict[str, str]:
+    """The system's names of variables by those of the FMU, where they differ."""
+    rename = extras.components[component].rename if extras else {}
+    return {own: new for new, own in rename.items()}
+
+
+def _components(
+    network: Network,
+    names: Mapping[Path, str],
+    settings: Settings,
+    wires: Iterable[Wire],
+    extras: Extras | None,
+) -> tuple[tuple[Component, ...], list[str]]:
+    """The components in the order of execution; what was decided about them."""
+    wired = {wire.target for wire in wires}
+    components, notes = {}, []
+    for path, part in network.parts.items():
+        name = names[path]
+        new = _new_names(name, extras)
+        values = {new.get(k, k): v for k, v in settings.values.get(path, {}).items()}
+        beside = extras.components[name] if extras else Beside({}, None, "none")
+        component = Component(
+            name, part.interface.path, values, beside.rename, beside.step_ns, beside.isolation
+        )
+        for variable in component.interface.of("input"):
+            port, start = Port(name, variable.name), variable.start
+            if port not in wired and variable.name not in values and start is not None:
+                values[variable.name] = component.interface.parse(
+                    f"{part.element.place}: start", variable.name, start, text=True
+                )
+                notes.append(f"input {port} is not connected; keeps its start value {start}")
+        components[name] = replace(component, values=values)
+    if extras:
+        return tuple(components.values()), notes
+    order = flow_order(tuple(components), [(w.source.component, w.target.component) for w in wires])
+    notes.append(f"order of execution: {', '.join(order)}")
+    return tuple(components[name] for name in order), notes
+
+
+def _stop(file: str, root: Any, given: float | None) -> int:
+    """The stop time in ns."""
+    experiment = child(root, "ssd:DefaultExperiment")
+    attributes = {} if experiment is None else experiment.attrib
+    start = float(attributes.get("startTime", "0"))
+    if start != 0.0:
+        raise InputError(
+            f"{at(file, experiment)}: startTime = {start:g} s is not supported; must be 0"
+        )
+    if given is not None:
+        return in_nanoseconds("stop", given)
+    if "stopTime" not in attributes:
+        raise InputError(f"{file}: no stopTime in a DefaultExperiment; give one: --stop")
+    return in_nanoseconds(f"{at(file, experiment)}: stopTime", float(attributes["stopTime"]))
+
+
+def _step(
+    file: str, parts: Iterable[Part], stop_ns: int, given: float | None, extras: Extras | None
+) -> tuple[int, list[str]]:
+    """The step in ns; what was decided about it."""
+    if given is not None:
+        return in_nanoseconds("step", given), []
+    if extras:
+        return extras.step_ns, []
+    declared_steps = [part.declared.step for part in parts if part.declared.step]
+    steps = [round(step * NANOSECONDS) for step in declared_steps]
+    fitting = [step for step in steps if step and stop_ns % step == 0]
+    if not fitting:
+        listed = choices(f"{step:g} s" for step in sorted(set(declared_steps)))
+        raise InputError(
+            f"{file}: names no step, as SSP has none, and of those of its FMUs ({listed}) none "
+            f"divides the stop of {stop_ns / NANOSECONDS:g} s; give one: --step"
+        )
+    step = min(fitting)
+    return step, [f"step = {step / NANOSECONDS:g} s, the smallest that its FMUs name; SSP has none"]
+
+
+def _unused(archive: Archive, root: Any) -> Iterator[str]:
+    """What has no bearing on the run, so that it is known."""
+    for name in archive.names:
+        if name.endswith(".ssd") and "/" not in name and name != STRUCTURE:
+            yield f"variant {name} is not used; {STRUCTURE} is"
+    types = Counter(annotation.get("type") for annotation in root.iter(qualified("ssc:Annotation")))
+    for kind in sorted(set(types) - {TYPE}):
+        yield f"annotations of type {kind!r} are not used ({types[kind]})"
+
+
+def _renamed(names: Mapping[Path, str]) -> Iterator[str]:
+    for path, name in names.items():
+        if name != ".".join(path):
+            yield f"component {'.'.join(path)} is called {name} here"

@@ -1,0 +1,218 @@
+"""From a system to an SSP 1.0 archive.
+
+    SystemStructure.ssd      components, connectors, connections, units, default experiment
+    resources/PLANT.fmu      the FMUs, each once
+    resources/plant.ssv      the values of a component
+
+The connectors have the FMU's own names, so that any tool can run the archive. What SSP has no form
+for is in an annotation, see annotation.py. A wire whose factor and offset are given, or follow from
+units that differ, has a linear transformation and suppresses the conversion of units: masters that
+know no units then compute the same. The same system gives the same bytes.
+"""
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from ..system.description import System
+from ..system.interface import Value, Variable, read_interface
+from ..system.parts import NANOSECONDS, Component, Port, Wire
+from ..system.units import Unit
+from .annotation import extras_of, write_extras
+from .archive import RESOURCES, STRUCTURE, write_archive
+from .declared import declared
+from .document import VERSION, add, new, to_bytes
+from .units import conversion, same, write_units
+
+SET = "initialValues"
+"""The name of all parameter sets: Ecos takes those of one name, EcosSimulation.init(...)."""
+
+_CAUSALITIES = ("input", "output", "parameter", "calculatedParameter")
+_TOOL = f"grasp-cosim {version('grasp-cosim')}"
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """The entries of an archive, and what other tools will make of it differently."""
+
+    entries: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def write_ssp(system: System, path: Path) -> Written:
+    """Write the archive; InputError where path is not that of an .ssp file."""
+    if path.suffix.lower() != ".ssp" or path.is_dir():
+        raise InputError(f"-o {path}: must be a file named like system.ssp")
+    entries: dict[str, bytes] = {}
+    sources = {c.name: _fmu_entry(c.fmu, entries) for c in system.components}
+    bindings = {c.name: _values_entry(c, entries) for c in system.components if c.values}
+    structure = to_bytes(_structure(system, sources, bindings))
+    entries = {STRUCTURE: structure, **dict(sorted(entries.items()))}
+    write_archive(path, entries)
+    return Written(tuple(entries), tuple(_notes(system)))
+
+
+def _notes(system: System) -> Iterable[str]:
+    yield (
+        f"SSP has no form for the step, {system.step_ns / NANOSECONDS:g} s, and the scheme, "
+        f"{system.scheme}: they are in an annotation that other tools do not read"
+    )
+    own = [c.name for c in system.components if c.step_ns is not None]
+    if own:
+        yield f"only in the annotation: steps of {', '.join(own)}"
+    for parts, what in ((system.events, "events"), (system.faults, "faults")):
+        if parts:
+            yield f"only in the annotation: {len(parts)} {what}"
+
+
+def _fmu_entry(fmu: Path, entries: dict[str, bytes]) -> str:
+    """The entry of an FMU, added where there is none with its content yet."""
+    data = fmu.read_bytes()
+    for name, known in entries.items():
+        if known == data:
+            return name
+    return _added(entries, _plain(fmu.stem), ".fmu", data)
+
+
+def _values_entry(component: Component, entries: dict[str, bytes]) -> str:
+    """The entry of the values of a component, under the names of its FMU."""
+    interface = component.interface
+    units = _units([component])
+    root = new("ssv:ParameterSet", version=VERSION, name=SET, generationTool=_TOOL)
+    parameters = add(root, "ssv:Parameters")
+    used: dict[str, Unit] = {}
+    for name, value in component.values.items():
+        variable = interface.by_name[name]
+        own = component.rename.get(name, name)
+        element = add(parameters, "ssv:Parameter", name=own)
+        items = declared(component.fmu).items.get(own, {})
+        labels = [label for label, number in items.items() if number == value]
+        if labels:
+            add(element, "ssv:Enumeration", value=labels[0])
+            continue
+        typed = add(element, f"ssv:{variable.kind}", value=_text(variable, value))
+        unit = _unit(component, variable, units)
+        if unit:
+            typed.set("unit", unit.name)
+            used[unit.name] = unit
+    write_units(root, "ssv", used.values())
+    return _added(entries, _plain(component.name), ".ssv", to_bytes(root))
+
+
+def _added(entries: dict[str, bytes], stem: str, suffix: str, data: bytes) -> str:
+    """Add data under the first free name like stem, stem_2, ..."""
+    count = 1
+    while (name := f"{RESOURCES}{stem}{f'_{count}' if count > 1 else ''}{suffix}") in entries:
+        count += 1
+    entries[name] = data
+    return name
+
+
+def _structure(system: System, sources: Mapping[str, str], bindings: Mapping[str, str]) -> Any:
+    name = Path(system.name).stem
+    root = new("ssd:SystemStructureDescription", version=VERSION, name=name, generationTool=_TOOL)
+    top = add(root, "ssd:System", name=name)
+    units = _units(system.components)
+    elements = add(top, "ssd:Elements")
+    for component in system.components:
+        _write_component(elements, component, sources, bindings, units)
+    if system.wires:
+        connections = add(top, "ssd:Connections")
+        for wire in system.wires:
+            _write_connection(connections, system, wire)
+    write_units(root, "ssd", units.values())
+    stop = system.stop_ns / NANOSECONDS
+    add(root, "ssd:DefaultExperiment", startTime="0.0", stopTime=repr(stop))
+    write_extras(add(root, "ssd:Annotations"), extras_of(system))
+    return root
+
+
+def _write_component(
+    elements: Any,
+    component: Component,
+    sources: Mapping[str, str],
+    bindings: Mapping[str, str],
+    units: Mapping[str, Unit],
+) -> None:
+    element = add(
+        elements,
+        "ssd:Component",
+        name=component.name,
+        type="application/x-fmu-sharedlibrary",
+        source=sources[component.name],
+        implementation="CoSimulation",
+    )
+    variables = read_interface(component.fmu).of(*_CAUSALITIES)
+    connectors = add(element, "ssd:Connectors") if variables else None
+    for variable in variables:
+        connector = add(connectors, "ssd:Connector", name=variable.name, kind=variable.causality)
+        if variable.name in declared(component.fmu).items:
+            continue  # an enumeration: its items are in the FMU, so that the type may be left out
+        unit = _unit(component, variable, units)
+        add(connector, f"ssc:{variable.kind}", **({"unit": unit.name} if unit else {}))
+    if component.name in bindings:
+        held = add(element, "ssd:ParameterBindings")
+        add(held, "ssd:ParameterBinding", source=bindings[component.name])
+
+
+def _write_connection(connections: Any, system: System, wire: Wire) -> None:
+    (start, start_unit), (end, end_unit) = (
+        _own(system, port) for port in (wire.source, wire.target)
+    )
+    element = add(
+        connections,
+        "ssd:Connection",
+        startElement=start.component,
+        startConnector=start.variable,
+        endElement=end.component,
+        endConnector=end.variable,
+    )
+    given = wire.factor is not None or wire.offset is not None
+    factor = 1.0 if wire.factor is None else wire.factor
+    offset = 0.0 if wire.offset is None else wire.offset
+    if not given and start_unit and end_unit and not same(start_unit, end_unit):
+        factor, offset = conversion(str(wire.target), start_unit, end_unit)
+    if given or (factor, offset) != (1.0, 0.0):
+        element.set("suppressUnitConversion", "true")
+        add(element, "ssc:LinearTransformation", factor=repr(factor), offset=repr(offset))
+
+
+def _own(system: System, port: Port) -> tuple[Port, Unit | None]:
+    """The port under the FMU's own name, and its unit."""
+    component = system.component(port.component, str(port))
+    variable = component.interface.by_name[port.variable]
+    own = component.rename.get(port.variable, port.variable)
+    return Port(port.component, own), declared(component.fmu).units.get(variable.unit or "")
+
+
+def _units(components: Iterable[Component]) -> dict[str, Unit]:
+    """The units of all variables by name; of two that mean something else the first."""
+    units: dict[str, Unit] = {}
+    for component in components:
+        known = declared(component.fmu).units
+        for variable in component.interface.variables:
+            unit = known.get(variable.unit or "")
+            if unit:
+                units.setdefault(unit.name, unit)
+    return dict(sorted(units.items()))
+
+
+def _unit(component: Component, variable: Variable, units: Mapping[str, Unit]) -> Unit | None:
+    """The unit to write at a variable; none where its name means something else in the archive."""
+    unit = declared(component.fmu).units.get(variable.unit or "")
+    return unit if unit and same(unit, units[unit.name]) else None
+
+
+def _text(variable: Variable, value: Value) -> str:
+    if variable.kind == "Real":
+        return repr(float(value))
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _plain(name: str) -> str:
+    """A name of letters that every file system and URI takes."""
+    return re.sub(r"[^A-Za-z0-9_.-]", "_", name)

@@ -1,0 +1,187 @@
+"""Tolerance bands of signals and metrics: given in a file, or derived from the reference itself.
+
+Derived, a band answers one question: can this deviation be told from a mere choice of numerics? The
+original is run again with twice the communication step, and in the other scheme. Of a method of
+order p, the result with twice the step is (2^p - 1) times as far from that with the step as that is
+from the exact one, which is at least its own error; the scheme adds or removes a delay of one step
+at each wire. The candidate has such an error of its own, so the band is twice the larger deviation.
+
+Nothing smaller than SHARE of the range of a signal, or of a metric, matters, and of a signal that
+hardly moves SMALL of its size, or of its nominal value where it is about 0: the rounding of a
+balance is no difference. That a moment like a first contact shifts by SHARE of the duration is
+allowed, too (see tube.py). csv-compare takes 0.002 for both shares.
+
+A file overrides that where it names a signal or metric, in the unit of the original:
+
+    [signals]
+    "plant.gap[1]" = { absolute = 1e-5, relative = 1e-3, time = 2e-3 }
+    "controller.*" = { relative = 0.01 }      # * stands for anything; an exact name goes first
+    "plant.contact*" = { absolute = inf }     # not judged
+
+    [metrics]
+    time_to_contact = { absolute = 0.002 }    # of both fingers; or "time_to_contact[1]"
+"""
+
+import math
+import re
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from ..errors import InputError, choices
+from .tube import Curve, deviation
+
+SHARE = 1e-3
+"""The smallest derived width as a share of the range, and time as a share of the duration."""
+
+SMALL = 1e-6
+"""The smallest derived width as a share of the size of a signal."""
+
+BOTH = 2.0
+"""The numerical errors of two runs, of that of one."""
+
+Source = Literal["given", "derived"]
+
+
+@dataclass(frozen=True, slots=True)
+class Band:
+    """A deviation up to width is allowed, in the unit of what is judged, and a shift of time in s.
+
+    A metric has no time.
+    """
+
+    width: float
+    time: float
+    source: Source
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """An entry of a file; relative is a share of the signal's range, or of the metric's value."""
+
+    absolute: float | None = None
+    relative: float | None = None
+    time: float | None = None
+
+    def band(self, scale: float, derived: Band) -> Band:
+        """The band it makes where relative is of scale; what it does not give stays derived."""
+        time = derived.time if self.time is None else self.time
+        if self.absolute is None and self.relative is None:
+            return Band(derived.width, time, "given")
+        width = (self.absolute or 0.0) + (self.relative * scale if self.relative else 0.0)
+        return Band(width, time, "given")
+
+
+@dataclass(frozen=True, slots=True)
+class Bands:
+    """The entries of a file by the pattern of names they are for."""
+
+    place: str = ""
+    signals: Mapping[str, Given] = field(default_factory=dict)
+    metrics: Mapping[str, Given] = field(default_factory=dict)
+
+
+def read_bands(path: Path) -> Bands:
+    """The bands of a TOML file; InputError names the entry that is wrong."""
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file of bands") from None
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"{path}: not readable as TOML: {error}") from error
+    _check_keys(str(path), table, ("signals", "metrics"))
+    return Bands(
+        str(path),
+        _entries(f"{path}: [signals]", table.get("signals", {}), ("absolute", "relative", "time")),
+        _entries(f"{path}: [metrics]", table.get("metrics", {}), ("absolute", "relative")),
+    )
+
+
+def entry_for(entries: Mapping[str, Given], *names: str) -> Given | None:
+    """The entry of the first of the names that has one; else the first pattern that fits one."""
+    exact = [entries[name] for name in names if name in entries]
+    fitting = (e for pattern, e in entries.items() if any(_fits(pattern, n) for n in names))
+    return exact[0] if exact else next(fitting, None)
+
+
+def check_patterns(place: str, entries: Mapping[str, Given], names: Sequence[str]) -> None:
+    """InputError for a pattern that no name fits: most likely it is misspelt."""
+    for pattern in entries:
+        if not any(_fits(pattern, name) for name in names):
+            raise InputError(f"{place}: nothing is called {pattern!r}; valid: {choices(names)}")
+
+
+def signal_band(
+    reference: Curve,
+    again: Iterable[Curve],
+    nominal: float | None,
+    time: float,
+    given: Given | None = None,
+) -> Band:
+    """The band of a signal from its reference and from the same run with other numerics.
+
+    time in s is the shift allowed unless given says otherwise, nominal the declared nominal value;
+    None stands for 1, as in FMI. A held curve (Booleans, integers) has the derived width 0.
+    """
+    derived = Band(_width(reference, again, nominal, time), time, "derived")
+    return given.band(float(np.ptp(reference.values)), derived) if given else derived
+
+
+def metric_band(
+    value: float | None,
+    again: Iterable[float | None],
+    shift: float,
+    given: Given | None = None,
+) -> Band:
+    """The band of a metric from its value and those of the same run with other numerics.
+
+    shift is what the time allowed for signals makes of it: that time where the metric is one, else
+    0. None is the value of a moment that never comes.
+    """
+    size = abs(value or 0.0)
+    apart = [abs(other - value) for other in again if other is not None and value is not None]
+    width = max(shift, SHARE * size, SMALL, BOTH * max(apart, default=0.0))
+    derived = Band(width, 0.0, "derived")
+    return given.band(size, derived) if given else derived
+
+
+def _width(reference: Curve, again: Iterable[Curve], nominal: float | None, time: float) -> float:
+    apart = [float(deviation(reference, other, time).values.max()) for other in again]
+    numerical = BOTH * max(apart, default=0.0)
+    if reference.held:
+        return numerical
+    size = max(float(np.abs(reference.values).max()), 1.0 if nominal is None else abs(nominal))
+    return max(SHARE * float(np.ptp(reference.values)), SMALL * size, numerical)
+
+
+def _fits(pattern: str, name: str) -> bool:
+    """Whether a name fits a pattern, in which only * is special: names have brackets."""
+    return re.fullmatch(".*".join(map(re.escape, pattern.split("*"))), name) is not None
+
+
+def _entries(place: str, table: Any, valid: Sequence[str]) -> dict[str, Given]:
+    if not isinstance(table, dict):
+        raise InputError(f"{place}: {table!r}: must be a table")
+    return {pattern: _given(f"{place}: {pattern!r}", e, valid) for pattern, e in table.items()}
+
+
+def _given(place: str, entry: Any, valid: Sequence[str]) -> Given:
+    if not isinstance(entry, dict) or not entry:
+        raise InputError(f"{place} = {entry!r}: must be a table with one of {choices(valid)}")
+    _check_keys(place, entry, valid)
+    for key, value in entry.items():
+        number = isinstance(value, float | int) and not isinstance(value, bool)
+        if not number or not value >= 0.0 or (math.isinf(value) and key != "absolute"):
+            more = ", inf where it is not judged" if key == "absolute" else ""
+            raise InputError(f"{place}: {key} = {value!r}: must be a number of at least 0{more}")
+    return Given(**{key: float(value) for key, value in entry.items()})
+
+
+def _check_keys(place: str, table: Mapping[str, Any], valid: Sequence[str]) -> None:
+    for key in table:
+        if key not in valid:
+            raise InputError(f"{place}: unknown entry {key!r}; valid: {choices(valid)}")

@@ -1,0 +1,137 @@
+"""How far two curves are apart where a shift in time is allowed: a tube around each.
+
+A moment like a first contact may come a few steps earlier or later without anything being wrong;
+sample by sample the contact force is then off by its whole size. So a curve is not compared with
+the other's sample but with what the other takes within +-shift of that time, as the reference
+results of the Modelica libraries are compared (csv-compare, pyfunnel: a rectangle moved along the
+reference). Those look only whether the candidate is in the tube of the reference, and miss that an
+impact is lacking altogether. Here both directions count, so the deviation is symmetric.
+
+At the end of a run, what a curve would take next is not known. A linear one is taken to go on as it
+came, point by point mirrored at its last sample; else one that is late there would always be out.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+ROUNDING = 0.5e-9
+"""s; times are whole nanoseconds, so a sample this close to the end of a window is at its end."""
+
+
+class Curve(NamedTuple):
+    """Samples values over time in s, rising; between them linear, or held where held is true."""
+
+    time: Array
+    values: Array
+    held: bool = False
+
+    def at(self, time: Array) -> Array:
+        """The values at other times; before the first and after the last sample those of it."""
+        if not self.held:
+            return np.interp(time, self.time, self.values)
+        before = np.searchsorted(self.time, time + ROUNDING, side="right") - 1
+        return self.values[np.clip(before, 0, None)]
+
+    def until(self, end: float) -> "Curve":
+        """What there is up to the time end in s."""
+        count = int(np.searchsorted(self.time, end + ROUNDING, side="right"))
+        return Curve(self.time[:count], self.values[:count], self.held)
+
+    def continued(self, shift: float) -> "Curve":
+        """The curve and how it goes on for a shift in s; a held one stays."""
+        end, last = self.time[-1], self.values[-1]
+        before = (self.time < end) & (self.time >= end - shift - ROUNDING)
+        if self.held or not before.any():
+            return self
+        return Curve(
+            np.concatenate([self.time, 2.0 * end - self.time[before][::-1]]),
+            np.concatenate([self.values, 2.0 * last - self.values[before][::-1]]),
+        )
+
+
+def curve(time: Array, values: npt.NDArray[Any]) -> Curve:
+    """The curve of a recorded signal; Booleans and integers are held between samples."""
+    return Curve(time, values.astype(np.float64), not np.issubdtype(values.dtype, np.floating))
+
+
+class Tube(NamedTuple):
+    """The least and the largest value of a curve within a shift of each time in s."""
+
+    time: Array
+    low: Array
+    high: Array
+
+
+class Deviation(NamedTuple):
+    """How far apart two curves are at each time in s, at least 0.
+
+    The distance is that between reference and candidate: the value of the one that is further out,
+    and the nearest that the other takes within the shift.
+    """
+
+    time: Array
+    values: Array
+    reference: Array
+    candidate: Array
+
+
+def tube(around: Curve, time: Array, shift: float) -> Tube:
+    """The tube around a curve: what it takes from time - shift to time + shift, both in s."""
+    around = around.continued(shift)
+    start, end = time - shift - ROUNDING, time + shift + ROUNDING
+    edges = around.at(time - shift), around.at(time + shift)
+    low, high = np.minimum(*edges), np.maximum(*edges)
+    first = np.searchsorted(around.time, start, side="left")
+    last = np.searchsorted(around.time, end, side="right")
+    some = last > first
+    least = _least(around.values, first[some], last[some])
+    largest = -_least(-around.values, first[some], last[some])
+    low[some] = np.minimum(low[some], least)
+    high[some] = np.maximum(high[some], largest)
+    return Tube(time, low, high)
+
+
+def deviation(reference: Curve, candidate: Curve, shift: float) -> Deviation:
+    """How far the curves are from each other's tubes, the larger of the two, at all their times.
+
+    0 where the one is, but for a shift of up to shift in s, the other. Symmetric.
+    """
+    time = np.union1d(reference.time, candidate.time)
+    ours, theirs = reference.at(time), candidate.at(time)
+    near_theirs = _nearest(tube(reference, time, shift), theirs)
+    near_ours = _nearest(tube(candidate, time, shift), ours)
+    theirs_out, ours_out = np.abs(theirs - near_theirs), np.abs(ours - near_ours)
+    first = theirs_out >= ours_out
+    return Deviation(
+        time,
+        np.where(first, theirs_out, ours_out),
+        np.where(first, near_theirs, ours),
+        np.where(first, theirs, near_ours),
+    )
+
+
+def _nearest(allowed: Tube, values: Array) -> Array:
+    """What is allowed and nearest to the values."""
+    return np.clip(values, allowed.low, allowed.high)
+
+
+def _least(values: Array, first: npt.NDArray[np.intp], last: npt.NDArray[np.intp]) -> Array:
+    """The least of values[first:last] for each pair; no pair is empty.
+
+    From the least of every 1, 2, 4, 8, ... values in a row: two of those cover any range.
+    """
+    result = np.empty(len(first))
+    length = last - first
+    least, span = values, 1
+    while len(result):
+        here = (span <= length) & (length < 2 * span)
+        result[here] = np.minimum(least[first[here]], least[last[here] - span])
+        if not (length >= 2 * span).any():
+            break
+        least = np.minimum(least[:-span], least[span:])
+        span *= 2
+    return result

@@ -1,0 +1,201 @@
+"""A qualification as text that is read in ten seconds, as JSON, and its bands as a file."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from math import inf, isfinite
+from typing import Any
+
+from ..system.parts import NANOSECONDS
+from .interface_difference import SEVERITIES, Difference
+from .qualify import Compared, Qualification
+
+ROWS = 8
+"""The most signals, metrics or differences of one severity that the text lists."""
+
+FEW = 3
+"""How many it lists where all of them are inside, or just notes."""
+
+WIDE = 0.1
+"""A band wider than this share of the range of its signal proves little."""
+
+
+def as_text(q: Qualification) -> str:
+    """The verdict, then what is out of band, the worst first, then the interface."""
+    parts = [_head(q)]
+    for name, compared in (("signal", q.signals), ("metric", q.metrics)):
+        if compared:
+            parts.append("\n".join(_table(name, compared)))
+    parts.append("\n".join(_differences(q.swap.differences)))
+    if q.signals:
+        parts.append("\n".join(_basis(q)))
+    return "\n\n".join(parts)
+
+
+def as_json(q: Qualification) -> dict[str, Any]:
+    """All of it, ready for JSON; a number that is infinite, or does not exist, is null."""
+    system = q.swap.system
+    return {
+        "qualified": q.qualified,
+        "reason": reason(q),
+        "component": q.swap.component,
+        "original": str(q.swap.original),
+        "candidate": str(q.swap.candidate),
+        "system": system.name,
+        "step": system.step_ns / NANOSECONDS,
+        "stop": system.stop_ns / NANOSECONDS,
+        "scheme": system.scheme,
+        "failure": q.failure,
+        "differences": [_difference_json(d) for d in q.swap.differences],
+        "signals": [_compared_json(c) for c in q.signals],
+        "metrics": [_compared_json(c) for c in q.metrics],
+        "uncompared": list(q.uncompared),
+        "numerics": list(q.numerics),
+    }
+
+
+def as_bands(q: Qualification) -> str:
+    """The bands as they were used, in the form of a file of bands (TOML)."""
+    lines = [f"# {q.swap.candidate.name} as {q.swap.component}: the bands as they were used"]
+    for table, compared in (("signals", q.signals), ("metrics", q.metrics)):
+        lines += ["", f"[{table}]"]
+        for c in sorted(compared, key=lambda c: c.name):
+            time = f", time = {c.band.time!r}" if table == "signals" else ""
+            lines.append(f"{json.dumps(c.name)} = {{ absolute = {c.band.width!r}{time} }}")
+    return "\n".join(lines) + "\n"
+
+
+def reason(q: Qualification) -> str:
+    """Why the verdict is what it is, in one line."""
+    if q.blocks:
+        first = q.blocks[0]
+        more = f", and {len(q.blocks) - 1} more" if len(q.blocks) > 1 else ""
+        return f"not run, the interface does not fit: {first.variable}: {first.text}{more}"
+    if q.failure:
+        return f"the candidate failed: {q.failure}"
+    counts = [
+        f"{sum(not c.inside for c in compared)} of {len(compared)} {name}"
+        for name, compared in (("signals", q.signals), ("metrics", q.metrics))
+        if compared
+    ]
+    return f"{' and '.join(counts)} out of band"
+
+
+def _head(q: Qualification) -> str:
+    system, word = q.swap.system, "QUALIFIED" if q.qualified else "NOT QUALIFIED"
+    step, stop = system.step_ns / NANOSECONDS, system.stop_ns / NANOSECONDS
+    return "\n".join(
+        [
+            f"{word}: {q.swap.candidate.name} as {q.swap.component} "
+            f"(now {q.swap.original.name}), {stop:g} s in steps of {1e3 * step:g} ms, "
+            f"{system.scheme}",
+            reason(q),
+        ]
+    )
+
+
+def _table(name: str, compared: Sequence[Compared]) -> list[str]:
+    outside = [c for c in compared if not c.inside]
+    shown = outside[:ROWS] or compared[:FEW]
+    rows = [("x band", name, "deviation", "band", "unit", "at t in s", "original", "candidate")]
+    rows += [
+        (
+            _number(c.ratio, 3),
+            c.name,
+            _number(c.deviation, 3),
+            _number(c.band.width, 3),
+            c.unit or "",
+            "" if c.time is None else f"{c.time:.9g}",
+            _number(c.original, 6),
+            _number(c.candidate, 6),
+        )
+        for c in shown
+    ]
+    if name == "metric":
+        rows = [(*row[:5], *row[6:]) for row in rows]  # type: ignore[misc]
+    left = len(compared) - len(shown)
+    more = f"{len(outside) - len(shown)} more out of band, " if len(outside) > len(shown) else ""
+    inside = len(compared) - len(outside) if outside else left
+    rest = [f"{'':8}{more}{inside} more inside"] if left else []
+    return [*_aligned(rows), *rest]
+
+
+def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Columns side by side: texts to the left, numbers to the right."""
+    texts = {i for i, title in enumerate(rows[0]) if title in ("signal", "metric", "unit")}
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        "  ".join(
+            cell.ljust(width) if i in texts else cell.rjust(width)
+            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in rows
+    ]
+
+
+def _differences(differences: Sequence[Difference]) -> list[str]:
+    if not differences:
+        return ["interface: no difference"]
+    counts = {s: sum(d.severity == s for d in differences) for s in SEVERITIES}
+    lines = ["interface: " + ", ".join(f"{n} {s}" for s, n in counts.items() if n)]
+    for severity in SEVERITIES:
+        of_it = [d for d in differences if d.severity == severity]
+        most = FEW if severity == "notes" else ROWS
+        lines += [f"  {severity:6}  {d.kind:11}  {d.variable}: {d.text}" for d in of_it[:most]]
+        if len(of_it) > most:
+            lines.append(f"  {severity:6}  {len(of_it) - most} more; --json has all")
+    return lines
+
+
+def _basis(q: Qualification) -> list[str]:
+    given = sum(c.band.source == "given" for c in (*q.signals, *q.metrics))
+    derived = len(q.signals) + len(q.metrics) - given
+    lines = []
+    if derived:
+        runs = "; ".join(q.numerics) or "its own range alone"
+        lines.append(f"bands: {given} given, {derived} derived from the original ({runs})")
+    else:
+        lines.append(f"bands: all {given} given")
+    if wide := [c.name for c in q.signals if c.span and WIDE * c.span < c.band.width < inf]:
+        lines.append(f"bands that are wide for the range of their signals: {', '.join(wide)}")
+    if q.uncompared:
+        lines.append(
+            f"not compared, as the candidate has no such output: {', '.join(q.uncompared)}"
+        )
+    return lines
+
+
+def _number(value: float | None, digits: int) -> str:
+    return "none" if value is None else f"{value:.{digits}g}"
+
+
+def _difference_json(d: Difference) -> dict[str, Any]:
+    return {
+        "severity": d.severity,
+        "kind": d.kind,
+        "variable": d.variable,
+        "text": d.text,
+        "original": d.original,
+        "candidate": d.candidate,
+    }
+
+
+def _compared_json(c: Compared) -> dict[str, Any]:
+    def finite(value: float) -> float | None:
+        return value if isfinite(value) else None
+
+    return {
+        "name": c.name,
+        "unit": c.unit,
+        "inside": c.inside,
+        "ratio": finite(c.ratio),
+        "deviation": finite(c.deviation),
+        "band": finite(c.band.width),
+        "band_time": c.band.time,
+        "band_source": c.band.source,
+        "time": c.time,
+        "original": c.original,
+        "candidate": c.candidate,
+        "span": c.span,
+    }

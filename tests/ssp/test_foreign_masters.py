@@ -1,0 +1,104 @@
+"""Our archive in the two C++ masters of PyPI: they load it and find the same contacts.
+
+Both step all components with the values of the last communication point, as our Jacobi scheme does.
+Each runs in a process of its own, where our FMUs find the Python they need.
+"""
+
+import importlib.util
+import json
+import subprocess
+import sys
+import zipfile
+from ctypes.util import find_library
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from grasp_cosim import System, simulate
+from grasp_cosim.grasp import CASES
+from grasp_cosim.ssp.write import write_ssp
+
+STEP = 1e-3  # s
+GAPS = ("plant.gap[1]", "plant.gap[2]")
+
+ECOS = """
+import json, sys
+from ecospy import EcosSimulation
+path, step, steps = sys.argv[1], float(sys.argv[2]), int(sys.argv[3])
+with EcosSimulation(ssp_path=path, step_size=step) as simulation:
+    simulation.init(parameter_set="initialValues")
+    rows = []
+    for _ in range(steps):
+        simulation.step(1)
+        rows.append([float(simulation.get_real(f"plant::gap[{j}]")) for j in (1, 2)])
+json.dump(rows, open(sys.argv[4], "w"))
+"""
+
+COSIM = """
+import json, sys
+from libcosimpy.CosimExecution import CosimExecution
+from libcosimpy.CosimObserver import CosimObserver
+path, step, steps = sys.argv[1], float(sys.argv[2]), int(sys.argv[3])
+execution = CosimExecution.from_ssp_file(path, round(step * 1e9))
+observer = CosimObserver.create_last_value()
+execution.add_observer(observer)
+plant = execution.slave_index_from_instance_name("plant")
+known = {v.name.decode(): v.reference for v in execution.slave_variables(plant)}
+rows = []
+for _ in range(steps):
+    execution.step(1)
+    rows.append(observer.last_real_values(plant, [known["gap[1]"], known["gap[2]"]]))
+json.dump(rows, open(sys.argv[4], "w"))
+"""
+
+
+@pytest.fixture(scope="module")
+def jacobi(grasp: System) -> System:
+    """A grasp that needs its values of all types: Case 1, the object elsewhere, one side darker."""
+    return grasp.with_values(
+        {**CASES[1], "plant.initial_object_position": 0.02, "sensor_1.reflectance": 0.86}
+    ).with_experiment(STEP, scheme="jacobi")
+
+
+def gaps(program: str, path: Path, system: System) -> npt.NDArray[np.float64]:
+    """The two gaps at the steps after t = 0."""
+    steps = system.stop_ns // system.step_ns
+    found = path.parent / "gaps.json"
+    command = [sys.executable, "-c", program, str(path), str(STEP), str(steps), str(found)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=240)
+    assert done.returncode == 0, done.stderr
+    return np.array(json.loads(found.read_text("utf-8")))
+
+
+def first_contacts(rows: npt.NDArray[np.float64]) -> list[int]:
+    """For each finger the first step that ends with its gap closed."""
+    assert (rows <= 0.0).any(axis=0).all()
+    return [int(k) for k in (rows <= 0.0).argmax(axis=0)]
+
+
+def check(theirs: npt.NDArray[np.float64], system: System) -> None:
+    result = simulate(system)
+    ours = np.column_stack([result[name] for name in GAPS])[1:]
+    assert ours.shape == theirs.shape
+    pairs = zip(first_contacts(theirs), first_contacts(ours), strict=True)
+    assert all(abs(a - b) <= 2 for a, b in pairs)
+    np.testing.assert_allclose(theirs, ours, rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.skipif(not importlib.util.find_spec("ecospy"), reason="ecospy is not installed")
+@pytest.mark.skipif(not find_library("tbb"), reason="libtbb12, which ecospy needs, is missing")
+def test_ecos_finds_the_same_contacts(jacobi: System, tmp_path: Path) -> None:
+    path = tmp_path / "grasp.ssp"
+    write_ssp(jacobi, path)
+    check(gaps(ECOS, path, jacobi), jacobi)
+
+
+@pytest.mark.skipif(not importlib.util.find_spec("libcosimpy"), reason="libcosimpy is missing")
+def test_libcosim_finds_the_same_contacts(jacobi: System, tmp_path: Path) -> None:
+    path = tmp_path / "grasp.ssp"
+    write_ssp(jacobi, path)
+    folder = tmp_path / "unpacked"
+    with zipfile.ZipFile(path) as file:
+        file.extractall(folder)
+    check(gaps(COSIM, folder, jacobi), jacobi)

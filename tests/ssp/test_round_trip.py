@@ -1,0 +1,226 @@
+"""A system written and read again is the same system, and runs the same to the bit."""
+
+import zipfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from grasp_cosim import InputError, System, simulate
+from grasp_cosim.ssp.document import parse
+from grasp_cosim.ssp.write import SET, write_ssp
+from grasp_cosim.system.parts import (
+    Component,
+    Condition,
+    Event,
+    Fault,
+    Initialisation,
+    Port,
+    Wire,
+)
+from ssp.hand_made import archive, component, connect, fmu, structure, system
+
+
+def round_trip(original: System, folder: Path) -> System:
+    """The system as it comes back, with the paths and the name of the original."""
+    path = folder / "again.ssp"
+    write_ssp(original, path)
+    loaded = System.load(path)
+    for before, after in zip(original.components, loaded.components, strict=True):
+        assert after.fmu.read_bytes() == before.fmu.read_bytes()
+        assert list(after.values) == list(before.values)  # the order in which they are set
+    paths = {c.name: c.fmu for c in original.components}
+    components = tuple(replace(c, fmu=paths[c.name]) for c in loaded.components)
+    return replace(loaded, name=original.name, components=components)
+
+
+def test_the_grasp_comes_back_as_it_was(grasp: System, tmp_path: Path) -> None:
+    assert round_trip(grasp, tmp_path) == grasp
+
+
+def test_the_grasp_runs_the_same_to_the_bit(grasp: System, tmp_path: Path) -> None:
+    changed = grasp.with_values({"plant.initial_object_position": 0.02}).with_experiment(1e-3)
+    path = tmp_path / "grasp.ssp"
+    write_ssp(changed, path)
+    ours, again = simulate(changed), simulate(System.load(path))
+    assert list(again) == list(ours)
+    assert np.array_equal(again.time, ours.time)
+    for name in ours:
+        assert again[name].tobytes() == ours[name].tobytes(), name
+
+
+def test_what_ssp_has_no_form_for_comes_back(grasp: System, tmp_path: Path) -> None:
+    plant, *others = grasp.components
+    gap, contact = Port("plant", "gap[1]"), Port("plant", "contact[1]")
+    full = replace(
+        grasp,
+        components=(replace(plant, step_ns=300_000, isolation="process"), *others),
+        scheme="jacobi",
+        initialisation=Initialisation("refuse", 1e-8, 7),
+        events=(
+            Event({Port("sensor_1", "reflectance"): 0.5}, at_ns=1_000_000),
+            Event({Port("sensor_2", "reflectance"): 0.1}, when=Condition(gap, "<", 0.01)),
+            Event({Port("sensor_2", "reflectance"): 1}, when=Condition(contact, "!=", False)),
+        ),
+        faults=(
+            Fault(Port("sensor_1", "gap"), "bias", {"value": 0.001}, 5, None, seed=3),
+            Fault(Port("sensor_2", "gap"), "stuck", {}, 0, 1_000_000_000),
+            Fault(Port("sensor_2", "gap"), "delay", {"time": 1e-3}, when=Condition(gap, ">", 0.0)),
+        ),
+    )
+    assert round_trip(full, tmp_path) == full
+
+
+def hand(folder: Path, *wires: Wire, rename: bool = False) -> System:
+    """Two FMUs with an output y in m and an input u in mm, beside other variables."""
+    variables = (
+        "output Real y - m",
+        "input Real u 0.0 mm",
+        "input Integer n 3",
+        "output Enumeration mode -",
+        "parameter Enumeration start 1",
+        "parameter Boolean active false",
+        "parameter String label none",
+        "parameter Real plain 1.0",
+    )
+    path = folder / "hand.fmu"
+    with zipfile.ZipFile(path, "w") as file:
+        file.writestr("modelDescription.xml", fmu(*variables))
+    names = {"in put": "u", "out": "y", "text": "label"} if rename else {}
+    label = "text" if rename else "label"
+    values: dict[str, float | int | str] = {
+        "n": -4,
+        "start": 2,
+        "active": True,
+        label: 'a "<b>" & ü',
+        "plain": 0.1 + 0.2,
+    }
+    target = "in put" if rename else "u"
+    free = [name for name in ("a", "b") if name not in {w.target.component for w in wires}]
+    components = tuple(
+        Component(name, path, {**values, **({target: 1.5} if name in free else {})}, names)
+        for name in ("b", "a")
+    )
+    return System("hand.toml", components, wires, 1_000_000, 1_000_000_000, "sequential")
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ((3.0, 0.25), (3.0, 0.25)),
+        ((1.0, 0.0), (1.0, 0.0)),
+        ((None, None), (1000.0, 0.0)),  # m to mm, said for masters that know no units
+    ],
+)
+def test_wires_with_a_factor(
+    tmp_path: Path,
+    given: tuple[float | None, float | None],
+    expected: tuple[float, float],
+) -> None:
+    wire = Wire(Port("a", "y"), Port("b", "u"), *given)
+    (again,) = round_trip(hand(tmp_path, wire), tmp_path).wires
+    assert again == Wire(wire.source, wire.target, *expected)
+
+
+def test_values_of_every_type(tmp_path: Path) -> None:
+    original = hand(tmp_path)
+    assert round_trip(original, tmp_path) == original
+
+
+def test_an_enumeration_is_written_by_name(tmp_path: Path) -> None:
+    write_ssp(hand(tmp_path), tmp_path / "hand.ssp")
+    with zipfile.ZipFile(tmp_path / "hand.ssp") as file:
+        text = file.read("resources/a.ssv").decode()
+        assert '<ssv:Parameter name="start">\n      <ssv:Enumeration value="on"/>' in text
+        (connector,) = parse("ssd", file.read("SystemStructure.ssd"), "ssd").findall(
+            ".//{*}Component[@name='a']//{*}Connector[@name='mode']"
+        )
+    assert len(connector) == 0  # the type is that of the FMU
+
+
+def test_renamed_variables_have_the_names_of_the_fmu_in_the_archive(tmp_path: Path) -> None:
+    wire = Wire(Port("a", "out"), Port("b", "in put"), 2.0, 0.0)
+    original = hand(tmp_path, wire, rename=True)
+    assert round_trip(original, tmp_path) == original
+    text = (zipfile.ZipFile(tmp_path / "again.ssp").read("SystemStructure.ssd")).decode()
+    assert 'startConnector="y" endElement="b" endConnector="u"' in text
+    assert 'name="in put"' not in text
+
+
+def test_the_same_system_gives_the_same_bytes(grasp: System, tmp_path: Path) -> None:
+    first, second = tmp_path / "a.ssp", tmp_path / "b.ssp"
+    write_ssp(grasp, first)
+    write_ssp(grasp, second)
+    assert first.read_bytes() == second.read_bytes()
+
+
+def test_what_is_in_the_archive(grasp: System, tmp_path: Path) -> None:
+    path = tmp_path / "grasp.ssp"
+    written = write_ssp(grasp.with_values({"sensor_2.reflectance": 0.8}), path)
+    with zipfile.ZipFile(path) as file:
+        assert file.testzip() is None
+        assert file.namelist() == list(written.entries)
+        assert written.entries == (
+            "SystemStructure.ssd",
+            "resources/GraspController.fmu",
+            "resources/GripperPlant.fmu",
+            "resources/ProximitySensor.fmu",
+            "resources/plant.ssv",
+            "resources/sensor_2.ssv",
+        )
+        structure = parse("ssd", file.read("SystemStructure.ssd"), "ssd")  # valid by the schema
+        values = parse("ssv", file.read("resources/sensor_2.ssv"), "ssv")
+    assert values.get("name") == SET
+    ((reflectance,),) = values[0]
+    assert (reflectance.get("value"), reflectance.get("unit")) == ("0.8", "1")
+    connectors = structure.findall(".//{*}Component[@name='plant']//{*}Connector")
+    assert len(connectors) == len(
+        grasp.component("plant", "").interface.of("input", "output", "parameter")
+    )
+    units = {c.get("name"): c[0].get("unit") for c in connectors}
+    assert (units["gap[1]"], units["velocity[1]"], units["contact[1]"]) == ("m", "m/s", None)
+    newton = structure.find(".//{*}Unit[@name='N']/{*}BaseUnit")
+    assert dict(newton.attrib) == {"kg": "1", "m": "1", "s": "-2"}
+    experiment = structure.find("{*}DefaultExperiment")
+    assert dict(experiment.attrib) == {"startTime": "0.0", "stopTime": "3.0"}
+
+
+def test_fmus_of_the_same_name_do_not_collide(grasp: System, tmp_path: Path) -> None:
+    other = tmp_path / "GripperPlant.fmu"
+    other.write_bytes(grasp.components[1].fmu.read_bytes())  # a sensor under the plant's name
+    mixed = replace(
+        grasp,
+        components=tuple(
+            replace(c, fmu=other) if c.name == "sensor_1" else c for c in grasp.components
+        ),
+    )
+    assert round_trip(mixed, tmp_path) == mixed
+
+
+def test_one_name_for_two_units_is_written_for_the_first_only(tmp_path: Path) -> None:
+    original = hand(tmp_path)
+    path = tmp_path / "feet.fmu"
+    description = fmu("output Real y - mm", "input Real u 0.0 mm").replace(b'"0.001"', b'"0.3048"')
+    with zipfile.ZipFile(path, "w") as file:
+        file.writestr("modelDescription.xml", description)
+    other = Component("c", path, {"u": 1.0})
+    mixed = replace(original, components=(*original.components, other))
+    assert round_trip(mixed, tmp_path) == mixed
+
+
+def test_only_an_ssp_file_is_written(grasp: System, tmp_path: Path) -> None:
+    for path in (tmp_path / "grasp.zip", tmp_path / "folder.ssp"):
+        (tmp_path / "folder.ssp").mkdir(exist_ok=True)
+        with pytest.raises(InputError, match=r"must be a file named like system\.ssp"):
+            write_ssp(grasp, path)
+
+
+def test_an_archive_of_others_comes_back(tmp_path: Path) -> None:
+    top = system(
+        "top",
+        component("a", "output y Real m") + component("b", "input u Real"),
+        connect("a/y", "b/u"),
+    )
+    ends = {"a": fmu("output Real y - m"), "b": fmu("input Real u 0.0 m")}
+    loaded = System.load(archive(tmp_path, structure(top), ends))
+    assert round_trip(loaded, tmp_path) == loaded

@@ -1,0 +1,200 @@
+"""Connections become wires: through nested systems, with units and transformations."""
+
+from pathlib import Path
+
+import pytest
+from grasp_cosim import InputError, System
+from grasp_cosim.system.parts import Port, Wire
+from ssp.hand_made import archive, component, connect, fmu, linear, structure, system
+
+GIVES = fmu("output Real y - m")
+TAKES = fmu("input Real u 0.5 mm")
+KELVIN = fmu("output Real y - K")
+CELSIUS = fmu("input Real u 0.0 degC")
+PLAIN_GIVES = fmu("output Real y -")
+PLAIN_TAKES = fmu("input Real u 0.5")
+BOTH = component("a", "output y Real") + component("b", "input u Real")
+
+
+def wires(folder: Path, top: str, a: bytes = GIVES, b: bytes = TAKES) -> tuple[Wire, ...]:
+    return System.load(archive(folder, structure(top), {"a": a, "b": b})).wires
+
+
+def one(folder: Path, content: str = "", suppress: str = "false", **ends: bytes) -> Wire:
+    connection = connect("a/y", "b/u", content, suppressUnitConversion=suppress)
+    (wire,) = wires(folder, system("top", BOTH, connection), **ends)
+    return wire
+
+
+A_TO_B = Port("a", "y"), Port("b", "u")
+
+
+def test_the_units_decide_where_nothing_is_said(tmp_path: Path) -> None:
+    assert one(tmp_path) == Wire(*A_TO_B)
+
+
+def test_the_two_ends_of_a_connection_are_in_no_order(tmp_path: Path) -> None:
+    assert wires(tmp_path, system("top", BOTH, connect("b/u", "a/y"))) == (Wire(*A_TO_B),)
+
+
+def test_suppressed_units_leave_the_number_as_it_is(tmp_path: Path) -> None:
+    assert one(tmp_path, suppress="true") == Wire(*A_TO_B, 1.0, 0.0)
+
+
+def test_a_transformation_takes_the_place_of_suppressed_units(tmp_path: Path) -> None:
+    assert one(tmp_path, linear(3.0, 0.25), "true") == Wire(*A_TO_B, 3.0, 0.25)
+
+
+def test_a_transformation_comes_after_the_conversion_of_units(tmp_path: Path) -> None:
+    # 2 m are 2000 mm, transformed 3 * 2000 + 0.25
+    wire = one(tmp_path, linear(3.0, 0.25))
+    assert wire.factor is not None
+    assert wire.offset is not None
+    assert wire.factor * 2.0 + wire.offset == pytest.approx(6000.25, rel=1e-15)
+
+
+def test_units_with_an_offset(tmp_path: Path) -> None:
+    # 300 K are 26.85 degC, doubled 53.7
+    wire = one(tmp_path, linear(2.0), a=KELVIN, b=CELSIUS)
+    assert wire.factor is not None
+    assert wire.offset is not None
+    assert wire.factor * 300.0 + wire.offset == pytest.approx(53.7, rel=1e-13)
+
+
+def test_units_that_only_the_archive_names_are_converted(tmp_path: Path) -> None:
+    elements = component("a", "output y Real m") + component("b", "input u Real mm")
+    top = system("top", elements, connect("a/y", "b/u"))
+    (wire,) = wires(tmp_path, top, PLAIN_GIVES, PLAIN_TAKES)
+    assert wire == Wire(*A_TO_B, 1000.0, 0.0)
+
+
+def test_units_of_different_quantities_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"hand.ssp: SystemStructure.ssd:2: connection .*m cannot"):
+        one(tmp_path, b=fmu("input Real u 0.0 N"))
+
+
+def inner(connectors: str, connections: str) -> str:
+    return system("sub", component("b", "input u Real"), connections, connectors)
+
+
+def test_through_a_nested_system(tmp_path: Path) -> None:
+    sub = inner("input in Real", connect("in", "b/u"))
+    top = system("top", component("a", "output y Real") + sub, connect("a/y", "sub/in"))
+    loaded = System.load(archive(tmp_path, structure(top), {"a": GIVES, "b": TAKES}))
+    assert loaded.wires == (Wire(Port("a", "y"), Port("sub_b", "u")),)
+    assert "component sub.b is called sub_b here" in loaded.notes
+
+
+def test_two_nested_systems_side_by_side(tmp_path: Path) -> None:
+    first = system("x", component("a", "output y"), connect("out", "a/y"), "output out")
+    second = system("x2", component("b", "input u"), connect("in", "b/u"), "input in")
+    top = system("top", first + second, connect("x/out", "x2/in"))
+    assert wires(tmp_path, top) == (Wire(Port("x_a", "y"), Port("x2_b", "u")),)
+
+
+def test_transformations_on_the_way_add_up(tmp_path: Path) -> None:
+    # 2 m, doubled to 4 m at a connector in m, are 4000 mm, plus 1
+    sub = inner("input in Real m", connect("in", "b/u", linear(1.0, 1.0)))
+    elements = component("a", "output y Real") + sub
+    top = system("top", elements, connect("a/y", "sub/in", linear(2.0)))
+    (wire,) = wires(tmp_path, top)
+    assert (wire.factor, wire.offset) == (2000.0, 1.0)
+
+
+def test_a_connector_between_in_another_unit_changes_nothing(tmp_path: Path) -> None:
+    sub = inner("input in Real mm", connect("in", "b/u"))
+    top = system("top", component("a", "output y Real") + sub, connect("a/y", "sub/in"))
+    assert wires(tmp_path, top) == (Wire(Port("a", "y"), Port("sub_b", "u")),)
+
+
+def test_a_connector_between_names_the_unit_of_an_fmu_without(tmp_path: Path) -> None:
+    sub = inner("input in Real m", connect("in", "b/u"))
+    top = system("top", component("a", "output y Real") + sub, connect("a/y", "sub/in"))
+    (wire,) = wires(tmp_path, top, a=PLAIN_GIVES)
+    assert (wire.factor, wire.offset) == (1000.0, 0.0)
+
+
+def test_an_unclear_unit_is_refused(tmp_path: Path) -> None:
+    sub = inner("input in Real", connect("in", "b/u"))
+    elements = component("a", "output y Real") + sub
+    top = system("top", elements, connect("a/y", "sub/in", linear(1000.0)))
+    with pytest.raises(InputError, match=r"unit at sub\.in is not clear, m or mm; give that conn"):
+        wires(tmp_path, top)
+
+
+@pytest.mark.parametrize(
+    ("connections", "message"),
+    [
+        (connect("a/y", "c/u"), "no element 'c'; valid: a, b"),
+        (connect("a/z", "b/u"), "a has no connector 'z'; valid: y"),
+        (connect("a/y", "w"), "top has no connector 'w'; valid: in, out"),
+        (connect("a/y", "in"), "both give a value; must lead from one that gives to one that"),
+        (connect("b/u", "out"), "both take a value"),
+        (
+            connect("a/y", "b/u") + connect("in", "b/u"),
+            r"b.u has two sources, a.y and in; must have one",
+        ),
+        (
+            connect(
+                "a/y",
+                "b/u",
+                "<ssc:IntegerMappingTransformation>"
+                '<ssc:MapEntry source="1" target="2"/></ssc:IntegerMappingTransformation>',
+            ),
+            "ssc:IntegerMappingTransformation is not supported on a connection; must be linear",
+        ),
+    ],
+)
+def test_connections_that_are_refused(tmp_path: Path, connections: str, message: str) -> None:
+    top = system("top", BOTH, connections, "input in Real; output out Real")
+    with pytest.raises(InputError, match=message) as error:
+        wires(tmp_path, top)
+    assert str(error.value).startswith("hand.ssp: SystemStructure.ssd:2: connection '")
+
+
+def test_connections_in_a_circle_are_refused(tmp_path: Path) -> None:
+    loop = system("sub", component("b", "input u"), connect("in", "out"), "input in; output out")
+    top = system("top", component("a", "output y") + loop, connect("sub/out", "sub/in"))
+    inside = top.replace(connect("in", "out"), connect("in", "out") + connect("in", "b/u"))
+    with pytest.raises(InputError, match="leads back to itself"):
+        wires(tmp_path, inside)
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "content", "message"),
+    [
+        (
+            fmu("output Integer y -"),
+            fmu("input Real u 0.0"),
+            "",
+            "from Integer to Real at b.u; must be the same",
+        ),
+        (
+            fmu("output Boolean y -"),
+            fmu("input Boolean u false"),
+            linear(2.0),
+            "transforms a Boolean; must be Real",
+        ),
+        (
+            fmu("calculatedParameter Real y -"),
+            fmu("parameter Real u 0.0"),
+            "",
+            "leads from a.y to a parameter, or from one; only outputs are passed on to inputs",
+        ),
+    ],
+)
+def test_values_that_wires_do_not_carry(
+    tmp_path: Path, a: bytes, b: bytes, content: str, message: str
+) -> None:
+    kinds = ("calculatedParameter", "parameter") if b"calculated" in a else ("output", "input")
+    elements = component("a", f"{kinds[0]} y") + component("b", f"{kinds[1]} u")
+    with pytest.raises(InputError, match=message):
+        wires(tmp_path, system("top", elements, connect("a/y", "b/u", content)), a, b)
+
+
+def test_an_enumeration_goes_to_an_enumeration(tmp_path: Path) -> None:
+    elements = component("a", "output y") + component("b", "input u")
+    ends = fmu("output Enumeration y -"), fmu("input Enumeration u 1")
+    assert wires(tmp_path, system("top", elements, connect("a/y", "b/u")), *ends) == (
+        Wire(*A_TO_B),
+    )

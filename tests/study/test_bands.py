@@ -1,0 +1,147 @@
+"""Bands: read from a file, or derived from the reference and its runs with other numerics."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from grasp_cosim.errors import InputError
+from grasp_cosim.study.bands import (
+    BOTH,
+    SHARE,
+    SMALL,
+    Band,
+    Given,
+    check_patterns,
+    entry_for,
+    metric_band,
+    read_bands,
+    signal_band,
+)
+from grasp_cosim.study.tube import Curve
+
+TIME = np.linspace(0.0, 1.0, 101, dtype=np.float64)
+SINE = Curve(TIME, 2.0 + np.sin(2.0 * np.pi * TIME))
+"""From 1 to 3."""
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "bands.toml"
+    path.write_text(text, "utf-8")
+    return path
+
+
+def test_the_smallest_band_is_a_share_of_the_range() -> None:
+    band = signal_band(SINE, (), None, 0.1)
+    assert band.width == pytest.approx(2.0 * SHARE)
+    assert (band.time, band.source) == (0.1, "derived")
+
+
+@pytest.mark.parametrize(
+    ("level", "nominal", "size"), [(5.0, None, 5.0), (0.0, None, 1.0), (1e-9, 0.01, 0.01)]
+)
+def test_a_signal_that_does_not_move_is_judged_by_its_size_or_nominal_value(
+    level: float, nominal: float | None, size: float
+) -> None:
+    flat = Curve(TIME, np.full(101, level))
+    assert signal_band(flat, (), nominal, 0.0).width == pytest.approx(SMALL * size)
+
+
+def test_what_numerics_change_is_allowed_twice() -> None:
+    other = [Curve(TIME, SINE.values + x) for x in (0.01, -0.03, 0.02)]
+    assert signal_band(SINE, other, None, 0.0).width == pytest.approx(BOTH * 0.03)
+
+
+def test_a_shift_by_numerics_needs_no_width() -> None:
+    late = Curve(TIME, np.concatenate([SINE.values[:1], SINE.values[:-1]]))
+    assert signal_band(SINE, [late], None, 0.0).width > 10 * SHARE
+    assert signal_band(SINE, [late], None, 0.01).width == pytest.approx(2.0 * SHARE)
+
+
+def test_a_contact_must_be_the_same_unless_numerics_change_it() -> None:
+    contact = Curve(TIME, (TIME > 0.5).astype(float), held=True)
+    bounce = Curve(TIME, contact.values * ((TIME < 0.6) | (TIME > 0.62)), held=True)
+    assert signal_band(contact, [contact], None, 0.01).width == 0.0
+    assert signal_band(contact, [bounce], None, 0.001).width == BOTH
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        (Given(absolute=0.1), Band(0.1, 0.05, "given")),
+        (Given(relative=0.1), Band(0.2, 0.05, "given")),
+        (Given(absolute=0.1, relative=0.1, time=0.0), Band(0.3, 0.0, "given")),
+        (Given(time=0.2), Band(2.0 * SHARE, 0.2, "given")),
+        (Given(absolute=0.0), Band(0.0, 0.05, "given")),
+        (Given(absolute=math.inf), Band(math.inf, 0.05, "given")),
+    ],
+)
+def test_a_file_overrides_what_it_gives(given: Given, expected: Band) -> None:
+    band = signal_band(SINE, (), None, 0.05, given)
+    assert (band.time, band.source) == (expected.time, "given")
+    assert band.width == pytest.approx(expected.width)
+
+
+def test_the_band_of_a_metric() -> None:
+    assert metric_band(2.0, (), 0.0).width == pytest.approx(2.0 * SHARE)
+    assert metric_band(2.0, (), 0.5).width == 0.5  # a time, with the shift that is allowed
+    assert metric_band(2.0, (2.1, None, 1.7), 0.0).width == pytest.approx(BOTH * 0.3)
+    assert metric_band(0.0, (), 0.0).width == SMALL
+    assert metric_band(None, (1.0,), 0.0).width == SMALL
+    assert metric_band(-2.0, (), 0.0, Given(relative=0.1, absolute=0.1)).width == pytest.approx(0.3)
+
+
+def test_an_exact_name_goes_before_the_first_pattern_that_fits() -> None:
+    one, two, three, four = (Given(absolute=float(i)) for i in range(4))
+    entries = {"*": one, "plant.*": two, "plant.gap[1]": three, "plant.gap[*]": four}
+    assert entry_for(entries, "plant.gap[1]") is three
+    assert entry_for(entries, "plant.gap[2]") is one
+    assert entry_for({"plant.gap[*]": four, "*": one}, "plant.gap[2]") is four
+    assert entry_for({"plant.gap[*]": four}, "plant.gap1") is None
+    assert entry_for({"time_to_contact": two}, "time_to_contact[1]", "time_to_contact") is two
+
+
+def test_a_file_is_read(tmp_path: Path) -> None:
+    text = """
+        signals = { "plant.gap[1]" = { absolute = 1e-5, relative = 1e-3, time = 1e-3 } }
+        [metrics]
+        time_to_contact = { absolute = 2 }
+        "peak*" = { absolute = inf }
+    """
+    bands = read_bands(written(tmp_path, text))
+    assert bands.signals == {"plant.gap[1]": Given(1e-5, 1e-3, 1e-3)}
+    assert bands.metrics == {"time_to_contact": Given(2.0), "peak*": Given(math.inf)}
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("signal = {}", r"bands.toml: unknown entry 'signal'; valid: signals, metrics"),
+        ("signals = 3", r"\[signals\]: 3: must be a table"),
+        ('signals = { "*" = 0.1 }', r"\[signals\]: '\*' = 0.1: must be a table with one of"),
+        ('signals = { "*" = {} }', r"must be a table with one of absolute, relative"),
+        ('signals = { a = { abs = 1 } }', r"'a': unknown entry 'abs'; valid: absolute, relative"),
+        ("metrics = { a = { time = 1 } }", r"unknown entry 'time'; valid: absolute, relative$"),
+        ('signals = { a = { absolute = -1 } }', r"absolute = -1: must be a number of at least"),
+        ('signals = { a = { absolute = nan } }', r"absolute = nan: must be a number"),
+        ('signals = { a = { time = inf } }', r"time = inf: must be a number of at least 0$"),
+        ('signals = { a = { time = true } }', r"time = True: must be a number"),
+        ('signals = { a = { time = "1" } }', r"time = '1': must be a number"),
+        ("signals = {", r"bands.toml: not readable as TOML: "),
+    ],
+)  # fmt: skip
+def test_a_wrong_file_is_one_line(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(InputError, match=message) as caught:
+        read_bands(written(tmp_path, text))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"none.toml: no such file of bands"):
+        read_bands(tmp_path / "none.toml")
+
+
+def test_a_pattern_for_nothing_is_an_error() -> None:
+    check_patterns("b.toml", {"plant.*": Given(0.1)}, ["plant.gap[1]"])
+    with pytest.raises(InputError, match=r"^b.toml: nothing is called 'plnt.\*'; valid: plant.gap"):
+        check_patterns("b.toml", {"plnt.*": Given(0.1)}, ["plant.gap[1]"])

@@ -1,0 +1,167 @@
+"""The tube: whether curves are the same but for a shift in time, and how far apart else."""
+
+import numpy as np
+import pytest
+from grasp_cosim.study.tube import Array, Curve, curve, deviation, tube
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+
+STEP = 1e-3
+NUMBERS = st.floats(-1e3, 1e3, width=32)
+SAMPLES = arrays.arrays(np.float64, st.integers(1, 60), elements=NUMBERS)
+HELD = st.booleans()
+SHIFT = st.integers(0, 12)
+
+
+def times(count: int, step_ns: int = 1_000_000) -> Array:
+    """s, from 0 on."""
+    return (np.arange(count) * step_ns / 1e9).astype(np.float64)
+
+
+def sampled(values: Array, held: bool = False) -> Curve:
+    return Curve(times(len(values)), values, held)
+
+
+def by_hand(one: Curve, other: Curve, shift: int) -> float:
+    """The deviation of curves on the same grid, for a shift of whole samples, by definition."""
+    n = len(one.values)
+    windows = [slice(max(i - shift, 0), i + shift + 1) for i in range(n)]
+    after = min(shift, n - 1)
+
+    def padded(values: Array) -> Array:
+        if one.held:
+            return np.pad(values, (0, after), mode="edge")
+        return np.pad(values, (0, after), mode="reflect", reflect_type="odd")
+
+    apart = [
+        max(padded(a.values)[w].min() - b.values[i], b.values[i] - padded(a.values)[w].max(), 0.0)
+        for a, b in ((one, other), (other, one))
+        for i, w in enumerate(windows)
+    ]
+    return float(max(apart))
+
+
+@given(SAMPLES, SHIFT, HELD)
+def test_a_curve_is_in_its_own_tube(values: Array, shift: int, held: bool) -> None:
+    same = sampled(values, held)
+    assert deviation(same, same, shift * STEP).values.max() == 0.0
+
+
+@given(SAMPLES, SHIFT, SHIFT, HELD)
+def test_a_curve_that_comes_later_is_inside_up_to_the_shift(
+    values: Array, later: int, more: int, held: bool
+) -> None:
+    early = sampled(np.concatenate([values, np.full(later, values[-1])]), held)
+    late = sampled(np.concatenate([np.full(later, values[0]), values]), held)
+    assert deviation(early, late, (later + more) * STEP).values.max() == 0.0
+
+
+@given(SAMPLES, st.floats(1e-3, 1e3), SHIFT, HELD)
+def test_an_offset_is_found_at_its_size(
+    values: Array, offset: float, shift: int, held: bool
+) -> None:
+    """At the largest value, no shift helps: the offset is the deviation."""
+    values = np.concatenate([values, np.full(shift + 1, values[-1])])
+    moved = sampled(values + offset, held)
+    largest = deviation(sampled(values, held), moved, shift * STEP).values.max()
+    assert largest == pytest.approx(offset, rel=1e-9, abs=1e-9)
+
+
+@st.composite
+def pairs(draw: st.DrawFn) -> tuple[Curve, Curve]:
+    count = draw(st.integers(1, 60))
+    held = draw(HELD)
+    values = arrays.arrays(np.float64, count, elements=NUMBERS)
+    return sampled(draw(values), held), sampled(draw(values), held)
+
+
+@given(pairs(), SHIFT)
+def test_it_is_symmetric_and_what_its_definition_says(
+    both: tuple[Curve, Curve], shift: int
+) -> None:
+    one, other = both
+    there, back = deviation(one, other, shift * STEP), deviation(other, one, shift * STEP)
+    assert (there.values == back.values).all()
+    assert (there.reference == back.candidate).all() or (there.values == 0.0).any()
+    assert there.values.max() == pytest.approx(by_hand(one, other, shift), abs=1e-9)
+
+
+@given(pairs(), SHIFT)
+def test_the_values_it_names_are_as_far_apart_as_it_says(
+    both: tuple[Curve, Curve], shift: int
+) -> None:
+    found = deviation(*both, shift * STEP)
+    assert np.abs(found.reference - found.candidate).tolist() == found.values.tolist()
+
+
+@given(pairs(), SHIFT)
+def test_more_shift_allows_more(both: tuple[Curve, Curve], shift: int) -> None:
+    tight, loose = (deviation(*both, n * STEP).values for n in (shift, shift + 1))
+    assert (loose <= tight + 1e-9).all()
+
+
+@settings(max_examples=50)
+@given(SAMPLES, st.floats(0.0, 0.02), HELD)
+def test_the_tube_holds_the_curve_between_samples_too(
+    values: Array, shift: float, held: bool
+) -> None:
+    """Anywhere within the shift of any time the curve is in the tube of that time."""
+    whole = sampled(values, held)
+    at = np.linspace(0.0, whole.time[-1], 37)
+    allowed = tube(whole, at, shift)
+    for fraction in (-1.0, -0.3, 0.0, 0.7, 1.0):
+        taken = whole.at(at + fraction * shift)
+        assert (allowed.low <= taken + 1e-6).all()
+        assert (taken <= allowed.high + 1e-6).all()
+
+
+def test_an_impact_that_comes_a_step_later_is_no_deviation_but_a_higher_one_is() -> None:
+    time = times(200)
+    impact = np.where(time < 0.1, 0.0, np.exp(-(time - 0.1) / 0.02))
+    late = np.concatenate([np.zeros(2), impact[:-2]])
+    assert np.abs(impact - late).max() == 1.0
+    assert deviation(Curve(time, impact), Curve(time, late), 3 * STEP).values.max() == 0.0
+    higher = deviation(Curve(time, impact), Curve(time, 1.25 * late), 3 * STEP)
+    worst = higher.values.argmax()
+    assert higher.values[worst] == pytest.approx(0.25)
+    assert (higher.reference[worst], higher.candidate[worst]) == (1.0, 1.25)
+    assert higher.time[worst] == time[102]
+
+
+def test_an_impact_that_is_lacking_is_found() -> None:
+    """A flat curve is all in the tube of the spike, but the spike is not in that of the curve."""
+    spike = np.zeros(100)
+    spike[50] = 1.0
+    for pair in ((spike, np.zeros(100)), (np.zeros(100), spike)):
+        found = deviation(sampled(pair[0]), sampled(pair[1]), 5 * STEP)
+        assert found.values.max() == 1.0
+        assert found.time[found.values.argmax()] == 0.05
+
+
+def test_curves_of_different_steps_are_compared_at_the_times_of_both() -> None:
+    fine, coarse = times(101), times(51, 2_000_000)
+    found = deviation(Curve(fine, np.sin(fine)), Curve(coarse, np.sin(coarse)), 0.0)
+    assert found.time.tolist() == fine.tolist()
+    assert found.values[::2].max() == 0.0
+    assert 0.0 < found.values.max() < 1e-6
+
+
+def test_what_is_held_does_not_change_before_its_time() -> None:
+    contact = curve(np.array([0.0, 1.0, 2.0]), np.array([False, True, True]))
+    assert contact.held
+    assert contact.at(np.array([-1.0, 0.0, 0.999, 1.0, 5.0])).tolist() == [0, 0, 0, 1, 1]
+    assert not curve(np.zeros(1), np.zeros(1)).held
+
+
+def test_a_curve_until_a_time() -> None:
+    short = sampled(np.arange(10.0)).until(0.004)
+    assert short.values.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+
+
+def test_a_late_curve_that_still_moves_at_the_end_is_inside() -> None:
+    time = times(100)
+    ramp = Curve(time, 5.0 * time)
+    late = Curve(time, 5.0 * np.maximum(time - 0.002, 0.0))
+    assert deviation(ramp, late, 0.002).values.max() == pytest.approx(0.0, abs=1e-12)
+    assert deviation(ramp, late, 0.001).values.max() == pytest.approx(5.0 * 0.001)

@@ -1,0 +1,232 @@
+"""Events and faults in runs of the built-in grasp, against the sensor's equation and NumPy."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from grasp_cosim import InputError, Result, System, simulate
+from grasp_cosim.system.parts import Condition, Event, Fault, FaultKind, Port
+
+Array = npt.NDArray[Any]
+
+STEP = 1e-3
+GAP = Port("sensor_1", "gap")
+REFLECTANCE = Port("sensor_1", "reflectance")
+
+
+def intensity(gap: Array, reflectance: Array | float = 1.0) -> Array:
+    """Eq. (9) in V, for a gap in m."""
+    return np.asarray(0.0024 * reflectance / (np.maximum(gap, 0.0) + 0.005) ** 1.1506)
+
+
+def seen(result: Result) -> Array:
+    """The gap in m that sensor 1 must have got for what it puts out, in each row."""
+    return np.asarray((0.0024 / result["sensor_1.intensity"]) ** (1 / 1.1506) - 0.005)
+
+
+def run(system: System, stop: float = 0.3, **changes: Any) -> Result:
+    return simulate(replace(system, **changes), step=STEP, stop=stop)
+
+
+def on_gap(kind: FaultKind, start: int = 0, end: int | None = None, **given: float) -> Fault:
+    """A fault of the wire to sensor 1, with a window in steps."""
+    unit = round(STEP * 1e9)
+    return Fault(GAP, kind, given, start * unit, None if end is None else end * unit)
+
+
+def test_a_change_of_reflectance_moves_the_target(grasp: System) -> None:
+    """Finger 1's side gets darker: it looks further away, so the target moves its way."""
+    event = Event({REFLECTANCE: 0.6}, at_ns=100_000_000)
+    plain, changed = run(grasp), run(grasp, events=(event,))
+    k = 100  # the row of the event: what it sets acts on the step from there
+    for name in plain:
+        assert plain[name][: k + 1].tobytes() == changed[name][: k + 1].tobytes()
+    alpha = np.where(np.arange(301) <= k, 1.0, 0.6)
+    expected = intensity(changed["plant.gap[1]"], alpha)
+    assert changed["sensor_1.intensity"] == pytest.approx(expected, rel=1e-12)
+    xi_1, xi_2 = changed["sensor_1.intensity"], changed["sensor_2.intensity"]
+    force = 3.0 * np.tanh((xi_1 - xi_2) / (xi_1 + xi_2))
+    assert changed["controller.simultaneous_contact_force"] == pytest.approx(force, rel=1e-12)
+    difference = changed["controller.target_position"] - plain["controller.target_position"]
+    assert not difference[: k + 1].any()
+    assert (np.diff(difference[k + 1 :]) < 0).all()
+    assert "t = 0.1 s: sensor_1.reflectance = 0.6" in changed.log
+
+
+def test_an_event_on_a_condition_happens_where_it_holds_first(grasp: System) -> None:
+    condition = Condition(Port("plant", "gap[1]"), "<", 0.04)
+    result = run(grasp, events=(Event({REFLECTANCE: 0.5}, when=condition),))
+    k = int(np.argmax(result["plant.gap[1]"] < 0.04))
+    assert 0 < k < 300
+    alpha = np.where(np.arange(301) <= k, 1.0, 0.5)
+    expected = intensity(result["plant.gap[1]"], alpha)
+    assert result["sensor_1.intensity"] == pytest.approx(expected, rel=1e-12)
+    line = f"t = {k * STEP:.9g} s: sensor_1.reflectance = 0.5 (plant.gap[1] < 0.04)"
+    assert line in result.log
+
+
+def test_an_event_on_a_slow_component_waits_for_its_next_own_step(grasp: System) -> None:
+    """The sensor steps every 5 ms: of what is set at 12 ms, it knows from 15 ms on."""
+    components = tuple(
+        replace(c, step_ns=5_000_000) if c.name == "sensor_1" else c for c in grasp.components
+    )
+    event = Event({REFLECTANCE: 0.6}, at_ns=12_000_000)
+    result = run(grasp, 0.03, components=components, events=(event,))
+    own = np.arange(0, 31, 5)
+    expected = intensity(result["plant.gap[1]"][own], np.where(own <= 15, 1.0, 0.6))
+    assert result["sensor_1.intensity"][own] == pytest.approx(expected, rel=1e-12)
+    assert result.log == ("t = 0.015 s: sensor_1.reflectance = 0.6",)
+
+
+def window(rows: int, start: int, end: int) -> npt.NDArray[np.bool_]:
+    """The rows that the steps from start until end lead to; row 0 is the initialisation's."""
+    steps = np.arange(rows) - 1
+    return np.asarray((steps >= start) & (steps < end))
+
+
+DETERMINISTIC: list[tuple[Fault, Callable[[Array], Array]]] = [
+    (on_gap("stuck", 50, 90), lambda gap: np.full_like(gap, gap[51])),
+    (on_gap("stuck", 50, 90, value=0.02), lambda gap: np.full_like(gap, 0.02)),
+    (on_gap("bias", 50, 90, value=0.003), lambda gap: gap + 0.003),
+    (on_gap("delay", 50, 90, time=0.005), lambda gap: np.roll(gap, 5)),
+    (on_gap("saturation", 50, 90, low=0.041, high=0.0445), lambda g: np.clip(g, 0.041, 0.0445)),
+    (on_gap("quantisation", 50, 90, step=1e-3), lambda gap: np.rint(gap / 1e-3) * 1e-3),
+]
+
+
+@pytest.mark.parametrize(
+    ("fault", "expected"), DETERMINISTIC, ids=[fault.kind for fault, _ in DETERMINISTIC]
+)
+def test_a_fault_of_a_wire(grasp: System, fault: Fault, expected: Callable[[Array], Array]) -> None:
+    result = run(grasp, stop=0.15, faults=(fault,))
+    gap = result["plant.gap[1]"]
+    got = np.where(window(151, 50, 90), expected(gap), gap)
+    assert result["sensor_1.intensity"] == pytest.approx(intensity(got), rel=1e-12)
+    assert result["sensor_2.intensity"] == pytest.approx(
+        intensity(result["plant.gap[2]"]), rel=1e-12
+    )
+    assert [line for line in result.log if "sensor_1.gap" in line] == [
+        f"t = 0.05 s: sensor_1.gap: {fault.kind} begins",
+        f"t = 0.09 s: sensor_1.gap: {fault.kind} ends",
+    ]
+
+
+def test_a_fault_from_0_acts_at_t_0(grasp: System) -> None:
+    result = run(grasp, stop=0.01, faults=(on_gap("bias", value=0.003),))
+    expected = intensity(result["plant.gap[1]"] + 0.003)
+    assert result["sensor_1.intensity"] == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_delay_from_0_repeats_the_value_of_t_0(grasp: System) -> None:
+    result = run(grasp, stop=0.05, faults=(on_gap("delay", time=0.005),))
+    gap = result["plant.gap[1]"]
+    expected = intensity(gap[np.maximum(np.arange(51) - 5, 0)])
+    assert result["sensor_1.intensity"] == pytest.approx(expected, rel=1e-12)
+
+
+def test_noise_of_a_wire(grasp: System) -> None:
+    result = run(grasp, faults=(on_gap("noise", standard_deviation=1e-4),))
+    x = (seen(result) - result["plant.gap[1]"]) / 1e-4
+    n = len(x)
+    assert abs(x.mean()) < 5 / math.sqrt(n)
+    assert abs(x.std() - 1) < 5 / math.sqrt(2 * n)
+    assert abs((x[1:] * x[:-1]).mean()) < 5 / math.sqrt(n)
+
+
+def test_dropouts_of_a_wire(grasp: System) -> None:
+    result = run(grasp, stop=0.2, faults=(on_gap("dropout", probability=0.5),))
+    gap = result["plant.gap[1]"]
+    through = np.isclose(seen(result), gap, rtol=0, atol=1e-12)
+    assert 60 < through.sum() < 140
+    newest = np.maximum.accumulate(np.where(through, np.arange(201), 0))
+    assert result["sensor_1.intensity"] == pytest.approx(intensity(gap[newest]), rel=1e-12)
+
+
+def test_a_fault_may_begin_on_a_condition(grasp: System) -> None:
+    condition = Condition(Port("plant", "gap[1]"), "<", 0.04)
+    fault = replace(on_gap("bias", 50, value=0.003), when=condition)
+    result = run(grasp, faults=(fault,))
+    gap = result["plant.gap[1]"]
+    first = max(50, int(np.argmax(gap < 0.04)))
+    expected = intensity(np.where(window(301, first, 301), gap + 0.003, gap))
+    assert result["sensor_1.intensity"] == pytest.approx(expected, rel=1e-12)
+
+
+FULL: dict[str, Any] = {
+    "events": (
+        Event({REFLECTANCE: 0.6}, at_ns=50_000_000),
+        Event({REFLECTANCE: 0.8}, when=Condition(Port("plant", "gap[1]"), "<", 0.04)),
+    ),
+    "faults": (
+        on_gap("noise", standard_deviation=1e-4),
+        on_gap("quantisation", 20, step=1e-5),
+        Fault(Port("sensor_2", "gap"), "dropout", {"probability": 0.3}, seed=5),
+        Fault(Port("controller", "position[1]"), "delay", {"time": 0.003}),
+        Fault(Port("controller", "velocity[2]"), "stuck", {}, 30_000_000, 60_000_000),
+        Fault(Port("controller", "intensity[1]"), "saturation", {"high": 0.4}, 10_000_000),
+        Fault(Port("plant", "force[1]"), "bias", {"value": -0.1}, 70_000_000),
+    ),
+}
+
+
+def bits(result: Result) -> dict[str, bytes]:
+    return {name: np.ascontiguousarray(result[name]).tobytes() for name in result}
+
+
+@pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
+def test_both_engines_give_the_same_bits(grasp: System, scheme: str) -> None:
+    if find_spec("numba") is None:
+        pytest.skip("numba is not installed")
+    system = replace(grasp, **FULL).with_experiment(STEP, 0.3, scheme)
+    plain = simulate(system, engine="python")
+    compiled = simulate(system, engine="compiled")
+    assert bits(plain) == bits(compiled)
+    assert plain.log == compiled.log
+    assert sum("sensor_1.reflectance" in line for line in plain.log) == 2
+
+
+def test_the_same_run_twice_gives_the_same_bits(grasp: System) -> None:
+    assert bits(run(grasp, **FULL)) == bits(run(grasp, **FULL))
+
+
+def test_another_seed_gives_other_values(grasp: System) -> None:
+    fault = on_gap("noise", standard_deviation=1e-4)
+    one, two = (run(grasp, 0.02, faults=(replace(fault, seed=seed),)) for seed in (1, 2))
+    assert (one["sensor_1.intensity"] != two["sensor_1.intensity"]).all()
+
+
+def test_steps_may_be_done_one_by_one(grasp: System) -> None:
+    whole = run(grasp, 0.05, **FULL)
+    with simulate.session(replace(grasp, **FULL), step=STEP, stop=0.05) as session:
+        while session.step():
+            pass
+        assert bits(session.result()) == bits(whole)
+
+
+def test_what_a_session_sets_is_what_an_event_sets(grasp: System) -> None:
+    event = Event({REFLECTANCE: 0.6}, at_ns=20_000_000)
+    whole = run(grasp, 0.05, events=(event,))
+    with simulate.session(grasp, step=STEP, stop=0.05) as session:
+        session.step(20)
+        session.set("sensor_1.reflectance", 0.6)
+        session.step(30)
+        result = session.result()
+        with pytest.raises(InputError, match=r"sensor_1\.gap: has a wire, from plant\.gap\[1\]"):
+            session.set("sensor_1.gap", 0.1)
+    assert bits(result) == bits(whole)
+    assert result.log == whole.log == ("t = 0.02 s: sensor_1.reflectance = 0.6",)
+
+
+def test_what_did_not_happen_is_in_the_log(grasp: System) -> None:
+    event = Event({REFLECTANCE: 0.6}, at_ns=10_000_000)
+    with simulate.session(replace(grasp, events=(event,)), step=STEP, stop=0.01) as session:
+        session.step(9)
+        assert session.result().log == ()
+        session.step()
+        line = "events[0] did not happen: no step began at or after t = 0.01 s"
+        assert session.result().log == (line,)
