@@ -1,6 +1,6 @@
 """What a macro step of the grasp costs in grasp-cosim and in other masters, in one run.
 
-    python benchmarks/masters.py [--cofmupy-python PYTHON]
+    python -m benchmarks.masters [--cofmupy-python PYTHON]
 
 Runs the loop of four instances and ten wires at 10 kHz with the Jacobi scheme, everything
 recorded, first on our Python FMUs and then on native ones of the same shape, in short chunks, one
@@ -19,7 +19,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from grasp_fmus.build import build
-from native_fmus import build_native
+
+from benchmarks.native_fmus import build_native
 
 WORKER = Path(__file__).parent / "worker.py"
 

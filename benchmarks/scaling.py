@@ -1,6 +1,6 @@
 """How the cost of a run grows with its steps and its instances, and that its memory does not.
 
-    python benchmarks/scaling.py
+    python -m benchmarks.scaling
 
 One plant and as many sensors as it takes to come to so many instances, all sensors on the same gap;
 with the Python FMUs and with native ones. Each figure is the least CPU time of several
@@ -17,7 +17,8 @@ from grasp_cosim import System, simulate
 from grasp_cosim.grasp import SYSTEM
 from grasp_cosim.system.parts import Port, Wire
 from grasp_fmus.build import build
-from native_fmus import build_native
+
+from benchmarks.native_fmus import build_native
 
 INSTANCES = (2, 4, 8, 16, 32, 64)
 LENGTHS = (1_000, 2_000, 4_000, 8_000)

@@ -144,7 +144,7 @@ def cofmupy(folder: Path) -> Master:
     It reads Booleans with fmi2GetReal, which an FMU may refuse and ours do: the Boolean outputs
     are taken out of the descriptions it read. That is less work, not more.
     """
-    wrappers = importlib.import_module("cofmupy.wrappers")
+    wrappers: Any = importlib.import_module("cofmupy.wrappers")
     read = wrappers.read_model_description
 
     def without_boolean_outputs(path: str) -> Any:
