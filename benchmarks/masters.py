@@ -3,8 +3,8 @@
     python -m benchmarks.masters [--cofmupy-python PYTHON]
 
 Runs the loop of four instances and ten wires at 10 kHz with the Jacobi scheme, everything
-recorded, first on our Python FMUs and then on native ones of the same shape, in short chunks, one
-master after the other. Prints the table of README.md. A master that is not installed is skipped by
+recorded, on our Python FMUs and on native ones of the same shape, in short chunks, one master after
+the other. Prints the table of README.md. A master that is not installed is skipped by
 name; cofmupy pins an FMPy and a matplotlib of its own, so it may be in an environment of its own.
 """
 
@@ -38,8 +38,24 @@ REFERENCE = "grasp-cosim compiled"
 MODULES = {"ecospy": "ecospy", "libcosimpy": "libcosimpy", "cofmupy": "cofmupy"}
 """What must be installed for a master."""
 
-KINDS = {"Python FMUs": 300, "native FMUs": 1000}
-"""Macro steps in a chunk, for each kind of FMU."""
+
+class Case(NamedTuple):
+    """What is measured: with which FMUs, how many macro steps to a chunk, and on one core only?"""
+
+    title: str
+    native: bool
+    steps: int
+    one_core: bool
+
+
+CASES = (
+    Case("Python FMUs, all cores", False, 300, False),
+    Case("Python FMUs, one core", False, 300, True),
+    Case("native FMUs, all cores", True, 1000, False),
+)
+"""ecospy and libcosimpy step their instances in several threads, which a Python FMU makes wait for
+one another: there one core can be faster than two.
+"""
 
 ROUNDS = 60
 
@@ -58,10 +74,11 @@ class Cost(NamedTuple):
 class Worker:
     """A master in its process."""
 
-    def __init__(self, python: str, name: str, folder: Path) -> None:
+    def __init__(self, python: str, name: str, folder: Path, one_core: bool) -> None:
         self.name = name
+        core = [str(max(os.sched_getaffinity(0)))] if one_core else []
         self._process = subprocess.Popen(
-            [python, str(WORKER), name, str(folder)],
+            [python, str(WORKER), name, str(folder), *core],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -110,17 +127,17 @@ def pythons(cofmupy_python: str | None) -> dict[str, str]:
     return found
 
 
-def measure(masters: dict[str, str], folder: Path, steps: int) -> dict[str, Cost]:
+def measure(masters: dict[str, str], folder: Path, case: Case) -> dict[str, Cost]:
     """The cost of all masters with the FMUs of a folder, chunk by chunk alternately."""
     with ExitStack() as stack:
         workers = []
         for name, python in masters.items():
-            workers.append(Worker(python, name, folder))
+            workers.append(Worker(python, name, folder, case.one_core))
             stack.callback(workers[-1].close)
         times: dict[str, list[float]] = {worker.name: [] for worker in workers}
         for _ in range(ROUNDS):
             for worker in workers:
-                times[worker.name].append(worker.chunk(steps))
+                times[worker.name].append(worker.chunk(case.steps))
         for worker in workers:
             print(f"{worker.name}: finger 1 at {worker.position():.5f} m", file=sys.stderr)
     return {name: _cost(chunks, times[REFERENCE]) for name, chunks in times.items()}
@@ -134,10 +151,10 @@ def _cost(chunks: list[float], reference: list[float]) -> Cost:
 def table(results: dict[str, dict[str, Cost]]) -> str:
     """The results as Markdown: us per macro step, and how many times ours that is."""
     lines = []
-    for kind, costs in results.items():
+    for title, costs in results.items():
         lines += [
             "",
-            f"| {kind} | best | median | worst | times ours | best / our best | recorded |",
+            f"| {title} | best | median | worst | times ours | best / our best | recorded |",
             "|---|---|---|---|---|---|---|",
         ]
         best = costs[REFERENCE].best
@@ -159,10 +176,11 @@ def main() -> None:
     if REFERENCE not in masters:
         sys.exit(f"{REFERENCE}: is what the others are compared with; install the extra `fast`")
     with tempfile.TemporaryDirectory(prefix="grasp_bench_") as name:
-        folders = {kind: Path(name, kind.split()[0]) for kind in KINDS}
-        build(folders["Python FMUs"])
-        build_native(folders["Python FMUs"], folders["native FMUs"])
-        print(table({k: measure(masters, folders[k], steps) for k, steps in KINDS.items()}))
+        python, native = Path(name, "python"), Path(name, "native")
+        build(python)
+        build_native(python, native)
+        results = {c.title: measure(masters, native if c.native else python, c) for c in CASES}
+    print(table(results))
 
 
 if __name__ == "__main__":

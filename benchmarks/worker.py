@@ -1,9 +1,10 @@
 """One master in a process of its own; started by masters.py, with that master's interpreter.
 
-    worker.py MASTER FOLDER
+    worker.py MASTER FOLDER [CORE]
 
-runs the grasp with the FMUs of FOLDER. It answers every number of macro steps on standard input
-with the time they took, in s, and an empty line with the value of plant.position[1] reached.
+runs the grasp with the FMUs of FOLDER, on one core if that is given. It answers every number of
+macro steps on standard input with the time they took, in s, and an empty line with the value of
+plant.position[1] reached.
 Masters are in processes of their own because their C++ libraries and their pins of FMPy collide.
 
 Every master runs the Jacobi scheme, the one they share, and records every output its own way.
@@ -210,6 +211,8 @@ def main() -> None:
     """Answer on the standard output as it was; what a master prints goes to standard error."""
     answers = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(2, 1)
+    if sys.argv[3:]:
+        os.sched_setaffinity(0, {int(sys.argv[3])})
     master = MASTERS[sys.argv[1]](Path(sys.argv[2]))
     master.advance(1)
     print("ready", file=answers)
