@@ -1,0 +1,136 @@
+"""The interpreted and the compiled loop give the same bits, the same errors, the same rows."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from grasp_cosim import InputError, SimulationError, System, simulate
+from grasp_cosim.grasp import CASES
+from grasp_cosim.master.engine import Engine
+from grasp_cosim.recording.result import Rejection, Result
+from grasp_cosim.system.parts import Port, Wire
+from mocks import Mock, Run, make_system
+
+pytest.importorskip("numba")
+ENGINES: tuple[Engine, ...] = ("python", "compiled")
+
+
+def both(system: System, **options: Any) -> tuple[Result, Result]:
+    one, two = (simulate(system, engine=engine, **options) for engine in ENGINES)
+    return one, two
+
+
+def assert_same_bits(one: Result, two: Result) -> None:
+    assert list(one) == list(two)
+    assert one.time.tobytes() == two.time.tobytes()
+    assert [n for n in one if one[n].tobytes() != two[n].tobytes()] == []
+
+
+@pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
+@pytest.mark.parametrize(("case", "step"), [(0, 2e-4), (1, 1e-3), (2, 1e-3)])
+def test_the_grasp(grasp: System, case: int, step: float, scheme: str) -> None:
+    stop = 0.4 if case == 0 else 2.5
+    assert_same_bits(*both(grasp.with_values(CASES[case]), step=step, stop=stop, scheme=scheme))
+
+
+@pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
+def test_slow_sensors_and_scaled_wires(grasp: System, scheme: str) -> None:
+    components = tuple(
+        replace(c, step_ns=3_000_000) if c.name == "sensor_1" else c for c in grasp.components
+    )
+    first, *others = grasp.wires
+    wires = (replace(first, factor=1.1, offset=-0.003), *others)
+    system = replace(
+        grasp, components=components, wires=wires, step_ns=1_000_000, stop_ns=2_400_000_000
+    )
+    one, two = both(system, scheme=scheme)
+    assert_same_bits(one, two)
+    held = one["sensor_1.intensity"]
+    assert (held[3:6] == held[3]).all()
+    assert held[6] != held[5]
+
+
+def test_decimation_keeps_each_nth_row_and_the_last(grasp: System) -> None:
+    whole = simulate(grasp, step=1e-3, stop=0.1)
+    for few in both(grasp, step=1e-3, stop=0.1, every=7):
+        kept = [*range(0, 101, 7), 100]
+        assert few.time.tolist() == whole.time[kept].tolist()
+        assert all((few[name] == whole[name][kept]).all() for name in whole)
+        assert few.metrics["steps"] == 100
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_an_fmu_that_fails_is_the_same_error(
+    grasp: System, altered: Callable[..., Path], engine: Engine
+) -> None:
+    nan = "l = float('nan') if u.gap < 0.044 else u.gap"
+    fmu = altered(
+        "ProximitySensor", "proximity_sensor/optics.py", "l = 0.0 if u.gap < 0.0 else u.gap", nan
+    )
+    with pytest.raises(SimulationError, match=r"^sensor_1: .* at t = 0\.061 s: ") as caught:
+        simulate(grasp.swap("sensor_1", fmu), engine=engine)
+    assert caught.value.result is not None
+    assert len(caught.value.result.time) == 611
+    assert not caught.value.result.complete
+
+
+def chain(tmp_path: Path, engine: Engine, *mocks: Mock) -> Run:
+    wires = [Wire(Port(a.name, "y"), Port(b.name, "u")) for a, b in pairwise(mocks)]
+    return Run(make_system(mocks, wires), mocks, engine)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("kind", ["Real", "Integer", "Boolean", "String"])
+def test_components_in_python_run_in_both(tmp_path: Path, engine: Engine, kind: str) -> None:
+    def output(u: float, t: float) -> Any:
+        return {"Real": t, "Integer": round(10 * t), "Boolean": t > 0.15, "String": f"{t:g}"}[kind]
+
+    a, b = Mock(tmp_path, "a", output, kind), Mock(tmp_path, "b", lambda u, t: u, kind)
+    chain(tmp_path, engine, a, b).to_the_end()
+    assert b.u == output(0.0, a.time)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_rejected_steps_are_resolved_in_both(tmp_path: Path, engine: Engine) -> None:
+    clock = Mock(tmp_path, "clock", lambda u, t: t, direct=False)
+    slow = Mock(
+        tmp_path, "slow", lambda u, t: t, direct=False,
+        rejects=lambda begin, end: 0.13 if begin < 0.13 < end else end,
+    )  # fmt: skip
+    run = chain(tmp_path, engine, slow, clock)
+    signals = run.to_the_end()
+    assert signals["slow.y"] == pytest.approx(signals["clock.y"], abs=1e-15)
+    assert run.master.rejections == {"slow": Rejection(1, 0.1)}
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_what_a_call_raises_ends_the_run(tmp_path: Path, engine: Engine) -> None:
+    """An exception must not get lost in compiled code."""
+
+    def output(u: float, t: float) -> float:
+        if t > 0.25:
+            raise SimulationError("a: enough")
+        return t
+
+    run = chain(tmp_path, engine, Mock(tmp_path, "a", output, direct=False))
+    with pytest.raises(SimulationError, match="a: enough"):
+        run.to_the_end()
+    assert run.signals()["a.y"] == pytest.approx([0.0, 0.1, 0.2])
+
+
+def test_without_numba_the_compiled_engine_is_refused(
+    grasp: System, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from grasp_cosim.master import compiled
+
+    compiled.compiled_loop.cache_clear()
+    monkeypatch.setitem(__import__("sys").modules, "numba", None)
+    with pytest.raises(InputError, match=r"numba is not installed.*grasp-cosim\[fast\]"):
+        simulate(grasp, stop=1e-3, engine="compiled")
+    monkeypatch.undo()
+    compiled.compiled_loop.cache_clear()
+    assert np.isfinite(simulate(grasp, stop=1e-3, engine="compiled")["plant.gap[1]"]).all()
