@@ -30,8 +30,11 @@ def test_wheel_runs_in_an_empty_folder(tmp_path: Path) -> None:
     python("-m", "pip", "install", "-q", "--no-deps", "--target", str(site), str(wheel), cwd=empty)
     where = python("-c", "import grasp_cosim; print(grasp_cosim.__file__)", cwd=empty, path=site)
     assert Path(where.strip()).is_relative_to(site)
-    out = python("-m", "grasp_cosim", "run", "--stop", "0.2", "--json", cwd=empty, path=site)
+    run = ("run", "--stop", "0.2", "--out", "results", "--json")
+    out = python("-m", "grasp_cosim", *run, cwd=empty, path=site)
     assert json.loads(out)["steps"] == 2000
+    python("-m", "grasp_cosim", "report", "results", cwd=empty, path=site)
+    assert (empty / "results/report.html").read_text("utf-8").endswith("</html>\n")
     assert {p.name for p in site.iterdir() if p.is_dir() and "-" not in p.name} == {
         "bin", "grasp_cosim", "grasp_controller", "grasp_fmus", "gripper_plant", "proximity_sensor",
     }  # fmt: skip

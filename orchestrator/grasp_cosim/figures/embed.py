@@ -15,7 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 LIMIT = 20_000_000
-"""So many values at most go into a page, 20 to 60 MB; longer runs are thinned."""
+"""So many values at most go into a page, 25 MB if they are smooth, 200 if they are pure noise; of
+longer runs the extremes are kept."""
 
 EFFORT = 4
 """Of zlib: 10 s for the most values that go into a page; 9 takes minutes to save a tenth."""

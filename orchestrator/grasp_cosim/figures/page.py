@@ -8,6 +8,7 @@ so a copy would have to be kept here, and neither keeps extremes over millions o
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping, Sequence
 from html import escape
 from importlib.metadata import version
@@ -67,7 +68,7 @@ def page_html(run: Run, title: str, limit: int = LIMIT) -> str:
         "shown": _at_first(run, grasp is not None),
         "marks": [
             *({"t": c["t"], "color": f"--finger{c['finger']}"} for c in contacts),
-            *({"t": t, "color": "--fault"} for t in _moments(run.settings)),
+            *({"t": t, "color": "--fault"} for t in _moments(run.settings["log"])),
         ],
         "grasp": {**grasp, "contacts": contacts} if grasp else None,
     }
@@ -121,9 +122,7 @@ def _data(shown: Shown) -> str:
 def _exactness(shown: Shown, rows: int) -> str:
     columns = len(shown.signals)
     if shown.rows_per_pair is None:
-        return (
-            f"All {rows:,} recorded points of {columns} signals are in this page, to the last bit."
-        )
+        return f"All {count(rows)} points of {columns} signals are in this page, to the last bit."
     return (
         f"<b>Of {count(rows)} points of {columns} signals this page keeps, of each "
         f"{shown.rows_per_pair}, the lowest and the highest value;</b> all are in signals.csv."
@@ -258,19 +257,21 @@ def _choice(run: Run) -> str:
     return "".join(html)
 
 
-def _moments(settings: Mapping[str, Any]) -> list[float]:
-    """The times in s at which events are due and faults begin, of those that say one."""
-    times = [e["at"] for e in settings["events"] if "at" in e]
-    return times + [f["from"] for f in settings["faults"] if "from" in f]
+def _moments(log: Sequence[str]) -> list[float]:
+    """The times in s with which lines of the log begin: events, faults."""
+    found = (re.match(r"t = (\S+) s: ", line) for line in log)
+    return [float(match[1]) for match in found if match]
 
 
 def _wiring(run: Run) -> str:
-    faults = {f["wire"].partition("->")[2].strip() or f["wire"]: f for f in run.settings["faults"]}
+    faults: dict[str, list[str]] = {}
+    for f in run.settings["faults"]:
+        faults.setdefault(f["wire"], []).append(f["kind"])
     links = []
     for w in run.settings["wires"]:
         label = [] if w["factor"] is None else [f"× {number(w['factor'])}"]
         label += [f"+ {number(w['offset'])}"] if w["offset"] else []
-        label += [faults[w["to"]]["kind"]] if w["to"] in faults else []
+        label += faults.get(w["to"], [])
         source, _, output = w["from"].partition(".")
         target, _, given = w["to"].partition(".")
         links.append(

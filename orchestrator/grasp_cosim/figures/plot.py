@@ -201,7 +201,7 @@ def save(figure: Figure, path: Path) -> None:
 
 
 def finish(axes: Axes, label: str, legend: bool = True) -> None:
-    """Label the upright axis of a finished diagram; a grid, a legend, no frame."""
+    """What all axes have: a label of the values, a grid, and a legend unless it is too long."""
     axes.set_ylabel(label)
     axes.grid(True, color="#dddddd", linewidth=0.6)
     if legend:

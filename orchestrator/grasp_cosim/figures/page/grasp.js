@@ -26,7 +26,7 @@ class Grasp {
     return valueAt(this.recording.time, this.series.get(name), t);
   }
 
-  // speed: simulated seconds per second, by which a glow lasts a while for the eye.
+  // speed: simulated seconds per second at a contact, by which a glow lasts a while for the eye.
   draw(t, speed) {
     const { pen, width, height } = fitted(this.canvas), plan = this.plan;
     const room = THICK + 70, scale = (width - 2 * room) / Math.max(this.high - this.low, 1e-6);
@@ -177,7 +177,9 @@ class Grasp {
   readings(t) {
     for (const cell of document.querySelectorAll("#readings output")) {
       const series = this.series.get(cell.dataset.signal), value = this.at(series.name, t);
-      const { factor, unit } = scaled(series.unit, Math.abs(value));
+      const top = series.levels.at(-1); // of the whole run, so that the unit stays the same
+      const { factor, unit } = scaled(
+        series.unit, Math.max(...top.high.map(Math.abs), ...top.low.map(Math.abs)));
       cell.textContent = series.steps ? (value ? "yes" : "no") : `${text(value * factor)} ${unit}`;
     }
   }

@@ -37,11 +37,10 @@ function draw() {
   overview();
   find("span").textContent = `${clock(view.from)} to ${clock(view.to)}`;
   if (grasp) {
-    grasp.draw(cursor, speed());
+    grasp.draw(cursor, chosenSpeed() || SLOW);
     find("scrub").value = cursor;
     find("clock").textContent = clock(cursor);
-    find("pace").textContent = playing || find("speed").value === "auto"
-      ? `${Number(speed().toPrecision(3))} × real time` : "";
+    find("pace").textContent = chosenSpeed() ? "" : `${speed()} × real time`;
   }
   remember();
 }
@@ -129,11 +128,12 @@ function recall() { // what the address asks for; what it does not say stays
 }
 
 // The animation ------------------------------------------------------------------------------
+const chosenSpeed = () => Number(find("speed").value); // 0: slow around contacts
+
 function speed() {
-  const value = find("speed").value;
-  if (value !== "auto") return Number(value);
-  const near = page.grasp.contacts.some((c) => cursor > c.t - AROUND[0] && cursor < c.t + AROUND[1]);
-  return near ? SLOW : 1;
+  const { contacts } = page.grasp;
+  const near = contacts.some((c) => cursor >= c.t - AROUND[0] && cursor < c.t + AROUND[1]);
+  return chosenSpeed() || (near ? SLOW : 1);
 }
 
 function play(on) {

@@ -1,0 +1,104 @@
+"""report: what it writes and prints, its mistakes in one line."""
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+from figures.runs import grasp_run, ring_run, write_run
+from grasp_cosim import System, cli, simulate
+from grasp_cosim.figures.page import page_html
+from grasp_cosim.recording.load import load_run
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A recorded grasp."""
+    write_run(tmp_path / "results", grasp_run())
+    return tmp_path / "results"
+
+
+def test_the_page_and_the_picture_are_beside_the_run(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(["report", str(folder)]) == 0
+    out, err = capsys.readouterr()
+    html = (folder / "report.html").read_text("utf-8")
+    assert html == page_html(load_run(folder), "results")
+    assert html == page_html(grasp_run(), "results")
+    assert (folder / "grasp.png").read_bytes().startswith(b"\x89PNG")
+    assert out.splitlines()[0].startswith(f"{folder / 'report.html'}: ")
+    assert out.splitlines()[1:] == [str(folder / "grasp.png")]
+    assert not err
+
+
+def test_json_and_another_place(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = tmp_path / "new" / "page.html"
+    assert cli.main(["report", str(folder), "--out", str(page), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {
+        "page": str(page),
+        "bytes": page.stat().st_size,
+        "pictures": [str(page.parent / "grasp.png")],
+    }
+    assert sorted(p.name for p in folder.iterdir()) == ["run.json", "signals.csv"]
+
+
+def test_a_system_that_is_no_grasp_has_a_picture_of_its_signals(tmp_path: Path) -> None:
+    write_run(tmp_path / "ring", ring_run(["a", "b"]))
+    assert cli.main(["report", str(tmp_path / "ring")]) == 0
+    assert {p.name for p in (tmp_path / "ring").iterdir()} == {
+        "report.html", "run.json", "signals.csv", "signals.png",
+    }  # fmt: skip
+
+
+def test_without_matplotlib_there_is_the_page_alone(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    assert cli.main(["report", str(folder), "--json"]) == 0
+    out, err = capsys.readouterr()
+    assert json.loads(out)["pictures"] == []
+    assert err.startswith("no picture: matplotlib is not installed")
+    assert "pip install 'grasp-cosim[plot]'" in err
+    assert len(err.splitlines()) == 1
+    assert (folder / "report.html").exists()
+    assert not (folder / "grasp.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("run.json", None, "run.json: No such file"),
+        ("signals.csv", None, "signals.csv: No such file"),
+        ("run.json", '{"units": {}}', "units are those of none; must be those of the columns"),
+    ],
+)
+def test_a_folder_that_is_no_run_is_one_line(
+    name: str, text: str | None, message: str, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if text is None:
+        (folder / name).unlink()
+    else:
+        (folder / name).write_text(text, "utf-8")
+    assert cli.main(["report", str(folder)]) == 2
+    err = capsys.readouterr().err
+    assert message in err
+    assert len(err.splitlines()) == 1
+    assert not (folder / "report.html").exists()
+
+
+def test_a_run_as_it_is_recorded_makes_a_page(grasp: System, tmp_path: Path) -> None:
+    result = simulate(grasp, stop=0.05)
+    result.to_csv(tmp_path / "signals.csv")
+    result.to_json(tmp_path / "run.json")
+    assert cli.main(["report", str(tmp_path)]) == 0
+    html = (tmp_path / "report.html").read_text("utf-8")
+    assert all(f"{c.name}</text>" in html for c in grasp.components)
+    assert all(f"{w.source} → {w.target}" in html for w in grasp.wires)
+
+
+def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["report", "--help"]) == 0
+    assert "Example: grasp-cosim report" in capsys.readouterr().out

@@ -1,0 +1,125 @@
+"""Runs made up for the pages: a grasp by formula, and any number of components in a ring."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from grasp_cosim.recording.load import Run
+
+WIDTH, CENTRE = 0.07, 0.01
+TOUCH = {1: 1.0, 2: 1.2}
+"""s; a finger closes until then at an even speed, then stands still."""
+START = {1: 0.11, 2: -0.11}
+SIDE = {1: 1.0, 2: -1.0}
+
+EXPERIMENT = {
+    "system": "grasp.toml",
+    "scheme": "sequential",
+    "initialisation": {"loops": "iterate", "tolerance": 1e-10, "iterations": 50},
+    "steps": 2000,
+    "wall_time": 1.5,
+    "real_time_factor": 1.25,
+    "complete": True,
+    "step": 1e-3,
+    "stop": 2.0,
+}
+
+
+def component(fmu: str, **values: Any) -> dict[str, Any]:
+    """The entry of a component in run.json."""
+    return {"fmu": fmu, "values": values, "step": None, "isolation": "none", "rename": {}}
+
+
+def wire(source: str, target: str, factor: float | None = None) -> dict[str, Any]:
+    """The entry of a wire in run.json."""
+    return {"from": source, "to": target, "factor": factor, "offset": None}
+
+
+def position(finger: int, t: float) -> float:
+    """Where a finger of grasp_run() is at t, in m."""
+    end = CENTRE + SIDE[finger] * WIDTH / 2
+    return START[finger] + (end - START[finger]) * min(t / TOUCH[finger], 1.0)
+
+
+def grasp_run(rows: int = 2001) -> Run:
+    """Two fingers that close on an object, one 0.2 s after the other, 2 s long."""
+    time = np.linspace(0.0, 2.0, rows)
+    signals: dict[str, Any] = {}
+    for j in (1, 2):
+        x = np.array([position(j, t) for t in time])
+        touching = time >= TOUCH[j]
+        signals |= {
+            f"plant.position[{j}]": x,
+            f"plant.velocity[{j}]": np.gradient(x, time),
+            f"plant.gap[{j}]": SIDE[j] * (x - CENTRE) - WIDTH / 2,
+            f"plant.contact_force[{j}]": np.where(touching, SIDE[j] * 3.4, 0.0),
+            f"plant.contact[{j}]": touching,
+            f"controller.force[{j}]": np.where(touching, -SIDE[j] * 3.4, -SIDE[j] * 0.1),
+        }
+    signals |= {
+        "plant.object_position": np.full(rows, CENTRE),
+        "controller.target_position": CENTRE * (1.0 - np.exp(-time)),
+        "sensor_1.intensity": 0.01 / (signals["plant.gap[1]"] + 0.005),
+        "sensor_2.intensity": 0.01 / (signals["plant.gap[2]"] + 0.005),
+    }
+    of = {"position": "m", "velocity": "m/s", "gap": "m", "contact_force": "N", "force": "N"}
+    units = {name: of.get(name.partition(".")[2].partition("[")[0]) for name in signals}
+    units |= {"plant.object_position": "m", "controller.target_position": "m"}
+    settings = {
+        **EXPERIMENT,
+        "time_to_contact": [1.0, 1.2],
+        "time_difference": 0.2,
+        "impact_velocity": [0.065, None],
+        "components": {
+            "plant": component("GripperPlant.fmu", object_width=WIDTH),
+            "sensor_1": component("ProximitySensor.fmu"),
+            "sensor_2": component("ProximitySensor.fmu"),
+            "controller": component("GraspController.fmu"),
+        },
+        "wires": [
+            *(wire(f"plant.gap[{j}]", f"sensor_{j}.gap") for j in (1, 2)),
+            *(wire(f"plant.position[{j}]", f"controller.position[{j}]") for j in (1, 2)),
+            *(wire(f"plant.velocity[{j}]", f"controller.velocity[{j}]") for j in (1, 2)),
+            *(wire(f"sensor_{j}.intensity", f"controller.intensity[{j}]") for j in (1, 2)),
+            *(wire(f"controller.force[{j}]", f"plant.force[{j}]") for j in (1, 2)),
+        ],
+        "events": [{"at": 0.5, "set": {"sensor_1.reflectance": 0.6}}],
+        "faults": [{"wire": "controller.intensity[1]", "kind": "bias", "value": 0.1}],
+        "log": ["t = 0.5 s: sensor_1.reflectance = 0.6"],
+        "rejections": {"sensor_2": {"count": 3, "first": 0.25}},
+    }
+    return Run(time, signals, units, {"plant.gap[1]": "l_1, distance"}, settings)
+
+
+def ring_run(names: list[str], rows: int = 50) -> Run:
+    """Components wired in a ring, each with an output y."""
+    time = np.linspace(0.0, 1.0, rows)
+    signals = {f"{name}.y": np.sin(time + k) for k, name in enumerate(names)}
+    settings = {
+        **EXPERIMENT,
+        "components": {name: component(f"{name}.fmu") for name in names},
+        "wires": [
+            wire(f"{a}.y", f"{b}.u") for a, b in zip(names, [*names[1:], names[0]], strict=True)
+        ],
+        "events": [],
+        "faults": [],
+        "log": [],
+        "rejections": {},
+    }
+    return Run(time, signals, dict.fromkeys(signals), {}, settings)
+
+
+def write_run(folder: Path, run: Run) -> None:
+    """As `run --out` does."""
+    folder.mkdir()
+    names = ",".join(f'"{name}"' for name in ("time", *run.signals))
+    columns = [run.time, *(v.astype(float) for v in run.signals.values())]
+    rows = (",".join(map(repr, row)) for row in np.column_stack(columns).tolist())
+    (folder / "signals.csv").write_text("\n".join((names, *rows)) + "\n", "utf-8")
+    about = {
+        "units": dict(run.units),
+        "types": {name: str(v.dtype) for name, v in run.signals.items()},
+        "descriptions": dict(run.descriptions),
+    }
+    (folder / "run.json").write_text(json.dumps({**run.settings, **about}), "utf-8")

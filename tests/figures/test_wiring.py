@@ -1,0 +1,204 @@
+"""The wiring diagram: every wire from its port to its port, boxes apart, feedback below."""
+
+import itertools
+import random
+import re
+import xml.etree.ElementTree as ET
+
+import pytest
+from grasp_cosim.figures.wiring import Link, wiring_svg
+
+SVG = "{http://www.w3.org/2000/svg}"
+Box = tuple[float, float, float, float]
+Point = tuple[float, float]
+
+
+class Diagram:
+    """What is drawn, read back: boxes by name as left, top, right, bottom; wires by name."""
+
+    def __init__(self, svg: str) -> None:
+        root = ET.fromstring(svg)
+        self.width, self.height = float(root.attrib["width"]), float(root.attrib["height"])
+        self.boxes: dict[str, Box] = {}
+        self.ports: dict[tuple[str, str, str], float] = {}
+        self.wires: dict[str, list[Point]] = {}
+        self.labels: dict[str, str] = {}
+        self.kinds: dict[str, str] = {}
+        for group in root.findall(f"{SVG}g"):
+            if group.attrib["class"] == "box":
+                self._box(group)
+            else:
+                self._wire(group)
+
+    def _box(self, group: ET.Element) -> None:
+        rect = group.find(f"{SVG}rect")
+        assert rect is not None
+        x, y, w, h = (float(rect.attrib[k]) for k in ("x", "y", "width", "height"))
+        name, _, *ports = group.findall(f"{SVG}text")
+        self.boxes[str(name.text)] = (x, y, x + w, y + h)
+        for port in ports:
+            side = "output" if port.get("text-anchor") == "end" else "input"
+            self.ports[str(name.text), side, str(port.text)] = float(port.attrib["y"]) - 4.0
+
+    def _wire(self, group: ET.Element) -> None:
+        title, *paths = (e for e in group if e.tag != f"{SVG}text")
+        label = group.find(f"{SVG}text")
+        assert len(paths) == 2
+        name = str(title.text).partition(", ")[0]
+        self.wires[name] = corners(paths[1].attrib["d"])
+        self.labels[name] = "" if label is None else str(label.text)
+        self.kinds[name] = group.attrib["class"]
+
+
+def corners(path: str) -> list[Point]:
+    """The points of a path of M, C, H, V and q, control points left out."""
+    x = y = 0.0
+    points = []
+    for command, text in re.findall(r"([MCHVq])([^MCHVq]*)", path):
+        numbers = [float(n) for n in text.split()]
+        if command == "H":
+            x = numbers[0]
+        elif command == "V":
+            y = numbers[0]
+        elif command == "q":
+            x, y = x + numbers[2], y + numbers[3]
+        else:
+            x, y = numbers[-2:]
+        points.append((x, y))
+    return points
+
+
+def link(text: str, label: str = "", fault: bool = False) -> Link:
+    source, target = text.split(" → ")
+    a, b = source.split(".", 1), target.split(".", 1)
+    return Link((a[0], a[1]), (b[0], b[1]), label, fault)
+
+
+def draw(names: list[str], links: list[Link]) -> Diagram:
+    return Diagram(wiring_svg(dict.fromkeys(names, "X.fmu"), links, {}))
+
+
+GRASP = ["plant", "sensor_1", "sensor_2", "controller"]
+GRASP_WIRES = [
+    link(text)
+    for text in (
+        "plant.gap[1] → sensor_1.gap",
+        "plant.gap[2] → sensor_2.gap",
+        "plant.position[1] → controller.position[1]",
+        "plant.position[2] → controller.position[2]",
+        "plant.velocity[1] → controller.velocity[1]",
+        "plant.velocity[2] → controller.velocity[2]",
+        "sensor_1.intensity → controller.intensity[1]",
+        "sensor_2.intensity → controller.intensity[2]",
+        "controller.force[1] → plant.force[1]",
+        "controller.force[2] → plant.force[2]",
+    )
+]
+
+
+def many(seed: int, components: int, wires: int) -> tuple[list[str], list[Link]]:
+    numbers = random.Random(seed)
+    names = [f"c{k}" for k in range(components)]
+    pairs = [(numbers.choice(names), numbers.choice(names)) for _ in range(wires)]
+    return names, [Link((a, f"y{k % 3}"), (b, f"u{k}")) for k, (a, b) in enumerate(pairs)]
+
+
+CASES = {
+    "grasp": (GRASP, GRASP_WIRES),
+    "ring of 64": (
+        [f"c{k}" for k in range(64)],
+        [Link((f"c{k}", "y"), (f"c{(k + 1) % 64}", "u")) for k in range(64)],
+    ),
+    "64 at random": many(1, 64, 100),
+    "12 at random": many(2, 12, 40),
+    "without wires": (["a", "b", "c"], []),
+    "nothing": ([], []),
+    "on itself": (["a"], [link("a.y → a.u")]),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_every_wire_leads_from_its_port_to_its_port(case: str) -> None:
+    names, links = CASES[case]
+    diagram = draw(names, links)
+    assert list(diagram.boxes) == names
+    assert sorted(diagram.wires) == sorted(w.name for w in links)
+    for w in links:
+        points = diagram.wires[w.name]
+        left, right = diagram.boxes[w.target[0]][0], diagram.boxes[w.source[0]][2]
+        start = right, diagram.ports[w.source[0], "output", w.source[1]]
+        end = left, diagram.ports[w.target[0], "input", w.target[1]]
+        assert points[0] == pytest.approx(start, abs=0.11)
+        assert points[-1] == pytest.approx(end, abs=0.11)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_boxes_stand_apart_and_inside(case: str) -> None:
+    diagram = draw(*CASES[case])
+    boxes = list(diagram.boxes.values())
+    for k, (left, top, right, bottom) in enumerate(boxes):
+        assert 0 < left < right < diagram.width
+        assert 0 < top < bottom < diagram.height
+        for a, b, c, d in boxes[:k]:
+            assert right < a or c < left or bottom < b or d < top
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_no_wire_runs_through_a_box(case: str) -> None:
+    diagram = draw(*CASES[case])
+    for name, points in diagram.wires.items():
+        for (x, y), (to_x, to_y) in itertools.pairwise(points):
+            assert 0 <= to_x <= diagram.width
+            assert 0 <= to_y <= diagram.height
+            if abs(x - to_x) > 1 and abs(y - to_y) > 1:
+                continue  # a bend between two columns
+            for left, top, right, bottom in diagram.boxes.values():
+                across = min(x, to_x) < right - 0.2 and max(x, to_x) > left + 0.2
+                down = min(y, to_y) < bottom - 0.2 and max(y, to_y) > top + 0.2
+                assert not (across and down), name
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_data_flow_to_the_right_and_feedback_below(case: str) -> None:
+    names, links = CASES[case]
+    diagram = draw(names, links)
+    lowest = max((box[3] for box in diagram.boxes.values()), default=0.0)
+    lanes = set()
+    for w in links:
+        points = diagram.wires[w.name]
+        if names.index(w.source[0]) < names.index(w.target[0]):
+            assert [x for x, _ in points] == sorted(x for x, _ in points)
+            assert "back" not in diagram.kinds[w.name]
+        else:
+            lane = max(y for _, y in points)
+            assert lane > lowest
+            lanes.add(lane)
+            assert "back" in diagram.kinds[w.name]
+            assert diagram.labels[w.name] == w.name
+    assert len(lanes) == sum("back" in kind for kind in diagram.kinds.values())
+
+
+def test_the_grasp_reads_from_the_plant_over_the_sensors_to_the_controller() -> None:
+    diagram = draw(GRASP, GRASP_WIRES)
+    left = {name: box[0] for name, box in diagram.boxes.items()}
+    top = {name: box[1] for name, box in diagram.boxes.items()}
+    assert left["plant"] < left["sensor_1"] == left["sensor_2"] < left["controller"]
+    assert top["sensor_1"] < top["sensor_2"]
+    assert diagram.width < 1184  # that of the page
+
+
+def test_labels_and_faults_stand_on_their_wires() -> None:
+    links = [link("a.y → b.u", "× 1000"), link("b.y → a.u", "noise", fault=True)]
+    diagram = draw(["a", "b"], links)
+    assert diagram.labels == {"a.y → b.u": "× 1000", "b.y → a.u": "b.y → a.u, noise"}
+    assert diagram.kinds == {"a.y → b.u": "wire", "b.y → a.u": "wire back fault"}
+
+
+def test_names_are_escaped_and_units_shown() -> None:
+    svg = wiring_svg(
+        {"<b>&": "x<y>.fmu"}, [Link(("<b>&", "<o>"), ("<b>&", "<i>"))], {"<b>&.<o>": "µ<"}
+    )
+    diagram = Diagram(svg)
+    assert list(diagram.boxes) == ["<b>&"]
+    assert ("<b>&", "output", "<o>") in diagram.ports
+    assert "µ&lt;" in svg
