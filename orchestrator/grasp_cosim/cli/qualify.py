@@ -56,7 +56,7 @@ def qualify(
     out: Path | None,
     as_json: bool,
 ) -> int:
-    r"""Find out whether CANDIDATE, an FMU, may take the place of COMPONENT.
+    """Find out whether CANDIDATE, an FMU, may take the place of COMPONENT.
 
     Compares the interfaces, then the closed loops with the original and with the candidate, signal
     by signal and metric by metric. Exit code 0: qualified; 1: not.
