@@ -1,73 +1,91 @@
 """One grasp of 3 s at 10 kHz: four FMU instances, every output recorded.
 
-Prints the real-time factor of whole runs and where a macro step's time goes. The lines below the
-first are ratios to the macro step, measured alternately with it.
+Prints the real-time factor of whole runs with both engines, and where a macro step's time goes in
+plain Python. The machine's noise is shown, not averaged away.
 """
 
 import statistics
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import replace
 
+import numpy as np
 from grasp_cosim import simulate
-from grasp_cosim.fmi.fmi2 import FmuInstance
+from grasp_cosim.fmi.instance import Call
+from grasp_cosim.fmi.load import load
 from grasp_cosim.grasp import grasp_system
-from grasp_cosim.master.fixed_step import Master
-from grasp_cosim.recording.result import Recorder
+from grasp_cosim.master.engine import Engine, has_numba, make_loop
+from grasp_cosim.master.loop import STEP
+from grasp_cosim.master.master import Master
 
 RUNS = 7
-STEPS = 500
-ROUNDS = 60
+STEPS = 50
+ROUNDS = 400
 
 
-def whole_runs() -> None:
+def whole_runs(engine: Engine) -> None:
     """Real-time factor of complete runs, recording included, loading not."""
     system = grasp_system()
-    factors = sorted(simulate(system).metrics["real_time_factor"] for _ in range(RUNS))
+    simulate(system, stop=0.01, engine=engine)  # compiles the loop
+    runs = [simulate(system, engine=engine).metrics for _ in range(RUNS)]
+    factors = sorted(run["real_time_factor"] for run in runs)
     print(
-        f"3 s at 10 kHz, {RUNS} runs: {factors[-1]:.2f} times real time at best, "
+        f"3 s at 10 kHz, {engine}, {RUNS} runs: {factors[-1]:.2f} times real time at best, "
         f"{statistics.median(factors):.2f} median, {factors[0]:.2f} at worst"
     )
 
 
 def parts() -> None:
-    """Share of a macro step taken by each component's calls, and by the recorder."""
+    """Print the share of a macro step that each component's calls take, at best."""
     system = grasp_system()
+    spent: dict[str, float] = {}
     with ExitStack() as stack:
-        instances = [
-            stack.enter_context(FmuInstance(c.name, c.interface)) for c in system.components
-        ]
-        master = Master(system, instances)
+        instances = [load(component) for component in system.components]
+        for instance in instances:
+            stack.callback(instance.close)
+        master = Master(system, instances, lambda *_: None, "python")
         master.initialise()
-        recorder = Recorder(master.plan, STEPS)
-        candidates: dict[str, Callable[[], object]] = {"macro step": lambda: master.advance(1)}
-        for link in master.plan.links:
-            for part, calls in (("send", link.send), ("receive", link.receive)):
-                candidates[f"{link.instance.name} {part}"] = _all(calls)
-            step = link.step[len(link.send)]
-            candidates[f"{link.instance.name} step"] = step
-        candidates["record a row"] = lambda: recorder(0)
-        times: dict[str, list[float]] = {name: [] for name in candidates}
-        for _ in range(ROUNDS):
-            for name, call in candidates.items():
-                times[name].append(_per_call(call))
-    macro = min(times["macro step"])
-    print(f"macro step without recording: {1e6 * macro:.1f} us at best")
-    for name, measured in times.items():
-        print(f"  {name:20s} {min(measured) / macro:6.1%}")
+        plan = master.plan
+        steps = {first for kind, first, *_ in plan.operations if kind == STEP}
+        calls = []
+        for i, (call, owner) in enumerate(zip(plan.calls, plan.owners, strict=True)):
+            name = "exchange" if owner is None else system.components[owner].name
+            calls.append(
+                Call(_timed(call.python, f"{name} {'step' if i in steps else 'values'}", spent))
+            )
+        run = make_loop(replace(plan, calls=tuple(calls)), "python")
+        rows = np.empty((STEPS, len(plan.values)))
+        rounds = []
+        for first in range(0, ROUNDS * STEPS, STEPS):
+            spent.update(dict.fromkeys(spent, 0.0))
+            start = time.perf_counter()
+            reached, _, status = run(rows, 0, first, first + STEPS, system.step_ns)
+            rounds.append({"macro step": time.perf_counter() - start, **spent})
+            if status:
+                raise RuntimeError(f"step {reached}: status {status}")
+    least = {name: min(times[name] for times in rounds) / STEPS for name in rounds[0]}
+    macro = least.pop("macro step")
+    print(f"macro step in plain Python without recording: {1e6 * macro:.1f} us at best")
+    for name, seconds in least.items():
+        print(f"  {name:20s} {seconds / macro:6.1%}")
 
 
-def _all(calls: tuple[Callable[[], int], ...]) -> Callable[[], object]:
-    return lambda: [call() for call in calls]
+def _timed(call: Callable[[], int], name: str, spent: dict[str, float]) -> Callable[[], int]:
+    """The call, with the time it takes added to what was spent under the name."""
+    spent[name] = 0.0
 
+    def timed() -> int:
+        start = time.perf_counter()
+        status = call()
+        spent[name] += time.perf_counter() - start
+        return status
 
-def _per_call(call: Callable[[], object]) -> float:
-    start = time.perf_counter()
-    for _ in range(STEPS // 10):
-        call()
-    return (time.perf_counter() - start) / (STEPS // 10)
+    return timed
 
 
 if __name__ == "__main__":
-    whole_runs()
+    if has_numba():
+        whole_runs("compiled")
+    whole_runs("python")
     parts()

@@ -6,6 +6,7 @@ in a step that then goes wrong: crash_at, exit_at, hang_at, error_at, discard_at
 step is done), early_at and terminate_at (the step ends there).
 """
 
+import ctypes
 import shutil
 import subprocess
 import tempfile
@@ -16,6 +17,7 @@ from pathlib import Path
 
 import fmpy
 import pytest
+from fmpy.fmi3 import FMU3Slave
 
 SOURCES = Path(__file__).parent / "fmi" / "native"
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
@@ -52,32 +54,47 @@ def build(
     version: str = "3.0",
     units: Mapping[str, str] | None = None,
     capabilities: Mapping[str, str] | None = None,
+    token: str = "{native}",
+    complete: bool = False,
 ) -> Path:
-    """The FMU name.fmu in folder; units by variable, capabilities as attributes (else CAPABLE)."""
+    """The FMU name.fmu in folder; units by variable, capabilities as attributes (else CAPABLE).
+
+    It loads with the right token only. With complete, it has the functions of FMI 3.0 for other
+    kinds of FMUs, too, without which FMPy does not load it.
+    """
     capabilities = CAPABLE if capabilities is None else capabilities
     describe = _description_2 if version == "2.0" else _description_3
     platform = fmpy.platform if version == "2.0" else fmpy.platform_tuple
     path = folder / f"{name}.fmu"
+    xml = describe(dict(units or {}), dict(capabilities)).replace("{native}", token)
     with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("modelDescription.xml", describe(dict(units or {}), dict(capabilities)))
+        archive.writestr("modelDescription.xml", xml)
         archive.writestr(
-            f"binaries/{platform}/native{fmpy.sharedLibraryExtension}", _library(version)
+            f"binaries/{platform}/native{fmpy.sharedLibraryExtension}", _library(version, complete)
         )
         archive.writestr("resources/", "")
     return path
 
 
 @lru_cache
-def _library(version: str) -> bytes:
-    headers = Path(fmpy.__file__).parent / "c-code"
+def _library(version: str, complete: bool) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
-        library = Path(folder, "native.so")
+        library, rest = Path(folder, "native.so"), Path(folder, "rest.c")
         source = SOURCES / f"fmi{version[0]}.c"
-        subprocess.run(
-            ["gcc", "-shared", "-fPIC", "-O2", f"-I{headers}", str(source), "-o", str(library)],
-            check=True,
-        )
+        _compile(library, source)
+        if complete:
+            has = ctypes.CDLL(str(library))
+            missing = [n for n in dir(FMU3Slave) if n[:4] == "fmi3" and not hasattr(has, n)]
+            rest.write_text("".join(f"int {n}(void) {{ return 3; }}\n" for n in missing), "utf-8")
+            library = library.with_name("complete.so")
+            _compile(library, source, rest)
         return library.read_bytes()
+
+
+def _compile(library: Path, *sources: Path) -> None:
+    headers = Path(fmpy.__file__).parent / "c-code"
+    command = ["gcc", "-shared", "-fPIC", "-O2", f"-I{headers}", *map(str, sources)]
+    subprocess.run([*command, "-o", str(library)], check=True)
 
 
 def _attributes(values: Mapping[str, str]) -> str:

@@ -6,40 +6,63 @@ import shutil
 from pathlib import Path
 
 import pytest
-from grasp_cosim import System, cli
+from grasp_cosim import System, cli, simulate
 from grasp_cosim.grasp import SYSTEM
+from grasp_cosim.ssp.write import write_ssp
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text("utf-8")
 COMMANDS = re.findall(r"^    \.venv/bin/(grasp-cosim .*?)(?:\s+#.*)?$", README, re.MULTILINE)
 EXAMPLES = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+TABLES = re.findall(r"```toml\n(.*?)```", README, re.DOTALL)
+
+
+@pytest.fixture(scope="session")
+def recorded(grasp: System, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a short run."""
+    folder = tmp_path_factory.mktemp("recorded")
+    result = simulate(grasp, step=1e-3, stop=0.1)
+    result.to_csv(folder / "signals.csv")
+    result.to_json(folder / "run.json")
+    return folder
+
+
+def _folder(path: Path) -> Path:
+    path.mkdir(exist_ok=True)
+    return path
 
 
 @pytest.fixture
-def checkout(tmp_path: Path, fmus: Path, grasp: System, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder like the repository: built FMUs, a vendor's FMU, a system of one's own."""
+def checkout(
+    tmp_path: Path, fmus: Path, grasp: System, recorded: Path, monkeypatch: pytest.MonkeyPatch
+) -> Path:
+    """A folder like the repository: built FMUs, a vendor's FMU, systems and a run of one's own."""
     (tmp_path / "orchestrator").symlink_to(ROOT / "orchestrator")
     shutil.copytree(fmus, tmp_path / "fmus/build")
     shutil.copy(fmus / "GripperPlant.fmu", tmp_path / "vendor.fmu")
     text = SYSTEM.read_text("utf-8").replace('fmu = "', 'fmu = "fmus/build/')
     (tmp_path / "my_system.toml").write_text(text, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    for command in ("run", "evaluate"):
-        monkeypatch.setattr(f"grasp_cosim.cli.{command}.grasp_system", lambda: grasp)
+    for module in ("frame", "evaluate"):
+        monkeypatch.setattr(f"grasp_cosim.cli.{module}.grasp_system", lambda: grasp)
+    write_ssp(grasp, tmp_path / "my_system.ssp")
+    for written in ("signals.csv", "run.json"):
+        shutil.copy(recorded / written, _folder(tmp_path / "results"))
     return tmp_path
 
 
 def test_there_is_something_to_try() -> None:
-    assert len(COMMANDS) == 9
+    assert len(COMMANDS) == 14
     assert len(EXAMPLES) == 1
 
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_command(checkout: Path, command: str) -> None:
     arguments = shlex.split(command)
-    if arguments[1] == "run":
+    if arguments[1] in ("run", "qualify"):
         arguments += ["--stop", "0.01"]
-    assert cli.main(arguments[1:]) == 0
+    touches = "--step-study" not in arguments  # in so short a time: nothing to judge
+    assert cli.main(arguments[1:]) == (0 if touches else 1)
 
 
 @pytest.mark.parametrize("example", EXAMPLES)
@@ -48,8 +71,28 @@ def test_example(checkout: Path, capsys: pytest.CaptureFixture[str], example: st
     exec(example.replace("stop=3.0", "stop=2.0"), {})
     out = capsys.readouterr().out
     assert out.startswith("[1.")
-    assert out.endswith("] m\n")
+    assert "] m\n0.2 (" in out
+    assert "sensor_2.reflectance = 0.5" in out
     assert (checkout / "results/signals.csv").is_file()
+
+
+def test_the_scenario_runs(checkout: Path) -> None:
+    """The events and faults of the README, appended to a system of one's own."""
+    (scenario,) = (table for table in TABLES if "[[events]]" in table)
+    path = checkout / "my_system.toml"
+    path.write_text(path.read_text("utf-8") + scenario, encoding="utf-8")
+    log = simulate(System.load(path), step=1e-3, stop=1.2).log
+    assert [line.partition(": ")[0] for line in log] == ["t = 0.5 s", "t = 0.5 s", "t = 1 s"]
+
+
+def test_the_keys_of_a_component_are_read(checkout: Path) -> None:
+    (keys,) = (table for table in TABLES if "[components.plant]" in table)
+    keys = keys.replace("GapRight", "gap[1]").replace("GapLeft", "gap[2]")
+    text = (checkout / "my_system.toml").read_text("utf-8")
+    own = re.sub(r"\[components\.plant\]\n.*?\n(?=\n)", lambda _: keys, text, flags=re.DOTALL)
+    (checkout / "my_system.toml").write_text(own, encoding="utf-8")
+    plant = System.load(checkout / "my_system.toml").component("plant", "test")
+    assert (plant.step_ns, plant.isolation, len(plant.rename)) == (1_000_000, "process", 2)
 
 
 def test_pictures_exist() -> None:

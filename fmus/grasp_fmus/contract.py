@@ -141,22 +141,24 @@ def packer(cls: type[Any], fields: list[Field]) -> Callable[[list[Any]], Any]:
             parts.append(items if f.size is None else f"({items},)")
             first += len(f.names)
     items = "".join(f"{part}, " for part in parts)
-    return _compiled(f"lambda v: new(cls, ({items}))", new=tuple.__new__, cls=cls)
+    return _compiled(f"(v): return new(cls, ({items}))", new=tuple.__new__, cls=cls)
 
 
 def unpacker(fields: list[Field]) -> Callable[[Any], list[Any]]:
     """A function from Outputs to the list of their scalars, compiled like packer()."""
-    outputs = [f for f in fields if f.causality == "output"]
-    items = [
-        f"y[{k}]" if f.size is None else f"y[{k}][{i}]"
-        for k, f in enumerate(outputs)
-        for i in range(len(f.names))
-    ]
-    return _compiled(f"lambda y: [{', '.join(items)}]")
+    parts: list[str] = []
+    items: list[str] = []
+    for f in fields:
+        if f.causality == "output":
+            own = [f"y{len(items) + i}, " for i in range(len(f.names))]
+            parts.append(own[0] if f.size is None else f"({''.join(own)}), ")
+            items += own
+    return _compiled(f"(y): ({''.join(parts)}) = y; return [{''.join(items)}]")
 
 
-def _compiled(expression: str, **names: Any) -> Callable[[Any], Any]:
-    function: Callable[[Any], Any] = eval(expression, names)  # noqa: S307 - written here, from the shape alone
+def _compiled(definition: str, **names: Any) -> Callable[[Any], Any]:
+    exec(f"def function{definition}", names)  # noqa: S102 - written here, from the shape alone
+    function: Callable[[Any], Any] = names["function"]
     return function
 
 

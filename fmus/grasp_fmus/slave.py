@@ -8,6 +8,7 @@ A call that is refused has no effect and leaves its reason in the log of the hos
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import wraps
 from math import inf, isclose, isfinite
 from typing import Any, Concatenate, NamedTuple, ParamSpec, TypeVar
@@ -57,9 +58,11 @@ class Message(NamedTuple):
     msg: str
 
 
-class Access(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Access:
     """How a list of value references is read or written; worked out once per list and phase."""
 
+    vrs: list[int]
     where: slice | None
     """None: not in a row."""
     outputs: bool
@@ -69,6 +72,9 @@ class Access(NamedTuple):
 
 Accesses = dict[tuple[int, ...], Access]
 """By the list of value references."""
+
+_NONE = Access([], None, False, False, False)
+"""How to read or write nothing, which is always allowed."""
 
 
 _P = ParamSpec("_P")
@@ -119,9 +125,12 @@ class Fmi2Slave(metaclass=Once):
         self._first_output = count(self._fields, "input")
         self._first_parameter = count(self._fields, "input", "output")
         self._outputs = slice(self._first_output, self._first_parameter)
-        self._pack = packer(self.block.Inputs, self._fields)
-        self._unpack = unpacker(self._fields)
-        self._step, self._evaluate = self.block.step, self.block.outputs
+        self._functions = (
+            self.block.step,
+            self.block.outputs,
+            packer(self.block.Inputs, self._fields),
+            unpacker(self._fields),
+        )
         self._params: Any = None
         self._inputs: Any = None  # None: something was set and the outputs are out of date
         self._state = self.block.initial_state(self.block.Params(), self.block.Inputs())
@@ -133,6 +142,8 @@ class Fmi2Slave(metaclass=Once):
         self._boolean_reads: Accesses = {}
         self._real_writes: Accesses = {}
         self._boolean_writes: Accesses = {}
+        # The last of each: the host nearly always asks for the same again
+        self._real_read = self._boolean_read = self._real_write = _NONE
 
     # The life cycle
 
@@ -172,11 +183,15 @@ class Fmi2Slave(metaclass=Once):
                 and -TIME_TOLERANCE <= current_time - self._time <= TIME_TOLERANCE
             ):
                 self._check_step(current_time, step_size)
-            if self._inputs is None:
-                self._read()
+            step, evaluate, pack, unpack = self._functions
+            params, inputs = self._params, self._inputs
+            if inputs is None:
+                if params is None:
+                    params = self._read_params()
+                self._inputs = inputs = pack(self._values)
             try:
-                state = self._step(self._params, self._state, self._inputs, step_size)
-                values = self._unpack(self._evaluate(self._params, state, self._inputs))
+                state = step(params, self._state, inputs, step_size)
+                values = unpack(evaluate(params, state, inputs))
             except ArithmeticError as error:
                 return self._discard(step_size, f"{type(error).__name__}: {error}")
             if not isfinite(sum(values)) and (text := self._not_finite(values)):
@@ -197,21 +212,29 @@ class Fmi2Slave(metaclass=Once):
     def get_real(self, vrs: list[int]) -> list[Any]:
         """Values of the given references."""
         try:
-            where, outputs, _, _ = self._real_reads.get(tuple(vrs)) or self._readable(vrs, float)
-            if self._inputs is None and outputs:
+            access = self._real_read
+            if vrs != access.vrs:
+                access = self._real_reads.get(tuple(vrs)) or self._readable(vrs, float)
+                self._real_read = access
+            if self._inputs is None and access.outputs:
                 self._refresh()
         except BaseException as error:
             raise self._reported(error) from None
+        where = access.where
         return self._values[where] if where else [self._values[vr] for vr in vrs]
 
     def get_boolean(self, vrs: list[int]) -> list[Any]:
         """Values of the given references."""
         try:
-            where, outputs, _, _ = self._boolean_reads.get(tuple(vrs)) or self._readable(vrs, bool)
-            if self._inputs is None and outputs:
+            access = self._boolean_read
+            if vrs != access.vrs:
+                access = self._boolean_reads.get(tuple(vrs)) or self._readable(vrs, bool)
+                self._boolean_read = access
+            if self._inputs is None and access.outputs:
                 self._refresh()
         except BaseException as error:
             raise self._reported(error) from None
+        where = access.where
         return self._values[where] if where else [self._values[vr] for vr in vrs]
 
     def get_integer(self, vrs: list[int]) -> list[Any]:
@@ -225,16 +248,18 @@ class Fmi2Slave(metaclass=Once):
     def set_real(self, vrs: list[int], values: list[Any]) -> None:
         """Set inputs or parameters, all or none; outputs follow when they are next asked for."""
         try:
-            access = self._real_writes.get(tuple(vrs)) or self._writable(vrs, float)
-            where, _, parameters, limited = access
-            if limited or not isfinite(sum(values)):
+            access = self._real_write
+            if vrs != access.vrs:
+                access = self._real_writes.get(tuple(vrs)) or self._writable(vrs, float)
+                self._real_write = access
+            if access.limited or not isfinite(sum(values)):
                 self._check_values(vrs, values)
         except BaseException as error:
             raise self._reported(error) from None
-        if parameters or not where:
+        if access.parameters or not access.where:
             self._store(vrs, values, access)
         else:
-            self._values[where] = values
+            self._values[access.where] = values
             self._inputs = None
 
     @_reported
@@ -337,6 +362,7 @@ class Fmi2Slave(metaclass=Once):
         stop = first + len(vrs)
         fields = [self._names[vr][0] for vr in vrs]
         access = Access(
+            list(vrs),
             slice(first, stop) if vrs == list(range(first, stop)) else None,
             any(f.causality == "output" for f in fields),
             any(f.causality == "parameter" for f in fields),
@@ -416,7 +442,8 @@ class Fmi2Slave(metaclass=Once):
         self._read()
         if self._phase < STEPPING:
             self._state = self.block.initial_state(self._params, self._inputs)
-        values = self._unpack(self._evaluate(self._params, self._state, self._inputs))
+        _, evaluate, _, unpack = self._functions
+        values = unpack(evaluate(self._params, self._state, self._inputs))
         if not isfinite(sum(values)) and (text := self._not_finite(values)):
             raise RefusalError(f"{text}: must be finite")
         self._values[self._outputs] = values
@@ -424,8 +451,13 @@ class Fmi2Slave(metaclass=Once):
     def _read(self) -> None:
         """Params and Inputs from the list of values."""
         if self._params is None:
-            try:
-                self._params = build_params(self.block, self._fields, self._values)
-            except ValueError as error:
-                raise RefusalError(str(error)) from error
-        self._inputs = self._pack(self._values)
+            self._read_params()
+        _, _, pack, _ = self._functions
+        self._inputs = pack(self._values)
+
+    def _read_params(self) -> Any:
+        try:
+            self._params = build_params(self.block, self._fields, self._values)
+        except ValueError as error:
+            raise RefusalError(str(error)) from error
+        return self._params

@@ -21,7 +21,7 @@ def command(
 ) -> Run:
     """Runs a command line in an empty folder; exit code, standard output, standard error."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("grasp_cosim.cli.run.grasp_system", lambda: grasp)
+    monkeypatch.setattr("grasp_cosim.cli.frame.grasp_system", lambda: grasp)
 
     def run(*arguments: str) -> tuple[int, str, str]:
         code = cli.main(list(arguments))

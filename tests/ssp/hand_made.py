@@ -173,7 +173,10 @@ def structure(
 
 
 def archive(
-    folder: Path, ssd: str, fmus: Mapping[str, bytes], files: Mapping[str, str] | None = None
+    folder: Path,
+    ssd: str,
+    fmus: Mapping[str, bytes],
+    files: Mapping[str, str | bytes] | None = None,
 ) -> Path:
     """The archive hand.ssp in a folder: its SSD, FMUs by name, further files by entry."""
     path = folder / "hand.ssp"

@@ -100,6 +100,10 @@ REFUSED = [
         structure(TOP, '<ssd:DefaultExperiment stopTime="-2"/>'),
         "stopTime = -2.0 s: must be a number greater than 0",
     ),
+    (
+        structure(TOP).replace('factor="0.001"', 'factor="0"'),
+        "unit 'mm': factor = 0, offset = 0: must be finite, and the factor other than 0",
+    ),
     (structure(TOP, ""), "no stopTime in a DefaultExperiment; give one: --stop"),
     (
         structure(TOP, '<ssd:DefaultExperiment stopTime="0.00025"/>'),
@@ -251,6 +255,9 @@ def step_of(folder: Path, *steps: str, stop: str = "1") -> int:
 def test_the_step_is_the_smallest_of_the_fmus_that_divides_the_stop(tmp_path: Path) -> None:
     assert step_of(tmp_path, "0.01", "0.001", "") == 1_000_000
     assert step_of(tmp_path, "0.01", "0.0003") == 10_000_000
+    assert step_of(tmp_path, "0.01", "0.0003", stop="0.9") == 300_000
+    assert step_of(tmp_path, "-1", "1e-20", "0.5") == 500_000_000
+    assert step_of(tmp_path, "1.4e-9", "0.5") == 500_000_000  # no whole nanosecond
 
 
 def test_a_step_and_a_stop_can_be_given(tmp_path: Path) -> None:

@@ -213,7 +213,9 @@ def test_a_whole_number_that_ssp_does_not_hold_is_refused(tmp_path: Path) -> Non
     path = tmp_path / "wide.fmu"
     description = b"""<fmiModelDescription fmiVersion="3.0" modelName="w" instantiationToken="{}">
       <CoSimulation modelIdentifier="w"/><ModelVariables><Int64 name="n" valueReference="1"
-      causality="parameter" variability="fixed" start="1"/></ModelVariables><ModelStructure/>
+      causality="parameter" variability="fixed" start="1"/><Binary name="b" valueReference="2"
+      causality="output"/></ModelVariables><ModelStructure><Output valueReference="2"/>
+      </ModelStructure>
       </fmiModelDescription>"""
     with zipfile.ZipFile(path, "w") as file:
         file.writestr("modelDescription.xml", description)
@@ -223,6 +225,8 @@ def test_a_whole_number_that_ssp_does_not_hold_is_refused(tmp_path: Path) -> Non
         write_ssp(wide, tmp_path / "wide.ssp")
     narrow = wide.with_values({"c.n": 2**31 - 1})
     assert round_trip(narrow, tmp_path) == narrow
+    notes = write_ssp(narrow, tmp_path / "narrow.ssp").notes
+    assert notes[-1] == "c.b is of type Binary: it has no connector"
 
 
 def test_only_an_ssp_file_is_written(grasp: System, tmp_path: Path) -> None:

@@ -172,3 +172,23 @@ def test_a_late_curve_that_still_moves_at_the_end_is_inside() -> None:
     late = Curve(time, 5.0 * np.maximum(time - 0.002, 0.0))
     assert deviation(ramp, late, 0.002).values.max() == pytest.approx(0.0, abs=1e-12)
     assert deviation(ramp, late, 0.001).values.max() == pytest.approx(5.0 * 0.001)
+
+
+def test_every_second_sample_and_the_ends() -> None:
+    whole = sampled(np.arange(6.0))
+    assert whole.thinned(0).values.tolist() == [0.0, 2.0, 4.0, 5.0]
+    assert whole.thinned(1).values.tolist() == [0.0, 1.0, 3.0, 5.0]
+    assert sampled(np.arange(1.0)).thinned(1).values.tolist() == [0.0]
+
+
+def test_a_peak_between_samples_is_in_the_band_of_one_that_is_thinned() -> None:
+    """An impact that decays, sampled at another part of its step, has another highest sample."""
+    time = times(200)
+    for part in (0.1, 0.5, 0.9):
+        impacts = [
+            np.where(time < start, 0.0, np.exp(np.minimum((start - time) / 0.02, 0.0)))
+            for start in (0.1, 0.1 + part * STEP)
+        ]
+        one, other = (Curve(time, values) for values in impacts)
+        hidden = max(deviation(one, one.thinned(i), 3 * STEP).values.max() for i in (0, 1))
+        assert 0.0 < deviation(one, other, 3 * STEP).values.max() <= 2.0 * hidden

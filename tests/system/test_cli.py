@@ -35,8 +35,8 @@ def command(
 ) -> Run:
     """Runs a command line in an empty folder; exit code, standard output, standard error."""
     monkeypatch.chdir(tmp_path)
-    for command in ("run", "evaluate"):
-        monkeypatch.setattr(f"grasp_cosim.cli.{command}.grasp_system", lambda: grasp)
+    for module in ("frame", "evaluate"):
+        monkeypatch.setattr(f"grasp_cosim.cli.{module}.grasp_system", lambda: grasp)
 
     def run(*arguments: str) -> tuple[int, str, str]:
         code = cli.main(list(arguments))

@@ -99,7 +99,7 @@ def _draw_deviation(axes: Axes, q: Qualification, compared: Compared) -> None:
         axes.axhline(compared.band.width, color=BLUE, linestyle="--", linewidth=1.0)
     axes.set_ylim(bottom=0.0)
     axes.annotate(
-        f"{compared.ratio:.3g} × band",
+        f"{compared.ratio:.3g} × band" if isfinite(compared.ratio) else "no band",
         (0.98, 0.93),
         xycoords="axes fraction",
         ha="right",

@@ -253,7 +253,7 @@ class LoadedInstance(ABC):
 
 
 def as_reason(said: list[str]) -> str:
-    """Messages as the end of a one-line error; of a traceback only what it comes to."""
+    """Messages, each once, as the end of a one-line error; of a traceback what it comes to."""
     last = [text.strip().rpartition("\n")[2] if _TRACEBACK in text else text for text in said]
-    text = " ".join(" ".join(last).split())
+    text = " ".join(" ".join(dict.fromkeys(last)).split())
     return f": {_PYTHONFMU_PREFIX.sub('', text)}" if text else ""

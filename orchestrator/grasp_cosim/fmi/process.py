@@ -1,16 +1,20 @@
 """An instance whose FMU lives in a process of its own: it may crash there, or hang."""
 
+import os
 from collections.abc import Mapping, Sequence
 from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
 
-from ..errors import SimulationError
+from ..errors import InputError, SimulationError
 from ..system.interface import Interface, Value, Variable
 from .child import Child
 from .exchange import FETCH, STEP
 from .instance import EARLY, WARNING, Call
+
+POSIX = os.name == "posix"
+"""Elsewhere a process is not handed open files."""
 
 
 class ProcessInstance:
@@ -21,6 +25,10 @@ class ProcessInstance:
         self.name = name
         self.interface = interface
         self._fresh = False
+        if not POSIX:
+            raise InputError(
+                f"{name}: isolation = 'process' needs Linux or macOS; must be 'none' here"
+            )
         self._child = Child(name, interface.path.name)
         try:
             self._child.start("load", name, interface)

@@ -25,7 +25,6 @@ from ..recording.result import in_one_piece
 
 STRUCTURE = "SystemStructure.ssd"
 RESOURCES = "resources/"
-_DATE = (1980, 1, 1, 0, 0, 0)
 _MODE = 0o644 << 16
 _extracting = Lock()
 
@@ -85,7 +84,7 @@ def write_archive(path: Path, entries: Mapping[str, bytes]) -> None:
     """Write the entries in the order given; the same entries give the same bytes."""
     with in_one_piece(path) as part, zipfile.ZipFile(part, "w") as file:
         for name, data in entries.items():
-            info = zipfile.ZipInfo(name, _DATE)
+            info = zipfile.ZipInfo(name)  # of 1980, uncompressed: the same at any time
             info.external_attr = _MODE
             info.create_system = 3  # Unix, on any system
             file.writestr(info, data)

@@ -45,11 +45,13 @@ def parse(place: str, data: bytes, form: str) -> Any:
 
     InputError where it is not; place names the file.
     """
-    parser = etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True)
+    parser = etree.XMLParser(
+        resolve_entities=False, no_network=True, remove_comments=True, remove_pis=True
+    )
     try:
         root = etree.fromstring(data, parser)
     except etree.XMLSyntaxError as error:
-        raise InputError(f"{place}: not readable as XML: {error}") from error
+        raise InputError(f"{place}: not readable as XML: {error.msg}") from error
     if root.getroottree().docinfo.doctype:
         raise InputError(f"{place}: has a document type; SSP has none")
     return checked(place, root, form)

@@ -56,18 +56,13 @@ class Given:
     transformation: Any
 
 
-@dataclass(frozen=True, slots=True)
-class Settings:
-    """values by the path of the component and the FMU's name of the variable; what was not used."""
-
-    values: Mapping[Path, Mapping[str, Value]]
-    notes: tuple[str, ...]
-
-
 def read_settings(
     archive: Archive, file: str, network: Network, units: Mapping[str, Unit]
-) -> Settings:
-    """All values that the bindings give, the one that holds for each variable."""
+) -> tuple[dict[Path, dict[str, Value]], list[str]]:
+    """The value that holds for each variable that is given one; what was not used.
+
+    By the path of the component and the FMU's name of the variable.
+    """
     values: dict[Path, dict[str, Value]] = {}
     notes: list[str] = []
     for path, binding in _bindings(network):
@@ -81,7 +76,7 @@ def read_settings(
                     notes.append(f"{parameter.place}: {end} is connected to {source}; not used")
                 else:
                     values.setdefault(end.path, {})[end.name] = value
-    return Settings(values, tuple(notes))
+    return values, notes
 
 
 def _bindings(network: Network) -> Iterator[tuple[Path, Binding]]:
@@ -129,12 +124,12 @@ def _set(
 ) -> dict[str, Parameter]:
     if binding.source is None:
         place, root = file, checked(file, binding.inline, "ssv")
-        known = {**units, **read_units(root, "ssv")}
+        known = {**units, **read_units(place, root, "ssv")}
     else:
         entry = archive.resolve(binding.place, binding.source)
         place = f"{archive.place}: {entry}"
         root = parse(place, archive.read(entry), "ssv")
-        known = dict(read_units(root, "ssv"))
+        known = dict(read_units(place, root, "ssv"))
     parameters: dict[str, Parameter] = {}
     for element in children(root, "ssv:Parameters", "ssv:Parameter"):
         name = element.get("name")

@@ -11,6 +11,7 @@ here and said in the notes of the system.
 - An archive of ours has an annotation with all that, see annotation.py; then it holds.
 """
 
+import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
@@ -19,7 +20,7 @@ from typing import Any
 
 from ..errors import InputError, choices
 from ..system.description import System, in_nanoseconds
-from ..system.interface import read_interface
+from ..system.interface import Value, read_interface
 from ..system.parts import NANOSECONDS, Component, Initialisation, Port, Wire
 from .annotation import TYPE, Beside, Extras, read_extras
 from .archive import STRUCTURE, Archive
@@ -37,7 +38,7 @@ from .network import (
     read_network,
 )
 from .order import flow_order
-from .parameters import Settings, read_settings
+from .parameters import read_settings
 from .tree import ComponentElement, read_system
 from .units import read_units
 
@@ -47,7 +48,7 @@ def read_ssp(path: FilePath, step: float | None = None, stop: float | None = Non
     archive = Archive(path)
     file = f"{archive.place}: {STRUCTURE}"
     root = parse(file, archive.read(STRUCTURE), "ssd")
-    units = read_units(root, "ssd")
+    units = read_units(file, root, "ssd")
     top = read_system(file, child(root, "ssd:System"), units)
     parts = {p: _part(archive, element) for p, element in components_of(top)}
     if not parts:
@@ -56,10 +57,13 @@ def read_ssp(path: FilePath, step: float | None = None, stop: float | None = Non
     extras = _extras(file, root)
     names = _names(file, parts, extras)
     wires = tuple(_wires(network, names, extras))
-    settings = read_settings(archive, file, network, units)
-    components, kept = _components(network, names, settings, wires, extras)
+    values, notes = read_settings(archive, file, network, units)
+    given = [_component(names[p], part, values.get(p, {}), extras) for p, part in parts.items()]
+    components = tuple(_keep_starts(file, given, wires, notes))
+    if extras is None:
+        components = _in_order(components, wires, notes)
     stop_ns = _stop(file, root, stop)
-    step_ns, chosen = _step(file, parts.values(), stop_ns, step, extras)
+    step_ns = _step(file, parts.values(), stop_ns, step, extras, notes)
     return System(
         archive.place,
         components,
@@ -70,7 +74,7 @@ def read_ssp(path: FilePath, step: float | None = None, stop: float | None = Non
         extras.events if extras else (),
         extras.faults if extras else (),
         extras.initialisation if extras else Initialisation(),
-        (*_unused(archive, root), *_renamed(names), *settings.notes, *kept, *chosen),
+        (*_unused(archive, root), *_renamed(names), *notes),
     )
 
 
@@ -110,9 +114,7 @@ def _names(file: str, parts: Iterable[Path], extras: Extras | None) -> dict[Path
 def _wires(network: Network, names: Mapping[Path, str], extras: Extras | None) -> Iterator[Wire]:
     """The wires, in the order of the connections that reach the inputs."""
     for target in network.into:
-        if target.path not in network.parts:
-            continue
-        if network.output(target) is None:
+        if target.path not in network.parts or network.output(target) is None:
             continue
         hops = network.trace(target)
         carried = _carried(network, hops)
@@ -169,38 +171,49 @@ def _new_names(component: str, extras: Extras | None) -> dict[str, str]:
     return {own: new for new, own in rename.items()}
 
 
-def _components(
-    network: Network,
-    names: Mapping[Path, str],
-    settings: Settings,
-    wires: Iterable[Wire],
-    extras: Extras | None,
-) -> tuple[tuple[Component, ...], list[str]]:
-    """The components in the order of execution; what was decided about them."""
+def _component(
+    name: str, part: Part, values: Mapping[str, Value], extras: Extras | None
+) -> Component:
+    """The component with the values it is given, under the system's names."""
+    new = _new_names(name, extras)
+    beside = extras.components[name] if extras else Beside({}, None, "none")
+    return Component(
+        name,
+        part.interface.path,
+        {new.get(own, own): value for own, value in values.items()},
+        beside.rename,
+        beside.step_ns,
+        beside.isolation,
+    )
+
+
+def _keep_starts(
+    file: str, components: Iterable[Component], wires: Iterable[Wire], notes: list[str]
+) -> Iterator[Component]:
+    """The components, with the start values of inputs that are not connected as values."""
     wired = {wire.target for wire in wires}
-    components, notes = {}, []
-    for path, part in network.parts.items():
-        name = names[path]
-        new = _new_names(name, extras)
-        values = {new.get(k, k): v for k, v in settings.values.get(path, {}).items()}
-        beside = extras.components[name] if extras else Beside({}, None, "none")
-        component = Component(
-            name, part.interface.path, values, beside.rename, beside.step_ns, beside.isolation
-        )
+    for component in components:
+        starts: dict[str, Value] = {}
         for variable in component.interface.of("input"):
-            port, start = Port(name, variable.name), variable.start
-            given = port in wired or variable.name in values
+            port, start = Port(component.name, variable.name), variable.start
+            given = port in wired or variable.name in component.values
             if variable.supported and not given and start is not None:
-                values[variable.name] = component.interface.parse(
-                    f"{part.element.place}: start", variable.name, start, text=True
+                place = f"{file}: start value of {port}"
+                starts[variable.name] = component.interface.parse(
+                    place, variable.name, start, text=True
                 )
                 notes.append(f"input {port} is not connected; keeps its start value {start}")
-        components[name] = replace(component, values=values)
-    if extras:
-        return tuple(components.values()), notes
-    order = flow_order(tuple(components), [(w.source.component, w.target.component) for w in wires])
+        yield replace(component, values={**component.values, **starts})
+
+
+def _in_order(
+    components: tuple[Component, ...], wires: Iterable[Wire], notes: list[str]
+) -> tuple[Component, ...]:
+    """The components along the flow of the data."""
+    known = {component.name: component for component in components}
+    order = flow_order(tuple(known), [(w.source.component, w.target.component) for w in wires])
     notes.append(f"order of execution: {', '.join(order)}")
-    return tuple(components[name] for name in order), notes
+    return tuple(known[name] for name in order)
 
 
 def _stop(file: str, root: Any, given: float | None) -> int:
@@ -220,24 +233,31 @@ def _stop(file: str, root: Any, given: float | None) -> int:
 
 
 def _step(
-    file: str, parts: Iterable[Part], stop_ns: int, given: float | None, extras: Extras | None
-) -> tuple[int, list[str]]:
-    """The step in ns; what was decided about it."""
+    file: str,
+    parts: Iterable[Part],
+    stop_ns: int,
+    given: float | None,
+    extras: Extras | None,
+    notes: list[str],
+) -> int:
+    """The step in ns: given, or ours, or the smallest of the FMUs that divides the stop."""
     if given is not None:
-        return in_nanoseconds("step", given), []
+        return in_nanoseconds("step", given)
     if extras:
-        return extras.step_ns, []
-    declared_steps = [part.declared.step for part in parts if part.declared.step]
-    steps = [round(step * NANOSECONDS) for step in declared_steps]
-    fitting = [step for step in steps if step and stop_ns % step == 0]
-    if not fitting:
-        listed = choices(f"{step:g} s" for step in sorted(set(declared_steps)))
-        raise InputError(
-            f"{file}: names no step, as SSP has none, and of those of its FMUs ({listed}) none "
-            f"divides the stop of {stop_ns / NANOSECONDS:g} s; give one: --step"
-        )
-    step = min(fitting)
-    return step, [f"step = {step / NANOSECONDS:g} s, the smallest that its FMUs name; SSP has none"]
+        return extras.step_ns
+    declared_steps = sorted({part.declared.step for part in parts if part.declared.step})
+    for step in declared_steps:
+        if not 0.0 < step * NANOSECONDS <= stop_ns:
+            continue
+        step_ns = round(step * NANOSECONDS)
+        if step_ns and stop_ns % step_ns == 0 and math.isclose(step_ns / NANOSECONDS, step):
+            notes.append(f"step = {step:g} s, the smallest that its FMUs name; SSP has none")
+            return step_ns
+    listed = choices(f"{step:g} s" for step in declared_steps)
+    raise InputError(
+        f"{file}: names no step, as SSP has none, and of those of its FMUs ({listed}) none "
+        f"divides the stop of {stop_ns / NANOSECONDS:g} s; give one: --step"
+    )
 
 
 def _unused(archive: Archive, root: Any) -> Iterator[str]:

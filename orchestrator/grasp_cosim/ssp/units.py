@@ -1,17 +1,19 @@
 """Units in SSP: read from and written to an element Units, and converted into each other."""
 
+import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 from ..errors import InputError
 from ..system.units import BASE, Unit, conversion
-from .document import add, child, children
+from .document import add, at, child, children
 
 
-def read_units(parent: Any, prefix: str) -> Mapping[str, Unit]:
-    """The units below an element of the format with that prefix."""
+def read_units(file: str, parent: Any, prefix: str) -> Mapping[str, Unit]:
+    """The units below an element of the format with that prefix; file is for error messages."""
     return {
-        unit.get("name"): _unit(unit) for unit in children(parent, f"{prefix}:Units", "ssc:Unit")
+        unit.get("name"): _unit(file, unit)
+        for unit in children(parent, f"{prefix}:Units", "ssc:Unit")
     }
 
 
@@ -50,11 +52,13 @@ def change(place: str, source: Unit, target: Unit) -> tuple[float, float]:
     return found
 
 
-def _unit(element: Any) -> Unit:
+def _unit(file: str, element: Any) -> Unit:
     base = child(element, "ssc:BaseUnit")
-    return Unit(
-        element.get("name"),
-        tuple(int(base.get(name, "0")) for name in BASE),
-        float(base.get("factor", "1")),
-        float(base.get("offset", "0")),
-    )
+    factor, offset = float(base.get("factor", "1")), float(base.get("offset", "0"))
+    if not factor or not math.isfinite(factor) or not math.isfinite(offset):
+        raise InputError(
+            f"{at(file, base)}: unit {element.get('name')!r}: factor = {factor:g}, "
+            f"offset = {offset:g}: must be finite, and the factor other than 0"
+        )
+    exponents = tuple(int(base.get(name, "0")) for name in BASE)
+    return Unit(element.get("name"), exponents, factor, offset)

@@ -64,6 +64,11 @@ def _notes(system: System) -> Iterable[str]:
     own = [c.name for c in system.components if c.step_ns is not None]
     if own:
         yield f"only in the annotation: steps of {', '.join(own)}"
+    for component in system.components:
+        for variable in read_interface(component.fmu).of(*_CAUSALITIES):
+            if not variable.supported:
+                port = Port(component.name, variable.name)
+                yield f"{port} is of type {variable.nature}: it has no connector"
     for parts, what in ((system.events, "events"), (system.faults, "faults")):
         if parts:
             yield f"only in the annotation: {len(parts)} {what}"

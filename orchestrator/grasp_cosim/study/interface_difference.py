@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 from ..errors import choices
 from ..system.description import System
-from ..system.interface import Value
+from ..system.interface import SUPPORTED, Value
 from ..system.parts import NANOSECONDS, Port
 from .unit_conversion import IDENTITY, Conversion, Units, conversion
 
@@ -183,6 +183,8 @@ def _missing(old: Described, use: Use, theirs: Iterable[Described]) -> Differenc
 
 def _extra(new: Described, use: Use, given: Mapping[str, Value]) -> Difference:
     name, causality = new["name"], new["causality"]
+    if causality == "input" and not _supported(new):
+        return Difference("notes", "extra", name, "new input that keeps its start value")
     if causality == "input" and name not in given:
         text = f"new input without a source; give it a value: --set '{use.component}.{name}=VALUE'"
         return Difference("blocks", "extra", name, text)
@@ -341,6 +343,11 @@ def family(type_: str) -> str:
 def settable(variable: Described) -> bool:
     """Whether it can be given a value."""
     return variable["causality"] in ("input", "parameter", "structuralParameter")
+
+
+def _supported(variable: Described) -> bool:
+    """Whether the master can set it; it leaves other inputs alone."""
+    return family(variable["type"]) in SUPPORTED and not variable["dimensions"]
 
 
 def _flags(report: Mapping[str, Any]) -> dict[str, Any]:

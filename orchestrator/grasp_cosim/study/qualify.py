@@ -130,9 +130,10 @@ def qualify(
     original = _curves(reference)
     _check(bands, original)
     result, failure = _attempt(swap.swapped, progress)
-    again, numerics = (
-        _other_numerics(swap.system, progress) if _derives(bands, original) else ((), ())
-    )
+    again: tuple[Curves, ...] = ()
+    numerics: tuple[str, ...] = ()
+    if _derives(bands, original):
+        again, numerics = _other_numerics(swap.system, original, progress)
     candidate_curves = _converted(_curves(result), swap) if result else {}
     judge = _Judge(swap, bands, reference.units, original, again)
     return Qualification(
@@ -172,10 +173,15 @@ def _derives(bands: Bands, original: Curves) -> bool:
     return not all(entry and entry.wide for entry in given)
 
 
-def _other_numerics(system: System, progress: bool) -> tuple[tuple[Curves, ...], tuple[str, ...]]:
-    """The original with twice the step and in the other scheme, as far as it runs so."""
-    runs: list[Curves] = []
-    said: list[str] = []
+def _other_numerics(
+    system: System, original: Curves, progress: bool
+) -> tuple[tuple[Curves, ...], tuple[str, ...]]:
+    """The original with twice the step and in the other scheme, as far as it runs so, and thinned.
+
+    And what they are, in words.
+    """
+    runs: list[Curves] = [{n: c.thinned(first) for n, c in original.items()} for first in (0, 1)]
+    said = ["every second sample"]
     for name, other in _variants(system):
         try:
             runs.append(_curves(_run(other, progress)))

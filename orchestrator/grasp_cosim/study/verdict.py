@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from math import inf, isfinite
 from typing import Any
 
+from ..errors import choices
 from ..system.parts import NANOSECONDS
 from .interface_difference import SEVERITIES, Difference
 from .qualify import Compared, Qualification
@@ -30,6 +31,8 @@ def as_text(q: Qualification) -> str:
     parts.append("\n".join(_differences(q.swap.differences)))
     if q.signals:
         parts.append("\n".join(_basis(q)))
+    elif q.failure:
+        parts.append(f"whether this machine loads it: grasp-cosim doctor {q.swap.candidate}")
     return "\n\n".join(parts)
 
 
@@ -70,9 +73,8 @@ def as_bands(q: Qualification) -> str:
 def reason(q: Qualification) -> str:
     """Why the verdict is what it is, in one line."""
     if q.blocks:
-        first = q.blocks[0]
-        more = f", and {len(q.blocks) - 1} more" if len(q.blocks) > 1 else ""
-        return f"not run, the interface does not fit: {first.variable}: {first.text}{more}"
+        names = choices((d.variable for d in q.blocks), FEW)
+        return f"not run, the interface does not fit: {names}"
     if q.failure:
         return f"the candidate failed: {q.failure}"
     counts = [

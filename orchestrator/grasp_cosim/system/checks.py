@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError, choices
@@ -12,6 +13,21 @@ from .units import conversion
 
 if TYPE_CHECKING:
     from .description import System
+
+
+def check_components(system: System) -> None:
+    """InputError where an FMU that a process can have once is in it twice."""
+    first: dict[Path, str] = {}
+    for component in system.components:
+        interface = component.interface
+        if interface.once_per_process and component.isolation == "none":
+            other = first.setdefault(interface.path, component.name)
+            if other != component.name:
+                raise InputError(
+                    f"{system.name}: {component.name} and {other} are both {interface.path.name}, "
+                    'of which a process can have one only; must have isolation = "process" but '
+                    "for one"
+                )
 
 
 def check_wires(system: System) -> None:
@@ -85,7 +101,7 @@ def remarks(system: System) -> tuple[str, ...]:
     for wire in system.wires:
         source, target = (_end(system, wire, causality) for causality in ("output", "input"))
         arrow = f"{wire.source} -> {wire.target}"
-        if target.type == "Float32" and source.type != "Float32":
+        if target.type == "Float32" and source.type in ("Real", "Float64"):
             lines.append(f"{arrow}: from {source.type} to Float32, rounded to 7 digits")
         if target.kind == "Real" and wire.factor is None and wire.offset is None:
             missing = [

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from ..errors import InputError, choices
-from .checks import check_initialisation, check_steps, check_wires
+from .checks import check_components, check_initialisation, check_steps, check_wires
 from .interface import Value
 from .parts import NANOSECONDS, Component, Event, Fault, Initialisation, Wire
 from .scenario_checks import check_scenario
@@ -41,6 +41,7 @@ class System:
         for component in self.components:
             for name, value in component.values.items():
                 component.interface.parse(f"{self.name}: {component.name}.{name}", name, value)
+        check_components(self)
         check_wires(self)
         check_scenario(self)
         check_initialisation(self)

@@ -93,6 +93,8 @@ class Interface:
     """Whether it was made with pythonfmu: its binary calls Python, and keeps the GIL."""
     early_return: bool = False
     """Whether a step may end early, FMI 3.0."""
+    once_per_process: bool = False
+    """Whether a process can have one instance of it only."""
 
     @cached_property
     def by_name(self) -> dict[str, Variable]:
@@ -204,6 +206,7 @@ def _read(path: Path, modified: int) -> Interface:
         model.coSimulation.canHandleVariableCommunicationStepSize,
         "resources/slavemodule.txt" in files,
         model.coSimulation.mightReturnEarlyFromDoStep,
+        model.coSimulation.canBeInstantiatedOnlyOncePerProcess,
     )
 
 

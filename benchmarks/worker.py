@@ -1,0 +1,226 @@
+"""One master in a process of its own; started by masters.py, with that master's interpreter.
+
+    worker.py MASTER FOLDER
+
+runs the grasp with the FMUs of FOLDER. It answers every number of macro steps on standard input
+with the time they took, in s, and an empty line with the value of plant.position[1] reached.
+Masters are in processes of their own because their C++ libraries and their pins of FMPy collide.
+
+Every master runs the Jacobi scheme, the one they share, and records every output its own way.
+"""
+
+import importlib
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+STEP = 1e-4
+"""The communication step, in s."""
+
+LONG = 1000.0
+"""s of simulated time that no measurement reaches."""
+
+COMPONENTS = {
+    "plant": "GripperPlant",
+    "sensor_1": "ProximitySensor",
+    "sensor_2": "ProximitySensor",
+    "controller": "GraspController",
+}
+WIRES = (
+    ("plant", "gap[1]", "sensor_1", "gap"),
+    ("plant", "gap[2]", "sensor_2", "gap"),
+    ("plant", "position[1]", "controller", "position[1]"),
+    ("plant", "position[2]", "controller", "position[2]"),
+    ("plant", "velocity[1]", "controller", "velocity[1]"),
+    ("plant", "velocity[2]", "controller", "velocity[2]"),
+    ("sensor_1", "intensity", "controller", "intensity[1]"),
+    ("sensor_2", "intensity", "controller", "intensity[2]"),
+    ("controller", "force[1]", "plant", "force[1]"),
+    ("controller", "force[2]", "plant", "force[2]"),
+)
+
+
+class Master(NamedTuple):
+    """A master that is ready to step."""
+
+    advance: Callable[[int], object]
+    """Does so many macro steps, recording included."""
+    position: Callable[[], float]
+    """plant.position[1] as reached, in m."""
+
+
+def variables(folder: Path) -> dict[str, list[Any]]:
+    """The outputs of each component, as FMPy reads them."""
+    fmpy = importlib.import_module("fmpy")
+    return {
+        name: [
+            v
+            for v in fmpy.read_model_description(folder / f"{fmu}.fmu").modelVariables
+            if v.causality == "output"
+        ]
+        for name, fmu in COMPONENTS.items()
+    }
+
+
+def ours(folder: Path, engine: str) -> Master:
+    """grasp-cosim; every output in memory."""
+    grasp_cosim = importlib.import_module("grasp_cosim")
+    grasp = importlib.import_module("grasp_cosim.grasp")
+    session = grasp_cosim.simulate.session(
+        grasp_cosim.System.load(grasp.SYSTEM, folder),
+        step=STEP,
+        stop=LONG,
+        scheme="jacobi",
+        engine=engine,
+    )
+    return Master(session.step, lambda: session["plant.position[1]"])
+
+
+def ecospy(folder: Path) -> Master:
+    """ecospy; every output by its CSV writer, the only recording it has."""
+    ecos = importlib.import_module("ecospy")
+    structure = ecos.EcosSimulationStructure()
+    for name, fmu in COMPONENTS.items():
+        structure.add_model(name, str(folder / f"{fmu}.fmu"))
+    for source, output, target, given in WIRES:
+        structure.make_real_connection(f"{source}::{output}", f"{target}::{given}")
+    simulation = ecos.EcosSimulation(structure=structure, step_size=STEP)
+    table = os.path.join(tempfile.mkdtemp(dir=os.environ["TMPDIR"]), "ecospy.csv")  # noqa: PTH118
+    names = [f"{name}::{v.name}" for name, outputs in variables(folder).items() for v in outputs]
+    simulation.add_csv_writer(table, identifiers=names)
+    if not simulation.init():
+        raise RuntimeError(ecos.EcosLib.get_last_error())
+    return Master(simulation.step, lambda: float(simulation.get_real("plant::position[1]")))
+
+
+def libcosimpy(folder: Path) -> Master:
+    """libcosimpy; every real output by its time series observer, in memory. It has no Booleans."""
+    logging = importlib.import_module("libcosimpy.CosimLogging")
+    logging.log_output_level(logging.CosimLogLevel.WARNING)
+    part = {
+        name: getattr(importlib.import_module(f"libcosimpy.{name}"), name)
+        for name in ("CosimExecution", "CosimObserver")
+    }
+    slave = importlib.import_module("libcosimpy.CosimSlave").CosimLocalSlave
+    real = importlib.import_module("libcosimpy.CosimEnums").CosimVariableType.REAL
+    read = importlib.import_module("fmpy").read_model_description
+    execution = part["CosimExecution"].from_step_size(round(STEP * 1e9))
+    files = {name: str(folder / f"{fmu}.fmu") for name, fmu in COMPONENTS.items()}
+    index = {name: execution.add_local_slave(slave(file, name)) for name, file in files.items()}
+    references = {
+        name: {v.name: v.valueReference for v in read(file).modelVariables}
+        for name, file in files.items()
+    }
+    for source, output, target, given in WIRES:
+        execution.connect_real_variables(
+            *(index[source], references[source][output]),
+            *(index[target], references[target][given]),
+        )
+    observer = part["CosimObserver"].create_time_series()
+    execution.add_observer(observer)
+    for name, outputs in variables(folder).items():
+        for v in outputs:
+            if v.type == "Real":
+                observer.start_time_series(index[name], v.valueReference, real)
+    last = part["CosimObserver"].create_last_value()
+    watched = references["plant"]["position[1]"]
+
+    def position() -> float:
+        """From an observer of its own, so that it costs nothing before."""
+        execution.add_observer(last)
+        execution.step(1)
+        return float(last.last_real_values(index["plant"], [watched])[0])
+
+    return Master(execution.step, position)
+
+
+def cofmupy(folder: Path) -> Master:
+    """cofmupy; every real output in its results in memory.
+
+    It reads Booleans with fmi2GetReal, which an FMU may refuse and ours do: the Boolean outputs
+    are taken out of the descriptions it read. That is less work, not more.
+    """
+    wrappers: Any = importlib.import_module("cofmupy.wrappers")
+    read = wrappers.read_model_description
+
+    def without_boolean_outputs(path: str) -> Any:
+        description = read(path)
+        description.modelVariables = [
+            v
+            for v in description.modelVariables
+            if not (v.causality == "output" and v.type == "Boolean")
+        ]
+        return description
+
+    wrappers.read_model_description = without_boolean_outputs
+    coordinator = importlib.import_module("cofmupy").Coordinator()
+    starts = {
+        name: {
+            v.name: float(v.start)
+            for v in read(str(folder / f"{fmu}.fmu")).modelVariables
+            if v.causality == "input"
+        }
+        for name, fmu in COMPONENTS.items()
+    }
+    coordinator.start(
+        {
+            "root": "",
+            "cosim_method": "jacobi",
+            "iterative": False,
+            "fmus": [
+                {
+                    "id": name,
+                    "path": str(folder / f"{fmu}.fmu"),
+                    "name": name,
+                    "initialization": starts[name],
+                }
+                for name, fmu in COMPONENTS.items()
+            ],
+            "connections": [
+                {
+                    "source": {"id": source, "variable": output},
+                    "target": {"id": target, "variable": given},
+                }
+                for source, output, target, given in WIRES
+            ],
+        }
+    )
+
+    def advance(steps: int) -> None:
+        for _ in range(steps):
+            coordinator.do_step(STEP)
+
+    return Master(advance, lambda: float(coordinator.get_variable(("plant", "position[1]"))[0]))
+
+
+MASTERS: dict[str, Callable[[Path], Master]] = {
+    "grasp-cosim compiled": lambda folder: ours(folder, "compiled"),
+    "grasp-cosim python": lambda folder: ours(folder, "python"),
+    "ecospy": ecospy,
+    "libcosimpy": libcosimpy,
+    "cofmupy": cofmupy,
+}
+
+
+def main() -> None:
+    """Answer on the standard output as it was; what a master prints goes to standard error."""
+    answers = os.fdopen(os.dup(1), "w", buffering=1)
+    os.dup2(2, 1)
+    master = MASTERS[sys.argv[1]](Path(sys.argv[2]))
+    master.advance(1)
+    print("ready", file=answers)
+    for line in sys.stdin:
+        if not line.strip():
+            print(master.position(), file=answers)
+            continue
+        start = time.perf_counter()
+        master.advance(int(line))
+        print(time.perf_counter() - start, file=answers)
+
+
+if __name__ == "__main__":
+    main()

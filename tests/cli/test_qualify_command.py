@@ -1,0 +1,151 @@
+"""qualify: what it prints and writes, its exit codes, its mistakes in one line."""
+
+import json
+import re
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from conftest import Altered
+from grasp_cosim import System, cli
+from grasp_cosim.study.bands import read_bands
+
+Run = Callable[..., tuple[int, str, str]]
+
+BEFORE = "(1e-3, 1e3)] = (0.5, 0.5)"
+SHORT = ["--step", "1e-3", "--stop", "0.05", "--isolation", "none"]
+
+
+@pytest.fixture
+def qualify(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    grasp: System,
+    tmp_path: Path,
+) -> Run:
+    """Runs the command in an empty folder; exit code, standard output, standard error."""
+    folder = tmp_path / "here"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr("grasp_cosim.cli.frame.grasp_system", lambda: grasp)
+
+    def run(*arguments: str | Path) -> tuple[int, str, str]:
+        code = cli.main(["qualify", *map(str, arguments)])
+        out, err = capsys.readouterr()
+        return code, out, err
+
+    return run
+
+
+def test_a_copy_is_qualified(qualify: Run, fmus: Path) -> None:
+    code, out, err = qualify(fmus / "GripperPlant.fmu", "--as", "plant", *SHORT)
+    assert (code, err) == (0, "")
+    lines = out.splitlines()
+    assert lines[0] == (
+        "QUALIFIED: GripperPlant.fmu as plant (now GripperPlant.fmu), "
+        "0.05 s in steps of 1 ms, sequential"
+    )
+    assert re.fullmatch(r"0 of \d+ signals and 0 of 11 metrics out of band", lines[1])
+    assert "interface: no difference" in lines
+
+
+def test_all_that_it_writes(qualify: Run, altered: Altered) -> None:
+    heavy = altered(
+        "GripperPlant", "gripper_plant/rigid.py", BEFORE, BEFORE.replace("0.5)", "0.6)")
+    )
+    code, out, err = qualify(heavy, "--as", "plant", *SHORT, "--out", "results", "--json")
+    assert code == 1
+    report = json.loads(out)
+    assert report == json.loads(Path("results/qualification.json").read_text())
+    assert report["qualified"] is False
+    assert sorted(p.name for p in Path("results").iterdir()) == [
+        "bands.toml", "qualification.json", "qualification.png",
+    ]  # fmt: skip
+    assert Path("results/qualification.png").read_bytes().startswith(b"\x89PNG")
+    assert err == "drew results/qualification.png\n"
+    bands = read_bands(Path("results/bands.toml"))
+    assert set(bands.signals) == {s["name"] for s in report["signals"]}
+    assert set(bands.metrics) == {m["name"] for m in report["metrics"]}
+
+
+def test_a_table_puts_the_worst_first(qualify: Run, altered: Altered) -> None:
+    heavy = altered(
+        "GripperPlant", "gripper_plant/rigid.py", BEFORE, BEFORE.replace("0.5)", "0.6)")
+    )
+    code, out, _ = qualify(heavy, "--as", "plant", *SHORT)
+    assert code == 1
+    lines = out.splitlines()
+    assert lines[0].startswith("NOT QUALIFIED: ")
+    assert lines[3].split("  ")[0] == "x band"
+    ratios = [float(line.split()[0]) for line in lines[4:7]]
+    assert ratios == sorted(ratios, reverse=True)
+    assert ratios[0] > 1.0
+    assert "  warns   start        finger_mass[2]: starts with 0.6 kg instead of 0.5 kg" in lines
+
+
+def test_a_candidate_that_does_not_fit_is_not_run_nor_drawn(qualify: Run, fmus: Path) -> None:
+    code, out, _ = qualify(fmus / "ProximitySensor.fmu", "--as", "plant", "--out", "results")
+    assert code == 1
+    assert "not run, the interface does not fit: force[1], " in out
+    assert [p.name for p in Path("results").iterdir()] == ["qualification.json"]
+
+
+def test_bands_and_values_are_taken(qualify: Run, altered: Altered, tmp_path: Path) -> None:
+    heavy = altered(
+        "GripperPlant", "gripper_plant/rigid.py", BEFORE, BEFORE.replace("0.5)", "0.6)")
+    )
+    (tmp_path / "bands.toml").write_text('[signals]\n"*" = { absolute = inf }\n')
+    bands = ["--bands", tmp_path / "bands.toml"]
+    assert qualify(heavy, "--as", "plant", *SHORT, *bands)[0] == 0
+    same = ["--set", "plant.finger_mass[2]=0.5"]
+    code, out, _ = qualify(heavy, "--as", "plant", *SHORT, *same)
+    assert code == 0
+    assert "interface: no difference" in out
+
+
+def test_a_candidate_that_does_not_load_is_no_wrong_input(
+    qualify: Run, fmus: Path, tmp_path: Path
+) -> None:
+    bare = tmp_path / "bare.fmu"
+    with zipfile.ZipFile(fmus / "GripperPlant.fmu") as whole, zipfile.ZipFile(bare, "w") as file:
+        file.writestr("modelDescription.xml", whole.read("modelDescription.xml"))
+    code, out, _ = qualify(bare, "--as", "plant", *SHORT)
+    assert code == 1
+    lines = out.splitlines()
+    assert lines[1].startswith("the candidate failed: plant: ")
+    assert lines[-1] == f"whether this machine loads it: grasp-cosim doctor {bare}"
+
+
+WRONG = [
+    (["GripperPlant.fmu"], "Missing option '--as'"),
+    (["none.fmu", "--as", "plant"], "none.fmu: no such FMU file"),
+    (["GripperPlant.fmu", "--as", "hand"], "--as hand: no component 'hand'; valid: plant, se"),
+    (["GripperPlant.fmu", "--as", "plant", "--rename", "gap"], "VARIABLE=CANDIDATES_VARIABLE"),
+    (["GripperPlant.fmu", "--as", "plant", "--rename", "a=b"], "'a' = 'b': GripperPlant.fmu has"),
+    (["GripperPlant.fmu", "--as", "plant", "--set", "plant.x=1"], "no input or parameter 'x'"),
+    (["GripperPlant.fmu", "--as", "plant", "--bands", "no.toml"], "no.toml: no such file of bands"),
+    (["GripperPlant.fmu", "--as", "plant", "--step", "7e-4"], "does not divide stop = 3 s"),
+    (["GripperPlant.fmu", "--as", "plant", "--isolation", "full"], "is not one of 'none', 'pro"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "message"), WRONG)
+def test_wrong_input_is_one_line_and_exit_2(
+    qualify: Run, fmus: Path, arguments: list[str], message: str
+) -> None:
+    first, *more = arguments
+    code, out, err = qualify(fmus / first, *more, "--out", "results")
+    assert (code, out) == (2, "")
+    assert len(err.splitlines()) == 1
+    assert message in err
+    assert list(Path().iterdir()) == []
+
+
+def test_a_band_for_nothing_is_exit_2(qualify: Run, fmus: Path, tmp_path: Path) -> None:
+    (tmp_path / "bands.toml").write_text('[signals]\n"plant.gpa*" = { absolute = 1 }\n')
+    code, _, err = qualify(
+        fmus / "GripperPlant.fmu", "--as", "plant", *SHORT, "--bands", tmp_path / "bands.toml"
+    )
+    assert code == 2
+    assert "[signals]: nothing is called 'plant.gpa*'; valid: plant.position[1]" in err

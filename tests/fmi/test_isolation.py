@@ -1,0 +1,242 @@
+"""Components in a process of their own: what happens there stays there."""
+
+import gc
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fmi.instances import Bound, real, running
+from grasp_cosim import InputError, SimulationError, System, simulate
+from grasp_cosim.fmi import child, process
+from grasp_cosim.fmi.instance import OK
+from native_fmus import TYPES, build, needs_gcc
+
+pytestmark = needs_gcc
+versions = pytest.mark.parametrize("version", ["2.0", "3.0"])
+
+
+def workers() -> set[int]:
+    """The processes of components that this process has."""
+    found = set()
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            try:
+                line = (entry / "cmdline").read_bytes().split(b"\0")
+                parent = int((entry / "stat").read_text().rpartition(")")[2].split()[1])
+            except OSError:  # it ended meanwhile
+                continue
+            if b"grasp_cosim.fmi.worker" in line and parent == os.getpid():
+                found.add(int(entry.name))
+    return found
+
+
+def open_files() -> int:
+    """How many this process has, but for what it merely has not collected."""
+    gc.collect()
+    return len(list(Path("/proc/self/fd").iterdir()))
+
+
+def system_file(folder: Path, version: str, values: str, isolation: str = "process") -> Path:
+    """A native part that drives a second one, which fails as its values say."""
+    build(folder, version=version)
+    u, y = f"u_{real(version)}", f"y_{real(version)}"
+    starts = {"Boolean": "false", "String": "''", "Enumeration": "1"}
+    others = "".join(f", u_{t} = {starts.get(t, '0')}" for t in list(TYPES[version])[1:])
+    path = folder / "two.toml"
+    path.write_text(
+        f"""wires = ["first.{y} -> second.{u}"]
+[experiment]
+step = 0.1
+stop = 2.0
+[components.first]
+fmu = "native.fmu"
+values = {{ {u} = 1.5{others} }}
+[components.second]
+fmu = "native.fmu"
+isolation = "{isolation}"
+values = {{ gain = 1.0{others}{values} }}
+""",
+        encoding="utf-8",
+    )
+    return path
+
+
+@versions
+def test_a_run_has_the_bits_of_one_in_this_process(tmp_path: Path, version: str) -> None:
+    runs = [
+        simulate(System.load(system_file(tmp_path, version, "", isolation)))
+        for isolation in ("none", "process")
+    ]
+    assert set(runs[0]) == set(runs[1])
+    assert all((runs[0][name] == runs[1][name]).all() for name in runs[0])
+    assert runs[1]["second.x"][-1] == pytest.approx(3.0, rel=1e-13)
+
+
+@versions
+@pytest.mark.parametrize(
+    ("parameter", "how"), [("crash_at", "signal SIGSEGV"), ("exit_at", "exit code 7")]
+)
+def test_a_crash_ends_the_run_with_the_recording_kept(
+    tmp_path: Path, version: str, parameter: str, how: str
+) -> None:
+    system = System.load(system_file(tmp_path, version, f", {parameter} = 1.05"))
+    message = f"second: the process of native.fmu ended with {how} at t = 1 s"
+    with pytest.raises(SimulationError) as caught:
+        simulate(system)
+    assert str(caught.value) == message
+    result = caught.value.result
+    assert result is not None
+    assert not result.complete
+    assert result.time.tolist() == [k * 100_000_000 / 1e9 for k in range(11)]
+    assert result["second.x"][-1] == pytest.approx(1.5, rel=1e-13)
+    assert not workers()
+    assert any("Segmentation fault" in note for note in caught.value.__notes__) is (
+        parameter == "crash_at"
+    )
+
+
+@versions
+def test_a_hang_is_bounded(tmp_path: Path, version: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(child, "TIMEOUT", 0.5)
+    with running(tmp_path, version, "process", {"hang_at": 0.25}) as part:
+        bound = Bound(part, 0.2)
+        assert bound.step() == OK
+        bound.clock[0] = 0.2
+        message = (
+            r"^part: the process of native.fmu did not answer within 0.5 s and was ended "
+            r"at t = 0.2 s"
+        )
+        for _ in range(2):  # it stays lost
+            with pytest.raises(SimulationError, match=message):
+                bound.step()
+        assert str(part.failure(3, 0.2)).startswith("part: the process of native.fmu did not")
+        assert not workers()
+
+
+def test_a_crash_in_the_initialisation_is_a_wrong_input(tmp_path: Path) -> None:
+    with running(tmp_path, "3.0", "process") as part:
+        (pid,) = workers()
+        os.kill(pid, signal.SIGKILL)
+        with pytest.raises(InputError, match=r"^part: the process of .* signal SIGKILL at t = 0 s"):
+            part.enter_initialization({}, 1.0)
+
+
+def test_nothing_stays_behind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    files = open_files()
+    for values in ({}, {"crash_at": 0.1}):
+        with running(tmp_path, "3.0", "process", values) as part:
+            assert len(workers()) == 1
+            if values:
+                with pytest.raises(SimulationError):
+                    Bound(part, 0.2).step()
+        del part
+        assert not workers()
+        assert list(folder.iterdir()) == []
+    assert open_files() == files
+    assert capfd.readouterr() == ("", "")  # of what the FMU prints
+
+
+def test_without_posix_it_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(process, "POSIX", False)
+    with (
+        pytest.raises(InputError, match=r"^part: isolation = 'process' needs Linux or macOS"),
+        running(tmp_path, "3.0", "process"),
+    ):
+        pass
+
+
+def test_the_grasp_has_the_same_bits(grasp: System) -> None:
+    """Also with FMUs that are written in Python, each in a Python of its own."""
+    alone = tuple(replace(component, isolation="process") for component in grasp.components)
+    here = simulate(grasp, stop=0.01)
+    there = simulate(replace(grasp, components=alone), stop=0.01)
+    assert all((here[name] == there[name]).all() for name in here)
+
+
+def test_an_fmu_that_a_process_can_have_once(tmp_path: Path) -> None:
+    for isolation in ("process", "none"):
+        path = system_file(tmp_path, "2.0", "", isolation)
+        build(tmp_path, version="2.0", capabilities={"canBeInstantiatedOnlyOncePerProcess": "true"})
+        if isolation == "process":
+            assert simulate(System.load(path)).complete
+        else:
+            message = "second and first are both native.fmu, of which a process can have one only"
+            with pytest.raises(InputError, match=message):
+                System.load(path)
+
+
+def test_what_the_fmu_prints_does_not_get_into_json(tmp_path: Path) -> None:
+    path = system_file(tmp_path, "3.0", "").read_text("utf-8")
+    alone = path.replace("[components.first]", '[components.first]\nisolation = "process"')
+    (tmp_path / "two.toml").write_text(alone, encoding="utf-8")
+    ran = subprocess.run(
+        [sys.executable, "-m", "grasp_cosim", "run", str(tmp_path / "two.toml"), "--json"],
+        capture_output=True, text=True, check=True, timeout=120,
+    )  # fmt: skip
+    assert "instantiated" not in ran.stdout + ran.stderr
+    assert json.loads(ran.stdout)["complete"] is True
+
+
+def test_the_process_ends_when_the_masters_is_killed(tmp_path: Path) -> None:
+    """Even while its FMU hangs."""
+    fmu = build(tmp_path)
+    code = f"""
+import numpy as np
+from pathlib import Path
+from grasp_cosim.fmi.load import load
+from grasp_cosim.system.parts import Component
+part = load(Component("part", Path({str(fmu)!r}), {{}}, isolation="process"))
+part.enter_initialization({{"hang_at": 0.1}}, 1.0)
+part.exit_initialization()
+print(part._child._process.pid, flush=True)
+part.stepper(np.zeros(2), 0.2).python()
+"""
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE) as master:
+        assert master.stdout is not None
+        worker = Path("/proc", master.stdout.readline().decode().strip())
+        assert worker.exists()
+        master.kill()
+    for _ in range(1000):
+        if not worker.exists() or "Z" in (worker / "stat").read_text().rpartition(")")[2][:3]:
+            return
+        time.sleep(0.01)
+    pytest.fail("the process of the component lives on")
+
+
+def test_values_that_are_pending_are_passed_on_in_order(tmp_path: Path) -> None:
+    """A value that is set one by one comes after what the loop has put before it."""
+    with running(tmp_path, "2.0", "process") as part:
+        bound = Bound(part, 0.1)
+        put, sent = bound.exchange("set", "u_Real")
+        fetch, got = bound.exchange("get", "y_Real")
+        sent[0] = 1.0
+        assert put() == OK
+        part.set([part.interface.by_name["u_Real"]], [2.0])
+        assert (fetch(), got.tolist()) == (OK, [2.0])
+        sent[0] = 3.0
+        assert (put(), fetch(), got.tolist()) == (OK, OK, [3.0])
+
+
+def test_many_more_values_than_a_page(tmp_path: Path) -> None:
+    """Rooms in the shared memory do not overlap."""
+    with running(tmp_path, "3.0", "process") as part:
+        bound = Bound(part, 0.1)
+        fetches = [bound.exchange("get", "now", "y_Float64") for _ in range(300)]
+        put, sent = bound.exchange("set", "u_Float64")
+        sent[0] = 5.0
+        assert (put(), bound.step()) == (OK, OK)
+        assert all(fetch() == OK for fetch, _ in fetches)
+        assert np.array([got for _, got in fetches]).tolist() == [[0.1, 5.0]] * 300

@@ -1,0 +1,61 @@
+"""Conversion between units."""
+
+import math
+
+import pytest
+from grasp_cosim.system.units import BASE, Unit, conversion
+from hypothesis import given
+from hypothesis import strategies as st
+
+exponents = st.tuples(*[st.integers(-4, 4)] * len(BASE))
+factors = st.floats(1e-9, 1e9) | st.floats(-1e9, -1e-9)
+offsets = st.floats(-1e3, 1e3)
+values = st.floats(-1e6, 1e6)
+LENGTH, FORCE, TEMPERATURE = (0, 1, *[0] * 6), (1, 1, -2, *[0] * 5), (*[0] * 4, 1, *[0] * 3)
+
+
+@given(exponents, factors, offsets, factors, offsets, values)
+def test_a_value_means_the_same_in_base_units(
+    powers: tuple[int, ...], a: float, b: float, c: float, d: float, value: float
+) -> None:
+    source, target = Unit("source", powers, a, b), Unit("target", powers, c, d)
+    found = conversion(source, target)
+    assert found is not None
+    factor, offset = found
+    before, after = a * value + b, c * (factor * value + offset) + d
+    rounding = 1e-12 * (abs(a * value) + abs(b) + abs(d))
+    assert math.isclose(before, after, rel_tol=1e-12, abs_tol=rounding)
+
+
+@given(exponents, factors, offsets)
+def test_a_unit_converts_to_itself_exactly(powers: tuple[int, ...], a: float, b: float) -> None:
+    assert conversion(Unit("one", powers, a, b), Unit("other", powers, a, b)) == (1.0, 0.0)
+
+
+@given(exponents, exponents, factors)
+def test_other_quantities_do_not_convert(
+    one: tuple[int, ...], other: tuple[int, ...], a: float
+) -> None:
+    found = conversion(Unit("one", one, a), Unit("other", other))
+    assert (found is None) is (one != other)
+
+
+@pytest.mark.parametrize(
+    ("source", "target", "value", "expected"),
+    [
+        (Unit("mm", LENGTH, 1e-3), Unit("m", LENGTH), 250.0, 0.25),
+        (Unit("m", LENGTH), Unit("mm", LENGTH, 1e-3), 0.25, 250.0),
+        (Unit("degC", TEMPERATURE, 1.0, 273.15), Unit("K", TEMPERATURE), 25.0, 298.15),
+        (
+            Unit("degF", TEMPERATURE, 5 / 9, 273.15 - 32 * 5 / 9),
+            Unit("degC", TEMPERATURE, 1.0, 273.15),
+            212.0,
+            100.0,
+        ),
+        (Unit("lbf", FORCE, 4.4482216152605), Unit("kN", FORCE, 1e3), 1000.0, 4.4482216152605),
+    ],
+)
+def test_known_values(source: Unit, target: Unit, value: float, expected: float) -> None:
+    found = conversion(source, target)
+    assert found is not None
+    assert found[0] * value + found[1] == pytest.approx(expected, rel=1e-13)
