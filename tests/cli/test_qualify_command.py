@@ -60,11 +60,11 @@ def test_all_that_it_writes(qualify: Run, altered: Altered) -> None:
     assert report == json.loads(Path("results/qualification.json").read_text())
     assert report["qualified"] is False
     assert sorted(p.name for p in Path("results").iterdir()) == [
-        "bands.toml", "qualification.json", "qualification.png",
+        "bands_used.toml", "qualification.json", "qualification.png",
     ]  # fmt: skip
     assert Path("results/qualification.png").read_bytes().startswith(b"\x89PNG")
     assert err == "drew results/qualification.png\n"
-    bands = read_bands(Path("results/bands.toml"))
+    bands = read_bands(Path("results/bands_used.toml"))
     assert set(bands.signals) == {s["name"] for s in report["signals"]}
     assert set(bands.metrics) == {m["name"] for m in report["metrics"]}
 
@@ -85,6 +85,7 @@ def test_a_table_puts_the_worst_first(qualify: Run, altered: Altered) -> None:
 
 
 def test_a_candidate_that_does_not_fit_is_not_run_nor_drawn(qualify: Run, fmus: Path) -> None:
+    qualify(fmus / "GripperPlant.fmu", "--as", "plant", *SHORT, "--out", "results")
     code, out, _ = qualify(fmus / "ProximitySensor.fmu", "--as", "plant", "--out", "results")
     assert code == 1
     assert "not run, the interface does not fit: force[1], " in out

@@ -202,3 +202,17 @@ def test_names_are_escaped_and_units_shown() -> None:
     assert list(diagram.boxes) == ["<b>&"]
     assert ("<b>&", "output", "<o>") in diagram.ports
     assert "µ&lt;" in svg
+
+
+def test_ports_stand_in_the_order_of_their_wires_and_those_of_feedback_lowest() -> None:
+    links = [
+        link("d.y → b.fed"),
+        link("c.y → d.second"),
+        link("b.y → d.first"),
+        link("a.to_c → c.u"),
+        link("a.to_b → b.u"),
+    ]
+    heights = draw(["a", "b", "c", "d"], links).ports
+    assert heights["b", "input", "u"] < heights["b", "input", "fed"]
+    assert heights["a", "output", "to_b"] < heights["a", "output", "to_c"]
+    assert heights["d", "input", "first"] < heights["d", "input", "second"]

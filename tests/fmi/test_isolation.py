@@ -204,7 +204,11 @@ part.exit_initialization()
 print(part._child._process.pid, flush=True)
 part.stepper(np.zeros(2), 0.2).python()
 """
-    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE) as master:
+    with subprocess.Popen(
+        [sys.executable, "-c", code],
+        stdout=subprocess.PIPE,
+        env={**os.environ, "TMPDIR": str(tmp_path)},  # it has no chance to tidy up
+    ) as master:
         assert master.stdout is not None
         worker = Path("/proc", master.stdout.readline().decode().strip())
         assert worker.exists()

@@ -18,7 +18,7 @@ from .frame import NEGATIVE, check_folder, json_option
 @click.option("--workers", type=click.IntRange(1), default=os.cpu_count(), show_default="all cores")
 @json_option
 def evaluate(out: Path, workers: int, as_json: bool) -> int:
-    r"""Run the published simulation table and figures and compare.
+    """Run the published simulation table and figures and compare.
 
     \b
     Example: grasp-cosim evaluate --out results

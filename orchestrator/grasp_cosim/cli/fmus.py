@@ -28,7 +28,7 @@ from .frame import NEGATIVE, check_folder, json_option
 )
 @json_option
 def build(out: Path | None, bind_python: str | None, as_json: bool) -> int:
-    r"""Build the FMUs: GripperPlant, ProximitySensor, GraspController.
+    """Build the FMUs: GripperPlant, ProximitySensor, GraspController.
 
     Says what is not as it was built last. --bind-python adds the libpython of PYTHON, by default
     of this one, to what the FMUs load.
@@ -59,7 +59,7 @@ def build(out: Path | None, bind_python: str | None, as_json: bool) -> int:
 @click.argument("fmu", type=click.Path(path_type=Path))
 @json_option
 def inspect(fmu: Path, as_json: bool) -> int:
-    r"""Show the interface of any FMU: variables, units, ranges, dependencies, capabilities.
+    """Show the interface of any FMU: variables, units, ranges, dependencies, capabilities.
 
     \b
     Example: grasp-cosim inspect fmus/build/GripperPlant.fmu
@@ -77,7 +77,7 @@ def inspect(fmu: Path, as_json: bool) -> int:
 @click.argument("fmu", required=False, type=click.Path(path_type=Path))
 @json_option
 def doctor(fmu: Path | None, as_json: bool) -> int:
-    r"""Find out whether this machine will load FMU, and what to do if not.
+    """Find out whether this machine will load FMU, and what to do if not.
 
     Without FMU: whether it will load Python FMUs at all.
 

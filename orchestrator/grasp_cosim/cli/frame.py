@@ -20,7 +20,7 @@ json_option = click.option("--json", "as_json", is_flag=True, help="Print one JS
 @click.version_option(package_name="grasp-cosim")
 @click.option("--debug", is_flag=True, help="Show the traceback of an error.")
 def cli(debug: bool) -> None:
-    r"""FMI co-simulation of a delicate grasp.
+    """FMI co-simulation of a delicate grasp.
 
     \b
     grasp-cosim run [SYSTEM]         a closed loop; by default the published grasp, from FMUs

@@ -39,7 +39,7 @@ from .frame import NEGATIVE, check_folder, json_option, load_system, pair
 @click.option(
     "--out",
     type=click.Path(path_type=Path),
-    help="Folder for qualification.json, qualification.png and the bands.toml that were used.",
+    help="Folder for qualification.json, qualification.png and bands_used.toml.",
 )
 @json_option
 def qualify(
@@ -56,7 +56,7 @@ def qualify(
     out: Path | None,
     as_json: bool,
 ) -> int:
-    r"""Find out whether CANDIDATE, an FMU, may take the place of COMPONENT.
+    """Find out whether CANDIDATE, an FMU, may take the place of COMPONENT.
 
     Compares the interfaces, then the closed loops with the original and with the candidate, signal
     by signal and metric by metric. Exit code 0: qualified; 1: not.
@@ -88,9 +88,13 @@ def qualify(
 
 
 def _write(found: Qualification, out: Path) -> None:
-    """What there is: without a run, there is neither a figure nor a band."""
+    """What there is: without a run there is no band and no figure, not even an earlier one."""
+    figure, bands = out / "qualification.png", out / "bands_used.toml"
     write_text(out / "qualification.json", json.dumps(verdict.as_json(found), indent=2) + "\n")
     if found.signals:
-        write_text(out / "bands.toml", verdict.as_bands(found))
-        draw_qualification(found, out / "qualification.png")
-        click.echo(f"drew {out / 'qualification.png'}", err=True)
+        write_text(bands, verdict.as_bands(found))
+        draw_qualification(found, figure)
+        click.echo(f"drew {figure}", err=True)
+    else:
+        figure.unlink(missing_ok=True)
+        bands.unlink(missing_ok=True)

@@ -55,7 +55,7 @@ def run(
     tolerance: float | None,
     as_json: bool,
 ) -> int:
-    r"""Run SYSTEM, a .toml or .ssp file; by default the built-in grasp.
+    """Run SYSTEM, a .toml or .ssp file; by default the built-in grasp.
 
     \b
     Example: grasp-cosim run --case 1 --set plant.initial_object_position=0.02 --out results --plot

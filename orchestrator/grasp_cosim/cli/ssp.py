@@ -19,7 +19,7 @@ from .frame import check_folder, json_option, load_system
 def ssp(
     system: Path | None, out: Path, step: float | None, stop: float | None, as_json: bool
 ) -> int:
-    r"""Write SYSTEM, a .toml or .ssp file, as an SSP 1.0 archive; by default the built-in grasp.
+    """Write SYSTEM, a .toml or .ssp file, as an SSP 1.0 archive; by default the built-in grasp.
 
     \b
     Example: grasp-cosim ssp my_system.toml -o my_system.ssp

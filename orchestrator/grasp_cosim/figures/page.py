@@ -53,7 +53,32 @@ def page_html(run: Run, title: str, limit: int = LIMIT) -> str:
     shown = fit(run.time, run.signals, limit)
     grasp = _grasp(run)
     contacts = _contacts(run) if grasp else []
-    state = {
+    sections = [*(["grasp"] if grasp else []), "traces", "metrics", "wiring", "settings"]
+    return _filled(
+        "page.html",
+        title=escape(title),
+        style=_text("page.css"),
+        summary=summary(run.settings),
+        contents="".join(f'<a href="#{s}">{s.capitalize()}</a>' for s in sections),
+        grasp=_grasp_html(grasp, contacts) if grasp else "",
+        zooms=_zooms(contacts),
+        signals=_choice(run),
+        exactness=_exactness(shown, len(run.time)),
+        metrics=metrics_table(run.settings),
+        wiring=_wiring(run),
+        settings=settings_html(run.settings),
+        version=escape(version("grasp-cosim")),
+        page=_json(_state(run, shown, grasp, contacts)),
+        data=_data(shown),
+        script="\n".join(map(_text, SCRIPTS)),
+    )
+
+
+def _state(
+    run: Run, shown: Shown, grasp: Mapping[str, Any] | None, contacts: Sequence[Mapping[str, float]]
+) -> dict[str, Any]:
+    """What the scripts are told, beside the values themselves."""
+    return {
         "rows": len(shown.time),
         "signals": [
             {
@@ -72,27 +97,6 @@ def page_html(run: Run, title: str, limit: int = LIMIT) -> str:
         ],
         "grasp": {**grasp, "contacts": contacts} if grasp else None,
     }
-    sections = ["traces", "metrics", "wiring", "settings"]
-    return _filled(
-        "page.html",
-        title=escape(title),
-        style=_text("page.css"),
-        summary=summary(run.settings),
-        contents="".join(
-            f'<a href="#{s}">{s.capitalize()}</a>' for s in (["grasp"] if grasp else []) + sections
-        ),
-        grasp=_grasp_html(grasp, contacts) if grasp else "",
-        zooms=_zooms(contacts),
-        signals=_choice(run),
-        exactness=_exactness(shown, len(run.time)),
-        metrics=metrics_table(run.settings),
-        wiring=_wiring(run),
-        settings=settings_html(run.settings),
-        version=escape(version("grasp-cosim")),
-        page=_json(state),
-        data=_data(shown),
-        script="\n".join(map(_text, SCRIPTS)),
-    )
 
 
 def _text(name: str) -> str:

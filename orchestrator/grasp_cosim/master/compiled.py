@@ -99,6 +99,8 @@ def compiled_loop() -> Callable[..., tuple[int, int, int]]:
     before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(_cache())
     try:
         return numba.njit(loop.run, cache=True)  # type: ignore[no-any-return]
+    except RuntimeError:  # no folder to keep it in can be written to
+        return numba.njit(loop.run)  # type: ignore[no-any-return]
     finally:
         numba.config.CACHE_DIR = before
 

@@ -20,7 +20,7 @@ from ..system.parts import NANOSECONDS
 from . import loop
 from .engine import Engine, make_loop
 from .initialisation import Propagation, order_ports
-from .plan import make_plan, slots_of
+from .plan import Planner, slots_of
 from .rejection import finish_step
 from .scenario import Scenario
 
@@ -51,14 +51,14 @@ class Master:
         self.values = np.zeros(len(self.slots))
         self.scenario = Scenario(system, instances, self.slots, self.values)
         self._receive = receive
-        self.plan = make_plan(
+        self.plan = Planner(
             system,
             instances,
             self.slots,
             self.values,
             self.scenario.fault_functions,
             self.scenario.before_step if system.events or system.faults else None,
-        )
+        ).plan()
         self._loop = make_loop(self.plan, engine)
         self._rows = np.empty((CHUNK, len(self.values)))
 

@@ -65,24 +65,8 @@ def slots_of(system: System, instances: Sequence[Instance]) -> dict[Port, int]:
     return {port: slot for slot, port in enumerate(ports)}
 
 
-def make_plan(
-    system: System,
-    instances: Sequence[Instance],
-    slots: Mapping[Port, int],
-    values: npt.NDArray[np.float64],
-    faults: Mapping[Port, FaultFunction],
-    before_step: Callable[[int], None] | None,
-) -> Plan:
-    """The plan of a system over the given vector of values.
-
-    faults act on wires, by target. before_step is called at the start of each macro step with its
-    number.
-    """
-    return _Builder(system, instances, slots, values, faults, before_step).plan()
-
-
-class _Builder:
-    """Collects the parts of a plan in the order of execution."""
+class Planner:
+    """Makes the plan of a system: collects its parts in the order of execution."""
 
     def __init__(
         self,
@@ -93,6 +77,11 @@ class _Builder:
         faults: Mapping[Port, FaultFunction],
         before_step: Callable[[int], None] | None,
     ) -> None:
+        """Over the given vector of values; slots are those of slots_of().
+
+        faults act on wires, by target. before_step is called at the start of each macro step with
+        its number.
+        """
         self.system = system
         self.instances = {instance.name: instance for instance in instances}
         self.slots = slots
@@ -110,6 +99,7 @@ class _Builder:
         self.raised: list[BaseException] = []
 
     def plan(self) -> Plan:
+        """The program of a macro step in the scheme of the system, and what it works on."""
         if self.before_step is not None:
             self._python(self.before_step, 1, 0)
         names = [component.name for component in self.system.components]

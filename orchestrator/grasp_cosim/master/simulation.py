@@ -15,6 +15,7 @@ from ..recording.dispatch import Dispatcher
 from ..recording.listener import Listener
 from ..recording.memory import MemoryListener
 from ..recording.result import Result
+from ..system.checks import remarks
 from ..system.description import System
 from ..system.interface import Value
 from ..system.parts import NANOSECONDS, Component, Port
@@ -146,7 +147,14 @@ class Session:
             for name, r in master.rejections.items()
         )
         pending = master.scenario.pending() if self.complete else ()
-        return (*self.system.notes, *master.log, *master.scenario.log, *rejected, *pending)
+        return (
+            *self.system.notes,
+            *remarks(self.system),
+            *master.log,
+            *master.scenario.log,
+            *rejected,
+            *pending,
+        )
 
 
 class Simulate:
