@@ -22,8 +22,10 @@ check: .venv/dev
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -q tests/test_import_rules.py
 
-bench: .venv/run
+bench: .venv/dev
 	$(BIN)/python benchmarks/macro_step.py
+	$(BIN)/python -m benchmarks.scaling
+	$(BIN)/python -m benchmarks.masters
 
 cards: .venv/run
 	$(BIN)/python -m grasp_fmus.cards plant/README.md=gripper_plant.rigid \
