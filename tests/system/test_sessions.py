@@ -1,13 +1,10 @@
 """Sessions: what can be done with one, and when that is over."""
 
-import signal
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from fmi.instances import KINDS
+from fmi.instances import KINDS, interrupted_after
 from fmi.test_rejected_steps import alone
 from grasp_cosim import InputError, SimulationError, simulate
 from grasp_cosim.master.engine import Engine
@@ -16,23 +13,6 @@ from native_fmus import needs_gcc
 
 pytestmark = needs_gcc
 engines = pytest.mark.parametrize("engine", ["python", "auto"])
-
-
-@contextmanager
-def interrupted_after(seconds: float) -> Iterator[None]:
-    """Raises KeyboardInterrupt in the main thread, as Ctrl-C does, and expects it."""
-
-    def interrupt(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGALRM, interrupt)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
-    try:
-        with pytest.raises(KeyboardInterrupt):
-            yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
 
 
 @engines
