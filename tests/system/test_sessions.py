@@ -62,3 +62,9 @@ def test_an_interrupted_session_does_not_go_on(
         result = session.result()
         assert not result.complete
         assert result["part.x"] == pytest.approx(2.0 * result.time, rel=1e-9)
+
+
+def test_a_session_that_has_not_stepped_has_metrics(tmp_path: Path) -> None:
+    with simulate.session(alone(tmp_path, "3.0", "none")) as session:
+        metrics = session.result().metrics
+    assert (metrics["steps"], metrics["real_time_factor"]) == (0, 0.0)
