@@ -132,3 +132,9 @@ def test_a_failure_in_initialisation_is_a_wrong_input(mock: Make) -> None:
     with pytest.raises(InputError, match="a: status 3") as caught:
         run([mock("b", lambda u, t: 1.0), a], ["ba"]).master.initialise()
     assert isinstance(caught.value.__cause__, SimulationError)
+
+
+def test_an_integer_that_a_float_does_not_hold_is_refused(mock: Make) -> None:
+    mocks = [mock("a", lambda u, t: 2**53 + 1, "Integer"), mock("b", through, "Integer")]
+    with pytest.raises(InputError, match=r"^a\.y = 9007199254740993 at step 0: must be smaller th"):
+        run(mocks, ["ab"]).master.initialise()
