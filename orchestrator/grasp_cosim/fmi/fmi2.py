@@ -1,7 +1,7 @@
 """An instance of an FMI 2.0 co-simulation FMU."""
 
 import ctypes
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ from fmpy.fmi2 import (
 )
 from fmpy.logging import addLoggerProxy
 
-from ..system.interface import Value, Variable
+from ..system.interface import Value
 from .instance import STEP_2, TRANSFER_2, Call, Native
 from .loaded import LOGGER, LoadedInstance
 
@@ -46,6 +46,7 @@ class FmuInstance(LoadedInstance):
     """One instance of an FMI 2.0 co-simulation FMU. Use as a context manager."""
 
     PREFIX = "fmi2"
+    SHAPE = TRANSFER_2
 
     def _instantiate(self, folder: Path) -> FMU2Slave:
         slave = FMU2Slave(
@@ -70,27 +71,6 @@ class FmuInstance(LoadedInstance):
 
     def _suffix(self, fmi_type: str) -> str:
         return "Integer" if fmi_type == "Enumeration" else fmi_type
-
-    def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:
-        """The call that passes data to inputs ("set") or fetches outputs into it ("get")."""
-        count = len(variables)
-        references = (ctypes.c_uint * count)(*(v.reference for v in variables))
-        self._keep += [references, data]
-        bound, address = self._function(
-            action.capitalize() + self._suffix(variables[0].type),
-            ctypes.byref(references),
-            ctypes.c_size_t(count),
-            ctypes.c_void_p(data.ctypes.data),
-        )
-        native = Native(
-            TRANSFER_2,
-            address,
-            self._slave.component,
-            ctypes.addressof(references),
-            count,
-            data.ctypes.data,
-        )
-        return Call(bound, native)
 
     def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
         """The call that advances by step seconds from the time in clock[0]."""

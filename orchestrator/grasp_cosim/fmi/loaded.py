@@ -27,7 +27,7 @@ from fmpy.fmi1 import FMICallException
 
 from ..errors import InputError, SimulationError
 from ..system.interface import Interface, Value, Variable
-from .instance import DISCARD, EARLY, ERROR, FATAL, OK, STATUS, Call
+from .instance import DISCARD, EARLY, ERROR, FATAL, OK, STATUS, TRANSFER_3, Call, Native
 
 _PYTHON_FUNCTION = ctypes.PYFUNCTYPE(ctypes.c_int)
 _NATIVE_FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int)
@@ -54,6 +54,9 @@ class LoadedInstance(ABC):
 
     PREFIX: ClassVar[str]
     """What its FMI functions begin with."""
+
+    SHAPE: ClassVar[int]
+    """The shape of those that set and get: TRANSFER_2, or TRANSFER_3 with the count at the end."""
 
     def __init__(self, name: str, interface: Interface) -> None:
         """Extract and instantiate; InputError where the FMU does not load."""
@@ -96,13 +99,6 @@ class LoadedInstance(ABC):
     @abstractmethod
     def _reached(self) -> float | None:
         """Where that step ended, in s; None where the FMU does not say."""
-
-    @abstractmethod
-    def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:
-        """The call that passes data to inputs ("set") or fetches outputs into it ("get").
-
-        The variables are all of one FMI type; data is contiguous, in their order and of dtype().
-        """
 
     @abstractmethod
     def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
@@ -175,6 +171,25 @@ class LoadedInstance(ABC):
         with self._failures():
             for variable, value in zip(variables, values, strict=True):
                 self._set(variable, value)
+
+    def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:
+        """The call that passes data to inputs ("set") or fetches outputs into it ("get").
+
+        The variables are all of one FMI type; data is contiguous, in their order and of dtype().
+        """
+        count, place = len(variables), data.ctypes.data
+        references = (ctypes.c_uint * count)(*(v.reference for v in variables))
+        self._keep += [references, data]
+        again = [ctypes.c_size_t(count)] if self.SHAPE == TRANSFER_3 else []
+        bound, address = self._function(
+            action.capitalize() + self._suffix(variables[0].type),
+            ctypes.byref(references),
+            ctypes.c_size_t(count),
+            ctypes.c_void_p(place),
+            *again,
+        )
+        instance, first = self._slave.component, ctypes.addressof(references)
+        return Call(bound, Native(self.SHAPE, address, instance, first, count, place))
 
     def _get(self, variable: Variable) -> Value:
         getter = getattr(self._slave, f"get{self._suffix(variable.type)}")
