@@ -1,6 +1,7 @@
 """An instance of an FMI 2.0 co-simulation FMU."""
 
 import ctypes
+from collections import defaultdict, deque
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -22,17 +23,17 @@ from fmpy.logging import addLoggerProxy
 
 from ..system.interface import Value
 from .instance import STEP_2, TRANSFER_2, Call, Native
-from .loaded import LOGGER, LoadedInstance
+from .loaded import KEPT, LOGGER, LoadedInstance
 
-_messages: list[tuple[str, str]] = []
-"""What FMUs logged: instance and text. FMPy's logger proxy is one per process, so is this."""
+_messages: defaultdict[str, deque[str]] = defaultdict(lambda: deque(maxlen=KEPT))
+"""What FMUs logged, by instance. FMPy's logger proxy is one per process, so is this."""
 
 
 def _log(_: Any, instance: bytes | None, status: int, category: Any, message: bytes | None) -> None:
     if status > 0:
         text = (message or b"").decode(errors="replace")
         LOGGER.info(" ".join(text.split()))
-        _messages.append(((instance or b"").decode(errors="replace"), text))
+        _messages[(instance or b"").decode(errors="replace")].append(text)
 
 
 _callbacks = fmi2CallbackFunctions()
@@ -59,9 +60,7 @@ class FmuInstance(LoadedInstance):
         return slave
 
     def _read_log(self) -> list[str]:
-        said = [text for instance, text in _messages if instance == self.name]
-        _messages[:] = [m for m in _messages if m[0] != self.name]
-        return said
+        return list(_messages.pop(self.name, ()))
 
     def _start(self, values: Mapping[str, Value], stop: float) -> None:
         for name, value in values.items():

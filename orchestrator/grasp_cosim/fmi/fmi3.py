@@ -6,6 +6,7 @@ left alone.
 """
 
 import ctypes
+from collections import deque
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from fmpy.fmi3 import FMU3Slave
 
 from ..system.interface import Interface, Value
 from .instance import EARLY, STEP_3, TRANSFER_3, WARNING, Call, Native
-from .loaded import LOGGER, LoadedInstance
+from .loaded import KEPT, LOGGER, LoadedInstance
 
 TERMINATE, SHORT = 1, 2
 """Places in the flags of a step, after that of an event."""
@@ -38,7 +39,7 @@ class Fmi3Instance(LoadedInstance):
 
     def __init__(self, name: str, interface: Interface) -> None:
         """Extract and instantiate; InputError where the FMU does not load."""
-        self._said: list[str] = []
+        self._said: deque[str] = deque(maxlen=KEPT)
         self._flags = np.zeros(3, np.bool_)
         self._last = np.zeros(1)
         super().__init__(name, interface)
@@ -64,7 +65,8 @@ class Fmi3Instance(LoadedInstance):
             self._said.append(text)
 
     def _read_log(self) -> list[str]:
-        said, self._said[:] = self._said.copy(), []
+        said = list(self._said)
+        self._said.clear()
         return said
 
     def _start(self, values: Mapping[str, Value], stop: float) -> None:

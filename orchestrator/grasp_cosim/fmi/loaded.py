@@ -13,6 +13,7 @@ import sys
 import tempfile
 import warnings
 from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -48,6 +49,9 @@ _OF_KIND: Mapping[str, Callable[[Any], Value]] = {
 LOGGER = logging.getLogger(__name__)
 """Gets what FMUs log, too; the process of a component prints it."""
 
+KEPT = 12
+"""The last messages of an FMU that are kept for the error: it may log some at every step."""
+
 
 class LoadedInstance(ABC):
     """One instance of a co-simulation FMU in this process. Use as a context manager."""
@@ -66,7 +70,7 @@ class LoadedInstance(ABC):
         self._keep: list[Any] = []
         self._running = False
         self._clock: npt.NDArray[np.float64] | None = None
-        self._unread: list[str] = []
+        self._unread: deque[str] = deque(maxlen=KEPT)
         self._read_log()  # forgets what an earlier instance of this name said
         self._folder = tempfile.TemporaryDirectory(prefix="grasp_fmu_")
         self._resources = Path(self._folder.name, "resources")
@@ -262,7 +266,7 @@ class LoadedInstance(ABC):
     def _messages(self) -> list[str]:
         """What this instance logged and nobody has read yet."""
         own = re.compile(rf"\A{re.escape(self.name)}, t = \S+ s: ")  # so our FMUs begin
-        said = [own.sub("", text, count=1) for text in self._unread + self._read_log()]
+        said = [own.sub("", text, count=1) for text in (*self._unread, *self._read_log())]
         self._unread.clear()
         return [text for text in said if not _PYTHONFMU_PREFIX.match(text)] or said
 
