@@ -47,7 +47,8 @@ class Variable:
     are the inputs an output depends on directly, None where that is not declared, which means all;
     initial_dependencies the same in initialisation mode. shape is () but for an array. low and high
     are what is declared; beyond that a value must fit into its type. nominal is the magnitude that
-    its values are compared with, 1 where none is declared, as FMI has it.
+    its values are compared with, 1 where none is declared, as FMI has it. relative says that it is
+    a difference, to which the offset of a unit does not apply.
     """
 
     name: str
@@ -65,6 +66,7 @@ class Variable:
     shape: tuple[int, ...] = ()
     description: str = ""
     nominal: float = 1.0
+    relative: bool = False
 
     @property
     def supported(self) -> bool:
@@ -284,6 +286,15 @@ def _variable(
         tuple(v.shape or ()),
         v.description or "",
         abs(float(declared["nominal"] or 1.0)) or 1.0,
+        _relative(v, element),
+    )
+
+
+def _relative(v: Any, element: ElementTree.Element) -> bool:
+    """Whether it is a difference; FMPy overlooks where a variable itself says so."""
+    said = [text for e in (element, *element) if (text := e.get("relativeQuantity"))]
+    return (
+        said[0] in ("true", "1") if said else bool(getattr(v.declaredType, "relativeQuantity", 0))
     )
 
 
