@@ -23,7 +23,7 @@ DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
   <CoSimulation modelIdentifier="{name}" canHandleVariableCommunicationStepSize="{vary}"/>
   <ModelVariables>
     <ScalarVariable name="u" valueReference="0" causality="input" variability="{variability}">
-      <{kind} start="{zero}"/></ScalarVariable>
+      <{kind} start="{zero}"{nominal}/></ScalarVariable>
     <ScalarVariable name="y" valueReference="1" causality="output" variability="{variability}">
       <{kind}/></ScalarVariable>
     <ScalarVariable name="p" valueReference="2" causality="parameter" variability="tunable">
@@ -40,8 +40,8 @@ DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 class Mock:
     """y = output(u, time), where time only moves with a step.
 
-    direct says whether y is declared to depend on u. rejects, if given, is asked at each step for
-    the time reached: the step is discarded where that is before its end.
+    direct says whether y is declared to depend on u, nominal is that of u. rejects, if given, is
+    asked at each step for the time reached: the step is discarded where that is before its end.
     """
 
     def __init__(
@@ -52,6 +52,7 @@ class Mock:
         kind: str = "Real",
         direct: bool | None = True,
         vary: bool = True,
+        nominal: float | None = None,
         rejects: Callable[[float, float], float] | None = None,
     ) -> None:
         self.name = name
@@ -67,6 +68,7 @@ class Mock:
         text = DESCRIPTION.format(
             name=name, kind=kind, depends=depends, vary=str(vary).lower(),
             variability="continuous" if kind == "Real" else "discrete",
+            nominal="" if nominal is None else f' nominal="{nominal}"',
             zero={"Boolean": "false", "String": ""}.get(kind, "0"),
         )  # fmt: skip
         with zipfile.ZipFile(self.path, "w") as archive:

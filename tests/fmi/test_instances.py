@@ -9,8 +9,10 @@ import pytest
 from fmi.instances import KINDS, SAMPLES, Bound, real, running, variable
 from fmpy import simulate_fmu
 from grasp_cosim import InputError, SimulationError
+from grasp_cosim.fmi import fmi2
 from grasp_cosim.fmi.instance import DISCARD, EARLY, OK, STEP_2, STEP_3, TRANSFER_2, TRANSFER_3
 from grasp_cosim.fmi.load import load
+from grasp_cosim.fmi.loaded import KEPT
 from grasp_cosim.system.parts import Component, Isolation
 from native_fmus import EARLY as MIGHT_RETURN_EARLY
 from native_fmus import TYPES, build, needs_gcc
@@ -88,6 +90,21 @@ def test_an_error_tells_what_the_fmu_logged(
         error = part.failure(bound.step(), 0.2)
     assert str(error) == "part: native.fmu returned error at t = 0.2 s: the lamp is broken"
     assert error.__notes__ == ["the lamp\nis broken"]
+
+
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_of_many_warnings_the_last_are_kept(tmp_path: Path, version: str) -> None:
+    with running(tmp_path, version, values={"error_at": 0.1}) as part:
+        for k in range(1000):
+            text = f"warning {k}".encode()
+            if version == "2.0":
+                fmi2._log(None, b"part", 1, b"", text)
+            else:
+                part._log(None, 1, b"", text)  # type: ignore[attr-defined]
+        error = part.failure(Bound(part, 0.2).step(), 0.0)
+    warnings = " ".join(f"warning {k}" for k in range(1000 - KEPT + 1, 1000))
+    assert str(error).endswith(f"returned error at t = 0 s: {warnings} the lamp is broken")
+    assert len(error.__notes__) == KEPT
 
 
 @both

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fmi.instances import Bound, real, running
+from fmi.instances import Bound, interrupted_after, real, running
 from grasp_cosim import InputError, SimulationError, System, simulate
 from grasp_cosim.fmi import child, process
 from grasp_cosim.fmi.instance import OK
@@ -118,6 +118,19 @@ def test_a_hang_is_bounded(tmp_path: Path, version: str, monkeypatch: pytest.Mon
             with pytest.raises(SimulationError, match=message):
                 bound.step()
         assert str(part.failure(3, 0.2)).startswith("part: the process of native.fmu did not")
+        assert not workers()
+
+
+@versions
+def test_an_interrupted_call_is_not_answered_later(tmp_path: Path, version: str) -> None:
+    """What it answers would be taken for the answer to the next call."""
+    with running(tmp_path, version, "process", {"hang_at": 0.1}) as part:
+        bound = Bound(part, 0.2)
+        with interrupted_after(0.1):
+            bound.step()
+        message = r"^part: the process of native.fmu was interrupted and ended at t = 0 s"
+        with pytest.raises(SimulationError, match=message):
+            part.get([part.interface.by_name["x"]])
         assert not workers()
 
 

@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 from grasp_cosim import InputError, SimulationError, System, simulate
+from grasp_cosim.fmi import instance
 from grasp_cosim.grasp import CASES
+from grasp_cosim.master import compiled
 from grasp_cosim.master.engine import Engine
 from grasp_cosim.recording.result import Rejection, Result
 from grasp_cosim.system.parts import Port, Wire
@@ -125,8 +127,6 @@ def test_what_a_call_raises_ends_the_run(tmp_path: Path, engine: Engine) -> None
 def test_without_numba_the_compiled_engine_is_refused(
     grasp: System, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from grasp_cosim.master import compiled
-
     compiled.compiled_loop.cache_clear()
     monkeypatch.setitem(__import__("sys").modules, "numba", None)
     with pytest.raises(InputError, match=r"numba is not installed.*grasp-cosim\[fast\]"):
@@ -134,3 +134,28 @@ def test_without_numba_the_compiled_engine_is_refused(
     monkeypatch.undo()
     compiled.compiled_loop.cache_clear()
     assert np.isfinite(simulate(grasp, stop=1e-3, engine="compiled")["plant.gap[1]"]).all()
+
+
+def test_it_is_compiled_where_the_user_has_no_home(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def no_home() -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setattr(Path, "home", no_home)
+    compiled.compiled_loop.cache_clear()
+    try:
+        assert callable(compiled.compiled_loop())
+    finally:
+        compiled.compiled_loop.cache_clear()
+
+
+def test_what_was_compiled_from_other_constants_is_not_taken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = compiled._cache()
+    changed = tmp_path / "instance.py"
+    changed.write_text(Path(instance.__file__).read_text().replace("EARLY = 6", "EARLY = 7"))
+    monkeypatch.setattr(instance, "__file__", str(changed))
+    assert compiled._cache() != before

@@ -74,6 +74,21 @@ def test_a_nonlinear_loop_is_solved(mock: Make) -> None:
     assert started.signals()["a.y"][0] == pytest.approx(1.0, abs=1e-9)
 
 
+def test_a_loop_of_small_values_is_solved(mock: Make) -> None:
+    """y = 1e-11 - 5 u, u = y has the solution 1e-11 / 6; the start value 0 is none."""
+    started = run([mock("a", lambda u, t: 1e-11 - 5.0 * u), mock("b", through)], ["ab", "ba"])
+    started.master.initialise()
+    assert started.signals()["a.y"][0] == pytest.approx(1e-11 / 6.0, rel=1e-6)
+
+
+def test_a_residual_is_relative_to_the_nominal_value(mock: Make) -> None:
+    """y = 2e-9 - u^3 / 1e-18, u = y has the solution 1e-9."""
+    cubic = mock("a", lambda u, t: 2e-9 - u**3 / 1e-18, nominal=1e-9)
+    started = run([cubic, mock("b", through, nominal=1e-9)], ["ab", "ba"])
+    started.master.initialise()
+    assert started.signals()["a.y"][0] == pytest.approx(1e-9, rel=1e-9)
+
+
 def test_two_loops_are_solved_together(mock: Make) -> None:
     mocks = [
         mock("a", lambda u, t: 1.0 - 2.0 * u), mock("b", through),
@@ -132,3 +147,9 @@ def test_a_failure_in_initialisation_is_a_wrong_input(mock: Make) -> None:
     with pytest.raises(InputError, match="a: status 3") as caught:
         run([mock("b", lambda u, t: 1.0), a], ["ba"]).master.initialise()
     assert isinstance(caught.value.__cause__, SimulationError)
+
+
+def test_an_integer_that_a_float_does_not_hold_is_refused(mock: Make) -> None:
+    mocks = [mock("a", lambda u, t: 2**53 + 1, "Integer"), mock("b", through, "Integer")]
+    with pytest.raises(InputError, match=r"^a\.y = 9007199254740993 at step 0: must be smaller th"):
+        run(mocks, ["ab"]).master.initialise()

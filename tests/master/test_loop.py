@@ -77,6 +77,14 @@ def test_numbers_of_every_type_come_through(engine: Engine, name: str) -> None:
     assert target.tobytes() == source.tobytes()
 
 
+def test_any_byte_but_zero_is_true(engine: Engine) -> None:
+    """As a C compiler that does not know fmi3Boolean for a bool leaves it."""
+    found = np.array([0, 1, 255], np.uint8).view(np.bool_)
+    casts = tuple((0, i, i) for i in range(3))
+    made = plan([7.0, 7.0, 7.0], [(LOAD, 0, 3, 1, 0)], casts=casts, buffers=(found,))
+    assert run(made, engine, 1)[1].tolist() == [[0.0, 1.0, 1.0]]
+
+
 @pytest.mark.parametrize(("name", "value"), [("int64", -(2**53)), ("uint64", 2**64 - 1)])
 def test_an_integer_that_a_float_does_not_hold_is_refused(
     engine: Engine, name: str, value: int

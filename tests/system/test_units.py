@@ -1,8 +1,13 @@
 """Conversion between units."""
 
 import math
+import zipfile
+from pathlib import Path
 
 import pytest
+from grasp_cosim import InputError, System
+from grasp_cosim.system.checks import wire_transform
+from grasp_cosim.system.parts import Component, Port, Wire
 from grasp_cosim.system.units import BASE, Unit, conversion
 from hypothesis import given
 from hypothesis import strategies as st
@@ -59,3 +64,43 @@ def test_known_values(source: Unit, target: Unit, value: float, expected: float)
     found = conversion(source, target)
     assert found is not None
     assert found[0] * value + found[1] == pytest.approx(expected, rel=1e-13)
+
+
+DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="2.0" modelName="t" guid="t">
+  <CoSimulation modelIdentifier="t"/>
+  <UnitDefinitions>
+    <Unit name="K"><BaseUnit K="1"/></Unit>
+    <Unit name="degF"><BaseUnit K="1" factor="0.5" offset="255.0"/></Unit>
+  </UnitDefinitions>
+  <TypeDefinitions>
+    <SimpleType name="Rise"><Real quantity="T" unit="K" relativeQuantity="true"/></SimpleType>
+  </TypeDefinitions>
+  <ModelVariables>
+    <ScalarVariable name="u" valueReference="0" causality="input"><Real {u}/></ScalarVariable>
+    <ScalarVariable name="y" valueReference="1" causality="output"><Real {y}/></ScalarVariable>
+  </ModelVariables>
+  <ModelStructure><Outputs><Unknown index="2" dependencies=""/></Outputs></ModelStructure>
+</fmiModelDescription>
+"""
+RISE = 'declaredType="Rise" start="0"'
+
+
+def from_y_to_u(folder: Path, y: str, u: str) -> tuple[float, float]:
+    """Factor and offset of a wire between variables with these attributes."""
+    with zipfile.ZipFile(folder / "t.fmu", "w") as archive:
+        archive.writestr("modelDescription.xml", DESCRIPTION.format(y=y, u=u))
+    components = Component("a", folder / "t.fmu", {"u": 0.0}), Component("b", folder / "t.fmu", {})
+    wire = Wire(Port("a", "y"), Port("b", "u"))
+    return wire_transform(System("t", components, (wire,), 1, 1, "sequential"), wire)
+
+
+def test_the_offset_of_a_unit_does_not_apply_to_a_difference(tmp_path: Path) -> None:
+    assert from_y_to_u(tmp_path, 'unit="degF"', 'unit="K" start="0"') == (0.5, 255.0)
+    assert from_y_to_u(tmp_path, 'unit="degF" relativeQuantity="true"', RISE) == (0.5, 0.0)
+
+
+@pytest.mark.parametrize("relative", ["", 'relativeQuantity="false"'])
+def test_a_difference_is_no_temperature(tmp_path: Path, relative: str) -> None:
+    with pytest.raises(InputError, match=r"only one of them is a difference .* factor = "):
+        from_y_to_u(tmp_path, f'unit="degF" {relative}', RISE)

@@ -128,6 +128,10 @@ class Child:
             kind, value, notes = self._connection.recv()
         except (EOFError, OSError) as error:
             raise self._lose() from error
+        except KeyboardInterrupt:  # an answer on the way would be taken for the next one
+            self._process.kill()
+            self._lose("was interrupted and ended")
+            raise
         return self._value(kind, value, notes)
 
     def _lose(self, what: str = "") -> SimulationError:

@@ -1,7 +1,8 @@
 """An instance of an FMI 2.0 co-simulation FMU."""
 
 import ctypes
-from collections.abc import Callable, Mapping, Sequence
+from collections import defaultdict, deque
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,19 +21,19 @@ from fmpy.fmi2 import (
 )
 from fmpy.logging import addLoggerProxy
 
-from ..system.interface import Value, Variable
+from ..system.interface import Value
 from .instance import STEP_2, TRANSFER_2, Call, Native
-from .loaded import LOGGER, LoadedInstance
+from .loaded import KEPT, LOGGER, LoadedInstance
 
-_messages: list[tuple[str, str]] = []
-"""What FMUs logged: instance and text. FMPy's logger proxy is one per process, so is this."""
+_messages: defaultdict[str, deque[str]] = defaultdict(lambda: deque(maxlen=KEPT))
+"""What FMUs logged, by instance. FMPy's logger proxy is one per process, so is this."""
 
 
 def _log(_: Any, instance: bytes | None, status: int, category: Any, message: bytes | None) -> None:
     if status > 0:
         text = (message or b"").decode(errors="replace")
         LOGGER.info(" ".join(text.split()))
-        _messages.append(((instance or b"").decode(errors="replace"), text))
+        _messages[(instance or b"").decode(errors="replace")].append(text)
 
 
 _callbacks = fmi2CallbackFunctions()
@@ -46,6 +47,7 @@ class FmuInstance(LoadedInstance):
     """One instance of an FMI 2.0 co-simulation FMU. Use as a context manager."""
 
     PREFIX = "fmi2"
+    SHAPE = TRANSFER_2
 
     def _instantiate(self, folder: Path) -> FMU2Slave:
         slave = FMU2Slave(
@@ -58,9 +60,7 @@ class FmuInstance(LoadedInstance):
         return slave
 
     def _read_log(self) -> list[str]:
-        said = [text for instance, text in _messages if instance == self.name]
-        _messages[:] = [m for m in _messages if m[0] != self.name]
-        return said
+        return list(_messages.pop(self.name, ()))
 
     def _start(self, values: Mapping[str, Value], stop: float) -> None:
         for name, value in values.items():
@@ -70,27 +70,6 @@ class FmuInstance(LoadedInstance):
 
     def _suffix(self, fmi_type: str) -> str:
         return "Integer" if fmi_type == "Enumeration" else fmi_type
-
-    def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:
-        """The call that passes data to inputs ("set") or fetches outputs into it ("get")."""
-        count = len(variables)
-        references = (ctypes.c_uint * count)(*(v.reference for v in variables))
-        self._keep += [references, data]
-        bound, address = self._function(
-            action.capitalize() + self._suffix(variables[0].type),
-            ctypes.byref(references),
-            ctypes.c_size_t(count),
-            ctypes.c_void_p(data.ctypes.data),
-        )
-        native = Native(
-            TRANSFER_2,
-            address,
-            self._slave.component,
-            ctypes.addressof(references),
-            count,
-            data.ctypes.data,
-        )
-        return Call(bound, native)
 
     def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
         """The call that advances by step seconds from the time in clock[0]."""

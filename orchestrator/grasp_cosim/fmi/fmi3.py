@@ -6,7 +6,8 @@ left alone.
 """
 
 import ctypes
-from collections.abc import Iterable, Mapping, Sequence
+from collections import deque
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +15,9 @@ import numpy as np
 import numpy.typing as npt
 from fmpy.fmi3 import FMU3Slave
 
-from ..system.interface import Interface, Value, Variable
+from ..system.interface import Interface, Value
 from .instance import EARLY, STEP_3, TRANSFER_3, WARNING, Call, Native
-from .loaded import LOGGER, LoadedInstance
+from .loaded import KEPT, LOGGER, LoadedInstance
 
 TERMINATE, SHORT = 1, 2
 """Places in the flags of a step, after that of an event."""
@@ -34,10 +35,11 @@ class Fmi3Instance(LoadedInstance):
     """One instance of an FMI 3.0 co-simulation FMU. Use as a context manager."""
 
     PREFIX = "fmi3"
+    SHAPE = TRANSFER_3
 
     def __init__(self, name: str, interface: Interface) -> None:
         """Extract and instantiate; InputError where the FMU does not load."""
-        self._said: list[str] = []
+        self._said: deque[str] = deque(maxlen=KEPT)
         self._flags = np.zeros(3, np.bool_)
         self._last = np.zeros(1)
         super().__init__(name, interface)
@@ -63,7 +65,8 @@ class Fmi3Instance(LoadedInstance):
             self._said.append(text)
 
     def _read_log(self) -> list[str]:
-        said, self._said[:] = self._said.copy(), []
+        said = list(self._said)
+        self._said.clear()
         return said
 
     def _start(self, values: Mapping[str, Value], stop: float) -> None:
@@ -81,28 +84,6 @@ class Fmi3Instance(LoadedInstance):
 
     def _suffix(self, fmi_type: str) -> str:
         return "Int64" if fmi_type == "Enumeration" else fmi_type
-
-    def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:
-        """The call that passes data to inputs ("set") or fetches outputs into it ("get")."""
-        count = len(variables)
-        references = (ctypes.c_uint * count)(*(v.reference for v in variables))
-        self._keep += [references, data]
-        bound, address = self._function(
-            action.capitalize() + self._suffix(variables[0].type),
-            ctypes.byref(references),
-            ctypes.c_size_t(count),
-            ctypes.c_void_p(data.ctypes.data),
-            ctypes.c_size_t(count),
-        )
-        native = Native(
-            TRANSFER_3,
-            address,
-            self._slave.component,
-            ctypes.addressof(references),
-            count,
-            data.ctypes.data,
-        )
-        return Call(bound, native)
 
     def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
         """The call that advances by step seconds from the time in clock[0]; EARLY is a status."""

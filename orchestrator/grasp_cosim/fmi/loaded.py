@@ -13,6 +13,7 @@ import sys
 import tempfile
 import warnings
 from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -27,7 +28,7 @@ from fmpy.fmi1 import FMICallException
 
 from ..errors import InputError, SimulationError
 from ..system.interface import Interface, Value, Variable
-from .instance import DISCARD, EARLY, ERROR, FATAL, OK, STATUS, Call
+from .instance import DISCARD, EARLY, ERROR, FATAL, OK, STATUS, TRANSFER_3, Call, Native
 
 _PYTHON_FUNCTION = ctypes.PYFUNCTYPE(ctypes.c_int)
 _NATIVE_FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int)
@@ -48,12 +49,18 @@ _OF_KIND: Mapping[str, Callable[[Any], Value]] = {
 LOGGER = logging.getLogger(__name__)
 """Gets what FMUs log, too; the process of a component prints it."""
 
+KEPT = 12
+"""The last messages of an FMU that are kept for the error: it may log some at every step."""
+
 
 class LoadedInstance(ABC):
     """One instance of a co-simulation FMU in this process. Use as a context manager."""
 
     PREFIX: ClassVar[str]
     """What its FMI functions begin with."""
+
+    SHAPE: ClassVar[int]
+    """The shape of those that set and get: TRANSFER_2, or TRANSFER_3 with the count at the end."""
 
     def __init__(self, name: str, interface: Interface) -> None:
         """Extract and instantiate; InputError where the FMU does not load."""
@@ -63,7 +70,7 @@ class LoadedInstance(ABC):
         self._keep: list[Any] = []
         self._running = False
         self._clock: npt.NDArray[np.float64] | None = None
-        self._unread: list[str] = []
+        self._unread: deque[str] = deque(maxlen=KEPT)
         self._read_log()  # forgets what an earlier instance of this name said
         self._folder = tempfile.TemporaryDirectory(prefix="grasp_fmu_")
         self._resources = Path(self._folder.name, "resources")
@@ -96,13 +103,6 @@ class LoadedInstance(ABC):
     @abstractmethod
     def _reached(self) -> float | None:
         """Where that step ended, in s; None where the FMU does not say."""
-
-    @abstractmethod
-    def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:
-        """The call that passes data to inputs ("set") or fetches outputs into it ("get").
-
-        The variables are all of one FMI type; data is contiguous, in their order and of dtype().
-        """
 
     @abstractmethod
     def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
@@ -176,6 +176,25 @@ class LoadedInstance(ABC):
             for variable, value in zip(variables, values, strict=True):
                 self._set(variable, value)
 
+    def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:
+        """The call that passes data to inputs ("set") or fetches outputs into it ("get").
+
+        The variables are all of one FMI type; data is contiguous, in their order and of dtype().
+        """
+        count, place = len(variables), data.ctypes.data
+        references = (ctypes.c_uint * count)(*(v.reference for v in variables))
+        self._keep += [references, data]
+        again = [ctypes.c_size_t(count)] if self.SHAPE == TRANSFER_3 else []
+        bound, address = self._function(
+            action.capitalize() + self._suffix(variables[0].type),
+            ctypes.byref(references),
+            ctypes.c_size_t(count),
+            ctypes.c_void_p(place),
+            *again,
+        )
+        instance, first = self._slave.component, ctypes.addressof(references)
+        return Call(bound, Native(self.SHAPE, address, instance, first, count, place))
+
     def _get(self, variable: Variable) -> Value:
         getter = getattr(self._slave, f"get{self._suffix(variable.type)}")
         return _OF_KIND[variable.kind](getter([variable.reference])[0])
@@ -247,7 +266,7 @@ class LoadedInstance(ABC):
     def _messages(self) -> list[str]:
         """What this instance logged and nobody has read yet."""
         own = re.compile(rf"\A{re.escape(self.name)}, t = \S+ s: ")  # so our FMUs begin
-        said = [own.sub("", text, count=1) for text in self._unread + self._read_log()]
+        said = [own.sub("", text, count=1) for text in (*self._unread, *self._read_log())]
         self._unread.clear()
         return [text for text in said if not _PYTHONFMU_PREFIX.match(text)] or said
 

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..errors import InputError
+from ..fmi import instance
 from ..fmi.instance import EARLY, PYTHON, STEP_2, STEP_3, TRANSFER_2, TRANSFER_3, Call, Native
 from . import loop
 
@@ -96,10 +97,11 @@ def compiled_loop() -> Callable[..., tuple[int, int, int]]:
             "install it with: pip install 'grasp-cosim[fast]'"
         ) from error
     _register()
-    before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(_cache())
+    before = numba.config.CACHE_DIR
     try:
+        numba.config.CACHE_DIR = str(_cache())
         return numba.njit(loop.run, cache=True)  # type: ignore[no-any-return]
-    except RuntimeError:  # no folder to keep it in can be written to
+    except RuntimeError:  # the user has no home, or no folder to keep it in can be written to
         return numba.njit(loop.run)  # type: ignore[no-any-return]
     finally:
         numba.config.CACHE_DIR = before
@@ -107,7 +109,8 @@ def compiled_loop() -> Callable[..., tuple[int, int, int]]:
 
 def _cache() -> Path:
     """A folder for this very source: numba looks for changes in loop.py only."""
-    sources = b"".join(Path(f).read_bytes() for f in (__file__, loop.__file__))
+    files = (__file__, loop.__file__, instance.__file__)  # with all constants that are compiled in
+    sources = b"".join(Path(f).read_bytes() for f in files)
     base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(base, "grasp-cosim", hashlib.sha256(sources).hexdigest()[:16])
 
@@ -204,7 +207,9 @@ def _register() -> None:
                 return np.float64(carray(at, 1, np.float32)[0])
             if code == 1:
                 return np.float64(carray(at, 1, np.int8)[0])
-            if code == 2 or code == 9:
+            if code == 9:  # C takes any byte but 0 for true
+                return 1.0 if carray(at, 1, np.uint8)[0] else 0.0
+            if code == 2:
                 return np.float64(carray(at, 1, np.uint8)[0])
             if code == 3:
                 return np.float64(carray(at, 1, np.int16)[0])

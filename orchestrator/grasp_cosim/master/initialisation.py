@@ -15,7 +15,7 @@ from ..errors import InputError, choices
 from ..fmi.instance import Instance
 from ..system.checks import wire_transform
 from ..system.description import System
-from ..system.interface import Value
+from ..system.interface import Value, Variable
 from ..system.parts import Initialisation, Port, Wire
 from .scenario import INITIAL
 
@@ -128,15 +128,17 @@ class Propagation:
         """Newton's method for the inputs that were cut; iterations and relative residual."""
         cuts = self.order.cuts
         x = np.array([self._start(port) for port in cuts])
+        nominal = np.array([self._variable(port).nominal for port in cuts])
         for count in range(1, choice.iterations + 1):
             g = self._evaluate(x)
-            residual = float(np.max(np.abs(g - x) / np.maximum(1.0, np.abs(g))))
+            residual = float(np.max(np.abs(g - x) / np.maximum(nominal, np.abs(g))))
             if not np.isfinite(residual):
                 break
-            if residual <= choice.tolerance:
+            # A start value is not taken for the solution because both are small.
+            if residual <= choice.tolerance and (count > 1 or not residual):
                 return count, residual
             try:
-                x = x - np.linalg.solve(self._slope(x, g) - np.eye(len(x)), g - x)
+                x = x - np.linalg.solve(self._slope(x, g, nominal) - np.eye(len(x)), g - x)
             except np.linalg.LinAlgError:
                 break
         raise InputError(
@@ -145,13 +147,16 @@ class Propagation:
         )
 
     def _slope(
-        self, x: npt.NDArray[np.float64], g: npt.NDArray[np.float64]
+        self,
+        x: npt.NDArray[np.float64],
+        g: npt.NDArray[np.float64],
+        nominal: npt.NDArray[np.float64],
     ) -> npt.NDArray[np.float64]:
         """The derivatives of what comes back at the cuts, by what is put in there."""
         columns = []
         for i in range(len(x)):
             moved = x.copy()
-            moved[i] += DIFFERENCE * max(1.0, abs(x[i]))
+            moved[i] += DIFFERENCE * max(nominal[i], abs(x[i]))
             columns.append((self._evaluate(moved) - g) / (moved[i] - x[i]))
         return np.array(columns).T
 
@@ -212,12 +217,14 @@ class Propagation:
             f"{choices(dict.fromkeys(found))} that the FMUs' dependencies do not show; {_advice()}"
         )
 
+    def _variable(self, port: Port) -> Variable:
+        return self._instances[port.component].interface.by_name[port.variable]
+
     def _kind(self, port: Port) -> str:
-        return self._instances[port.component].interface.by_name[port.variable].kind
+        return self._variable(port).kind
 
     def _start(self, port: Port) -> float:
-        instance = self._instances[port.component]
-        return float(instance.get([instance.interface.by_name[port.variable]])[0])
+        return float(self._instances[port.component].get([self._variable(port)])[0])
 
 
 def _described(system: System, loops: Sequence[Sequence[Port]]) -> str:

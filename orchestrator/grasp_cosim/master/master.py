@@ -16,7 +16,7 @@ from ..errors import InputError, SimulationError
 from ..fmi.instance import DISCARD, EARLY, Instance
 from ..recording.result import Rejection
 from ..system.description import System
-from ..system.parts import NANOSECONDS
+from ..system.parts import NANOSECONDS, Port
 from . import loop
 from .engine import Engine, make_loop
 from .initialisation import Propagation, order_ports
@@ -76,7 +76,10 @@ class Master:
         for instance in self.instances:
             instance.exit_initialization()
         for port, slot in self.slots.items():
-            self.values[slot] = float(propagation.values[port])
+            value = propagation.values[port]
+            if isinstance(value, int) and abs(value) >= loop.EXACT:
+                raise InputError(_too_long(port, value, 0))
+            self.values[slot] = float(value)
         self._receive(np.zeros(1, np.int64), self.values[np.newaxis])
 
     def advance(self, steps: int) -> int:
@@ -112,7 +115,7 @@ class Master:
         """Make good for a step that was rejected; any other bad status ends the run."""
         kind, call, _, period, _ = self.plan.operations[operation]
         if status == loop.TOO_LONG:
-            raise SimulationError(self._too_long(step, operation))
+            raise SimulationError(_too_long(*self._longest(step, operation)))
         if status == loop.RAISED:
             raise self.plan.raised.pop()
         instance = self.instances[self.plan.owners[call]]
@@ -124,14 +127,19 @@ class Master:
         known = self.rejections.get(instance.name, Rejection(0, begin))
         self.rejections[instance.name] = Rejection(known.count + 1, known.first)
 
-    def _too_long(self, step: int, operation: int) -> str:
+    def _longest(self, step: int, operation: int) -> tuple[Port, int, int]:
+        """The port whose value the operation refused, the value, and the number of its row."""
         _, first, last, _, _ = self.plan.operations[operation]
         buffers = self.plan.buffers
         for buffer, index, slot in self.plan.casts[first:last]:
-            if abs(int(value := buffers[buffer][index])) >= loop.EXACT:
+            if abs(value := int(buffers[buffer][index])) >= loop.EXACT:
                 port = next(p for p, s in self.slots.items() if s == slot)
-                return (
-                    f"{port} = {value} at step {step}: must be smaller than 2**53 in magnitude, "
-                    "to be exact as a float64"
-                )
+                return port, value, step + 1
         raise AssertionError("no value is too long")  # pragma: no cover
+
+
+def _too_long(port: Port, value: int, step: int) -> str:
+    return (
+        f"{port} = {value} at step {step}: must be smaller than 2**53 in magnitude, "
+        "to be exact as a float64"
+    )

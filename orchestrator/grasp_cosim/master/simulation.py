@@ -43,6 +43,7 @@ class Session:
         self._memory = MemoryListener(every)
         self._wall_time = 0.0
         self._failed = False
+        self._closed = False
         self._stack = ExitStack()
         try:
             instances = [self._loaded(component) for component in system.components]
@@ -73,6 +74,7 @@ class Session:
 
         SimulationError, with the result, where a listener fails at its end.
         """
+        self._closed = True
         try:
             self._stack.close()
         except SimulationError as error:
@@ -93,17 +95,31 @@ class Session:
     def step(self, steps: int = 1) -> bool:
         """Do a number of communication steps, fewer at the end; False if none was left to do.
 
-        SimulationError, with what was recorded as its result, where an FMU fails.
+        SimulationError, with what was recorded as its result, where an FMU fails. After that, and
+        after an interruption such as Ctrl-C, the FMUs are not at one time: InputError.
         """
         start = time.perf_counter()
         try:
-            return self._master.advance(steps) > 0
-        except SimulationError as error:
-            self._failed = True
-            error.result = self.result()
-            raise
+            with self._in_use():
+                return self._master.advance(steps) > 0
         finally:
             self._wall_time += time.perf_counter() - start
+
+    @contextmanager
+    def _in_use(self) -> Iterator[None]:
+        """Refuses a session whose FMUs must not be called; whatever is raised inside breaks it."""
+        if self._closed or self._failed:
+            state = "closed" if self._closed else "broken off by a failure or an interruption"
+            raise InputError(f"{self.system.name}: the session is {state}; must be a new one")
+        try:
+            yield
+        except InputError:  # which was found before any FMU was called
+            raise
+        except BaseException as error:
+            self._failed = True
+            if isinstance(error, SimulationError):
+                error.result = self.result()
+            raise
 
     def __getitem__(self, name: str) -> float:
         """The value now of an output or a wired input, by a name like 'plant.gap[1]'.
@@ -119,9 +135,11 @@ class Session:
     def set(self, name: str, value: Value) -> None:
         """Set a tunable parameter or an input without a wire, from now on.
 
-        InputError where there is none of that name, or where the value does not fit.
+        InputError where there is none of that name, or where the value does not fit; errors of
+        FMUs as of step().
         """
-        self._master.scenario.set(name, value, self._master.steps_done)
+        with self._in_use():
+            self._master.scenario.set(name, value, self._master.steps_done)
 
     def result(self) -> Result:
         """What was recorded until now."""

@@ -66,7 +66,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
         return {
             **grasp_metrics(self.time, self.signals),
             "wall_time": self.wall_time,
-            "real_time_factor": simulated / self.wall_time,
+            "real_time_factor": simulated / self.wall_time if self.wall_time else 0.0,
             "steps": int(self._steps[-1]),
             "scheme": self.system.scheme,
             "step": self.system.step_ns / NANOSECONDS,

@@ -89,7 +89,13 @@ def wire_transform(system: System, wire: Wire) -> tuple[float, float]:
         raise InputError(
             f"{ends}, which cannot be converted; must be the same quantity, or {advice}"
         )
-    return found
+    factor, offset = found
+    if offset and source.relative != target.relative:
+        raise InputError(
+            f"{ends}, and only one of them is a difference (relativeQuantity); must be both, or "
+            f"{advice}"
+        )
+    return factor, 0.0 if target.relative else offset
 
 
 def remarks(system: System) -> tuple[str, ...]:

@@ -46,7 +46,9 @@ class Variable:
     type is the FMI type (Real, Float32, Int8, ...), kind what the system makes of it. dependencies
     are the inputs an output depends on directly, None where that is not declared, which means all;
     initial_dependencies the same in initialisation mode. shape is () but for an array. low and high
-    are what is declared; beyond that a value must fit into its type.
+    are what is declared; beyond that a value must fit into its type. nominal is the magnitude that
+    its values are compared with, 1 where none is declared, as FMI has it. relative says that it is
+    a difference, to which the offset of a unit does not apply.
     """
 
     name: str
@@ -63,6 +65,8 @@ class Variable:
     initial_dependencies: tuple[str, ...] | None = None
     shape: tuple[int, ...] = ()
     description: str = ""
+    nominal: float = 1.0
+    relative: bool = False
 
     @property
     def supported(self) -> bool:
@@ -281,6 +285,16 @@ def _variable(
         initial_dependencies,
         tuple(v.shape or ()),
         v.description or "",
+        abs(float(declared["nominal"] or 1.0)) or 1.0,
+        _relative(v, element),
+    )
+
+
+def _relative(v: Any, element: ElementTree.Element) -> bool:
+    """Whether it is a difference; FMPy overlooks where a variable itself says so."""
+    said = [text for e in (element, *element) if (text := e.get("relativeQuantity"))]
+    return (
+        said[0] in ("true", "1") if said else bool(getattr(v.declaredType, "relativeQuantity", 0))
     )
 
 

@@ -12,7 +12,7 @@ import fmpy
 
 from ..errors import InputError, check_fmu_file
 
-FROM_TYPE = ("unit", "displayUnit", "min", "max", "nominal")
+FROM_TYPE = ("unit", "displayUnit", "min", "max", "nominal", "relativeQuantity")
 """What a variable has from its declared type where it says nothing itself."""
 
 
