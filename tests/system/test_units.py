@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 exponents = st.tuples(*[st.integers(-4, 4)] * len(BASE))
 factors = st.floats(1e-9, 1e9) | st.floats(-1e9, -1e-9)
-offsets = st.floats(-1e3, 1e3)
+offsets = st.just(0.0) | st.floats(1e-200, 1e3) | st.floats(-1e3, -1e-200)
 values = st.just(0.0) | st.floats(1e-200, 1e6) | st.floats(-1e6, -1e-200)
 """Not so small that rounding is no longer relative, on the way through the units either."""
 LENGTH, FORCE, TEMPERATURE = (0, 1, *[0] * 6), (1, 1, -2, *[0] * 5), (*[0] * 4, 1, *[0] * 3)

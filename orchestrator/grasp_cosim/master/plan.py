@@ -17,6 +17,7 @@ from ..system.checks import wire_transform
 from ..system.description import System
 from ..system.interface import Variable
 from ..system.parts import NANOSECONDS, Port, Wire
+from .faults import FaultFunction
 from .loop import CALL, COPY, LOAD, LOAD_LONG, RAISED, SCALE, STEP, STORE
 
 NUMBERS = ("Real", "Integer", "Boolean")
@@ -24,9 +25,6 @@ NUMBERS = ("Real", "Integer", "Boolean")
 
 Operation = tuple[int, int, int, int, int]
 """Kind, first and last of its range, period and phase."""
-
-FaultFunction = Callable[[float, int], float]
-"""What a wire makes of a value at a step number."""
 
 
 @dataclass(frozen=True, slots=True)

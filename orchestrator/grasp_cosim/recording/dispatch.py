@@ -48,12 +48,13 @@ class Dispatcher:
 
     def __call__(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
         """Hand rows on; SimulationError at the first value not finite, which is the last kept."""
-        finite = np.isfinite(rows[:, self._columns])
+        outputs = rows[:, self._columns]
+        finite = np.isfinite(outputs)
         good = bool(finite.all())
         if not good:
             bad = int(finite.all(axis=1).argmin())
-            steps, rows = steps[: bad + 1], rows[: bad + 1]
-        columns = np.hstack((rows[:, self._columns], self._energy(rows)))
+            steps, rows, outputs = steps[: bad + 1], rows[: bad + 1], outputs[: bad + 1]
+        columns = np.concatenate((outputs, self._energy(rows)), axis=1)
         wanted = steps % self._every == 0
         self._pending = None
         if wanted.any():
@@ -61,8 +62,8 @@ class Dispatcher:
         if not wanted[-1]:
             self._pending = steps[-1:].copy(), columns[-1:].copy()
         if not good:
-            name = self.signals[int(finite[bad].argmin())].name
-            value = rows[bad, self._columns[finite[bad].argmin()]]
+            i = int(finite[bad].argmin())
+            name, value = self.signals[i].name, outputs[bad, i]
             raise SimulationError(f"{name} = {value} at step {steps[bad]}: must be finite")
 
     def flush(self) -> None:

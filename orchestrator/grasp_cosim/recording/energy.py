@@ -171,64 +171,80 @@ class ExchangeEnergy:
         taken in the units of the component that moves.
         """
         self.signals = tuple(bond.signal for bond in bonds)
-        self._ledgers = [_Ledger(bond, column, transforms or {}) for bond in bonds]
+        self._ledgers = [
+            (
+                [i for i, bond in enumerate(bonds) if bond.period == period],
+                _Ledger([b for b in bonds if b.period == period], column, transforms or {}),
+            )
+            for period in dict.fromkeys(bond.period for bond in bonds)
+        ]
         self._rows = 0
 
     def __call__(self, rows: Floats) -> Floats:
         """Energies as (len(rows), len(bonds)) of rows as (n, all columns)."""
-        energies = np.empty((len(rows), len(self._ledgers)))
+        energies = np.empty((len(rows), len(self.signals)))
         # The master reports values that are not finite; they are none of this function's concern.
         with np.errstate(invalid="ignore", over="ignore"):
-            for ledger, energy in zip(self._ledgers, energies.T, strict=True):
-                energy[:] = ledger.add(self._rows, rows)
+            for places, ledger in self._ledgers:
+                energies[:, places] = ledger.add(self._rows, rows)
         self._rows += len(rows)
         return energies
 
 
 class _Ledger:
-    """The sums of one bond, up to the last row."""
+    """The sums of some bonds of the same period, up to the last row; a column for each."""
 
     def __init__(
         self,
-        bond: Bond,
+        bonds: Sequence[Bond],
         column: Mapping[Port, int],
         transforms: Mapping[Port, tuple[float, float]],
     ) -> None:
-        self._period, self._scale = bond.period, bond.scale
-        self._held, self._position = column[bond.force], column[bond.position]
-        self._source, self._seen = column[bond.source], column[bond.seen or bond.position]
-        self._of_force = transforms.get(bond.force, IDENTITY)
-        self._of_seen = transforms.get(bond.seen, IDENTITY) if bond.seen else IDENTITY
-        self._moved = self._answered = (np.empty(0), np.empty(0))
-        self._total = 0.0
+        self._period = bonds[0].period
+        self._scale = np.array([bond.scale for bond in bonds])
+        self._held, self._position, self._source, self._seen = np.array(
+            [
+                [column[port] for port in (b.force, b.position, b.source, b.seen or b.position)]
+                for b in bonds
+            ]
+        ).T
+        of_force = [transforms.get(bond.force, IDENTITY) for bond in bonds]
+        of_seen = [transforms.get(bond.seen, IDENTITY) if bond.seen else IDENTITY for bond in bonds]
+        self._of_force, self._of_seen = np.array(of_force).T, np.array(of_seen).T
+        self._of_seen[0, self._of_seen[0] == 0.0] = np.inf  # hides all motion
+        none = np.empty((0, len(bonds)))
+        self._moved = self._answered = (none, none)
+        self._total = np.zeros((1, len(bonds)))
 
     def add(self, first: int, rows: Floats) -> Floats:
-        """The energy at each of the rows, which are those of the steps from first on."""
-        earned = np.zeros(len(rows))
-        held = np.concatenate([self._moved[0], rows[:, self._held]])
-        position = np.concatenate([self._moved[1], rows[:, self._position]])
-        _add_last(earned, held[1:] * np.diff(position))
+        """The energies at each of the rows, which are those of the steps from first on."""
+        earned = np.zeros((len(rows), len(self._scale)))
+        held = np.concatenate((self._moved[0], rows[:, self._held]))
+        position = np.concatenate((self._moved[1], rows[:, self._position]))
+        _add_last(earned, held[1:] * (position[1:] - position[:-1]))
         # A source with a step of its own answers for what it saw at the ends of that step.
         ends = slice(-first % self._period, None, self._period)
-        force = np.concatenate([self._answered[0], self._forces(rows[ends])])
-        seen = np.concatenate([self._answered[1], self._positions(rows[ends])])
-        _add_last(earned[ends], -0.5 * (force[1:] + force[:-1]) * np.diff(seen))
+        force = np.concatenate((self._answered[0], self._forces(rows[ends])))
+        seen = np.concatenate((self._answered[1], self._positions(rows[ends])))
+        _add_last(earned[ends], -0.5 * (force[1:] + force[:-1]) * (seen[1:] - seen[:-1]))
         self._moved = held[-1:], position[-1:]
         self._answered = force[-1:], seen[-1:]
         # One sum after the other from the carried total on: the same bits for any blocks.
-        total = np.cumsum(np.concatenate([[self._total], self._scale * earned]))
-        self._total = float(total[-1])
+        total = np.cumsum(np.concatenate((self._total, self._scale * earned)), axis=0)
+        self._total = total[-1:]
         return total[1:]
 
     def _forces(self, rows: Floats) -> Floats:
-        """What the source puts out, in the unit of the held force."""
+        """What the sources put out, in the units of the held forces."""
         factor, offset = self._of_force
-        return factor * rows[:, self._source] + offset
+        forces: Floats = factor * rows[:, self._source] + offset
+        return forces
 
     def _positions(self, rows: Floats) -> Floats:
-        """What the source has seen, in the unit of the position; a factor of 0 hides all motion."""
+        """What the sources have seen, in the units of the positions."""
         factor, offset = self._of_seen
-        return (rows[:, self._seen] - offset) / factor if factor else np.zeros(len(rows))
+        positions: Floats = (rows[:, self._seen] - offset) / factor
+        return positions
 
 
 def _add_last(sums: Floats, changes: Floats) -> None:
