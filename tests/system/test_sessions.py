@@ -3,10 +3,11 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from fmi.instances import KINDS, interrupted_after
 from fmi.test_rejected_steps import alone
-from grasp_cosim import InputError, SimulationError, simulate
+from grasp_cosim import InputError, SimulationError, System, simulate
 from grasp_cosim.master.engine import Engine
 from grasp_cosim.system.parts import Isolation
 from native_fmus import needs_gcc
@@ -68,3 +69,17 @@ def test_a_session_that_has_not_stepped_has_metrics(tmp_path: Path) -> None:
     with simulate.session(alone(tmp_path, "3.0", "none")) as session:
         metrics = session.result().metrics
     assert (metrics["steps"], metrics["real_time_factor"]) == (0, 0.0)
+
+
+@pytest.mark.parametrize("steps", [0, -1, 1.5, True, 2**63])
+def test_steps_are_counted_in_whole_numbers(grasp: System, steps: int) -> None:
+    with simulate.session(grasp, stop=0.01) as session:
+        with pytest.raises(InputError, match=r"steps = .*: must be a whole number from 1 to"):
+            session.step(steps)
+        assert session.step(np.int64(3))  # type: ignore[arg-type]
+        assert session.time == 3e-4
+
+
+def test_an_engine_that_does_not_exist_is_refused(grasp: System) -> None:
+    with pytest.raises(InputError, match="engine = 'complied': must be one of auto, python, comp"):
+        simulate(grasp, stop=1e-3, engine="complied")  # type: ignore[arg-type]

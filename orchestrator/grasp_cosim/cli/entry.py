@@ -1,5 +1,7 @@
 """From a command line to an exit code."""
 
+import errno
+import os
 import sys
 from typing import NoReturn
 
@@ -8,6 +10,9 @@ import click
 from ..errors import InputError, SimulationError
 from . import evaluate, fmus, qualify, report, run, ssp
 from .frame import FAILED, INTERRUPTED, WRONG, cli, fail
+
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EIO)
+"""Errors of a disk, not of the input."""
 
 COMMANDS = (
     run.run,
@@ -25,7 +30,21 @@ for command in COMMANDS:
 
 def entry() -> NoReturn:
     """The command grasp-cosim."""
-    sys.exit(main(sys.argv[1:]))
+    _keep_output_for_us()
+    code = main(sys.argv[1:])
+    try:
+        sys.stdout.close()
+    except OSError as error:
+        code = fail(f"standard output: {error.strerror}", FAILED)
+    sys.exit(code)
+
+
+def _keep_output_for_us() -> None:
+    """What the binary of an FMU prints goes to standard error: with --json, we alone may print."""
+    sys.stdout.flush()
+    ours = os.dup(1)
+    os.dup2(2, 1)
+    sys.stdout = os.fdopen(ours, "w", encoding=sys.stdout.encoding, errors=sys.stdout.errors)
 
 
 def main(arguments: list[str]) -> int:
@@ -45,7 +64,7 @@ def main(arguments: list[str]) -> int:
         return fail(str(error), WRONG, debug)
     except OSError as error:
         text = f"{error.filename}: {error.strerror}" if error.filename else str(error)
-        return fail(text, WRONG, debug)
+        return fail(text, FAILED if error.errno in FULL else WRONG, debug)
     except SimulationError as error:
         return fail(str(error), FAILED, debug)
     except (KeyboardInterrupt, click.Abort):

@@ -10,7 +10,7 @@ from ..errors import InputError, SimulationError
 from ..figures.plot import check_plot
 from ..grasp import CASES
 from ..master.engine import ENGINES, Engine
-from ..master.simulation import simulate
+from ..master.simulation import MOST, simulate
 from ..recording.mdf import check_mdf
 from ..recording.result import Result
 from ..study.metrics import LABELS
@@ -31,7 +31,9 @@ from .step_study import run_step_study
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for signals.csv and run.json.")
 @click.option("--plot", is_flag=True, help="Draw grasp.png, in --out or the current folder.")
 @click.option("--mdf", is_flag=True, help="Write signals.mf4 (ASAM MDF 4) too; needs --out.")
-@click.option("--every", type=click.IntRange(1), default=1, help="Record each N-th step only.")
+@click.option(
+    "--every", type=click.IntRange(1, MOST), default=1, help="Record each N-th step only."
+)
 @click.option("--engine", type=click.Choice(ENGINES), default="auto", show_default=True)
 @click.option(
     "--step-study", is_flag=True, help="Repeat the run over steps: is --step small enough?"
@@ -84,6 +86,8 @@ def run(
     except SimulationError as error:
         if error.result:
             _write(error.result, out, plot, mdf)
+            if out:
+                click.echo(f"kept what was recorded, in {out}", err=True)
         raise
     _write(result, out, plot, mdf)
     for line in result.log[len(chosen.notes) :]:

@@ -6,6 +6,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from ..errors import InputError, choices
 from . import loop
 from .compiled import Calls, buffer_table, compiled_loop
 from .plan import Plan
@@ -22,6 +23,8 @@ def make_loop(plan: Plan, engine: Engine) -> Loop:
 
     InputError where it is to be compiled and numba is not installed.
     """
+    if engine not in ENGINES:
+        raise InputError(f"engine = {engine!r}: must be one of {choices(ENGINES)}")
     if engine == "compiled" or (engine == "auto" and has_numba()):
         return _compiled(plan)
     return _interpreted(plan)

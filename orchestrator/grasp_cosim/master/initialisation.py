@@ -118,8 +118,8 @@ class Propagation:
                 )
         count, residual = self._solve(choice)
         lines = [
-            f"{_described(self.system, [path])}: iterated {count} times at t = 0, to a relative "
-            f"residual of {residual:.1e}"
+            f"{_described(self.system, [path])}: solved in {count} iteration"
+            f"{'' if count == 1 else 's'}, to a relative residual of {residual:.1e}"
             for path in order.loops
         ]
         return lines + self._check_dependencies()

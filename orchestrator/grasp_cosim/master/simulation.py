@@ -5,6 +5,7 @@ import threading
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from numbers import Integral
 
 from tqdm import tqdm
 
@@ -22,6 +23,9 @@ from ..system.parts import NANOSECONDS, Component, Port
 from .engine import Engine
 from .master import Master
 
+MOST = 2**62
+"""The highest number of steps, far beyond the longest run."""
+
 LOOK = 0.1
 """s of wall time between two looks at the progress bar and at Ctrl-C."""
 
@@ -37,8 +41,7 @@ class Session:
         engine: Engine = "auto",
     ) -> None:
         """Load and initialise; see simulate() for the arguments and errors."""
-        if isinstance(every, bool) or not isinstance(every, int) or every < 1:
-            raise InputError(f"every = {every!r}: must be a whole number from 1 on")
+        _check_count("every", every)
         self.system = system
         self._memory = MemoryListener(every)
         self._wall_time = 0.0
@@ -98,10 +101,11 @@ class Session:
         SimulationError, with what was recorded as its result, where an FMU fails. After that, and
         after an interruption such as Ctrl-C, the FMUs are not at one time: InputError.
         """
+        _check_count("steps", steps)
         start = time.perf_counter()
         try:
             with self._in_use():
-                return self._master.advance(steps) > 0
+                return self._master.advance(int(steps)) > 0
         finally:
             self._wall_time += time.perf_counter() - start
 
@@ -160,8 +164,7 @@ class Session:
     def _log(self) -> tuple[str, ...]:
         master = self._master
         rejected = (
-            f"{name}: {r.count} steps were rejected and taken in parts, the first at "
-            f"t = {r.first:.9g} s"
+            f"{name}: rejected steps, taken in parts: {r.count}, the first at t = {r.first:.9g} s"
             for name, r in master.rejections.items()
         )
         pending = master.scenario.pending() if self.complete else ()
@@ -221,6 +224,11 @@ class Simulate:
 
 
 simulate = Simulate()
+
+
+def _check_count(name: str, count: object) -> None:
+    if isinstance(count, bool) or not isinstance(count, Integral) or not 1 <= int(count) <= MOST:
+        raise InputError(f"{name} = {count!r}: must be a whole number from 1 to {MOST}")
 
 
 def _drive(session: Session, progress: bool) -> None:

@@ -32,11 +32,12 @@ class Run:
     settings: Mapping[str, Any]
 
 
-def load_run(folder: Path) -> Run:
+def load_run(folder: str | Path) -> Run:
     """The run in a folder that `run --out` wrote.
 
     InputError where a file is missing or damaged, or the two files are not of the same run.
     """
+    folder = Path(folder)
     settings = _settings(folder / SETTINGS)
     names, table = _table(folder / SIGNALS)
     units, types = settings["units"], settings.get("types", {})

@@ -49,15 +49,19 @@ def check_wires(system: System) -> None:
     outputs = [
         str(Port(c.name, v.name)) for c in system.components for v in c.interface.of("output")
     ]
-    for component in system.components:
-        for variable in component.interface.of("input"):
-            port = Port(component.name, variable.name)
-            given = port in sources or variable.name in component.values
-            if variable.supported and not given:
-                raise InputError(
-                    f"{system.name}: input {port} has no source; wire one of {choices(outputs)} "
-                    f"to it, or give it a value: --set {port}=VALUE, or in the system file"
-                )
+    missing = [
+        Port(component.name, variable.name)
+        for component in system.components
+        for variable in component.interface.of("input")
+        if variable.supported and variable.name not in component.values
+    ]
+    if missing := [port for port in missing if port not in sources]:
+        plural = len(missing) > 1
+        raise InputError(
+            f"{system.name}: input{'s' * plural} {choices(missing)} {'have' if plural else 'has'} "
+            f"no source; wire one of {choices(outputs)} to {'each' if plural else 'it'}, or give "
+            f"it a value: --set {missing[0]}=VALUE, or in the system file"
+        )
 
 
 def wire_transform(system: System, wire: Wire) -> tuple[float, float]:
