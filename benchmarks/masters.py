@@ -40,24 +40,24 @@ MODULES = {"ecospy": "ecospy", "libcosimpy": "libcosimpy", "cofmupy": "cofmupy"}
 
 
 class Case(NamedTuple):
-    """What is measured: with which FMUs, how many macro steps to a chunk, and on one core only?"""
+    """What is measured: the FMUs, macro steps to a chunk, chunks of each master, one core only?"""
 
     title: str
     native: bool
     steps: int
+    rounds: int
     one_core: bool
 
 
 CASES = (
-    Case("Python FMUs, all cores", False, 300, False),
-    Case("Python FMUs, one core", False, 300, True),
-    Case("native FMUs, all cores", True, 1000, False),
+    Case("Python FMUs, all cores, long chunks", False, 5000, 10, False),
+    Case("Python FMUs, all cores", False, 300, 60, False),
+    Case("Python FMUs, one core", False, 300, 60, True),
+    Case("native FMUs, all cores", True, 1000, 60, False),
 )
 """ecospy and libcosimpy step their instances in several threads, which a Python FMU makes wait for
-one another: there one core can be faster than two.
+one another: there one core can be faster than two, and a long chunk slower than a short one.
 """
-
-ROUNDS = 60
 
 
 class Cost(NamedTuple):
@@ -135,7 +135,7 @@ def measure(masters: dict[str, str], folder: Path, case: Case) -> dict[str, Cost
             workers.append(Worker(python, name, folder, case.one_core))
             stack.callback(workers[-1].close)
         times: dict[str, list[float]] = {worker.name: [] for worker in workers}
-        for _ in range(ROUNDS):
+        for _ in range(case.rounds):
             for worker in workers:
                 times[worker.name].append(worker.chunk(case.steps))
         for worker in workers:
