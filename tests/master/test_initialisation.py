@@ -67,6 +67,14 @@ def test_a_linear_loop_is_solved_and_said(mock: Make) -> None:
     assert "algebraic loop at t = 0: a.u -> a.y -> b.u -> b.y -> a.u: solved in " in line
 
 
+def test_a_loop_that_any_value_solves_keeps_its_start_and_says_so(mock: Make) -> None:
+    started = run([mock("a", through), mock("b", through)], ["ab", "ba"])
+    started.master.initialise()
+    assert started.signals()["a.y"] == [0.0]
+    (line,) = started.master.log
+    assert "a.u: its start values solve it and are kept, to a relative residual of 0" in line
+
+
 def test_a_nonlinear_loop_is_solved(mock: Make) -> None:
     """y = 2 - u^3, u = y has the solution 1."""
     started = run([mock("a", lambda u, t: 2.0 - u**3), mock("b", through)], ["ab", "ba"])

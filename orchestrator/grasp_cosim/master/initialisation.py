@@ -118,8 +118,8 @@ class Propagation:
                 )
         count, residual = self._solve(choice)
         lines = [
-            f"{_described(self.system, [path])}: solved in {count} iteration"
-            f"{'' if count == 1 else 's'}, to a relative residual of {residual:.1e}"
+            f"{_described(self.system, [path])}: {_solution(count)}, to a "
+            f"relative residual of {residual:.1e}"
             for path in order.loops
         ]
         return lines + self._check_dependencies()
@@ -136,7 +136,7 @@ class Propagation:
                 break
             # A start value is not taken for the solution because both are small.
             if residual <= choice.tolerance and (count > 1 or not residual):
-                return count, residual
+                return count - 1, residual
             try:
                 x = x - np.linalg.solve(self._slope(x, g, nominal) - np.eye(len(x)), g - x)
             except np.linalg.LinAlgError:
@@ -225,6 +225,13 @@ class Propagation:
 
     def _start(self, port: Port) -> float:
         return float(self._instances[port.component].get([self._variable(port)])[0])
+
+
+def _solution(iterations: int) -> str:
+    """Other values may solve a loop that its start values solve: that they were kept is said."""
+    if not iterations:
+        return "its start values solve it and are kept"
+    return f"solved in {iterations} iteration{'' if iterations == 1 else 's'}"
 
 
 def _described(system: System, loops: Sequence[Sequence[Port]]) -> str:
