@@ -1,5 +1,6 @@
 """The interpreted and the compiled loop give the same bits, the same errors, the same rows."""
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
@@ -159,3 +160,17 @@ def test_what_was_compiled_from_other_constants_is_not_taken(
     changed.write_text(Path(instance.__file__).read_text().replace("EARLY = 6", "EARLY = 7"))
     monkeypatch.setattr(instance, "__file__", str(changed))
     assert compiled._cache() != before
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_value_that_is_not_finite_at_t_0_is_kept_too(
+    tmp_path: Path, engine: Engine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mock = Mock(tmp_path, "a", lambda u, t: math.nan)
+    monkeypatch.setattr("grasp_cosim.master.simulation.load", lambda component: mock)
+    with pytest.raises(SimulationError, match=r"^a\.y = nan at step 0: must be finite") as caught:
+        simulate(make_system([mock], []), engine=engine)
+    assert caught.value.result is not None
+    assert caught.value.result.time.tolist() == [0.0]
+    assert not caught.value.result.complete
+    assert mock.calls[-1] == "close"

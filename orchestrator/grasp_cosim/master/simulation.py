@@ -55,9 +55,18 @@ class Session:
                 system, self._master.slots, (self._memory, *listeners), every
             )
             self._stack.callback(lambda: self._dispatch.end(self.complete))
-            self._master.initialise()
+            self._initialise()
         except BaseException:
             self._stack.close()
+            raise
+
+    def _initialise(self) -> None:
+        """SimulationError, with the row of t = 0 as its result, where that is not finite."""
+        try:
+            self._master.initialise()
+        except SimulationError as error:
+            self._failed = True
+            error.result = self.result()
             raise
 
     def _loaded(self, component: Component) -> Instance:
