@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from ..errors import InputError, choices
 from ..fmi.instance import Instance
-from ..system.checks import wire_transform
+from ..system.checks import transforms
 from ..system.description import System
 from ..system.interface import Value, Variable
 from ..system.parts import Initialisation, Port, Wire
@@ -92,11 +92,7 @@ class Propagation:
         self.values: dict[Port, Value] = {}
         self._instances = {instance.name: instance for instance in instances}
         self._wires = {wire.target: wire for wire in system.wires}
-        self._transforms = {
-            wire.target: wire_transform(system, wire)
-            for wire in system.wires
-            if self._kind(wire.target) != "String"
-        }
+        self._transforms = transforms(system)
         self._faults = faults
 
     def run(self) -> list[str]:

@@ -43,7 +43,7 @@ class Master:
     ) -> None:
         self.system = system
         self.instances = tuple(instances)
-        self.total_steps = system.stop_ns // system.step_ns
+        self.total_steps = system.total_steps
         self.steps_done = 0
         self.rejections: dict[str, Rejection] = {}
         self.log: list[str] = []

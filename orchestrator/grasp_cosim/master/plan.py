@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..fmi.instance import Call, Instance, dtype
-from ..system.checks import wire_transform
+from ..system.checks import transforms
 from ..system.description import System
 from ..system.interface import Variable
 from ..system.parts import NANOSECONDS, Port, Wire
@@ -87,6 +87,7 @@ class Planner:
         self.view: Any = memoryview(values)  # type: ignore[arg-type]  # numpy's stubs for 3.11
         self.faults = faults
         self.before_step = before_step
+        self.transforms = transforms(system)
         self.clock = np.zeros(2)
         self.operations: list[Operation] = []
         self.wires: list[tuple[int, int, float, float]] = []
@@ -103,7 +104,7 @@ class Planner:
         names = [component.name for component in self.system.components]
         if self.system.scheme == "sequential":
             for name in names:
-                last = self._period(name) - 1
+                last = self.system.period(name) - 1
                 self._move(name, last)
                 self._transfer(name, "input", last)
                 self._step(name)
@@ -127,20 +128,15 @@ class Planner:
             self.raised,
         )
 
-    def _period(self, name: str) -> int:
-        own = self.system.component(name, name).step_ns
-        return 1 if own is None else own // self.system.step_ns
-
     def _move(self, name: str, phase: int) -> None:
         """The wires that end at a component, then their faults."""
-        period = self._period(name)
+        period = self.system.period(name)
         wires = [wire for wire in self.system.wires if wire.target.component == name]
         numbers = [wire for wire in wires if wire.target in self.slots]
-        transforms = {wire.target: wire_transform(self.system, wire) for wire in numbers}
         for kind in (COPY, SCALE):
             first = len(self.wires)
             for wire in numbers:
-                transform = transforms[wire.target]
+                transform = self.transforms[wire.target]
                 if (transform == (1.0, 0.0)) == (kind == COPY):
                     ends = self.slots[wire.source], self.slots[wire.target]
                     self.wires.append((*ends, *transform))
@@ -176,7 +172,7 @@ class Planner:
 
     def _step(self, name: str) -> None:
         """Advance a component and fetch its outputs, at the end of its own step."""
-        period = self._period(name)
+        period = self.system.period(name)
         step = period * self.system.step_ns / NANOSECONDS
         call = self.instances[name].stepper(self.clock, step)
         self._call(STEP, call, name, period, period - 1)
@@ -184,7 +180,7 @@ class Planner:
 
     def _transfer(self, name: str, causality: str, phase: int) -> None:
         """Pass all wired inputs, or fetch all outputs, a call per FMI type."""
-        instance, period = self.instances[name], self._period(name)
+        instance, period = self.instances[name], self.system.period(name)
         for fmi_type, variables in _by_type(instance, causality):
             taken = [v for v in variables if Port(name, v.name) in self.slots]
             if not taken:

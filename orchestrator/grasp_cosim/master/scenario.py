@@ -129,9 +129,7 @@ class _PendingEvent:
     ) -> None:
         self.name = name
         self.event = event
-        components = [system.component(port.component, name) for port in event.set]
-        self._period = math.lcm(*((c.step_ns or system.step_ns) for c in components))
-        self._period //= system.step_ns
+        self._period = math.lcm(*(system.period(port.component) for port in event.set))
         self._first = first_step(event.at_ns or 0, system.step_ns)
         self._calls: dict[str, tuple[Instance, list[Variable], list[Value]]] = {}
         by_name = {instance.name: instance for instance in instances}

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..errors import SimulationError
-from ..system.checks import wire_transform
+from ..system.checks import transforms
 from ..system.description import System
 from ..system.parts import Port
 from .energy import ExchangeEnergy, bonds
@@ -32,12 +32,7 @@ class Dispatcher:
         self._every = every
         self._outputs = _outputs(system, slots)
         self._columns = np.array([slots[port] for port in self._outputs], np.intp)
-        transforms = {
-            wire.target: wire_transform(system, wire)
-            for wire in system.wires
-            if wire.target in slots
-        }
-        self._energy = ExchangeEnergy(bonds(system), slots, transforms)
+        self._energy = ExchangeEnergy(bonds(system), slots, transforms(system))
         self.signals = (*self._outputs.values(), *self._energy.signals)
         self._pending: tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]] | None = None
         with ExitStack() as begun:

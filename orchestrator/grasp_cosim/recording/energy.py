@@ -122,7 +122,7 @@ def _bond(system: System, component: Component, force: Variable) -> Bond | None:
         wire.source,
         place,
         _seen(system, place, source),
-        (source.step_ns or system.step_ns) // system.step_ns,
+        system.period(source.name),
         float(np.prod(factors)),  # type: ignore[arg-type]  # no None is left in it
     )
 

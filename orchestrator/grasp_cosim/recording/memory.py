@@ -27,7 +27,7 @@ class MemoryListener:
         self._system, self._signals = system, tuple(signals)
         self._steps = np.empty(0, np.int64)
         self._table = np.empty((0, len(signals)))
-        total = system.stop_ns // system.step_ns
+        total = system.total_steps
         try:
             self._grow(total // self._every + 2)  # t = 0, and the last one besides every n-th
         except MemoryError:

@@ -102,6 +102,11 @@ def wire_transform(system: System, wire: Wire) -> tuple[float, float]:
     return factor, 0.0 if target.relative else offset
 
 
+def transforms(system: System) -> dict[Port, tuple[float, float]]:
+    """Factor and offset of every wire, by its target: see wire_transform()."""
+    return {wire.target: wire_transform(system, wire) for wire in system.wires}
+
+
 def remarks(system: System) -> tuple[str, ...]:
     """What a user should know of a system that is valid, a line each.
 

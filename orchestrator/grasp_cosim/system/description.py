@@ -72,6 +72,16 @@ class System:
 
         return read_toml(path, Path(fmus) if fmus else None).with_experiment(step, stop)
 
+    @property
+    def total_steps(self) -> int:
+        """The number of communication steps from 0 to the stop time."""
+        return self.stop_ns // self.step_ns
+
+    def period(self, name: str) -> int:
+        """The own step of the component of that name, in communication steps of the system."""
+        own = self.component(name, name).step_ns
+        return 1 if own is None else own // self.step_ns
+
     def component(self, name: str, place: str) -> Component:
         """The component of that name; place says who asks, for the error message."""
         for component in self.components:
