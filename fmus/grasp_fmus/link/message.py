@@ -1,0 +1,167 @@
+"""Datagrams: a header of 80 bytes, a body, and where a key is shared 32 bytes of HMAC-SHA256."""
+
+import hmac
+import struct
+from collections.abc import Sequence
+from math import isfinite
+from pathlib import Path
+from typing import NamedTuple
+
+from .signature import HASH_SIZE, Signature, WireVariable
+
+Value = float | int | bool | str
+
+MAGIC, VERSION = b"GRSP", 1
+HELLO, WELCOME, REFUSE, INITIALISE, STEP, OUTPUTS, END = range(1, 8)
+"""Kinds of datagrams."""
+
+OTHER_INTERFACE, BUSY, UNKNOWN, FAILED = range(1, 5)
+"""Why a peer refuses: the code of a REFUSE."""
+
+HEAD = struct.Struct(f"<4sHBB{HASH_SIZE}sQQQddqII")
+TAG_SIZE = 32
+LARGEST = 65_507
+"""Bytes of a UDP datagram over IPv4."""
+
+STRING_SIZE = 128
+SMALLEST_KEY = 16
+"""Bytes of a shared key, at least."""
+
+MALFORMED, FORGED = "malformed", "forged"
+"""Why a datagram is none: it is not of this protocol, or its tag is not that of the key."""
+
+_CODES = {"Real": "d", "Integer": "q", "Boolean": "Q", "String": f"{STRING_SIZE}s"}
+
+
+class Message(NamedTuple):
+    """A datagram taken apart; times in s but for sent, which is in ns of the proxy's clock."""
+
+    kind: int
+    code: int
+    interface: bytes
+    session: int
+    cookie: int
+    sequence: int
+    time: float
+    step: float
+    sent: int
+    body: bytes
+
+
+class Sealer:
+    """Packs and opens datagrams, with a shared key or without."""
+
+    def __init__(self, key: bytes | None = None) -> None:
+        """ValueError where the key is too short to be one."""
+        if key is not None and len(key) < SMALLEST_KEY:
+            raise ValueError(f"key of {len(key)} bytes: must have {SMALLEST_KEY} or more")
+        self._key = key
+        self._tag_size = TAG_SIZE if key else 0
+
+    def pack(self, m: Message) -> bytes:
+        """The datagram of a message; ValueError where it would be too large."""
+        head = HEAD.pack(
+            MAGIC, VERSION, m.kind, m.code, m.interface, m.session, m.cookie, m.sequence, m.time,
+            m.step, m.sent, len(m.body), 0,
+        )  # fmt: skip
+        datagram = head + m.body
+        if len(datagram) + self._tag_size > LARGEST:
+            size = len(datagram) + self._tag_size
+            raise ValueError(f"datagram of {size} bytes: must be {LARGEST} at most")
+        return datagram + hmac.digest(self._key, datagram, "sha256") if self._key else datagram
+
+    def open(self, datagram: bytes) -> Message | str:
+        """The message of a datagram, or why it is none: MALFORMED or FORGED."""
+        end = len(datagram) - self._tag_size
+        if end < HEAD.size or len(datagram) > LARGEST:
+            return MALFORMED
+        (magic, version, kind, code, interface, session, cookie, sequence, time, step, sent, size,
+         zero) = HEAD.unpack_from(datagram)  # fmt: skip
+        if magic != MAGIC or version != VERSION:
+            return MALFORMED
+        if self._key is not None:
+            tag = hmac.digest(self._key, datagram[:end], "sha256")
+            if not hmac.compare_digest(tag, datagram[end:]):
+                return FORGED
+        if size != end - HEAD.size or zero or not HELLO <= kind <= END or not isfinite(time + step):
+            return MALFORMED
+        body = datagram[HEAD.size : end]
+        return Message(kind, code, interface, session, cookie, sequence, time, step, sent, body)
+
+
+class Codec:
+    """Values of variables as a body: Real f64, Integer i64, Boolean u64, String 128 bytes."""
+
+    def __init__(self, variables: Sequence[WireVariable]) -> None:
+        self._struct = struct.Struct("<" + "".join(_CODES[v.kind] for v in variables))
+        self._reals = [i for i, v in enumerate(variables) if v.kind == "Real"]
+        self._integers = [i for i, v in enumerate(variables) if v.kind == "Integer"]
+        self._booleans = [i for i, v in enumerate(variables) if v.kind == "Boolean"]
+        self._strings = [(i, v.name) for i, v in enumerate(variables) if v.kind == "String"]
+        self.size = self._struct.size
+
+    def pack(self, values: Sequence[Value]) -> bytes:
+        """The body of values; ValueError where a string is too long."""
+        if self._strings:
+            values = list(values)
+            for i, name in self._strings:
+                values[i] = _as_bytes(name, str(values[i]))  # type: ignore[call-overload]
+        return self._struct.pack(*values)
+
+    def unpack(self, body: bytes) -> list[Value] | None:
+        """The values of a body; None where it has another size or holds what is no value.
+
+        That is a Real that is not finite, an Integer beyond 32 bits, a Boolean other than 0 and 1,
+        a string that is not UTF-8.
+        """
+        if len(body) != self.size:
+            return None
+        values = list(self._struct.unpack(body))
+        if not isfinite(sum([values[i] for i in self._reals])) and not all(
+            isfinite(values[i]) for i in self._reals
+        ):
+            return None
+        for i in self._integers:
+            if not -(2**31) <= values[i] < 2**31:
+                return None
+        for i in self._booleans:
+            if values[i] > 1:
+                return None
+            values[i] = values[i] == 1
+        try:
+            for i, _ in self._strings:
+                values[i] = values[i].rstrip(b"\0").decode()
+        except UnicodeDecodeError:
+            return None
+        return values
+
+
+def _as_bytes(name: str, text: str) -> bytes:
+    data = text.encode()
+    if len(data) >= STRING_SIZE or "\0" in text:
+        raise ValueError(
+            f"{name} = {text!r}: must have fewer than {STRING_SIZE} bytes in UTF-8, and no NUL"
+        )
+    return data
+
+
+def read_key(path: Path) -> bytes:
+    """The key in a file, without line ends around it; OSError, or ValueError where it is short."""
+    key = path.read_bytes().strip(b"\r\n")
+    Sealer(key)
+    return key
+
+
+def check_size(signature: Signature) -> None:
+    """ValueError where the variables do not fit into a datagram."""
+    for name, variables in (("request", signature.request), ("answer", signature.answer)):
+        size = HEAD.size + Codec(variables).size + TAG_SIZE
+        if size > LARGEST:
+            raise ValueError(
+                f"a {name} with {len(variables)} variables has {size} bytes: "
+                f"must be {LARGEST} at most"
+            )
+    if HEAD.size + len(signature.text.encode()) + TAG_SIZE > LARGEST:
+        raise ValueError(
+            f"{len(signature.variables)} variables: their names must fit into {LARGEST} bytes"
+        )

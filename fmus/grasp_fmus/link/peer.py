@@ -1,0 +1,226 @@
+"""The bench's side of a session: judges requests, keeps the order, counts. No sockets.
+
+The caller does what an Action says and sends what it gets: at most one datagram for each received.
+"""
+
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from secrets import randbits
+from typing import NamedTuple
+
+from .message import (
+    BUSY,
+    END,
+    FAILED,
+    FORGED,
+    HELLO,
+    INITIALISE,
+    OTHER_INTERFACE,
+    OUTPUTS,
+    REFUSE,
+    STEP,
+    UNKNOWN,
+    WELCOME,
+    Codec,
+    Message,
+    Sealer,
+    Value,
+)
+from .signature import Signature
+
+ALIVE = 1_000_000_000
+"""ns since its last request for which a session keeps others away."""
+
+GREETED = 64
+"""The most sessions that have said HELLO and not yet begun."""
+
+
+@dataclass(slots=True)
+class PeerCounters:
+    """What was received: requests, by what became of them.
+
+    steps and initialisations: done. repeated: answered again. duplicated: steps that had come
+    already; stale: those older than the last. foreign: of another interface, or of a session that
+    is not known. malformed: no datagram of this protocol, or with values that are none. forged:
+    without the tag of the key. busy: HELLOs while another session was under way.
+    """
+
+    steps: int = 0
+    initialisations: int = 0
+    repeated: int = 0
+    duplicated: int = 0
+    stale: int = 0
+    foreign: int = 0
+    malformed: int = 0
+    forged: int = 0
+    busy: int = 0
+
+    def as_dict(self) -> dict[str, int]:
+        """The counters by name."""
+        return asdict(self)
+
+
+class Request(NamedTuple):
+    """What to do: INITIALISE, STEP or END; times in s.
+
+    values are inputs, then parameters. fresh: set the model up anew, a session begins.
+    """
+
+    kind: int
+    time: float
+    step: float
+    values: list[Value]
+    fresh: bool
+
+
+Action = Request | bytes | None
+"""A Request to do and to answer with outputs() or failed(); a datagram to send; or nothing."""
+
+
+class Peer:
+    """One bench. It serves one session at a time."""
+
+    def __init__(
+        self,
+        signature: Signature,
+        key: bytes | None = None,
+        cookie: Callable[[], int] = lambda: randbits(64) or 1,
+    ) -> None:
+        """Cookie makes numbers from 1 to 2**64 - 1 that nobody can guess.
+
+        ValueError where the key is too short.
+        """
+        self.signature = signature
+        self.counters = PeerCounters()
+        self._sealer = Sealer(key)
+        self._request = Codec(signature.request)
+        self._answer = Codec(signature.answer)
+        self._make_cookie = cookie
+        self._greeted: OrderedDict[int, int] = OrderedDict()  # cookies by session
+        self._live: tuple[int, int] | None = None  # session and cookie
+        self._heard = 0
+        self._last: Message | None = None
+        self._last_answer: bytes | None = None
+        self._stepping = False
+
+    @property
+    def stepping(self) -> bool:
+        """Whether the session under way has begun to step."""
+        return self._stepping
+
+    def receive(self, datagram: bytes, now: int) -> Action:
+        """Judge a datagram, whatever it holds; now in ns of a monotonic clock."""
+        m = self._sealer.open(datagram)
+        if isinstance(m, str):
+            return self._drop("forged" if m == FORGED else "malformed")
+        if m.kind == HELLO:
+            return self._hello(m, now)
+        if m.kind not in (INITIALISE, STEP, END):
+            return self._drop("malformed")
+        if m.interface != self.signature.hash:
+            return self._drop("foreign")
+        return self._in_session(m, now)
+
+    def outputs(self, values: list[Value], time: float) -> bytes:
+        """The answer to the last request: outputs, and the time in s that they belong to."""
+        return self._keep(OUTPUTS, 0, time, self._answer.pack(values))
+
+    def failed(self, reason: str) -> bytes:
+        """The answer to the last request where it cannot be done; the session is over."""
+        answer = self._keep(REFUSE, FAILED, 0.0, reason.encode()[:1024])
+        self._over()
+        return answer
+
+    def _drop(self, counter: str) -> Action:
+        setattr(self.counters, counter, getattr(self.counters, counter) + 1)
+        return None
+
+    def _busy(self, session: int, now: int) -> bool:
+        live = self._live
+        return live is not None and live[0] != session and now - self._heard < ALIVE
+
+    def _hello(self, m: Message, now: int) -> Action:
+        if m.sequence or m.cookie:
+            return self._drop("malformed")
+        if m.interface != self.signature.hash:
+            self.counters.foreign += 1
+            return self._refuse(m, OTHER_INTERFACE, self.signature.text.encode())
+        if m.body != self.signature.text.encode():
+            return self._drop("malformed")
+        if self._busy(m.session, now):
+            self.counters.busy += 1
+            return self._refuse(m, BUSY)
+        if self._live is not None and self._live[0] == m.session:
+            cookie = self._live[1]
+        else:
+            cookie = self._greeted.get(m.session) or self._make_cookie()
+            self._greeted[m.session] = cookie
+            if len(self._greeted) > GREETED:
+                self._greeted.popitem(last=False)
+        return self._pack(m._replace(cookie=cookie), WELCOME, 0, 0.0, b"")
+
+    def _in_session(self, m: Message, now: int) -> Action:
+        if self._live != (m.session, m.cookie):
+            return self._begin(m, now)
+        self._heard = now
+        if m.kind == END:
+            self._over()
+            return Request(END, m.time, 0.0, [], fresh=False)
+        last = self._last.sequence if self._last else 0
+        if m.sequence < last:
+            return self._drop("stale")
+        if m.sequence == last:
+            if m.kind == STEP or self._last_answer is None:
+                return self._drop("duplicated")
+            self.counters.repeated += 1
+            return self._last_answer
+        return self._do(m, fresh=False)
+
+    def _begin(self, m: Message, now: int) -> Action:
+        """The first INITIALISE of a session makes it the one under way."""
+        if self._greeted.get(m.session) != m.cookie or m.kind != INITIALISE:
+            self.counters.foreign += 1
+            return None if m.kind == END else self._refuse(m, UNKNOWN)
+        if self._busy(m.session, now):
+            self.counters.busy += 1
+            return self._refuse(m, BUSY)
+        request = self._do(m, fresh=True)
+        if isinstance(request, Request):
+            del self._greeted[m.session]
+            self._live, self._heard, self._stepping = (m.session, m.cookie), now, False
+        return request
+
+    def _do(self, m: Message, fresh: bool) -> Action:
+        values = self._request.unpack(m.body)
+        if values is None or (m.kind == STEP) != (m.step > 0.0):
+            return self._drop("malformed")
+        if m.kind == INITIALISE and self._stepping and not fresh:
+            return self._drop("malformed")
+        self._last, self._last_answer = m, None
+        if m.kind == STEP:
+            self._stepping = True
+            self.counters.steps += 1
+        else:
+            self.counters.initialisations += 1
+        return Request(m.kind, m.time, m.step, values, fresh)
+
+    def _over(self) -> None:
+        self._live, self._last, self._last_answer, self._stepping = None, None, None, False
+
+    def _refuse(self, m: Message, code: int, body: bytes = b"") -> bytes:
+        return self._pack(m, REFUSE, code, 0.0, body)
+
+    def _keep(self, kind: int, code: int, time: float, body: bytes) -> bytes:
+        assert self._last is not None  # noqa: S101 - there is a request to answer
+        self._last_answer = self._pack(self._last, kind, code, time, body)
+        return self._last_answer
+
+    def _pack(self, m: Message, kind: int, code: int, time: float, body: bytes) -> bytes:
+        """An answer to m."""
+        return self._sealer.pack(
+            Message(
+                kind, code, self.signature.hash, m.session, m.cookie, m.sequence, time, 0.0,
+                m.sent, body,
+            )
+        )  # fmt: skip
