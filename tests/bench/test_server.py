@@ -1,5 +1,6 @@
 """The bench at its port: real sockets on the loopback."""
 
+import itertools
 import json
 import os
 import random
@@ -102,25 +103,37 @@ def garbage(seed: int, legal: bytes) -> Iterator[bytes]:
             yield bytes(spoilt[: chance.randrange(len(spoilt) + 1)])
 
 
-def test_legal_traffic_is_served_among_malformed_datagrams(fmus: Path) -> None:
+@pytest.mark.slow
+@pytest.mark.parametrize("key", [None, KEY])
+def test_half_a_million_malformed_datagrams(fmus: Path, key: bytes | None) -> None:
+    """With a key and without: no crash, no growth, every legal request served."""
     fmu = fmus / "GripperPlant.fmu"
     values = requests(fmu)
     with (
-        serving(fmu, Serving(lockstep=True, key=KEY)) as server,
-        proxied(fmu, server, KEY) as proxy,
+        serving(fmu, Serving(lockstep=True, key=key)) as server,
+        proxied(fmu, server, key) as proxy,
         socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vandal,
     ):
         proxy.begin(1, values)
-        noise = garbage(1, proxy.client.step(0.0, 1e-3, values, 0))
-        for k in range(100):
-            for _ in range(100):
-                vandal.sendto(next(noise), server.address)
+        legal = bytearray(proxy.client.step(0.0, 1e-3, values, 0))
+        if key is None:
+            legal[24:40] = bytes(16)  # an outsider knows neither session nor cookie
+        noise = list(itertools.islice(garbage(1, bytes(legal)), 10_000))
+        vandal.connect(server.address)
+        blocks = 0
+        for k in range(5000):
+            for i in range(100):
+                vandal.send(noise[(100 * k + i) % len(noise)])
             proxy.step(k * 1e-3, 1e-3, values)
-        vandal.sendto(bytes(LARGEST), server.address)
-        proxy.step(0.1, 1e-3, values)
+            blocks = blocks or sys.getallocatedblocks() * (k == 1000)
+        grown = sys.getallocatedblocks() - blocks
+        vandal.send(bytes(LARGEST))
+        proxy.step(5.0, 1e-3, values)
         counters = server.bench.counters()
-    assert (counters["steps"], counters["failures"]) == (101, 0)
-    assert counters["forged"] + counters["malformed"] > 100
+    dropped = ("malformed", "forged", "foreign", "stale", "duplicated")
+    assert sum(counters[name] for name in dropped) == 500_001
+    assert (counters["steps"], counters["failures"]) == (5001, 0)
+    assert grown < 500
 
 
 def test_the_command_serves_until_it_is_interrupted(fmus: Path) -> None:
