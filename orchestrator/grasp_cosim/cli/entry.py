@@ -8,7 +8,7 @@ from typing import NoReturn
 import click
 
 from ..errors import InputError, SimulationError
-from . import evaluate, fmus, qualify, report, run, serve, ssp
+from . import evaluate, fmus, qualify, relay, report, run, serve, ssp
 from .frame import FAILED, INTERRUPTED, WRONG, cli, fail
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EIO)
@@ -21,6 +21,7 @@ COMMANDS = (
     qualify.qualify,
     ssp.ssp,
     serve.serve,
+    relay.relay,
     fmus.build,
     fmus.inspect,
     fmus.doctor,
