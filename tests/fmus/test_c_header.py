@@ -19,6 +19,7 @@ from grasp_fmus.c_header import c_header, c_prefix
 from grasp_fmus.contract import Field, declared
 from grasp_fmus.link.client import Client, Verdict
 from grasp_fmus.link.message import (
+    BUSY,
     END,
     FAILED,
     HEAD,
@@ -488,6 +489,18 @@ def test_the_oldest_of_many_greetings_is_forgotten(driver: Path) -> None:
     assert isinstance(opened, Message)
     assert (opened.kind, opened.code) == (REFUSE, UNKNOWN)
     assert records[18].event == DO_INITIALISE
+
+
+def test_of_two_that_were_greeted_the_later_one_waits(driver: Path) -> None:
+    one, other = known(session=1), known(session=2, number=1)
+    first = [one.hello(), other.hello(), one.initialise(), other.initialise()]
+    at = [*((0, d) for d in first), (ALIVE - 1, other.initialise()), (ALIVE, other.initialise())]
+    records, counters = linked(driver, [*at, (ALIVE, one.step(0.0))])
+    events = [SEND, SEND, DO_INITIALISE, SEND, SEND, DO_INITIALISE, SEND]
+    assert [r.event for r in records] == events
+    codes = [r.answer[6:8] for r in records[3:5] + records[6:]]
+    assert codes == [bytes([REFUSE, BUSY])] * 2 + [bytes([REFUSE, UNKNOWN])]
+    assert counters == PeerCounters(initialisations=2, busy=2, foreign=1)
 
 
 def test_outputs_that_are_none_fail_and_are_named(tmp_path: Path) -> None:
