@@ -442,6 +442,7 @@ INVALID: dict[str, Callable[[bytes], bytes]] = {
     "UTF-8 over-long in three": lambda b: b[:24] + b"\xe0\x9f\xbf".ljust(128, b"\0") + b[152:],
     "a surrogate": lambda b: b[:24] + b"\xed\xa0\x80".ljust(128, b"\0") + b[152:],
     "beyond Unicode": lambda b: b[:24] + b"\xf4\x90\x80\x80".ljust(128, b"\0") + b[152:],
+    "a lead byte that is none": lambda b: b[:24] + b"\xfc\x80\x80\x80".ljust(128, b"\0") + b[152:],
     "a byte less": lambda b: b[:-1],
     "a byte more": lambda b: b + b"\0",
 }
@@ -457,6 +458,22 @@ def test_no_value_is_taken_from_what_is_malformed(driver: Path, what: str) -> No
     assert (records[3].event, records[3].answer, records[3].time) == (NOTHING, b"", 0.0)
     assert (records[4].event, records[4].behind) == (DO_STEP, 0.0)
     assert counters == PeerCounters(steps=2, initialisations=1, malformed=1)
+
+
+def test_hello_is_judged_first(driver: Path) -> None:
+    """Each is malformed; the last would be one of another interface, were it not too large."""
+    session, text = Session(), EVERY_KIND.text.encode()
+    tail = struct.pack("<qII", 0, 65_428, 0) + bytes(65_428)
+    hellos = [
+        session.made(HELLO, text, sequence=1),
+        session.made(HELLO, text, cookie=1),
+        session.made(HELLO, text + b"\n"),
+        session.made(HELLO, text.replace(b"q", b"Q")),
+        session.made(HELLO, b"", interface=bytes(16))[:64] + tail,
+    ]
+    records, counters = linked(driver, [(0, hello) for hello in hellos])
+    assert [(r.event, r.answer) for r in records] == [(NOTHING, b"")] * 5
+    assert counters == PeerCounters(malformed=5)
 
 
 def test_lost_requests_are_told(driver: Path) -> None:
@@ -747,6 +764,8 @@ def test_inputs_are_made_safe_once_the_proxy_is_silent(target: Path) -> None:
     with Target(target) as bench:
         assert bench.said(bench.process.stderr) == b"safe\n"
         bench.begin(bench.values((-1.0, 1.0)))
+        assert bench.said(bench.process.stderr) == b"safe\n"
+        assert bench.ask(bench.client.step(0.0, 0.1, bench.values(), 0)) is Verdict.ANSWERED
         assert bench.said(bench.process.stderr) == b"safe\n"
 
 
