@@ -17,6 +17,7 @@ from ..study.metrics import LABELS
 from ..system.description import SCHEMES
 from ..system.interface import Value
 from .frame import INTERRUPTED, check_folder, fail, json_option, load_system, pair
+from .realtime import chosen_realtime, realtime_options, timing_lines
 from .step_study import run_step_study
 
 
@@ -39,6 +40,7 @@ from .step_study import run_step_study
     "--step-study", is_flag=True, help="Repeat the run over steps: is --step small enough?"
 )
 @click.option("--tolerance", type=float, help="Of contact times in a step study, s.")
+@realtime_options
 @json_option
 def run(
     system: Path | None,
@@ -56,14 +58,20 @@ def run(
     step_study: bool,
     tolerance: float | None,
     as_json: bool,
+    realtime: bool,
+    **pacing: Any,
 ) -> int:
     """Run SYSTEM, a .toml or .ssp file; by default the built-in grasp.
 
     \b
     Example: grasp-cosim run --case 1 --set plant.initial_object_position=0.02 --out results --plot
+    In real time: grasp-cosim run --realtime --step 1e-3 --priority 80 --cpu 1 --out results
     """
     if tolerance is not None and not step_study:
         raise InputError(f"--tolerance {tolerance!r}: must come with --step-study")
+    paced = chosen_realtime(realtime, pacing)
+    if paced and step_study:
+        raise InputError("--realtime: must not come with --step-study, which is not paced")
     if mdf and not out:
         raise InputError("--mdf: must come with --out, the folder for signals.mf4")
     if mdf:
@@ -82,7 +90,7 @@ def run(
     if out or plot:
         check_folder(out or Path())
     try:
-        result = simulate(chosen, progress=True, every=every, engine=engine)
+        result = simulate(chosen, progress=True, every=every, engine=engine, realtime=paced)
     except SimulationError as error:
         if error.result:
             _write(error.result, out, plot, mdf)
@@ -92,7 +100,7 @@ def run(
     _write(result, out, plot, mdf)
     for line in result.log[len(chosen.notes) :]:
         click.echo(line, err=True)
-    click.echo(json.dumps(dict(result.metrics)) if as_json else _summary(result))
+    click.echo(json.dumps(_as_json(result)) if as_json else _summary(result))
     if not result.complete:
         message = f"interrupted at t = {result.time[-1]:.6g} s; kept what was recorded"
         return fail(message, INTERRUPTED)
@@ -111,6 +119,11 @@ def _write(result: Result, out: Path | None, plot: bool, mdf: bool) -> None:
         click.echo(f"drew {path}", err=True)
 
 
+def _as_json(result: Result) -> dict[str, Any]:
+    timing = {"realtime": result.timing.as_dict()} if result.timing else {}
+    return {**result.metrics, **timing}
+
+
 def _summary(result: Result) -> str:
     m = result.metrics
     lines = [
@@ -121,7 +134,7 @@ def _summary(result: Result) -> str:
         lines += [
             f"{label:22s}{_numbers(m[key], factor)} {unit}" for label, key, factor, unit in LABELS
         ]
-    return "\n".join(lines)
+    return "\n".join([*lines, *(timing_lines(result.timing) if result.timing else ())])
 
 
 def _numbers(value: Any, factor: float) -> str:
