@@ -69,7 +69,9 @@ def test_curves_fall_from_all_steps_to_the_worst_one_through_the_quantiles() -> 
     [
         (1000, ["median", "p99", "p99.9", "worst"]),
         (999, ["median", "p99", "worst"]),
+        (49, ["median", "worst"]),  # 49 * (1 / 49) < 1
         (2, ["median", "worst"]),
+        (1, ["worst"]),
     ],
 )
 def test_a_quantile_that_is_the_worst_step_is_no_mark_of_its_own(

@@ -117,8 +117,9 @@ def _curve(part: str, spread: Spread, histogram: Histogram) -> Curve:
         for k in range(len(counts))
         if tails[k] and (counts[k] or (k and counts[k - 1]))
     ]
-    figures, shares = quantiles(spread), {**QUANTILES, "worst": 1.0 / total}
-    marks = {name: (figures[name], share) for name, share in shares.items() if share * total >= 1.0}
+    one = 1.0 / total
+    figures, shares = quantiles(spread), {**QUANTILES, "worst": one}
+    marks = {name: (figures[name], share) for name, share in shares.items() if share >= one}
     points = sorted({*bins, *marks.values()}, key=lambda p: (p[0], -p[1]))
     return Curve(part, tuple(points), marks)
 
