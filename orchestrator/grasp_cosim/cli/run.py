@@ -8,12 +8,13 @@ import click
 
 from ..errors import InputError, SimulationError
 from ..figures.plot import check_plot
+from ..figures.timing import draw_timing
 from ..grasp import CASES
 from ..master.engine import ENGINES, Engine
 from ..master.simulation import MOST, simulate
 from ..recording.mdf import check_mdf
 from ..recording.result import Result
-from ..study.metrics import LABELS
+from ..study.metrics import LABELS, is_grasp
 from ..system.description import SCHEMES
 from ..system.interface import Value
 from .frame import INTERRUPTED, check_folder, fail, json_option, load_system, pair
@@ -30,7 +31,11 @@ from .step_study import run_step_study
 @click.option("--stop", type=float, help="Stop time in s.")
 @click.option("--scheme", type=click.Choice(SCHEMES))
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for signals.csv and run.json.")
-@click.option("--plot", is_flag=True, help="Draw grasp.png, in --out or the current folder.")
+@click.option(
+    "--plot",
+    is_flag=True,
+    help="Draw grasp.png, and timing.png with --realtime, in --out or the current folder.",
+)
 @click.option("--mdf", is_flag=True, help="Write signals.mf4 (ASAM MDF 4) too; needs --out.")
 @click.option(
     "--every", type=click.IntRange(1, MOST), default=1, help="Record each N-th step only."
@@ -84,9 +89,10 @@ def run(
     if step_study:
         return run_step_study(chosen, tolerance, out, plot, as_json)
     if plot:
-        check_plot(
+        outputs = (
             f"{c.name}.{v.name}" for c in chosen.components for v in c.interface.of("output")
         )
+        check_plot(outputs, paced is not None)
     if out or plot:
         check_folder(out or Path())
     try:
@@ -114,9 +120,17 @@ def _write(result: Result, out: Path | None, plot: bool, mdf: bool) -> None:
     if out and mdf:
         result.to_mdf(out / "signals.mf4")
     if plot:
-        path = (out or Path()) / "grasp.png"
-        result.plot(path)
-        click.echo(f"drew {path}", err=True)
+        _draw(result, out or Path())
+
+
+def _draw(result: Result, folder: Path) -> None:
+    """The grasp if it is one, and the timing if it was paced."""
+    if is_grasp(result.signals):
+        result.plot(folder / "grasp.png")
+        click.echo(f"drew {folder / 'grasp.png'}", err=True)
+    if result.timing:
+        draw_timing(result.timing, float(result.time[-1]), folder / "timing.png")
+        click.echo(f"drew {folder / 'timing.png'}", err=True)
 
 
 def _as_json(result: Result) -> dict[str, Any]:

@@ -2,6 +2,8 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
+from math import inf
 from typing import Any, NamedTuple, Self
 
 from ..errors import InputError
@@ -90,7 +92,7 @@ class Timing:
         """What as_dict() gave; InputError, naming the place, where it is something else."""
         try:
             overruns = found["overruns"]
-            return cls(
+            timing = cls(
                 factor=float(found["factor"]),
                 period=float(found["period"]),
                 overrun=str(found["overrun"]),
@@ -99,7 +101,16 @@ class Timing:
                 steps=int(found["steps"]),
                 real_time_factor=float(found["real_time_factor"]),
                 overruns=int(overruns["count"]),
-                listed=tuple(Overrun(**entry) for entry in overruns["listed"]),
+                listed=tuple(
+                    Overrun(
+                        int(o["step"]),
+                        float(o["time"]),
+                        float(o["late"]),
+                        str(o["culprit"]),
+                        float(o["took"]),
+                    )
+                    for o in overruns["listed"]
+                ),
                 culprits={str(name): int(n) for name, n in overruns["culprits"].items()},
                 parts={
                     name: Spread(*(float(part[key]) for key in SPREAD_KEYS))
@@ -110,11 +121,43 @@ class Timing:
                     for name, h in found["histograms"].items()
                 },
             )
+            timing._check()
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise InputError(
                 f"{place}: is damaged ({type(error).__name__}: {error}); "
                 "must be what `grasp-cosim run --realtime --out` wrote"
             ) from error
+        return timing
+
+    def _check(self) -> None:
+        """ValueError where the figures cannot be of one run: whoever draws them relies on it."""
+        times = [t for o in self.listed for t in (o.time, o.late, o.took)]
+        times += [t for part in self.parts.values() for t in part]
+        rules = {
+            "period must be > 0": 0.0 < self.period < inf,
+            "times must be finite and not negative": all(0.0 <= t < inf for t in times),
+            "there must be a histogram of each part": self.parts.keys() == self.histograms.keys(),
+            "histograms must have counts between edges": all(map(_whole, self.histograms.values())),
+            "overruns must be from those listed to all steps": len(self.listed)
+            <= self.overruns
+            <= self.steps,
+            "there must be a list of overruns": bool(self.listed) == bool(self.overruns),
+            "culprits must be those of all overruns": sum(self.culprits.values()) == self.overruns
+            and {o.culprit for o in self.listed} <= self.culprits.keys(),
+        }
+        for rule, kept in rules.items():
+            if not kept:
+                raise ValueError(rule)
+
+
+def _whole(histogram: Histogram) -> bool:
+    edges, counts = histogram
+    return (
+        len(edges) == len(counts) + 1
+        and all(0.0 <= a < b < inf for a, b in pairwise(edges))
+        and min(counts, default=-1) >= 0
+        and sum(counts) > 0
+    )
 
 
 SPREAD_KEYS = ("median", "p99", "p99.9", "worst", "worst_at")
