@@ -24,14 +24,17 @@ import pythonfmu
 
 from .binary import bound, libpython, mended, preamble
 from .changes import changes, read_members
-from .contract import declared
+from .contract import declared, variables
 from .cross_check import cross_check_files
 from .documentation import icon, licences, page
-from .model_description import model_description
+from .model_description import Description, model_description
 
 SCRIPTS = Path(__file__).parent / "scripts"
-ADAPTER = ("__init__.py", "contract.py", "host_log.py", "loader.py", "slave.py", "snapshot.py")
-"""What of this package runs inside an FMU."""
+ADAPTER = (
+    "__init__.py", "base.py", "contract.py", "host_log.py", "loader.py", "slave.py", "snapshot.py",
+    "variable.py",
+)  # fmt: skip
+"""What of this package runs inside an FMU made from a block."""
 
 BINARIES = Path(pythonfmu.__file__).parent / "resources" / "binaries"
 HASH = "CONTENT_HASH"
@@ -94,9 +97,9 @@ def _members(script: Path, bind_python: str | None) -> dict[str, bytes]:
         sources[script.name] = preamble(bind_python).encode() + sources[script.name]
     name = script.stem
     summary = (slave.__doc__ or "").rstrip(".")
-    fields = declared(slave.block)
+    description = Description(name, summary, variables(declared(slave.block)))
     return {
-        "modelDescription.xml": model_description(name, summary, fields, HASH),
+        "modelDescription.xml": model_description(description, HASH),
         "model.png": icon(name),
         "documentation/index.html": page(
             name,
