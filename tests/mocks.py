@@ -78,7 +78,9 @@ class Mock:
     def interface(self) -> Interface:
         return read_interface(self.path)
 
-    def enter_initialization(self, values: Mapping[str, Value], stop: float) -> None:
+    def enter_initialization(
+        self, values: Mapping[str, Value], stop: float | None, start: float = 0.0
+    ) -> None:
         self.calls.append("enter")
         self.u = values.get("u", self.u)
 

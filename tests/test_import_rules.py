@@ -16,8 +16,17 @@ BLOCKS = {
 OURS = {*BLOCKS.values(), "grasp_fmus", "grasp_cosim"}
 
 
+LINK = "grasp_fmus.link"
+
+
 def imports(folder: Path) -> Iterator[tuple[str, str]]:
     """File and top-level package of every absolute import below a folder."""
+    for file, module in modules(folder):
+        yield file, module.partition(".")[0]
+
+
+def modules(folder: Path) -> Iterator[tuple[str, str]]:
+    """File and module of every absolute import below a folder."""
     files = sorted(folder.rglob("*.py"))
     assert files, folder
     for file in files:
@@ -28,7 +37,7 @@ def imports(folder: Path) -> Iterator[tuple[str, str]]:
             elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
                 names = [node.module]
             for name in names:
-                yield file.name, name.partition(".")[0]
+                yield file.name, name
 
 
 @pytest.mark.parametrize(("folder", "package"), BLOCKS.items())
@@ -48,8 +57,19 @@ def test_the_orchestrator_imports_no_physics_and_no_pythonfmu() -> None:
 
 
 def test_the_orchestrator_builds_the_fmus_at_two_places_only() -> None:
-    found = {f for f, n in imports(ROOT / "orchestrator/grasp_cosim") if n == "grasp_fmus"}
-    assert found == {"fmus.py", "grasp.py"}
+    builders = {
+        f
+        for f, module in modules(ROOT / "orchestrator/grasp_cosim")
+        if module.startswith("grasp_fmus") and not module.startswith(LINK)
+    }
+    assert builders == {"fmus.py", "grasp.py"}
+
+
+def test_the_wire_protocol_is_known_to_the_bench_alone_and_knows_nobody() -> None:
+    users = {f for f, m in modules(ROOT / "orchestrator/grasp_cosim") if m.startswith(LINK)}
+    assert users == {"bench.py", "model.py", "server.py", "wire.py"}
+    foreign = {n for _, n in imports(ROOT / "fmus/grasp_fmus/link")} - sys.stdlib_module_names
+    assert not foreign
 
 
 def test_the_fmu_adapter_knows_no_physics_but_for_the_scripts() -> None:

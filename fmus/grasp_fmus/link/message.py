@@ -154,11 +154,11 @@ def read_key(path: Path) -> bytes:
 
 def check_size(signature: Signature) -> None:
     """ValueError where the variables do not fit into a datagram."""
-    for name, variables in (("request", signature.request), ("answer", signature.answer)):
+    for name, variables in (("a request", signature.request), ("an answer", signature.answer)):
         size = HEAD.size + Codec(variables).size + TAG_SIZE
         if size > LARGEST:
             raise ValueError(
-                f"a {name} with {len(variables)} variables has {size} bytes: "
+                f"{name} with {len(variables)} variables has {size} bytes: "
                 f"must be {LARGEST} at most"
             )
     if HEAD.size + len(signature.text.encode()) + TAG_SIZE > LARGEST:

@@ -62,10 +62,10 @@ class FmuInstance(LoadedInstance):
     def _read_log(self) -> list[str]:
         return list(_messages.pop(self.name, ()))
 
-    def _start(self, values: Mapping[str, Value], stop: float) -> None:
+    def _start(self, values: Mapping[str, Value], stop: float | None, start: float) -> None:
         for name, value in values.items():
             self._set(self.interface.by_name[name], value)
-        self._slave.setupExperiment(startTime=0.0, stopTime=stop)
+        self._slave.setupExperiment(startTime=start, stopTime=stop)
         self._slave.enterInitializationMode()
 
     def _suffix(self, fmi_type: str) -> str:

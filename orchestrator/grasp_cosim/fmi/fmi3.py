@@ -69,7 +69,7 @@ class Fmi3Instance(LoadedInstance):
         self._said.clear()
         return said
 
-    def _start(self, values: Mapping[str, Value], stop: float) -> None:
+    def _start(self, values: Mapping[str, Value], stop: float | None, start: float) -> None:
         variables = {self.interface.by_name[name]: value for name, value in values.items()}
         structural = {v: x for v, x in variables.items() if v.causality == "structuralParameter"}
         if structural:
@@ -80,7 +80,7 @@ class Fmi3Instance(LoadedInstance):
         for variable, value in variables.items():
             if variable not in structural:
                 self._set(variable, value)
-        self._slave.enterInitializationMode(startTime=0.0, stopTime=stop)
+        self._slave.enterInitializationMode(startTime=start, stopTime=stop)
 
     def _suffix(self, fmi_type: str) -> str:
         return "Int64" if fmi_type == "Enumeration" else fmi_type

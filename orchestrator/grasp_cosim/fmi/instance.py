@@ -60,8 +60,12 @@ class Instance(Protocol):
     def interface(self) -> Interface:
         """What it declares, under the system's names."""
 
-    def enter_initialization(self, values: Mapping[str, Value], stop: float) -> None:
-        """Set start values and enter initialisation mode; the experiment ends at stop in s.
+    def enter_initialization(
+        self, values: Mapping[str, Value], stop: float | None, start: float = 0.0
+    ) -> None:
+        """Set start values and enter initialisation mode; the experiment is from start to stop, s.
+
+        stop is None where the end is not known.
 
         InputError where the FMU refuses.
         """

@@ -89,7 +89,7 @@ class LoadedInstance(ABC):
         """What this instance logged since the last call."""
 
     @abstractmethod
-    def _start(self, values: Mapping[str, Value], stop: float) -> None:
+    def _start(self, values: Mapping[str, Value], stop: float | None, start: float) -> None:
         """Set the values and enter initialisation mode."""
 
     @abstractmethod
@@ -154,10 +154,12 @@ class LoadedInstance(ABC):
             sys.path.remove(str(self._resources))
         self._folder.cleanup()
 
-    def enter_initialization(self, values: Mapping[str, Value], stop: float) -> None:
-        """Set start values, set up the experiment (stop in s) and enter initialisation mode."""
+    def enter_initialization(
+        self, values: Mapping[str, Value], stop: float | None, start: float = 0.0
+    ) -> None:
+        """Set start values, set up the experiment (times in s) and enter initialisation mode."""
         with self._refusals():
-            self._start(values, stop)
+            self._start(values, stop, start)
 
     def exit_initialization(self) -> None:
         """Leave initialisation mode."""

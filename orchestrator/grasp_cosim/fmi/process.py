@@ -47,9 +47,11 @@ class ProcessInstance:
         """Terminate and free the FMU as far as it permits, and end its process."""
         self._child.close()
 
-    def enter_initialization(self, values: Mapping[str, Value], stop: float) -> None:
-        """Set start values and enter initialisation mode; the experiment ends at stop in s."""
-        self._child.start("enter_initialization", dict(values), stop)
+    def enter_initialization(
+        self, values: Mapping[str, Value], stop: float | None, start: float = 0.0
+    ) -> None:
+        """Set start values and enter initialisation mode; the times are in s."""
+        self._child.start("enter_initialization", dict(values), stop, start)
 
     def exit_initialization(self) -> None:
         """Leave initialisation mode."""

@@ -1,0 +1,99 @@
+"""A bench stand-in at a UDP port."""
+
+import select
+import socket
+import time
+from typing import Any, Self
+
+from grasp_fmus.link.message import LARGEST
+
+from ..errors import InputError
+from .bench import Bench, Say
+
+BURST = 64
+"""The most datagrams that are taken before the bench's clock is looked at again."""
+
+
+class Server:
+    """Serves a bench, which it closes. A context manager; serve() returns after stop()."""
+
+    def __init__(
+        self, bench: Bench, address: tuple[str, int] = ("127.0.0.1", 0), say: Say = lambda _: None
+    ) -> None:
+        """Bind the port, 0 for any that is free; InputError where that is not possible."""
+        self.bench = bench
+        self._say = say
+        self._wake, self._woken = socket.socketpair()
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            self._socket.bind(address)
+        except (OSError, OverflowError) as error:
+            self.close()
+            raise InputError(
+                f"{address[0]}:{address[1]}: cannot listen there: {_reason(error)}; must be an "
+                "address of this machine and a port that is free"
+            ) from error
+        self._socket.setblocking(False)
+
+    @property
+    def address(self) -> tuple[str, int]:
+        """Where it listens."""
+        host, port = self._socket.getsockname()
+        return host, port
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the server."""
+        self.close()
+
+    def close(self) -> None:
+        """Free the FMU and the port."""
+        self.bench.close()
+        for s in (self._socket, self._wake, self._woken):
+            s.close()
+
+    def stop(self) -> None:
+        """Have serve() return; from another thread or from a signal handler."""
+        self._wake.send(b"\0")
+
+    def serve(self, sessions: int | None = None, duration_ns: int | None = None) -> None:
+        """Serve until stop(), or for so many sessions or so long."""
+        end = None if duration_ns is None else time.monotonic_ns() + duration_ns
+        poll = select.poll()
+        poll.register(self._socket, select.POLLIN)
+        poll.register(self._woken, select.POLLIN)
+        while sessions is None or self.bench.served.sessions < sessions:
+            now = time.monotonic_ns()
+            if end is not None and now >= end:
+                return
+            moments = [m for m in (end, self.bench.due()) if m is not None]
+            wait = max(0, min(moments) - now) / 1e6 if moments else None
+            ready = [descriptor for descriptor, _ in poll.poll(wait)]
+            if self._woken.fileno() in ready:
+                return
+            if ready:
+                self._receive()
+            self.bench.look(time.monotonic_ns())
+
+    def _receive(self) -> None:
+        """Take what has come, at most a burst of it."""
+        for _ in range(BURST):
+            try:
+                datagram, source = self._socket.recvfrom(LARGEST + 1)
+            except (BlockingIOError, ConnectionError):  # nothing there; or an answer found nobody
+                return
+            answer = self.bench.answer(datagram, "{}:{}".format(*source), time.monotonic_ns())
+            if answer is not None:
+                self._send(answer, source)
+
+    def _send(self, answer: bytes, source: tuple[str, int]) -> None:
+        try:
+            self._socket.sendto(answer, source)
+        except OSError as error:  # to the proxy it is a lost datagram
+            self._say("{}:{}: not sent: {}".format(*source, _reason(error)))
+
+
+def _reason(error: Exception) -> Any:
+    return getattr(error, "strerror", None) or error

@@ -1,0 +1,94 @@
+"""The command serve."""
+
+import json
+from pathlib import Path
+
+import click
+
+from ..bench.bench import Bench, Serving
+from ..bench.server import Server
+from ..bench.wire import shared_key
+from ..errors import InputError
+from ..system.description import in_nanoseconds
+from ..system.interface import read_interface
+from .frame import INTERRUPTED, fail, json_option, pair
+from .signals import ended_by_signals
+
+PORT = 5501
+"""Where a bench listens if nobody says otherwise."""
+
+
+@click.command()
+@click.argument("fmu", type=click.Path(path_type=Path))
+@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen at.")
+@click.option("--port", type=click.IntRange(0, 65535), default=PORT, show_default=True)
+@click.option("--lockstep", is_flag=True, help="Step when asked, not by the clock.")
+@click.option("--step", type=float, help="Own step in s; default: that of the proxy.")
+@click.option(
+    "--watchdog", type=float, default=0.1, show_default=True, help="Longest silence in s."
+)
+@click.option(
+    "--failsafe",
+    multiple=True,
+    metavar="INPUT=VALUE",
+    help="Of an input after a silence; default: its start value.",
+)
+@click.option("--key-file", type=click.Path(path_type=Path), help="A key shared with the proxy.")
+@click.option("--sessions", type=click.IntRange(1), help="End after so many sessions.")
+@click.option("--duration", type=float, help="End after so many s.")
+@json_option
+def serve(
+    fmu: Path,
+    host: str,
+    port: int,
+    lockstep: bool,
+    step: float | None,
+    watchdog: float,
+    failsafe: tuple[str, ...],
+    key_file: Path | None,
+    sessions: int | None,
+    duration: float | None,
+    as_json: bool,
+) -> int:
+    """Serve FMU to a proxy, as a bench would, until interrupted.
+
+    It runs in real time, or with --lockstep one step at a request: then a loop over the proxy gives
+    the same values as one without. Port 0 takes one that is free. What came is counted, and said
+    in the end. Exit code 130 where --sessions or --duration was cut short.
+
+    \b
+    Example: grasp-cosim serve fmus/build/GripperPlant.fmu --lockstep
+    """
+    if lockstep and step is not None:
+        raise InputError(f"--step {step!r}: must be left out with --lockstep, the proxy decides")
+    serving = Serving(
+        lockstep,
+        None if step is None else in_nanoseconds("--step", step),
+        in_nanoseconds("--watchdog", watchdog),
+        dict(pair("--failsafe", text, "INPUT=VALUE") for text in failsafe),
+        None if key_file is None else shared_key(key_file),
+    )
+    end = None if duration is None else in_nanoseconds("--duration", duration)
+    bench = Bench(read_interface(fmu), serving, _say)
+    with Server(bench, (host, port), _say) as server:
+        for note in bench.notes:
+            _say(note)
+        at = "{}:{}".format(*server.address)
+        _say(f"serving {fmu.name} at {at}, {'lockstep' if lockstep else 'real time'}")
+        if not host.startswith("127.") and key_file is None:
+            _say(f"{host} can be reached by others, who may take part: --key-file keeps them out")
+        with ended_by_signals(server.stop) as came:
+            server.serve(sessions, end)
+        counters = bench.counters()
+    if as_json:
+        click.echo(json.dumps(counters))
+    else:
+        came_in = ", ".join(f"{name} {count}" for name, count in counters.items() if count)
+        click.echo(came_in or "nothing came")
+    if came and (sessions or duration):
+        return fail("interrupted before --sessions or --duration ended it", INTERRUPTED)
+    return 0
+
+
+def _say(text: str) -> None:
+    click.echo(text, err=True)

@@ -1,0 +1,166 @@
+"""Datagrams to the byte, as the card has them; what is not one of them is none."""
+
+import hashlib
+import hmac
+import math
+import struct
+from pathlib import Path
+
+import pytest
+from grasp_fmus.link import message
+from grasp_fmus.link.message import Codec, Message, Sealer, read_key
+from grasp_fmus.link.signature import Signature, WireVariable
+from hypothesis import given
+from hypothesis import strategies as st
+
+KEY = bytes(range(16))
+HASH = b"0123456789abcdef"
+EXAMPLE = Message(message.STEP, 0, HASH, 2**63 + 1, 7, 3, 0.25, 1e-3, -5, b"12345678")
+
+ALL = (
+    WireVariable("a", "Real", "input"),
+    WireVariable("b", "Integer", "input"),
+    WireVariable("c", "Boolean", "input"),
+    WireVariable("d", "String", "input"),
+)
+
+messages = st.builds(
+    Message,
+    st.integers(1, 7),
+    st.integers(0, 255),
+    st.binary(min_size=16, max_size=16),
+    st.integers(0, 2**64 - 1),
+    st.integers(0, 2**64 - 1),
+    st.integers(0, 2**64 - 1),
+    st.floats(-1e300, 1e300),
+    st.floats(-1e300, 1e300),
+    st.integers(-(2**63), 2**63 - 1),
+    st.binary(max_size=300),
+)
+
+
+def test_the_bytes_are_those_of_the_card() -> None:
+    datagram = Sealer().pack(EXAMPLE)
+    assert datagram[:8] == b"GRSP\x01\x00\x05\x00"
+    assert datagram[8:24] == HASH
+    assert struct.unpack_from("<QQQ", datagram, 24) == (2**63 + 1, 7, 3)
+    assert struct.unpack_from("<dd", datagram, 48) == (0.25, 1e-3)
+    assert struct.unpack_from("<qII", datagram, 64) == (-5, 8, 0)
+    assert datagram[80:] == b"12345678"
+
+
+def test_the_tag_is_that_of_the_standard() -> None:
+    datagram = Sealer(KEY).pack(EXAMPLE)
+    assert datagram[:-32] == Sealer().pack(EXAMPLE)
+    assert datagram[-32:] == hmac.new(KEY, datagram[:-32], hashlib.sha256).digest()
+
+
+@given(messages, st.sampled_from([None, KEY]))
+def test_what_is_packed_is_opened(m: Message, key: bytes | None) -> None:
+    assert Sealer(key).open(Sealer(key).pack(m)) == m
+
+
+@given(messages, st.integers(0), st.integers(1, 255))
+def test_one_changed_byte_is_noticed_with_a_key(m: Message, place: int, change: int) -> None:
+    datagram = bytearray(Sealer(KEY).pack(m))
+    datagram[place % len(datagram)] ^= change
+    assert Sealer(KEY).open(bytes(datagram)) in (message.FORGED, message.MALFORMED)
+
+
+@pytest.mark.parametrize(
+    ("place", "data"),
+    [(0, b"grsp"), (4, b"\x02"), (6, b"\x00"), (6, b"\x08"), (72, b"\x07"), (76, b"\x01")],
+)
+def test_malformed(place: int, data: bytes) -> None:
+    datagram = bytearray(Sealer().pack(EXAMPLE))
+    datagram[place : place + len(data)] = data
+    assert Sealer().open(bytes(datagram)) == message.MALFORMED
+
+
+@pytest.mark.parametrize("time", [math.nan, math.inf, -math.inf])
+def test_a_time_that_is_not_finite_is_malformed(time: float) -> None:
+    assert Sealer().open(Sealer().pack(EXAMPLE._replace(time=time))) == message.MALFORMED
+    assert Sealer().open(Sealer().pack(EXAMPLE._replace(step=time))) == message.MALFORMED
+
+
+@given(st.integers(0, 88))
+def test_a_piece_of_a_datagram_is_none(size: int) -> None:
+    datagram = Sealer().pack(EXAMPLE)
+    assert isinstance(Sealer().open(datagram[:size]), str if size < len(datagram) else Message)
+    assert Sealer().open(datagram + b"\0" * (size + 1)) == message.MALFORMED
+
+
+def test_the_largest_datagram() -> None:
+    body = bytes(message.LARGEST - 80)
+    assert len(Sealer().pack(EXAMPLE._replace(body=body))) == message.LARGEST
+    with pytest.raises(ValueError, match=r"65508 bytes: must be 65507 at most"):
+        Sealer().pack(EXAMPLE._replace(body=body + b"\0"))
+    with pytest.raises(ValueError, match=r"must be 65507 at most"):
+        Sealer(KEY).pack(EXAMPLE._replace(body=body))
+
+
+@given(
+    st.floats(allow_nan=False, allow_infinity=False),
+    st.integers(-(2**31), 2**31 - 1),
+    st.booleans(),
+    st.text(st.characters(exclude_characters="\0", codec="utf-8"), max_size=30),
+)
+def test_values_there_and_back(a: float, b: int, c: bool, d: str) -> None:
+    codec = Codec(ALL)
+    body = codec.pack([a, b, c, d])
+    assert len(body) == codec.size == 8 + 8 + 8 + 128
+    back = codec.unpack(body)
+    assert back == [a, b, c, d]
+    assert [type(v) for v in back] == [float, int, bool, str]
+    assert math.copysign(1.0, a) == math.copysign(1.0, float(back[0]))
+
+
+@pytest.mark.parametrize(
+    ("place", "bad"),
+    [
+        (0, struct.pack("<d", math.nan)),
+        (0, struct.pack("<d", -math.inf)),
+        (8, struct.pack("<q", 2**31)),
+        (8, struct.pack("<q", -(2**31) - 1)),
+        (16, struct.pack("<Q", 2)),
+        (24, b"\xff\xfe"),
+    ],
+)
+def test_what_is_no_value(place: int, bad: bytes) -> None:
+    body = bytearray(Codec(ALL).pack([1.0, 1, True, "x"]))
+    body[place : place + len(bad)] = bad
+    assert Codec(ALL).unpack(bytes(body)) is None
+
+
+def test_the_largest_reals_are_values_though_their_sum_is_not() -> None:
+    codec = Codec(ALL[:1] * 2)
+    assert codec.unpack(codec.pack([1.7e308, 1.7e308])) == [1.7e308, 1.7e308]
+
+
+@pytest.mark.parametrize("size", [0, 7, 9, 151, 153])
+def test_a_body_of_another_size_holds_no_values(size: int) -> None:
+    assert Codec(ALL).unpack(bytes(size)) is None
+
+
+@pytest.mark.parametrize("text", ["x" * 128, "é" * 64, "a\0b"])
+def test_a_string_that_does_not_fit_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match=r"d = .*: must have fewer than 128 bytes"):
+        Codec(ALL).pack([1.0, 1, True, text])
+
+
+def test_a_key_is_read_without_the_line_end(tmp_path: Path) -> None:
+    (tmp_path / "key").write_bytes(KEY.hex().encode() + b"\n")
+    assert read_key(tmp_path / "key") == KEY.hex().encode()
+    (tmp_path / "key").write_bytes(b"fifteen bytes!!\n")
+    with pytest.raises(ValueError, match="key of 15 bytes: must have 16 or more"):
+        read_key(tmp_path / "key")
+
+
+def test_too_many_variables_for_a_datagram() -> None:
+    many = tuple(WireVariable(f"x{i}", "String", "output") for i in range(512))
+    with pytest.raises(ValueError, match="an answer with 512 variables has 65648 bytes"):
+        message.check_size(Signature(many))
+    names = tuple(WireVariable("x" * 1000 + str(i), "Real", "output") for i in range(70))
+    with pytest.raises(ValueError, match="their names must fit"):
+        message.check_size(Signature(names))
+    message.check_size(Signature(ALL))
