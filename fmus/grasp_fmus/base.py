@@ -12,7 +12,7 @@ from functools import wraps
 from math import inf, isclose, isfinite
 from typing import Any, Concatenate, NamedTuple, ParamSpec, TypeVar
 
-from .host_log import CATEGORIES, as_format, host_log
+from .host_log import CATEGORIES, ERROR, as_format, host_log
 from .loader import Component, Once, forget, survive
 from .variable import TYPES, Scalar, Variable
 
@@ -23,9 +23,6 @@ PHASES = (
     "in step mode",
     "after fmi2Terminate",
 )
-
-WARNING, DISCARD, ERROR = 1, 2, 3
-"""FMI statuses."""
 
 MOST_ACCESSES = 64
 """How many lists of value references are remembered, so that no host can fill the memory."""

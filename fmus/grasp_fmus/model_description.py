@@ -7,7 +7,7 @@ from math import isfinite
 from typing import NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from .host_log import CATEGORIES
+from .host_log import CATEGORIES, DISCARD, ERROR
 from .variable import TYPES, Scalar, Variable
 
 
@@ -32,6 +32,7 @@ UNITS: dict[str, Unit] = {
     "N.s/m": Unit({"kg": 1, "s": -1}),
     "N/m": Unit({"kg": 1, "s": -2}),
     "V": Unit({"kg": 1, "m": 2, "s": -3, "A": -1}, ("mV", 1e3)),
+    "s": Unit({"s": 1}),
     "1/s": Unit({"s": -1}),
     "1": Unit({}),
 }
@@ -68,6 +69,8 @@ class Description:
     """Those that are defined; of a variable's unit that is not here, there is the name alone."""
     capabilities: Mapping[str, bool] = field(default_factory=lambda: CAPABILITIES)
     experiment: Experiment = Experiment()
+    statuses: Sequence[int] = (DISCARD, ERROR)
+    """Those that it logs with messages."""
     structured: bool = True
     """Whether all names are in FMI's structured naming convention."""
 
@@ -90,8 +93,8 @@ def model_description(d: Description, guid: str) -> bytes:
     SubElement(root, "CoSimulation", {"modelIdentifier": d.name, **capabilities})
     _add_units(root, d)
     categories = SubElement(root, "LogCategories")
-    for category in CATEGORIES.values():
-        SubElement(categories, "Category", name=category)
+    for status in d.statuses:
+        SubElement(categories, "Category", name=CATEGORIES[status])
     times = zip(("startTime", "stopTime", "tolerance", "stepSize"), d.experiment, strict=True)
     experiment = {key: repr(time) for key, time in times if time is not None}
     if experiment:

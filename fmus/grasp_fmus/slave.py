@@ -8,7 +8,6 @@ from math import inf, isfinite
 from typing import Any
 
 from .base import (
-    DISCARD,
     INSTANTIATED,
     STEPPING,
     TIME_TOLERANCE,
@@ -17,6 +16,7 @@ from .base import (
     reported,
 )
 from .contract import Block, build_params, count, declared, packer, unpacker, variables
+from .host_log import DISCARD
 from .snapshot import Snapshot, from_bytes, to_bytes
 
 

@@ -6,7 +6,12 @@ from typing import Literal
 Scalar = float | bool | int | str
 Causality = Literal["input", "output", "parameter"]
 
-TYPES: dict[type[Scalar], str] = {float: "Real", bool: "Boolean", int: "Integer", str: "String"}
+TYPES: dict[type[Scalar], Literal["Real", "Boolean", "Integer", "String"]] = {
+    float: "Real",
+    bool: "Boolean",
+    int: "Integer",
+    str: "String",
+}
 """What FMI calls a kind of variable."""
 
 
