@@ -231,7 +231,6 @@ class Fmi2Proxy(Slave):
             if not connection.initialise(self._time, inputs, deadline):
                 self._give_up(connection, settings)
             self._take(connection)
-            self._report(connection)
         self._inputs = inputs
 
     def _connected(self) -> Connection:
@@ -252,8 +251,7 @@ class Fmi2Proxy(Slave):
         deadline = self.clock() + round(settings.connect_timeout * _NANOSECONDS)
         if not connection.greet(deadline):
             self._give_up(connection, settings)
-        self._state = CONNECTED
-        self._report(connection)
+        self._values[self._diagnostics.start] = self._state = CONNECTED
         return connection
 
     def _required(self) -> Connection:
@@ -263,7 +261,8 @@ class Fmi2Proxy(Slave):
     def _disconnect(self) -> None:
         if self._connection is not None:
             self._close()
-            self._connection, self._state = None, NOT_CONNECTED
+            self._connection = None
+            self._values[self._diagnostics.start] = self._state = NOT_CONNECTED
 
     def _give_up(self, connection: Connection, settings: Settings) -> None:
         """Say why initialisation failed, as RefusalError; the host may try again."""
@@ -331,7 +330,7 @@ class Fmi2Proxy(Slave):
         self._values[self._outputs] = outputs
 
     def _report(self, connection: Connection) -> None:
-        """Bring the diagnostics up to date."""
+        """Bring the diagnostics up to date; before the first step they would not settle."""
         client = connection.client
         c = client.counters
         counts = (c.missed, self._missed, c.late, c.out_of_order, c.duplicated, c.rejected)
@@ -339,7 +338,7 @@ class Fmi2Proxy(Slave):
             self._state,
             *(min(count, MOST) for count in counts),
             client.round_trip / _NANOSECONDS,
-            self._time - client.outputs_time if client.outputs else 0.0,
+            self._time - client.outputs_time,
         ]
 
 

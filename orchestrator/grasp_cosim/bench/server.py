@@ -8,6 +8,7 @@ from typing import Any, Self
 from grasp_fmus.link.message import LARGEST
 
 from ..errors import InputError
+from ..system.parts import NANOSECONDS
 from .bench import Bench, Say
 
 BURST = 64
@@ -61,17 +62,15 @@ class Server:
     def serve(self, sessions: int | None = None, duration_ns: int | None = None) -> None:
         """Serve until stop(), or for so many sessions or so long."""
         end = None if duration_ns is None else time.monotonic_ns() + duration_ns
-        poll = select.poll()
-        poll.register(self._socket, select.POLLIN)
-        poll.register(self._woken, select.POLLIN)
         while sessions is None or self.bench.served.sessions < sessions:
             now = time.monotonic_ns()
             if end is not None and now >= end:
                 return
             moments = [m for m in (end, self.bench.due()) if m is not None]
-            wait = max(0, min(moments) - now) / 1e6 if moments else None
-            ready = [descriptor for descriptor, _ in poll.poll(wait)]
-            if self._woken.fileno() in ready:
+            wait = max(0, min(moments) - now) / NANOSECONDS if moments else None
+            # Not poll(), which rounds up to whole milliseconds
+            ready, _, _ = select.select((self._socket, self._woken), (), (), wait)
+            if self._woken in ready:
                 return
             if ready:
                 self._receive()

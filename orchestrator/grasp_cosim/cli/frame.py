@@ -30,6 +30,7 @@ def cli(debug: bool) -> None:
     grasp-cosim ssp SYSTEM -o FILE   a system as an SSP archive
     grasp-cosim proxy FMU -o FILE    an FMU with the same variables that talks to a peer
     grasp-cosim serve FMU            an FMU as a test bench, for a proxy
+    grasp-cosim relay --to HOST:PORT a bad network on the way there, reproducible
     grasp-cosim build                the FMUs
     grasp-cosim inspect FMU          an FMU's interface
     grasp-cosim doctor FMU           whether this machine will load an FMU

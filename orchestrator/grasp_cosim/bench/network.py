@@ -1,0 +1,143 @@
+"""What a nasty network does to a datagram: a pure function of seed, direction and number.
+
+Nothing here knows of sockets or clocks, so the same seed gives the same fates on every machine,
+however fast the datagrams come.
+"""
+
+import hashlib
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Literal, NamedTuple, get_args
+
+from ..errors import InputError
+from ..system.parts import NANOSECONDS
+
+Direction = Literal["request", "reply"]
+"""From a client to the peer, and from the peer back."""
+
+DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
+
+LONGEST = 1e6
+"""s, longest time of any kind: eleven days."""
+
+
+@dataclass(frozen=True, slots=True)
+class Conditions:
+    """What happens in one direction. Probabilities hold for each datagram by itself.
+
+    A datagram that is not lost takes between delay and delay + jitter, uniformly distributed; with
+    the probability reorder it is held back by reorder_by longer, so that later ones overtake it.
+    With the probability duplicate it comes twice, and each of the two has its own delay.
+    InputError where a probability is not within 0 and 1, or a time, in s, not within 0 and LONGEST.
+    """
+
+    delay: float = 0.0
+    jitter: float = 0.0
+    loss: float = 0.0
+    duplicate: float = 0.0
+    reorder: float = 0.0
+    reorder_by: float = 0.02
+
+    def __post_init__(self) -> None:
+        for name in ("loss", "duplicate", "reorder"):
+            value = getattr(self, name)
+            if not 0.0 <= value <= 1.0:
+                raise InputError(f"{name} = {value!r}: must be a probability, from 0 to 1")
+        for name in ("delay", "jitter", "reorder_by"):
+            check_time(name, getattr(self, name))
+
+
+@dataclass(frozen=True, slots=True)
+class Outage:
+    """A window, from start on and before until, in which nothing that arrives gets through.
+
+    By requests: begins when the request of number start arrives and ends when that of number until
+    does; the first one is 1. That repeats exactly, whatever the timing. By s: time since the first
+    datagram. What was under way before still arrives. InputError where there is no such window.
+    """
+
+    start: float
+    until: float
+    by: Literal["requests", "s"] = "requests"
+
+    def __post_init__(self) -> None:
+        text = f"outage from {self.start!r} until {self.until!r} {self.by}"
+        lowest = 1 if self.by == "requests" else 0
+        if not lowest <= self.start < self.until < math.inf:
+            raise InputError(f"{text}: must begin at {lowest} or later, and end after that")
+        if self.by == "requests" and not (self.start % 1 == 0 == self.until % 1):
+            raise InputError(f"{text}: must be whole numbers")
+
+    def covers(self, requests: int, elapsed_ns: int) -> bool:
+        """Whether it is on at the request of this number, and so long after the first datagram."""
+        now = requests if self.by == "requests" else elapsed_ns / NANOSECONDS
+        return self.start <= now < self.until
+
+
+def _undisturbed() -> Mapping[Direction, Conditions]:
+    return MappingProxyType(dict.fromkeys(DIRECTIONS, Conditions()))
+
+
+@dataclass(frozen=True, slots=True)
+class Network:
+    """Both directions, the outages, the seed, and how many datagrams may be under way at once.
+
+    InputError where seed is no whole number from 0 on, or capacity none from 1 on.
+    """
+
+    conditions: Mapping[Direction, Conditions] = field(default_factory=_undisturbed)
+    outages: tuple[Outage, ...] = ()
+    seed: int = 0
+    capacity: int = 4096
+
+    def __post_init__(self) -> None:
+        for name, least in (("seed", 0), ("capacity", 1)):
+            value = getattr(self, name)
+            if not (isinstance(value, int) and value >= least):
+                raise InputError(f"{name} = {value!r}: must be a whole number, at least {least}")
+
+    def fate(self, direction: Direction, number: int) -> tuple["Passage", ...]:
+        """The ways through of the datagram of a number, 1, 2, 3, ...: none where it is lost.
+
+        Two are the datagram and its copy. Outages are not in it.
+        """
+        conditions = self.conditions[direction]
+        u = _uniforms(self.seed, direction, number)
+        if u[0] < conditions.loss:
+            return ()
+        first = _passage(conditions, u[1], u[2])
+        if u[3] < conditions.duplicate:
+            return first, _passage(conditions, u[4], u[5])
+        return (first,)
+
+
+class Passage(NamedTuple):
+    """One way through the network: how long it takes, and whether reorder is in that."""
+
+    delay_ns: int
+    held_back: bool
+
+
+def check_time(name: str, value: float) -> None:
+    """InputError where a time in s is negative, longer than LONGEST, or no number."""
+    if not 0.0 <= value <= LONGEST:
+        raise InputError(f"{name} = {value!r} s: must be from 0 to {LONGEST:g} s")
+
+
+def _passage(conditions: Conditions, position: float, chance: float) -> Passage:
+    held_back = chance < conditions.reorder
+    delay = conditions.delay + conditions.jitter * position
+    return Passage(round((delay + conditions.reorder_by * held_back) * NANOSECONDS), held_back)
+
+
+def _uniforms(seed: int, direction: Direction, number: int) -> list[float]:
+    """Six independent numbers, uniform in [0, 1), each always used for the same thing.
+
+    A hash (BLAKE2b) of what they are for, as in a counter-based generator: there is no state that
+    the order of arrival could change, and a higher loss leaves the delays of the rest as they were.
+    """
+    purpose = repr((seed, direction, number)).encode()
+    digest = hashlib.blake2b(purpose, digest_size=48).digest()
+    return [(int.from_bytes(digest[i : i + 8], "little") >> 11) * 2.0**-53 for i in range(0, 48, 8)]

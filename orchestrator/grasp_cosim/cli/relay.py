@@ -1,0 +1,150 @@
+"""The command relay."""
+
+import csv
+import json
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+
+import click
+
+from ..bench.network import DIRECTIONS, Conditions, Network, Outage, check_time
+from ..bench.relay import Address, Relay, is_loopback, text
+from ..bench.traffic import Entry, Log
+from ..errors import InputError
+from .frame import INTERRUPTED, fail, json_option
+from .signals import ended_by_signals
+
+
+@click.command()
+@click.option("--to", "peer", required=True, metavar="HOST:PORT", help="The peer.")
+@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on.")
+@click.option(
+    "--port", type=click.IntRange(0, 65_535), default=0, help="Default: one that is free."
+)
+@click.option("--delay", type=float, default=0.0, metavar="S", help="Of every datagram.")
+@click.option("--jitter", type=float, default=0.0, metavar="S", help="Up to so much more delay.")
+@click.option("--loss", type=float, default=0.0, metavar="P", help="Probability, 0 to 1.")
+@click.option("--duplicate", type=float, default=0.0, metavar="P", help="Probability, 0 to 1.")
+@click.option("--reorder", type=float, default=0.0, metavar="P", help="Probability, 0 to 1.")
+@click.option(
+    "--reorder-by",
+    type=float,
+    default=Conditions().reorder_by,
+    show_default=True,
+    metavar="S",
+    help="How long --reorder holds a datagram back.",
+)
+@click.option(
+    "--outage",
+    "outages",
+    multiple=True,
+    metavar="FROM:UNTIL",
+    help="Nothing gets through: numbers of requests, or s since the first as in 0.5s:2s.",
+)
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+@click.option(
+    "--capacity",
+    type=click.IntRange(1),
+    default=Network().capacity,
+    show_default=True,
+    help="Datagrams under way at most; more are dropped.",
+)
+@click.option("--duration", type=float, metavar="S", help="Default: until Ctrl-C.")
+@click.option("--log", type=click.Path(path_type=Path), help="CSV with the fate of each datagram.")
+@json_option
+def relay(
+    peer: str,
+    host: str,
+    port: int,
+    delay: float,
+    jitter: float,
+    loss: float,
+    duplicate: float,
+    reorder: float,
+    reorder_by: float,
+    outages: tuple[str, ...],
+    seed: int,
+    capacity: int,
+    duration: float | None,
+    log: Path | None,
+    as_json: bool,
+) -> int:
+    """Relay UDP datagrams to a peer and back through a nasty network, until Ctrl-C.
+
+    The n-th datagram of a direction has the same fate whenever the seed is the same. Both
+    directions have the same conditions. Counts are printed at the end. Exit code 130 where a
+    --duration was cut short.
+
+    \b
+    Example: grasp-cosim relay --port 5600 --to 127.0.0.1:5501 --delay 0.001 --loss 0.01 --seed 1
+    """
+    if duration is not None:
+        check_time("duration", duration)
+    conditions = Conditions(delay, jitter, loss, duplicate, reorder, reorder_by)
+    network = Network(
+        dict.fromkeys(DIRECTIONS, conditions), tuple(map(_outage, outages)), seed, capacity
+    )
+    with (
+        _written(log) as note,
+        Relay(_address(peer), network, host=host, port=port, log=note) as relay,
+    ):
+        with ended_by_signals(relay.stop) as came:
+            _say(relay)
+            relay.run(duration)
+        click.echo(_json(relay, seed) if as_json else _table(relay))
+    if came and duration is not None:
+        return fail(f"interrupted before --duration {duration!r} was over", INTERRUPTED)
+    return 0
+
+
+def _address(peer: str) -> Address:
+    host, _, port = peer.rpartition(":")
+    if not (host and re.fullmatch("[0-9]{1,5}", port)):
+        raise InputError(f"--to {peer!r}: must be HOST:PORT, as in 127.0.0.1:5501")
+    return host, int(port)
+
+
+def _outage(given: str) -> Outage:
+    found = re.fullmatch(r"([0-9]+(?:\.[0-9]+)?)(s?):([0-9]+(?:\.[0-9]+)?)\2", given)
+    if not found:
+        raise InputError(
+            f"--outage {given!r}: must be FROM:UNTIL, in numbers of requests, as in 100:200,"
+            " or in s, as in 0.5s:2s"
+        )
+    return Outage(float(found[1]), float(found[3]), "s" if found[2] else "requests")
+
+
+@contextmanager
+def _written(path: Path | None) -> Iterator[Log | None]:
+    """A log into a CSV file; none where path is None."""
+    if path is None:
+        yield None
+        return
+    with path.open("w", encoding="utf-8", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(Entry._fields)
+        yield table.writerow
+
+
+def _say(relay: Relay) -> None:
+    if not is_loopback(relay.address):
+        note = f"listening beyond this machine: whoever reaches {text(relay.address)} reaches"
+        click.echo(f"{note} {text(relay.peer)}", err=True)
+    click.echo(f"relaying {text(relay.address)} -> {text(relay.peer)}", err=True)
+
+
+def _json(relay: Relay, seed: int) -> str:
+    counts = {d: {**asdict(c), "dropped": c.dropped} for d, c in relay.counters.items()}
+    ends = {"listening": text(relay.address), "to": text(relay.peer), "seed": seed}
+    return json.dumps({**ends, **counts})
+
+
+def _table(relay: Relay) -> str:
+    rows = {direction: asdict(c) for direction, c in relay.counters.items()}
+    names = list(rows["request"])
+    lines = [" " * 8 + "".join(f"{name:>12s}" for name in names)]
+    lines += [f"{d:8s}" + "".join(f"{row[n]:12d}" for n in names) for d, row in rows.items()]
+    return "\n".join(lines)
