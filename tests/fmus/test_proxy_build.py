@@ -17,6 +17,9 @@ import pytest
 from conftest import Load
 from fmpy.validation import validate_fmu
 from grasp_cosim import cli
+from grasp_cosim.bench.wire import wire_signature
+from grasp_cosim.system.interface import read_interface
+from grasp_fmus.c_header import c_header
 from grasp_fmus.documentation import icon
 
 Proxy = Callable[..., Path]
@@ -426,6 +429,22 @@ def test_an_unchanged_proxy_is_left_alone(fmus: Path, run: Run) -> None:
     assert [p.name for p in Path("sub").iterdir()] == ["Eye.fmu"]
 
 
+def test_the_peers_side_as_a_c_header(fmus: Path, run: Run) -> None:
+    """What it does: test_c_header.py."""
+    original = fmus / "GripperPlant.fmu"
+    signature, _ = wire_signature(read_interface(original))
+    both = ("-o", "P.fmu", "--c-header", "sub/bench.h")
+    assert run(original, *both) == (0, "P.fmu: new\nsub/bench.h: written\n", "")
+    text = Path("sub/bench.h").read_text("ascii")
+    starts = {n: v["start"] for n, v in variables(original).items() if v["start"] is not None}
+    assert text == c_header("GripperPlant", signature, starts)
+    Path("P.fmu").unlink()
+    code, out, _ = run(original, "--c-header", "other.h", "--json")
+    assert (code, json.loads(out)) == (0, {"notes": [], "c_header": "other.h"})
+    assert Path("other.h").read_text("ascii") == text
+    assert not Path("P.fmu").exists()
+
+
 # Mistakes
 
 
@@ -440,6 +459,8 @@ def test_an_unchanged_proxy_is_left_alone(fmus: Path, run: Run) -> None:
         (["ProximitySensor.fmu", "-o", "Grün.fmu"], "Grün.fmu: must be an identifier of C"),
         (["ProximitySensor.fmu", "-o", "P"], "P: must be an identifier of C"),
         (["ProximitySensor.fmu", "-o", "./ProximitySensor.fmu"], "is the original; must be"),
+        (["ProximitySensor.fmu", "--c-header", "ProximitySensor.fmu"], "is the original; must be"),
+        (["ProximitySensor.fmu", "-o", "P.fmu", "--c-header", "P.fmu"], "is the proxy; must be"),
         (["ProximitySensor.fmu", "-o", "P.fmu", "--timeout", "0"],
          "proxy.timeout = 0.0 s: must be from 1e-06 to 3600 s"),
         (["ProximitySensor.fmu", "-o", "P.fmu", "--timeout", "nan"],
