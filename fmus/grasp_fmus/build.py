@@ -65,7 +65,7 @@ def build(out: Path, bind_python: str | None = None) -> list[Built]:
         built.append(build_fmu(script, out, bind_python))
         for name, data in cross_check_files(script.stem, _slave(script).block).items():
             if not (out / name).is_file() or (out / name).read_bytes() != data:
-                _write(out / name, data)
+                write_file(out / name, data)
     return built
 
 
@@ -125,8 +125,7 @@ def write_fmu(template: Mapping[str, bytes], target: Path) -> Built:
         return Built(target, "unchanged")
     else:
         built = Built(target, "changed", changes(before, files))
-    target.parent.mkdir(parents=True, exist_ok=True)
-    _write(target, _archive(files))
+    write_file(target, _archive(files))
     return built
 
 
@@ -220,7 +219,9 @@ def _archive(members: Mapping[str, bytes]) -> bytes:
     return buffer.getvalue()
 
 
-def _write(target: Path, data: bytes) -> None:
+def write_file(target: Path, data: bytes) -> None:
+    """Write a file in one piece, with its folder."""
+    target.parent.mkdir(parents=True, exist_ok=True)
     part = target.with_name(f"{target.name}.{os.getpid()}.part")
     part.write_bytes(data)
     part.replace(target)

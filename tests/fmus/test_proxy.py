@@ -383,7 +383,11 @@ def lost(host: Host, peer: ScriptedPeer) -> None:
 
 
 def test_a_lost_peer_takes_the_outputs_to_their_failsafe_values() -> None:
-    failsafe = {"failsafe.doubled": -1.0, "failsafe.passed": 7, "failsafe.echo": "lost"}
+    failsafe: dict[str, Any] = {
+        "failsafe.doubled": -1.0,
+        "failsafe.passed": 7,
+        "failsafe.echo": "lost",
+    }
     with connected(**failsafe) as (host, peer):
         lost(host, peer)
         assert host.outputs() == [-1.0, 7, False, "lost"]
@@ -396,13 +400,15 @@ def test_a_lost_peer_takes_the_outputs_to_their_failsafe_values() -> None:
 
 
 def test_an_output_may_be_held_for_itself() -> None:
-    with connected(**{"hold.doubled": True, "hold.denied": True}) as (host, peer):
+    hold: dict[str, Any] = {"hold.doubled": True, "hold.denied": True}
+    with connected(**hold) as (host, peer):
         lost(host, peer)
         assert host.outputs() == [3.0, 0, False, ""]
 
 
 def test_all_outputs_may_be_held() -> None:
-    with connected(on_loss="hold", **{"failsafe.doubled": -1.0}) as (host, peer):
+    failsafe: dict[str, Any] = {"failsafe.doubled": -1.0}
+    with connected(on_loss="hold", **failsafe) as (host, peer):
         lost(host, peer)
         assert host.outputs() == START
         assert host.log()[-1].endswith("; proxy.on_loss = hold")

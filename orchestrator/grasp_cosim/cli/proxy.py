@@ -62,35 +62,50 @@ def proxy(
     \b
     Example: grasp-cosim proxy fmus/build/GripperPlant.fmu -o GripperPlantProxy.fmu --timeout 0.001
     """
-    if out is None and c_header is None:
-        raise InputError("proxy: must have -o FILE.fmu or --c-header FILE, or both")
+    from grasp_fmus.build import write_file  # only here: its libraries take time to load
+    from grasp_fmus.c_header import c_header as header
+    from grasp_fmus.proxy import Settings
+    from grasp_fmus.proxy_build import build_proxy
+
+    _check_paths(fmu, out, c_header)
     if bind_python == "":
         raise InputError("--bind-python '': must be a Python program, or left out")
     interface = read_interface(fmu)
-    for option, path in (("-o", out), ("--c-header", c_header)):
-        if path is not None and path.resolve() == fmu.resolve():
-            raise InputError(f"{option} {path}: is the original; must be another file")
-        if path is not None:
-            check_folder(path.parent)
     signature, notes = wire_signature(interface)
     report: dict[str, object] = {"notes": notes}
     lines = []
-    if out is not None:
-        from grasp_fmus.proxy import Settings  # only here: its libraries take time to load
-        from grasp_fmus.proxy_build import build_proxy
-
-        original = _original(interface, [v.name for v in signature.variables])
-        try:
-            settings = Settings(host, port, timeout)
-            built = build_proxy(out, original, settings, bind_python)
-        except ValueError as error:
-            raise InputError(f"proxy: {error}") from error
-        lines += [f"{out}: {built.status}", *(f"    {change}" for change in built.changes)]
-        report |= {"fmu": str(out), "status": built.status, "changes": list(built.changes)}
+    try:
+        if out is not None:
+            original = _original(interface, [v.name for v in signature.variables])
+            built = build_proxy(out, original, Settings(host, port, timeout), bind_python)
+            lines += [f"{out}: {built.status}", *(f"    {change}" for change in built.changes)]
+            report |= {"fmu": str(out), "status": built.status, "changes": list(built.changes)}
+        if c_header is not None:
+            starts = {v.name: _start(interface.by_name[v.name]) for v in signature.request}
+            known = {name: start for name, start in starts.items() if start is not None}
+            write_file(c_header, header(interface.identifier, signature, known).encode())
+            lines.append(f"{c_header}: written")
+            report["c_header"] = str(c_header)
+    except ValueError as error:
+        raise InputError(f"proxy: {error}") from error
     for note in notes:
         click.echo(note, err=True)
     click.echo(json.dumps(report) if as_json else "\n".join(lines))
     return 0
+
+
+def _check_paths(fmu: Path, out: Path | None, c_header: Path | None) -> None:
+    """InputError where there is nothing to write, or it cannot be written there."""
+    taken = {fmu.resolve(): "the original"}
+    for option, path in (("-o", out), ("--c-header", c_header)):
+        if path is None:
+            continue
+        if path.resolve() in taken:
+            raise InputError(f"{option} {path}: is {taken[path.resolve()]}; must be another file")
+        taken[path.resolve()] = "the proxy"
+        check_folder(path.parent)
+    if len(taken) == 1:
+        raise InputError("proxy: must have -o FILE.fmu or --c-header FILE, or both")
 
 
 def _original(interface: Interface, names: list[str]) -> "Original":
