@@ -23,6 +23,7 @@ def main(fmu: str) -> None:
             os.kill(child, signal.SIGKILL)
             os.waitpid(child, 0)
             children.remove(child)
+            print(child, "ended", flush=True)  # noqa: T201
             continue
         reading, writing = os.pipe()
         child = os.fork()
