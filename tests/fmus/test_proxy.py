@@ -10,6 +10,7 @@ from random import Random
 from typing import Any
 
 import pytest
+from grasp_fmus import connection
 from grasp_fmus.base import LoggedError
 from grasp_fmus.connection import STALE
 from grasp_fmus.link.message import (
@@ -245,6 +246,13 @@ def test_a_string_as_long_as_can_be() -> None:
         host.set(label=text)
         host.step()
         assert peer.values(peer.got[-1])[3] == host.get("echo") == text
+
+
+def test_a_host_with_more_files_open_than_can_be_watched(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(connection, "DESCRIPTORS", 3)
+    host = Host(9, Clock())
+    line = refused(host, host.slave.enter_initialization_mode)
+    assert line.endswith("127.0.0.1:9: no connection: the host has 3 files open: must have fewer")
 
 
 # Keys
@@ -601,9 +609,9 @@ class Down:
 
 def test_a_network_that_is_down_is_a_peer_that_is_silent(monkeypatch: pytest.MonkeyPatch) -> None:
     with connected(misses_tolerated=0, timeout=1e-3) as (host, peer):
-        connection: Any = host.slave._connection
+        ours: Any = host.slave._connection
         with monkeypatch.context() as m:
-            m.setattr(connection, "_socket", Down(connection._socket))
+            m.setattr(ours, "_socket", Down(ours._socket))
             peer.clock.tick = 400_000
             host.step()
         assert (host.state(), host.counts()) == (3, {"missed": 1, "consecutive_missed": 1})

@@ -223,6 +223,9 @@ def test_the_proxy_of_an_fmu_with_every_type_of_fmi_2(tmp_path: Path, proxy: Pro
             if v.get("name") == "u_Real":
                 typed.set("relativeQuantity", "true")
                 typed.set("start", "1.0625")
+            if v.get("name") == "now":
+                v.set("initial", "exact")
+                typed.set("start", "0.5")
             if v.get("name") == "gain":
                 typed.set("max", "100")
 
@@ -301,6 +304,37 @@ def _only(root: Element, name: str) -> None:
     model = root.find("ModelVariables")
     assert model is not None
     model.insert(place, kept)
+
+
+@native_fmus.needs_gcc
+def test_dependencies_that_are_not_declared_are_all(tmp_path: Path, proxy: Proxy) -> None:
+    def undeclare(root: Element) -> None:
+        for unknown in root.iter("Unknown"):
+            unknown.attrib.pop("dependencies")
+
+    original = rewritten(native_fmus.build(tmp_path, version="2.0"), undeclare)
+    made = proxy(original)
+    check(original, made)
+    causalities = {n: v["causality"] for n, v in variables(original).items()}
+    everything = {n for n, causality in causalities.items() if causality != "output"}
+    declared = initial(made)
+    assert all(declared[n] == everything for n, c in causalities.items() if c == "output")
+
+
+@native_fmus.needs_gcc
+def test_an_output_that_is_constant_stays_so(tmp_path: Path, proxy: Proxy) -> None:
+    def fix(root: Element) -> None:
+        for v in root.iter("ScalarVariable"):
+            if v.get("name") == "steps":
+                v.set("variability", "constant")
+                v.set("initial", "exact")
+                v[0].set("start", "7")
+
+    made = proxy(rewritten(native_fmus.build(tmp_path, version="2.0"), fix))
+    assert validate_fmu(made) == []
+    found = variables(made)["steps"]
+    assert (found["variability"], found["start"]) == ("constant", 7)
+    assert "steps" not in initial(made)
 
 
 @native_fmus.needs_gcc
