@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from grasp_fmus import build, proxy_build
 
 ROOT = Path(__file__).parent.parent
 BLOCKS = {
@@ -79,3 +80,13 @@ def test_the_fmu_adapter_knows_no_physics_but_for_the_scripts() -> None:
         ("ProximitySensor.py", "proximity_sensor"),
         ("GraspController.py", "grasp_controller"),
     }
+
+
+def test_what_is_packed_into_fmus_imports_the_standard_library_only() -> None:
+    packed = {Path(name).name for name in (*build.ADAPTER, *proxy_build.ADAPTER)}
+    foreign = {
+        (file, name)
+        for file, name in imports(ROOT / "fmus/grasp_fmus")
+        if file in packed and name not in sys.stdlib_module_names
+    }
+    assert not foreign

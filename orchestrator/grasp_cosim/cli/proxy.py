@@ -8,6 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+from grasp_fmus.model_description import Experiment, Unit
+from grasp_fmus.proxy import DEFAULTS, Settings
+from grasp_fmus.variable import Variable as ProxyVariable
 
 from ..bench.wire import wire_signature
 from ..errors import InputError
@@ -18,7 +21,6 @@ from .frame import check_folder, json_option
 
 if TYPE_CHECKING:
     from grasp_fmus.proxy_build import Original
-    from grasp_fmus.variable import Variable as ProxyVariable
 
 KINDS: Mapping[str, type[Value]] = {"Real": float, "Integer": int, "Boolean": bool, "String": str}
 
@@ -26,10 +28,14 @@ KINDS: Mapping[str, type[Value]] = {"Real": float, "Integer": int, "Boolean": bo
 @click.command()
 @click.argument("fmu", type=click.Path(path_type=Path))
 @click.option("-o", "--out", type=click.Path(path_type=Path), help="The proxy to write, an .fmu.")
-@click.option("--host", default="127.0.0.1", show_default=True, help="Where its peer is.")
-@click.option("--port", type=click.IntRange(1, 65535), default=5501, show_default=True)
+@click.option("--host", default=DEFAULTS.host, show_default=True, help="Where its peer is.")
+@click.option("--port", type=click.IntRange(1, 65535), default=DEFAULTS.port, show_default=True)
 @click.option(
-    "--timeout", type=float, default=0.01, show_default=True, help="Longest wait per step in s."
+    "--timeout",
+    type=float,
+    default=DEFAULTS.timeout,
+    show_default=True,
+    help="Longest wait per step in s.",
 )
 @click.option(
     "--bind-python",
@@ -64,7 +70,6 @@ def proxy(
     """
     from grasp_fmus.build import write_file  # only here: its libraries take time to load
     from grasp_fmus.c_header import c_header as header
-    from grasp_fmus.proxy import Settings
     from grasp_fmus.proxy_build import build_proxy
 
     _check_paths(fmu, out, c_header)
@@ -110,7 +115,6 @@ def _check_paths(fmu: Path, out: Path | None, c_header: Path | None) -> None:
 
 def _original(interface: Interface, names: list[str]) -> "Original":
     """What a proxy has from the FMU; names are the variables to exchange, in order."""
-    from grasp_fmus.model_description import Experiment, Unit
     from grasp_fmus.proxy_build import Original
 
     experiment = inspect_fmu(interface.path)["default_experiment"]
@@ -137,10 +141,8 @@ def _original(interface: Interface, names: list[str]) -> "Original":
     )
 
 
-def _variable(interface: Interface, v: Variable, known: set[str]) -> "ProxyVariable":
+def _variable(interface: Interface, v: Variable, known: set[str]) -> ProxyVariable:
     """The variable in the proxy: an output follows inputs and parameters at the start only."""
-    from grasp_fmus.variable import Variable as ProxyVariable
-
     limits = (v.low, v.high)
     initially: tuple[str, ...] = ()
     if v.causality == "output":
