@@ -56,7 +56,7 @@ def wait(system: System, realtime: Realtime) -> npt.NDArray[np.float64]:
     """The lateness of each start in ns where there is nothing to do but to wait."""
     pacer = Pacer(system, realtime)
     values = np.zeros(pacer.width)
-    pacer.bind(values)
+    pacer.bind(values, lambda _: None)
     late = np.empty(system.total_steps)
     for step in range(len(late)):
         pacer(step)

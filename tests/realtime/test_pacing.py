@@ -1,14 +1,16 @@
 """Pacing by a clock that is made up: deadlines, overruns and who is to blame are exact."""
 
 from fractions import Fraction
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 from grasp_cosim import InputError, Realtime, SimulationError
 from grasp_cosim.master.engine import Engine
+from grasp_cosim.master.master import CHUNK
 from grasp_cosim.realtime.meter import LISTED
 from grasp_cosim.realtime.options import Overrun
-from grasp_cosim.realtime.pacer import BREATH_NS, SLICE_NS, SPIN_NS, Pacer
+from grasp_cosim.realtime.pacer import BREATH_NS, SLICE_NS, SOME, SPIN_NS, Pacer
 from grasp_cosim.realtime.timing import Timing
 from mocks import Mock, make_system
 from realtime.fake import MS, NEAR, US, Fake, Paced
@@ -170,6 +172,38 @@ def test_recording_is_to_blame_where_it_takes_too_long(tmp_path: Path) -> None:
     assert culprits(timing) == [(2, "recording")]
     assert timing.listed[0].took == pytest.approx(0.08, abs=NEAR)
     assert timing.parts["recording"].worst_at == 0.2
+
+
+def test_rows_are_handed_on_while_there_is_time_to_wait(tmp_path: Path, engine: Engine) -> None:
+    """And what is recorded is all of them, in order."""
+    run = Paced(tmp_path, {"a": {-1: 10 * MS}}, engine=engine, steps=1500)
+    took: list[int] = []
+
+    def slow() -> None:
+        took.append(len(run.memory.time))
+        run.fake.time += 50 * MS
+
+    run.recording = slow
+    timing = run.to_the_end()
+    assert timing.overruns == 0
+    assert max(b - a for a, b in pairwise([*took, 1501])) <= SOME + 2
+    assert run.memory.time.tolist() == [k * 100 * MS / 1e9 for k in range(1501)]
+    assert run.memory.signals["a.y"] == pytest.approx(run.memory.time)
+
+
+def test_rows_wait_where_there_is_no_time_for_them(tmp_path: Path, engine: Engine) -> None:
+    run = Paced(tmp_path, {"a": {-1: 60 * MS}}, engine=engine, steps=1500)
+    took: list[int] = []
+
+    def slow() -> None:
+        took.append(len(run.memory.time))
+        run.fake.time += 50 * MS
+
+    run.recording = slow
+    timing = run.to_the_end()
+    assert took == [1, SOME + 1, CHUNK + 1]
+    assert culprits(timing) == [(SOME - 1, "recording"), (CHUNK - 1, "recording"), (1499, "a")][:2]
+    assert len(run.memory.time) == 1501
 
 
 def test_who_calls_single_steps_is_to_blame_for_a_pause(tmp_path: Path) -> None:

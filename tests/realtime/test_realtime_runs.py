@@ -116,15 +116,17 @@ def test_ctrl_c_does_not_wait_for_the_next_step(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, engine: Engine
 ) -> None:
     """Which would begin only after 1000 s."""
-    mock = Mock(tmp_path, "a", lambda u, t: t)
+    timer = threading.Timer(0.1, lambda: os.kill(os.getpid(), signal.SIGINT))
+
+    def output(u: float, t: float) -> float:
+        if t > 0.0:
+            timer.start()
+        return t
+
+    mock = Mock(tmp_path, "a", output)
     monkeypatch.setattr("grasp_cosim.master.simulation.load", lambda component: mock)
-    timer = threading.Timer(0.2, lambda: os.kill(os.getpid(), signal.SIGINT))
-    timer.start()
-    try:
-        system = make_system([mock], [], 10)
-        result = simulate(system, engine=engine, realtime=Realtime(factor=1e-4))
-    finally:
-        timer.join()
+    result = simulate(make_system([mock], [], 10), engine=engine, realtime=Realtime(factor=1e-4))
+    timer.join()
     assert not result.complete
     assert result.time.tolist() == [0.0, 0.1]
 

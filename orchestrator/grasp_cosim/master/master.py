@@ -59,7 +59,7 @@ class Master:
         self.slots = slots_of(system, instances)
         self.values = np.zeros(len(self.slots) + (pacer.width if pacer else 0))
         if pacer:
-            pacer.bind(self.values[len(self.slots) :])
+            pacer.bind(self.values[len(self.slots) :], self._hand_on_until)
         self.scenario = Scenario(system, instances, self.slots, self.values)
         self._receive = receive
         self.plan = Planner(
@@ -74,7 +74,7 @@ class Master:
         self._pacer = pacer
         self._loop = make_loop(self.plan, engine)
         self._rows = np.empty((CHUNK, len(self.values)))
-        self._handed_on = 0
+        self._base = self._handed_on = 0
         self._handed_on_at = time.monotonic()
 
     def initialise(self) -> None:
@@ -109,7 +109,7 @@ class Master:
         end = min(first + steps, self.total_steps)
         try:
             while self.steps_done < end:
-                self._chunk(min(self._handed_on + CHUNK, end))
+                self._chunk(min(self._base + CHUNK, end))
         except HaltError:
             pass
         except OverrunError:
@@ -122,6 +122,12 @@ class Master:
 
     def hand_on(self) -> None:
         """Hand on the rows that wait; SimulationError where a value is not finite."""
+        self._hand_on_until(self.steps_done)
+        self._base = self._handed_on
+
+    def _hand_on_until(self, step: int) -> None:
+        """Hand on the rows up to a step that is done; the pacer does while it waits in the loop."""
+        self.steps_done = step
         rows = self._waiting()
         if not len(rows):
             return
@@ -135,7 +141,7 @@ class Master:
 
     def _waiting(self) -> npt.NDArray[np.float64]:
         """The rows that were not handed on yet."""
-        return self._rows[: self.steps_done - self._handed_on]
+        return self._rows[self._handed_on - self._base : self.steps_done - self._base]
 
     def _enough(self) -> bool:
         """Whether rows wait no longer: they are many, or have waited long, or are the last."""
@@ -152,7 +158,7 @@ class Master:
         except BaseException:
             self.hand_on()
             raise
-        if len(self._waiting()) == CHUNK:
+        if self.steps_done == self._base + CHUNK:
             self.hand_on()
 
     def _run(self, stop: int) -> None:
@@ -160,7 +166,7 @@ class Master:
         step, operation = self.steps_done, 0
         try:
             while step < stop:
-                rows = self._rows[step - self._handed_on :]
+                rows = self._rows[step - self._base :]
                 step, operation, status = self._loop(
                     rows, operation, step, stop, self.system.step_ns
                 )

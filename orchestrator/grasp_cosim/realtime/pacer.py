@@ -28,8 +28,11 @@ SLICE_NS = 50_000_000
 BREATH_NS = 500_000_000
 """At a real-time priority the longest time without a sleep, as nothing else may get to run."""
 
+SOME = 64
+"""So many rows are handed on while it waits, if there is time for it."""
+
 AFTER = 512
-"""Steps after which the times of a chunk are looked at even where there is no time to spare."""
+"""Steps after which times are handed on to the meter even where there is no time for it."""
 
 NAP = 1e-4
 """s of a sleep that is there for others only."""
@@ -64,8 +67,9 @@ class Pacer:
 
         InputError as of Realtime.period() and Meter.
         """
-        self._period = realtime.period(system.step_ns)
-        self.meter = Meter(system, realtime, self._period)
+        period = realtime.period(system.step_ns)
+        self.meter = Meter(system, realtime, period)
+        self._period = period.as_integer_ratio()
         self.breathes = False
         """Whether it has to sleep from time to time for the sake of others."""
         self._policy = realtime.overrun
@@ -78,7 +82,9 @@ class Pacer:
         self._base_step: int | None = None
         self._end: tuple[int, int] | None = None
         self._pending: tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]] | None = None
-        self._cost = 0
+        self._taken = 0
+        self._hand_on: Callable[[int], None] = lambda _: None
+        self._measuring = self._recording = 0
         self._head: Any = memoryview(bytearray(8 * HEAD)).cast("d")
         self._keep: list[Any] = []
 
@@ -87,8 +93,12 @@ class Pacer:
         """How many values it needs in a row."""
         return HEAD + len(self.meter.segments)
 
-    def bind(self, values: npt.NDArray[np.float64]) -> None:
-        """Have it write into these values, width of them."""
+    def bind(self, values: npt.NDArray[np.float64], hand_on: Callable[[int], None]) -> None:
+        """Have it write into these values, width of them.
+
+        hand_on hands on the rows of the steps before one. It is called while there is time to wait.
+        """
+        self._hand_on = hand_on
         self._head = memoryview(values[:HEAD])  # type: ignore[arg-type]  # numpy's 3.11 stubs
         self._stamped = values[HEAD:]
 
@@ -124,8 +134,7 @@ class Pacer:
 
         HaltError where the run is interrupted meanwhile, OverrunError where it stops at an overrun.
         """
-        if self._pending is not None and self._has_room(step):
-            self._timed(step - 1, self._measure)
+        self._use_the_wait(step)
         arrived, late = self._arrive(step)
         if late > 0 and self._policy == "continue":
             self._base, self._base_step = arrived, step
@@ -149,7 +158,9 @@ class Pacer:
         Hands their rows on, which counts as recording. What the times come to is found out while
         it waits for a later step, or else before it takes the next ones.
         """
-        self._timed(int(steps[-1]) - 1, lambda: self._take(steps - 1, rows, hand_on))
+        self._taken = int(steps[-1])
+        took = self._timed(self._taken - 1, lambda: self._take(steps - 1, rows, hand_on))
+        self._recording = took
 
     def timing(self, granted: Sequence[str], refused: Sequence[str]) -> Timing:
         """What the times came to so far: see Meter.timing()."""
@@ -174,10 +185,8 @@ class Pacer:
     def _measure(self) -> None:
         """Hand the times that wait on to the meter."""
         if self._pending is not None:
-            start = self._now()
             self.meter.add(*self._pending)
             self._pending = None
-            self._cost = self._now() - start
 
     def _settle(self) -> None:
         """Hand all times on to the meter."""
@@ -186,19 +195,30 @@ class Pacer:
             self.meter.end(*self._end)
             self._end = None
 
-    def _has_room(self, step: int) -> bool:
-        """Whether to measure would not make the step begin late, or has to be done anyhow."""
-        if self._pending is not None and step > self._pending[0][-1] + AFTER:
-            return True
-        return 2 * (self._due(step) - (self._now() - self._origin)) > 3 * self._cost
+    def _use_the_wait(self, step: int) -> None:
+        """Do what has to be done some time, where it is not likely to make the step late.
 
-    def _timed(self, step: int, action: Callable[[], None]) -> None:
-        """Do it, and count the time that takes as recording after that step."""
+        It is expected to take half as long again as it did the last time.
+        """
+        waiting = step - self._taken
+        if self._base_step is None or (self._pending is None and waiting < SOME):
+            return
+        spare = self._due(step) - (self._now() - self._origin)
+        if self._pending is not None:
+            if 2 * spare > 3 * self._measuring or waiting > AFTER:
+                self._measuring = self._timed(step - 1, self._measure)
+        elif 2 * spare > 3 * self._recording:
+            self._hand_on(step)
+
+    def _timed(self, step: int, action: Callable[[], None]) -> int:
+        """Do it, and count the time that takes as recording after that step; the time in ns."""
         start = self._now()
         try:
             action()
         finally:
-            self.meter.recorded(step, self._now() - start)
+            took = self._now() - start
+            self.meter.recorded(step, took)
+        return took
 
     def _arrive(self, step: int) -> tuple[int, int]:
         """The time now, and by how much the step before ended late; negative where it did not."""
@@ -213,8 +233,8 @@ class Pacer:
 
     def _due(self, step: int) -> int:
         """When a step begins by the schedule, in ns."""
-        period, steps = self._period, step - (self._base_step or 0)
-        return self._base + steps * period.numerator // period.denominator
+        numerator, denominator = self._period
+        return self._base + (step - (self._base_step or 0)) * numerator // denominator
 
     def _wait(self, due: int, now: int) -> int:
         """Sleep, then spin, until it is due; the time then."""
