@@ -38,7 +38,9 @@ def chosen_realtime(paced: bool, given: Mapping[str, Any]) -> Realtime | None:
 
     InputError where one of them comes without --realtime.
     """
-    asked = {name: given[name] for name in NAMES if given[name] not in (None, False)}
+    asked = {
+        name: given[name] for name in NAMES if given[name] is not None and given[name] is not False
+    }
     if paced:
         return Realtime(**asked)
     for name, value in asked.items():

@@ -96,6 +96,7 @@ class Master:
                 raise InputError(_too_long(port, value, 0))
             self.values[slot] = float(value)
         self._receive(np.zeros(1, np.int64), self.values[np.newaxis])
+        self._handed_on_at = time.monotonic()
 
     def advance(self, steps: int) -> int:
         """Do the given number of steps, or fewer where the stop time is nearer; how many it were.
