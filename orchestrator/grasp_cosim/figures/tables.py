@@ -24,7 +24,9 @@ EXPERIMENT = (
 SETTINGS = ("components", "wires", "events", "faults", "log", "rejections")
 """Those that are shown as lists of their own."""
 
-_ABOUT_SIGNALS = ("units", "types", "descriptions")
+_NO_METRICS = ("units", "types", "descriptions", "realtime")
+"""What there is about each signal, and the timing of a paced run."""
+
 _UNITS = {"step": "s", "stop": "s", "wall_time": "s"}
 
 
@@ -44,7 +46,7 @@ def metrics_table(run: Mapping[str, Any]) -> str:
     """The metrics of the grasp with a column per finger, then any others as they are."""
     known = [entry for entry in LABELS if entry[1] in run]
     named = {key for _, key, _, _ in LABELS}
-    others = [key for key in run if key not in {*named, *EXPERIMENT, *SETTINGS, *_ABOUT_SIGNALS}]
+    others = [key for key in run if key not in {*named, *EXPERIMENT, *SETTINGS, *_NO_METRICS}]
     if not known and not others:
         return "<p>There are no metrics of this system.</p>"
     rows = [_metric(label, run[key], factor, unit) for label, key, factor, unit in known]

@@ -118,7 +118,8 @@ class Meter:
     def live(self) -> str:
         """How it goes, in a few words."""
         worst = self._inside.worst(0) / 1e6
-        return f"worst step {worst:.3g} ms, {self.overruns} overruns"
+        factor = self._real_time_factor()
+        return f"{factor:.3g}x, worst step {worst:.3g} ms, {self.overruns} overruns"
 
     def timing(self, granted: Sequence[str], refused: Sequence[str]) -> Timing:
         """What it all came to so far; granted and refused are what the operating system did."""

@@ -166,6 +166,12 @@ class Pacer:
         self._settle()
         return self.meter.timing(granted, refused)
 
+    def live(self, settled: bool = False) -> str:
+        """How it goes, in a few words: in the run without what is measured later, or settled."""
+        if settled:
+            self._settle()
+        return self.meter.live()
+
     def verdict(self) -> str:
         """What led to an OverrunError, when the steps until then are recorded."""
         self._settle()
