@@ -1,15 +1,19 @@
 """Runs of the grasp by the clock: the same bits, a timing that is kept, an end on Ctrl-C."""
 
+import io
 import json
 import logging
 import os
+import re
 import signal
+import sys
 import threading
 from pathlib import Path
 from typing import Any
 
 import pytest
 from grasp_cosim import InputError, Realtime, System, simulate
+from grasp_cosim.figures.tables import metrics_table
 from grasp_cosim.fmi.instance import CLOCK
 from grasp_cosim.master.engine import Engine
 from grasp_cosim.realtime.pacer import HAS_CLOCK
@@ -93,6 +97,27 @@ def test_a_session_is_paced_as_well(grasp: System, engine: Engine) -> None:
     assert timing is not None
     assert timing.steps == 1000
     assert Timing.from_dict("here", timing.as_dict()) == timing
+
+
+def test_the_page_of_a_paced_run_takes_its_timing_for_no_metric(grasp: System) -> None:
+    result = simulate(grasp, stop=0.01, realtime=FAST)
+    assert result.timing is not None
+    run = {**result.metrics, "realtime": result.timing.as_dict()}
+    assert metrics_table(run) == metrics_table(result.metrics)
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_a_terminal_shows_how_it_goes(grasp: System, monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal, file = Terminal(), io.StringIO()
+    for stream in (terminal, file):
+        monkeypatch.setattr(sys, "stderr", stream)
+        simulate(grasp, stop=0.05, progress=True, realtime=FAST)
+    assert file.getvalue() == ""
+    assert re.search(r"0\.05/0\.05 s .*x, worst step [\d.]+ ms, 500 over", terminal.getvalue())
 
 
 def test_what_is_refused_is_said_and_the_run_goes_on(

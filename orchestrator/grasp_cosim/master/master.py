@@ -145,7 +145,9 @@ class Master:
 
     def _enough(self) -> bool:
         """Whether rows wait no longer: they are many, or have waited long, or are the last."""
-        if self.steps_done == self.total_steps or len(self._waiting()) >= ENOUGH:
+        if self.steps_done == self.total_steps:
+            return True
+        if self._pacer is None and len(self._waiting()) >= ENOUGH:  # a pacer has its own occasions
             return True
         return time.monotonic() - self._handed_on_at > LONG
 

@@ -305,11 +305,13 @@ def _drive(session: Session, progress: bool) -> None:
         steps, start = 1, time.perf_counter()
         while not session.halt.is_set() and session.step(steps):
             if session.pacer and not bar.disable:
-                bar.set_postfix_str(session.pacer.meter.live(), refresh=False)
+                bar.set_postfix_str(session.pacer.live(), refresh=False)
             bar.update(session.time - bar.n)
             now = time.perf_counter()
             steps = max(1, min(2 * steps, int(steps * LOOK / (now - start))))
             start = now
+        if session.pacer:
+            bar.set_postfix_str(session.pacer.live(settled=True))
 
 
 @contextmanager

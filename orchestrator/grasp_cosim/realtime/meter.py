@@ -69,6 +69,9 @@ class Meter:
         self._names = (*names, EXCHANGE)
         self._periods = np.array([1, 1, *map(system.period, names), 1, 1])
         self._phase = 0 if system.scheme == "jacobi" else -1
+        owners = np.array(self.segments) % len(self._names)  # the exchange is the last one
+        self._order = owners.argsort(kind="stable")
+        self._firsts = owners[self._order].searchsorted(np.arange(len(self._names)))
         self._inside = Histograms(len(self._names) + 3)
         self._recording = Histograms(1)
         self._recordings: list[tuple[int, int]] = []
@@ -102,7 +105,6 @@ class Meter:
     def recorded(self, step: int, took: int) -> None:
         """After that step, recording took so many ns. Comes before the next step is judged."""
         self._recordings.append((step, took))
-        self._recording.add(np.array([[float(took)]]), np.array([step]))
 
     def verdict(self) -> str:
         """The overrun that was listed last, in words."""
@@ -116,7 +118,8 @@ class Meter:
     def live(self) -> str:
         """How it goes, in a few words."""
         worst = self._inside.worst(0) / 1e6
-        return f"worst step {worst:.3g} ms, {self.overruns} overruns"
+        factor = self._real_time_factor()
+        return f"{factor:.3g}x, worst step {worst:.3g} ms, {self.overruns} overruns"
 
     def timing(self, granted: Sequence[str], refused: Sequence[str]) -> Timing:
         """What it all came to so far; granted and refused are what the operating system did."""
@@ -180,19 +183,18 @@ class Meter:
         """What was spent on recording after each of these steps, which are in a row."""
         spent = np.zeros(len(steps))
         first, last = int(steps[0]), int(steps[-1])
-        for step, took in self._recordings:
-            if step <= last:
-                spent[step - first] += took
-        self._recordings = [entry for entry in self._recordings if entry[0] > last]
+        taken = [entry for entry in self._recordings if entry[0] <= last]
+        if taken:
+            self._recordings = self._recordings[len(taken) :]
+            after, took = np.array([s for s, _ in taken]), np.array([float(t) for _, t in taken])
+            np.add.at(spent, after - first, took)
+            self._recording.add(took[:, np.newaxis], after)
         return spent
 
     def _parts(self, rows: Table) -> Table:
         """The times of the components and of the exchange, a row per step."""
-        ends = np.diff(rows[:, BEGIN:], axis=1)
-        parts = np.zeros((len(self._names), len(rows)))
-        for segment, owner in zip(ends.T, self.segments, strict=True):
-            parts[owner] += segment
-        return parts.T
+        segments = np.diff(rows[:, BEGIN:], axis=1)
+        return np.add.reduceat(segments[:, self._order], self._firsts, axis=1)
 
     def _happened(self, steps: Steps) -> npt.NDArray[np.bool_] | None:
         """Which parts there are in these steps: a slow component is not called in all of them."""

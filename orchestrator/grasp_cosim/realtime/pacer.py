@@ -159,13 +159,18 @@ class Pacer:
         it waits for a later step, or else before it takes the next ones.
         """
         self._taken = int(steps[-1])
-        took = self._timed(self._taken - 1, lambda: self._take(steps - 1, rows, hand_on))
-        self._recording = took
+        self._timed(self._taken - 1, lambda: self._take(steps - 1, rows, hand_on))
 
     def timing(self, granted: Sequence[str], refused: Sequence[str]) -> Timing:
         """What the times came to so far: see Meter.timing()."""
         self._settle()
         return self.meter.timing(granted, refused)
+
+    def live(self, settled: bool = False) -> str:
+        """How it goes, in a few words: in the run without what is measured later, or settled."""
+        if settled:
+            self._settle()
+        return self.meter.live()
 
     def verdict(self) -> str:
         """What led to an OverrunError, when the steps until then are recorded."""
@@ -179,14 +184,18 @@ class Pacer:
         hand_on: Callable[[], None],
     ) -> None:
         self._measure()
+        start = self._now()
         self._pending = steps, rows.copy()
         hand_on()
+        self._recording = self._now() - start
 
     def _measure(self) -> None:
         """Hand the times that wait on to the meter."""
         if self._pending is not None:
+            start = self._now()
             self.meter.add(*self._pending)
             self._pending = None
+            self._measuring = self._now() - start
 
     def _settle(self) -> None:
         """Hand all times on to the meter."""
@@ -206,19 +215,17 @@ class Pacer:
         spare = self._due(step) - (self._now() - self._origin)
         if self._pending is not None:
             if 2 * spare > 3 * self._measuring or waiting > AFTER:
-                self._measuring = self._timed(step - 1, self._measure)
+                self._timed(step - 1, self._measure)
         elif 2 * spare > 3 * self._recording:
             self._hand_on(step)
 
-    def _timed(self, step: int, action: Callable[[], None]) -> int:
-        """Do it, and count the time that takes as recording after that step; the time in ns."""
+    def _timed(self, step: int, action: Callable[[], None]) -> None:
+        """Do it, and count the time that takes as recording after that step."""
         start = self._now()
         try:
             action()
         finally:
-            took = self._now() - start
-            self.meter.recorded(step, took)
-        return took
+            self.meter.recorded(step, self._now() - start)
 
     def _arrive(self, step: int) -> tuple[int, int]:
         """The time now, and by how much the step before ended late; negative where it did not."""
