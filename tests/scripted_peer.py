@@ -263,6 +263,7 @@ class Host:
         self.references = {v.name: i for i, v in enumerate(self.slave._variables)}
         self.time = 0.0
         self.set(**{"proxy.port": port, "proxy.timeout": 100.0, "proxy.connect_timeout": 100.0})
+        settings = {"on_loss": "failsafe", **settings}
         self.set(**{f"proxy.{name}": value for name, value in settings.items()})
 
     def _kind(self, name: str) -> str:

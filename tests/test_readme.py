@@ -52,7 +52,7 @@ def checkout(
 
 
 def test_there_is_something_to_try() -> None:
-    assert len(COMMANDS) == 14
+    assert len(COMMANDS) == 18
     assert len(EXAMPLES) == 1
 
 
@@ -61,6 +61,8 @@ def test_command(checkout: Path, command: str) -> None:
     arguments = shlex.split(command)
     if arguments[1] in ("run", "qualify"):
         arguments += ["--stop", "0.01"]
+    if arguments[1] in ("serve", "relay"):
+        arguments += ["--port", "0", "--duration", "0.01"]
     touches = "--step-study" not in arguments  # in so short a time: nothing to judge
     assert cli.main(arguments[1:]) == (0 if touches else 1)
 

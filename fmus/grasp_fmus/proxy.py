@@ -49,7 +49,7 @@ class Settings(NamedTuple):
     timeout: float = TIMEOUT
     connect_timeout: float = 5.0
     misses_tolerated: int = 3
-    on_loss: str = FAILSAFE
+    on_loss: str = STOP
     resume: bool = False
     key_file: str = ""
 

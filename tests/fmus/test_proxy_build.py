@@ -34,7 +34,7 @@ OWN_PARAMETERS = {
     "proxy.timeout": ("Real", "0.01"),
     "proxy.connect_timeout": ("Real", "5.0"),
     "proxy.misses_tolerated": ("Integer", "3"),
-    "proxy.on_loss": ("String", "failsafe"),
+    "proxy.on_loss": ("String", "stop"),
     "proxy.resume": ("Boolean", "false"),
     "proxy.key_file": ("String", ""),
 }

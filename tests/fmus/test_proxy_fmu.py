@@ -66,8 +66,9 @@ def outputs(instance: Instance) -> list[Any]:
     ]
 
 
-def initialised(instance: Instance, port: int) -> Instance:
+def initialised(instance: Instance, port: int, on_loss: bytes = b"failsafe") -> Instance:
     assert put(instance, "Integer", "proxy.port", port) == OK
+    assert put(instance, "String", "proxy.on_loss", on_loss) == OK
     return instance.initialise()
 
 
@@ -155,8 +156,7 @@ def test_a_loss_is_a_warning_in_the_log(fmu: Fmu) -> None:
 
 def test_a_loss_may_stop_the_host(fmu: Fmu) -> None:
     with ScriptedPeer() as peer, Instance(fmu, "bench") as instance:
-        assert put(instance, "String", "proxy.on_loss", b"stop") == OK
-        initialised(instance, peer.port)
+        initialised(instance, peer.port, b"stop")
         peer.told(STEP, fail)
         assert instance.step(0.0, 0.5) == ERROR
         (said,) = instance.log
