@@ -6,6 +6,7 @@ import gc
 import os
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -91,6 +92,31 @@ def test_a_system_that_has_none_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
         f"{name}: not possible on this operating system"
         for name in ("CPU 0", "memory locked", "SCHED_FIFO, priority 20")
     ]
+
+
+@linux
+@pytest.mark.parametrize(
+    ("runtime", "sleeps", "said"),
+    [
+        (950_000, False, 1),
+        (950_000, True, 0),
+        (-1, False, 0),
+        (1_000_000, False, 0),
+        (None, False, 0),
+    ],
+)
+def test_a_priority_that_the_kernel_breaks_off_is_said(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, runtime: int | None, sleeps: bool, said: int
+) -> None:
+    System(monkeypatch)
+    monkeypatch.setattr("grasp_cosim.realtime.privileges.THROTTLE", tmp_path)
+    if runtime is not None:
+        (tmp_path / "sched_rt_runtime_us").write_text(f"{runtime}\n")
+        (tmp_path / "sched_rt_period_us").write_text("1000000\n")
+    with privileges(Realtime(priority=20), sleeps) as found:
+        assert found.granted == ["SCHED_FIFO, priority 20"]
+    assert len(found.refused) == said
+    assert all("for 50 ms in every 1000 ms; sysctl kernel.sched" in line for line in found.refused)
 
 
 @pytest.mark.parametrize("collecting", [True, False])

@@ -66,7 +66,8 @@ def timing_lines(timing: Timing) -> list[str]:
     if not timing.overruns:
         return [*lines, "overruns              none: every step ended within its period"]
     blamed = ", ".join(f"{name} {count}" for name, count in timing.culprits.items())
-    worst = max(timing.listed, key=lambda o: o.late)
+    causes = [o for o in timing.listed if o.culprit != "backlog"] or timing.listed
+    worst = max(causes, key=lambda o: o.late)
     lines += [
         f"overruns              {timing.overruns} of {timing.steps} steps; because of: {blamed}",
         f"  e.g.                at t = {worst.time:.6g} s {_ms(worst.late)} ms late: "

@@ -71,7 +71,8 @@ class Session:
             self._stack.callback(self._end)
             self._initialise()
             if realtime and self.pacer:
-                self._privileges = self._stack.enter_context(privileges(realtime))
+                granted = privileges(realtime, self.pacer.sleeps)
+                self._privileges = self._stack.enter_context(granted)
                 self.pacer.breathes = realtime.priority is not None
             for line in self._privileges.refused:
                 LOGGER.warning("%s", line)

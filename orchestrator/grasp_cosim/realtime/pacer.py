@@ -89,6 +89,12 @@ class Pacer:
         self._keep: list[Any] = []
 
     @property
+    def sleeps(self) -> bool:
+        """Whether there is time to sleep between two steps."""
+        numerator, denominator = self._period
+        return numerator > SPIN_NS * denominator
+
+    @property
     def width(self) -> int:
         """How many values it needs in a row."""
         return HEAD + len(self.meter.segments)

@@ -8,6 +8,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from ..errors import choices
 from .options import Realtime
@@ -25,10 +26,11 @@ class Privileges:
 
 
 @contextmanager
-def privileges(realtime: Realtime) -> Iterator[Privileges]:
+def privileges(realtime: Realtime, sleeps: bool = True) -> Iterator[Privileges]:
     """Asks for what is wanted, and keeps the garbage collector away; all is put back at the end.
 
-    Priority and CPU are those of the calling thread.
+    Priority and CPU are those of the calling thread. sleeps says whether it will sleep between two
+    steps: if not, the kernel may break its priority off, which is then said.
     """
     found = Privileges()
     with ExitStack() as stack:
@@ -53,6 +55,8 @@ def privileges(realtime: Realtime) -> Iterator[Privileges]:
                 found.refused.append(f"{name}: {error.strerror}; {remedy}")
             else:
                 found.granted.append(name)
+        if realtime.priority is not None and not sleeps:
+            found.refused.extend(_throttled())
         yield found
 
 
@@ -64,6 +68,27 @@ LOCKING = (
     "needs CAP_IPC_LOCK, or a limit of locked memory that is high enough "
     "(ulimit -l, memlock in /etc/security/limits.conf)"
 )
+
+
+THROTTLE = Path("/proc/sys/kernel")
+"""Where Linux says for how long in a period a thread of a real-time priority may run."""
+
+
+def _throttled() -> list[str]:
+    """A line, where the kernel stops a thread that runs all the time."""
+    try:
+        allowed, period = (
+            int((THROTTLE / f"sched_rt_{name}_us").read_text()) for name in ("runtime", "period")
+        )
+    except OSError:  # not Linux, which has no such limit
+        return []
+    if not 0 <= allowed < period:
+        return []
+    return [
+        "SCHED_FIFO all the time: the period leaves no time to sleep, and the kernel stops "
+        f"such a thread for {(period - allowed) / 1e3:g} ms in every {period / 1e3:g} ms; "
+        "sysctl kernel.sched_rt_runtime_us=-1 lifts that, or run without a priority"
+    ]
 
 
 def _cpus() -> str:
