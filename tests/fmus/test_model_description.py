@@ -25,12 +25,12 @@ from fmpy.validation import validate_fmu
 from grasp_controller import series
 from gripper_plant import rigid
 from lxml import etree  # type: ignore[import-untyped]
-from proximity_sensor import optics
+from proximity_sensor import channel
 
 BLOCKS: dict[str, ModuleType] = {
     "GraspController": series,
     "GripperPlant": rigid,
-    "ProximitySensor": optics,
+    "ProximitySensor": channel,
 }
 SCHEMA = Path(fmpy.__file__).parent / "schema" / "fmi2" / "fmi2ModelDescription.xsd"
 
@@ -283,6 +283,7 @@ ATOMS: dict[str, dict[str, int]] = {
     "kg": {"kg": 1},
     "N": {"kg": 1, "m": 1, "s": -2},
     "V": {"kg": 1, "m": 2, "s": -3, "A": -1},
+    "Hz": {"s": -1},
 }
 
 
@@ -502,7 +503,10 @@ SWITCHES: dict[str, list[dict[str, bool]]] = {
         for b in (False, True)
     ],
     "GripperPlant": [{}],
-    "ProximitySensor": [{}],
+    "ProximitySensor": [
+        {"pattern": a, "ambient": b, "noise": b, "adc": b, "filter": b, "median": c}
+        for a, b, c in ((False, False, False), (True, False, False), (True, True, False))
+    ],
 }
 
 
