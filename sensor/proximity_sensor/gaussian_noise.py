@@ -22,9 +22,7 @@ class Params:
     standard_deviation: Annotated[
         float, "V", "standard deviation of a sample of the raw voltage", (0.0, 10.0)
     ] = 0.005
-    seed: Annotated[float, "1", "a whole number; equal seeds, equal noise", (0.0, 4294967295.0)] = (
-        1.0
-    )
+    seed: Annotated[float, "1", "a whole number; equal seeds, equal noise", (0.0, 1e9)] = 1.0
 
     def __post_init__(self) -> None:
         check("noise", self, "seed")
