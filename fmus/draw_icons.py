@@ -2,9 +2,9 @@
 
     python fmus/draw_icons.py [FOLDER]
 
-One picture per FMU, NAME.png, 256 x 256 px with a transparent background, by default into
-grasp_fmus/icons. FMI tools show them small, on white as well as on dark: few shapes, thick lines,
-and colours of middle brightness.
+One picture per FMU, NAME.png, and one for all proxies, 256 x 256 px with a transparent background,
+by default into grasp_fmus/icons. FMI tools show them small, on white as well as on dark: few
+shapes, thick lines, and colours of middle brightness.
 """
 
 import sys
@@ -70,12 +70,23 @@ def grasp_controller(axes: Axes) -> None:
         axes.plot(x, [middle + dy for dy in y], color=WHITE, lw=7, solid_joinstyle="round")
 
 
+def proxy(axes: Axes) -> None:
+    """A block in outline, and what goes to and fro between it and the real one."""
+    style = "round,pad=0,rounding_size=10"
+    outline = FancyBboxPatch((26, 150), 204, 80, style, fill=False, edgecolor=BLUE, lw=9, ls=":")
+    axes.add_patch(outline)
+    _box(axes, 20, 16, 216, 84, BLUE)
+    _arrow(axes, 92, 148, 0, -44, RED, 16)
+    _arrow(axes, 164, 102, 0, 44, AMBER, 16)
+
+
 ICONS: dict[str, Callable[[Axes], None]] = {
     "GripperPlant": gripper_plant,
     "ProximitySensor": proximity_sensor,
     "GraspController": grasp_controller,
+    "Proxy": proxy,
 }
-"""What draws the icon of each FMU."""
+"""What draws the icon of each FMU, and of all proxies."""
 
 
 def _box(axes: Axes, left: float, bottom: float, width: float, height: float, color: str) -> None:

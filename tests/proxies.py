@@ -1,10 +1,17 @@
-"""A proxy's side by hand: requests made and answers judged by a Client, over a socket or not."""
+"""Both ends of the wire: an FMU that is served, its proxy, and a proxy's side by hand."""
 
 import socket
+import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Self
 
+from grasp_cosim import cli
+from grasp_cosim.bench.bench import Bench, Serving
+from grasp_cosim.bench.server import Server
+from grasp_cosim.system.interface import read_interface
 from grasp_fmus.link.client import Client, Verdict
 from grasp_fmus.link.message import LARGEST, Value
 from grasp_fmus.link.signature import Signature
@@ -70,3 +77,26 @@ def wait_until(condition: Callable[[], bool]) -> None:
     while not condition():
         assert time.monotonic() < end
         time.sleep(0.001)
+
+
+@contextmanager
+def serving(
+    fmu: Path, how: Serving, address: tuple[str, int] = ("127.0.0.1", 0)
+) -> Iterator[Server]:
+    """A server in a thread, stopped in the end."""
+    with Server(Bench(read_interface(fmu), how), address) as server:
+        thread = threading.Thread(target=server.serve)
+        thread.start()
+        try:
+            yield server
+        finally:
+            server.stop()
+            thread.join(30.0)
+            assert not thread.is_alive()
+
+
+def build_proxy(fmu: Path, out: Path, port: int, *options: str) -> Path:
+    """The proxy of an FMU, made by the command; it waits for an answer as long as it takes."""
+    made = ["proxy", str(fmu), "-o", str(out), "--port", str(port), "--timeout", "30", *options]
+    assert cli.main(made) == 0
+    return out

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from grasp_fmus import build, proxy_build
 
 ROOT = Path(__file__).parent.parent
 BLOCKS = {
@@ -56,13 +57,13 @@ def test_the_orchestrator_imports_no_physics_and_no_pythonfmu() -> None:
     assert not found
 
 
-def test_the_orchestrator_builds_the_fmus_at_two_places_only() -> None:
+def test_the_orchestrator_builds_fmus_at_three_places_only() -> None:
     builders = {
         f
         for f, module in modules(ROOT / "orchestrator/grasp_cosim")
         if module.startswith("grasp_fmus") and not module.startswith(LINK)
     }
-    assert builders == {"fmus.py", "grasp.py"}
+    assert builders == {"fmus.py", "grasp.py", "proxy.py"}
 
 
 def test_the_wire_protocol_is_known_to_the_bench_alone_and_knows_nobody() -> None:
@@ -79,3 +80,13 @@ def test_the_fmu_adapter_knows_no_physics_but_for_the_scripts() -> None:
         ("ProximitySensor.py", "proximity_sensor"),
         ("GraspController.py", "grasp_controller"),
     }
+
+
+def test_what_is_packed_into_fmus_imports_the_standard_library_only() -> None:
+    packed = {Path(name).name for name in (*build.ADAPTER, *proxy_build.ADAPTER)}
+    foreign = {
+        (file, name)
+        for file, name in imports(ROOT / "fmus/grasp_fmus")
+        if file in packed and name not in sys.stdlib_module_names
+    }
+    assert not foreign

@@ -12,7 +12,7 @@ import os
 import re
 import sys
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import metadata
@@ -24,14 +24,17 @@ import pythonfmu
 
 from .binary import bound, libpython, mended, preamble
 from .changes import changes, read_members
-from .contract import declared
+from .contract import declared, variables
 from .cross_check import cross_check_files
 from .documentation import icon, licences, page
-from .model_description import model_description
+from .model_description import Description, model_description
 
 SCRIPTS = Path(__file__).parent / "scripts"
-ADAPTER = ("__init__.py", "contract.py", "host_log.py", "loader.py", "slave.py", "snapshot.py")
-"""What of this package runs inside an FMU."""
+ADAPTER = (
+    "__init__.py", "base.py", "contract.py", "host_log.py", "loader.py", "slave.py", "snapshot.py",
+    "variable.py",
+)  # fmt: skip
+"""What of this package runs inside an FMU made from a block."""
 
 BINARIES = Path(pythonfmu.__file__).parent / "resources" / "binaries"
 HASH = "CONTENT_HASH"
@@ -62,55 +65,74 @@ def build(out: Path, bind_python: str | None = None) -> list[Built]:
         built.append(build_fmu(script, out, bind_python))
         for name, data in cross_check_files(script.stem, _slave(script).block).items():
             if not (out / name).is_file() or (out / name).read_bytes() != data:
-                _write(out / name, data)
+                write_file(out / name, data)
     return built
 
 
 def build_fmu(script: Path, out: Path, bind_python: str | None = None) -> Built:
     """Build the FMU of one script into the folder out, like build(), but nothing beside it."""
-    template = _members(script, bind_python)
-    content = _content_hash(template)
-    members = {
-        name.replace(HASH, content): data.replace(HASH.encode(), content.encode())
-        for name, data in template.items()
-    }
-    target = out / f"{script.stem}.fmu"
-    if not target.exists():
-        built = Built(target, "new")
-    elif (before := read_members(target)) == members:
-        return Built(target, "unchanged")
-    else:
-        built = Built(target, "changed", changes(before, members))
-    out.mkdir(parents=True, exist_ok=True)
-    _write(target, _archive(members))
-    return built
-
-
-def _members(script: Path, bind_python: str | None) -> dict[str, bytes]:
-    """The files of the FMU, with HASH in the place of the content hash."""
     slave = _slave(script)
-    sources = _sources(script)
+    name, summary = script.stem, (slave.__doc__ or "").rstrip(".")
+    description = Description(name, summary, variables(declared(slave.block)))
+    html = page(
+        name,
+        summary,
+        _card(slave.block),
+        metadata.version("grasp-cosim"),
+        bound_library(bind_python),
+    )
+    template = members(description, html, icon(name), _sources(script), bind_python)
+    return write_fmu(template, out / f"{name}.fmu")
+
+
+def members(
+    description: Description,
+    html: str,
+    picture: bytes,
+    sources: Mapping[str, bytes],
+    bind_python: str | None,
+) -> dict[str, bytes]:
+    """The files of an FMU, with HASH in the place of the content hash.
+
+    sources are its script NAME.py and, by their paths, the files of the packages that it imports.
+    """
+    name = description.name
+    script = f"{name}.py"
     if bind_python:
-        sources[script.name] = preamble(bind_python).encode() + sources[script.name]
-    name = script.stem
-    summary = (slave.__doc__ or "").rstrip(".")
-    fields = declared(slave.block)
+        sources = {**sources, script: preamble(bind_python).encode() + sources[script]}
     return {
-        "modelDescription.xml": model_description(name, summary, fields, HASH),
-        "model.png": icon(name),
-        "documentation/index.html": page(
-            name,
-            summary,
-            _card(slave.block),
-            metadata.version("grasp-cosim"),
-            libpython(bind_python) if bind_python else None,
-        ).encode(),
+        "modelDescription.xml": model_description(description, HASH),
+        "model.png": picture,
+        "documentation/index.html": html.encode(),
         **{f"documentation/licenses/{file}": text for file, text in licences().items()},
         f"binaries/linux64/{name}.so": _linux_binary(bind_python),
         f"binaries/win64/{name}.dll": _binary("win64/pythonfmu-export.dll"),
         "resources/slavemodule.txt": f"{name}_{HASH}".encode(),
         **_packed(sources),
     }
+
+
+def write_fmu(template: Mapping[str, bytes], target: Path) -> Built:
+    """Write an FMU of these files, where it is not there already with the same content."""
+    content = _content_hash(template)
+    files = {
+        name.replace(HASH, content): data.replace(HASH.encode(), content.encode())
+        for name, data in template.items()
+    }
+    if not target.exists():
+        built = Built(target, "new")
+    elif (before := read_members(target)) == files:
+        return Built(target, "unchanged")
+    else:
+        built = Built(target, "changed", changes(before, files))
+    write_file(target, _archive(files))
+    return built
+
+
+def own_files(names: Sequence[str]) -> dict[str, bytes]:
+    """Files of this package, by their path in an FMU."""
+    folder = _folder(__package__)
+    return {f"{__package__}/{name}": (folder / name).read_bytes() for name in names}
 
 
 def _slave(script: Path) -> Any:
@@ -128,16 +150,20 @@ def _sources(script: Path) -> dict[str, bytes]:
     text = script.read_bytes()
     sources = {script.name: text}
     for package in dict.fromkeys(_IMPORT.findall(text.decode())):
-        folder = Path(importlib.import_module(package).__file__ or "").parent
-        files = (
-            [folder / name for name in ADAPTER] if package == __package__ else folder.rglob("*.py")
-        )
-        for file in sorted(files):
+        if package == __package__:
+            sources |= own_files(ADAPTER)
+            continue
+        folder = _folder(package)
+        for file in sorted(folder.rglob("*.py")):
             sources[f"{package}/{file.relative_to(folder).as_posix()}"] = file.read_bytes()
     return sources
 
 
-def _packed(sources: dict[str, bytes]) -> dict[str, bytes]:
+def _folder(package: str) -> Path:
+    return Path(importlib.import_module(package).__file__ or "").parent
+
+
+def _packed(sources: Mapping[str, bytes]) -> dict[str, bytes]:
     """The sources as they stand in the FMU, all modules under names with HASH."""
     packages = {name.partition("/")[0] for name in sources if "/" in name}
     imports = re.compile(rf"^from ({'|'.join(sorted(packages))})\b", re.MULTILINE)
@@ -157,6 +183,11 @@ def _card(block: Any) -> str:
     folder = Path(sys.modules[block.__package__].__file__ or "").parent
     inside = folder / "README.md"
     return (inside if inside.exists() else folder.parent / "README.md").read_text("utf-8")
+
+
+def bound_library(bind_python: str | None) -> Path | None:
+    """The libpython to which FMUs are bound; None where they are not."""
+    return libpython(bind_python) if bind_python else None
 
 
 def _binary(name: str) -> bytes:
@@ -188,7 +219,9 @@ def _archive(members: Mapping[str, bytes]) -> bytes:
     return buffer.getvalue()
 
 
-def _write(target: Path, data: bytes) -> None:
+def write_file(target: Path, data: bytes) -> None:
+    """Write a file in one piece, with its folder."""
+    target.parent.mkdir(parents=True, exist_ok=True)
     part = target.with_name(f"{target.name}.{os.getpid()}.part")
     part.write_bytes(data)
     part.replace(target)

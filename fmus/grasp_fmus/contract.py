@@ -18,10 +18,9 @@ name[1], name[2], a nested class name.field. After the description follow, in an
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, is_dataclass
 from dataclasses import fields as dataclass_fields
-from typing import Annotated, Any, Literal, Protocol, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Protocol, get_args, get_origin, get_type_hints
 
-Scalar = float | bool
-Causality = Literal["input", "output", "parameter"]
+from .variable import Causality, Scalar, Variable
 
 
 class Block(Protocol):
@@ -80,6 +79,13 @@ class Field:
         """The start values of its scalar variables; None where there is none."""
         return [self.start] if self.size is None else list(self.start or [None] * self.size)
 
+    @property
+    def variability(self) -> str:
+        """That of its scalar variables, as FMI calls it."""
+        if self.causality == "parameter":
+            return "tunable" if self.tunable else "fixed"
+        return "discrete" if self.kind is bool else "continuous"
+
 
 def declared(block: Block) -> list[Field]:
     """The fields of a block: inputs, outputs, parameters, each in the order of declaration."""
@@ -93,6 +99,32 @@ def declared(block: Block) -> list[Field]:
 def count(fields: list[Field], *causalities: Causality) -> int:
     """Number of scalar variables of the given causalities."""
     return sum(len(f.names) for f in fields if f.causality in causalities)
+
+
+def variables(fields: list[Field]) -> list[Variable]:
+    """The scalar variables of fields, in their order.
+
+    At the start outputs depend on all parameters, beside the inputs that are declared.
+    """
+    parameters = tuple(name for f in fields if f.causality == "parameter" for name in f.names)
+    now, initially = feedthrough(fields, False), feedthrough(fields, True)
+    return [
+        Variable(
+            name,
+            f.kind,
+            f.causality,
+            f.unit,
+            start,
+            f.variability,
+            f.limits,
+            f.description,
+            f.nominal,
+            dependencies=tuple(now.get(name, ())),
+            initial_dependencies=(*initially[name], *parameters) if name in initially else (),
+        )
+        for f in fields
+        for name, start in zip(f.names, f.starts, strict=True)
+    ]
 
 
 def feedthrough(fields: list[Field], initially: bool) -> dict[str, list[str]]:

@@ -6,6 +6,7 @@ from importlib import metadata
 from pathlib import Path
 from re import MULTILINE, sub
 from string import Template
+from typing import NamedTuple
 
 from markdown_it import MarkdownIt
 from markdown_it.renderer import RendererHTML
@@ -63,11 +64,9 @@ fix.</p>
 <p>A refused call returns <code>fmi2Error</code> and has no effect. The reason is in the log even
 when debug logging is off: instance, time, variable, value and the allowed range. On Windows it
 returns <code>fmi2Fatal</code>, and the log needs debug logging.</p>
-<p>A step whose results would not be finite returns <code>fmi2Discard</code>.</p>
+<p>$steps</p>
 <h2>State</h2>
-<p>Getting, setting, freeing and serialising the state of the FMU are supported. A state can be
-exchanged between instances of the same FMU. The bytes of a serialised state are guarded by a check
-sum.</p>
+<p>$states</p>
 <h2>Licence</h2>
 <p>MIT, <a href="licenses/license.txt">licenses/license.txt</a>. The binary comes from pythonfmu,
 MIT as well, <a href="licenses/pythonfmu.txt">licenses/pythonfmu.txt</a>.</p>
@@ -81,15 +80,46 @@ _LICENCES = {"license.txt": "grasp-cosim", "pythonfmu.txt": "pythonfmu"}
 
 _ANY = """A libpython in the process: start the host with
 <code>LD_PRELOAD=libpython3.x.so.1.0</code>, say <code>libpython3.11.so.1.0</code>, or use an FMU
-built with <code>grasp-cosim build --bind-python</code>. Python's standard library is found through
-<code>PYTHONHOME</code>, or through <code>python3</code> on the <code>PATH</code>."""
+built with <code>grasp-cosim $command --bind-python</code>. Python's standard library is found
+through <code>PYTHONHOME</code>, or through <code>python3</code> on the <code>PATH</code>."""
 _BOUND = """Nothing where there is <code>$library</code>, to which this FMU is bound: it brings it
 along, and knows where its standard library is. On another machine build it there."""
 """What a host on Linux needs."""
 
 
-def page(name: str, summary: str, card: str, version: str, library: Path | None = None) -> str:
-    """documentation/index.html of the FMU name, from its equation card in Markdown.
+class Making(NamedTuple):
+    """What is said of an FMU by what it was made from: the command, steps and states, as HTML."""
+
+    command: str
+    steps: str
+    states: str
+
+
+BLOCK = Making(
+    "build",
+    "A step whose results would not be finite returns <code>fmi2Discard</code>.",
+    """Getting, setting, freeing and serialising the state of the FMU are supported. A state can be
+exchanged between instances of the same FMU. The bytes of a serialised state are guarded by a check
+sum.""",
+)
+PROXY = Making(
+    "proxy",
+    """A step without an answer in time returns <code>fmi2OK</code>: <code>proxy.state</code> says
+what became of it, and the log that the peer is lost. With <code>proxy.on_loss = stop</code> the
+step in which it is lost returns <code>fmi2Error</code>, and so does every later one.""",
+    "Not supported: the state is that of the peer.",
+)
+
+
+def page(
+    name: str,
+    summary: str,
+    card: str,
+    version: str,
+    library: Path | None = None,
+    making: Making = BLOCK,
+) -> str:
+    """documentation/index.html of the FMU name, from its card in Markdown.
 
     library is the libpython to which the FMU is bound, if it is.
 
@@ -101,7 +131,13 @@ def page(name: str, summary: str, card: str, version: str, library: Path | None 
         summary=escape(summary.rstrip(".")),
         card=_rendered(card),
         version=escape(version),
-        linux=Template(_BOUND).substitute(library=escape(str(library))) if library else _ANY,
+        linux=(
+            Template(_BOUND).substitute(library=escape(str(library)))
+            if library
+            else Template(_ANY).substitute(command=making.command)
+        ),
+        steps=making.steps,
+        states=making.states,
     )
 
 

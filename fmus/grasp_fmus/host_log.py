@@ -12,7 +12,14 @@ from collections.abc import Callable
 Log = Callable[[int, str], None]
 """Logs a message with an FMI status."""
 
-CATEGORIES = {2: "logStatusDiscard", 3: "logStatusError"}
+WARNING, DISCARD, ERROR = 1, 2, 3
+"""FMI statuses."""
+
+CATEGORIES = {
+    WARNING: "logStatusWarning",
+    DISCARD: "logStatusDiscard",
+    ERROR: "logStatusError",
+}
 """The categories in use, by status; their names are those of the FMI standard."""
 
 _LOGGER = ctypes.CFUNCTYPE(

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 from weakref import ref
 
 if TYPE_CHECKING:
-    from .slave import Fmi2Slave
-    from .snapshot import Snapshot
+    from .base import Slave
 
 
 class Component:
@@ -19,11 +18,11 @@ class Component:
     pythonfmu asks the class, not the instance, to serialise a state.
     """
 
-    def __init__(self, slave: "Callable[..., Fmi2Slave]") -> None:
+    def __init__(self, slave: "Callable[..., Slave]") -> None:
         self._slave = slave
-        self._instance: ref[Fmi2Slave]
+        self._instance: ref[Slave]
 
-    def __call__(self, **kwargs: Any) -> "Fmi2Slave":
+    def __call__(self, **kwargs: Any) -> "Slave":
         """A fresh instance, at instantiation and at every reset."""
         instance = self._slave(self, **kwargs)
         self._instance = ref(instance)
@@ -32,14 +31,14 @@ class Component:
     def _fmu_state_to_bytes(self, snapshot: Any) -> bytes:
         return self._alive().state_to_bytes(snapshot)
 
-    def _fmu_state_from_bytes(self, data: bytes) -> "Snapshot":
+    def _fmu_state_from_bytes(self, data: bytes) -> Any:
         try:
             return self._alive().state_from_bytes(data)
         except BaseException:
             release(data)  # pythonfmu keeps what it could not use
             raise
 
-    def _alive(self) -> "Fmi2Slave":
+    def _alive(self) -> "Slave":
         instance = self._instance()
         assert instance is not None  # noqa: S101 - pythonfmu holds it as long as it calls
         return instance

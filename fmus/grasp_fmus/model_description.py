@@ -1,19 +1,26 @@
-"""modelDescription.xml of FMI 2.0, from the fields that a block declares."""
+"""modelDescription.xml of FMI 2.0, from the variables of a slave."""
 
-from collections.abc import Iterable
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from importlib import metadata
+from math import isfinite
 from typing import NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from .contract import Field, feedthrough
-from .host_log import CATEGORIES
+from .host_log import CATEGORIES, DISCARD, ERROR
+from .variable import TYPES, Scalar, Variable
 
 
 class Unit(NamedTuple):
-    """Exponents of the SI base units, and what people read: name and factor from the unit."""
+    """Exponents of the SI base units, and what people read: name and factor from the unit.
 
-    base: dict[str, int]
+    value in base units = factor * value + offset.
+    """
+
+    base: Mapping[str, int]
     display: tuple[str, float] | None = None
+    factor: float = 1.0
+    offset: float = 0.0
 
 
 UNITS: dict[str, Unit] = {
@@ -26,123 +33,163 @@ UNITS: dict[str, Unit] = {
     "N/m": Unit({"kg": 1, "s": -2}),
     "V": Unit({"kg": 1, "m": 2, "s": -3, "A": -1}, ("mV", 1e3)),
     "V/s": Unit({"kg": 1, "m": 2, "s": -4, "A": -1}),
+    "s": Unit({"s": 1}),
     "1/s": Unit({"s": -1}),
     "Hz": Unit({"s": -1}),
     "1": Unit({}),
 }
 """V.m^n is not among them: its exponent is a parameter."""
 
-STEP_SIZE = 1e-4
-STOP_TIME = 3.0
 
-Dependencies = dict[str, list[str]]
+class Experiment(NamedTuple):
+    """A default experiment, times in s; None where nothing is said."""
+
+    start: float | None = 0.0
+    stop: float | None = 3.0
+    tolerance: float | None = None
+    step: float | None = 1e-4
 
 
-def model_description(name: str, description: str, fields: list[Field], guid: str) -> bytes:
-    """The document as UTF-8; the value reference of a variable is its position."""
+CAPABILITIES: Mapping[str, bool] = {
+    "needsExecutionTool": True,
+    "canHandleVariableCommunicationStepSize": True,
+    "canNotUseMemoryManagementFunctions": True,
+    "canGetAndSetFMUstate": True,
+    "canSerializeFMUstate": True,
+}
+"""Of an FMU made from a block."""
+
+
+@dataclass(frozen=True)
+class Description:
+    """What a model description says; the value reference of a variable is its position."""
+
+    name: str
+    summary: str
+    variables: Sequence[Variable]
+    units: Mapping[str, Unit] = field(default_factory=lambda: UNITS)
+    """Those that are defined; of a variable's unit that is not here, there is the name alone."""
+    capabilities: Mapping[str, bool] = field(default_factory=lambda: CAPABILITIES)
+    experiment: Experiment = Experiment()
+    statuses: Sequence[int] = (DISCARD, ERROR)
+    """Those that it logs with messages."""
+    structured: bool = True
+    """Whether all names are in FMI's structured naming convention."""
+
+
+def model_description(d: Description, guid: str) -> bytes:
+    """The document as UTF-8."""
     root = Element(
         "fmiModelDescription",
         fmiVersion="2.0",
-        modelName=name,
+        modelName=d.name,
         guid=guid,
-        description=description,
+        description=d.summary,
         version=metadata.version("grasp-cosim"),
         license="MIT",
         generationTool=f"grasp-cosim with pythonfmu {metadata.version('pythonfmu')}",
-        variableNamingConvention="structured",
+        variableNamingConvention="structured" if d.structured else "flat",
         numberOfEventIndicators="0",
     )
-    SubElement(
-        root,
-        "CoSimulation",
-        modelIdentifier=name,
-        needsExecutionTool="true",
-        canHandleVariableCommunicationStepSize="true",
-        canNotUseMemoryManagementFunctions="true",
-        canGetAndSetFMUstate="true",
-        canSerializeFMUstate="true",
-    )
-    _add_units(root, fields)
+    capabilities = {key: _literal(value) for key, value in d.capabilities.items()}
+    SubElement(root, "CoSimulation", {"modelIdentifier": d.name, **capabilities})
+    _add_units(root, d)
     categories = SubElement(root, "LogCategories")
-    for category in CATEGORIES.values():
-        SubElement(categories, "Category", name=category)
-    SubElement(
-        root, "DefaultExperiment", startTime="0", stopTime=repr(STOP_TIME), stepSize=repr(STEP_SIZE)
-    )
+    for status in d.statuses:
+        SubElement(categories, "Category", name=CATEGORIES[status])
+    times = zip(("startTime", "stopTime", "tolerance", "stepSize"), d.experiment, strict=True)
+    experiment = {key: repr(time) for key, time in times if time is not None}
+    if experiment:
+        SubElement(root, "DefaultExperiment", experiment)
     variables = SubElement(root, "ModelVariables")
-    _add_variables(variables, fields)
-    _add_structure(root, fields)
+    for v in d.variables:
+        _add_variable(variables, v, d.units)
+    _add_structure(root, d.variables)
     indent(root)
     document: bytes = tostring(root, "UTF-8", xml_declaration=True)
     return document + b"\n"
 
 
-def _add_units(root: Element, fields: list[Field]) -> None:
+def _literal(value: Scalar) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _add_units(root: Element, d: Description) -> None:
+    names = dict.fromkeys(v.unit for v in d.variables if v.unit)
+    if not names:
+        return
     definitions = SubElement(root, "UnitDefinitions")
-    for name in dict.fromkeys(f.unit for f in fields if f.unit):
+    for name in names:
         element = SubElement(definitions, "Unit", name=name)
-        if name not in UNITS:
+        if name not in d.units:
             continue
-        unit = UNITS[name]
-        SubElement(element, "BaseUnit", {base: str(power) for base, power in unit.base.items()})
+        unit = d.units[name]
+        base = {key: str(power) for key, power in unit.base.items()}
+        if unit.factor != 1.0:
+            base["factor"] = repr(unit.factor)
+        if unit.offset != 0.0:
+            base["offset"] = repr(unit.offset)
+        SubElement(element, "BaseUnit", base)
         if unit.display:
             display, factor = unit.display
             SubElement(element, "DisplayUnit", name=display, factor=repr(factor))
 
 
-def _add_variables(parent: Element, fields: list[Field]) -> None:
-    for f in fields:
-        for name, start in zip(f.names, f.starts, strict=True):
-            variable = SubElement(
-                parent,
-                "ScalarVariable",
-                name=name,
-                valueReference=str(len(parent)),
-                causality=f.causality,
-                variability=_variability(f),
-                description=f.description,
-            )
-            if f.causality != "input":
-                variable.set("initial", "calculated" if f.causality == "output" else "exact")
-            if f.kind is bool:
-                attributes = {} if start is None else {"start": str(start).lower()}
-                SubElement(variable, "Boolean", attributes)
-            else:
-                SubElement(variable, "Real", _real(f, start))
+def _add_variable(parent: Element, v: Variable, units: Mapping[str, Unit]) -> None:
+    element = SubElement(
+        parent,
+        "ScalarVariable",
+        name=v.name,
+        valueReference=str(len(parent)),
+        causality=v.causality,
+        variability=v.variability,
+    )
+    if v.description:
+        element.set("description", v.description)
+    if v.causality != "input":
+        element.set("initial", _initial(v))
+    SubElement(element, TYPES[v.kind], _attributes(v, units))
 
 
-def _variability(f: Field) -> str:
-    if f.causality == "parameter":
-        return "tunable" if f.tunable else "fixed"
-    return "discrete" if f.kind is bool else "continuous"
+def _initial(v: Variable) -> str:
+    if v.causality == "parameter" or v.variability == "constant":
+        return "exact"
+    return "calculated" if v.start is None else "approx"
 
 
-def _real(f: Field, start: float | None) -> dict[str, str]:
-    attributes = {"unit": f.unit}
-    if f.unit in UNITS and (display := UNITS[f.unit].display):
-        attributes["displayUnit"] = display[0]
-    if f.limits:
-        attributes["min"], attributes["max"] = map(repr, f.limits)
-    if f.nominal is not None:
-        attributes["nominal"] = repr(f.nominal)
-    if start is not None:
-        attributes["start"] = repr(float(start))
+def _attributes(v: Variable, units: Mapping[str, Unit]) -> dict[str, str]:
+    """Of its type's element."""
+    attributes: dict[str, str] = {}
+    if v.kind is float and v.unit:
+        attributes["unit"] = v.unit
+        if v.unit in units and (display := units[v.unit].display):
+            attributes["displayUnit"] = display[0]
+    if v.relative:
+        attributes["relativeQuantity"] = "true"
+    if v.kind in (float, int) and v.limits:
+        limits = zip(("min", "max"), v.limits, strict=True)
+        attributes |= {key: repr(v.kind(limit)) for key, limit in limits if isfinite(limit)}
+    if v.nominal is not None:
+        attributes["nominal"] = repr(v.nominal)
+    if v.start is not None:
+        attributes["start"] = _literal(float(v.start) if v.kind is float else v.start)
     return attributes
 
 
-def _add_structure(root: Element, fields: list[Field]) -> None:
-    """What the outputs depend on: while stepping on inputs, at the start on parameters as well."""
-    names = [name for f in fields for name in f.names]
-    index = {name: i for i, name in enumerate(names, 1)}
-    parameters = [name for f in fields if f.causality == "parameter" for name in f.names]
+def _add_structure(root: Element, variables: Sequence[Variable]) -> None:
+    index = {v.name: i for i, v in enumerate(variables, 1)}
     structure = SubElement(root, "ModelStructure")
-    for section, initially in (("Outputs", False), ("InitialUnknowns", True)):
-        unknowns = SubElement(structure, section)
-        for output, inputs in feedthrough(fields, initially).items():
-            known: Iterable[str] = (*inputs, *parameters) if initially else inputs
+    outputs = [v for v in variables if v.causality == "output"]
+    unknowns = [v for v in outputs if _initial(v) != "exact"]
+    for section, listed in (("Outputs", outputs), ("InitialUnknowns", unknowns)):
+        if not listed:
+            continue
+        parent = SubElement(structure, section)
+        for v in listed:
+            known = v.dependencies if section == "Outputs" else v.initial_dependencies
             SubElement(
-                unknowns,
+                parent,
                 "Unknown",
-                index=str(index[output]),
+                index=str(index[v.name]),
                 dependencies=" ".join(str(index[name]) for name in known),
             )

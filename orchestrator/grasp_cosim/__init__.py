@@ -3,7 +3,16 @@
 from .errors import InputError, SimulationError
 from .grasp import grasp_system
 from .master.simulation import simulate
+from .realtime.options import Realtime
 from .recording.result import Result
 from .system.description import System
 
-__all__ = ["InputError", "Result", "SimulationError", "System", "grasp_system", "simulate"]
+__all__ = [
+    "InputError",
+    "Realtime",
+    "Result",
+    "SimulationError",
+    "System",
+    "grasp_system",
+    "simulate",
+]

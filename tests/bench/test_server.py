@@ -8,7 +8,6 @@ import signal
 import socket
 import subprocess
 import sys
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,23 +20,9 @@ from grasp_cosim.bench.wire import wire_signature
 from grasp_cosim.errors import InputError
 from grasp_cosim.system.interface import read_interface
 from grasp_fmus.link.message import LARGEST
-from proxies import HandProxy, UdpAsk, wait_until
+from proxies import HandProxy, UdpAsk, serving, wait_until
 
 KEY = b"a key of 16 byte"
-
-
-@contextmanager
-def serving(fmu: Path, how: Serving) -> Iterator[Server]:
-    """A server in a thread, stopped in the end."""
-    with Server(Bench(read_interface(fmu), how)) as server:
-        thread = threading.Thread(target=server.serve)
-        thread.start()
-        try:
-            yield server
-        finally:
-            server.stop()
-            thread.join(30.0)
-            assert not thread.is_alive()
 
 
 @contextmanager

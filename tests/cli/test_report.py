@@ -2,10 +2,12 @@
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from figures.runs import grasp_run, ring_run, write_run
+from figures.timings import paced
 from grasp_cosim import System, cli, simulate
 from grasp_cosim.figures.page import page_html
 from grasp_cosim.recording.load import load_run
@@ -51,6 +53,20 @@ def test_a_system_that_is_no_grasp_has_a_picture_of_its_signals(tmp_path: Path) 
     assert {p.name for p in (tmp_path / "ring").iterdir()} == {
         "report.html", "run.json", "signals.csv", "signals.png",
     }  # fmt: skip
+
+
+def test_a_paced_run_has_a_picture_of_its_timing_too(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = replace(ring_run(["a", "b"]), timing=paced(steps=50, hiccups=2))
+    write_run(tmp_path / "ring", run)
+    assert cli.main(["report", str(tmp_path / "ring"), "--json"]) == 0
+    pictures = [tmp_path / "ring" / name for name in ("signals.png", "timing.png")]
+    assert json.loads(capsys.readouterr().out)["pictures"] == [str(p) for p in pictures]
+    assert all(p.read_bytes().startswith(b"\x89PNG") for p in pictures)
+    html = (tmp_path / "ring" / "report.html").read_text("utf-8")
+    assert html == page_html(run, "ring")
+    assert "2 of 50 steps (4 %) ended after their period" in html
 
 
 def test_without_matplotlib_there_is_the_page_alone(

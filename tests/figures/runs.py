@@ -121,5 +121,6 @@ def write_run(folder: Path, run: Run) -> None:
         "units": dict(run.units),
         "types": {name: str(v.dtype) for name, v in run.signals.items()},
         "descriptions": dict(run.descriptions),
+        **({"realtime": run.timing.as_dict()} if run.timing else {}),
     }
     (folder / "run.json").write_text(json.dumps({**run.settings, **about}), "utf-8")

@@ -1,10 +1,12 @@
 """The page in a headless Chromium: it runs without an error, draws, zooms, plays."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from figures.javascript import in_browser
 from figures.runs import CENTRE, TOUCH, WIDTH, grasp_run, position, ring_run
+from figures.timings import paced
 from grasp_cosim.figures.page import page_html
 
 pytestmark = pytest.mark.slow
@@ -209,6 +211,42 @@ def test_nothing_sticks_out_of_a_narrow_or_wide_window(
     act = "return [document.documentElement.scrollWidth, innerWidth];"
     width, inner = in_browser(html, act, tmp_path, size=size)
     assert width <= inner
+
+
+@pytest.mark.parametrize("width", [420, 1101])
+def test_the_charts_of_a_paced_run_fit(width: int, tmp_path: Path) -> None:
+    """A narrow window, and two narrow columns: nothing sticks out, no label covers another one,
+    curves and dots are inside the charts.
+    """
+    html = page_html(replace(grasp_run(), timing=paced(steps=2000)), "results")
+    act = """
+      const box = (element) => element.getBoundingClientRect(), root = document.documentElement;
+      const apart = (a, b) => a.right <= b.left || b.right <= a.left
+        || a.bottom <= b.top || b.bottom <= a.top;
+      const charts = [...document.querySelectorAll(".chart")];
+      return [root.scrollWidth - innerWidth, charts.map((chart) => {
+        const place = box(chart), plot = box(chart.querySelector("svg"));
+        const texts = [...chart.querySelectorAll("text")].map(box);
+        const drawn = [...chart.querySelectorAll("polyline, circle")].map(box);
+        return {
+          covered: texts.filter((a, i) => !texts.slice(i + 1).every((b) => apart(a, b))).length,
+          outside: texts.filter((a) => a.left < place.left || a.right > place.right + 8).length,
+          astray: drawn.filter((a) => a.right < plot.left || a.left > plot.right
+            || a.bottom < plot.top || a.top > plot.bottom).length,
+          curves: chart.querySelectorAll("polyline").length,
+          widest: Math.max(0, ...drawn.map((a) => a.width)) / plot.width,
+          dots: chart.querySelectorAll("circle").length,
+        };
+      })];
+    """
+    beyond, (distributions, overruns) = in_browser(html, act, tmp_path, size=(width, 1200))
+    assert beyond <= 0
+    for chart in (distributions, overruns):
+        assert (chart["covered"], chart["outside"], chart["astray"]) == (0, 0, 0)
+    assert distributions["curves"] == 9
+    assert distributions["dots"] == 9 * 4
+    assert 0.3 < distributions["widest"] <= 1.0
+    assert overruns["dots"] == 12
 
 
 def test_any_system_has_traces(tmp_path: Path) -> None:

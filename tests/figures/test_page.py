@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from figures.runs import grasp_run, ring_run
 from figures.test_embed import unpacked
+from figures.timings import paced
 from grasp_cosim.errors import InputError
 from grasp_cosim.figures.page import page_html, write_page
 from grasp_cosim.recording.load import Run
@@ -51,7 +52,11 @@ class Elements(HTMLParser):
         return [str(a["id"]) for _, a in self.found if "id" in a]
 
 
-@pytest.mark.parametrize("run", [grasp_run(), ring_run(["a", "b"])], ids=["grasp", "ring"])
+@pytest.mark.parametrize(
+    "run",
+    [grasp_run(), ring_run(["a", "b"]), replace(grasp_run(), timing=paced(steps=2000))],
+    ids=["grasp", "ring", "paced"],
+)
 def test_the_page_is_whole_and_needs_nothing_from_outside(run: Run) -> None:
     html = page_html(run, "results")
     page = Elements(html)

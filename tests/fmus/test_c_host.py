@@ -4,13 +4,19 @@ import shutil
 import subprocess
 import sys
 import sysconfig
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
 from fmi2 import ERROR, OK, Fmu, Instance
 from grasp_fmus.build import SCRIPTS, build_fmu
+from grasp_fmus.link.message import END, HELLO, INITIALISE, STEP
+from grasp_fmus.link.signature import Signature
+from grasp_fmus.model_description import Experiment
+from grasp_fmus.proxy import Settings
+from grasp_fmus.proxy_build import Original, build_proxy
 from pythons import VERSIONS, python
+from scripted_peer import SIGNATURE, VARIABLES, ScriptedPeer
 
 SOURCE = Path(__file__).with_name("host.c")
 STEPS, H = 20, 1e-3
@@ -55,9 +61,17 @@ def bound(tmp_path: Path) -> Bind:
 
 
 def run(
-    host: Path, fmu: Fmu, values: dict[str, float], *wrapper: str, **environment: str
+    host: Path,
+    fmu: Fmu,
+    values: dict[str, float],
+    *wrapper: str,
+    outputs: Sequence[str] = (),
+    **environment: str,
 ) -> subprocess.CompletedProcess[str]:
-    """The host with one value set, in an environment with a PATH alone."""
+    """The host with one value set, in an environment with a PATH alone.
+
+    It asks for the outputs that are named, else for all.
+    """
     ((name, value),) = values.items()
     return subprocess.run(
         [
@@ -70,7 +84,7 @@ def run(
             repr(H),
             str(fmu.references[name]),
             repr(value),
-            *(str(fmu.references[output]) for output in real_outputs(fmu)),
+            *(str(fmu.references[output]) for output in outputs or real_outputs(fmu)),
         ],
         env={"PATH": "/usr/bin:/bin", **environment},
         cwd=fmu.folder,
@@ -154,6 +168,29 @@ def test_what_is_refused_in_c_is_an_error_to_go_on_from(
     *messages, call, terminated, closed = done.stdout.splitlines()
     assert messages == ["3: host, t = 0 s: object_width = 99.0 m: must be from 0 to 10 m"]
     assert (call, terminated, closed) == ("setReal: 3", "terminated: 0", "closed: 0")
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_bound_proxy_runs_in_c(host: Path, tmp_path: Path, version: str) -> None:
+    """Until the host asks for a state; the end is said all the same."""
+    kinds = {"force", "gain", "doubled"}
+    wire = Signature(tuple(v for v in SIGNATURE.variables if v.name in kinds))
+    variables = [v for v in VARIABLES if v.name in kinds]
+    with ScriptedPeer(signature=wire, outputs=lambda values: [values[0] * values[1]]) as peer:
+        built = build_proxy(
+            tmp_path / "TheProxy.fmu",
+            Original("Original.fmu", variables, {}, Experiment(), True),
+            Settings(port=peer.port, timeout=60.0, connect_timeout=60.0),
+            python(version, shared=True).program,
+        )
+        fmu = Fmu(built.path, tmp_path / "unpacked")
+        done = run(host, fmu, {"force": -0.1}, outputs=["doubled", "proxy.age"])
+    assert (done.returncode, done.stderr) == (ERROR, ""), done.stdout
+    *rows, said, call, terminated, closed = done.stdout.splitlines()
+    assert rows == ["-0.20000000000000001 0"] * (STEPS - 1)
+    assert "fmi2GetFMUstate: a proxy has no state" in said
+    assert (call, terminated, closed) == ("getFMUstate: 3", "terminated: 0", "closed: 0")
+    assert peer.kinds() == [HELLO, INITIALISE, *[STEP] * (STEPS - 1), END]
 
 
 @pytest.mark.slow

@@ -12,7 +12,7 @@ import pytest
 from grasp_fmus import build as builder
 from grasp_fmus import documentation
 from grasp_fmus.contract import declared
-from grasp_fmus.documentation import icon, licences, page
+from grasp_fmus.documentation import PROXY, icon, licences, page
 
 ROOT = Path(__file__).parents[2]
 
@@ -189,6 +189,7 @@ def test_a_missing_licence_is_named(monkeypatch: pytest.MonkeyPatch, distributio
         licences()
 
 
+@pytest.mark.parametrize("name", [*BLOCKS, "Proxy"])
 def test_the_icon_is_a_small_picture_with_a_transparent_background(name: str) -> None:
     png = icon(name)
     assert png.startswith(b"\x89PNG\r\n\x1a\n")
@@ -199,9 +200,9 @@ def test_the_icon_is_a_small_picture_with_a_transparent_background(name: str) ->
     assert b"tEXt" not in png  # neither program nor date
 
 
-def test_icons_differ_and_there_is_one_per_fmu() -> None:
+def test_icons_differ_and_there_is_one_per_fmu_and_one_for_proxies() -> None:
     files = list(documentation.ICONS.iterdir())
-    assert {file.name for file in files} == {f"{name}.png" for name in BLOCKS}
+    assert {file.name for file in files} == {f"{name}.png" for name in (*BLOCKS, "Proxy")}
     assert len({file.read_bytes() for file in files}) == len(files)
 
 
@@ -210,6 +211,7 @@ def test_a_missing_icon_is_named() -> None:
         icon("Nonesuch")
 
 
+@pytest.mark.parametrize("name", [*BLOCKS, "Proxy"])
 def test_the_script_draws_the_icons(tmp_path: Path, name: str) -> None:
     image = pytest.importorskip("matplotlib.image")
     runpy.run_path(str(ROOT / "fmus" / "draw_icons.py"))["main"](tmp_path)
@@ -236,3 +238,12 @@ def test_a_bound_fmu_says_what_it_is_bound_to() -> None:
     assert f"Nothing where there is {library}, to which this FMU is bound" in text(parsed(bound))
     assert "LD_PRELOAD" not in bound
     assert "LD_PRELOAD" in page("Name", "A summary.", "# Card\n", "1.2.3")
+
+
+def test_the_page_of_a_proxy_says_what_is_different() -> None:
+    html = page("Name", "A summary.", "# Card\n", "1.2.3", making=PROXY)
+    found = sections(html)
+    assert "grasp-cosim proxy --bind-python" in found["How the host must find Python"]
+    assert "fmi2Discard" not in found["Errors"]
+    assert "returns fmi2OK: proxy.state says what became of it" in found["Errors"]
+    assert found["State"] == " State Not supported: the state is that of the peer."

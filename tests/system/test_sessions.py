@@ -1,15 +1,20 @@
 """Sessions: what can be done with one, and when that is over."""
 
+import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from fmi.instances import KINDS, interrupted_after
 from fmi.test_rejected_steps import alone
 from grasp_cosim import InputError, SimulationError, System, simulate
+from grasp_cosim.master import master
 from grasp_cosim.master.engine import Engine
+from grasp_cosim.recording.memory import MemoryListener
 from grasp_cosim.system.parts import Isolation
+from mocks import Mock, make_system
 from native_fmus import needs_gcc
 
 pytestmark = needs_gcc
@@ -83,3 +88,94 @@ def test_steps_are_counted_in_whole_numbers(grasp: System, steps: int) -> None:
 def test_an_engine_that_does_not_exist_is_refused(grasp: System) -> None:
     with pytest.raises(InputError, match="engine = 'complied': must be one of auto, python, comp"):
         simulate(grasp, stop=1e-3, engine="complied")  # type: ignore[arg-type]
+
+
+class Blocks(MemoryListener):
+    """Remembers how many rows came at once."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.sizes: list[int] = []
+
+    def block(self, steps: Any, rows: Any) -> None:
+        self.sizes.append(len(steps))
+        super().block(steps, rows)
+
+
+def test_rows_of_single_steps_are_handed_on_together(
+    grasp: System, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(master, "LONG", math.inf)
+    blocks = Blocks()
+    with simulate.session(grasp, stop=0.1, listeners=[blocks]) as session:
+        for _ in range(80):
+            session.step()
+        assert blocks.sizes == [1, 32, 32]
+        assert len(session.result().time) == 81
+        session.step(2000)
+        assert session.complete
+    assert blocks.sizes == [1, 32, 32, 16, 920]
+    assert np.array_equal(blocks.signals["plant.gap[1]"], simulate(grasp, stop=0.1)["plant.gap[1]"])
+
+
+def test_rows_that_wait_are_handed_on_after_a_while(
+    grasp: System, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(master, "LONG", 0.0)
+    blocks = Blocks()
+    with simulate.session(grasp, stop=0.1, listeners=[blocks]) as session:
+        for _ in range(3):
+            session.step()
+    assert blocks.sizes == [1, 1, 1, 1]
+
+
+@engines
+def test_a_value_that_is_not_finite_is_found_in_its_step(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, engine: Engine
+) -> None:
+    """Also where it has gone again at the end of the call."""
+    monkeypatch.setattr(master, "LONG", math.inf)
+    mock = Mock(tmp_path, "a", lambda u, t: math.inf if 0.45 < t < 0.65 else t)
+    monkeypatch.setattr("grasp_cosim.master.simulation.load", lambda component: mock)
+    with simulate.session(make_system([mock], [], 10), engine=engine) as session:
+        for _ in range(3):
+            session.step()
+        with pytest.raises(
+            SimulationError, match=r"^a\.y = inf at step 5: must be finite"
+        ) as error:
+            session.step(5)
+        assert error.value.result is not None
+        assert len(error.value.result.time) == 6
+
+
+def test_a_listener_that_fails_at_a_look_breaks_the_session(
+    grasp: System, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(master, "LONG", math.inf)
+
+    class Full(Blocks):
+        def block(self, steps: Any, rows: Any) -> None:
+            if len(self.sizes):
+                raise SimulationError("full")
+            super().block(steps, rows)
+
+    with simulate.session(grasp, stop=0.1, listeners=[Full()]) as session:
+        session.step()
+        with pytest.raises(SimulationError, match=r"^full$") as error:
+            session.result()
+        assert error.value.result is not None
+        assert len(error.value.result.time) == 2
+        with pytest.raises(InputError, match="broken off by a failure"):
+            session.step()
+
+
+def test_a_setting_is_checked_each_time(grasp: System) -> None:
+    with simulate.session(grasp, stop=0.1) as session:
+        session.set("sensor_1.reflectance", 0.5)
+        session.set("sensor_1.reflectance", 0.25)
+        with pytest.raises(InputError, match=r"^set: sensor_1\.reflectance: reflectance = 'dark'"):
+            session.set("sensor_1.reflectance", "dark")
+        for _ in range(2):
+            with pytest.raises(InputError, match=r"^set: sensor_1\.gain: is a fixed parameter"):
+                session.set("sensor_1.gain", 1.0)
+        assert len(session.result().log) == 2

@@ -112,7 +112,7 @@ class Codec:
         """The values of a body; None where it has another size or holds what is no value.
 
         That is a Real that is not finite, an Integer beyond 32 bits, a Boolean other than 0 and 1,
-        a string that is not UTF-8.
+        a string that is not UTF-8 or not filled up with NUL, at least one.
         """
         if len(body) != self.size:
             return None
@@ -130,7 +130,10 @@ class Codec:
             values[i] = values[i] == 1
         try:
             for i, _ in self._strings:
-                values[i] = values[i].rstrip(b"\0").decode()
+                text, end, rest = values[i].partition(b"\0")
+                if not end or rest.strip(b"\0"):
+                    return None
+                values[i] = text.decode()
         except UnicodeDecodeError:
             return None
         return values

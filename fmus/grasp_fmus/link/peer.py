@@ -32,6 +32,9 @@ from .signature import Signature
 ALIVE = 1_000_000_000
 """ns since its last request for which a session keeps others away."""
 
+LARGEST_REASON = 1024
+"""Bytes of what a REFUSE says in words."""
+
 GREETED = 64
 """The most sessions that have said HELLO and not yet begun."""
 
@@ -102,6 +105,7 @@ class Peer:
         self._heard = 0
         self._last: Message | None = None
         self._last_answer: bytes | None = None
+        self._refused: tuple[int, int, int] | None = None  # the request that failed, for its repeat
         self._stepping = False
 
     @property
@@ -128,8 +132,11 @@ class Peer:
 
     def failed(self, reason: str) -> bytes:
         """The answer to the last request where it cannot be done; the session is over."""
-        answer = self._keep(REFUSE, FAILED, 0.0, reason.encode()[:1024])
+        m = self._last
+        answer = self._keep(REFUSE, FAILED, 0.0, reason.encode()[:LARGEST_REASON])
         self._over()
+        if m is not None:
+            self._refused = m.session, m.cookie, m.sequence
         return answer
 
     def _drop(self, counter: str) -> Action:
@@ -163,7 +170,6 @@ class Peer:
     def _in_session(self, m: Message, now: int) -> Action:
         if self._live != (m.session, m.cookie):
             return self._begin(m, now)
-        self._heard = now
         if m.kind == END:
             self._over()
             return Request(END, m.time, 0.0, [], fresh=False)
@@ -175,29 +181,34 @@ class Peer:
                 return self._drop("duplicated")
             self.counters.repeated += 1
             return self._last_answer
-        return self._do(m, fresh=False)
+        return self._do(m, now, fresh=False)
 
     def _begin(self, m: Message, now: int) -> Action:
         """The first INITIALISE of a session makes it the one under way."""
+        if m.kind == INITIALISE and self._refused == (m.session, m.cookie, m.sequence):
+            self.counters.repeated += 1
+            return self._last_answer
         if self._greeted.get(m.session) != m.cookie or m.kind != INITIALISE:
             self.counters.foreign += 1
             return None if m.kind == END else self._refuse(m, UNKNOWN)
         if self._busy(m.session, now):
             self.counters.busy += 1
             return self._refuse(m, BUSY)
-        request = self._do(m, fresh=True)
+        request = self._do(m, now, fresh=True)
         if isinstance(request, Request):
             del self._greeted[m.session]
-            self._live, self._heard, self._stepping = (m.session, m.cookie), now, False
+            self._live, self._stepping = (m.session, m.cookie), False
         return request
 
-    def _do(self, m: Message, fresh: bool) -> Action:
+    def _do(self, m: Message, now: int, fresh: bool) -> Action:
         values = self._request.unpack(m.body)
         if values is None or (m.kind == STEP) != (m.step > 0.0):
             return self._drop("malformed")
         if m.kind == INITIALISE and self._stepping and not fresh:
             return self._drop("malformed")
-        self._last, self._last_answer = m, None
+        # Only what is new counts as heard: who repeats a recorded datagram keeps nobody away
+        self._heard = now
+        self._last, self._last_answer, self._refused = m, None, None
         if m.kind == STEP:
             self._stepping = True
             self.counters.steps += 1
@@ -206,7 +217,7 @@ class Peer:
         return Request(m.kind, m.time, m.step, values, fresh)
 
     def _over(self) -> None:
-        self._live, self._last, self._last_answer, self._stepping = None, None, None, False
+        self._live, self._last, self._stepping = None, None, False
 
     def _refuse(self, m: Message, code: int, body: bytes = b"") -> bytes:
         return self._pack(m, REFUSE, code, 0.0, body)

@@ -1,5 +1,6 @@
 """From an FMU's interface to what a proxy of it and its peer exchange."""
 
+from math import isfinite
 from pathlib import Path
 from typing import Literal
 
@@ -52,7 +53,11 @@ def _obstacle(v: Variable) -> str | None:
         return "structural"
     if not v.supported:
         return f"of type {v.nature}"
-    return f"of type {v.type}" if v.type in WIDE else None
+    if v.type in WIDE:
+        return f"of type {v.type}"
+    if v.kind == "Real" and v.start is not None and not isfinite(float(v.start)):
+        return f"{v.start} at the start"
+    return None
 
 
 def _kind(v: Variable) -> Literal["Real", "Integer", "Boolean", "String"]:

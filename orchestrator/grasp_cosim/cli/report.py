@@ -8,6 +8,7 @@ import click
 from ..errors import InputError
 from ..figures.page import write_page
 from ..figures.plot import plot_run, plot_signals
+from ..figures.timing import draw_timing
 from ..recording.load import load_run
 from ..study.metrics import is_grasp
 from .frame import check_folder, json_option
@@ -21,7 +22,8 @@ def report(run: Path, out: Path | None, as_json: bool) -> int:
     """Make a page of RUN, a folder that `run --out` wrote: traces, animation, wiring, settings.
 
     The page is one file that needs nothing else. A picture is drawn beside it with matplotlib, the
-    extra plot; without it there is the page alone.
+    extra plot, and one more of the timing of a run in real time; without it there is the page
+    alone.
 
     \b
     Example: grasp-cosim report results
@@ -36,6 +38,9 @@ def report(run: Path, out: Path | None, as_json: bool) -> int:
     try:
         draw(recorded, picture)
         pictures.append(picture)
+        if recorded.timing:
+            draw_timing(recorded.timing, float(recorded.time[-1]), page.parent / "timing.png")
+            pictures.append(page.parent / "timing.png")
     except InputError as error:
         click.echo(f"no picture: {error}", err=True)
     if as_json:

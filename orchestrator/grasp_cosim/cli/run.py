@@ -8,15 +8,17 @@ import click
 
 from ..errors import InputError, SimulationError
 from ..figures.plot import check_plot
+from ..figures.timing import draw_timing
 from ..grasp import CASES
 from ..master.engine import ENGINES, Engine
 from ..master.simulation import MOST, simulate
 from ..recording.mdf import check_mdf
 from ..recording.result import Result
-from ..study.metrics import LABELS
+from ..study.metrics import LABELS, is_grasp
 from ..system.description import SCHEMES
 from ..system.interface import Value
 from .frame import INTERRUPTED, check_folder, fail, json_option, load_system, pair
+from .realtime import chosen_realtime, realtime_options, timing_lines
 from .step_study import run_step_study
 
 
@@ -29,7 +31,11 @@ from .step_study import run_step_study
 @click.option("--stop", type=float, help="Stop time in s.")
 @click.option("--scheme", type=click.Choice(SCHEMES))
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for signals.csv and run.json.")
-@click.option("--plot", is_flag=True, help="Draw grasp.png, in --out or the current folder.")
+@click.option(
+    "--plot",
+    is_flag=True,
+    help="Draw grasp.png, and timing.png with --realtime, in --out or the current folder.",
+)
 @click.option("--mdf", is_flag=True, help="Write signals.mf4 (ASAM MDF 4) too; needs --out.")
 @click.option(
     "--every", type=click.IntRange(1, MOST), default=1, help="Record each N-th step only."
@@ -39,6 +45,7 @@ from .step_study import run_step_study
     "--step-study", is_flag=True, help="Repeat the run over steps: is --step small enough?"
 )
 @click.option("--tolerance", type=float, help="Of contact times in a step study, s.")
+@realtime_options
 @json_option
 def run(
     system: Path | None,
@@ -56,14 +63,20 @@ def run(
     step_study: bool,
     tolerance: float | None,
     as_json: bool,
+    realtime: bool,
+    **pacing: Any,
 ) -> int:
     """Run SYSTEM, a .toml or .ssp file; by default the built-in grasp.
 
     \b
     Example: grasp-cosim run --case 1 --set plant.initial_object_position=0.02 --out results --plot
+    In real time: grasp-cosim run --realtime --step 1e-3 --priority 80 --cpu 1 --out results
     """
     if tolerance is not None and not step_study:
         raise InputError(f"--tolerance {tolerance!r}: must come with --step-study")
+    paced = chosen_realtime(realtime, pacing)
+    if paced and step_study:
+        raise InputError("--realtime: must not come with --step-study, which is not paced")
     if mdf and not out:
         raise InputError("--mdf: must come with --out, the folder for signals.mf4")
     if mdf:
@@ -76,13 +89,14 @@ def run(
     if step_study:
         return run_step_study(chosen, tolerance, out, plot, as_json)
     if plot:
-        check_plot(
+        outputs = (
             f"{c.name}.{v.name}" for c in chosen.components for v in c.interface.of("output")
         )
+        check_plot(outputs, paced is not None)
     if out or plot:
         check_folder(out or Path())
     try:
-        result = simulate(chosen, progress=True, every=every, engine=engine)
+        result = simulate(chosen, progress=True, every=every, engine=engine, realtime=paced)
     except SimulationError as error:
         if error.result:
             _write(error.result, out, plot, mdf)
@@ -92,7 +106,7 @@ def run(
     _write(result, out, plot, mdf)
     for line in result.log[len(chosen.notes) :]:
         click.echo(line, err=True)
-    click.echo(json.dumps(dict(result.metrics)) if as_json else _summary(result))
+    click.echo(json.dumps(_as_json(result)) if as_json else _summary(result))
     if not result.complete:
         message = f"interrupted at t = {result.time[-1]:.6g} s; kept what was recorded"
         return fail(message, INTERRUPTED)
@@ -106,9 +120,22 @@ def _write(result: Result, out: Path | None, plot: bool, mdf: bool) -> None:
     if out and mdf:
         result.to_mdf(out / "signals.mf4")
     if plot:
-        path = (out or Path()) / "grasp.png"
-        result.plot(path)
-        click.echo(f"drew {path}", err=True)
+        _draw(result, out or Path())
+
+
+def _draw(result: Result, folder: Path) -> None:
+    """The grasp if it is one, and the timing if it was paced."""
+    if is_grasp(result.signals):
+        result.plot(folder / "grasp.png")
+        click.echo(f"drew {folder / 'grasp.png'}", err=True)
+    if result.timing:
+        draw_timing(result.timing, float(result.time[-1]), folder / "timing.png")
+        click.echo(f"drew {folder / 'timing.png'}", err=True)
+
+
+def _as_json(result: Result) -> dict[str, Any]:
+    timing = {"realtime": result.timing.as_dict()} if result.timing else {}
+    return {**result.metrics, **timing}
 
 
 def _summary(result: Result) -> str:
@@ -121,7 +148,7 @@ def _summary(result: Result) -> str:
         lines += [
             f"{label:22s}{_numbers(m[key], factor)} {unit}" for label, key, factor, unit in LABELS
         ]
-    return "\n".join(lines)
+    return "\n".join([*lines, *(timing_lines(result.timing) if result.timing else ())])
 
 
 def _numbers(value: Any, factor: float) -> str:

@@ -20,12 +20,22 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..realtime.timing import Timing
 from ..recording.load import SETTINGS as RUN_JSON
 from ..recording.load import Run
 from ..recording.result import write_text
 from ..study.metrics import CONTROLLER, FINGERS, PLANT, first_contact
 from .embed import LIMIT, Shown, fit, packed
-from .tables import EXPERIMENT, SETTINGS, count, metrics_table, number, settings_html, summary
+from .tables import (
+    EXPERIMENT,
+    SETTINGS,
+    count,
+    metrics_table,
+    number,
+    settings_html,
+    summary,
+)
+from .timing_html import timing_html
 from .wiring import Link, wiring_svg
 
 SCRIPTS = ("data.js", "traces.js", "grasp.js", "main.js", "hands.js")
@@ -53,18 +63,27 @@ def page_html(run: Run, title: str, limit: int = LIMIT) -> str:
     shown = fit(run.time, run.signals, limit)
     grasp = _grasp(run)
     contacts = _contacts(run) if grasp else []
-    sections = [*(["grasp"] if grasp else []), "traces", "metrics", "wiring", "settings"]
+    timing = run.timing
+    sections = {
+        **({"grasp": "Grasp"} if grasp else {}),
+        "traces": "Traces",
+        "metrics": "Metrics",
+        **({"timing": "Real time"} if timing else {}),
+        "wiring": "Wiring",
+        "settings": "Settings",
+    }
     return _filled(
         "page.html",
         title=escape(title),
         style=_text("page.css"),
         summary=summary(run.settings),
-        contents="".join(f'<a href="#{s}">{s.capitalize()}</a>' for s in sections),
+        contents="".join(f'<a href="#{s}">{name}</a>' for s, name in sections.items()),
         grasp=_grasp_html(grasp, contacts) if grasp else "",
         zooms=_zooms(contacts),
         signals=_choice(run),
         exactness=_exactness(shown, len(run.time)),
         metrics=metrics_table(run.settings),
+        timing=_timing_html(timing, float(run.time[-1])) if timing else "",
         wiring=_wiring(run),
         settings=settings_html(run.settings),
         version=escape(version("grasp-cosim")),
@@ -131,6 +150,10 @@ def _exactness(shown: Shown, rows: int) -> str:
         f"<b>Of {count(rows)} points of {columns} signals this page keeps, of each "
         f"{shown.rows_per_pair}, the lowest and the highest value;</b> all are in signals.csv."
     )
+
+
+def _timing_html(timing: Timing, end: float) -> str:
+    return f'<section id="timing">\n<h2>Real time</h2>\n{timing_html(timing, end)}\n</section>'
 
 
 # The grasp -------------------------------------------------------------------------------------

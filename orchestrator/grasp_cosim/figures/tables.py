@@ -24,6 +24,9 @@ EXPERIMENT = (
 SETTINGS = ("components", "wires", "events", "faults", "log", "rejections")
 """Those that are shown as lists of their own."""
 
+TIMING = "realtime"
+"""The entry that a paced run has more: its timing."""
+
 _ABOUT_SIGNALS = ("units", "types", "descriptions")
 _UNITS = {"step": "s", "stop": "s", "wall_time": "s"}
 
@@ -43,8 +46,8 @@ def summary(run: Mapping[str, Any]) -> str:
 def metrics_table(run: Mapping[str, Any]) -> str:
     """The metrics of the grasp with a column per finger, then any others as they are."""
     known = [entry for entry in LABELS if entry[1] in run]
-    named = {key for _, key, _, _ in LABELS}
-    others = [key for key in run if key not in {*named, *EXPERIMENT, *SETTINGS, *_ABOUT_SIGNALS}]
+    shown = {*(key for _, key, _, _ in LABELS), *EXPERIMENT, *SETTINGS, *_ABOUT_SIGNALS, TIMING}
+    others = [key for key in run if key not in shown]
     if not known and not others:
         return "<p>There are no metrics of this system.</p>"
     rows = [_metric(label, run[key], factor, unit) for label, key, factor, unit in known]
@@ -70,10 +73,10 @@ def settings_html(run: Mapping[str, Any]) -> str:
         for key in EXPERIMENT
     ]
     lists = [
-        _list("Events", map(entries, run["events"]), "No events."),
-        _list("Faults on wires", map(entries, run["faults"]), "No faults."),
-        _list("Log", run["log"], "Nothing to report."),
-        _list(
+        bullets("Events", map(entries, run["events"]), "No events."),
+        bullets("Faults on wires", map(entries, run["faults"]), "No faults."),
+        bullets("Log", run["log"], "Nothing to report."),
+        bullets(
             "Steps discarded or cut short",
             (f"{name}: {entries(about)}" for name, about in run["rejections"].items()),
             "None.",
@@ -91,6 +94,13 @@ def table(heads: str, rows: Iterable[str]) -> str:
     head = f"<thead><tr>{heads}</tr></thead>" if heads else ""
     body = "".join(f"<tr>{row}</tr>" for row in rows)
     return f'<div class="scroll"><table>{head}<tbody>{body}</tbody></table></div>'
+
+
+def bullets(title: str, lines: Iterable[str], none: str) -> str:
+    """A list below a title, each line as a text; none is said where there are no lines."""
+    items = "".join(f"<li>{escape(line)}</li>" for line in lines)
+    body = f'<ul class="plain">{items}</ul>' if items else f'<p class="hint">{none}</p>'
+    return f"<section><h3>{title}</h3>{body}</section>"
 
 
 def entries(values: Mapping[str, Any]) -> str:
@@ -146,9 +156,3 @@ def _how(component: Mapping[str, Any]) -> str:
     if component["rename"]:
         parts.append("renamed: " + ", ".join(f"{k} is {v}" for k, v in component["rename"].items()))
     return "; ".join(parts)
-
-
-def _list(title: str, lines: Iterable[str], none: str) -> str:
-    items = "".join(f"<li>{escape(line)}</li>" for line in lines)
-    body = f'<ul class="plain">{items}</ul>' if items else f'<p class="hint">{none}</p>'
-    return f"<section><h3>{title}</h3>{body}</section>"

@@ -17,7 +17,17 @@ import numpy.typing as npt
 
 from ..errors import InputError
 from ..fmi import instance
-from ..fmi.instance import EARLY, PYTHON, STEP_2, STEP_3, TRANSFER_2, TRANSFER_3, Call, Native
+from ..fmi.instance import (
+    CLOCK,
+    EARLY,
+    PYTHON,
+    STEP_2,
+    STEP_3,
+    TRANSFER_2,
+    TRANSFER_3,
+    Call,
+    Native,
+)
 from . import loop
 
 CODES = (
@@ -141,7 +151,7 @@ def _register() -> None:
 
         return typed
 
-    none = function(status)
+    none, clock_gettime = function(status), function(status, status, word)
     transfer_2, transfer_3 = function(status, *[word] * 4), function(status, *[word] * 5)
     step_2 = function(status, word, double, double, status)
     step_3 = function(status, word, double, double, byte, word, word, word, word)
@@ -149,6 +159,10 @@ def _register() -> None:
     @intrinsic
     def call_python(typing: Any, f: Any) -> Any:
         return none(typing, f)
+
+    @intrinsic
+    def call_clock(typing: Any, f: Any, a: Any, b: Any) -> Any:
+        return clock_gettime(typing, f, a, b)
 
     @intrinsic
     def call_transfer_2(typing: Any, f: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
@@ -194,6 +208,11 @@ def _register() -> None:
                 )  # fmt: skip
                 said = carray(pointer(flags, 0), 3, np.uint8)
                 return EARLY if status <= loop.WORST and (said[1] or said[2]) else status
+            if shape == CLOCK:
+                status = call_clock(f, instance, refs)
+                now = carray(pointer(refs, 0), 2, np.int64)
+                carray(pointer(data, 0), 1, np.float64)[0] = now[0] * 1_000_000_000 + now[1] - size
+                return status
             return call_python(f)
 
         return compiled

@@ -7,6 +7,7 @@ the end of that step: what it puts out is never from the future. Time is an inte
 nanoseconds.
 """
 
+import time
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -14,6 +15,7 @@ import numpy.typing as npt
 
 from ..errors import InputError, SimulationError
 from ..fmi.instance import DISCARD, EARLY, Instance
+from ..realtime.pacer import HaltError, OverrunError, Pacer
 from ..recording.result import Rejection
 from ..system.description import System
 from ..system.parts import NANOSECONDS, Port
@@ -26,6 +28,12 @@ from .scenario import Scenario
 
 CHUNK = 1024
 """The most steps between two times that rows are handed on."""
+
+ENOUGH = 32
+"""So many rows are handed on at the end of advance(): one by one would cost more than a step."""
+
+LONG = 0.1
+"""s of wall time after which it hands on any."""
 
 RowReceiver = Callable[[npt.NDArray[np.int64], npt.NDArray[np.float64]], None]
 """Takes step numbers and rows of all values; the rows are reused afterwards."""
@@ -40,6 +48,7 @@ class Master:
         instances: Sequence[Instance],
         receive: RowReceiver,
         engine: Engine = "auto",
+        pacer: Pacer | None = None,
     ) -> None:
         self.system = system
         self.instances = tuple(instances)
@@ -48,7 +57,9 @@ class Master:
         self.rejections: dict[str, Rejection] = {}
         self.log: list[str] = []
         self.slots = slots_of(system, instances)
-        self.values = np.zeros(len(self.slots))
+        self.values = np.zeros(len(self.slots) + (pacer.width if pacer else 0))
+        if pacer:
+            pacer.bind(self.values[len(self.slots) :], self._hand_on_until)
         self.scenario = Scenario(system, instances, self.slots, self.values)
         self._receive = receive
         self.plan = Planner(
@@ -58,9 +69,13 @@ class Master:
             self.values,
             self.scenario.fault_functions,
             self.scenario.before_step if system.events or system.faults else None,
+            pacer,
         ).plan()
+        self._pacer = pacer
         self._loop = make_loop(self.plan, engine)
         self._rows = np.empty((CHUNK, len(self.values)))
+        self._base = self._handed_on = 0
+        self._handed_on_at = time.monotonic()
 
     def initialise(self) -> None:
         """Start values in, then outputs at t = 0 that agree with the inputs at t = 0."""
@@ -81,24 +96,77 @@ class Master:
                 raise InputError(_too_long(port, value, 0))
             self.values[slot] = float(value)
         self._receive(np.zeros(1, np.int64), self.values[np.newaxis])
+        self._handed_on_at = time.monotonic()
 
     def advance(self, steps: int) -> int:
         """Do the given number of steps, or fewer where the stop time is nearer; how many it were.
 
-        SimulationError where an FMU fails; the rows until then have been handed on.
+        Fewer, too, where the pacer is halted. Rows may wait to be handed on, unless a value is not
+        finite. SimulationError where an FMU fails, or where the run stops at an overrun; the rows
+        until then have been handed on.
         """
         first = self.steps_done
         end = min(first + steps, self.total_steps)
-        while self.steps_done < end:
-            self._chunk(self.steps_done, min(self.steps_done + CHUNK, end))
+        try:
+            while self.steps_done < end:
+                self._chunk(min(self._base + CHUNK, end))
+        except HaltError:
+            pass
+        except OverrunError:
+            assert self._pacer is not None  # noqa: S101 - who else has raised it
+            raise SimulationError(self._pacer.verdict()) from None
+        fresh = self._waiting()[max(first - self._handed_on, 0) :]
+        if self._enough() or not np.isfinite(fresh).all():
+            self.hand_on()
         return self.steps_done - first
 
-    def _chunk(self, start: int, stop: int) -> None:
-        """Run the loop from start to stop, and hand the rows on whatever happens."""
-        step, operation = start, 0
+    def hand_on(self) -> None:
+        """Hand on the rows that wait; SimulationError where a value is not finite."""
+        self._hand_on_until(self.steps_done)
+        self._base = self._handed_on
+
+    def _hand_on_until(self, step: int) -> None:
+        """Hand on the rows up to a step that is done; the pacer does while it waits in the loop."""
+        self.steps_done = step
+        rows = self._waiting()
+        if not len(rows):
+            return
+        steps = np.arange(self._handed_on + 1, self.steps_done + 1)
+        self._handed_on, self._handed_on_at = self.steps_done, time.monotonic()
+        if self._pacer is None:
+            self._receive(steps, rows)
+        else:
+            times = rows[:, len(self.slots) :]
+            self._pacer.record(steps, times, lambda: self._receive(steps, rows))
+
+    def _waiting(self) -> npt.NDArray[np.float64]:
+        """The rows that were not handed on yet."""
+        return self._rows[self._handed_on - self._base : self.steps_done - self._base]
+
+    def _enough(self) -> bool:
+        """Whether rows wait no longer: they are many, or have waited long, or are the last."""
+        if self.steps_done == self.total_steps or len(self._waiting()) >= ENOUGH:
+            return True
+        return time.monotonic() - self._handed_on_at > LONG
+
+    def _chunk(self, stop: int) -> None:
+        """Run the loop until stop; hand the rows on where there is no room left, or it fails."""
+        try:
+            self._run(stop)
+            if self._pacer is not None and self.steps_done == self.total_steps:
+                self._pacer.finish(self.total_steps)
+        except BaseException:
+            self.hand_on()
+            raise
+        if self.steps_done == self._base + CHUNK:
+            self.hand_on()
+
+    def _run(self, stop: int) -> None:
+        """Run the loop until stop, and make good for steps that were rejected."""
+        step, operation = self.steps_done, 0
         try:
             while step < stop:
-                rows = self._rows[step - start :]
+                rows = self._rows[step - self._base :]
                 step, operation, status = self._loop(
                     rows, operation, step, stop, self.system.step_ns
                 )
@@ -108,8 +176,6 @@ class Master:
                     operation += 1
         finally:
             self.steps_done = step
-            if step > start:
-                self._receive(np.arange(start + 1, step + 1), self._rows[: step - start])
 
     def _resolve(self, step: int, operation: int, status: int) -> None:
         """Make good for a step that was rejected; any other bad status ends the run."""

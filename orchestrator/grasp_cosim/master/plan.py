@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..fmi.instance import Call, Instance, dtype
+from ..realtime.pacer import Pacer
 from ..system.checks import transforms
 from ..system.description import System
 from ..system.interface import Variable
@@ -74,11 +75,12 @@ class Planner:
         values: npt.NDArray[np.float64],
         faults: Mapping[Port, FaultFunction],
         before_step: Callable[[int], None] | None,
+        pacer: Pacer | None = None,
     ) -> None:
         """Over the given vector of values; slots are those of slots_of().
 
         faults act on wires, by target. before_step is called at the start of each macro step with
-        its number.
+        its number, after the pacer of a run in real time.
         """
         self.system = system
         self.instances = {instance.name: instance for instance in instances}
@@ -87,6 +89,8 @@ class Planner:
         self.view: Any = memoryview(values)  # type: ignore[arg-type]  # numpy's stubs for 3.11
         self.faults = faults
         self.before_step = before_step
+        self.pacer = pacer
+        self.stamps = 0
         self.transforms = transforms(system)
         self.clock = np.zeros(2)
         self.operations: list[Operation] = []
@@ -99,6 +103,8 @@ class Planner:
 
     def plan(self) -> Plan:
         """The program of a macro step in the scheme of the system, and what it works on."""
+        if self.pacer is not None:
+            self._python(self.pacer, 1, 0)
         if self.before_step is not None:
             self._python(self.before_step, 1, 0)
         names = [component.name for component in self.system.components]
@@ -106,15 +112,20 @@ class Planner:
             for name in names:
                 last = self.system.period(name) - 1
                 self._move(name, last)
+                self._stamp()
                 self._transfer(name, "input", last)
                 self._step(name)
+                self._stamp()
         else:
             for name in names:
                 self._move(name, 0)
+            self._stamp()
             for name in names:
                 self._transfer(name, "input", 0)
+                self._stamp()
             for name in names:
                 self._step(name)
+                self._stamp()
         return Plan(
             self.values,
             self.clock,
@@ -146,6 +157,12 @@ class Planner:
                 self._fault(wire.target, period, phase)
             if wire.target not in self.slots:
                 self._text(wire, period, phase)
+
+    def _stamp(self) -> None:
+        """The end of a segment of the step: see realtime.meter.segments_of."""
+        if self.pacer is not None:
+            self._call(CALL, self.pacer.stamp(self.stamps), None, 1, 0)
+            self.stamps += 1
 
     def _fault(self, target: Port, period: int, phase: int) -> None:
         fault, slot, view = self.faults[target], self.slots[target], self.view

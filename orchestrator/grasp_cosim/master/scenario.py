@@ -62,6 +62,7 @@ class Scenario:
         ]
         self.fault_functions = fault_functions(self._windows, system.step_ns)
         self._due = self.next_step(0)
+        self._settable: set[Port] = set()
 
     def before_step(self, step: int) -> None:
         """What happens at communication point step, before the step that begins there.
@@ -91,7 +92,9 @@ class Scenario:
         """
         component, _, variable = name.partition(".")
         port, place = Port(component, variable), f"set: {name}"
-        check_setting(self._system, port, value, place)
+        if port not in self._settable:
+            check_setting(self._system, port, value, place)
+            self._settable.add(port)
         event = _PendingEvent(place, Event({port: value}), self._system, self._instances)
         self._note(step, event.happen())
 

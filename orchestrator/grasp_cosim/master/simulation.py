@@ -1,5 +1,6 @@
 """Runs a system: to its end with simulate(), or step by step with simulate.session()."""
 
+import logging
 import signal
 import threading
 import time
@@ -12,6 +13,9 @@ from tqdm import tqdm
 from ..errors import InputError, SimulationError, choices
 from ..fmi.instance import Instance
 from ..fmi.load import load
+from ..realtime.options import Realtime
+from ..realtime.pacer import Pacer
+from ..realtime.privileges import Privileges, privileges
 from ..recording.dispatch import Dispatcher
 from ..recording.listener import Listener
 from ..recording.memory import MemoryListener
@@ -22,6 +26,9 @@ from ..system.interface import Value
 from ..system.parts import NANOSECONDS, Component, Port
 from .engine import Engine
 from .master import Master
+
+LOGGER = logging.getLogger(__name__)
+"""Gets what the operating system does not permit."""
 
 MOST = 2**62
 """The highest number of steps, far beyond the longest run."""
@@ -39,6 +46,7 @@ class Session:
         every: int = 1,
         listeners: Sequence[Listener] = (),
         engine: Engine = "auto",
+        realtime: Realtime | None = None,
     ) -> None:
         """Load and initialise; see simulate() for the arguments and errors."""
         _check_count("every", every)
@@ -47,15 +55,26 @@ class Session:
         self._wall_time = 0.0
         self._failed = False
         self._closed = False
+        self.halt = threading.Event()
+        """Set, it ends the waiting of a run in real time, at a communication point."""
+        self.pacer = Pacer(system, realtime, self.halt.is_set) if realtime else None
+        self._privileges = Privileges()
         self._stack = ExitStack()
         try:
             instances = [self._loaded(component) for component in system.components]
-            self._master = Master(system, instances, lambda *rows: self._dispatch(*rows), engine)
+            self._master = Master(
+                system, instances, lambda *rows: self._dispatch(*rows), engine, self.pacer
+            )
             self._dispatch = Dispatcher(
                 system, self._master.slots, (self._memory, *listeners), every
             )
-            self._stack.callback(lambda: self._dispatch.end(self.complete))
+            self._stack.callback(self._end)
             self._initialise()
+            if realtime and self.pacer:
+                self._privileges = self._stack.enter_context(privileges(realtime))
+                self.pacer.breathes = realtime.priority is not None
+            for line in self._privileges.refused:
+                LOGGER.warning("%s", line)
         except BaseException:
             self._stack.close()
             raise
@@ -68,6 +87,16 @@ class Session:
             self._failed = True
             error.result = self.result()
             raise
+
+    def _end(self) -> None:
+        """Hand on what is left, and end the listeners, even where that fails."""
+        try:
+            self._master.hand_on()
+        except BaseException:
+            self._failed = True
+            raise
+        finally:
+            self._dispatch.end(self.complete)
 
     def _loaded(self, component: Component) -> Instance:
         instance = load(component)
@@ -155,9 +184,21 @@ class Session:
             self._master.scenario.set(name, value, self._master.steps_done)
 
     def result(self) -> Result:
-        """What was recorded until now."""
-        self._dispatch.flush()
-        master, signals = self._master, self._dispatch.signals
+        """What was recorded until now.
+
+        SimulationError, with the result, where a listener does not take it.
+        """
+        try:
+            self._master.hand_on()
+            self._dispatch.flush()
+        except SimulationError as error:
+            self._failed = True
+            error.result = self._result()
+            raise
+        return self._result()
+
+    def _result(self) -> Result:
+        master, signals, asked = self._master, self._dispatch.signals, self._privileges
         return Result(
             self.system,
             self._memory.time,
@@ -168,6 +209,7 @@ class Session:
             descriptions={s.name: s.description for s in signals},
             rejections=dict(master.rejections),
             log=self._log(),
+            timing=self.pacer.timing(asked.granted, asked.refused) if self.pacer else None,
         )
 
     def _log(self) -> tuple[str, ...]:
@@ -201,6 +243,7 @@ class Simulate:
         every: int = 1,
         listeners: Sequence[Listener] = (),
         engine: Engine = "auto",
+        realtime: Realtime | None = None,
     ) -> Result:
         """Run a system to its stop time and return every output at every communication point.
 
@@ -208,12 +251,13 @@ class Simulate:
         standard error if that is a terminal. every keeps only each n-th communication point, and
         the last. listeners get what is kept while it is recorded. engine is "python", "compiled"
         (needs numba) or "auto", compiled where numba is installed; the results have the same bits.
+        realtime paces the run by the clock: the result has a timing, and the same bits.
         Ctrl-C ends the run early: the result is what was recorded, with complete = False.
         InputError where an FMU does not load or refuses its parameters; SimulationError, with what
         was recorded as its result, where one fails on the way.
         """
         system = system.with_experiment(step, stop, scheme)
-        with Session(system, every, listeners, engine) as session:
+        with Session(system, every, listeners, engine, realtime) as session:
             _drive(session, progress)
             return session.result()
 
@@ -227,9 +271,14 @@ class Simulate:
         every: int = 1,
         listeners: Sequence[Listener] = (),
         engine: Engine = "auto",
+        realtime: Realtime | None = None,
     ) -> Session:
-        """A run that its user advances, for `with`; the arguments are those of simulate()."""
-        return Session(system.with_experiment(step, stop, scheme), every, listeners, engine)
+        """A run that its user advances, for `with`; the arguments are those of simulate().
+
+        In real time its schedule begins with the first step.
+        """
+        system = system.with_experiment(step, stop, scheme)
+        return Session(system, every, listeners, engine, realtime)
 
 
 simulate = Simulate()
@@ -244,17 +293,19 @@ def _drive(session: Session, progress: bool) -> None:
     """Step to the end, or until Ctrl-C."""
     total = session.system.stop_ns / NANOSECONDS
     with (
-        _interrupts() as interrupted,
+        _interrupts(session.halt),
         tqdm(
             total=total,
             unit="s",
             desc="simulated",
             disable=None if progress else True,
-            bar_format="{l_bar}{bar}| {n:.2f}/{total:.2f} s [{elapsed}<{remaining}]",
+            bar_format="{l_bar}{bar}| {n:.2f}/{total:.2f} s [{elapsed}<{remaining}]{postfix}",
         ) as bar,
     ):
         steps, start = 1, time.perf_counter()
-        while not interrupted.is_set() and session.step(steps):
+        while not session.halt.is_set() and session.step(steps):
+            if session.pacer and not bar.disable:
+                bar.set_postfix_str(session.pacer.meter.live(), refresh=False)
             bar.update(session.time - bar.n)
             now = time.perf_counter()
             steps = max(1, min(2 * steps, int(steps * LOOK / (now - start))))
@@ -262,11 +313,10 @@ def _drive(session: Session, progress: bool) -> None:
 
 
 @contextmanager
-def _interrupts() -> Iterator[threading.Event]:
+def _interrupts(interrupted: threading.Event) -> Iterator[None]:
     """Collects Ctrl-C instead of raising it, which could happen inside a Python FMU."""
-    interrupted = threading.Event()
     if threading.current_thread() is not threading.main_thread():
-        yield interrupted
+        yield
         return
 
     def remember(*_: object) -> None:
@@ -275,6 +325,6 @@ def _interrupts() -> Iterator[threading.Event]:
 
     previous = signal.signal(signal.SIGINT, remember)
     try:
-        yield interrupted
+        yield
     finally:
         signal.signal(signal.SIGINT, previous)

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..errors import InputError, choices
+from ..realtime.timing import Timing
 
 SIGNALS, SETTINGS = "signals.csv", "run.json"
 """The files of a run's folder."""
@@ -30,6 +31,8 @@ class Run:
     units: Mapping[str, str | None]
     descriptions: Mapping[str, str]
     settings: Mapping[str, Any]
+    timing: Timing | None = None
+    """How it kept to the clock; None where it was not paced."""
 
 
 def load_run(folder: str | Path) -> Run:
@@ -56,6 +59,11 @@ def load_run(folder: str | Path) -> Run:
         units=units,
         descriptions=settings.get("descriptions", {}),
         settings=settings,
+        timing=(
+            Timing.from_dict(f"{path}: realtime", settings["realtime"])
+            if "realtime" in settings
+            else None
+        ),
     )
 
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..realtime.timing import Timing
 from ..study.metrics import grasp_metrics
 from ..system.description import System
 from ..system.parts import NANOSECONDS
@@ -49,6 +50,8 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     """By component; only those that rejected steps."""
     log: tuple[str, ...] = ()
     """What is worth knowing about the run, a line each."""
+    timing: Timing | None = None
+    """How it kept to the clock; None where it was not paced."""
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
         return self.signals[name]
@@ -90,7 +93,8 @@ class Result(Mapping[str, npt.NDArray[Any]]):
 
     def to_json(self, path: str | Path) -> None:
         """Write the metrics and the settings() that led to them, then what is known by signal
-        (units, types, descriptions), the log, and the rejections by component.
+        (units, types, descriptions), the log, the rejections by component, and, as "realtime",
+        the timing of a paced run.
         """
         report = {
             **self.metrics,
@@ -100,6 +104,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
             "descriptions": dict(self.descriptions),
             "log": list(self.log),
             "rejections": {name: asdict(r) for name, r in self.rejections.items()},
+            **({"realtime": self.timing.as_dict()} if self.timing else {}),
         }
         write_text(Path(path), json.dumps(report, indent=2) + "\n")
 

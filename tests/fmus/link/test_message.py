@@ -124,6 +124,8 @@ def test_values_there_and_back(a: float, b: int, c: bool, d: str) -> None:
         (8, struct.pack("<q", -(2**31) - 1)),
         (16, struct.pack("<Q", 2)),
         (24, b"\xff\xfe"),
+        (24, b"a\0b"),
+        (24, b"a" * 128),
     ],
 )
 def test_what_is_no_value(place: int, bad: bytes) -> None:

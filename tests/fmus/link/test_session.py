@@ -260,3 +260,26 @@ def test_sessions_that_never_begin_do_not_fill_the_memory() -> None:
     for session in range(10_000):
         bench.answers(Client(SIGNATURE).greet(session, T0))
     assert len(bench.peer._greeted) == 64
+
+
+def test_the_reason_of_a_failure_is_told_again_where_it_was_lost() -> None:
+    bench, client = Bench(), Client(SIGNATURE)
+    heard(bench, client, client.greet(1, T0))
+    request = client.initialise(0.0, VALUES, T0)
+    assert isinstance(bench.peer.receive(request, T0), Request)
+    refusal = bench.peer.failed("no power")
+    assert bench.answers(request) == refusal
+    assert bench.peer.counters.repeated == 1
+    later = client.initialise(0.0, VALUES, T0)
+    assert heard(bench, client, later) is Verdict.REFUSED
+    assert client.refusal is not None
+    assert client.refusal.text == "the peer does not know this session"
+
+
+def test_a_recorded_step_sent_again_and_again_keeps_nobody_away() -> None:
+    bench = Bench()
+    client = begun(bench, session=1)
+    request = client.step(0.0, 0.1, VALUES, T0)
+    for later in range(0, 3 * ALIVE, ALIVE // 4):
+        bench.answers(request, T0 + later)
+    begun(bench, session=2, now=T0 + 2 * ALIVE)

@@ -1,0 +1,124 @@
+"""The grasp in real time, four FMUs at 1 and 10 kHz, beside what the machine itself does.
+
+    python -m benchmarks.realtime [--seconds 60] [--rates 1000 10000] [--priority P] [--cpu N]
+
+Three measurements for each rate, under the same priority and on the same CPU. The gaps of a loop
+that only looks at the clock are times in which this machine ran nothing of ours: nobody can do
+better. Waiting alone, without any FMU, is what sleeping costs on top. Then comes the run. What
+the run shows beyond the other two is our share.
+"""
+
+import argparse
+import time
+from itertools import pairwise
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from grasp_cosim import Realtime, System, simulate
+from grasp_cosim.cli.realtime import timing_lines
+from grasp_cosim.grasp import grasp_system
+from grasp_cosim.realtime.meter import BEGIN, DUE
+from grasp_cosim.realtime.pacer import Pacer
+from grasp_cosim.realtime.privileges import privileges
+from grasp_cosim.realtime.timing import Timing
+
+GAPS = (100_000, 1_000_000, 10_000_000)
+"""ns: gaps longer than each of these are counted."""
+
+SHORT = 10_000
+"""ns: gaps up to this are looks at the clock."""
+
+
+class Gaps(NamedTuple):
+    """The longer gaps of a spin loop in ns, and how long it ran."""
+
+    gaps: list[int]
+    ran: int
+
+
+def spin(seconds: float) -> Gaps:
+    """Look at the clock for so long, and remember the gaps."""
+    gaps: list[int] = []
+    now = time.monotonic_ns
+    start = last = now()
+    end = start + round(seconds * 1e9)
+    while last < end:
+        t = now()
+        if t - last > SHORT:
+            gaps.append(t - last)
+        last = t
+    return Gaps(gaps, last - start)
+
+
+def wait(system: System, realtime: Realtime) -> npt.NDArray[np.float64]:
+    """The lateness of each start in ns where there is nothing to do but to wait."""
+    pacer = Pacer(system, realtime)
+    values = np.zeros(pacer.width)
+    pacer.bind(values, lambda _: None)
+    late = np.empty(system.total_steps)
+    for step in range(len(late)):
+        pacer(step)
+        late[step] = values[BEGIN] - values[DUE]
+    return late
+
+
+def stolen() -> float:
+    """s that the hypervisor has taken from the CPUs since the machine started; 0 elsewhere."""
+    stat = Path("/proc/stat")
+    return float(stat.read_text().split()[8]) / 100.0 if stat.exists() else 0.0
+
+
+def measure(seconds: float, rate: int, realtime: Realtime) -> None:
+    """All three at a rate in Hz."""
+    system = grasp_system().with_experiment(1.0 / rate, seconds, None)
+    simulate(system, stop=10 / rate)  # compiles the loop
+    marks = [stolen()]
+    with privileges(realtime):
+        gaps = spin(seconds)
+        marks.append(stolen())
+        late = wait(system, realtime)
+        marks.append(stolen())
+    timing = simulate(system, progress=True, realtime=realtime).timing
+    marks.append(stolen())
+    assert timing is not None  # noqa: S101 - it is paced
+    print(f"\n== {rate} Hz for {seconds:g} s; granted: {', '.join(timing.granted) or 'nothing'}")
+    for line in timing.refused:
+        print(line)
+    _print_machine(gaps, late, [b - a for a, b in pairwise(marks)])
+    _print_run(timing)
+
+
+def _print_machine(gaps: Gaps, late: npt.NDArray[np.float64], steal: list[float]) -> None:
+    counts = ", ".join(
+        f"{sum(gap > limit for gap in gaps.gaps)} over {limit / 1e6:g} ms" for limit in GAPS
+    )
+    worst, lost = max(gaps.gaps, default=0) / 1e6, sum(gaps.gaps) / gaps.ran
+    print(f"machine, spin loop:  gaps {counts}; worst {worst:.3f} ms; {lost:.2%} of the time lost")
+    quantiles = np.quantile(late, (0.5, 0.99, 0.999, 1.0)) / 1e3
+    print("machine, waiting:    start late by", _row(quantiles))
+    for name, stolen_time in zip(("spin loop", "waiting", "run"), steal, strict=True):
+        print(f"steal during {name}: {stolen_time:.2f} s of CPU")
+
+
+def _print_run(timing: Timing) -> None:
+    for name, part in timing.parts.items():
+        print(f"run, {name:14s}", _row(1e6 * np.array(part[:4])), f"at t = {part.worst_at:.4f} s")
+    for line in timing_lines(timing):
+        print(f"run: {line}")
+
+
+def _row(quantiles: npt.NDArray[np.float64]) -> str:
+    return "p50 {:9.1f}  p99 {:9.1f}  p99.9 {:9.1f}  worst {:9.1f} us".format(*quantiles)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seconds", type=float, default=60.0)
+    parser.add_argument("--rates", type=int, nargs="+", default=[1000, 10_000])
+    parser.add_argument("--priority", type=int)
+    parser.add_argument("--cpu", type=int)
+    given = parser.parse_args()
+    for rate in given.rates:
+        measure(given.seconds, rate, Realtime(priority=given.priority, cpu=given.cpu))

@@ -1,0 +1,362 @@
+"""A slave behind pythonfmu's FMI 2.0 interface: life cycle, typed values, checks, log.
+
+What it computes is up to a subclass. Value references are positions in one list of values. Outputs
+may be worked out when they are asked for, so that they agree with the inputs of that moment.
+
+A call that is refused has no effect and leaves its reason in the log of the host.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import wraps
+from math import inf, isclose, isfinite
+from typing import Any, Concatenate, NamedTuple, ParamSpec, TypeVar
+
+from .host_log import CATEGORIES, ERROR, as_format, host_log
+from .loader import Component, Once, forget, survive
+from .variable import TYPES, Scalar, Variable
+
+INSTANTIATED, INITIALISING, STEPPING, TERMINATED = range(4)
+PHASES = (
+    "before initialisation",
+    "in initialisation mode",
+    "in step mode",
+    "after fmi2Terminate",
+)
+
+MOST_ACCESSES = 64
+"""How many lists of value references are remembered, so that no host can fill the memory."""
+
+TIME_TOLERANCE = 1e-9
+"""How far, in s, the host's clock may be from the slave's; relative to the time it is 1e-12."""
+
+
+class RefusalError(Exception):
+    """A call was refused, for the reason given."""
+
+
+class LoggedError(Exception):
+    """A call failed, for a reason that is in the log of the host."""
+
+    def __repr__(self) -> str:
+        """What pythonfmu adds while debug logging is on, as a format of printf."""
+        return "failed, for the reason logged before"
+
+
+class Message(NamedTuple):
+    """A message for pythonfmu's own log."""
+
+    status: int
+    category: str
+    msg: str
+
+
+@dataclass(frozen=True, slots=True)
+class Access:
+    """How a list of value references is read or written; worked out once per list and phase."""
+
+    vrs: list[int]
+    where: slice | None
+    """None: not in a row."""
+    outputs: bool
+    parameters: bool
+    limited: bool
+
+
+Accesses = dict[tuple[int, ...], Access]
+"""By the list of value references."""
+
+_NONE = Access([], None, False, False, False)
+"""How to read or write nothing, which is always allowed."""
+
+
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
+_S = TypeVar("_S", bound="Slave")
+
+
+def reported(call: Callable[Concatenate[_S, _P], _R]) -> Callable[Concatenate[_S, _P], _R]:
+    """The call, with what it raises in the log. In the calls of every step it is written out."""
+
+    @wraps(call)
+    def reporting(self: _S, /, *arguments: _P.args, **named: _P.kwargs) -> _R:
+        try:
+            return call(self, *arguments, **named)
+        except BaseException as error:
+            raise self._reported(error) from None
+
+    return reporting
+
+
+class Slave(metaclass=Once):
+    """An FMI 2.0 co-simulation slave, as pythonfmu calls it.
+
+    A subclass makes _variables and _values in _prepare(), brings outputs up to date in _refresh(),
+    steps in do_step(), and has the four functions of states.
+    """
+
+    _variables: list[Variable]
+    _values: list[Any]
+
+    def __init__(
+        self, component: Component, instance_name: str, resources: str, logger: int, visible: int
+    ) -> None:
+        """As pythonfmu calls it: logger is the address of its logger."""
+        forget(resources)
+        self.instance_name = instance_name
+        self.log_queue: list[Message] = []
+        self._component = component
+        self._host_log = host_log(logger, instance_name)
+        self._time = 0.0
+        self._params: Any = None  # None: one was set and they are to be read again
+        self._inputs: Any = None  # None: something was set and the outputs are out of date
+        try:
+            self._prepare()
+        except BaseException as error:
+            raise self._reported(error) from None
+
+    def _prepare(self) -> None:
+        """Make what an instance has; then _enter(INSTANTIATED)."""
+        raise NotImplementedError
+
+    def _refresh(self) -> None:
+        """Bring the outputs up to date, and set _inputs; RefusalError where that cannot be."""
+        raise NotImplementedError
+
+    def _enter(self, phase: int) -> None:
+        self._phase = phase
+        self._reads: dict[type[Scalar], Accesses] = {kind: {} for kind in TYPES}
+        self._writes: dict[type[Scalar], Accesses] = {kind: {} for kind in TYPES}
+        # The last of each: the host nearly always asks for the same again
+        self._real_read = self._boolean_read = self._real_write = _NONE
+
+    # The life cycle
+
+    @reported
+    def setup_experiment(
+        self, start_time: float, stop_time: float | None = None, tolerance: float | None = None
+    ) -> None:
+        """Time starts at start_time, in s."""
+        self._require("fmi2SetupExperiment", INSTANTIATED)
+        if not isfinite(start_time):
+            raise RefusalError(f"start time = {start_time} s: must be a finite number")
+        self._time = start_time
+
+    @reported
+    def enter_initialization_mode(self) -> None:
+        """Refuse parameters set so far that do not go together."""
+        self._require("fmi2EnterInitializationMode", INSTANTIATED)
+        self._refresh()
+        self._enter(INITIALISING)
+
+    @reported
+    def exit_initialization_mode(self) -> None:
+        """Outputs are those of the parameters and inputs set so far."""
+        self._require("fmi2ExitInitializationMode", INITIALISING)
+        self._refresh()
+        self._enter(STEPPING)
+
+    def terminate(self) -> None:
+        """The end; values can still be read."""
+        self._enter(TERMINATED)
+
+    # Values
+
+    def get_real(self, vrs: list[int]) -> list[Any]:
+        """Values of the given references."""
+        try:
+            access = self._real_read
+            if vrs != access.vrs:
+                access = self._reads[float].get(tuple(vrs)) or self._readable(vrs, float)
+                self._real_read = access
+            if self._inputs is None and access.outputs:
+                self._refresh()
+        except BaseException as error:
+            raise self._reported(error) from None
+        where = access.where
+        return self._values[where] if where else [self._values[vr] for vr in vrs]
+
+    def get_boolean(self, vrs: list[int]) -> list[Any]:
+        """Values of the given references."""
+        try:
+            access = self._boolean_read
+            if vrs != access.vrs:
+                access = self._reads[bool].get(tuple(vrs)) or self._readable(vrs, bool)
+                self._boolean_read = access
+            if self._inputs is None and access.outputs:
+                self._refresh()
+        except BaseException as error:
+            raise self._reported(error) from None
+        where = access.where
+        return self._values[where] if where else [self._values[vr] for vr in vrs]
+
+    def get_integer(self, vrs: list[int]) -> list[Any]:
+        """Values of the given references."""
+        return self._get(int, vrs)
+
+    def get_string(self, vrs: list[int]) -> list[Any]:
+        """Values of the given references."""
+        return self._get(str, vrs)
+
+    def set_real(self, vrs: list[int], values: list[Any]) -> None:
+        """Set inputs or parameters, all or none; outputs follow when they are next asked for."""
+        try:
+            access = self._real_write
+            if vrs != access.vrs:
+                access = self._writes[float].get(tuple(vrs)) or self._writable(vrs, float)
+                self._real_write = access
+            if access.limited or not isfinite(sum(values)):
+                self._check_values(vrs, values)
+        except BaseException as error:
+            raise self._reported(error) from None
+        if access.parameters or not access.where:
+            self._store(vrs, values, access)
+        else:
+            self._values[access.where] = values
+            self._inputs = None
+
+    def set_boolean(self, vrs: list[int], values: list[Any]) -> None:
+        """Set inputs or parameters, all or none; outputs follow when they are next asked for."""
+        self._set(bool, vrs, values)
+
+    def set_integer(self, vrs: list[int], values: list[Any]) -> None:
+        """Set inputs or parameters, all or none; outputs follow when they are next asked for."""
+        self._set(int, vrs, values)
+
+    def set_string(self, vrs: list[int], values: list[Any]) -> None:
+        """Set inputs or parameters, all or none; outputs follow when they are next asked for."""
+        self._set(str, vrs, values)
+
+    @reported
+    def _get(self, kind: type[Scalar], vrs: list[int]) -> list[Any]:
+        access = self._reads[kind].get(tuple(vrs)) or self._readable(vrs, kind)
+        if self._inputs is None and access.outputs:
+            self._refresh()
+        return [self._values[vr] for vr in vrs]
+
+    @reported
+    def _set(self, kind: type[Scalar], vrs: list[int], values: list[Any]) -> None:
+        access = self._writes[kind].get(tuple(vrs)) or self._writable(vrs, kind)
+        if access.limited:
+            self._check_values(vrs, values)
+        self._store(vrs, values, access)
+
+    def _store(self, vrs: list[int], values: list[Any], access: Access) -> None:
+        if access.where:
+            self._values[access.where] = values
+        else:
+            for vr, value in zip(vrs, values, strict=True):
+                self._values[vr] = value
+        if access.parameters:
+            self._params = None
+        self._inputs = None
+
+    # State
+
+    def state_to_bytes(self, snapshot: Any) -> bytes:
+        """A state of this FMU, serialised."""
+        raise NotImplementedError
+
+    def state_from_bytes(self, data: bytes) -> Any:
+        """A state of this FMU from its bytes."""
+        raise NotImplementedError
+
+    # Checks
+
+    def _require(self, call: str, phase: int) -> None:
+        if self._phase != phase:
+            raise RefusalError(f"{call} {PHASES[self._phase]}: must be {PHASES[phase]}")
+
+    def _check_step(self, current_time: float, step_size: float) -> None:
+        self._require("fmi2DoStep", STEPPING)
+        if not 0.0 < step_size < inf:
+            raise RefusalError(f"step size = {step_size} s: must be a finite number above 0")
+        if not isclose(current_time, self._time, rel_tol=1e-12, abs_tol=TIME_TOLERANCE):
+            raise RefusalError(f"step from {current_time} s: must be from {self._time} s")
+
+    def _readable(self, vrs: list[int], kind: type[Scalar]) -> Access:
+        """How to read these variables; RefusalError where there are no such ones."""
+        self._check_references(vrs, kind)
+        return self._kept(self._reads[kind], vrs)
+
+    def _writable(self, vrs: list[int], kind: type[Scalar]) -> Access:
+        """How to write these variables; RefusalError where that is not allowed now."""
+        self._check_references(vrs, kind)
+        for vr in vrs:
+            v = self._variables[vr]
+            if v.causality == "output":
+                raise RefusalError(f"{v.name}: output set: must be an input or a parameter")
+            if self._phase == TERMINATED:
+                raise RefusalError(f"{v.name}: set after fmi2Terminate: must be before")
+            if self._phase == STEPPING and v.variability == "fixed":
+                raise RefusalError(
+                    f"{v.name}: fixed parameter set in step mode: must be before "
+                    "fmi2ExitInitializationMode"
+                )
+        return self._kept(self._writes[kind], vrs)
+
+    def _kept(self, accesses: Accesses, vrs: list[int]) -> Access:
+        first = vrs[0] if vrs else 0
+        stop = first + len(vrs)
+        variables = [self._variables[vr] for vr in vrs]
+        access = Access(
+            list(vrs),
+            slice(first, stop) if vrs == list(range(first, stop)) else None,
+            any(v.causality == "output" for v in variables),
+            any(v.causality == "parameter" for v in variables),
+            any(v.limits for v in variables),
+        )
+        if len(accesses) == MOST_ACCESSES:
+            accesses.clear()
+        accesses[tuple(vrs)] = access
+        return access
+
+    def _check_references(self, vrs: list[int], kind: type[Scalar]) -> None:
+        if vrs and not any(v.kind is kind for v in self._variables):
+            raise RefusalError(f"value reference {vrs[0]}: there is no {TYPES[kind]} variable")
+        for vr in vrs:
+            if not 0 <= vr < len(self._variables):
+                last = len(self._variables) - 1
+                raise RefusalError(f"value reference {vr}: must be from 0 to {last}")
+            v = self._variables[vr]
+            if v.kind is not kind:
+                wrong, right = TYPES[kind], TYPES[v.kind]
+                raise RefusalError(f"{v.name}: accessed as {wrong}: must be as {right}")
+
+    def _check_values(self, vrs: list[int], values: list[Any]) -> None:
+        for vr, value in zip(vrs, values, strict=True):
+            v = self._variables[vr]
+            low, high = v.limits or (-inf, inf)
+            if v.kind is str:
+                size = len(value.encode())
+                if not low <= size <= high:
+                    raise RefusalError(
+                        f"{v.name} = {value!r}: must have {low:g} to {high:g} bytes in UTF-8"
+                    )
+            elif not (low <= value <= high and isfinite(value)):
+                allowed = f"from {low:g} to {high:g}{v.in_unit}" if v.limits else "a finite number"
+                raise RefusalError(f"{v.name} = {value!r}{v.in_unit}: must be {allowed}")
+
+    # Reports
+
+    def _reported(self, error: BaseException) -> LoggedError:
+        """Log an exception that would leave the slave; what leaves it instead."""
+        self._inputs = None  # the outputs may not have been worked out
+        if isinstance(error, RefusalError):
+            self._log(ERROR, str(error))
+        else:
+            from traceback import format_exception  # only a bug needs it
+
+            self._log(ERROR, "".join(format_exception(error)).strip())
+        survive((self._component, self, self.log_queue))
+        return LoggedError()
+
+    def _log(self, status: int, text: str) -> None:
+        message = f"{self.instance_name}, t = {self._time:.9g} s: {text}"
+        if self._host_log is not None:
+            self._host_log(status, message)
+        else:
+            self.log_queue.append(Message(status, CATEGORIES[status], as_format(message)))
+
+    def _get_log_queue(self) -> list[Message]:
+        return self.log_queue

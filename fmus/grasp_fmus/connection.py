@@ -1,0 +1,160 @@
+"""A proxy's connection to its peer: the socket, and how long an answer is awaited."""
+
+import socket
+import sys
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from errno import ECONNREFUSED
+from secrets import randbits
+from select import select
+from time import monotonic_ns
+
+from .link.client import Client, Refusal, Verdict
+from .link.message import BUSY, FAILED, LARGEST, UNKNOWN, Value
+
+REPEAT = 50_000_000
+"""ns after which a HELLO or an INITIALISE without an answer is sent again."""
+
+STALE = 64
+"""The most datagrams that are taken from before a request."""
+
+DESCRIPTORS = 1024
+"""Those that select() can watch, but on Windows, where it can watch any."""
+
+NEW, GREETING, WELCOME, INITIALISING, READY = range(5)
+
+
+class Connection:
+    """One socket, connected to the peer. Times are ns of the clock, or s of simulation. Close it.
+
+    A request is given up at its deadline, whatever comes meanwhile. refusal says why the last one
+    was refused, None where it was not; trouble what the network said about it.
+    """
+
+    def __init__(
+        self, host: str, port: int, client: Client, clock: Callable[[], int] = monotonic_ns
+    ) -> None:
+        """OSError where there is no such host, or no socket to be had."""
+        self.client = client
+        self.refusal: Refusal | None = None
+        self.trouble = ""
+        self._clock = clock
+        self._stage = NEW
+        self._pending = b""
+        address = socket.getaddrinfo(host, port, socket.AF_INET, socket.SOCK_DGRAM)[0][4]
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            if sys.platform != "win32" and self._socket.fileno() >= DESCRIPTORS:
+                raise OSError(f"the host has {DESCRIPTORS} files open: must have fewer")
+            self._socket.setblocking(False)
+            self._socket.connect(address)
+        except OSError:
+            self._socket.close()
+            raise
+
+    def close(self) -> None:
+        """End the session, if there is one, and close the socket."""
+        if self._stage > GREETING:
+            with suppress(OSError):  # a peer that is gone needs no end
+                self._socket.send(self.client.end(self._clock()))
+        self._socket.close()
+
+    def greet(self, deadline: int) -> bool:
+        """Begin a session; whether the peer welcomes it. Goes on with what was begun before."""
+        if self._stage == NEW:
+            self._pending = self.client.greet(randbits(64), self._clock())
+            self._stage = GREETING
+        if self._stage == GREETING and self._ask(self._pending, deadline, repeat=True):
+            self._stage = WELCOME
+        return self._stage > GREETING
+
+    def initialise(self, time: float, values: Sequence[Value], deadline: int) -> bool:
+        """Set values; whether the outputs are there. Goes on with what is under way."""
+        if self._stage != INITIALISING:
+            self._pending = self.client.initialise(time, values, self._clock())
+            self._stage = INITIALISING
+        if self._ask(self._pending, deadline, repeat=True):
+            self._stage = READY
+        elif self.refusal and self.refusal.code in (UNKNOWN, FAILED):
+            self._stage = NEW
+        return self._stage == READY
+
+    def step(
+        self, time: float, step: float, values: Sequence[Value], deadline: int, anew: bool
+    ) -> bool:
+        """Step from time over step, both in s; whether the outputs came in time, else a miss.
+
+        anew: where the peer does not know the session, or there is none, begin another.
+        """
+        if self._step(time, step, values, deadline, anew):
+            return True
+        if self._stage == READY:
+            self.client.miss()
+        else:  # what is under way is awaited in the next step as well
+            self.client.counters.missed += 1
+        return False
+
+    def _step(
+        self, time: float, step: float, values: Sequence[Value], deadline: int, anew: bool
+    ) -> bool:
+        for _ in range(2):
+            if self._stage != READY and not (
+                self.greet(deadline) and self.initialise(time, values, deadline)
+            ):
+                return False
+            request = self.client.step(time, step, values, self._clock())
+            if self._ask(request, deadline, repeat=False):
+                return True
+            if not (anew and self.refusal and self.refusal.code == UNKNOWN):
+                return False
+            self._stage = NEW
+        return False
+
+    def _ask(self, request: bytes, deadline: int, repeat: bool) -> bool:
+        """Send a request and wait for its answer until the deadline; whether it came."""
+        self.refusal, self.trouble = None, ""
+        verdict, again = self._drain(), None
+        while verdict is Verdict.NOTHING and (now := self._clock()) < deadline:
+            if again is None or now >= again:
+                self._send(request)
+                again = now + REPEAT if repeat else deadline
+            if select([self._socket], [], [], (min(again, deadline) - now) * 1e-9)[0]:
+                verdict = self._receive() or Verdict.NOTHING
+        return verdict is Verdict.ANSWERED
+
+    def _drain(self) -> Verdict:
+        """Take what came since the last request, up to an answer to one that is repeated."""
+        for _ in range(STALE):
+            verdict = self._receive()
+            if verdict is not Verdict.NOTHING:
+                return verdict or Verdict.NOTHING
+        return Verdict.NOTHING
+
+    def _receive(self) -> Verdict | None:
+        """Take one datagram; None where there is none."""
+        try:
+            datagram = self._socket.recv(LARGEST + 1)
+        except BlockingIOError:
+            return None
+        except OSError as error:  # of an earlier datagram: that it did not arrive
+            self._note(error)
+            return Verdict.NOTHING
+        verdict = self.client.receive(datagram, self._clock())
+        if verdict is Verdict.REFUSED:
+            self.refusal = self.client.refusal
+            if self.refusal and self.refusal.code == BUSY:
+                return Verdict.NOTHING  # it may become free
+        return verdict
+
+    def _send(self, request: bytes) -> None:
+        for _ in range(2):  # a call that reports what became of an earlier datagram sends nothing
+            try:
+                self._socket.send(request)
+            except OSError as error:
+                self._note(error)
+            else:
+                return
+
+    def _note(self, error: OSError) -> None:
+        if error.errno != ECONNREFUSED:  # that nobody listens is what no answer means
+            self.trouble = error.strerror or str(error)

@@ -1,0 +1,372 @@
+"""The slave of a proxy: at every step it exchanges its variables with a peer over UDP.
+
+Beside those of the original it has parameters and outputs of its own, proxy.*. In initialisation
+mode outputs follow every set, as those of the original do; after that every step.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from time import monotonic_ns
+from typing import Any, NamedTuple
+from weakref import finalize
+
+from .base import (
+    INITIALISING,
+    INSTANTIATED,
+    STEPPING,
+    RefusalError,
+    Slave,
+    reported,
+)
+from .connection import Connection
+from .host_log import WARNING
+from .link.client import Client
+from .link.message import FAILED, STRING_SIZE, read_key
+from .link.signature import Kind, Signature, WireVariable
+from .variable import TYPES, Scalar, Variable
+
+HOST, PORT = "127.0.0.1", 5501
+
+TIMEOUT = 0.01
+"""s. The step of the original is no measure: 0.1 ms is less than many a network needs."""
+
+HOLD, FAILSAFE, STOP = ON_LOSS = ("hold", "failsafe", "stop")
+"""What a proxy does when the peer is lost."""
+
+NOT_CONNECTED, CONNECTED, MISSING, LOST = range(4)
+"""The values of proxy.state."""
+
+MOST = 2**31 - 1
+_NANOSECONDS = 1e9
+
+
+class Settings(NamedTuple):
+    """The parameters proxy.*, but for those of the outputs."""
+
+    host: str = HOST
+    port: int = PORT
+    timeout: float = TIMEOUT
+    connect_timeout: float = 5.0
+    misses_tolerated: int = 3
+    on_loss: str = FAILSAFE
+    resume: bool = False
+    key_file: str = ""
+
+
+_SETTINGS: dict[str, tuple[str, tuple[float, float] | None, str]] = {
+    "host": ("", None, "name or IPv4 address of the peer"),
+    "port": ("", (1, 65535), "its UDP port"),
+    "timeout": ("s", (1e-6, 3600.0), "longest wait for the outputs of a step, by the clock"),
+    "connect_timeout": (
+        "s", (1e-3, 3600.0), "longest wait for an answer in initialisation mode, by the clock",
+    ),
+    "misses_tolerated": ("", (0, MOST), "misses in a row before the peer is lost with one more"),
+    "on_loss": ("", None, "hold: outputs stay; failsafe: proxy.failsafe.*; stop: fmi2Error"),
+    "resume": ("", None, "go on asking a lost peer, and come back when it answers"),
+    "key_file": ("", None, "file with a key shared with the peer, 16 bytes or more; empty: none"),
+}  # fmt: skip
+"""By name: unit, limits, description."""
+
+_DIAGNOSTICS: tuple[tuple[str, type[Scalar], str, str], ...] = (
+    (
+        "state",
+        int,
+        "",
+        "0 not connected, 1 connected, 2 missing: outputs held, 3 lost: on_loss holds",
+    ),
+    ("missed", int, "", "steps without an answer in time"),
+    ("consecutive_missed", int, "", "of these, those since the last answer in time"),
+    ("late", int, "", "answers that came after their step was given up"),
+    ("out_of_order", int, "", "of these, those after the answer to a newer step: dropped"),
+    ("duplicated", int, "", "answers that had come already"),
+    ("rejected", int, "", "datagrams that were malformed, foreign or not authentic"),
+    ("round_trip_time", float, "s", "of the newest answer"),
+    ("age", float, "s", "simulation time since that which the outputs belong to"),
+)
+"""Name, kind, unit, description."""
+
+DEFAULTS = Settings()
+
+ZEROS: dict[type[Scalar], Scalar] = {float: 0.0, bool: False, int: 0, str: ""}
+"""The value of a variable that has no start value."""
+
+
+def own_variables(outputs: Sequence[Variable], settings: Settings = DEFAULTS) -> list[Variable]:
+    """What a proxy has beside the original: settings, hold, failsafe, diagnostics.
+
+    The settings are start values.
+    """
+    starts: Sequence[Scalar] = settings
+    parameters = [
+        Variable(
+            f"proxy.{name}", type(start), "parameter", unit, start, "fixed", limits, description
+        )
+        for (name, (unit, limits, description)), start in zip(
+            _SETTINGS.items(), starts, strict=True
+        )
+    ]
+    holds = [
+        Variable(
+            f"proxy.hold.{v.name}", bool, "parameter", "", False, "fixed",
+            description=f"of a lost peer: {v.name} stays as it is",
+        )
+        for v in outputs
+    ]  # fmt: skip
+    failsafes = [
+        Variable(
+            f"proxy.failsafe.{v.name}", v.kind, "parameter", v.unit, ZEROS[v.kind], "fixed",
+            description=f"of a lost peer: value of {v.name}", relative=v.relative,
+        )
+        for v in outputs
+    ]  # fmt: skip
+    diagnostics = [
+        Variable(
+            f"proxy.{name}", kind, "output", unit,
+            variability="continuous" if kind is float else "discrete", description=description,
+        )
+        for name, kind, unit, description in _DIAGNOSTICS
+    ]  # fmt: skip
+    return [*parameters, *holds, *failsafes, *diagnostics]
+
+
+class Fmi2Proxy(Slave):
+    """A proxy as an FMI 2.0 co-simulation slave; a subclass says of what.
+
+    Values are in the order: inputs, parameters, outputs of the original, then own_variables().
+    """
+
+    original: str
+    """The file name of the original."""
+    variables: tuple[Variable, ...]
+    """Those of the original: inputs, parameters, outputs."""
+    settings = DEFAULTS
+    """Where its own parameters start."""
+    clock: Callable[[], int] = staticmethod(monotonic_ns)
+
+    def _prepare(self) -> None:
+        wire = Signature(tuple(_wire(v) for v in self.variables))
+        outputs = self.variables[len(wire.request) :]
+        self._signature = wire
+        self._variables = [*map(_limited, self.variables), *own_variables(outputs, self.settings)]
+        self._values = [ZEROS[v.kind] if v.start is None else v.start for v in self._variables]
+        sizes = (len(wire.request), n := len(outputs), len(Settings._fields), n, n)
+        self._request, self._outputs, self._settings, self._holds, self._failsafes = _slices(sizes)
+        self._diagnostics = slice(self._failsafes.stop, len(self._values))
+        self._connection: Connection | None = None
+        self._address = ("", 0, "")
+        self._state = NOT_CONNECTED
+        self._missed = 0
+        self._loss = ""
+        self._enter(INSTANTIATED)
+
+    # The life cycle
+
+    @reported
+    def enter_initialization_mode(self) -> None:
+        """Greet the peer."""
+        self._require("fmi2EnterInitializationMode", INSTANTIATED)
+        self._connected()
+        self._enter(INITIALISING)
+
+    @reported
+    def do_step(self, current_time: float, step_size: float) -> bool:
+        """Send inputs and parameters, wait for the outputs; without them, hold or lose."""
+        self._check_step(current_time, step_size)
+        if self._inputs is None:
+            self._refresh()
+        settings, connection = self._read_settings(), self._required()
+        if self._state != LOST or settings.resume:
+            deadline = self.clock() + round(settings.timeout * _NANOSECONDS)
+            anew = self._state == LOST
+            if connection.step(current_time, step_size, self._inputs, deadline, anew):
+                self._note_answer(connection)
+            else:
+                self._note_miss(connection, settings)
+        if self._state == LOST and settings.on_loss == STOP:
+            self._report(connection)
+            raise RefusalError(self._loss)
+        self._time = current_time + step_size
+        if self._state != LOST:
+            self._take(connection)
+        self._report(connection)
+        return True
+
+    @reported
+    def terminate(self) -> None:
+        """The end, for the peer as well; values can still be read."""
+        self._disconnect()
+        super().terminate()
+
+    # State
+
+    @reported
+    def _get_fmu_state(self) -> None:
+        raise RefusalError("fmi2GetFMUstate: a proxy has no state, it is the peer's")
+
+    @reported
+    def _set_fmu_state(self, snapshot: Any) -> None:
+        raise RefusalError("fmi2SetFMUstate: a proxy has no state, it is the peer's")
+
+    @reported
+    def state_to_bytes(self, snapshot: Any) -> bytes:
+        """Refused."""
+        raise RefusalError("fmi2SerializeFMUstate: a proxy has no state, it is the peer's")
+
+    @reported
+    def state_from_bytes(self, data: bytes) -> Any:
+        """Refused."""
+        raise RefusalError("fmi2DeSerializeFMUstate: a proxy has no state, it is the peer's")
+
+    # The peer
+
+    def _refresh(self) -> None:
+        """In initialisation mode, exchange values; after that outputs do not follow a set."""
+        if self._phase not in (INITIALISING, STEPPING) or self._inputs is not None:
+            return
+        inputs = self._values[self._request]
+        if self._phase == INITIALISING:
+            connection, settings = self._connected(), self._read_settings()
+            deadline = self.clock() + round(settings.connect_timeout * _NANOSECONDS)
+            if not connection.initialise(self._time, inputs, deadline):
+                self._give_up(connection, settings)
+            self._take(connection)
+        self._inputs = inputs
+
+    def _connected(self) -> Connection:
+        """The connection, with a session, to where the settings say; RefusalError without one."""
+        settings = self._read_settings()
+        address = (settings.host, settings.port, settings.key_file)
+        if self._connection is not None and self._address == address:
+            return self._connection
+        self._disconnect()
+        client = Client(self._signature, _key(settings.key_file))
+        try:
+            connection = Connection(settings.host, settings.port, client, self.clock)
+        except (OSError, UnicodeError) as error:
+            reason = getattr(error, "strerror", None) or error
+            raise RefusalError(f"{_peer(settings)}: no connection: {reason}") from error
+        self._connection, self._address = connection, address
+        self._close = finalize(self, connection.close)
+        deadline = self.clock() + round(settings.connect_timeout * _NANOSECONDS)
+        if not connection.greet(deadline):
+            self._give_up(connection, settings)
+        self._values[self._diagnostics.start] = self._state = CONNECTED
+        return connection
+
+    def _required(self) -> Connection:
+        assert self._connection is not None  # noqa: S101 - there is one from initialisation on
+        return self._connection
+
+    def _disconnect(self) -> None:
+        if self._connection is not None:
+            self._close()
+            self._connection = None
+            self._values[self._diagnostics.start] = self._state = NOT_CONNECTED
+
+    def _give_up(self, connection: Connection, settings: Settings) -> None:
+        """Say why initialisation failed, as RefusalError; the host may try again."""
+        self._disconnect()
+        if connection.refusal:
+            raise RefusalError(f"{_peer(settings)}: {connection.refusal.text}")
+        trouble = f" ({connection.trouble})" if connection.trouble else ""
+        raise RefusalError(
+            f"no answer from {_peer(settings)} within {settings.connect_timeout:g} s{trouble}: "
+            f"start the peer first, e.g. grasp-cosim serve {self.original} --port {settings.port}"
+        )
+
+    def _note_answer(self, connection: Connection) -> None:
+        if self._state == LOST:
+            self._log(WARNING, f"{_peer(self._read_settings())}: the peer answers again")
+        self._state, self._missed = CONNECTED, 0
+
+    def _note_miss(self, connection: Connection, settings: Settings) -> None:
+        self._missed += 1
+        failed = connection.refusal is not None and connection.refusal.code == FAILED
+        if self._state != LOST:
+            self._state = MISSING
+            if failed or self._missed > settings.misses_tolerated:
+                self._lose(connection, settings)
+
+    def _lose(self, connection: Connection, settings: Settings) -> None:
+        self._state = LOST
+        if connection.refusal:
+            reason = connection.refusal.text
+        else:
+            trouble = f" ({connection.trouble})" if connection.trouble else ""
+            reason = f"no answer within {settings.timeout:g} s{trouble}"
+        self._loss = f"{_peer(settings)} is lost, {self._missed} missed in a row: {reason}"
+        if settings.on_loss == STOP:
+            return
+        self._log(WARNING, f"{self._loss}; proxy.on_loss = {settings.on_loss}")
+        self._take(connection)
+        if settings.on_loss == FAILSAFE:
+            places = zip(
+                self._values[self._outputs],
+                self._values[self._holds],
+                self._values[self._failsafes],
+                strict=True,
+            )
+            self._values[self._outputs] = [now if hold else safe for now, hold, safe in places]
+
+    # Values
+
+    def _read_settings(self) -> Settings:
+        """The settings now; RefusalError where one is none."""
+        if self._params is None:
+            settings = Settings(*self._values[self._settings])
+            if settings.on_loss not in ON_LOSS:
+                raise RefusalError(
+                    f"proxy.on_loss = {settings.on_loss!r}: must be {', '.join(ON_LOSS)}"
+                )
+            self._params = settings
+        now: Settings = self._params
+        return now
+
+    def _take(self, connection: Connection) -> None:
+        """Take over the newest outputs."""
+        outputs = connection.client.outputs
+        assert outputs is not None  # noqa: S101 - there are some from initialisation on
+        self._values[self._outputs] = outputs
+
+    def _report(self, connection: Connection) -> None:
+        """Bring the diagnostics up to date; before the first step they would not settle."""
+        client = connection.client
+        c = client.counters
+        counts = (c.missed, self._missed, c.late, c.out_of_order, c.duplicated, c.rejected)
+        self._values[self._diagnostics] = [
+            self._state,
+            *(min(count, MOST) for count in counts),
+            client.round_trip / _NANOSECONDS,
+            self._time - client.outputs_time,
+        ]
+
+
+def _slices(sizes: Sequence[int]) -> list[slice]:
+    """Places in a list, one after the other."""
+    ends = [sum(sizes[: i + 1]) for i in range(len(sizes))]
+    return [slice(end - size, end) for size, end in zip(sizes, ends, strict=True)]
+
+
+def _wire(v: Variable) -> WireVariable:
+    kind: Kind = TYPES[v.kind]
+    return WireVariable(v.name, kind, v.causality, v.unit or None)
+
+
+def _limited(v: Variable) -> Variable:
+    """As a host may set it: the peer checks values, but for what the wire cannot carry."""
+    return replace(v, limits=(0, STRING_SIZE - 1)) if v.kind is str else v
+
+
+def _peer(settings: Settings) -> str:
+    return f"{settings.host}:{settings.port}"
+
+
+def _key(file: str) -> bytes | None:
+    """The shared key; None without a file."""
+    try:
+        return read_key(Path(file)) if file else None
+    except OSError as error:
+        raise RefusalError(f"proxy.key_file = {file!r}: {error.strerror}") from error
+    except ValueError as error:
+        raise RefusalError(f"proxy.key_file = {file!r}: {error}") from error

@@ -1,0 +1,141 @@
+"""Builds the proxy of an FMU: the same variables, and a slave that asks a peer for the outputs."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib import metadata
+from math import inf
+from pathlib import Path
+
+from .build import Built, bound_library, members, own_files, write_fmu
+from .documentation import PROXY, icon, page
+from .host_log import ERROR, WARNING
+from .model_description import UNITS, Description, Experiment, Unit
+from .proxy import DEFAULTS, Settings, own_variables
+from .variable import TYPES, Variable
+
+ADAPTER = (
+    "__init__.py", "base.py", "connection.py", "host_log.py", "link/__init__.py", "link/client.py",
+    "link/message.py", "link/signature.py", "loader.py", "proxy.py", "variable.py",
+)  # fmt: skip
+"""What of this package runs inside a proxy."""
+
+CARD = Path(__file__).parent / "link" / "README.md"
+
+_WORD = r"(?:[A-Za-z_]\w*|'(?:[^'\\]|\\.)+')(?:\[\d+(?:,\d+)*\])?"
+_STRUCTURED = re.compile(rf"{_WORD}(?:\.{_WORD})*", re.ASCII)
+"""Names of FMI's structured naming convention, but for der(), which proxy.hold. cannot precede."""
+
+_IDENTIFIER = re.compile(r"[A-Za-z_]\w*", re.ASCII)
+
+
+@dataclass(frozen=True)
+class Original:
+    """What a proxy has from the FMU whose place it takes; file is its name.
+
+    variables are its inputs, parameters and outputs, in this order.
+    """
+
+    file: str
+    variables: Sequence[Variable]
+    units: Mapping[str, Unit]
+    experiment: Experiment
+    can_vary_step: bool
+
+
+def build_proxy(
+    target: Path,
+    original: Original,
+    settings: Settings = DEFAULTS,
+    bind_python: str | None = None,
+) -> Built:
+    """Build the proxy of an FMU; its own parameters start at settings.
+
+    bind_python is as in build(). A proxy that is there already with the same content is left alone.
+    ValueError where the stem of target is no identifier of C, a setting is out of its range, or a
+    name is taken.
+    """
+    name = target.stem
+    if not _IDENTIFIER.fullmatch(name) or target.suffix != ".fmu":
+        raise ValueError(f"{target.name}: must be an identifier of C, letters, digits and _, .fmu")
+    taken = [v.name for v in original.variables if v.name.startswith("proxy.")]
+    if taken:
+        raise ValueError(f"{original.file}: {taken[0]}: proxy. begins the names of a proxy's own")
+    own = own_variables([v for v in original.variables if v.causality == "output"], settings)
+    for v in own:
+        low, high = v.limits or (-inf, inf)
+        if isinstance(v.start, float | int) and not low <= v.start <= high:
+            raise ValueError(
+                f"{v.name} = {v.start}{v.in_unit}: must be from {low:g} to {high:g}{v.in_unit}"
+            )
+    description = _description(name, original, own)
+    html = page(
+        name,
+        description.summary,
+        _card(own),
+        metadata.version("grasp-cosim"),
+        bound_library(bind_python),
+        PROXY,
+    )
+    sources = {f"{name}.py": _script(name, original, settings).encode(), **own_files(ADAPTER)}
+    return write_fmu(members(description, html, icon("Proxy"), sources, bind_python), target)
+
+
+def _description(name: str, original: Original, own: Sequence[Variable]) -> Description:
+    variables = [*original.variables, *own]
+    return Description(
+        name,
+        f"Proxy of {original.file}: a peer has its outputs, over UDP",
+        variables,
+        {"s": UNITS["s"], **original.units},
+        {
+            "needsExecutionTool": True,
+            "canHandleVariableCommunicationStepSize": original.can_vary_step,
+            "canNotUseMemoryManagementFunctions": True,
+            "canGetAndSetFMUstate": False,
+            "canSerializeFMUstate": False,
+        },
+        original.experiment,
+        (WARNING, ERROR),
+        all(_STRUCTURED.fullmatch(v.name) for v in variables),
+    )
+
+
+def _script(name: str, original: Original, settings: Settings) -> str:
+    """The script of the FMU: what its slave needs to know of the original."""
+    lines = [
+        f"        Variable({v.name!r}, {v.kind.__name__}, {v.causality!r}, {v.unit!r}, "
+        f"{v.start!r}, {v.variability!r}),\n"
+        for v in original.variables
+    ]
+    return (
+        f"from grasp_fmus import proxy\nfrom grasp_fmus.variable import Variable\n\n\n"
+        f"class {name}(proxy.Fmi2Proxy):\n"
+        f"    original = {original.file!r}\n"
+        f"    settings = proxy.{settings!r}\n"
+        f"    variables = (\n{''.join(lines)}    )\n"
+    )
+
+
+def _card(own: Sequence[Variable]) -> str:
+    """The protocol, and what a proxy has beside the original's variables, in Markdown."""
+    cells = [
+        (f"`{v.name}`", v.causality, TYPES[v.kind], v.unit, _start(v), _limits(v), v.description)
+        for v in own
+    ]
+    rows = [f"| {' | '.join(cell.replace('|', '&#124;') for cell in row)} |\n" for row in cells]
+    return (
+        "## Variables of the proxy\n\n"
+        "All others are those of the original.\n\n"
+        "| variable | causality | type | unit | start | range | meaning |\n"
+        f"|---|---|---|---|---|---|---|\n{''.join(rows)}\n"
+        f"{CARD.read_text('utf-8')}"
+    )
+
+
+def _start(v: Variable) -> str:
+    return "" if v.start is None else str(v.start).lower()
+
+
+def _limits(v: Variable) -> str:
+    return f"{v.limits[0]:g} to {v.limits[1]:g}" if v.limits else ""

@@ -1,0 +1,43 @@
+"""A scalar variable of an FMU, as its slave and its description need it."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+Scalar = float | bool | int | str
+Causality = Literal["input", "output", "parameter"]
+
+TYPES: dict[type[Scalar], Literal["Real", "Boolean", "Integer", "String"]] = {
+    float: "Real",
+    bool: "Boolean",
+    int: "Integer",
+    str: "String",
+}
+"""What FMI calls a kind of variable."""
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """A scalar variable; its value reference is its place among all.
+
+    limits are what a host may set. dependencies are the variables that reach an output without a
+    step, initial_dependencies those that do so in initialisation mode, by name. relative says that
+    it is a difference, to which the offset of a unit does not apply.
+    """
+
+    name: str
+    kind: type[Scalar]
+    causality: Causality
+    unit: str = ""
+    start: Scalar | None = None
+    variability: str = "continuous"
+    limits: tuple[float, float] | None = None
+    description: str = ""
+    nominal: float | None = None
+    relative: bool = False
+    dependencies: tuple[str, ...] = ()
+    initial_dependencies: tuple[str, ...] = ()
+
+    @property
+    def in_unit(self) -> str:
+        """Its unit after a number, with a space before it; empty where it has none."""
+        return f" {self.unit}" if self.unit else ""

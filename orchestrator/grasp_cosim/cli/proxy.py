@@ -1,0 +1,174 @@
+"""The command proxy."""
+
+import json
+import math
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+from grasp_fmus.model_description import Experiment, Unit
+from grasp_fmus.proxy import DEFAULTS, Settings
+from grasp_fmus.variable import Variable as ProxyVariable
+
+from ..bench.wire import wire_signature
+from ..errors import InputError
+from ..host.inspection import inspect_fmu
+from ..system.interface import Interface, Value, Variable, read_interface
+from ..system.units import BASE
+from .frame import check_folder, json_option
+
+if TYPE_CHECKING:
+    from grasp_fmus.proxy_build import Original
+
+KINDS: Mapping[str, type[Value]] = {"Real": float, "Integer": int, "Boolean": bool, "String": str}
+
+
+@click.command()
+@click.argument("fmu", type=click.Path(path_type=Path))
+@click.option("-o", "--out", type=click.Path(path_type=Path), help="The proxy to write, an .fmu.")
+@click.option("--host", default=DEFAULTS.host, show_default=True, help="Where its peer is.")
+@click.option("--port", type=click.IntRange(1, 65535), default=DEFAULTS.port, show_default=True)
+@click.option(
+    "--timeout",
+    type=float,
+    default=DEFAULTS.timeout,
+    show_default=True,
+    help="Longest wait per step in s.",
+)
+@click.option(
+    "--bind-python",
+    is_flag=False,
+    flag_value=sys.executable,
+    metavar="[PYTHON]",
+    help="For hosts that are not Python: bind to libpython.",
+)
+@click.option(
+    "--c-header", type=click.Path(path_type=Path), help="Write the peer's side as a C99 header."
+)
+@json_option
+def proxy(
+    fmu: Path,
+    out: Path | None,
+    host: str,
+    port: int,
+    timeout: float,
+    bind_python: str | None,
+    c_header: Path | None,
+    as_json: bool,
+) -> int:
+    """Make a proxy of FMU: an FMU with the same variables that gets its outputs from a peer.
+
+    It sends inputs and parameters in one UDP datagram per step and waits --timeout for the outputs.
+    What happens without an answer is up to its parameters proxy.*, where --host, --port and
+    --timeout are start values. The peer: grasp-cosim serve, or a bench with the header of
+    --c-header.
+
+    \b
+    Example: grasp-cosim proxy fmus/build/GripperPlant.fmu -o GripperPlantProxy.fmu --timeout 0.001
+    """
+    from grasp_fmus.build import write_file  # only here: its libraries take time to load
+    from grasp_fmus.c_header import c_header as header
+    from grasp_fmus.proxy_build import build_proxy
+
+    _check_paths(fmu, out, c_header)
+    if bind_python == "":
+        raise InputError("--bind-python '': must be a Python program, or left out")
+    interface = read_interface(fmu)
+    signature, notes = wire_signature(interface)
+    report: dict[str, object] = {"notes": notes}
+    lines = []
+    try:
+        if out is not None:
+            original = _original(interface, [v.name for v in signature.variables])
+            built = build_proxy(out, original, Settings(host, port, timeout), bind_python)
+            lines += [f"{out}: {built.status}", *(f"    {change}" for change in built.changes)]
+            report |= {"fmu": str(out), "status": built.status, "changes": list(built.changes)}
+        if c_header is not None:
+            starts = {v.name: _start(interface.by_name[v.name]) for v in signature.request}
+            known = {name: start for name, start in starts.items() if start is not None}
+            write_file(c_header, header(interface.identifier, signature, known).encode())
+            lines.append(f"{c_header}: written")
+            report["c_header"] = str(c_header)
+    except ValueError as error:
+        raise InputError(f"proxy: {error}") from error
+    for note in notes:
+        click.echo(note, err=True)
+    click.echo(json.dumps(report) if as_json else "\n".join(lines))
+    return 0
+
+
+def _check_paths(fmu: Path, out: Path | None, c_header: Path | None) -> None:
+    """InputError where there is nothing to write, or it cannot be written there."""
+    taken = {fmu.resolve(): "the original"}
+    for option, path in (("-o", out), ("--c-header", c_header)):
+        if path is None:
+            continue
+        if path.resolve() in taken:
+            raise InputError(f"{option} {path}: is {taken[path.resolve()]}; must be another file")
+        taken[path.resolve()] = "the proxy"
+        check_folder(path.parent)
+    if len(taken) == 1:
+        raise InputError("proxy: must have -o FILE.fmu or --c-header FILE, or both")
+
+
+def _original(interface: Interface, names: list[str]) -> "Original":
+    """What a proxy has from the FMU; names are the variables to exchange, in order."""
+    from grasp_fmus.proxy_build import Original
+
+    experiment = inspect_fmu(interface.path)["default_experiment"]
+    known = {name for name in names if interface.by_name[name].causality != "output"}
+    units = {
+        unit.name: Unit(
+            {key: power for key, power in zip(BASE, unit.exponents, strict=True) if power},
+            factor=unit.factor,
+            offset=unit.offset,
+        )
+        for unit in interface.units.values()
+    }
+    return Original(
+        interface.path.name,
+        [_variable(interface, interface.by_name[name], known) for name in names],
+        units,
+        Experiment(
+            experiment["start_time"],
+            experiment["stop_time"],
+            experiment["tolerance"],
+            experiment["step_size"],
+        ),
+        interface.can_vary_step,
+    )
+
+
+def _variable(interface: Interface, v: Variable, known: set[str]) -> ProxyVariable:
+    """The variable in the proxy: an output follows inputs and parameters at the start only."""
+    limits = (v.low, v.high)
+    initially: tuple[str, ...] = ()
+    if v.causality == "output":
+        declared = v.dependencies if v.initial_dependencies is None else v.initial_dependencies
+        inputs = {i.name for i in interface.of("input")}
+        sources = known if declared is None else (known - inputs) | (known & set(declared))
+        initially = tuple(u.name for u in interface.variables if u.name in sources)
+    return ProxyVariable(
+        v.name,
+        KINDS[v.kind],
+        v.causality,  # type: ignore[arg-type]  # one of the three that are exchanged
+        v.unit or "",
+        _start(v),
+        v.variability,
+        None if all(map(math.isinf, limits)) else limits,
+        v.description,
+        None if v.kind != "Real" or v.nominal == 1.0 else v.nominal,
+        v.relative,
+        initial_dependencies=initially,
+    )
+
+
+def _start(v: Variable) -> Value | None:
+    """Its start value; inputs and parameters have one in any case."""
+    if v.start is None:
+        return None if v.causality == "output" else KINDS[v.kind]()
+    if v.kind == "Boolean":
+        return v.start in ("true", "1")
+    return KINDS[v.kind](v.start)

@@ -1,0 +1,66 @@
+"""How a run is to be paced by the clock."""
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from numbers import Real
+from typing import Literal, get_args
+
+from ..errors import InputError, choices
+
+Overrun = Literal["catch-up", "continue", "stop"]
+OVERRUNS: tuple[str, ...] = get_args(Overrun)
+
+
+@dataclass(frozen=True, slots=True)
+class Realtime:
+    """A run in real time; InputError where a value is none of those given here."""
+
+    factor: float = 1.0
+    """How many times as fast as real time, > 0."""
+    overrun: Overrun = "catch-up"
+    """What follows a step that ends after the next one should have begun: "catch-up" keeps to the
+    schedule, late steps are done without waiting; "continue" shifts the schedule by the delay;
+    "stop" ends the run with a SimulationError.
+    """
+    priority: int | None = None
+    """Of SCHED_FIFO, 1 to 99; None leaves the scheduling as it is."""
+    cpu: int | None = None
+    """The number of the CPU to stay on; None leaves it to the operating system."""
+    lock_memory: bool = False
+    """Keep the memory of the process from being swapped out."""
+
+    def __post_init__(self) -> None:
+        factor = self.factor
+        if isinstance(factor, bool) or not isinstance(factor, Real) or not 0 < factor < math.inf:
+            raise InputError(f"factor = {factor!r}: must be a finite number > 0")
+        if self.overrun not in OVERRUNS:
+            raise InputError(f"overrun = {self.overrun!r}: must be one of {choices(OVERRUNS)}")
+        _check_whole("priority", self.priority, 1, 99)
+        _check_whole("cpu", self.cpu, 0, 2**16)
+        if not isinstance(self.lock_memory, bool):
+            raise InputError(f"lock_memory = {self.lock_memory!r}: must be True or False")
+
+    def period(self, step_ns: int) -> Fraction:
+        """The wall time in ns between the beginnings of two steps of step_ns; it is exact.
+
+        InputError where that is less than 1 ns, or more than a year.
+        """
+        period = step_ns / Fraction(repr(float(self.factor)))  # 0.1 is meant to be a tenth
+        if not 1 <= period <= YEAR_NS:
+            raise InputError(
+                f"factor = {self.factor!r}: a step of {step_ns / 1e9:g} s would begin every "
+                f"{float(period) / 1e9:g} s; must be from 1 ns to a year"
+            )
+        return period
+
+
+YEAR_NS = 366 * 24 * 3600 * 10**9
+"""The longest period."""
+
+
+def _check_whole(name: str, value: int | None, least: int, most: int) -> None:
+    if value is None:
+        return
+    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+        raise InputError(f"{name} = {value!r}: must be a whole number from {least} to {most}")

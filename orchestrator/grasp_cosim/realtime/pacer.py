@@ -1,0 +1,257 @@
+"""Waits for the clock: the operation of the plan at the beginning of a macro step.
+
+The pacer and the stamps between the components write wall times into the vector of values, behind
+the slots of the ports. So they are in the rows of the loop, and cost nothing where there are none.
+"""
+
+import ctypes
+import sys
+import time
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ..fmi.instance import CLOCK, Call, Native
+from ..system.description import System
+from .meter import ARRIVED, BEGIN, DUE, HEAD, LATE, Meter
+from .options import Realtime
+from .timing import Timing
+
+SPIN_NS = 200_000
+"""Before the deadline the pacer does not sleep any more: it may be woken too late."""
+
+SLICE_NS = 50_000_000
+"""The longest sleep between two looks at Ctrl-C."""
+
+BREATH_NS = 500_000_000
+"""At a real-time priority the longest time without a sleep, as nothing else may get to run."""
+
+SOME = 64
+"""So many rows are handed on while it waits, if there is time for it."""
+
+AFTER = 512
+"""Steps after which times are handed on to the meter even where there is no time for it."""
+
+NAP = 1e-4
+"""s of a sleep that is there for others only."""
+
+
+class OverrunError(Exception):
+    """A step ended after its deadline, and the run is to stop there."""
+
+
+class HaltError(Exception):
+    """The run was interrupted while it waited for the beginning of a step."""
+
+
+class Clock(NamedTuple):
+    """A monotonic clock in ns, and a sleep of a time in s by it."""
+
+    now: Callable[[], int] = time.monotonic_ns
+    sleep: Callable[[float], None] = time.sleep
+
+
+class Pacer:
+    """Begins each step at its time, and hands the wall times on to the meter."""
+
+    def __init__(
+        self,
+        system: System,
+        realtime: Realtime,
+        halted: Callable[[], bool] = lambda: False,
+        clock: Clock | None = None,
+    ) -> None:
+        """Ask halted while it waits; it says whether the run was interrupted.
+
+        InputError as of Realtime.period() and Meter.
+        """
+        period = realtime.period(system.step_ns)
+        self.meter = Meter(system, realtime, period)
+        self._period = period.as_integer_ratio()
+        self.breathes = False
+        """Whether it has to sleep from time to time for the sake of others."""
+        self._policy = realtime.overrun
+        self._halted = halted
+        self._clock = clock or Clock()
+        self._now = self._clock.now
+        self._origin = self._now()
+        self._slept = 0
+        self._base = 0
+        self._base_step: int | None = None
+        self._end: tuple[int, int] | None = None
+        self._pending: tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]] | None = None
+        self._taken = 0
+        self._hand_on: Callable[[int], None] = lambda _: None
+        self._measuring = self._recording = 0
+        self._head: Any = memoryview(bytearray(8 * HEAD)).cast("d")
+        self._keep: list[Any] = []
+
+    @property
+    def width(self) -> int:
+        """How many values it needs in a row."""
+        return HEAD + len(self.meter.segments)
+
+    def bind(self, values: npt.NDArray[np.float64], hand_on: Callable[[int], None]) -> None:
+        """Have it write into these values, width of them.
+
+        hand_on hands on the rows of the steps before one. It is called while there is time to wait.
+        """
+        self._hand_on = hand_on
+        self._head = memoryview(values[:HEAD])  # type: ignore[arg-type]  # numpy's 3.11 stubs
+        self._stamped = values[HEAD:]
+
+    def stamp(self, i: int) -> Call:
+        """The call that says when segment i of a step has ended."""
+        data, now, origin = self._stamped[i : i + 1], self._now, self._origin
+        view: Any = memoryview(data)  # type: ignore[arg-type]  # numpy's 3.11 stubs
+
+        def python() -> int:
+            view[0] = now() - origin
+            return 0
+
+        if now is not time.monotonic_ns or not HAS_CLOCK:
+            return Call(python)
+        seconds = np.zeros(2, np.int64)
+        self._keep += [seconds, data]
+        function = ctypes.CDLL(None).clock_gettime
+        address = ctypes.cast(function, ctypes.c_void_p).value or 0
+        return Call(
+            python,
+            Native(
+                CLOCK,
+                address,
+                time.CLOCK_MONOTONIC,
+                seconds.ctypes.data,
+                origin,
+                data.ctypes.data,
+            ),
+        )
+
+    def __call__(self, step: int) -> None:
+        """Wait for the beginning of a step.
+
+        HaltError where the run is interrupted meanwhile, OverrunError where it stops at an overrun.
+        """
+        self._use_the_wait(step)
+        arrived, late = self._arrive(step)
+        if late > 0 and self._policy == "continue":
+            self._base, self._base_step = arrived, step
+        due = self._due(step)
+        begin = self._wait(due, arrived)
+        head = self._head
+        head[ARRIVED], head[LATE], head[DUE], head[BEGIN] = arrived, late, due, begin
+
+    def finish(self, step: int) -> None:
+        """The last step has just ended, where another step would begin; OverrunError as above."""
+        self._end = self._arrive(step)
+
+    def record(
+        self,
+        steps: npt.NDArray[np.int64],
+        rows: npt.NDArray[np.float64],
+        hand_on: Callable[[], None],
+    ) -> None:
+        """Take steps that were done: the numbers they lead to, and what was written of each.
+
+        Hands their rows on, which counts as recording. What the times come to is found out while
+        it waits for a later step, or else before it takes the next ones.
+        """
+        self._taken = int(steps[-1])
+        took = self._timed(self._taken - 1, lambda: self._take(steps - 1, rows, hand_on))
+        self._recording = took
+
+    def timing(self, granted: Sequence[str], refused: Sequence[str]) -> Timing:
+        """What the times came to so far: see Meter.timing()."""
+        self._settle()
+        return self.meter.timing(granted, refused)
+
+    def verdict(self) -> str:
+        """What led to an OverrunError, when the steps until then are recorded."""
+        self._settle()
+        return self.meter.verdict()
+
+    def _take(
+        self,
+        steps: npt.NDArray[np.int64],
+        rows: npt.NDArray[np.float64],
+        hand_on: Callable[[], None],
+    ) -> None:
+        self._measure()
+        self._pending = steps, rows.copy()
+        hand_on()
+
+    def _measure(self) -> None:
+        """Hand the times that wait on to the meter."""
+        if self._pending is not None:
+            self.meter.add(*self._pending)
+            self._pending = None
+
+    def _settle(self) -> None:
+        """Hand all times on to the meter."""
+        self._measure()
+        if self._end is not None:
+            self.meter.end(*self._end)
+            self._end = None
+
+    def _use_the_wait(self, step: int) -> None:
+        """Do what has to be done some time, where it is not likely to make the step late.
+
+        It is expected to take half as long again as it did the last time.
+        """
+        waiting = step - self._taken
+        if self._base_step is None or (self._pending is None and waiting < SOME):
+            return
+        spare = self._due(step) - (self._now() - self._origin)
+        if self._pending is not None:
+            if 2 * spare > 3 * self._measuring or waiting > AFTER:
+                self._measuring = self._timed(step - 1, self._measure)
+        elif 2 * spare > 3 * self._recording:
+            self._hand_on(step)
+
+    def _timed(self, step: int, action: Callable[[], None]) -> int:
+        """Do it, and count the time that takes as recording after that step; the time in ns."""
+        start = self._now()
+        try:
+            action()
+        finally:
+            took = self._now() - start
+            self.meter.recorded(step, took)
+        return took
+
+    def _arrive(self, step: int) -> tuple[int, int]:
+        """The time now, and by how much the step before ended late; negative where it did not."""
+        arrived = self._now() - self._origin
+        if self._base_step is None:
+            self._base, self._base_step, self._slept = arrived, step, arrived
+        late = arrived - self._due(step)
+        if late > 0 and self._policy == "stop":
+            self._end = arrived, late
+            raise OverrunError
+        return arrived, late
+
+    def _due(self, step: int) -> int:
+        """When a step begins by the schedule, in ns."""
+        numerator, denominator = self._period
+        return self._base + (step - (self._base_step or 0)) * numerator // denominator
+
+    def _wait(self, due: int, now: int) -> int:
+        """Sleep, then spin, until it is due; the time then."""
+        if now + SPIN_NS < due:
+            while (left := due - SPIN_NS - now) > 0:
+                if self._halted():
+                    raise HaltError
+                self._clock.sleep(min(left, SLICE_NS) / 1e9)
+                now = self._now() - self._origin
+            self._slept = now
+        elif self.breathes and now - self._slept > BREATH_NS:
+            self._clock.sleep(NAP)
+            self._slept = now = self._now() - self._origin
+        while now < due:
+            now = self._now() - self._origin
+        return now
+
+
+HAS_CLOCK = sys.platform == "linux" and sys.maxsize > 2**32
+"""Whether compiled code can read time.monotonic_ns(): clock_gettime with two words of 64 bits."""

@@ -1,0 +1,111 @@
+"""What a paced run asks of the operating system. It does without what is not permitted."""
+
+import ctypes
+import gc
+import os
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+
+from ..errors import choices
+from .options import Realtime
+
+CURRENT, FUTURE, ON_FAULT = 1, 2, 4
+"""Flags of mlockall on Linux: pages that are there, that will be, each from its first use on."""
+
+
+@dataclass(frozen=True)
+class Privileges:
+    """A line for each that was asked for: those that were granted, and those that were not."""
+
+    granted: list[str] = field(default_factory=list)
+    refused: list[str] = field(default_factory=list)
+
+
+@contextmanager
+def privileges(realtime: Realtime) -> Iterator[Privileges]:
+    """Asks for what is wanted, and keeps the garbage collector away; all is put back at the end.
+
+    Priority and CPU are those of the calling thread.
+    """
+    found = Privileges()
+    with ExitStack() as stack:
+        stack.enter_context(_no_garbage_collection())
+        thread = threading.get_native_id()
+        wanted: list[tuple[str, Callable[[], Callable[[], object]], str]] = []
+        if realtime.cpu is not None:
+            cpu = realtime.cpu
+            wanted.append((f"CPU {cpu}", lambda: _pin(thread, cpu), _cpus()))
+        if realtime.lock_memory:
+            wanted.append(("memory locked", _lock, LOCKING))
+        if realtime.priority is not None:
+            priority = realtime.priority
+            name = f"SCHED_FIFO, priority {priority}"
+            wanted.append((name, lambda: _schedule(thread, priority), SCHEDULING))
+        for name, ask, remedy in wanted:
+            try:
+                stack.callback(ask())
+            except AttributeError:  # Python offers what the system has
+                found.refused.append(f"{name}: not possible on this operating system")
+            except OSError as error:
+                found.refused.append(f"{name}: {error.strerror}; {remedy}")
+            else:
+                found.granted.append(name)
+        yield found
+
+
+SCHEDULING = (
+    "needs CAP_SYS_NICE, or a limit of real-time priorities that is high enough "
+    "(ulimit -r, rtprio in /etc/security/limits.conf)"
+)
+LOCKING = (
+    "needs CAP_IPC_LOCK, or a limit of locked memory that is high enough "
+    "(ulimit -l, memlock in /etc/security/limits.conf)"
+)
+
+
+def _cpus() -> str:
+    affinity = getattr(os, "sched_getaffinity", None)
+    return f"must be one of {choices(sorted(affinity(0)))}" if affinity else ""
+
+
+def _schedule(thread: int, priority: int) -> Callable[[], object]:
+    """Ask for the priority; what puts back how it was."""
+    policy, parameter = os.sched_getscheduler(thread), os.sched_getparam(thread)
+    os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(priority))
+    return lambda: os.sched_setscheduler(thread, policy, parameter)
+
+
+def _pin(thread: int, cpu: int) -> Callable[[], object]:
+    """Stay on a CPU; what puts back how it was."""
+    before = os.sched_getaffinity(thread)
+    os.sched_setaffinity(thread, {cpu})
+    return lambda: os.sched_setaffinity(thread, before)
+
+
+def _lock() -> Callable[[], object]:
+    """Lock the memory; what unlocks it."""
+    if sys.platform != "linux":  # whose flags these are
+        raise AttributeError("mlockall")
+    libc = ctypes.CDLL(None, use_errno=True)
+    if libc.mlockall(CURRENT | FUTURE | ON_FAULT):
+        code = ctypes.get_errno()
+        raise OSError(code, os.strerror(code))
+    return libc.munlockall
+
+
+@contextmanager
+def _no_garbage_collection() -> Iterator[None]:
+    """Collect garbage now, and then not before the end: it would take too long on the way."""
+    collecting = gc.isenabled()
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
+        if collecting:
+            gc.enable()

@@ -1,0 +1,46 @@
+"""Run as a program: starts processes that serve an FMU in lockstep, fast, as all is imported once.
+
+For each line on standard input it starts one, and prints its process id and its port. A process
+that is not wanted any more is killed by its id; all end with this one's standard input.
+"""
+
+import os
+import signal
+import sys
+from pathlib import Path
+
+from grasp_cosim.bench.bench import Bench, Serving
+from grasp_cosim.bench.server import Server
+from grasp_cosim.system.interface import read_interface
+
+
+def main(fmu: str) -> None:
+    interface = read_interface(Path(fmu))
+    children: list[int] = []
+    for line in sys.stdin:
+        if line.startswith("end "):
+            child = int(line[4:])
+            os.kill(child, signal.SIGKILL)
+            os.waitpid(child, 0)
+            children.remove(child)
+            print(child, "ended", flush=True)  # noqa: T201
+            continue
+        reading, writing = os.pipe()
+        child = os.fork()
+        if not child:
+            with Server(Bench(interface, Serving(lockstep=True))) as server:
+                os.write(writing, str(server.address[1]).encode())
+                server.serve()
+            os._exit(0)
+        os.close(writing)
+        port = os.read(reading, 16).decode()
+        os.close(reading)
+        children.append(child)
+        print(child, port, flush=True)  # noqa: T201
+    for child in children:
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

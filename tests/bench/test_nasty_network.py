@@ -1,0 +1,155 @@
+"""The grasp over a network that loses, delays, repeats and swaps; the peer lost, and back again."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from itertools import count
+from pathlib import Path
+
+import numpy as np
+import pytest
+from grasp_cosim import System, simulate
+from grasp_cosim.bench.bench import Serving
+from grasp_cosim.bench.network import DIRECTIONS, Conditions, Direction, Network, Outage
+from grasp_cosim.bench.relay import Relay, relaying
+from grasp_cosim.bench.server import Server
+from grasp_cosim.bench.traffic import Entry
+from grasp_cosim.recording.result import Result
+from grasp_cosim.system.interface import Value
+from proxies import build_proxy, serving, wait_until
+
+STEP = 0.01
+STEPS = 300
+CLEAN = 12
+"""The datagrams at the beginning, which pass in both directions: HELLO and INITIALISE."""
+
+BAD = Conditions(jitter=0.002, loss=0.05, duplicate=0.02)
+
+
+def network(conditions: Conditions, *outages: Outage) -> Network:
+    """With a seed at which the session begins and ends without a loss."""
+    both: dict[Direction, Conditions] = dict.fromkeys(DIRECTIONS, conditions)
+    for seed in count(1):
+        found = Network(both, outages, seed=seed)
+        clean = (*range(1, CLEAN), *range(STEPS - 5, STEPS + 2 * CLEAN))
+        if all(len(found.fate(d, n)) == 1 for d in DIRECTIONS for n in clean):
+            return found
+    raise AssertionError
+
+
+@contextmanager
+def behind_a_relay(
+    system: System, name: str, folder: Path, bad: Network, log: list[Entry]
+) -> Iterator[tuple[System, Server, Relay]]:
+    """The system with a component on the bench, which steps on request, behind a relay."""
+    fmu = system.component(name, "test").fmu
+    with (
+        serving(fmu, Serving(lockstep=True)) as server,
+        relaying(server.address, bad, log=log.append) as relay,
+    ):
+        proxy = build_proxy(fmu, folder / f"{name}_bench.fmu", relay.port)
+        yield system.swap(name, proxy), server, relay
+
+
+@pytest.fixture(scope="module")
+def slow_grasp(grasp: System) -> System:
+    return grasp.with_experiment(step=STEP, stop=STEP * STEPS)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["plant", "controller"])
+def test_with_losses_and_jitter_the_grasp_completes_and_every_datagram_is_accounted_for(
+    slow_grasp: System, tmp_path: Path, name: str
+) -> None:
+    log: list[Entry] = []
+    values: dict[str, Value] = {
+        f"{name}.proxy.timeout": 0.1,
+        f"{name}.proxy.misses_tolerated": 1000,
+    }
+    with behind_a_relay(slow_grasp, name, tmp_path, network(BAD), log) as (system, server, relay):
+        result = simulate(system.with_values(values))
+        wait_until(lambda: server.bench.counters()["sessions"] == 1)
+        peer, counters = server.bench.counters(), relay.counters
+    requests = counters["request"].received - 1  # but for END
+    begun = requests - STEPS  # HELLO and INITIALISE, all answered
+    assert begun < CLEAN
+
+    def lost(direction: Direction) -> int:
+        """Of the requests to step, or of the answers to them."""
+        return sum(e.direction == direction and e.fate == "lost" and e.number > begun for e in log)
+
+    def copies(direction: Direction) -> int:
+        return sum(e.direction == direction and e.copy == 1 and e.number > begun for e in log)
+
+    assert lost("request") > 0
+    assert lost("reply") > 0
+    assert last(result, f"{name}.proxy.missed") - last(result, f"{name}.proxy.late") == lost(
+        "request"
+    ) + lost("reply")
+    assert last(result, f"{name}.proxy.duplicated") == copies("reply")
+    assert last(result, f"{name}.proxy.rejected") == 0
+    assert peer["duplicated"] + peer["stale"] == copies("request") + (
+        STEPS - lost("request") - peer["steps"]
+    )
+    assert result["plant.contact[1]"][-1]
+    assert result["plant.contact[2]"][-1]
+    assert result["plant.contact_force[1]"][-1] == pytest.approx(3.43, rel=0.1)
+    assert result["plant.contact_force[2]"][-1] == pytest.approx(-3.43, rel=0.1)
+
+
+def last(result: Result, name: str) -> int:
+    return int(result[name][-1])
+
+
+def test_the_peer_out_of_reach_for_a_while_and_back(slow_grasp: System, tmp_path: Path) -> None:
+    """Twenty requests get nowhere; the peer makes up for them with what comes after."""
+    log: list[Entry] = []
+    gone = Network(outages=(Outage(100, 120),))
+    values: dict[str, Value] = {
+        "plant.proxy.timeout": 0.05,
+        "plant.proxy.on_loss": "hold",
+        "plant.proxy.resume": True,
+    }
+    with behind_a_relay(slow_grasp, "plant", tmp_path, gone, log) as (system, _, _):
+        result = simulate(system.with_values(values))
+    state, row = result["plant.proxy.state"], result["plant.proxy.consecutive_missed"]
+    lost = np.flatnonzero(state == 3)
+    assert len(lost) >= 17  # of the 20 the first three are tolerated
+    assert row[lost[0]] == 4
+    assert list(state[lost[0] - 4 : lost[0] + 1]) == [1, 2, 2, 2, 3]
+    held = result["plant.position[1]"][lost[0] - 4 : lost[-1] + 1]
+    assert (held == held[0]).all()
+    assert state[-1] == 1
+    assert result["plant.contact[1]"][-1]
+    missed, late = last(result, "plant.proxy.missed"), last(result, "plant.proxy.late")
+    assert missed - late == 20
+
+
+@pytest.mark.parametrize("resume", [True, False])
+def test_the_peer_started_anew(slow_grasp: System, tmp_path: Path, resume: bool) -> None:
+    """It knows no session; a proxy that may resume begins another one, from the start values."""
+    fmu = slow_grasp.component("plant", "test").fmu
+    values: dict[str, Value] = {
+        "plant.proxy.timeout": 0.05,
+        "plant.proxy.misses_tolerated": 2,
+        "plant.proxy.on_loss": "failsafe",
+        "plant.proxy.hold.gap[1]": True,
+        "plant.proxy.failsafe.gap[2]": 0.25,
+        "plant.proxy.resume": resume,
+    }
+    with serving(fmu, Serving(lockstep=True)) as first:
+        address = first.address
+        proxy = build_proxy(fmu, tmp_path / "plant_bench.fmu", address[1])
+        session = simulate.session(slow_grasp.swap("plant", proxy).with_values(values))
+        session.step(20)
+    with session:
+        gap = session["plant.gap[1]"]
+        session.step(10)
+        assert session["plant.proxy.state"] == 3
+        assert (session["plant.gap[1]"], session["plant.gap[2]"]) == (gap, 0.25)
+        with serving(fmu, Serving(lockstep=True), address):
+            session.step(5)
+            assert session["plant.proxy.state"] == (1 if resume else 3)
+            session.step(5)
+        result = session.result()
+    assert len(result.time) == 41
+    assert (result["plant.gap[2]"][-1] == 0.25) != resume

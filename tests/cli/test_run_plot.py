@@ -1,0 +1,76 @@
+"""run --plot: a picture of the grasp, one of the timing of a run in real time, or both."""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from grasp_cosim import System, cli
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def command(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    grasp: System,
+    fmus: Path,
+    tmp_path: Path,
+) -> Run:
+    """Runs a command line in a folder with a sensor.toml; exit code, what was said on each."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("grasp_cosim.cli.frame.grasp_system", lambda: grasp)
+    (tmp_path / "sensor.toml").write_text(
+        "[experiment]\nstep = 1e-3\nstop = 0.02\n"
+        f'[components.sensor]\nfmu = "{fmus / "ProximitySensor.fmu"}"\nvalues = {{ gap = 0.02 }}\n'
+    )
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        code = cli.main(list(arguments))
+        out, err = capsys.readouterr()
+        return code, out, err
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("arguments", "pictures"),
+    [
+        (["--step", "1e-3", "--stop", "0.02"], ["grasp.png"]),
+        (["--step", "1e-3", "--stop", "0.02", "--realtime"], ["grasp.png", "timing.png"]),
+        (["sensor.toml", "--realtime"], ["timing.png"]),
+    ],
+)
+def test_what_there_is_to_draw_is_drawn(
+    arguments: list[str], pictures: list[str], command: Run, tmp_path: Path
+) -> None:
+    code, _, err = command("run", *arguments, "--plot", "--out", "results")
+    assert code == 0
+    assert sorted(p.name for p in (tmp_path / "results").glob("*.png")) == pictures
+    for name in pictures:
+        assert (tmp_path / "results" / name).read_bytes().startswith(b"\x89PNG")
+        assert f"drew results/{name}\n" in err
+
+
+def test_the_timing_goes_to_the_current_folder_without_out(command: Run, tmp_path: Path) -> None:
+    assert command("run", "sensor.toml", "--realtime", "--plot")[0] == 0
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["sensor.toml", "timing.png"]
+
+
+def test_without_matplotlib_a_run_in_real_time_is_refused_at_once(
+    command: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    code, _, err = command("run", "sensor.toml", "--realtime", "--plot", "--out", "results")
+    assert code == 2
+    assert "matplotlib is not installed" in err
+    assert not (tmp_path / "results").exists()
+
+
+def test_a_run_that_stops_at_an_overrun_is_drawn_as_far_as_it_got(
+    command: Run, tmp_path: Path
+) -> None:
+    options = ["--realtime", "--factor", "1e5", "--overrun", "stop", "--plot", "--out", "results"]
+    assert command("run", "sensor.toml", *options)[0] == 3
+    assert (tmp_path / "results/timing.png").read_bytes().startswith(b"\x89PNG")

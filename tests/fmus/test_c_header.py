@@ -1,0 +1,810 @@
+"""The C header for the bench side: compiles without a warning, and does what link/peer.py does."""
+
+import hmac
+import random
+import shutil
+import socket
+import struct
+import subprocess
+from collections.abc import Callable, Iterator
+from dataclasses import fields
+from hashlib import sha256
+from itertools import count
+from pathlib import Path
+from select import select
+from typing import IO, NamedTuple
+
+import pytest
+from grasp_fmus.c_header import c_header, c_prefix
+from grasp_fmus.contract import Field, declared
+from grasp_fmus.link.client import Client, Verdict
+from grasp_fmus.link.message import (
+    BUSY,
+    END,
+    FAILED,
+    HEAD,
+    HELLO,
+    INITIALISE,
+    OUTPUTS,
+    REFUSE,
+    STEP,
+    STRING_SIZE,
+    TAG_SIZE,
+    UNKNOWN,
+    WELCOME,
+    Message,
+    Sealer,
+    Value,
+)
+from grasp_fmus.link.peer import ALIVE, Peer, PeerCounters, Request
+from grasp_fmus.link.signature import Causality, Kind, Signature, WireVariable
+from gripper_plant import rigid
+
+NATIVE = Path(__file__).parent / "native"
+STRICT = [
+    "-Wall", "-Wextra", "-Werror", "-Wpedantic", "-Wconversion", "-Wsign-conversion", "-Wshadow",
+    "-Wundef", "-Wcast-qual", "-Wcast-align",
+]  # fmt: skip
+C99 = ["gcc", "-std=c99", "-Wstrict-prototypes", *STRICT]
+SANITISED = ["-g", "-O2", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+
+RANDOM = b"not at random..."
+"""What the driver makes its cookies from."""
+KEY = b"sixteen bytes of key, and some more"
+FAIL, SILENT = 13, 14
+"""Values of p.integer with which the driver's model fails, and does not answer."""
+NOTHING, SEND, DO_INITIALISE, DO_STEP, ENDED = range(5)
+"""Events of the header."""
+
+KINDS: dict[Kind, str] = {"Real": "d", "Integer": "q", "Boolean": "Q", "String": "128s"}
+RECORD = struct.Struct("=dddIIII")
+
+pytestmark = pytest.mark.skipif(not shutil.which("gcc"), reason="NO gcc: nothing to compile with")
+
+
+def variables(causality: Causality, prefix: str, *kinds: Kind) -> list[WireVariable]:
+    return [WireVariable(f"{prefix}.{kind.lower()}", kind, causality) for kind in kinds]
+
+
+IN_ORDER: tuple[Kind, ...] = ("Real", "Integer", "Boolean", "String")
+EVERY_KIND = Signature(
+    (
+        *variables("input", "u", *IN_ORDER),
+        *variables("parameter", "p", *reversed(IN_ORDER)),
+        *variables("output", "y", "String", "Boolean", "Integer", "Real"),
+        *variables("output", "q", "Integer", "String", "Real", "Boolean"),
+    )
+)
+
+
+def plant() -> tuple[Signature, dict[str, Value]]:
+    """The gripper plant's variables and their start values."""
+    listed: list[tuple[Field, str, Value | None]] = [
+        (f, name, start)
+        for f in declared(rigid)
+        for name, start in zip(f.names, f.starts, strict=True)
+    ]
+    return Signature(
+        tuple(
+            WireVariable(name, "Boolean" if f.kind is bool else "Real", f.causality, f.unit or None)
+            for f, name, _ in listed
+        )
+    ), {name: start for _, name, start in listed if start is not None}
+
+
+def compile_c(
+    folder: Path, header: str, name: str, source: str | Path, *options: str | Path
+) -> Path:
+    """A program from a source, a file or text, that includes the header of that name."""
+    (folder / f"{c_prefix(name)}.h").write_text(header, "ascii")
+    if isinstance(source, str):
+        (folder / "source.c").write_text(source, "ascii")
+        source = folder / "source.c"
+    program = folder / "program"
+    command = [*C99, "-I", folder, *options, source, "-o", program, "-lm"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    return program
+
+
+@pytest.fixture(scope="session")
+def driver(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The header for every kind behind a pipe, with all the compiler can check at run time."""
+    header = c_header("EveryKind", EVERY_KIND)
+    folder = tmp_path_factory.mktemp("driver")
+    return compile_c(folder, header, "EveryKind", NATIVE / "link_driver.c", *SANITISED)
+
+
+def driven(driver: Path, *words: str, pipe: bytes = b"") -> bytes:
+    """What the driver writes."""
+    done = subprocess.run([driver, *words], input=pipe, capture_output=True)
+    assert (done.returncode, done.stderr) == (0, b"")
+    return done.stdout
+
+
+def sized(data: bytes) -> bytes:
+    return struct.pack("=I", len(data)) + data
+
+
+# What the compiler says
+
+
+@pytest.mark.parametrize("define", [[], ["-DGRIPPER_PLANT_EXAMPLE_MAIN"]])
+@pytest.mark.parametrize("optimise", ["-O0", "-O3"])
+def test_without_a_warning(tmp_path: Path, define: list[str], optimise: str) -> None:
+    compile_c(
+        tmp_path, c_header("GripperPlant", *plant()), "GripperPlant",
+        '#include "gripper_plant.h"\nint nothing(void);\nint nothing(void) { return 0; }\n',
+        *define, optimise, "-c",
+    )  # fmt: skip
+
+
+@pytest.mark.skipif(not shutil.which("g++"), reason="NO g++")
+def test_in_cpp_and_beside_another(tmp_path: Path) -> None:
+    (tmp_path / "a.h").write_text(c_header("GripperPlant", *plant()))
+    (tmp_path / "b.h").write_text(c_header("EveryKind", EVERY_KIND))
+    source = tmp_path / "both.cpp"
+    source.write_text('#include "a.h"\n#include "b.h"\n#include "a.h"\nint main() { return 0; }\n')
+    subprocess.run(["g++", "-std=c++11", *STRICT, "-c", source, "-o", tmp_path / "o"], check=True)
+
+
+def test_no_more_of_a_library_than_a_target_has() -> None:
+    library, _, _ = c_header("GripperPlant", *plant()).partition("#ifdef GRIPPER_PLANT_EXAMPLE")
+    included = {line for line in library.splitlines() if line.startswith("#include")}
+    assert included == {f"#include <std{n}.h>" for n in ("bool", "def", "int")} | {
+        "#include <string.h>"
+    }
+    assert "malloc" not in library
+
+
+AWKWARD = (
+    "x[1]", "x_1", "x.1", "der(x)", "class", "_", "7", "µ/* */ ", "a\\", "b??/", 'c"%s', "int",
+    "int_", "\u202e", "double", "main", "NULL", "x[1].y[2,3]",
+)  # fmt: skip
+
+
+def test_any_name(tmp_path: Path) -> None:
+    signature = Signature(
+        tuple(
+            WireVariable(f"{name}{c[0] * (c == 'output')}", kind, c, "*/ ?")
+            for c in ("input", "output")
+            for name, kind in zip(AWKWARD, IN_ORDER * 5, strict=False)
+        )
+    )
+    header = c_header("*/ Ünit", signature)
+    prefix = c_prefix("*/ Ünit")
+    source = f"""#include "{prefix}.h"
+        #include <stdio.h>
+        int main(void) {{
+            unsigned char text[{prefix.upper()}_SIGNATURE_SIZE];
+            {prefix}_signature(text);
+            fwrite({prefix}_hash(), 1, 16, stdout);
+            fwrite(text, 1, sizeof text, stdout);
+            return 0;
+        }}"""
+    done = subprocess.run([compile_c(tmp_path, header, "*/ Ünit", source)], capture_output=True)
+    assert done.stdout == signature.hash + signature.text.encode()
+
+
+def test_members_by_the_variables_names() -> None:
+    inputs = [WireVariable(name, "Real", "input") for name in AWKWARD]
+    header = c_header("M", Signature(tuple(inputs)))
+    struct_text = header.partition("typedef struct {")[2].partition("}")[0]
+    members = [line.split()[1].rstrip(";") for line in struct_text.strip().splitlines()]
+    assert members == [
+        "x_1", "x_1_2", "x_1_3", "der_x", "class_", "v", "v_7", "v_2", "a", "b", "c_s", "int_",
+        "int_2", "v_3", "double_", "main", "NULL_", "x_1_y_2_3",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "prefix"),
+    [
+        ("GripperPlant", "gripper_plant"), ("HTTPServer2", "http_server2"), ("a.b-c", "a_b_c"),
+        ("3D", "model_3_d"), ("模型", "model"), ("already_snake", "already_snake"),
+    ],
+)  # fmt: skip
+def test_prefix(name: str, prefix: str) -> None:
+    assert c_prefix(name) == prefix
+
+
+@pytest.mark.parametrize("which", ["input", "parameter", "output", "nothing"])
+def test_a_model_with_one_side_only(tmp_path: Path, which: Causality) -> None:
+    signature = Signature(tuple(v for v in EVERY_KIND.variables if v.causality == which))
+    compile_c(tmp_path, c_header("M", signature), "M", '#include "m.h"\nint main(void) {return 0;}')
+
+
+STARTS: dict[str, Value] = {
+    "u.real": 0.1, "u.integer": -(2**31), "u.boolean": True, "u.string": 'a "?" \\ µ\n',
+    "p.real": -5e-324, "p.integer": 2**31 - 1, "p.string": "x" * 127, "y.real": 4.0,
+}  # fmt: skip
+
+
+def test_start_values(tmp_path: Path) -> None:
+    source = """#include "every_kind.h"
+        #include <stdio.h>
+        int main(void) {
+            every_kind_inputs u = EVERY_KIND_INPUTS_DEFAULTS;
+            every_kind_parameters p = EVERY_KIND_PARAMETERS_DEFAULTS;
+            printf("%a %d %d %s|", u.u_real, u.u_integer, u.u_boolean, u.u_string);
+            printf("%a %d %d %s", p.p_real, p.p_integer, p.p_boolean, p.p_string);
+            return 0;
+        }"""
+    program = compile_c(tmp_path, c_header("EveryKind", EVERY_KIND, STARTS), "EveryKind", source)
+    u, _, p = subprocess.run([program], capture_output=True).stdout.decode().partition("|")
+    real, *rest = u.split(" ", 3)
+    assert (float.fromhex(real), *rest) == (0.1, str(-(2**31)), "1", STARTS["u.string"])
+    real, *rest = p.split(" ", 3)
+    assert (float.fromhex(real), *rest) == (-5e-324, str(2**31 - 1), "0", "x" * 127)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "kind"),
+    [
+        ("u.real", float("inf"), "Real"), ("p.real", "high", "Real"),
+        ("u.integer", 2**31, "Integer"), ("u.integer", 2**70, "Integer"),
+        ("u.integer", 0.5, "Integer"), ("p.boolean", 2, "Boolean"), ("p.string", "a\0b", "String"),
+        ("p.string", "µ" * 64, "String"),
+    ],
+)  # fmt: skip
+def test_a_start_value_that_is_none(name: str, value: Value, kind: str) -> None:
+    with pytest.raises(ValueError, match=rf"^{name} = .*") as error:
+        c_header("EveryKind", EVERY_KIND, {name: value})
+    assert "\n" not in str(error.value)
+    assert kind in str(error.value) or "must have fewer than 128 bytes" in str(error.value)
+
+
+def test_more_than_a_datagram() -> None:
+    many = [WireVariable(f"u[{i}]", "String", "input") for i in range(512)]
+    with pytest.raises(ValueError, match="must be 65507 at most"):
+        c_header("M", Signature(tuple(many)))
+
+
+# What it computes
+
+
+def test_hash_and_signature(driver: Path) -> None:
+    assert driven(driver, "text") == EVERY_KIND.hash + EVERY_KIND.text.encode()
+
+
+@pytest.mark.parametrize(
+    ("key", "size"),
+    [(16, 0), (63, 55), (64, 56), (65, 64), (20, 119), (131, 152), (16, 120), (64, 65_000)],
+)
+def test_sha256_and_hmac(driver: Path, key: int, size: int) -> None:
+    drawn = random.Random(size)
+    secret, data = drawn.randbytes(key), drawn.randbytes(size)
+    expected = sha256(data).digest() + hmac.digest(secret, data, "sha256")
+    assert driven(driver, "hmac", pipe=sized(secret) + sized(data)) == expected
+
+
+class Record(NamedTuple):
+    """What the driver did with a datagram."""
+
+    time: float
+    step: float
+    behind: float
+    event: int
+    alive: bool
+    fresh: bool
+    answer: bytes
+
+
+def linked(
+    driver: Path, received: list[tuple[int, bytes]], key: bytes | None = None
+) -> tuple[list[Record], PeerCounters]:
+    """What the driver does with datagrams at times in ns, and what it counts."""
+    pipe = b"".join(struct.pack("=q", now) + sized(datagram) for now, datagram in received)
+    out = driven(driver, "link", key.decode() if key else "-", pipe=pipe)
+    records = []
+    for _ in received:
+        time, step, behind, event, alive, fresh, size = RECORD.unpack_from(out)
+        answer = out[RECORD.size : RECORD.size + size]
+        out = out[RECORD.size + size :]
+        records.append(Record(time, step, behind, event, alive == 1, fresh == 1, answer))
+    return records, PeerCounters(*struct.unpack(f"={len(fields(PeerCounters))}Q", out))
+
+
+def cookies() -> Iterator[int]:
+    """What the header makes of its random bytes."""
+    for i in count():
+        digest = hmac.digest(RANDOM, i.to_bytes(8, "little"), "sha256")
+        yield int.from_bytes(digest[:8], "little")
+
+
+def computed(values: list[Value]) -> list[Value]:
+    """The outputs of the driver's model."""
+    real, integer, boolean, text, p_text, p_boolean, p_integer, p_real = values
+    assert isinstance(real, float)
+    assert isinstance(integer, int)
+    assert isinstance(p_real, float)
+    assert isinstance(p_integer, int)
+    return [
+        text, not boolean, integer ^ 0x55, -real, p_integer ^ 0x55, p_text, -p_real, not p_boolean,
+    ]  # fmt: skip
+
+
+class Reference:
+    """What the driver must do, by link/peer.py."""
+
+    def __init__(self, key: bytes | None = None) -> None:
+        self.peer = Peer(EVERY_KIND, key, cookies().__next__)
+
+    def receive(self, datagram: bytes, now: int) -> tuple[int, bytes]:
+        """Event and answer."""
+        action = self.peer.receive(datagram, now)
+        if isinstance(action, Request):
+            event = {INITIALISE: DO_INITIALISE, STEP: DO_STEP, END: ENDED}[action.kind]
+            return event, b"" if event == ENDED else self._answer(action)
+        return (SEND, action) if action else (NOTHING, b"")
+
+    def _answer(self, request: Request) -> bytes:
+        if request.values[6] == SILENT:
+            return b""
+        if request.values[6] == FAIL:
+            return self.peer.failed("thirteen")
+        return self.peer.outputs(computed(request.values), request.time + request.step)
+
+
+VALUES: list[Value] = [0.5, 3, True, "µm", "", False, -7, 1e-300]
+REALS = (0.0, -0.0, 1.0, -1 / 3, 5e-324, 1.7976931348623157e308, 2.2250738585072014e-308)
+TEXTS = ("", "a", "µ€𝄞", "\x7f" * 127, "𐀀\U0010ffff\ud7ff\ue000", "߿ࠀ\uffff")
+
+
+def drawn_values(rng: random.Random) -> list[Value]:
+    def real() -> float:
+        [value] = struct.unpack("<d", rng.randbytes(8))
+        return rng.choice((*REALS, value)) if abs(value) <= REALS[5] else rng.choice(REALS)
+
+    def integer() -> int:
+        return rng.choice((0, -1, 2**31 - 1, -(2**31), rng.randrange(-(2**31), 2**31)))
+
+    def text() -> str:
+        return rng.choice(TEXTS)
+
+    def boolean() -> bool:
+        return rng.random() < 0.5
+
+    return [real(), integer(), boolean(), text(), text(), boolean(), integer(), real()]
+
+
+def packed(values: list[Value], variables: tuple[WireVariable, ...]) -> bytes:
+    """A body by Python's struct alone."""
+    raw = [value.encode() if isinstance(value, str) else value for value in values]
+    return struct.pack("<" + "".join(KINDS[v.kind] for v in variables), *raw)
+
+
+class Session:
+    """Makes the requests of a proxy, legal ones or others."""
+
+    def __init__(self, session: int = 99, key: bytes | None = None) -> None:
+        self.session, self.cookie, self.sequence = session, 0, 0
+        self.sealer = Sealer(key)
+
+    def hello(self) -> bytes:
+        return self.made(HELLO, EVERY_KIND.text.encode(), cookie=0, sequence=0)
+
+    def initialise(self, values: list[Value] = VALUES, time: float = 0.0) -> bytes:
+        self.sequence += 1
+        return self.made(INITIALISE, packed(values, EVERY_KIND.request), time)
+
+    def step(self, time: float, step: float = 0.5, values: list[Value] = VALUES) -> bytes:
+        self.sequence += 1
+        return self.made(STEP, packed(values, EVERY_KIND.request), time, step)
+
+    def end(self) -> bytes:
+        return self.made(END, b"")
+
+    def made(
+        self, kind: int, body: bytes, time: float = 0.0, step: float = 0.0,
+        cookie: int | None = None, sequence: int | None = None, interface: bytes = EVERY_KIND.hash,
+    ) -> bytes:  # fmt: skip
+        cookie = self.cookie if cookie is None else cookie
+        sequence = self.sequence if sequence is None else sequence
+        return self.sealer.pack(
+            Message(kind, 0, interface, self.session, cookie, sequence, time, step, -4, body)
+        )
+
+
+def known(key: bytes | None = None, session: int = 99, number: int = 0) -> Session:
+    """A session that has the cookie of that number."""
+    made = Session(session, key)
+    *_, made.cookie = (cookie for cookie, _ in zip(cookies(), range(number + 1), strict=False))
+    return made
+
+
+def test_values_byte_for_byte(driver: Path) -> None:
+    """Against Python's struct; the model turns them round, so no error undoes another."""
+    rng = random.Random(5)
+    drawn = [drawn_values(rng) for _ in range(400)]
+    session = known()
+    received = [session.hello(), *(session.initialise(values) for values in drawn)]
+    records, counters = linked(driver, [(0, datagram) for datagram in received])
+    for values, record in zip(drawn, records[1:], strict=True):
+        assert record.answer[HEAD.size :] == packed(computed(values), EVERY_KIND.answer)
+    assert counters == PeerCounters(initialisations=400)
+
+
+INVALID: dict[str, Callable[[bytes], bytes]] = {
+    "a Real that is inf": lambda b: struct.pack("<d", float("inf")) + b[8:],
+    "a Real that is NaN": lambda b: struct.pack("<d", float("nan")) + b[8:],
+    "a parameter that is NaN": lambda b: b[:-8] + struct.pack("<d", float("nan")),
+    "an Integer beyond 32 bits": lambda b: b[:8] + struct.pack("<q", 2**31) + b[16:],
+    "another": lambda b: b[:8] + struct.pack("<q", -(2**31) - 1) + b[16:],
+    "a Boolean that is 2": lambda b: b[:16] + struct.pack("<Q", 2) + b[24:],
+    "a Boolean that is 2**32": lambda b: b[:16] + struct.pack("<Q", 2**32) + b[24:],
+    "a String without an end": lambda b: b[:24] + b"x" * 128 + b[152:],
+    "a String with more after its end": lambda b: b[:24] + b"x\0y".ljust(128, b"\0") + b[152:],
+    "a String not in UTF-8": lambda b: b[:24] + b"\xff".ljust(128, b"\0") + b[152:],
+    "UTF-8 cut off": lambda b: b[:24] + b"\xe2\x82".ljust(128, b"\0") + b[152:],
+    "UTF-8 cut off at the end": lambda b: b[:24] + b"\xf0".rjust(127, b"x") + b"\0" + b[152:],
+    "UTF-8 over-long": lambda b: b[:24] + b"\xc0\x80".ljust(128, b"\0") + b[152:],
+    "UTF-8 over-long in three": lambda b: b[:24] + b"\xe0\x9f\xbf".ljust(128, b"\0") + b[152:],
+    "a surrogate": lambda b: b[:24] + b"\xed\xa0\x80".ljust(128, b"\0") + b[152:],
+    "beyond Unicode": lambda b: b[:24] + b"\xf4\x90\x80\x80".ljust(128, b"\0") + b[152:],
+    "a lead byte that is none": lambda b: b[:24] + b"\xfc\x80\x80\x80".ljust(128, b"\0") + b[152:],
+    "a byte less": lambda b: b[:-1],
+    "a byte more": lambda b: b + b"\0",
+}
+
+
+@pytest.mark.parametrize("what", INVALID)
+def test_no_value_is_taken_from_what_is_malformed(driver: Path, what: str) -> None:
+    session = known()
+    legal = [session.hello(), session.initialise(), session.step(0.0)]
+    body = INVALID[what](packed([1.0, *VALUES[1:]], EVERY_KIND.request))
+    bad = session.made(STEP, body, 0.5, 0.5, sequence=3)
+    records, counters = linked(driver, [(0, d) for d in (*legal, bad, session.step(0.5))])
+    assert (records[3].event, records[3].answer, records[3].time) == (NOTHING, b"", 0.0)
+    assert (records[4].event, records[4].behind) == (DO_STEP, 0.0)
+    assert counters == PeerCounters(steps=2, initialisations=1, malformed=1)
+
+
+def test_hello_is_judged_first(driver: Path) -> None:
+    """Each is malformed; the last would be one of another interface, were it not too large."""
+    session, text = Session(), EVERY_KIND.text.encode()
+    tail = struct.pack("<qII", 0, 65_428, 0) + bytes(65_428)
+    hellos = [
+        session.made(HELLO, text, sequence=1),
+        session.made(HELLO, text, cookie=1),
+        session.made(HELLO, text + b"\n"),
+        session.made(HELLO, text.replace(b"q", b"Q")),
+        session.made(HELLO, b"", interface=bytes(16))[:64] + tail,
+    ]
+    records, counters = linked(driver, [(0, hello) for hello in hellos])
+    assert [(r.event, r.answer) for r in records] == [(NOTHING, b"")] * 5
+    assert counters == PeerCounters(malformed=5)
+
+
+def test_lost_requests_are_told(driver: Path) -> None:
+    session = known()
+    received = [session.hello(), session.initialise(time=2.0), session.step(2.0, 0.25)]
+    session.step(2.25)
+    received += [session.step(2.75, 0.1), session.step(2.85 + 1e-12, 0.1), session.step(1.0, 0.5)]
+    records, _ = linked(driver, [(0, d) for d in received])
+    assert [r.event for r in records] == [SEND, DO_INITIALISE, *[DO_STEP] * 4]
+    assert [r.behind for r in records[1:5]] == [0.0, 0.0, 0.5, 0.0]
+    assert records[5].behind == pytest.approx(-1.95)
+    assert [r.fresh for r in records[1:3]] == [True, False]
+
+
+def test_the_watchdog_is_fed_by_new_requests_alone(driver: Path) -> None:
+    """A recorded one, sent again and again, does not keep the inputs from being made safe."""
+    session = known()
+    hello, initialise, step = session.hello(), session.initialise(), session.step(0.0)
+    at = [(0, hello), (1, initialise), (2, initialise), (3, step), (4, step), (5, hello),
+          (6, session.step(0.5)), (6, session.end())]  # fmt: skip
+    records, _ = linked(driver, at)
+    assert [r.alive for r in records] == [False, True, False, True, False, False, True, False]
+
+
+def test_the_oldest_of_many_greetings_is_forgotten(driver: Path) -> None:
+    greetings = [(0, Session(i).hello()) for i in range(17)]
+    first, second = known(session=0), known(session=1, number=1)
+    records, _ = linked(driver, [*greetings, (0, first.initialise()), (0, second.initialise())])
+    opened = Sealer().open(records[17].answer)
+    assert isinstance(opened, Message)
+    assert (opened.kind, opened.code) == (REFUSE, UNKNOWN)
+    assert records[18].event == DO_INITIALISE
+
+
+def test_of_two_that_were_greeted_the_later_one_waits(driver: Path) -> None:
+    one, other = known(session=1), known(session=2, number=1)
+    first = [one.hello(), other.hello(), one.initialise(), other.initialise()]
+    at = [*((0, d) for d in first), (ALIVE - 1, other.initialise()), (ALIVE, other.initialise())]
+    records, counters = linked(driver, [*at, (ALIVE, one.step(0.0))])
+    events = [SEND, SEND, DO_INITIALISE, SEND, SEND, DO_INITIALISE, SEND]
+    assert [r.event for r in records] == events
+    codes = [r.answer[6:8] for r in records[3:5] + records[6:]]
+    assert codes == [bytes([REFUSE, BUSY])] * 2 + [bytes([REFUSE, UNKNOWN])]
+    assert counters == PeerCounters(initialisations=2, busy=2, foreign=1)
+
+
+def test_outputs_that_are_none_fail_and_are_named(tmp_path: Path) -> None:
+    outputs = [WireVariable(n, "Real", "output", "N") for n in ("y[1]", "µ")]
+    source = """#include "m.h"
+        #include <stdio.h>
+        int main(void) {
+            static m_link link;
+            static uint8_t answer[M_ANSWER_SIZE];
+            m_link_init(&link, (const uint8_t *)"0123456789abcdef", NULL, 0);
+            if (m_link_answer(&link, 0.0, answer) || m_link_fail(&link, "x", answer))
+                return 1;
+            link.pending = link.live = true;
+            link.outputs.v = 1e300 * 1e300;
+            fwrite(answer, 1, m_link_answer(&link, 0.0, answer), stdout);
+            return link.live;
+        }"""
+    header = c_header("M", Signature(tuple(outputs)))
+    done = subprocess.run([compile_c(tmp_path, header, "M", source)], capture_output=True)
+    assert done.returncode == 0
+    assert done.stdout[80:].decode() == "output with no valid value: µ"
+    assert done.stdout[6:8] == bytes([REFUSE, FAILED])
+
+
+# Against link/peer.py
+
+
+class Proxies:
+    """Some proxies at one peer, whose requests come in disorder, again, or damaged."""
+
+    def __init__(self, rng: random.Random, key: bytes | None) -> None:
+        self.rng, self.key = rng, key
+        self.sessions = [Session(i, key) for i in range(4)]
+        self.sent: list[bytes] = [self.sessions[0].hello()]
+        self.turn = self.sessions[0]
+
+    def request(self) -> bytes:
+        """The next datagram."""
+        rng = self.rng
+        if rng.random() < 0.02:
+            self.turn = rng.choice(self.sessions)
+        if rng.random() < 0.15:
+            return rng.choice(self.sent[-20:])
+        datagram = self._drawn(self.turn)
+        self.sent.append(datagram)
+        return self._damaged(datagram) if rng.random() < 0.15 else datagram
+
+    def _drawn(self, s: Session) -> bytes:
+        rng = self.rng
+        chosen = rng.random()
+        if chosen < 0.04 or not s.cookie:
+            s.sequence = 0
+            return s.hello()
+        values = drawn_values(rng)
+        values[6] = rng.choice((FAIL, SILENT)) if rng.random() < 0.02 else values[6]
+        if chosen < 0.2 or not s.sequence:
+            return s.initialise(values, rng.choice((0.0, 2.5)))
+        if chosen < 0.21:
+            return s.end()
+        return s.step(rng.uniform(-1.0, 1e6), rng.choice((0.1, 1e-3, 1e-9, 0.0, -1.0)), values)
+
+    def _damaged(self, datagram: bytes) -> bytes:
+        rng = self.rng
+        tag = TAG_SIZE if self.key else 0
+        data = bytearray(datagram[: len(datagram) - tag])
+        kind = rng.randrange(4)
+        if kind == 0:
+            data[rng.randrange(HEAD.size)] ^= 1 << rng.randrange(8)
+        elif kind == 1:
+            data = data[: rng.randrange(len(data))]
+        elif kind == 2:
+            data += rng.randbytes(rng.randrange(1, 40))
+        else:
+            at = rng.choice((40, 48, 56, 72, 76))
+            data[at : at + 8] = rng.choice((bytes(8), b"\xff" * 8, rng.randbytes(8)))
+        sealed = self.key if rng.random() < 0.8 else b"another key of another"
+        return bytes(data) + (hmac.digest(sealed, data, "sha256") if self.key and sealed else b"")
+
+    def hear(self, answer: bytes) -> None:
+        """Takes the cookie of a WELCOME."""
+        opened = Sealer(self.key).open(answer)
+        if isinstance(opened, Message) and opened.kind == WELCOME:
+            self.sessions[opened.session].cookie = opened.cookie
+
+
+@pytest.mark.parametrize("key", [None, KEY], ids=["open", "keyed"])
+def test_the_same_as_the_peer_in_python(driver: Path, key: bytes | None) -> None:
+    """Whatever comes: the same events, the same answers to the bit, the same counts."""
+    rng = random.Random(20)
+    proxies, reference = Proxies(rng, key), Reference(key)
+    now = 0
+    received, expected = [], []
+    for _ in range(6000):
+        now += rng.choice((1_000_000, 1_000_000, 300_000_000, ALIVE)) if rng.random() < 0.3 else 0
+        datagram = proxies.request()
+        received.append((now, datagram))
+        expected.append(reference.receive(datagram, now))
+        proxies.hear(expected[-1][1])
+    records, counters = linked(driver, received, key)
+    for i, (record, (event, answer)) in enumerate(zip(records, expected, strict=True)):
+        assert (record.event, record.answer) == (event, answer), i
+    assert counters == reference.peer.counters
+    seen = counters.as_dict()
+    assert min(seen[name] for name in seen if key or name != "forged") > 5, seen
+    assert {event for event, _ in expected} == {NOTHING, SEND, DO_INITIALISE, DO_STEP, ENDED}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("key", [None, KEY], ids=["open", "keyed"])
+def test_nothing_that_is_received_does_harm(driver: Path, key: bytes | None) -> None:
+    """100,000 datagrams with and without a key, under the sanitisers."""
+    session = Session(7, key)
+    corpus = [Session(i, key).hello() for i in range(20)]
+    corpus += [session.initialise(), session.end()]
+    corpus += [session.step(0.5 * i, values=drawn_values(random.Random(i))) for i in range(30)]
+    corpus += [session.made(STEP, b"", 0.0, 0.1), session.made(HELLO, b"", interface=bytes(16))]
+    out = driven(
+        driver, "fuzz", key.decode() if key else "-", "100000", "4711",
+        pipe=b"".join(map(sized, corpus)),
+    )  # fmt: skip
+    counters = PeerCounters(*struct.unpack(f"={len(fields(PeerCounters))}Q", out)).as_dict()
+    assert min(counters[name] for name in counters if key or name != "forged") > 50, counters
+
+
+# The example, as the target with the gripper plant
+
+
+@pytest.fixture(scope="session")
+def target(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    header = c_header("GripperPlant", *plant())
+    folder = tmp_path_factory.mktemp("target")
+    return compile_c(folder, header, "GripperPlant", NATIVE / "plant_target.c", *SANITISED)
+
+
+class Target:
+    """A running target, and a proxy's socket to it."""
+
+    def __init__(self, program: Path, *words: str, key: bytes | None = None) -> None:
+        self.process = subprocess.Popen(
+            [program, "0", *words], bufsize=0, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        )
+        line = self.said(self.process.stdout)
+        assert line.startswith(b"listening on "), line
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.settimeout(10.0)
+        self.socket.connect(("127.0.0.1", int(line.split()[-1])))
+        self.signature, self.starts = plant()
+        self.client = Client(self.signature, key)
+
+    def __enter__(self) -> "Target":
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.socket.close()
+        self.process.kill()
+        self.process.communicate()
+
+    def said(self, stream: IO[bytes] | None) -> bytes:
+        """The next line on a stream of the target's; waits for it."""
+        assert stream is not None
+        assert select([stream], [], [], 10.0)[0]
+        return stream.readline()
+
+    def values(self, force: rigid.Pair = (0.0, 0.0), finger_mass: float = 0.5) -> list[Value]:
+        """What a request carries; the mass is that of finger 1."""
+        own = {"force[1]": force[0], "force[2]": force[1], "finger_mass[1]": finger_mass}
+        return [{**self.starts, **own}[v.name] for v in self.signature.request]
+
+    def ask(self, request: bytes) -> Verdict:
+        """The verdict on what comes back."""
+        self.socket.send(request)
+        return self.client.receive(self.socket.recv(65_535), 0)
+
+    def begin(self, values: list[Value] | None = None, session: int = 1) -> None:
+        assert self.ask(self.client.greet(session, 0)) is Verdict.ANSWERED
+        request = self.client.initialise(0.0, values or self.values(), 0)
+        assert self.ask(request) is Verdict.ANSWERED
+
+
+def flat(outputs: rigid.Outputs) -> list[Value]:
+    """The outputs in the order of the wire."""
+    return [
+        *outputs.position, *outputs.velocity, *outputs.gap, *outputs.contact_force,
+        *outputs.contact, outputs.object_position,
+    ]  # fmt: skip
+
+
+def test_the_plant_in_c_to_the_last_bit(target: Path) -> None:
+    """In free flight, at the impact, pressed and let go again."""
+    p, u = rigid.Params(), rigid.Inputs()
+    x = rigid.initial_state(p, u)
+    h, seen = 1e-3, set()
+    with Target(target) as bench:
+        bench.begin()
+        assert bench.client.outputs == flat(rigid.outputs(p, x, u))
+        for k in range(800):
+            force = (-20.0, 15.0 + 0.01 * k) if k < 600 else (3.0, -2.0)
+            u = rigid.Inputs(force)
+            x = rigid.step(p, x, u, h)
+            request = bench.client.step(k * h, h, bench.values(force), 0)
+            assert bench.ask(request) is Verdict.ANSWERED
+            expected = flat(rigid.outputs(p, x, u))
+            assert list(map(repr, bench.client.outputs or [])) == list(map(repr, expected)), k
+            assert bench.client.outputs_time == k * h + h
+            seen.add((expected[8], expected[9]))
+    assert seen >= {(False, False), (True, True)}
+    assert expected[8:10] == [False, False]
+
+
+def test_steps_lost_on_the_way_are_made_up_for(target: Path) -> None:
+    p, u = rigid.Params(), rigid.Inputs((-1.0, 1.0))
+    expected = rigid.step(p, rigid.step(p, rigid.initial_state(p, u), u, 0.3), u, 0.1)
+    with Target(target) as bench:
+        bench.begin()
+        for k in range(3):
+            bench.client.step(0.1 * k, 0.1, bench.values(), 0)
+        request = bench.client.step(0.3, 0.1, bench.values((-1.0, 1.0)), 0)
+        assert bench.ask(request) is Verdict.ANSWERED
+        assert bench.client.outputs == flat(rigid.outputs(p, expected, u))
+
+
+def test_a_model_that_fails_says_why(target: Path) -> None:
+    with Target(target) as bench:
+        assert bench.ask(bench.client.greet(5, 0)) is Verdict.ANSWERED
+        values = bench.values(finger_mass=-1.0)
+        assert bench.ask(bench.client.initialise(0.0, values, 0)) is Verdict.REFUSED
+        assert bench.client.refusal is not None
+        assert bench.client.refusal.text == "the peer failed: finger_mass: must be over 0 kg"
+        bench.begin(session=6)
+
+
+def test_a_key_in_a_file(target: Path, tmp_path: Path) -> None:
+    """Who has another gets no answer: the first that comes is that to the right one."""
+    file = tmp_path / "key"
+    file.write_bytes(b"\r\n" + KEY + b"\r\n")
+    with Target(target, str(file), key=KEY) as bench:
+        bench.socket.send(Client(bench.signature, b"a" * 16).greet(1, 0))
+        bench.socket.send(Client(bench.signature).greet(2, 0))
+        bench.begin(session=3)
+        assert bench.client.counters.rejected == 0
+
+
+def test_inputs_are_made_safe_once_the_proxy_is_silent(target: Path) -> None:
+    with Target(target) as bench:
+        assert bench.said(bench.process.stderr) == b"safe\n"
+        bench.begin(bench.values((-1.0, 1.0)))
+        assert bench.said(bench.process.stderr) == b"safe\n"
+        assert bench.ask(bench.client.step(0.0, 0.1, bench.values(), 0)) is Verdict.ANSWERED
+        assert bench.said(bench.process.stderr) == b"safe\n"
+
+
+def test_a_target_with_a_clock_of_its_own(target: Path) -> None:
+    """It starts with the first step, and answers with what it has."""
+    period = 2**-9
+    with Target(target, "-", str(period)) as bench:
+        bench.begin()
+        seen: list[tuple[float, Value]] = []
+        while not seen or seen[-1][1] == 0.11:
+            assert len(seen) < 100_000
+            request = bench.client.step(0.0, 0.1, bench.values((-1.0, 1.0)), 0)
+            assert bench.ask(request) is Verdict.ANSWERED
+            assert bench.client.outputs is not None
+            seen.append((bench.client.outputs_time, bench.client.outputs[0]))
+        times, positions = zip(*seen, strict=True)
+        assert times[0] == 0.0
+        assert times[-1] > 0.0
+        assert all((time / period).is_integer() for time in times)
+        assert positions[-1] < 0.11
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        ([], 2, "usage"), (["65536"], 2, "usage"), (["0", "-", "-1"], 2, "usage"),
+        (["0", "nowhere"], 2, "nowhere: cannot be read"), (["0", "/dev/null"], 2, "key of 0 bytes"),
+    ],
+)  # fmt: skip
+def test_a_target_called_wrongly(target: Path, words: list[str], code: int, said: str) -> None:
+    done = subprocess.run([target, *words], capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (code, "")
+    assert said in done.stderr
+
+
+def test_the_constants_are_those_of_the_protocol() -> None:
+    text = c_header("M", EVERY_KIND)
+    assert f"M_HEAD_SIZE = {HEAD.size}," in text
+    assert f"M_STRING_SIZE = {STRING_SIZE}," in text
+    assert f"INT64_C({ALIVE})" in text
+    assert "M_LARGEST_REASON = 256 " in text
+    assert OUTPUTS == 6

@@ -1,0 +1,117 @@
+"""What is asked of the operating system: granted or refused in plain words, and put back."""
+
+import ctypes
+import errno
+import gc
+import os
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from grasp_cosim import Realtime
+from grasp_cosim.realtime.privileges import privileges
+
+linux = pytest.mark.skipif(sys.platform != "linux", reason="only Linux has these")
+
+ALL = Realtime(priority=20, cpu=0, lock_memory=True)
+
+
+def refuses(code: int) -> Callable[..., Any]:
+    def call(*_: object) -> None:
+        raise OSError(code, os.strerror(code))
+
+    return call
+
+
+class System:
+    """What an operating system that grants all of it was asked."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.asked: list[tuple[Any, ...]] = []
+        for name in ("sched_setscheduler", "sched_setaffinity"):
+            monkeypatch.setattr(os, name, self._remember(name), raising=False)
+        monkeypatch.setattr(os, "sched_getscheduler", lambda thread: 0, raising=False)
+        monkeypatch.setattr(os, "sched_getparam", lambda thread: "parameter", raising=False)
+        monkeypatch.setattr(os, "sched_getaffinity", lambda thread: {0, 1}, raising=False)
+        self.code = 0
+        monkeypatch.setattr(ctypes, "CDLL", lambda *_, **__: self)
+
+    def _remember(self, name: str) -> Callable[..., None]:
+        return lambda thread, *arguments: self.asked.append((name, *arguments))
+
+    def mlockall(self, flags: int) -> int:
+        self.asked.append(("mlockall", flags))
+        ctypes.set_errno(self.code)
+        return -1 if self.code else 0
+
+    def munlockall(self) -> int:
+        self.asked.append(("munlockall",))
+        return 0
+
+
+@linux
+def test_what_was_granted_is_put_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    system = System(monkeypatch)
+    with privileges(ALL) as found:
+        assert found.granted == ["CPU 0", "memory locked", "SCHED_FIFO, priority 20"]
+        assert found.refused == []
+        given = [entry[0] for entry in system.asked]
+        assert given == ["sched_setaffinity", "mlockall", "sched_setscheduler"]
+        system.asked.clear()
+    assert system.asked == [
+        ("sched_setscheduler", 0, "parameter"), ("munlockall",), ("sched_setaffinity", {0, 1}),
+    ]  # fmt: skip
+
+
+@linux
+def test_what_is_not_permitted_is_said_with_the_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
+    system = System(monkeypatch)
+    system.code = errno.ENOMEM
+    monkeypatch.setattr(os, "sched_setscheduler", refuses(errno.EPERM))
+    monkeypatch.setattr(os, "sched_setaffinity", refuses(errno.EINVAL))
+    with privileges(Realtime(priority=20, cpu=9, lock_memory=True)) as found:
+        assert found.granted == []
+    cpu, memory, priority = found.refused
+    assert cpu == "CPU 9: Invalid argument; must be one of 0, 1"
+    assert memory.startswith("memory locked: Cannot allocate memory; needs CAP_IPC_LOCK, or a")
+    assert priority.startswith(
+        "SCHED_FIFO, priority 20: Operation not permitted; needs CAP_SYS_NICE, or a limit"
+    )
+    assert system.asked == [("mlockall", 7)]
+
+
+def test_a_system_that_has_none_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("sched_setscheduler", "sched_getscheduler", "sched_getaffinity"):
+        monkeypatch.delattr(os, name, raising=False)
+    monkeypatch.setattr(sys, "platform", "darwin")
+    with privileges(ALL) as found:
+        assert found.granted == []
+    assert found.refused == [
+        f"{name}: not possible on this operating system"
+        for name in ("CPU 0", "memory locked", "SCHED_FIFO, priority 20")
+    ]
+
+
+@pytest.mark.parametrize("collecting", [True, False])
+def test_no_garbage_is_collected_on_the_way(collecting: bool) -> None:
+    before = gc.isenabled()
+    (gc.enable if collecting else gc.disable)()
+    try:
+        with privileges(Realtime()) as found:
+            assert not gc.isenabled()
+            assert gc.get_freeze_count() > 0
+        assert gc.isenabled() == collecting
+        assert gc.get_freeze_count() == 0
+        assert (found.granted, found.refused) == ([], [])
+    finally:
+        (gc.enable if before else gc.disable)()
+
+
+@linux
+def test_a_cpu_of_this_machine_is_granted() -> None:
+    before = os.sched_getaffinity(0)
+    with privileges(Realtime(cpu=min(before))) as found:
+        assert os.sched_getaffinity(0) == {min(before)}
+    assert found.granted == [f"CPU {min(before)}"]
+    assert os.sched_getaffinity(0) == before

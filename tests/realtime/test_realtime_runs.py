@@ -1,0 +1,155 @@
+"""Runs of the grasp by the clock: the same bits, a timing that is kept, an end on Ctrl-C."""
+
+import json
+import logging
+import os
+import signal
+import threading
+from pathlib import Path
+from typing import Any
+
+import pytest
+from grasp_cosim import InputError, Realtime, System, simulate
+from grasp_cosim.fmi.instance import CLOCK
+from grasp_cosim.master.engine import Engine
+from grasp_cosim.realtime.pacer import HAS_CLOCK
+from grasp_cosim.realtime.timing import Timing
+from grasp_cosim.recording.load import load_run
+from mocks import Mock, make_system
+
+FAST = Realtime(factor=1e4)
+"""Not to wait at all in a test."""
+
+PARTS = ["step", "start", "plant", "sensor_1", "sensor_2", "controller", "exchange", "between"]
+
+
+@pytest.fixture(params=["python", "compiled"])
+def engine(request: pytest.FixtureRequest) -> Engine:
+    if request.param == "compiled":
+        pytest.importorskip("numba")
+    chosen: Engine = request.param
+    return chosen
+
+
+@pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
+def test_a_paced_run_has_the_same_bits(grasp: System, engine: Engine, scheme: str) -> None:
+    options: dict[str, Any] = {"step": 1e-3, "stop": 2.0, "scheme": scheme, "engine": engine}
+    free, paced = simulate(grasp, **options), simulate(grasp, realtime=FAST, **options)
+    assert free.timing is None
+    assert list(free) == list(paced)
+    assert free.time.tobytes() == paced.time.tobytes()
+    assert [n for n in free if free[n].tobytes() != paced[n].tobytes()] == []
+    timing = paced.timing
+    assert timing is not None
+    assert (timing.steps, timing.factor, timing.period) == (2000, 1e4, 1e-7)
+    assert list(timing.parts) == [*PARTS, "recording"]
+    assert all(0.0 <= p.median <= p.p99 <= p.p999 <= p.worst for p in timing.parts.values())
+    assert timing.parts["plant"].median > 0.0
+    assert timing.overruns == 2000 == sum(timing.culprits.values())
+    assert 0.0 < timing.real_time_factor < 1e4
+
+
+@pytest.mark.skipif(not HAS_CLOCK, reason="this system's clock is read in Python")
+def test_compiled_code_reads_the_clock_itself(grasp: System) -> None:
+    with simulate.session(grasp, stop=0.01, realtime=FAST) as session:
+        natives = [call.native for call in session._master.plan.calls]
+    assert [n.shape for n in natives if n].count(CLOCK) == 8
+    with simulate.session(grasp, stop=0.01) as session:
+        assert not [c for c in session._master.plan.calls if c.native and c.native.shape == CLOCK]
+        assert len(session._master.values) == len(session._master.slots)
+
+
+def test_the_timing_comes_back_from_the_folder(grasp: System, tmp_path: Path) -> None:
+    result = simulate(grasp, step=1e-3, stop=0.1, realtime=FAST)
+    result.to_csv(tmp_path / "signals.csv")
+    result.to_json(tmp_path / "run.json")
+    assert result.timing is not None
+    assert load_run(tmp_path).timing == result.timing
+    text = json.loads((tmp_path / "run.json").read_text())
+    assert list(text["realtime"]) == [
+        "factor", "period", "overrun", "granted", "refused", "steps", "real_time_factor",
+        "overruns", "parts", "histograms",
+    ]  # fmt: skip
+    assert set(text["realtime"]["parts"]["step"]) == {"median", "p99", "p99.9", "worst", "worst_at"}
+    text["realtime"]["overruns"] = 7
+    (tmp_path / "run.json").write_text(json.dumps(text))
+    with pytest.raises(InputError, match=r"run\.json: realtime: is damaged \(TypeError: .*must be"):
+        load_run(tmp_path)
+
+
+def test_a_run_that_is_not_paced_has_no_timing(grasp: System, tmp_path: Path) -> None:
+    result = simulate(grasp, stop=0.01)
+    result.to_csv(tmp_path / "signals.csv")
+    result.to_json(tmp_path / "run.json")
+    assert "realtime" not in json.loads((tmp_path / "run.json").read_text())
+    assert load_run(tmp_path).timing is None
+
+
+def test_a_session_is_paced_as_well(grasp: System, engine: Engine) -> None:
+    with simulate.session(grasp, stop=0.1, engine=engine, realtime=FAST) as session:
+        while session.step(7):
+            pass
+        timing = session.result().timing
+    assert timing is not None
+    assert timing.steps == 1000
+    assert Timing.from_dict("here", timing.as_dict()) == timing
+
+
+def test_what_is_refused_is_said_and_the_run_goes_on(
+    grasp: System, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def refuse(*_: object) -> None:
+        raise PermissionError(1, "Operation not permitted")
+
+    monkeypatch.setattr(os, "sched_setaffinity", refuse, raising=False)
+    with caplog.at_level(logging.WARNING):
+        result = simulate(grasp, stop=0.01, realtime=Realtime(factor=1e4, cpu=0))
+    assert result.complete
+    assert result.timing is not None
+    (refused,) = result.timing.refused
+    assert refused.startswith("CPU 0: ")
+    assert caplog.messages == [refused]
+
+
+@pytest.mark.parametrize("engine", ["python", "auto"])
+def test_ctrl_c_does_not_wait_for_the_next_step(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, engine: Engine
+) -> None:
+    """Which would begin only after 1000 s."""
+    timer = threading.Timer(0.1, lambda: os.kill(os.getpid(), signal.SIGINT))
+
+    def output(u: float, t: float) -> float:
+        if t > 0.0:
+            timer.start()
+        return t
+
+    mock = Mock(tmp_path, "a", output)
+    monkeypatch.setattr("grasp_cosim.master.simulation.load", lambda component: mock)
+    result = simulate(make_system([mock], [], 10), engine=engine, realtime=Realtime(factor=1e-4))
+    timer.join()
+    assert not result.complete
+    assert result.time.tolist() == [0.0, 0.1]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"factor": 0.0}, r"factor = 0\.0: must be a finite number > 0"),
+        ({"factor": float("nan")}, "factor = nan: must be a finite number > 0"),
+        ({"factor": "2"}, "factor = '2': must be a finite number > 0"),
+        ({"overrun": "ignore"}, "overrun = 'ignore': must be one of catch-up, continue, stop"),
+        ({"priority": 100}, "priority = 100: must be a whole number from 1 to 99"),
+        ({"priority": True}, "priority = True: must be a whole number from 1 to 99"),
+        ({"cpu": -1}, "cpu = -1: must be a whole number from 0 to"),
+        ({"lock_memory": 1}, "lock_memory = 1: must be True or False"),
+    ],
+)
+def test_an_option_that_is_none_is_refused(wrong: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=f"^{message}"):
+        Realtime(**wrong)
+
+
+@pytest.mark.parametrize("factor", [1e-12, 1e9])
+def test_a_period_that_no_clock_can_keep_is_refused(grasp: System, factor: float) -> None:
+    with pytest.raises(InputError, match=r"a step of 0\.0001 s would begin every .* 1 ns to a yea"):
+        simulate(grasp, stop=0.1, realtime=Realtime(factor=factor))
