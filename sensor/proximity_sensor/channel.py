@@ -168,7 +168,7 @@ def _settled(p: Params, light: float) -> Chain:
     chain = SILENT._replace(memory=memory, window=(volts,) * 10)
     if not p.noise.enabled:
         return chain
-    deviation, generator = gaussian_noise.normal(mrg32k3a.stream(p.noise.seed))
+    deviation, generator = gaussian_noise.normal(mrg32k3a.stream(float(p.noise.seed)))
     chain = chain._replace(number=-float(WARM_UP), generator=generator, deviation=deviation)
     for _ in range(WARM_UP):
         chain = _sampled(p, chain, light)

@@ -15,13 +15,13 @@ class Params:
     """Parameters; a value outside its declared range raises ValueError."""
 
     enabled: Annotated[bool, "", "conversion to digital values"] = False
-    bits: Annotated[float, "1", "resolution, a whole number", (1.0, 32.0)] = 16.0
+    bits: Annotated[int, "", "resolution", (1, 32)] = 16
     range: Annotated[
         tuple[float, float], "V", "lower and upper end of the input range", (-1e3, 1e3)
     ] = (-10.0, 10.0)
 
     def __post_init__(self) -> None:
-        check("adc", self, "bits")
+        check("adc", self)
         low, high = self.range
         if not low < high:
             raise ValueError(f"adc.range = {low!r}, {high!r} V: the second must be above the first")
@@ -30,7 +30,7 @@ class Params:
 def converted(p: Params, v: float) -> float:
     """The level in V for an input of v V."""
     low, high = p.range
-    levels = ldexp(1.0, int(p.bits))
+    levels = ldexp(1.0, p.bits)
     step = (high - low) / levels
     code = float(floor((v - low) / step + 0.5))
     code = 0.0 if code < 0.0 else levels - 1.0 if code >= levels else code

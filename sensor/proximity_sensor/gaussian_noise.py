@@ -22,10 +22,10 @@ class Params:
     standard_deviation: Annotated[
         float, "V", "standard deviation of a sample of the raw voltage", (0.0, 10.0)
     ] = 0.005
-    seed: Annotated[float, "1", "a whole number; equal seeds, equal noise", (0.0, 1e9)] = 1.0
+    seed: Annotated[int, "", "equal seeds, equal noise", (0, 1_000_000_000)] = 1
 
     def __post_init__(self) -> None:
-        check("noise", self, "seed")
+        check("noise", self)
 
 
 def normal(s: mrg32k3a.State) -> tuple[float, mrg32k3a.State]:

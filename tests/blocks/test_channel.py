@@ -33,7 +33,7 @@ GAPS = st.floats(0.0, 0.2)
 
 ON = Params(
     ambient=ambient_light.Params(True, drift=0.02),
-    noise=gaussian_noise.Params(True, seed=7.0),
+    noise=gaussian_noise.Params(True, seed=7),
     adc=converter.Params(True),
     filter=low_pass.Params(True),
     median=sliding_median.Params(True),
@@ -43,7 +43,7 @@ ON = Params(
 STAGES: dict[str, Any] = {
     "ambient": ambient_light.Params(True, drift=0.02),
     "noise": gaussian_noise.Params(True),
-    "adc": converter.Params(True, 8.0, (0.0, 1.0)),
+    "adc": converter.Params(True, 8, (0.0, 1.0)),
     "filter": low_pass.Params(True),
     "median": sliding_median.Params(True),
 }
@@ -104,7 +104,7 @@ def test_parameters_of_a_stage_that_is_off_do_nothing() -> None:
         pattern=stripes.Params(ratio=0.1),
         ambient=ambient_light.Params(offset=1.0, drift=1.0),
         noise=gaussian_noise.Params(standard_deviation=1.0),
-        adc=converter.Params(bits=1.0),
+        adc=converter.Params(bits=1),
         filter=low_pass.Params(cutoff=5e5),
         sampling=clock.Params(1.0),
     )
@@ -144,7 +144,7 @@ def conditioned(p: Params, gaps: list[float]) -> NDArray[np.float64]:
         xi += p.ambient.offset + p.ambient.drift * t
         steady += p.ambient.offset
     if p.noise.enabled:
-        u = np.array(uniforms(int(p.noise.seed), 2 * len(xi)))
+        u = np.array(uniforms(p.noise.seed, 2 * len(xi)))
         normal = np.sqrt(-2.0 * np.log(u[::2])) * np.cos(2.0 * np.pi * u[1::2])
         xi += p.noise.standard_deviation * normal
     if p.adc.enabled:
@@ -171,7 +171,7 @@ def conditioned(p: Params, gaps: list[float]) -> NDArray[np.float64]:
     [
         *(only(stage) for stage in STAGES),
         ON,
-        replace(ON, adc=converter.Params(True, 12.0, (0.0, 1.2)), sampling=clock.Params(25_000.0)),
+        replace(ON, adc=converter.Params(True, 12, (0.0, 1.2)), sampling=clock.Params(25_000.0)),
         replace(ON, filter=low_pass.Params(True, 1500.0), reflectance=0.57),
         without(ON, "adc"),
         without(ON, "ambient"),
@@ -220,7 +220,7 @@ def test_the_noise_is_there_from_the_start() -> None:
     """Over the seeds, the first value is scattered as much as a late one."""
     first, late = [], []
     for seed in range(300):
-        p = replace(ON, noise=gaussian_noise.Params(True, seed=float(seed)))
+        p = replace(ON, noise=gaussian_noise.Params(True, seed=seed))
         values = run(p, [0.05] * 60, 1e-4)
         first.append(values[0])
         late.append(values[-1])
@@ -305,7 +305,7 @@ def test_asking_changes_nothing() -> None:
 @pytest.mark.parametrize("stage", STAGES)
 def test_the_seed_alone_decides_on_the_noise(stage: str) -> None:
     """Not the step, and not what the other stages do."""
-    p = replace(only(stage), noise=gaussian_noise.Params(True, seed=3.0))
+    p = replace(only(stage), noise=gaussian_noise.Params(True, seed=3))
     for steps in (20, 40):
         x = channel.initial_state(p, Inputs(0.05))
         for _ in range(steps):
@@ -335,11 +335,12 @@ PARAMETERS = [
 @pytest.mark.parametrize(("stage", "parameter"), PARAMETERS)
 def test_a_value_outside_its_range_is_refused(stage: str, parameter: Parameter) -> None:
     block = type(getattr(Params(), stage))
+    unit = f" {parameter.unit}" if parameter.unit else ""
     for number, value in parameter.invalid():
         with pytest.raises(ValueError, match=r"^\w+\.\w+ = ") as caught:
             block(**{parameter.name: value})
         assert str(caught.value) == (
-            f"{stage}.{parameter.name} = {number!r} {parameter.unit}: "
+            f"{stage}.{parameter.name} = {number!r}{unit}: "
             f"must be from {parameter.low:g} to {parameter.high:g}"
         )
 
@@ -352,19 +353,6 @@ def test_both_ends_of_a_range_are_accepted(stage: str, parameter: Parameter) -> 
         return
     for end in (parameter.low, parameter.high):
         assert getattr(block(**{parameter.name: end}), parameter.name) == end
-
-
-@pytest.mark.parametrize(
-    ("block", "name", "text"),
-    [
-        (gaussian_noise.Params, "seed", "noise.seed = 2.5 1: must be a whole number"),
-        (converter.Params, "bits", "adc.bits = 2.5 1: must be a whole number"),
-    ],
-)
-def test_half_numbers_are_refused(block: type[Any], name: str, text: str) -> None:
-    with pytest.raises(ValueError, match="whole number") as caught:
-        block(**{name: 2.5})
-    assert str(caught.value) == text
 
 
 def test_the_filter_must_fit_the_sampling() -> None:

@@ -10,7 +10,7 @@ from proximity_sensor.converter import Params
 QUICK = settings(deadline=None, derandomize=True, max_examples=200)
 
 CONVERTERS = st.builds(
-    lambda bits, low, span: Params(True, float(bits), (low, low + span)),
+    lambda bits, low, span: Params(True, bits, (low, low + span)),
     st.integers(1, 24),
     st.floats(-20.0, 5.0),
     st.floats(0.1, 20.0),
@@ -50,7 +50,7 @@ def test_it_saturates(p: Params, beyond: float) -> None:
 
 
 def test_twelve_bits_of_five_volts() -> None:
-    p = Params(True, 12.0, (0.0, 5.0))
+    p = Params(True, 12, (0.0, 5.0))
     v = np.random.default_rng(1).uniform(-1.0, 6.0, 2000)
     codes = np.clip(np.floor(v / 5.0 * 4096 + 0.5), 0, 4095)
     assert [converter.converted(p, float(x)) for x in v] == (codes * 5.0 / 4096).tolist()
@@ -58,7 +58,7 @@ def test_twelve_bits_of_five_volts() -> None:
 
 def test_its_error_is_that_of_rounding() -> None:
     """Even, of variance step^2/12."""
-    p = Params(True, 8.0, (0.0, 2.0))
+    p = Params(True, 8, (0.0, 2.0))
     _, _, step = levels(p)
     v = np.random.default_rng(2).uniform(0.1, 1.9, 20_000)
     error = np.array([converter.converted(p, float(x)) for x in v]) - v

@@ -43,9 +43,9 @@ ambient.offset                parameter  Real     V      0.35
 ambient.drift                 parameter  Real     V/s    0.0
 noise.enabled                 parameter  Boolean  -      false
 noise.standard_deviation      parameter  Real     V      0.005
-noise.seed                    parameter  Real     1      1.0
+noise.seed                    parameter  Integer  -      1
 adc.enabled                   parameter  Boolean  -      false
-adc.bits                      parameter  Real     1      16.0
+adc.bits                      parameter  Integer  -      16
 adc.range[1]                  parameter  Real     V      -10.0
 adc.range[2]                  parameter  Real     V      10.0
 filter.enabled                parameter  Boolean  -      false

@@ -1,5 +1,6 @@
 """The sensor's electronics through the FMU: states, steps, seeds, refusals."""
 
+from ctypes import c_int, c_size_t, c_uint
 from math import sin
 
 import pytest
@@ -12,12 +13,18 @@ STAGES = ("pattern", "ambient", "noise", "adc", "filter", "median")
 H = 1e-4
 
 
-def sensor(load: Load, **values: float) -> Instance:
+def sensor(load: Load, seed: int = 1, **values: float) -> Instance:
     """With every stage on; a double underscore in a name stands for the point."""
     instance = Instance(load("ProximitySensor"))
     switches = [instance.fmu.references[f"{stage}.enabled"] for stage in STAGES]
     assert instance.set_boolean(switches, [True] * len(STAGES)) == OK
+    assert set_integer(instance, "noise.seed", seed) == OK
     return instance.initialise(**{n.replace("__", "."): v for n, v in values.items()})
+
+
+def set_integer(instance: Instance, name: str, value: int) -> int:
+    reference = (c_uint * 1)(instance.fmu.references[name])
+    return instance.call("SetInteger", reference, c_size_t(1), (c_int * 1)(value))
 
 
 def drive(instance: Instance, first: int, last: int, size: float = H) -> list[float]:
@@ -39,7 +46,7 @@ def test_off_by_default() -> None:
 @pytest.mark.parametrize("size", [1e-4, 1.7e-4, 1 / 3e4])
 def test_step_save_step_restore_step(load: Load, size: float) -> None:
     """In the middle of a sampling period as well."""
-    with sensor(load, noise__seed=3.0, ambient__drift=0.1) as instance:
+    with sensor(load, seed=3, ambient__drift=0.1) as instance:
         drive(instance, 0, 101, size)
         state = instance.state()
         first = drive(instance, 101, 250, size)
@@ -50,7 +57,7 @@ def test_step_save_step_restore_step(load: Load, size: float) -> None:
 
 
 def test_a_state_goes_through_bytes_to_another_instance(load: Load) -> None:
-    with sensor(load, noise__seed=3.0) as one:
+    with sensor(load, seed=3) as one:
         drive(one, 0, 101)
         state = one.state()
         data = state.to_bytes()
@@ -79,8 +86,8 @@ def test_the_step_changes_neither_noise_nor_filter(load: Load) -> None:
 
 def test_equal_seeds_equal_noise(load: Load) -> None:
     runs = []
-    for seed in (1.0, 1.0, 2.0):
-        with sensor(load, noise__seed=seed) as instance:
+    for seed in (1, 1, 2):
+        with sensor(load, seed=seed) as instance:
             runs.append(drive(instance, 0, 50))
     assert runs[0] == runs[1]
     assert not set(runs[1]) & set(runs[2])
@@ -89,7 +96,6 @@ def test_equal_seeds_equal_noise(load: Load) -> None:
 @pytest.mark.parametrize(
     ("name", "value", "text"),
     [
-        ("noise.seed", 0.5, "noise.seed = 0.5 1: must be a whole number"),
         ("adc.range[1]", 10.0, "adc.range = 10.0, 10.0 V: the second must be above the first"),
         ("filter.cutoff", 5e3, "filter.cutoff = 5000.0 Hz: must be below half of sampling.rate, "),
     ],
@@ -99,4 +105,17 @@ def test_what_does_not_fit_is_refused(load: Load, name: str, value: float, text:
         switch = [instance.fmu.references["filter.enabled"]]
         assert (instance.set_boolean(switch, [True]), instance.set({name: value})) == (OK, OK)
         assert (instance.setup(), instance.enter()) == (OK, ERROR)
+        assert text in instance.log[0].text
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "text"),
+    [
+        ("noise.seed", -1, "noise.seed = -1: must be from 0 to 1e+09"),
+        ("adc.bits", 33, "adc.bits = 33: must be from 1 to 32"),
+    ],
+)
+def test_whole_numbers_have_a_range_too(load: Load, name: str, value: int, text: str) -> None:
+    with Instance(load("ProximitySensor")) as instance:
+        assert set_integer(instance, name, value) == ERROR
         assert text in instance.log[0].text
