@@ -13,7 +13,7 @@ ROOT = Path(__file__).parent.parent
     ("folder", "module"),
     [
         ("plant", "gripper_plant.rigid"),
-        ("sensor", "proximity_sensor.optics"),
+        ("sensor", "proximity_sensor.channel"),
         ("controller", "grasp_controller.series"),
     ],
 )

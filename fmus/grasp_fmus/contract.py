@@ -5,8 +5,8 @@ Every field of Params, Inputs and Outputs carries
 
     name: Annotated[type, unit, description, ...] = default
 
-with float, bool, a tuple of them, or (in Params) another such class as its type. A tuple becomes
-name[1], name[2], a nested class name.field. After the description follow, in any order,
+with float, bool, a tuple of them, or (in Params) int or another such class as its type. A tuple
+becomes name[1], name[2], a nested class name.field. After the description follow, in any order,
 
 - for a parameter its range (lowest, highest), and "tunable" if it may change at run time;
 - for a real input or output its nominal value, a float;

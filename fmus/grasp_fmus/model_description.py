@@ -32,8 +32,10 @@ UNITS: dict[str, Unit] = {
     "N.s/m": Unit({"kg": 1, "s": -1}),
     "N/m": Unit({"kg": 1, "s": -2}),
     "V": Unit({"kg": 1, "m": 2, "s": -3, "A": -1}, ("mV", 1e3)),
+    "V/s": Unit({"kg": 1, "m": 2, "s": -4, "A": -1}),
     "s": Unit({"s": 1}),
     "1/s": Unit({"s": -1}),
+    "Hz": Unit({"s": -1}),
     "1": Unit({}),
 }
 """V.m^n is not among them: its exponent is a parameter."""

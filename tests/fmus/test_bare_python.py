@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import pytest
 from grasp_controller import series
 from gripper_plant import rigid
-from proximity_sensor import optics
+from proximity_sensor import channel
 from pythons import VERSIONS, python
 
 HOST = Path(__file__).with_name("bare_host.py")
@@ -25,7 +25,7 @@ class Case(NamedTuple):
 
 CASES = {
     "GripperPlant": Case(rigid, rigid.Inputs(force=(-60.0, 45.0))),  # both fingers hit the object
-    "ProximitySensor": Case(optics, optics.Inputs(gap=0.0123)),
+    "ProximitySensor": Case(channel, channel.Inputs(gap=0.0123)),
     "GraspController": Case(
         series,
         series.Inputs(position=(0.09, -0.1), velocity=(-0.1, 0.2), intensity=(0.05, 0.04)),

@@ -10,15 +10,20 @@ from pathlib import Path
 import pytest
 from grasp_fmus import build as builder
 from grasp_fmus.build import Built
+from grasp_fmus.contract import declared
+from proximity_sensor import channel
 
 SENSOR = Path(__file__).parents[2] / "sensor"
 SCRIPT = builder.SCRIPTS / "ProximitySensor.py"
 OPTICS, CARD = "proximity_sensor/optics.py", "README.md"
+CLOCK = "proximity_sensor/clock.py"
+"""Of the parameters the last."""
 
 GAIN = "(0.0, 1e6)] = 0.0024"
 EXPONENT = '"n, diffusion exponent", (0.1, 10.0)]'
 OUTPUT = '    intensity: Annotated[float, "V", "xi, offset-compensated output", 0.1, {"gap"}]\n'
 FORMULA = "p.gain * p.reflectance / (l + p.offset_distance) ** p.diffusion_exponent"
+RATE = "(1.0, 1e6)] = 10_000.0\n"
 
 DESCRIPTION, SOURCE = "modelDescription.xml: changed", f"resources/{OPTICS}: changed"
 
@@ -133,10 +138,10 @@ def test_a_change_is_reported_once(build: Build) -> None:
         ),
         pytest.param(
             [
-                (OPTICS, "    ] = 0.005\n",
-                 '    ] = 0.005\n    noise: Annotated[float, "V", "noise", (0.0, 1.0)] = 0.0\n'),
+                (CLOCK, RATE,
+                 f'{RATE}    jitter: Annotated[float, "s", "jitter", (0.0, 1.0)] = 0.0\n'),
             ],
-            ["noise: added", DESCRIPTION, SOURCE],
+            ["sampling.jitter: added", DESCRIPTION, f"resources/{CLOCK}: changed"],
             id="variable added",
         ),
         pytest.param(
@@ -157,17 +162,10 @@ def test_variables_that_follow_move_up(build: Build) -> None:
     added = f'{text}\n    tilt: Annotated[float, "1", "tilt", 0.1] = 0.0\n'
     build()
     lines = build((OPTICS, text, added)).changes
-    assert lines == (
-        "diffusion_exponent: valueReference 4 -> 5",
-        "gain: valueReference 3 -> 4",
-        "gap: valueReference 0 -> 1",
-        "intensity: valueReference 1 -> 2",
-        "offset_distance: valueReference 5 -> 6",
-        "reflectance: valueReference 2 -> 3",
-        "tilt: added",
-        DESCRIPTION,
-        SOURCE,
-    )
+    names = [name for f in declared(channel) for name in f.names]
+    moved = [f"{name}: valueReference {k} -> {k + 1}" for k, name in enumerate(names)]
+    assert "gain: valueReference 3 -> 4" in moved
+    assert lines == (*sorted([*moved, "tilt: added"]), DESCRIPTION, SOURCE)
     assert build().changes[-3:] == ("tilt: removed", DESCRIPTION, SOURCE)
 
 

@@ -20,6 +20,7 @@ Pair = tuple[float, float]
 @dataclass(frozen=True)
 class Inner:
     on: Annotated[bool, "", "a switch"] = True
+    bits: Annotated[int, "", "a whole number", (1, 9)] = 3
     rate: Annotated[Pair, "1/s", "rates", (-2.0, 3.0)] = (-0.5, 0.25)
 
     def __post_init__(self) -> None:
@@ -60,7 +61,7 @@ def test_scalars_in_the_order_of_declaration() -> None:
     assert NAMES == [
         "gap", "force[1]", "force[2]", "armed[1]", "armed[2]",
         "both[1]", "both[2]", "own[1]", "own[2]", "late", "never",
-        "mass", "inner.on", "inner.rate[1]", "inner.rate[2]", "offset",
+        "mass", "inner.on", "inner.bits", "inner.rate[1]", "inner.rate[2]", "offset",
     ]  # fmt: skip
 
 
@@ -68,6 +69,8 @@ def test_what_a_field_holds() -> None:
     rate = BY_NAME["inner.rate"]
     assert (rate.causality, rate.kind, rate.size) == ("parameter", float, 2)
     assert (rate.unit, rate.description, rate.limits) == ("1/s", "rates", (-2.0, 3.0))
+    bits = BY_NAME["inner.bits"]
+    assert (bits.kind, bits.limits, bits.variability) == (int, (1, 9), "fixed")
     armed = BY_NAME["armed"]
     assert (armed.causality, armed.kind, armed.size) == ("input", bool, 2)
     never = BY_NAME["never"]
@@ -80,7 +83,7 @@ def test_starts_are_the_defaults_and_outputs_have_none() -> None:
     assert [start for f in FIELDS for start in f.starts] == [
         0.3, 1.0, -1.0, False, True,
         None, None, None, None, None, None,
-        2.0, True, -0.5, 0.25, 0.0,
+        2.0, True, 3, -0.5, 0.25, 0.0,
     ]  # fmt: skip
 
 
@@ -92,14 +95,14 @@ def test_nominal_values() -> None:
         "both": 2.0, "own": 3.0, "late": 4.0,
         "mass": 2.0, "inner.rate": 0.5, "offset": None,
     }  # fmt: skip
-    assert {f.nominal for f in FIELDS if f.kind is bool} == {None}
+    assert {f.nominal for f in FIELDS if f.kind is not float} == {None}
 
 
 def test_count() -> None:
     assert count(FIELDS, "input") == 5
     assert count(FIELDS, "output") == 6
     assert count(FIELDS, "input", "output") == 11
-    assert count(FIELDS, "parameter") == 5
+    assert count(FIELDS, "parameter") == 6
     assert count(FIELDS) == 0
 
 
@@ -130,13 +133,13 @@ def test_inputs_and_outputs_to_and_from_the_list_of_values() -> None:
 
 
 def test_params_from_the_list_of_values() -> None:
-    values = [*range(11), 3.0, False, 0.1, 0.2, 0.5]
-    assert build_params(block(), FIELDS, values) == Params(3.0, Inner(False, (0.1, 0.2)), 0.5)
+    values = [*range(11), 3.0, False, 7, 0.1, 0.2, 0.5]
+    assert build_params(block(), FIELDS, values) == Params(3.0, Inner(False, 7, (0.1, 0.2)), 0.5)
 
 
 def test_what_the_block_refuses_is_passed_on() -> None:
     with pytest.raises(ValueError, match="rate too high"):
-        build_params(block(), FIELDS, [*range(11), 3.0, False, 1.5, 0.2, 0.5])
+        build_params(block(), FIELDS, [*range(11), 3.0, False, 7, 1.5, 0.2, 0.5])
 
 
 class BareInput(NamedTuple):

@@ -21,7 +21,7 @@ from grasp_fmus.cross_check import SIGNALS, STEP_SIZE, cross_check_files
 
 BLOCKS = {
     "GripperPlant": "gripper_plant.rigid",
-    "ProximitySensor": "proximity_sensor.optics",
+    "ProximitySensor": "proximity_sensor.channel",
     "GraspController": "grasp_controller.series",
 }
 LITERAL = re.compile(r"-?\d+(\.\d+)?(e-?\d+)?")

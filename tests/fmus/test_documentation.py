@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[2]
 
 BLOCKS = {
     "GripperPlant": ("plant", "gripper_plant.rigid"),
-    "ProximitySensor": ("sensor", "proximity_sensor.optics"),
+    "ProximitySensor": ("sensor", "proximity_sensor.channel"),
     "GraspController": ("controller", "grasp_controller.series"),
 }
 SECTIONS = {

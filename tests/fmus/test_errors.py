@@ -187,7 +187,7 @@ def test_how_far_the_clocks_may_be_apart(load: Load, start: float, off: float) -
 
 
 def test_outputs_follow_an_input_whose_step_was_discarded(altered: Altered, tmp_path: Path) -> None:
-    source, step = "proximity_sensor/optics.py", "    return x\n"
+    source, step = "proximity_sensor/channel.py", "    return x\n"
     fmu = Fmu(altered("ProximitySensor", source, step, "    return 1 / 0\n"), tmp_path)
     with Instance(fmu, "eye") as instance:
         instance.initialise(gap=0.02)
@@ -312,9 +312,9 @@ def test_what_pythonfmu_adds_to_an_exception_is_harmless(
 
 
 def test_a_block_that_does_not_start_says_why(altered: Altered, tmp_path: Path) -> None:
-    start = "    return State()\n"
-    broken = "    raise LookupError('no lamp')\n"
-    fmu = Fmu(altered("ProximitySensor", "proximity_sensor/optics.py", start, broken), tmp_path)
+    source, start = "proximity_sensor/channel.py", "    return State(0.0, "
+    broken = f"    raise LookupError('no lamp')\n{start}"
+    fmu = Fmu(altered("ProximitySensor", source, start, broken), tmp_path)
     instance = object.__new__(Instance)
     with pytest.raises(AssertionError):
         instance.__init__(fmu, "eye")  # type: ignore[misc]

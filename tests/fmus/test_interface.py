@@ -33,6 +33,25 @@ reflectance                   parameter  Real     1      1.0
 gain                          parameter  Real     V.m^n  0.0024
 diffusion_exponent            parameter  Real     1      1.1506
 offset_distance               parameter  Real     m      0.005
+pattern.enabled               parameter  Boolean  -      false
+pattern.ratio                 parameter  Real     1      0.57
+pattern.period                parameter  Real     m      0.02
+pattern.phase                 parameter  Real     m      0.0
+pattern.edge                  parameter  Real     m      0.002
+ambient.enabled               parameter  Boolean  -      false
+ambient.offset                parameter  Real     V      0.35
+ambient.drift                 parameter  Real     V/s    0.0
+noise.enabled                 parameter  Boolean  -      false
+noise.standard_deviation      parameter  Real     V      0.005
+noise.seed                    parameter  Integer  -      1
+adc.enabled                   parameter  Boolean  -      false
+adc.bits                      parameter  Integer  -      16
+adc.range[1]                  parameter  Real     V      -10.0
+adc.range[2]                  parameter  Real     V      10.0
+filter.enabled                parameter  Boolean  -      false
+filter.cutoff                 parameter  Real     Hz     500.0
+median.enabled                parameter  Boolean  -      false
+sampling.rate                 parameter  Real     Hz     10000.0
 """
 CONTROLLER = """
 position[1]                   input      Real     m      0.11

@@ -25,12 +25,12 @@ from fmpy.validation import validate_fmu
 from grasp_controller import series
 from gripper_plant import rigid
 from lxml import etree  # type: ignore[import-untyped]
-from proximity_sensor import optics
+from proximity_sensor import channel
 
 BLOCKS: dict[str, ModuleType] = {
     "GraspController": series,
     "GripperPlant": rigid,
-    "ProximitySensor": optics,
+    "ProximitySensor": channel,
 }
 SCHEMA = Path(fmpy.__file__).parent / "schema" / "fmi2" / "fmi2ModelDescription.xsd"
 
@@ -155,7 +155,7 @@ def test_default_experiment(root: Element) -> None:
 
 
 def test_every_scalar_of_the_block_is_a_variable(root: Element, name: str) -> None:
-    types = {bool: "Boolean", float: "Real"}
+    types = {bool: "Boolean", int: "Integer", float: "Real"}
     expected = {n: (d.causality, types[d.kind]) for n, d in declarations(BLOCKS[name]).items()}
     found = {n: (v.attrib["causality"], v[0].tag) for n, v in variables(root).items()}
     assert list(found.items()) == list(expected.items())
@@ -246,9 +246,9 @@ def test_min_and_max_are_the_range_of_the_parameter(root: Element, name: str) ->
     }
     assert expected
     found = {
-        n: (float(r.attrib["min"]), float(r.attrib["max"]))
-        for n, r in reals(root).items()
-        if "min" in r.attrib or "max" in r.attrib
+        n: (float(v[0].attrib["min"]), float(v[0].attrib["max"]))
+        for n, v in variables(root).items()
+        if "min" in v[0].attrib or "max" in v[0].attrib
     }
     assert found == expected
 
@@ -283,6 +283,7 @@ ATOMS: dict[str, dict[str, int]] = {
     "kg": {"kg": 1},
     "N": {"kg": 1, "m": 1, "s": -2},
     "V": {"kg": 1, "m": 2, "s": -3, "A": -1},
+    "Hz": {"s": -1},
 }
 
 
@@ -466,7 +467,14 @@ def with_scalar(value: Any, name: str, new: Any) -> Any:
 def perturbed(value: Any, name: str) -> Iterator[Any]:
     """The value with one of its scalars changed, in every way that the block accepts."""
     now = scalars(value)[name]
-    for other in [not now] if isinstance(now, bool) else [now + delta for delta in DELTAS]:
+    others: list[Any]
+    if isinstance(now, bool):
+        others = [not now]
+    elif isinstance(now, int):
+        others = [now + 1, now - 1]
+    else:
+        others = [now + delta for delta in DELTAS]
+    for other in others:
         try:
             yield with_scalar(value, name, other)
         except ValueError:
@@ -486,7 +494,7 @@ def params_at_random(block: Any, rng: random.Random, **switches: bool) -> Any:
     p = block.Params()
     for name, start in scalars(p).items():
         try:
-            if not isinstance(start, bool):
+            if isinstance(start, float):
                 p = with_scalar(p, name, start * rng.uniform(0.8, 1.2))
         except ValueError:
             continue
@@ -502,7 +510,10 @@ SWITCHES: dict[str, list[dict[str, bool]]] = {
         for b in (False, True)
     ],
     "GripperPlant": [{}],
-    "ProximitySensor": [{}],
+    "ProximitySensor": [
+        {"pattern": a, "ambient": b, "noise": b, "adc": b, "filter": b, "median": c}
+        for a, b, c in ((False, False, False), (True, False, False), (True, True, False))
+    ],
 }
 
 

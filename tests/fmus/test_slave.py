@@ -10,7 +10,7 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
 from grasp_controller import series
 from gripper_plant import rigid
-from proximity_sensor import optics
+from proximity_sensor import channel
 
 
 class Host:
@@ -124,7 +124,7 @@ def test_a_host_outlives_what_a_block_refuses(fmus: Path, tmp_path: Path) -> Non
 
 @pytest.mark.parametrize(
     ("name", "block"),
-    [("GripperPlant", rigid), ("ProximitySensor", optics), ("GraspController", series)],
+    [("GripperPlant", rigid), ("ProximitySensor", channel), ("GraspController", series)],
 )
 def test_start_values_are_those_of_the_block(
     fmus: Path, tmp_path: Path, name: str, block: Any

@@ -1,4 +1,4 @@
-from proximity_sensor import optics
+from proximity_sensor import channel
 
 from grasp_fmus import slave
 
@@ -6,4 +6,4 @@ from grasp_fmus import slave
 class ProximitySensor(slave.Fmi2Slave):
     """Optical proximity sensor of the reflected-light-intensity type, one channel."""
 
-    block = optics
+    block = channel

@@ -1,0 +1,29 @@
+"""Ambient light: the raw voltage has an offset, which may drift after its calibration.
+
+    c(t) = c + drift·t,   c = 0.35 V as in the paper's fit
+
+The compensation at the end of the chain takes off the calibrated value c, not the drift. The run
+begins with the calibration.
+"""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from .ranges import check
+
+
+@dataclass(frozen=True, slots=True)
+class Params:
+    """Parameters; a value outside its declared range raises ValueError."""
+
+    enabled: Annotated[bool, "", "offset by ambient light, and its compensation"] = False
+    offset: Annotated[float, "V", "c, offset at the calibration", (-10.0, 10.0)] = 0.35
+    drift: Annotated[float, "V/s", "rate of the offset after the calibration", (-10.0, 10.0)] = 0.0
+
+    def __post_init__(self) -> None:
+        check("ambient", self)
+
+
+def voltage(p: Params, t: float) -> float:
+    """The offset in V, t s after the calibration; before it, the calibrated one."""
+    return p.offset + p.drift * t if t > 0.0 else p.offset

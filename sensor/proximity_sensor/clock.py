@@ -1,0 +1,40 @@
+"""The sampling instants: k / rate after the start, k = 0, 1, 2, ..., whatever the steps are.
+
+A sample at the end of a step belongs to the next one, whose inputs it sees. The time to the next
+instant is counted in periods, so that nothing adds up over a run but the rounding of the steps: a
+millionth of a period is room for ten thousand million of them.
+"""
+
+from dataclasses import dataclass
+from math import ceil
+from typing import Annotated
+
+from .ranges import check
+
+TOLERANCE = 1e-6
+"""How near, in periods, an instant counts as reached; a nanosecond at 1 kHz."""
+
+
+@dataclass(frozen=True, slots=True)
+class Params:
+    """Parameters; a value outside its declared range raises ValueError."""
+
+    rate: Annotated[float, "Hz", "sampling rate, where a stage is on", (1.0, 1e6)] = 10_000.0
+
+    def __post_init__(self) -> None:
+        check("sampling", self)
+
+
+def due(wait: float) -> bool:
+    """Whether the next instant, wait periods away, is now."""
+    return wait <= TOLERANCE
+
+
+def samples(p: Params, wait: float, h: float) -> tuple[int, float]:
+    """How many instants lie in a step of h s, its end excluded, and the wait at its end.
+
+    wait is the time to the next instant in periods.
+    """
+    periods = h * p.rate
+    n = max(0, ceil(periods - wait - TOLERANCE))
+    return n, wait + n - periods

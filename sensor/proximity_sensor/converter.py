@@ -1,0 +1,37 @@
+"""Analogue-to-digital converter: rounds to the nearest of 2^bits levels, and saturates.
+
+The levels stand (high - low) / 2^bits apart, from low to one below high.
+"""
+
+from dataclasses import dataclass
+from math import floor, ldexp
+from typing import Annotated
+
+from .ranges import check
+
+
+@dataclass(frozen=True, slots=True)
+class Params:
+    """Parameters; a value outside its declared range raises ValueError."""
+
+    enabled: Annotated[bool, "", "conversion to digital values"] = False
+    bits: Annotated[int, "", "resolution", (1, 32)] = 16
+    range: Annotated[
+        tuple[float, float], "V", "lower and upper end of the input range", (-1e3, 1e3)
+    ] = (-10.0, 10.0)
+
+    def __post_init__(self) -> None:
+        check("adc", self)
+        low, high = self.range
+        if not low < high:
+            raise ValueError(f"adc.range = {low!r}, {high!r} V: the second must be above the first")
+
+
+def converted(p: Params, v: float) -> float:
+    """The level in V for an input of v V."""
+    low, high = p.range
+    levels = ldexp(1.0, p.bits)
+    step = (high - low) / levels
+    code = float(floor((v - low) / step + 0.5))
+    code = 0.0 if code < 0.0 else levels - 1.0 if code >= levels else code
+    return low + code * step

@@ -1,0 +1,35 @@
+"""Noise of the raw voltage: Gaussian, white, a number of its own for every sample.
+
+    v = sqrt(-2·ln u_1)·cos(2·pi·u_2)                                                Box-Muller
+
+The numbers depend on the seed and on the number of the sample, on nothing else. Seeds are streams
+of MRG32k3a, so two seeds share no numbers.
+"""
+
+from dataclasses import dataclass
+from math import cos, log, pi, sqrt
+from typing import Annotated
+
+from . import mrg32k3a
+from .ranges import check
+
+
+@dataclass(frozen=True, slots=True)
+class Params:
+    """Parameters; a value outside its declared range raises ValueError."""
+
+    enabled: Annotated[bool, "", "noise of the raw voltage"] = False
+    standard_deviation: Annotated[
+        float, "V", "standard deviation of a sample of the raw voltage", (0.0, 10.0)
+    ] = 0.005
+    seed: Annotated[int, "", "equal seeds, equal noise", (0, 1_000_000_000)] = 1
+
+    def __post_init__(self) -> None:
+        check("noise", self)
+
+
+def normal(s: mrg32k3a.State) -> tuple[float, mrg32k3a.State]:
+    """A number of the standard normal distribution, and the generator's state after it."""
+    u_1, s = mrg32k3a.uniform(s)
+    u_2, s = mrg32k3a.uniform(s)
+    return sqrt(-2.0 * log(u_1)) * cos(2.0 * pi * u_2), s

@@ -1,0 +1,39 @@
+"""A striped surface: the reflectance changes along the approach.
+
+Stripes of half a period each, by turns with the reflectance alpha and with ratio·alpha. At the gap
+equal to phase the sensor looks at the middle of a stripe of alpha; from one to the next the
+reflectance changes linearly over the length edge, since the spot of light is no point.
+"""
+
+from dataclasses import dataclass
+from math import floor
+from typing import Annotated
+
+from .ranges import check
+
+
+@dataclass(frozen=True, slots=True)
+class Params:
+    """Parameters; a value outside its declared range raises ValueError."""
+
+    enabled: Annotated[bool, "", "the surface is striped along the approach"] = False
+    ratio: Annotated[
+        float, "1", "reflectance of every other stripe relative to the first", (0.0, 1e3)
+    ] = 0.57
+    period: Annotated[float, "m", "length of two stripes along the gap", (1e-6, 10.0)] = 0.02
+    phase: Annotated[float, "m", "gap at the middle of a first stripe", (-10.0, 10.0)] = 0.0
+    edge: Annotated[float, "m", "length over which stripes blend, a spot of light", (1e-9, 1.0)] = (
+        0.002
+    )
+
+    def __post_init__(self) -> None:
+        check("pattern", self)
+
+
+def factor(p: Params, l: float) -> float:
+    """The reflectance at a gap of l m relative to that of the first stripes."""
+    turns = (l - p.phase) / p.period
+    from_middle = abs(turns - floor(turns) - 0.5)
+    first = 0.5 + (from_middle - 0.25) * p.period / p.edge
+    first = 0.0 if first < 0.0 else 1.0 if first > 1.0 else first
+    return first + (1.0 - first) * p.ratio

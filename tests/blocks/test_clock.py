@@ -1,0 +1,87 @@
+"""The sampling instants, against exact arithmetic."""
+
+from fractions import Fraction
+from itertools import pairwise
+from math import ceil
+from random import Random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from proximity_sensor import clock
+from proximity_sensor.clock import Params
+
+QUICK = settings(deadline=None, derandomize=True, max_examples=100)
+
+
+def counted(p: Params, steps: list[float]) -> tuple[int, float]:
+    """Samples within the steps, from an instant on, and the wait at their end."""
+    total, wait = 0, 0.0
+    for h in steps:
+        n, wait = clock.samples(p, wait, h)
+        total += n
+    return total, wait
+
+
+@pytest.mark.parametrize(
+    ("step", "rate"),
+    [(1e-4, 1e4), (1e-3, 1e4), (1e-5, 1e4), (3e-4, 1e4), (1 / 3e4, 1e4), (1e-3, 44_100.0),
+     (1e-4, 3333.0), (1 / 256, 1e4), (2.5e-5, 1e4), (7e-4, 1e3), (1e-6, 1e6)],
+)  # fmt: skip
+def test_equal_steps_miss_none_and_add_none(step: float, rate: float) -> None:
+    """The step and the rate as decimals or fractions: what they are meant to be."""
+    periods = Fraction(step).limit_denominator(10**7) * Fraction(rate)
+    total, wait = 0, 0.0
+    for k in range(1, 10_001):
+        n, wait = clock.samples(Params(rate), wait, step)
+        total += n
+        assert total == ceil(k * periods)
+    assert wait == pytest.approx(float(ceil(10_000 * periods) - 10_000 * periods), abs=1e-8)
+
+
+@QUICK
+@given(st.lists(st.integers(1, 5_000_000), min_size=1, max_size=40), st.floats(1.0, 1e6))
+def test_any_steps_of_whole_nanoseconds(nanoseconds: list[int], rate: float) -> None:
+    """Unless an instant is so near that rounding decides; then it counts as reached."""
+    periods = Fraction(sum(nanoseconds), 10**9) * Fraction(rate)
+    total, wait = counted(Params(rate), [n * 1e-9 for n in nanoseconds])
+    expected = ceil(periods - Fraction(clock.TOLERANCE))
+    near = abs(periods - Fraction(clock.TOLERANCE) - round(periods)) < Fraction(1, 10**8)
+    assert total == expected or near
+    assert wait == pytest.approx(float(total - periods), abs=1e-7)
+
+
+@QUICK
+@given(st.integers(1, 30), st.integers(0, 2**32), st.floats(1.0, 1e5))
+def test_any_split_of_a_time_has_the_same_samples(parts: int, seed: int, rate: float) -> None:
+    """Masters give steps as differences of rounded times, here of no particular size."""
+    rng = Random(seed)
+    times = [0.0, *sorted(rng.uniform(0.0, 0.1) for _ in range(parts - 1)), 0.1]
+    steps = [b - a for a, b in pairwise(times) if b > a]
+    whole, wait = counted(Params(rate), [0.1])
+    split, wait_split = counted(Params(rate), steps)
+    assert split == whole
+    assert wait_split == pytest.approx(wait, abs=1e-9)
+
+
+def test_an_instant_at_the_end_of_a_step_is_left_to_the_next() -> None:
+    p = Params(1e4)
+    assert clock.samples(p, 0.0, 1e-4) == (1, 0.0)
+    assert clock.samples(p, 0.5, 0.5e-4) == (0, 0.0)
+    assert clock.due(0.0)
+
+
+def test_rounding_does_not_move_an_instant() -> None:
+    for off in (1e-9, -1e-9):
+        assert clock.due(off)
+        n, wait = clock.samples(Params(1e4), off, 1e-4)
+        assert n == 1
+        assert wait == pytest.approx(off, abs=1e-15)
+    assert not clock.due(1e-5)
+
+
+def test_steps_too_short_to_matter_add_up() -> None:
+    """A step of a tenth of the tolerance: the sample is taken, once."""
+    total, wait = counted(Params(1e4), [1e-11] * 1000)
+    assert total == 1
+    assert wait == pytest.approx(1.0 - 1e-4, abs=1e-12)

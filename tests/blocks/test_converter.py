@@ -1,0 +1,77 @@
+"""The analogue-to-digital converter against its definition."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from proximity_sensor import converter
+from proximity_sensor.converter import Params
+
+QUICK = settings(deadline=None, derandomize=True, max_examples=200)
+
+CONVERTERS = st.builds(
+    lambda bits, low, span: Params(True, bits, (low, low + span)),
+    st.integers(1, 24),
+    st.floats(-20.0, 5.0),
+    st.floats(0.1, 20.0),
+)
+
+
+def levels(p: Params) -> tuple[float, float, float]:
+    """Lowest and highest level, and the step between them."""
+    low, high = p.range
+    step = (high - low) / 2.0**p.bits
+    return low, high - step, step
+
+
+@QUICK
+@given(CONVERTERS, st.floats(0.0, 1.0))
+def test_within_the_range_it_is_half_a_step_off_at_most(p: Params, part: float) -> None:
+    lowest, highest, step = levels(p)
+    v = lowest + part * (highest - lowest)
+    assert abs(converter.converted(p, v) - v) <= 0.5 * step * (1.0 + 1e-6)
+
+
+@QUICK
+@given(CONVERTERS, st.floats(-50.0, 50.0))
+def test_it_gives_one_of_its_levels(p: Params, v: float) -> None:
+    lowest, _, step = levels(p)
+    code = (converter.converted(p, v) - lowest) / step
+    assert code == pytest.approx(round(code), abs=1e-6)
+    assert -0.5 < code < 2.0**p.bits - 0.5
+
+
+@QUICK
+@given(CONVERTERS, st.floats(0.0, 1e6))
+def test_it_saturates(p: Params, beyond: float) -> None:
+    lowest, highest, step = levels(p)
+    assert converter.converted(p, lowest - beyond) == lowest
+    assert converter.converted(p, highest + 0.5 * step + beyond) == pytest.approx(highest, abs=1e-9)
+
+
+def test_twelve_bits_of_five_volts() -> None:
+    p = Params(True, 12, (0.0, 5.0))
+    v = np.random.default_rng(1).uniform(-1.0, 6.0, 2000)
+    codes = np.clip(np.floor(v / 5.0 * 4096 + 0.5), 0, 4095)
+    assert [converter.converted(p, float(x)) for x in v] == (codes * 5.0 / 4096).tolist()
+
+
+def test_its_error_is_that_of_rounding() -> None:
+    """Even, of variance step^2/12."""
+    p = Params(True, 8, (0.0, 2.0))
+    _, _, step = levels(p)
+    v = np.random.default_rng(2).uniform(0.1, 1.9, 20_000)
+    error = np.array([converter.converted(p, float(x)) for x in v]) - v
+    assert abs(error.mean()) < 4.0 * step / np.sqrt(12 * 20_000)
+    assert error.var() == pytest.approx(step**2 / 12.0, rel=0.03)
+
+
+def test_sixteen_bits_have_a_level_at_zero() -> None:
+    assert converter.converted(Params(True), 1e-6) == 0.0
+
+
+@pytest.mark.parametrize("ends", [(5.0, 5.0), (5.0, -5.0)])
+def test_a_range_without_an_inside_is_refused(ends: tuple[float, float]) -> None:
+    with pytest.raises(ValueError, match="the second must be above the first") as caught:
+        Params(range=ends)
+    assert str(caught.value).startswith(f"adc.range = {ends[0]}, {ends[1]} V: ")

@@ -1,0 +1,107 @@
+"""The low-pass filter against scipy's, and against what a Butterworth filter is."""
+
+from math import pi, tan
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from proximity_sensor import low_pass
+from proximity_sensor.low_pass import Coefficients
+from scipy import signal
+
+QUICK = settings(deadline=None, derandomize=True, max_examples=100)
+
+PUBLISHED = low_pass.coefficients(500.0, 10_000.0)
+
+CUTOFFS = st.floats(1e-3, 0.49)
+"""As a fraction of the sampling rate."""
+
+
+def polynomials(c: Coefficients) -> tuple[list[float], list[float]]:
+    """Numerator and denominator, multiplied out."""
+    b, a, *sections = c
+    above, below = np.array([b, b]), np.array([1.0, a])
+    for b_0, a_1, a_2 in sections:
+        above = np.convolve(above, [b_0, 2.0 * b_0, b_0])
+        below = np.convolve(below, [1.0, a_1, a_2])
+    return above.tolist(), below.tolist()
+
+
+def run(c: Coefficients, samples: list[float], start: float) -> list[float]:
+    z = low_pass.settled(c, start)
+    results = []
+    for v in samples:
+        y, z = low_pass.filtered(c, z, v)
+        results.append(y)
+    return results
+
+
+def test_the_published_filter_is_scipys() -> None:
+    b, a = signal.butter(5, 500, fs=10_000)
+    above, below = polynomials(PUBLISHED)
+    np.testing.assert_allclose(above, b, rtol=1e-12, atol=0.0)
+    np.testing.assert_allclose(below, a, rtol=1e-12, atol=0.0)
+
+
+@pytest.mark.parametrize("cutoff", [50.0, 137.0, 500.0, 1000.0, 2500.0, 4000.0, 4900.0])
+def test_other_filters_are_scipys_too(cutoff: float) -> None:
+    """scipy goes through the poles, which costs it digits where they are close together."""
+    b, a = signal.butter(5, cutoff, fs=10_000)
+    above, below = polynomials(low_pass.coefficients(cutoff, 10_000.0))
+    np.testing.assert_allclose(above, b, rtol=1e-11, atol=0.0)
+    np.testing.assert_allclose(below, a, rtol=0.0, atol=1e-12)
+
+
+@QUICK
+@given(CUTOFFS)
+def test_the_magnitude_is_butterworths(part: float) -> None:
+    """1 / sqrt(1 + (tan(pi·f) / tan(pi·part))^10): 1 at rest, -3 dB at the cutoff, then down."""
+    b, a, *sections = low_pass.coefficients(part, 1.0)
+    for f in (0.0, 0.5 * part, part, 0.5 * (part + 0.5)):
+        z = np.exp(-2j * pi * f)
+        h = b * (1.0 + z) / (1.0 + a * z)
+        for b_0, a_1, a_2 in sections:
+            h *= b_0 * (1.0 + z) ** 2 / (1.0 + a_1 * z + a_2 * z * z)
+        expected = (1.0 + (np.tan(pi * f) / np.tan(pi * part)) ** 10) ** -0.5
+        assert abs(h) == pytest.approx(expected, rel=1e-6)
+
+
+@QUICK
+@given(CUTOFFS)
+def test_it_is_stable(part: float) -> None:
+    _, a, *sections = low_pass.coefficients(part, 1.0)
+    assert abs(a) < 1.0
+    for _, a_1, a_2 in sections:
+        assert abs(a_2) < 1.0
+        assert abs(a_1) < 1.0 + a_2
+
+
+def test_the_samples_are_scipys() -> None:
+    samples = np.random.default_rng(3).normal(size=1000)
+    sections = signal.butter(5, 500, fs=10_000, output="sos")
+    expected, _ = signal.sosfilt(sections, samples, zi=0.7 * signal.sosfilt_zi(sections))
+    np.testing.assert_allclose(run(PUBLISHED, samples.tolist(), 0.7), expected, atol=1e-13)
+
+
+@QUICK
+@given(CUTOFFS, st.floats(-100.0, 100.0))
+def test_it_starts_settled(part: float, v: float) -> None:
+    values = run(low_pass.coefficients(part, 1.0), [v] * 50, v)
+    assert values == pytest.approx([v] * 50, rel=1e-9)
+
+
+def test_a_ramp_comes_a_millisecond_late() -> None:
+    """The sum of the sections' delays: (1 + 2·cos(pi/5) + 2·cos(2·pi/5)) / 2k periods."""
+    values = run(PUBLISHED, [float(k) for k in range(500)], 0.0)
+    late = (1.0 + 5.0**0.5) / (2.0 * tan(0.05 * pi))
+    assert 499.0 - values[-1] == pytest.approx(late, rel=1e-9)
+    assert late == pytest.approx(10.2, abs=0.05)
+
+
+def test_it_settles_on_a_step_and_overshoots_as_it_should() -> None:
+    """12.8 % for a Butterworth filter of 5th order."""
+    values = run(PUBLISHED, [1.0] * 300, 0.0)
+    assert values[0] == pytest.approx(signal.butter(5, 500, fs=10_000)[0][0], rel=1e-12)
+    assert max(values) == pytest.approx(1.128, abs=0.002)
+    assert values[-1] == pytest.approx(1.0, abs=1e-9)
