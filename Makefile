@@ -29,7 +29,7 @@ bench: .venv/dev
 
 cards: .venv/run
 	$(BIN)/python -m grasp_fmus.cards plant/README.md=gripper_plant.rigid \
-		sensor/README.md=proximity_sensor.optics controller/README.md=grasp_controller.series
+		sensor/README.md=proximity_sensor.channel controller/README.md=grasp_controller.series
 
 .venv/run: pyproject.toml constraints.txt
 	$(if $(PYTHON),,$(error grasp-cosim needs Python 3.11 or newer; name one with PYTHON=...))
