@@ -66,6 +66,7 @@ class Bench:
         self._failsafe = _failsafe(interface, self.peer, serving.failsafe)
         self._model = Model(interface, signature)
         self._values: list[Value] = []
+        self._in_session = False
         self._deadline: int | None = None  # of the next own step
         self._step_ns = 0
         self._heard: int | None = None  # the last request, while the watchdog watches
@@ -94,6 +95,7 @@ class Bench:
             return None
         if action.fresh:
             self._end("another session takes its place")
+            self._in_session = True
             self._say(f"a session of {source} begins at t = {action.time:.9g} s")
         try:
             self._do(action, now)
@@ -114,7 +116,7 @@ class Bench:
             self._model.begin()
             self._model.set(request.values)
             if self._deadline is None:
-                self._step_ns = self._serving.step_ns or round(request.step * NANOSECONDS)
+                self._step_ns = self._serving.step_ns or max(1, round(request.step * NANOSECONDS))
                 self._deadline = now + self._step_ns
 
     def look(self, now: int) -> None:
@@ -147,11 +149,11 @@ class Bench:
 
     def _end(self, reason: str) -> None:
         """End the session under way, if there is one."""
-        running, self._own_failure = bool(self._values), ""
+        was_one, self._in_session = self._in_session, False
         self._deadline = self._heard = None
-        self._values = []
+        self._own_failure = ""
         self._model.close()
-        if running:
+        if was_one:
             self.served.sessions += 1
             self._say(f"the session is over at t = {self._model.time:.9g} s: {reason}")
 
