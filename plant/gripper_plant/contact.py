@@ -13,18 +13,21 @@ the constraint g = 0 hold in Baumgarte's stabilised form
 and never less than zero: the object pushes, it does not hold. Card: plant/README.md
 """
 
-from math import ceil, inf, sqrt
+from math import inf, sqrt
+
+from . import friction
+from . import substeps as own
 
 Finger = tuple[float, float, float]
 """Position s in m and velocity in m/s (opening positive), contact force in N (>= 0)."""
 
-SUBSTEP_RATIO = 0.1
-"""Longest sub-step as a fraction of the contact's fastest time constant."""
+ITERATIONS = 8
+"""To find the contact force beside friction: each leaves 1/19 of the error, or less."""
 
 
 def substeps(alpha: float, beta: float, h: float) -> int:
     """Number of equal sub-steps that resolve the contact (alpha, beta in 1/s) within h seconds."""
-    return max(1, ceil(h * max(2.0 * alpha, beta) / SUBSTEP_RATIO - 1e-9))
+    return own.count(max(2.0 * alpha, beta), h)
 
 
 def time_to_contact(gap: float, rate: float, acceleration: float) -> float:
@@ -43,13 +46,23 @@ def time_to_contact(gap: float, rate: float, acceleration: float) -> float:
 
 
 def advance(
-    s: float, v: float, surface: float, m: float, f: float, alpha: float, beta: float, h: float
+    s: float,
+    v: float,
+    surface: float,
+    m: float,
+    f: float,
+    alpha: float,
+    beta: float,
+    h: float,
+    rub: friction.Law = friction.NONE,
 ) -> Finger:
     """Advance a finger of m kg at s m with v m/s by h seconds, the actuator force f in N held.
 
     surface is where the object begins, in m; alpha and beta are the stabilisation rates in 1/s.
-    Free flight is exact, and so is the moment of contact within a sub-step.
+    Without friction free flight is exact, and so is the moment of contact within a sub-step.
     """
+    if friction.acts(rub):
+        return _advance_rubbing(s, v, surface, m, f, alpha, beta, h, rub)
     if time_to_contact(s - surface, v, f / m) >= h:
         return _fly(s, v, f / m, h)
     contact_force = 0.0
@@ -65,6 +78,59 @@ def advance(
                 s = surface
             s, v, contact_force = _touch(s, v, surface, m, f, alpha, beta, d - free)
     return s, v, contact_force
+
+
+def _advance_rubbing(
+    s: float,
+    v: float,
+    surface: float,
+    m: float,
+    f: float,
+    alpha: float,
+    beta: float,
+    h: float,
+    rub: friction.Law,
+) -> Finger:
+    """advance() of a finger with friction, which acts beside the contact force."""
+    contact_force = 0.0
+    n = own.count(max(2.0 * alpha, beta, friction.rate(rub, m)), h)
+    d = h / n
+    for _ in range(n):
+        after, rate = friction.move(s, v, m, f, rub, d)
+        if after > surface:
+            s, v, contact_force = after, rate, 0.0
+            continue
+        free = min(d, time_to_contact(s - surface, v, (rate - v) / d)) if s > surface else 0.0
+        if free > 0.0:
+            _, v = friction.move(s, v, m, f, rub, free)
+            s = surface
+        s, v, contact_force = _touch_rubbing(s, v, surface, m, f, alpha, beta, d - free, rub)
+    return s, v, contact_force
+
+
+def _touch_rubbing(
+    s: float,
+    v: float,
+    surface: float,
+    m: float,
+    f: float,
+    alpha: float,
+    beta: float,
+    d: float,
+    rub: friction.Law,
+) -> Finger:
+    """One step of the stabilised constraint beside friction; the contact force is held over it.
+
+    The force is that of the mean rate and the mean gap, found by iteration. It takes the energy
+    2·alpha·m·d·(mean velocity)^2 and gives none.
+    """
+    contact_force = max(0.0, -f)
+    after, rate = s, v
+    for _ in range(ITERATIONS if d > 0.0 else 0):
+        after, rate = friction.move(s, v, m, f + contact_force, rub, d)
+        mean_rate, mean_gap = (after - s) / d, 0.5 * (s + after) - surface
+        contact_force = max(0.0, -m * (2.0 * alpha * mean_rate + beta * beta * mean_gap) - f)
+    return after, rate, contact_force if after <= surface else 0.0
 
 
 def _fly(s: float, v: float, acceleration: float, d: float) -> Finger:

@@ -1,6 +1,6 @@
 """What the parameters of a block declare about themselves: names, units and valid ranges."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass
 from math import inf, nan, nextafter
 from typing import Any, get_type_hints
 
@@ -29,11 +29,11 @@ class Parameter:
 
 
 def parameters(block: type[Any]) -> list[Parameter]:
-    """The parameters of a block that are numbers."""
+    """The parameters of a block, or of a part of one, that are numbers; not those of its parts."""
     default = block()
     found = []
     for name, hint in get_type_hints(block, include_extras=True).items():
-        if hint.__origin__ is not bool:
+        if not is_dataclass(hint) and hint.__origin__ is not bool:
             unit, _, (low, high), *_ = hint.__metadata__
             found.append(Parameter(name, unit, low, high, getattr(default, name)))
     return found

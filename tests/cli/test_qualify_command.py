@@ -52,7 +52,7 @@ def test_a_copy_is_qualified(qualify: Run, fmus: Path) -> None:
 
 def test_all_that_it_writes(qualify: Run, altered: Altered) -> None:
     heavy = altered(
-        "GripperPlant", "gripper_plant/rigid.py", BEFORE, BEFORE.replace("0.5)", "0.6)")
+        "GripperPlant", "gripper_plant/fingers.py", BEFORE, BEFORE.replace("0.5)", "0.6)")
     )
     code, out, err = qualify(heavy, "--as", "plant", *SHORT, "--out", "results", "--json")
     assert code == 1
@@ -71,7 +71,7 @@ def test_all_that_it_writes(qualify: Run, altered: Altered) -> None:
 
 def test_a_table_puts_the_worst_first(qualify: Run, altered: Altered) -> None:
     heavy = altered(
-        "GripperPlant", "gripper_plant/rigid.py", BEFORE, BEFORE.replace("0.5)", "0.6)")
+        "GripperPlant", "gripper_plant/fingers.py", BEFORE, BEFORE.replace("0.5)", "0.6)")
     )
     code, out, _ = qualify(heavy, "--as", "plant", *SHORT)
     assert code == 1
@@ -94,7 +94,7 @@ def test_a_candidate_that_does_not_fit_is_not_run_nor_drawn(qualify: Run, fmus: 
 
 def test_bands_and_values_are_taken(qualify: Run, altered: Altered, tmp_path: Path) -> None:
     heavy = altered(
-        "GripperPlant", "gripper_plant/rigid.py", BEFORE, BEFORE.replace("0.5)", "0.6)")
+        "GripperPlant", "gripper_plant/fingers.py", BEFORE, BEFORE.replace("0.5)", "0.6)")
     )
     (tmp_path / "bands.toml").write_text('[signals]\n"*" = { absolute = inf }\n')
     bands = ["--bands", tmp_path / "bands.toml"]

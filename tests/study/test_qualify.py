@@ -24,7 +24,8 @@ def short(grasp: System) -> System:
 def heavy(altered: Altered) -> Path:
     """The plant with a heavier second finger, which its model description tells."""
     before = "(1e-3, 1e3)] = (0.5, 0.5)"
-    return altered("GripperPlant", "gripper_plant/rigid.py", before, before.replace("0.5)", "0.6)"))
+    after = before.replace("0.5)", "0.6)")
+    return altered("GripperPlant", "gripper_plant/fingers.py", before, after)
 
 
 def by_name(compared: tuple[Compared, ...]) -> dict[str, Compared]:
@@ -115,7 +116,7 @@ def test_a_written_band_file_gives_the_same_verdict(
     assert second.numerics == ()
 
 
-FORCE = "u_1, u_2 = u.force"
+FORCE = "u_1, u_2 = fingers.forces(p.actuator, u)"
 
 
 def test_a_candidate_that_fails_on_the_way(short: System, altered: Altered) -> None:
@@ -137,7 +138,7 @@ def test_a_candidate_that_refuses_its_parameters(short: System, altered: Altered
     before = "right, left = self.initial_position"
     trap = "if self.initial_object_position == 0.01:\n            raise ValueError('no licence')"
     refuse = f"{trap}\n        {before}"
-    fmu = altered("GripperPlant", "gripper_plant/rigid.py", before, refuse)
+    fmu = altered("GripperPlant", "gripper_plant/fingers.py", before, refuse)
     moved = short.with_values({"plant.initial_object_position": 0.01})
     found = qualify(moved, "plant", fmu, isolation="none")
     assert not found.qualified

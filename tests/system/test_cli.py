@@ -174,7 +174,7 @@ def test_nothing_to_draw_is_found_at_once(command: Run, fmus: Path, tmp_path: Pa
 def test_a_vendor_plant_with_one_more_input(command: Run, altered: Altered) -> None:
     force = 'actuator force on the finger", 1.0] = (0.0, 0.0)\n'
     ambient = '    ambient: Annotated[float, "K", "temperature", 300.0] = 300.0\n'
-    fmu = altered("GripperPlant", "gripper_plant/rigid.py", force, force + ambient)
+    fmu = altered("GripperPlant", "gripper_plant/fingers.py", force, force + ambient)
     code, _, err = command("run", "--stop", "0.01", "--swap", f"plant={fmu}")
     assert code == 2
     assert "input plant.ambient has no source" in err
@@ -224,6 +224,8 @@ def test_build_names_what_it_built(command: Run, tmp_path: Path) -> None:
     assert [p.name for p in built] == [
         "GraspController.fmu",
         "GripperPlant.fmu",
+        "GripperPlantCompliant.fmu",
+        "GripperPlantMovable.fmu",
         "ProximitySensor.fmu",
     ]
     assert all((tmp_path / p).is_file() for p in built)
@@ -236,7 +238,8 @@ def test_the_built_in_grasp_builds_its_fmus(tmp_path: Path) -> None:
     )  # fmt: skip
     assert json.loads(done.stdout)["steps"] == 100
     assert sorted(p.name for p in (tmp_path / "fmus/build").glob("*.fmu")) == [
-        "GraspController.fmu", "GripperPlant.fmu", "ProximitySensor.fmu",
+        "GraspController.fmu", "GripperPlant.fmu", "GripperPlantCompliant.fmu",
+        "GripperPlantMovable.fmu", "ProximitySensor.fmu",
     ]  # fmt: skip
 
 

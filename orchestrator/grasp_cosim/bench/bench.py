@@ -66,8 +66,8 @@ class Bench:
             raise InputError(str(error)) from error
         self._failsafe = _failsafe(interface, self.peer, serving.failsafe)
         self._model = Model(interface, signature)
-        self._running = False  # a session
         self._values: list[Value] = []
+        self._in_session = False
         self._deadline: int | None = None  # of the next own step
         self._step_ns = 0
         self._heard: int | None = None  # the last request, while the watchdog watches
@@ -96,6 +96,7 @@ class Bench:
             return None
         if action.fresh:
             self._end("another session takes its place")
+            self._in_session = True
             self._say(f"a session of {source} begins at t = {action.time:.9g} s")
         try:
             self._do(action, now)
@@ -106,7 +107,7 @@ class Bench:
     def _do(self, request: Request, now: int) -> None:
         if self._own_failure:
             raise SimulationError(self._own_failure)
-        self._running, self._values = True, request.values
+        self._values = request.values
         if request.kind == INITIALISE:
             self._model.initialise(request.time, request.values, request.fresh)
         elif self._serving.lockstep:
@@ -160,11 +161,11 @@ class Bench:
 
     def _end(self, reason: str) -> None:
         """End the session under way, if there is one."""
-        running, self._running, self._own_failure = self._running, False, ""
+        was_one, self._in_session = self._in_session, False
         self._deadline = self._heard = None
-        self._values = []
+        self._own_failure = ""
         self._model.close()
-        if running:
+        if was_one:
             self.served.sessions += 1
             self._say(f"the session is over at t = {self._model.time:.9g} s: {reason}")
 

@@ -1,0 +1,98 @@
+"""The two fingers, Eq. (1):  m_j·x_j'' = u_j + f_cj,  and what every plant with them declares.
+
+The x axis is fixed to the wrist and points right. Finger 1 is the right one: it closes with
+u_1 < 0 and the object pushes it back with f_c1 >= 0. Finger 2 mirrors it. Card: plant/README.md
+"""
+
+from dataclasses import dataclass, field
+from math import copysign
+from typing import Annotated, NamedTuple, TypeAlias
+
+from . import friction as finger_friction
+from .ranges import check
+
+Pair = tuple[float, float]
+"""A value per finger: right, left."""
+
+
+@dataclass(frozen=True, slots=True)
+class Actuator:
+    """Parameters; a value outside its declared range raises ValueError."""
+
+    force_limit: Annotated[
+        Pair, "N", "largest force of the actuator, either way; 0 is no limit", (0.0, 1e6)
+    ] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        check(self, "actuator.")
+
+
+@dataclass(frozen=True, slots=True)
+class Params:
+    """Parameters of every plant; a value outside its declared range raises ValueError."""
+
+    finger_mass: Annotated[Pair, "kg", "m_j, mass of the finger", (1e-3, 1e3)] = (0.5, 0.5)
+    initial_position: Annotated[
+        Pair, "m", "x_init,j, position of the fingertip at the start", (-10.0, 10.0)
+    ] = (0.11, -0.11)
+    object_width: Annotated[float, "m", "W, width of the object", (0.0, 10.0)] = 0.07
+    initial_object_position: Annotated[
+        float, "m", "x_m, centre of the object at the start", (-10.0, 10.0)
+    ] = 0.03
+    friction: finger_friction.Params = field(default=finger_friction.Params(), kw_only=True)
+    actuator: Actuator = field(default=Actuator(), kw_only=True)
+
+    def __post_init__(self) -> None:
+        check(self)
+        right, left = self.initial_position
+        x_m, w = self.initial_object_position, self.object_width
+        if not left <= x_m - 0.5 * w <= x_m + 0.5 * w <= right:
+            raise ValueError(
+                f"object_width = {w!r} m at initial_object_position = {x_m!r} m: the object spans "
+                f"{x_m - 0.5 * w:g} to {x_m + 0.5 * w:g} m, must fit between the fingertips at "
+                f"{left:g} and {right:g} m"
+            )
+
+
+class Inputs(NamedTuple):
+    """Held over the step."""
+
+    force: Annotated[Pair, "N", "u_j, actuator force on the finger", 1.0] = (0.0, 0.0)
+
+
+Position: TypeAlias = Annotated[Pair, "m", "x_j, position of the fingertip", 0.1, set()]
+Velocity: TypeAlias = Annotated[Pair, "m/s", "x_j', velocity of the fingertip", 0.1, set()]
+Gap: TypeAlias = Annotated[
+    Pair, "m", "l_j, distance from the sensor face to the object surface", 0.1, set()
+]
+ContactForce: TypeAlias = Annotated[
+    Pair, "N", "f_cj, force of the object on the finger", 1.0, set()
+]
+Contact: TypeAlias = Annotated[tuple[bool, bool], "", "the finger touches the object", set()]
+ObjectPosition: TypeAlias = Annotated[float, "m", "centre of the object", 0.1, set()]
+"""What every plant puts out, in this order."""
+
+
+def forces(p: Actuator, u: Inputs) -> Pair:
+    """u_j in N as the actuators bring them up."""
+    u_1, u_2 = u.force
+    most_1, most_2 = p.force_limit
+    return _limited(u_1, most_1), _limited(u_2, most_2)
+
+
+def surfaces(p: Params) -> Pair:
+    """Where the object begins for each finger at the start, in its own opening direction, m."""
+    x_m, half = p.initial_object_position, 0.5 * p.object_width
+    return half + x_m, half - x_m
+
+
+def reach(p: Params, velocity: Pair, u: Inputs, h: float) -> Pair:
+    """How far the fingers can get within h seconds, without what holds them back, m."""
+    m_1, m_2 = p.finger_mass
+    v_1, v_2 = velocity
+    u_1, u_2 = forces(p.actuator, u)
+    return h * (abs(v_1) + 0.5 * h * abs(u_1) / m_1), h * (abs(v_2) + 0.5 * h * abs(u_2) / m_2)
+
+
+def _limited(u: float, most: float) -> float:
+    return u if most == 0.0 or abs(u) <= most else copysign(most, u)

@@ -1,0 +1,102 @@
+"""A body that slides or sticks: Coulomb, viscous and Stribeck friction.
+
+    m·x'' = f - sgn(x')·F(|x'|)        F(v) = F_C + (F_S - F_C)·exp(-(v/v_s)^2) + B·v
+
+At rest friction takes up any force up to F_S, and the velocity is exactly zero.
+Card: plant/README.md
+"""
+
+from dataclasses import dataclass
+from math import copysign, exp
+from typing import Annotated
+
+from .ranges import check
+
+Pair = tuple[float, float]
+"""A value per finger: right, left."""
+
+Law = tuple[float, float, float, float]
+"""F_C in N, F_S in N (>= F_C), B in N.s/m, v_s in m/s (> 0)."""
+
+Motion = tuple[float, float]
+"""Position in m and velocity in m/s."""
+
+NONE: Law = (0.0, 0.0, 0.0, 1.0)
+"""No friction."""
+
+
+@dataclass(frozen=True, slots=True)
+class Params:
+    """Parameters; a value outside its declared range raises ValueError."""
+
+    coulomb: Annotated[Pair, "N", "F_Cj, Coulomb friction of the finger", (0.0, 1e3)] = (0.0, 0.0)
+    static: Annotated[
+        Pair, "N", "F_Sj, breakaway force of the finger; less than F_Cj counts as F_Cj", (0.0, 1e3)
+    ] = (0.0, 0.0)
+    viscous: Annotated[Pair, "N.s/m", "B_j, viscous friction of the finger", (0.0, 1e3)] = (
+        0.0,
+        0.0,
+    )
+    stribeck_velocity: Annotated[
+        float, "m/s", "v_s, velocity over which friction falls from F_Sj to F_Cj", (1e-6, 1e3)
+    ] = 0.01
+
+    def __post_init__(self) -> None:
+        check(self, "friction.")
+
+
+def laws(p: Params) -> tuple[Law, Law]:
+    """The friction of either finger."""
+    c_1, c_2 = p.coulomb
+    s_1, s_2 = p.static
+    b_1, b_2 = p.viscous
+    v_s = p.stribeck_velocity
+    return (c_1, max(c_1, s_1), b_1, v_s), (c_2, max(c_2, s_2), b_2, v_s)
+
+
+def acts(law: Law) -> bool:
+    """Whether there is any friction."""
+    _, static, viscous, _ = law
+    return static > 0.0 or viscous > 0.0
+
+
+def rate(law: Law, m: float) -> float:
+    """How fast friction slows down m kg, 1/s; a sub-step must resolve it."""
+    _, _, viscous, _ = law
+    return viscous / m
+
+
+def resistance(law: Law, speed: float) -> float:
+    """F(v) in N at a speed in m/s."""
+    coulomb, static, viscous, v_s = law
+    if static == coulomb:
+        return coulomb + viscous * speed
+    ratio = speed / v_s
+    return coulomb + (static - coulomb) * exp(-ratio * ratio) + viscous * speed
+
+
+def move(x: float, v: float, m: float, f: float, law: Law, d: float) -> Motion:
+    """Advance m kg at x m with v m/s by d seconds, the force f in N held.
+
+    Friction is held at the speed in the middle. The moment at which the body stops is met exactly:
+    there it stays, unless f exceeds the breakaway force.
+    """
+    if not acts(law):
+        after = v + d * f / m
+        return x + 0.5 * d * (v + after), after
+    _, static, _, _ = law
+    if v == 0.0 and abs(f) <= static:
+        return x, 0.0
+    way = copysign(1.0, v if v != 0.0 else f)
+    middle = way * v + 0.5 * d * (way * f - resistance(law, way * v)) / m
+    a = (f - way * resistance(law, max(0.0, middle))) / m
+    after = v + a * d
+    if way * after >= 0.0:
+        return x + 0.5 * d * (v + after), after
+    stop = -v / a
+    x += 0.5 * stop * v
+    if abs(f) <= static:
+        return x, 0.0
+    rest = d - stop
+    after = rest * (f - copysign(static, f)) / m
+    return x + 0.5 * rest * after, after
