@@ -2,36 +2,15 @@
 
 import json
 import os
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from grasp_cosim import System, cli
+from conftest import Run
 from grasp_cosim.cli.realtime import timing_lines
 from grasp_cosim.realtime.timing import Overrun, Spread, Timing
 from grasp_cosim.recording.load import load_run
 
-Run = Callable[..., tuple[int, str, str]]
 PACED = ("run", "--realtime", "--factor", "1000", "--step", "1e-3", "--stop", "0.5")
-
-
-@pytest.fixture
-def command(
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    grasp: System,
-    tmp_path: Path,
-) -> Run:
-    """Runs a command line in an empty folder; exit code, standard output, standard error."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("grasp_cosim.cli.frame.grasp_system", lambda: grasp)
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        code = cli.main(list(arguments))
-        out, err = capsys.readouterr()
-        return code, out, err
-
-    return run
 
 
 def test_the_timing_is_in_the_json_and_in_the_folder(command: Run, tmp_path: Path) -> None:
