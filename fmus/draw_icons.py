@@ -38,13 +38,27 @@ def main(folder: Path) -> None:
 
 def gripper_plant(axes: Axes) -> None:
     """Two fingers under a wrist, an object between them."""
-    _box(axes, 20, 16, 40, 184, RED)
-    _box(axes, 196, 16, 40, 184, BLUE)
-    _box(axes, 100, 196, 56, 48, GREY)
-    _box(axes, 12, 168, 232, 44, GREY)
+    _gripper(axes)
     _box(axes, 84, 24, 88, 108, AMBER)
     _arrow(axes, 56, 78, 26, 0, RED, 16)
     _arrow(axes, 200, 78, -26, 0, BLUE, 16)
+
+
+def gripper_plant_compliant(axes: Axes) -> None:
+    """The object gives where the fingers press."""
+    _gripper(axes)
+    waist = [(84, 24), (172, 24), (172, 54), (146, 78), (172, 102), (172, 132)]
+    axes.add_patch(Polygon([*waist, (84, 132), (84, 102), (110, 78), (84, 54)], color=AMBER, lw=0))
+    _arrow(axes, 56, 78, 48, 0, RED, 16)
+    _arrow(axes, 200, 78, -48, 0, BLUE, 16)
+
+
+def gripper_plant_movable(axes: Axes) -> None:
+    """One finger alone pushes the object over an edge, on a floor."""
+    _gripper(axes)
+    _box(axes, 70, 2, 116, 18, GREY)
+    axes.add_patch(Polygon([(90, 40), (162, 22), (186, 118), (114, 136)], color=AMBER, lw=0))
+    _arrow(axes, 56, 92, 46, 0, RED, 16)
 
 
 def proximity_sensor(axes: Axes) -> None:
@@ -82,11 +96,20 @@ def proxy(axes: Axes) -> None:
 
 ICONS: dict[str, Callable[[Axes], None]] = {
     "GripperPlant": gripper_plant,
+    "GripperPlantCompliant": gripper_plant_compliant,
+    "GripperPlantMovable": gripper_plant_movable,
     "ProximitySensor": proximity_sensor,
     "GraspController": grasp_controller,
     "Proxy": proxy,
 }
 """What draws the icon of each FMU, and of all proxies."""
+
+
+def _gripper(axes: Axes) -> None:
+    _box(axes, 20, 16, 40, 184, RED)
+    _box(axes, 196, 16, 40, 184, BLUE)
+    _box(axes, 100, 196, 56, 48, GREY)
+    _box(axes, 12, 168, 232, 44, GREY)
 
 
 def _box(axes: Axes, left: float, bottom: float, width: float, height: float, color: str) -> None:

@@ -77,6 +77,8 @@ def test_the_fmu_adapter_knows_no_physics_but_for_the_scripts() -> None:
     found = {(f, n) for f, n in imports(ROOT / "fmus/grasp_fmus") if n in OURS - {"grasp_fmus"}}
     assert found == {
         ("GripperPlant.py", "gripper_plant"),
+        ("GripperPlantCompliant.py", "gripper_plant"),
+        ("GripperPlantMovable.py", "gripper_plant"),
         ("ProximitySensor.py", "proximity_sensor"),
         ("GraspController.py", "grasp_controller"),
     }

@@ -52,7 +52,7 @@ def checkout(
 
 
 def test_there_is_something_to_try() -> None:
-    assert len(COMMANDS) == 18
+    assert len(COMMANDS) == 19
     assert len(EXAMPLES) == 1
 
 

@@ -5,6 +5,7 @@
 
 import importlib
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 from .contract import Block, Field, declared
@@ -12,27 +13,49 @@ from .contract import Block, Field, declared
 BEGIN, END = "<!-- variables -->\n", "<!-- end of variables -->\n"
 
 
-def updated(card: str, block: Block) -> str:
-    """The text of a card with its variable table up to date; ValueError without the marks."""
+def updated(card: str, blocks: Mapping[str, Block]) -> str:
+    """The text of the card of these blocks, by name, with its variables up to date.
+
+    ValueError without the marks.
+    """
     before, begin, rest = card.partition(BEGIN)
     _, end, after = rest.partition(END)
     if not (begin and end):
         raise ValueError(f"a card must have {BEGIN.strip()} and {END.strip()} around its table")
-    return f"{before}{BEGIN}{variable_table(block)}{END}{after}"
+    return f"{before}{BEGIN}{variable_tables(blocks)}{END}{after}"
 
 
-def variable_table(block: Block) -> str:
-    """The variables of a block as a Markdown table."""
+def variable_tables(blocks: Mapping[str, Block]) -> str:
+    """The variables of a block as a Markdown table; of several, what all have, then what each adds.
+
+    The blocks are given by name.
+    """
+    rows = {name: [_row(f) for f in declared(block)] for name, block in blocks.items()}
+    first, *others = rows.values()
+    if not others:
+        return _table(first)
+    common = [row for row in first if all(row in other for other in others)]
+    tables = [f"What all have:\n\n{_table(common)}"]
+    for name, own in rows.items():
+        added = _table([row for row in own if row not in common])
+        tables.append(f"What `{name}` adds:\n\n{added}")
+    return "\n".join(tables)
+
+
+def _table(rows: list[str]) -> str:
     lines = [
         "| variable | causality | unit | start | range | feedthrough of | meaning |",
         "|---|---|---|---|---|---|---|",
-    ]
-    lines += [
-        f"| `{_name(f)}` | {'tunable ' if f.tunable else ''}{f.causality} | {f.unit} "
-        f"| {_start(f)} | {_range(f)} | {_feedthrough(f)} | {f.description} |"
-        for f in declared(block)
+        *rows,
     ]
     return "\n".join(lines) + "\n"
+
+
+def _row(f: Field) -> str:
+    return (
+        f"| `{_name(f)}` | {'tunable ' if f.tunable else ''}{f.causality} | {f.unit} "
+        f"| {_start(f)} | {_range(f)} | {_feedthrough(f)} | {f.description} |"
+    )
 
 
 def _name(f: Field) -> str:
@@ -55,11 +78,14 @@ def _feedthrough(f: Field) -> str:
 
 
 def main(cards: list[str]) -> None:
-    """Update the cards, each given as CARD=MODULE."""
+    """Update the cards, each given as CARD=MODULE, or CARD=MODULE,MODULE,... for several blocks."""
     for card in cards:
-        path, _, module = card.partition("=")
-        block: Block = importlib.import_module(module)
-        text = updated(Path(path).read_text("utf-8"), block)
+        path, _, modules = card.partition("=")
+        blocks: dict[str, Block] = {
+            module.rpartition(".")[2]: importlib.import_module(module)
+            for module in modules.split(",")
+        }
+        text = updated(Path(path).read_text("utf-8"), blocks)
         Path(path).write_text(text, "utf-8")
 
 

@@ -113,7 +113,7 @@ class Connection:
     def _ask(self, request: bytes, deadline: int, repeat: bool) -> bool:
         """Send a request and wait for its answer until the deadline; whether it came."""
         self.refusal, self.trouble = None, ""
-        verdict, again = self._drain(), None
+        verdict, again = self._drain(deadline), None
         while verdict is Verdict.NOTHING and (now := self._clock()) < deadline:
             if again is None or now >= again:
                 self._send(request)
@@ -122,12 +122,14 @@ class Connection:
                 verdict = self._receive() or Verdict.NOTHING
         return verdict is Verdict.ANSWERED
 
-    def _drain(self) -> Verdict:
+    def _drain(self, deadline: int) -> Verdict:
         """Take what came since the last request, up to an answer to one that is repeated."""
         for _ in range(STALE):
             verdict = self._receive()
             if verdict is not Verdict.NOTHING:
                 return verdict or Verdict.NOTHING
+            if self._clock() >= deadline:  # large ones with a tag to check take their time
+                break
         return Verdict.NOTHING
 
     def _receive(self) -> Verdict | None:

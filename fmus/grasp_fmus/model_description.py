@@ -36,9 +36,11 @@ UNITS: dict[str, Unit] = {
     "s": Unit({"s": 1}),
     "1/s": Unit({"s": -1}),
     "Hz": Unit({"s": -1}),
+    "s/m": Unit({"s": 1, "m": -1}),
+    "rad": Unit({"rad": 1}),
     "1": Unit({}),
 }
-"""V.m^n is not among them: its exponent is a parameter."""
+"""V.m^n and N/m^n are not among them: their exponent is a parameter."""
 
 
 class Experiment(NamedTuple):

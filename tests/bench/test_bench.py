@@ -1,6 +1,8 @@
 """The bench without its socket: FMUs stepped by requests or by a clock that the test moves."""
 
 import math
+import re
+import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -137,6 +139,37 @@ def test_a_step_from_nowhere_fails_and_the_next_session_is_served(
     assert it.bench.counters()["failures"] == 1
     it.proxy.begin(2, starts(fmu))
     assert it.proxy.step(0.0, STEP, starts(fmu))
+
+
+@pytest.mark.parametrize("step", [5e-324, 4e-10, 1e10, 1e300])
+def test_a_step_that_no_clock_can_keep_fails_and_the_next_session_is_served(
+    fmus: Path, step: float, clocked: MakeClocked
+) -> None:
+    fmu = fmus / "ProximitySensor.fmu"
+    it = clocked(fmu, Serving())
+    it.proxy.begin(1, starts(fmu))
+    with pytest.raises(RuntimeError, match=r"step of .* s: must be from 1 ns to 1e\+09 s"):
+        it.proxy.step(0.0, step, starts(fmu))
+    assert it.bench.due() is None
+    it.proxy.begin(2, starts(fmu))
+    assert it.proxy.step(0.0, STEP, starts(fmu))
+
+
+def test_sessions_of_an_fmu_without_inputs_and_parameters_count(
+    fmus: Path, tmp_path: Path, clocked: MakeClocked
+) -> None:
+    sensor, fmu = fmus / "ProximitySensor.fmu", tmp_path / "Source.fmu"
+    with zipfile.ZipFile(sensor) as old, zipfile.ZipFile(fmu, "w") as new:
+        for name in old.namelist():
+            data = old.read(name)
+            if name == "modelDescription.xml":
+                data = re.sub(b'causality="(input|parameter)"', b'causality="local"', data)
+            new.writestr(name, data)
+    it = clocked(fmu, Serving(lockstep=True))
+    it.proxy.begin(1, [])
+    assert it.bench.counters()["sessions"] == 0
+    it.proxy.end()
+    assert it.bench.counters()["sessions"] == 1
 
 
 def test_a_parameter_that_the_fmu_refuses_is_said(fmus: Path, clocked: MakeClocked) -> None:

@@ -23,6 +23,9 @@ from proxies import build_proxy
 MOMENTS, PORTION = 200, 50
 TOLERATED = 3
 TIMEOUT = 0.02
+PATIENCE = 1.0
+"""s that a proxy waits for a peer that is killed before the run has begun."""
+
 STEPS = 150
 FAILSAFE = {"force[1]": -0.125, "force[2]": 0.25}
 
@@ -85,7 +88,6 @@ def proxied(grasp: System, tmp_path_factory: pytest.TempPathFactory) -> System:
         "intensity[2]": 0.2,
         "proxy.timeout": TIMEOUT,
         "proxy.misses_tolerated": TOLERATED,
-        "proxy.connect_timeout": 1.0,
         **{f"proxy.failsafe.{name}": value for name, value in FAILSAFE.items()},
         **dict.fromkeys(HELD, True),
     }
@@ -100,22 +102,27 @@ def run_until_killed(system: System, peers: Peers, seed: int) -> Result | None:
     chance = random.Random(seed)
     child, port = peers.start()
     policy = chance.choice(("failsafe", "hold", "stop"))
-    values: dict[str, Value] = {"controller.proxy.port": port, "controller.proxy.on_loss": policy}
     # One in twenty while it is loaded and initialised, the others in the run
-    early, late = chance.uniform(0.0, 0.1), chance.uniform(0.0, 0.05)
-    killer = threading.Timer(late if seed % 20 else early, peers.kill, [child])
-    if seed % 20 == 0:
+    early = seed % 20 == 0
+    values: dict[str, Value] = {
+        "controller.proxy.port": port,
+        "controller.proxy.on_loss": policy,
+        "controller.proxy.connect_timeout": PATIENCE if early else 60.0,
+    }
+    moment = chance.uniform(0.0, 0.1 if early else 0.05)
+    killer = threading.Timer(moment, peers.kill, [child])
+    if early:
         killer.start()
     try:
         with simulate.session(system.with_values(values)) as session:
-            if seed % 20:
+            if not early:
                 killer.start()
             while session.step(10):
                 pass
             return session.result()
     except InputError as error:
-        refused = f"no answer from 127.0.0.1:{port} within 1 s"
-        if refused not in str(error):
+        refused = f"no answer from 127.0.0.1:{port} within {PATIENCE:g} s"
+        if refused not in str(error) or not early:
             raise
         return None
     except SimulationError as error:

@@ -15,8 +15,9 @@ from pathlib import Path
 import pytest
 from echo_peer import EchoPeer, client
 from grasp_cosim import cli
+from grasp_cosim.bench.address import Address
 from grasp_cosim.bench.network import DIRECTIONS, Conditions, Network, Outage
-from grasp_cosim.bench.relay import MOST_CLIENTS, Address, Relay, relaying
+from grasp_cosim.bench.relay import MOST_CLIENTS, Relay, relaying
 from grasp_cosim.bench.traffic import Counters, Entry
 from grasp_cosim.errors import InputError
 from proxies import wait_until

@@ -157,6 +157,7 @@ def test_the_command_serves_until_it_is_interrupted(fmus: Path) -> None:
         (["--failsafe", "gap=wide"], "failsafe gap: gap = 'wide': must be a finite number"),
         (["--key-file", "{short}"], "key of 5 bytes: must have 16 or more"),
         (["--host", "192.0.2.1"], "192.0.2.1:5501: cannot listen there"),
+        (["--host", ""], ":5501: no such host; must be an IPv4 address or a name that has one"),
     ],
 )
 def test_wrong_input_is_one_line(
@@ -179,3 +180,23 @@ def test_a_bounded_service_ends_by_itself(fmus: Path, capsys: pytest.CaptureFixt
     fmu = str(fmus / "ProximitySensor.fmu")
     assert cli.main(["serve", fmu, "--port", "0", "--duration", "0.01"]) == 0
     assert capsys.readouterr().out == "nothing came\n"
+
+
+@pytest.mark.parametrize(
+    ("host", "key", "open_to_others"),
+    [("localhost", False, False), ("0.0.0.0", False, True), ("0.0.0.0", True, False)],
+)
+def test_it_says_who_may_take_part(
+    fmus: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    host: str,
+    key: bool,
+    open_to_others: bool,
+) -> None:
+    (tmp_path / "key").write_bytes(KEY)
+    given = ["--host", host, *(["--key-file", str(tmp_path / "key")] if key else [])]
+    command = ["serve", str(fmus / "ProximitySensor.fmu"), "--port", "0", "--duration", "0.01"]
+    assert cli.main([*command, *given]) == 0
+    err = capsys.readouterr().err
+    assert ("can be reached by others, who may take part" in err) == open_to_others

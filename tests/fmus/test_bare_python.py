@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import pytest
 from grasp_controller import series
-from gripper_plant import rigid
+from gripper_plant import compliant, movable, rigid
 from proximity_sensor import channel
 from pythons import VERSIONS, python
 
@@ -25,6 +25,8 @@ class Case(NamedTuple):
 
 CASES = {
     "GripperPlant": Case(rigid, rigid.Inputs(force=(-60.0, 45.0))),  # both fingers hit the object
+    "GripperPlantCompliant": Case(compliant, compliant.Inputs(force=(-60.0, 45.0))),
+    "GripperPlantMovable": Case(movable, movable.Inputs(force=(-60.0, 45.0))),
     "ProximitySensor": Case(channel, channel.Inputs(gap=0.0123)),
     "GraspController": Case(
         series,
@@ -90,5 +92,5 @@ def test_something_happens_within_the_steps(name: str) -> None:
     """The comparison above would see a difference."""
     outputs = without_fmu(CASES[name])
     assert any(value != (0.0).hex() for values in outputs.values() for value in values)
-    if name == "GripperPlant":
+    if name.startswith("GripperPlant"):
         assert all(outputs[f"contact[{j}]"][-1] == (1.0).hex() for j in (1, 2))

@@ -3,6 +3,7 @@
 import hmac
 import random
 import shutil
+import signal
 import socket
 import struct
 import subprocess
@@ -12,6 +13,7 @@ from hashlib import sha256
 from itertools import count
 from pathlib import Path
 from select import select
+from time import monotonic, sleep
 from typing import IO, NamedTuple
 
 import pytest
@@ -788,15 +790,33 @@ def test_a_target_with_a_clock_of_its_own(target: Path) -> None:
         assert positions[-1] < 0.11
 
 
+def test_a_target_that_was_away_for_long_does_not_race_after_its_clock(target: Path) -> None:
+    period = 2**-9
+    with Target(target, "-", str(period)) as bench:
+        bench.begin()
+        begin = monotonic()
+        for away in (True, False):
+            for _ in range(1000):  # in each of which it may do a period
+                request = bench.client.step(0.0, 0.1, bench.values(), 0)
+                assert bench.ask(request) is Verdict.ANSWERED
+            if away:
+                bench.process.send_signal(signal.SIGSTOP)
+                sleep(1.2)
+                bench.process.send_signal(signal.SIGCONT)
+        assert monotonic() - begin - bench.client.outputs_time > 1.0
+
+
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
         ([], 2, "usage"), (["65536"], 2, "usage"), (["0", "-", "-1"], 2, "usage"),
+        (["port"], 2, "usage"), ([""], 2, "usage"), (["0", "-", "1ms"], 2, "usage"),
+        (["0", "-", "1e-12"], 2, "usage"), (["0", "-", "nan"], 2, "usage"),
         (["0", "nowhere"], 2, "nowhere: cannot be read"), (["0", "/dev/null"], 2, "key of 0 bytes"),
     ],
 )  # fmt: skip
 def test_a_target_called_wrongly(target: Path, words: list[str], code: int, said: str) -> None:
-    done = subprocess.run([target, *words], capture_output=True, text=True)
+    done = subprocess.run([target, *words], capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stdout) == (code, "")
     assert said in done.stderr
 

@@ -23,8 +23,20 @@ STEPS, H = 20, 1e-3
 NOT_LOADED = 65
 """The host's exit code where the loader refuses the FMU."""
 
-INPUT = {"GripperPlant": "force[1]", "ProximitySensor": "gap", "GraspController": "position[2]"}
-VALUE = {"GripperPlant": -60.0, "ProximitySensor": 0.0123, "GraspController": -0.09}
+INPUT = {
+    "GripperPlant": "force[1]",
+    "GripperPlantCompliant": "force[1]",
+    "GripperPlantMovable": "force[1]",
+    "ProximitySensor": "gap",
+    "GraspController": "position[2]",
+}
+VALUE = {
+    "GripperPlant": -60.0,
+    "GripperPlantCompliant": -60.0,
+    "GripperPlantMovable": -60.0,
+    "ProximitySensor": 0.0123,
+    "GraspController": -0.09,
+}
 
 pytestmark = [
     pytest.mark.skipif(not shutil.which("gcc"), reason="NO gcc: no host to test with"),

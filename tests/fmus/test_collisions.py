@@ -21,6 +21,8 @@ H = 1e-3
 BLOCKS = {
     "GraspController": ROOT / "controller" / "grasp_controller",
     "GripperPlant": ROOT / "plant" / "gripper_plant",
+    "GripperPlantCompliant": ROOT / "plant" / "gripper_plant",
+    "GripperPlantMovable": ROOT / "plant" / "gripper_plant",
     "ProximitySensor": ROOT / "sensor" / "proximity_sensor",
 }
 ADAPTER = ROOT / "fmus" / "grasp_fmus"
@@ -110,6 +112,16 @@ PARAMETERS: dict[str, list[dict[str, float]]] = {
         {},
         {"finger_mass[1]": 0.8, "object_width": 0.1, "initial_object_position": 0.0},
         {"finger_mass[2]": 0.2, "baumgarte_alpha": 350.0},
+    ],
+    "GripperPlantCompliant": [
+        {},
+        {"finger_mass[1]": 0.8, "kelvin_voigt.stiffness": 400.0, "initial_object_position": 0.0},
+        {"finger_mass[2]": 0.2, "friction.static[1]": 0.5},
+    ],
+    "GripperPlantMovable": [
+        {},
+        {"object_mass": 0.2, "floor_friction": 0.6, "initial_object_position": 0.0},
+        {"finger_mass[2]": 0.2, "friction.static[1]": 0.5},
     ],
     "ProximitySensor": [{}, {"reflectance": 0.3}, {"gain": 0.01, "diffusion_exponent": 2.0}],
 }
@@ -212,12 +224,13 @@ import proximity_sensor.optics
 import grasp_controller.series
 import grasp_fmus.slave, grasp_fmus.contract, grasp_fmus.snapshot, grasp_fmus.host_log
 sys.path.insert(0, str(Path(grasp_fmus.__file__).parent / "scripts"))
-import GraspController, GripperPlant, ProximitySensor
+import GraspController, GripperPlant, GripperPlantCompliant, GripperPlantMovable, ProximitySensor
 MODULES = {
     name: module for name, module in sys.modules.items()
     if name.partition(".")[0] in (
         "gripper_plant", "proximity_sensor", "grasp_controller", "grasp_fmus",
-        "GraspController", "GripperPlant", "ProximitySensor",
+        "GraspController", "GripperPlant", "GripperPlantCompliant", "GripperPlantMovable",
+        "ProximitySensor",
     )
 }
 assert len(MODULES) > 15

@@ -18,7 +18,13 @@ from typing import Any
 import pytest
 from fmi2 import ERROR, OK, Fmu, Instance
 
-NAMES = ("GraspController", "GripperPlant", "ProximitySensor")
+NAMES = (
+    "GraspController",
+    "GripperPlant",
+    "GripperPlantCompliant",
+    "GripperPlantMovable",
+    "ProximitySensor",
+)
 BEFORE, CYCLES = 1000, 2000
 """The first cycles fill caches; growth is counted from there to the last."""
 

@@ -15,7 +15,13 @@ from fmi2 import DISCARD, ERROR, OK, Fmu, Instance, State
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-NAMES = ("GripperPlant", "ProximitySensor", "GraspController")
+NAMES = (
+    "GripperPlant",
+    "GripperPlantCompliant",
+    "GripperPlantMovable",
+    "ProximitySensor",
+    "GraspController",
+)
 
 ANY = st.floats(width=64)
 SENSIBLE = st.sampled_from([0.0, 1e-3, 0.01, 0.05, 0.1, 0.5, 1.0, -0.1, -1.0])

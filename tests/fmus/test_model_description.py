@@ -23,13 +23,15 @@ from conftest import Load
 from fmi2 import OK, Instance
 from fmpy.validation import validate_fmu
 from grasp_controller import series
-from gripper_plant import rigid
+from gripper_plant import compliant, movable, rigid
 from lxml import etree  # type: ignore[import-untyped]
 from proximity_sensor import channel
 
 BLOCKS: dict[str, ModuleType] = {
     "GraspController": series,
     "GripperPlant": rigid,
+    "GripperPlantCompliant": compliant,
+    "GripperPlantMovable": movable,
     "ProximitySensor": channel,
 }
 SCHEMA = Path(fmpy.__file__).parent / "schema" / "fmi2" / "fmi2ModelDescription.xsd"
@@ -284,6 +286,7 @@ ATOMS: dict[str, dict[str, int]] = {
     "N": {"kg": 1, "m": 1, "s": -2},
     "V": {"kg": 1, "m": 2, "s": -3, "A": -1},
     "Hz": {"s": -1},
+    "rad": {"rad": 1},
 }
 
 
@@ -312,7 +315,7 @@ def test_units_are_defined_once_and_used(root: Element) -> None:
 def test_base_units(root: Element) -> None:
     for unit in root.iter("Unit"):
         base = unit.find("BaseUnit")
-        if unit.attrib["name"] == "V.m^n":
+        if unit.attrib["name"] in ("V.m^n", "N/m^n"):
             assert base is None  # n is a parameter
         else:
             assert base is not None
@@ -338,18 +341,21 @@ def test_people_read_millimetres(root: Element) -> None:
 
 # The paper's symbols
 
+PLANT = {
+    "force": "u_j",
+    "position": "x_j",
+    "velocity": "x_j'",
+    "gap": "l_j",
+    "contact_force": "f_cj",
+    "finger_mass": "m_j",
+    "initial_position": "x_init,j",
+    "object_width": "W",
+    "initial_object_position": "x_m",
+}
 PAPER = {
-    "GripperPlant": {
-        "force": "u_j",
-        "position": "x_j",
-        "velocity": "x_j'",
-        "gap": "l_j",
-        "contact_force": "f_cj",
-        "finger_mass": "m_j",
-        "initial_position": "x_init,j",
-        "object_width": "W",
-        "initial_object_position": "x_m",
-    },
+    "GripperPlant": PLANT,
+    "GripperPlantCompliant": PLANT,
+    "GripperPlantMovable": PLANT,
     "ProximitySensor": {
         "gap": "l",
         "intensity": "xi",
@@ -510,6 +516,8 @@ SWITCHES: dict[str, list[dict[str, bool]]] = {
         for b in (False, True)
     ],
     "GripperPlant": [{}],
+    "GripperPlantCompliant": [{"hunt_crossley": on} for on in (False, True)],
+    "GripperPlantMovable": [{"hunt_crossley": on} for on in (False, True)],
     "ProximitySensor": [
         {"pattern": a, "ambient": b, "noise": b, "adc": b, "filter": b, "median": c}
         for a, b, c in ((False, False, False), (True, False, False), (True, True, False))

@@ -597,6 +597,19 @@ def test_a_flood_does_not_put_off_the_deadline() -> None:
         clock.tick = 0
 
 
+def test_what_came_before_a_step_does_not_put_off_its_deadline() -> None:
+    clock = Clock()
+    with connected(clock=clock, timeout=1e-3) as (host, peer):
+        for _ in range(STALE):
+            peer.send(b"x")
+        clock.tick = 100_000
+        begin = clock.now
+        host.step()
+        assert clock.now - begin <= 1_000_000 + 6 * clock.tick
+        assert host.get("proxy.missed") == 1
+        clock.tick = 0
+
+
 class Down:
     """A socket whose cable was pulled."""
 

@@ -9,8 +9,16 @@ from fmpy import extract, read_model_description, simulate_fmu
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
 from grasp_controller import series
-from gripper_plant import rigid
+from gripper_plant import compliant, movable, rigid
 from proximity_sensor import channel
+
+BLOCKS: dict[str, Any] = {
+    "GripperPlant": rigid,
+    "GripperPlantCompliant": compliant,
+    "GripperPlantMovable": movable,
+    "ProximitySensor": channel,
+    "GraspController": series,
+}
 
 
 class Host:
@@ -43,7 +51,7 @@ class Host:
         self.slave.freeInstance()
 
 
-@pytest.mark.parametrize("name", ["GripperPlant", "ProximitySensor", "GraspController"])
+@pytest.mark.parametrize("name", BLOCKS)
 def test_runs_in_plain_fmpy(fmus: Path, name: str) -> None:
     result: Any = simulate_fmu(fmus / f"{name}.fmu", stop_time=0.01, validate=True)
     assert len(result) > 10
@@ -124,7 +132,7 @@ def test_a_host_outlives_what_a_block_refuses(fmus: Path, tmp_path: Path) -> Non
 
 @pytest.mark.parametrize(
     ("name", "block"),
-    [("GripperPlant", rigid), ("ProximitySensor", channel), ("GraspController", series)],
+    BLOCKS.items(),
 )
 def test_start_values_are_those_of_the_block(
     fmus: Path, tmp_path: Path, name: str, block: Any

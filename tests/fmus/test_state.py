@@ -10,11 +10,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 H = 1e-3
-NAMES = ("GripperPlant", "ProximitySensor", "GraspController")
+NAMES = (
+    "GripperPlant",
+    "GripperPlantCompliant",
+    "GripperPlantMovable",
+    "ProximitySensor",
+    "GraspController",
+)
 
+PLANTS = NAMES[:3]
 
 PARAMETERS = {
     "GripperPlant": {"finger_mass[1]": 0.7, "object_width": 0.06},
+    "GripperPlantCompliant": {"finger_mass[1]": 0.7, "kelvin_voigt.stiffness": 800.0},
+    "GripperPlantMovable": {"object_mass": 0.04, "friction.coulomb[2]": 0.1},
     "ProximitySensor": {"offset_distance": 0.006},
     "GraspController": {"contact_force.stiffness": 90.0, "impact_reduction.mass": 1.3},
 }
@@ -145,17 +154,18 @@ def test_a_state_of_another_fmu_is_refused(load: Load) -> None:
         state.free()
 
 
+@pytest.mark.parametrize("name", PLANTS)
 @given(
     forces=st.lists(st.floats(-50.0, 50.0), min_size=2, max_size=2),
     steps=st.integers(0, 60),
     size=st.sampled_from([1e-4, 1e-3, 7e-3]),
 )
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=25, deadline=None)
 def test_any_moment_can_be_restored(
-    load: Load, forces: list[float], steps: int, size: float
+    load: Load, name: str, forces: list[float], steps: int, size: float
 ) -> None:
     """In flight, in contact, leaving: from a drawn moment on, twice the same bits."""
-    with Instance(load("GripperPlant")).initialise() as instance:
+    with Instance(load(name)).initialise() as instance:
         assert instance.set({"force[1]": forces[0], "force[2]": forces[1]}) == OK
         time = 0.0
         for _ in range(steps):

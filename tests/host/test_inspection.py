@@ -173,7 +173,16 @@ def test_our_controller(fmus: Path) -> None:
     assert rows["simultaneous_contact.enabled"]["start"] == "true"
 
 
-@pytest.mark.parametrize("name", ["GripperPlant", "ProximitySensor", "GraspController"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "GripperPlant",
+        "GripperPlantCompliant",
+        "GripperPlantMovable",
+        "ProximitySensor",
+        "GraspController",
+    ],
+)
 def test_our_fmus_are_shown_as_fmpy_reads_them(fmus: Path, name: str) -> None:
     report = inspect_fmu(fmus / f"{name}.fmu")
     model = fmpy.read_model_description(fmus / f"{name}.fmu")

@@ -8,6 +8,7 @@ import pytest
 from grasp_cosim import InputError, Realtime, SimulationError
 from grasp_cosim.master.engine import Engine
 from grasp_cosim.master.master import CHUNK
+from grasp_cosim.master.plan import Planner
 from grasp_cosim.realtime.meter import LISTED
 from grasp_cosim.realtime.options import Overrun
 from grasp_cosim.realtime.pacer import BREATH_NS, SLICE_NS, SOME, SPIN_NS, Pacer
@@ -256,6 +257,26 @@ def test_the_time_between_two_beginnings_is_divided_without_a_gap(tmp_path: Path
         for low, high, count in zip(h.edges, h.edges[1:], h.counts, strict=False)
     )
     assert total == pytest.approx((run.fake.time - before) / 1e9, rel=1 / 16)
+
+
+def test_interrupted_in_a_binary_it_keeps_what_was_handed_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Planner, "_guarded", lambda _, call: call)  # as of calls of binaries
+    run = Paced(tmp_path, {"a": {-1: 10 * MS}}, steps=200)
+
+    def interrupt() -> None:
+        if len(run.began["a"]) == 150:
+            raise KeyboardInterrupt
+
+    run.fake.on_sleep = interrupt
+    with pytest.raises(KeyboardInterrupt):
+        run.master.advance(200)
+    done = run.master.steps_done
+    assert SOME <= done <= 150
+    run.master.hand_on()
+    assert len(run.memory.time) == done + 1
+    assert run.timing().steps <= done
 
 
 def test_halted_it_stops_at_a_communication_point_and_can_go_on(

@@ -1,6 +1,7 @@
 """Sessions: what can be done with one, and when that is over."""
 
 import math
+import signal
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ import pytest
 from fmi.instances import KINDS, interrupted_after
 from fmi.test_rejected_steps import alone
 from grasp_cosim import InputError, SimulationError, System, simulate
-from grasp_cosim.master import master
+from grasp_cosim.master import master, simulation
 from grasp_cosim.master.engine import Engine
 from grasp_cosim.recording.memory import MemoryListener
 from grasp_cosim.system.parts import Isolation
@@ -68,6 +69,21 @@ def test_an_interrupted_session_does_not_go_on(
         result = session.result()
         assert not result.complete
         assert result["part.x"] == pytest.approx(2.0 * result.time, rel=1e-9)
+
+
+def test_an_interruption_of_which_an_fmu_makes_an_error_is_one_all_the_same(
+    grasp: System, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def load(_: object) -> None:
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt:  # as pythonfmu does
+            raise InputError("plant: refused its initialisation: KeyboardInterrupt") from None
+
+    monkeypatch.setattr(simulation, "load", load)
+    with pytest.raises(KeyboardInterrupt):
+        simulate(grasp, stop=0.01)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_a_session_that_has_not_stepped_has_metrics(tmp_path: Path) -> None:

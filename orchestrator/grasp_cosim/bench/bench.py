@@ -7,6 +7,7 @@ from grasp_fmus.link.message import END, INITIALISE
 from grasp_fmus.link.peer import Peer, Request
 
 from ..errors import InputError, SimulationError
+from ..system.description import LONGEST
 from ..system.interface import Interface, Value
 from ..system.parts import NANOSECONDS
 from .model import Model
@@ -112,12 +113,23 @@ class Bench:
         elif self._serving.lockstep:
             self._model.step(request.time, request.step, request.values)
         else:
+            step_ns = self._own_step(request.step)
             self._heard = now
             self._model.begin()
             self._model.set(request.values)
             if self._deadline is None:
-                self._step_ns = self._serving.step_ns or max(1, round(request.step * NANOSECONDS))
-                self._deadline = now + self._step_ns
+                self._step_ns = step_ns
+                self._deadline = now + step_ns
+
+    def _own_step(self, asked: float) -> int:
+        """The step of the own clock in ns, where the proxy asks for one in s."""
+        if self._serving.step_ns is not None:
+            return self._serving.step_ns
+        if not 1.0 <= asked * NANOSECONDS <= LONGEST * NANOSECONDS:
+            raise SimulationError(
+                f"step of {asked!r} s: must be from 1 ns to {LONGEST:g} s, to be the own step"
+            )
+        return round(asked * NANOSECONDS)
 
     def look(self, now: int) -> None:
         """Do what is due by the own clock."""

@@ -4,7 +4,6 @@ Knows nothing of what is in a datagram. Every client has a socket of its own tow
 that the peer can tell them apart; the peer sees the addresses of these.
 """
 
-import ipaddress
 import selectors
 import socket
 import threading
@@ -16,11 +15,9 @@ from dataclasses import dataclass
 
 from ..errors import InputError
 from ..system.parts import NANOSECONDS
+from .address import Address, is_loopback, listening, resolved, text
 from .network import Direction, Network
 from .traffic import Counters, Held, Log, Traffic
-
-Address = tuple[str, int]
-"""IPv4 address and port."""
 
 MOST_CLIENTS = 16
 """Clients remembered; a further one takes the place of the one that was silent for longest."""
@@ -67,7 +64,7 @@ class Relay:
             self._wake, woken = (stack.enter_context(end) for end in socket.socketpair())
             self._wake.setblocking(False)
             self._selector.register(woken, selectors.EVENT_READ, self._woken)
-            self._listening = stack.enter_context(_listening(resolved(host, port)))
+            self._listening = stack.enter_context(listening(resolved(host, port)))
             self._selector.register(self._listening, selectors.EVENT_READ, self._request)
             self.address: Address = self._listening.getsockname()
             self._refuse_itself()
@@ -130,8 +127,8 @@ class Relay:
     def _woken(self, woken: socket.socket) -> None:
         woken.recv(LARGEST)
 
-    def _request(self, listening: socket.socket) -> None:
-        if received := _received(listening):
+    def _request(self, requests: socket.socket) -> None:
+        if received := _received(requests):
             data, address = received
             self._traffic.receive("request", data, self._client(address), self._clock())
 
@@ -206,43 +203,6 @@ def relaying(
         finally:
             relay.stop()
             running.result()
-
-
-def resolved(host: str, port: int, lowest_port: int = 0) -> Address:
-    """IPv4 address and port; InputError where the host has none or the port is out of range."""
-    if not lowest_port <= port <= 65_535:
-        raise InputError(f"{text((host, port))}: port must be from {lowest_port} to 65535")
-    try:
-        found = socket.getaddrinfo(host, port, socket.AF_INET, socket.SOCK_DGRAM)
-    except (OSError, UnicodeError) as error:
-        raise InputError(
-            f"{text((host, port))}: no such host; must be an IPv4 address or a name that has one"
-        ) from error
-    return str(found[0][4][0]), port
-
-
-def text(address: Address) -> str:
-    """As in a command line, 127.0.0.1:5501."""
-    return f"{address[0]}:{address[1]}"
-
-
-def is_loopback(address: Address) -> bool:
-    """Whether only this machine can send there."""
-    return ipaddress.ip_address(address[0]).is_loopback
-
-
-def _listening(address: Address) -> socket.socket:
-    listening = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    try:
-        listening.bind(address)
-    except OSError as error:
-        listening.close()
-        raise InputError(
-            f"{text(address)}: cannot listen there: {error.strerror}; must be an address of this"
-            " machine and a free port, or 0"
-        ) from error
-    listening.setblocking(False)
-    return listening
 
 
 def _connected(peer: Address) -> socket.socket:

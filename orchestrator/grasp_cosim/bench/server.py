@@ -3,12 +3,12 @@
 import select
 import socket
 import time
-from typing import Any, Self
+from typing import Self
 
 from grasp_fmus.link.message import LARGEST
 
-from ..errors import InputError
 from ..system.parts import NANOSECONDS
+from .address import Address, listening, resolved, text
 from .bench import Bench, Say
 
 BURST = 64
@@ -19,25 +19,20 @@ class Server:
     """Serves a bench, which it closes. A context manager; serve() returns after stop()."""
 
     def __init__(
-        self, bench: Bench, address: tuple[str, int] = ("127.0.0.1", 0), say: Say = lambda _: None
+        self, bench: Bench, address: Address = ("127.0.0.1", 0), say: Say = lambda _: None
     ) -> None:
         """Bind the port, 0 for any that is free; InputError where that is not possible."""
         self.bench = bench
         self._say = say
-        self._wake, self._woken = socket.socketpair()
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
-            self._socket.bind(address)
-        except (OSError, OverflowError) as error:
-            self.close()
-            raise InputError(
-                f"{address[0]}:{address[1]}: cannot listen there: {_reason(error)}; must be an "
-                "address of this machine and a port that is free"
-            ) from error
-        self._socket.setblocking(False)
+            self._socket = listening(resolved(*address))
+        except BaseException:
+            bench.close()
+            raise
+        self._wake, self._woken = socket.socketpair()
 
     @property
-    def address(self) -> tuple[str, int]:
+    def address(self) -> Address:
         """Where it listens."""
         host, port = self._socket.getsockname()
         return host, port
@@ -83,16 +78,12 @@ class Server:
                 datagram, source = self._socket.recvfrom(LARGEST + 1)
             except (BlockingIOError, ConnectionError):  # nothing there; or an answer found nobody
                 return
-            answer = self.bench.answer(datagram, "{}:{}".format(*source), time.monotonic_ns())
+            answer = self.bench.answer(datagram, text(source), time.monotonic_ns())
             if answer is not None:
                 self._send(answer, source)
 
-    def _send(self, answer: bytes, source: tuple[str, int]) -> None:
+    def _send(self, answer: bytes, source: Address) -> None:
         try:
             self._socket.sendto(answer, source)
         except OSError as error:  # to the proxy it is a lost datagram
-            self._say("{}:{}: not sent: {}".format(*source, _reason(error)))
-
-
-def _reason(error: Exception) -> Any:
-    return getattr(error, "strerror", None) or error
+            self._say(f"{text(source)}: not sent: {error.strerror or error}")

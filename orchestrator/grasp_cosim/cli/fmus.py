@@ -28,7 +28,7 @@ from .frame import NEGATIVE, check_folder, json_option
 )
 @json_option
 def build(out: Path | None, bind_python: str | None, as_json: bool) -> int:
-    """Build the FMUs: GripperPlant, ProximitySensor, GraspController.
+    """Build the FMUs: three plants, GripperPlant*, then ProximitySensor and GraspController.
 
     Says what is not as it was built last. --bind-python adds the libpython of PYTHON, by default
     of this one, to what the FMUs load.

@@ -10,8 +10,9 @@ from pathlib import Path
 
 import click
 
+from ..bench.address import Address, is_loopback, text
 from ..bench.network import DIRECTIONS, Conditions, Network, Outage, check_time
-from ..bench.relay import Address, Relay, is_loopback, text
+from ..bench.relay import Relay
 from ..bench.traffic import Entry, Log
 from ..errors import InputError
 from .frame import INTERRUPTED, fail, json_option

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import click
 
+from ..bench.address import is_loopback, text
 from ..bench.bench import Bench, Serving
 from ..bench.server import Server
 from ..bench.wire import shared_key
@@ -73,10 +74,10 @@ def serve(
     with Server(bench, (host, port), _say) as server:
         for note in bench.notes:
             _say(note)
-        at = "{}:{}".format(*server.address)
+        at = text(server.address)
         _say(f"serving {fmu.name} at {at}, {'lockstep' if lockstep else 'real time'}")
-        if not host.startswith("127.") and key_file is None:
-            _say(f"{host} can be reached by others, who may take part: --key-file keeps them out")
+        if not is_loopback(server.address) and key_file is None:
+            _say(f"{at} can be reached by others, who may take part: --key-file keeps them out")
         with ended_by_signals(server.stop) as came:
             server.serve(sessions, end)
         counters = bench.counters()

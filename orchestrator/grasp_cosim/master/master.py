@@ -176,8 +176,8 @@ class Master:
                     self.steps_done = step
                     self._resolve(step, operation, status)
                     operation += 1
-        finally:
-            self.steps_done = step
+        finally:  # an interruption of the loop does not say how far it came; the pacer knows more
+            self.steps_done = max(step, self._handed_on)
 
     def _resolve(self, step: int, operation: int, status: int) -> None:
         """Make good for a step that was rejected; any other bad status ends the run."""

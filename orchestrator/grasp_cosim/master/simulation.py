@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from numbers import Integral
+from types import FrameType
 
 from tqdm import tqdm
 
@@ -61,15 +62,16 @@ class Session:
         self._privileges = Privileges()
         self._stack = ExitStack()
         try:
-            instances = [self._loaded(component) for component in system.components]
-            self._master = Master(
-                system, instances, lambda *rows: self._dispatch(*rows), engine, self.pacer
-            )
-            self._dispatch = Dispatcher(
-                system, self._master.slots, (self._memory, *listeners), every
-            )
-            self._stack.callback(self._end)
-            self._initialise()
+            with _interruptible():
+                instances = [self._loaded(component) for component in system.components]
+                self._master = Master(
+                    system, instances, lambda *rows: self._dispatch(*rows), engine, self.pacer
+                )
+                self._dispatch = Dispatcher(
+                    system, self._master.slots, (self._memory, *listeners), every
+                )
+                self._stack.callback(self._end)
+                self._initialise()
             if realtime and self.pacer:
                 granted = privileges(realtime, self.pacer.sleeps)
                 self._privileges = self._stack.enter_context(granted)
@@ -313,6 +315,34 @@ def _drive(session: Session, progress: bool) -> None:
             start = now
         if session.pacer:
             bar.set_postfix_str(session.pacer.live(settled=True))
+
+
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    """Ctrl-C is a KeyboardInterrupt here even where a Python FMU makes an error of its own of it.
+
+    So it is while a proxy waits for its peer.
+    """
+    default = signal.default_int_handler
+    here = threading.current_thread() is threading.main_thread()
+    if not here or signal.getsignal(signal.SIGINT) is not default:
+        yield
+        return
+    came = threading.Event()
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        came.set()
+        default(number, frame)
+
+    signal.signal(signal.SIGINT, interrupt)
+    try:
+        yield
+    except (InputError, SimulationError) as error:
+        if came.is_set():
+            raise KeyboardInterrupt from error
+        raise
+    finally:
+        signal.signal(signal.SIGINT, default)
 
 
 @contextmanager

@@ -1,0 +1,204 @@
+"""An upright box on a floor, pushed from both sides: it slides, tilts about an edge, falls back.
+
+A plane rigid box of mass m, width 2b and height 2a, uniform, r^2 = a^2 + b^2. Flat, it slides with
+Coulomb friction mu·m·g. Tilted by theta > 0 it stands on its right edge, at p, with its centre
+X = b·cos(theta) - a·sin(theta) short of the edge and Z = b·sin(theta) + a·cos(theta) above it:
+
+    m·p'' + m·Z·theta'' + m·X·theta'^2 = F + F_f          |F_f| <= mu·N
+    m·Z·p'' + 4/3·m·r^2·theta'' + m·g·X = Q
+    N = m·(g + X·theta'' - Z·theta'^2) + F·tan(theta)
+
+The pushes are those of smooth fingertips at the height h, square to the faces: F is the sum of
+their horizontal parts, Q their moment about the edge. The mirrored box tilts to the left.
+Card: plant/README.md
+"""
+
+from math import atan2, copysign, cos, sin, tan
+from typing import NamedTuple
+
+from . import friction
+from .contact import time_to_contact
+
+GRAVITY = 9.80665
+"""m/s^2."""
+
+PIECES = 4
+"""Most parts of a sub-step: it is cut where the edge stops sliding and where the box lands.
+
+A box that does more than that within one rattles, and what is left of the sub-step is not resolved.
+"""
+
+
+class Shape(NamedTuple):
+    """Of the box: half its width and height in m, its mass in kg; of the floor: mu; h in m."""
+
+    b: float
+    a: float
+    m: float
+    mu: float
+    h: float
+
+
+class Box(NamedTuple):
+    """Middle of the base while flat, from there on its edge less b, in m; tilt in rad; rates."""
+
+    x: float
+    tilt: float
+    v: float
+    w: float
+
+
+class Pushes(NamedTuple):
+    """Horizontal forces on the faces in N (>= 0): from the left and from the right."""
+
+    left: float
+    right: float
+
+
+def balance(q: Shape) -> float:
+    """The tilt in rad from which the box topples: its centre is above the edge."""
+    return atan2(q.b, q.a)
+
+
+def centre(q: Shape, box: Box) -> float:
+    """Where the centre of the box is, m."""
+    side = copysign(1.0, box.tilt)
+    return box.x + side * (q.b - q.b * cos(box.tilt)) + q.a * sin(box.tilt)
+
+
+def faces(q: Shape, box: Box) -> tuple[float, float]:
+    """Where the fingertips meet the right and the left face, m."""
+    lean, width = q.h * tan(box.tilt), 2.0 * q.b / cos(box.tilt)
+    if box.tilt > 0.0:
+        return box.x + q.b + lean, box.x + q.b + lean - width
+    if box.tilt < 0.0:
+        return box.x - q.b + lean + width, box.x - q.b + lean
+    return box.x + q.b, box.x - q.b
+
+
+def energy(q: Shape, box: Box) -> float:
+    """Of the motion and of the height above that of the flat box, J."""
+    x, z = _arms(q, abs(box.tilt))
+    forward = box.v + z * box.w
+    turning = x * x + (q.a * q.a + q.b * q.b) / 3.0
+    return q.m * (0.5 * forward * forward + 0.5 * turning * box.w * box.w + GRAVITY * (z - q.a))
+
+
+def advance(q: Shape, box: Box, push: Pushes, d: float) -> Box:
+    """The box d seconds later, the pushes held."""
+    rest = d
+    for _ in range(PIECES):
+        side = _side(q, box, push)
+        if side == 0.0:
+            weight = q.mu * q.m * GRAVITY
+            floor = (weight, weight, 0.0, 1.0)
+            x, v = friction.move(box.x, box.v, q.m, push.left - push.right, floor, rest)
+            return Box(x, 0.0, v, 0.0)
+        if side > 0.0:
+            box, used = _turn(q, box, push, rest)
+        else:
+            box, used = _turn(q, _mirrored(box), Pushes(push.right, push.left), rest)
+            box = _mirrored(box)
+        rest -= used
+        if rest <= 0.0:
+            break
+    return box
+
+
+def _mirrored(box: Box) -> Box:
+    return Box(-box.x, 0.0 - box.tilt, 0.0 - box.v, 0.0 - box.w)
+
+
+def _side(q: Shape, box: Box, push: Pushes) -> float:
+    """1 for a box on its right edge, -1 on its left; 0 for one that is flat and stays so.
+
+    A flat box starts to turn about an edge where the floor can bear it nowhere else.
+    """
+    if box.tilt != 0.0:
+        return copysign(1.0, box.tilt)
+    weight, force = q.m * GRAVITY, push.left - push.right
+    grip = q.mu * weight
+    sticks = box.v == 0.0 and abs(force) <= grip
+    net = 0.0 if sticks else force - copysign(grip, box.v if box.v != 0.0 else force)
+    moment = force * q.h - net * q.a
+    return 1.0 if moment > weight * q.b else -1.0 if moment < -weight * q.b else 0.0
+
+
+def _turn(q: Shape, box: Box, push: Pushes, d: float) -> tuple[Box, float]:
+    """A box on its right edge, and how many of the d seconds it took to get there.
+
+    It stops early where the edge comes to rest, or the box lands.
+    """
+    slip = _slip(q, box.tilt, box.v, box.w, push)
+    after, turn = _ahead(q, box, push, slip, d)
+    used = d
+    if box.v * after.v < 0.0:
+        used = d * box.v / (box.v - after.v)
+        after, turn = _ahead(q, box, push, slip, used)
+        after = Box(after.x, after.tilt, 0.0, after.w)
+    if after.tilt <= 0.0 and (box.tilt > 0.0 or after.tilt < 0.0):
+        used = min(used, time_to_contact(box.tilt, box.w, turn))
+        after, _ = _ahead(q, box, push, slip, used)
+        after = _landed(q, after)
+    return after, used
+
+
+def _ahead(q: Shape, box: Box, push: Pushes, slip: float, d: float) -> tuple[Box, float]:
+    """The box after d seconds by the midpoint rule, and its angular acceleration on the way."""
+    _, turn = _accelerations(q, box.tilt, box.w, push, slip)
+    tilt, w = box.tilt + 0.5 * d * box.w, box.w + 0.5 * d * turn
+    slide, turn = _accelerations(q, tilt, w, push, slip)
+    x = box.x + d * (box.v + 0.5 * d * slide)
+    tilt = box.tilt + d * (box.w + 0.5 * d * turn)
+    return Box(x, tilt, box.v + d * slide, box.w + d * turn), turn
+
+
+def _landed(q: Shape, box: Box) -> Box:
+    """Flat again, without a rebound: the floor takes the turning, its friction what it can of the
+    sliding. The impulse of the floor is m·b·|theta'|.
+    """
+    v = box.v + q.a * box.w
+    left = max(0.0, abs(v) - q.mu * q.b * abs(box.w))
+    return Box(box.x, 0.0, copysign(left, v), 0.0)
+
+
+def _slip(q: Shape, tilt: float, v: float, w: float, push: Pushes) -> float:
+    """The way in which the right edge slides, 1 or -1; 0 where it sticks."""
+    if v != 0.0:
+        return copysign(1.0, v)
+    x, z = _arms(q, tilt)
+    _, turn = _accelerations(q, tilt, w, push, 0.0)
+    needed = q.m * (z * turn + x * w * w) - (push.left - push.right)
+    normal = q.m * x * turn + _load(q, tilt, w, push)
+    return 0.0 if abs(needed) <= q.mu * normal else -copysign(1.0, needed)
+
+
+def _accelerations(
+    q: Shape, tilt: float, w: float, push: Pushes, slip: float
+) -> tuple[float, float]:
+    """P'' in m/s^2 and theta'' in rad/s^2 of a box on its right edge that slips as given."""
+    x, z = _arms(q, tilt)
+    inertia = 4.0 / 3.0 * q.m * (q.a * q.a + q.b * q.b)
+    squeeze = cos(tilt) * cos(tilt)
+    moment = (push.left * (q.h - 2.0 * q.b * sin(tilt)) - push.right * q.h) / squeeze
+    moment -= q.m * GRAVITY * x
+    if slip == 0.0:
+        return 0.0, moment / inertia
+    force, load = push.left - push.right - q.m * x * w * w, _load(q, tilt, w, push)
+    drag = slip * q.mu
+    turn = (moment - z * (force - drag * load)) / (inertia - q.m * z * (z + drag * x))
+    if load + q.m * x * turn < 0.0:  # the floor does not hold the box down
+        drag = 0.0
+        turn = (moment - z * force) / (inertia - q.m * z * z)
+    return (force - drag * load) / q.m - (z + drag * x) * turn, turn
+
+
+def _load(q: Shape, tilt: float, w: float, push: Pushes) -> float:
+    """N less its part m·X·theta'', N."""
+    _, z = _arms(q, tilt)
+    return q.m * (GRAVITY - z * w * w) + (push.left - push.right) * tan(tilt)
+
+
+def _arms(q: Shape, tilt: float) -> tuple[float, float]:
+    """X and Z in m."""
+    return q.b * cos(tilt) - q.a * sin(tilt), q.b * sin(tilt) + q.a * cos(tilt)

@@ -1,0 +1,97 @@
+"""What a surface that gives does to a finger: Kelvin-Voigt or Hunt-Crossley, never a pull.
+
+With the depth delta to which the finger has sunk in,
+
+    f_c = max(0, k·delta + c·delta')                                        Kelvin-Voigt
+    f_c = max(0, k·delta^n·(1 + lambda·delta'))                             Hunt-Crossley
+
+and zero where delta <= 0. Over a sub-step the force is held at a mean for which the work of the
+spring is exactly what it stores. Card: plant/README.md
+"""
+
+from dataclasses import dataclass
+from math import pow as power
+from math import sqrt
+from typing import Annotated
+
+from .ranges import check
+
+Law = tuple[float, float, float, float]
+"""k in N/m^n, n, c in N.s/m, lambda in s/m."""
+
+SHORT = 1e-5
+"""Way through a sub-step, relative to the depth, for which stored energies differ too little."""
+
+DEEPEST = 0.1
+"""m; a finger that sinks in deeper is not resolved any better."""
+
+SETTLED = 1e-11
+"""Relative change of a contact force below which an iteration has found it."""
+
+
+@dataclass(frozen=True, slots=True)
+class KelvinVoigt:
+    """Parameters; a value outside its declared range raises ValueError."""
+
+    stiffness: Annotated[float, "N/m", "k, stiffness of the surface", (1e-3, 1e7)] = 1000.0
+    damping: Annotated[float, "N.s/m", "c, damping of the surface", (0.0, 1e5)] = 10.0
+
+    def __post_init__(self) -> None:
+        check(self, "kelvin_voigt.")
+
+
+@dataclass(frozen=True, slots=True)
+class HuntCrossley:
+    """Parameters; a value outside its declared range raises ValueError."""
+
+    enabled: Annotated[bool, "", "Hunt-Crossley contact; off, Kelvin-Voigt"] = False
+    stiffness: Annotated[float, "N/m^n", "k, stiffness of the surface", (1e-3, 1e9)] = 20000.0
+    exponent: Annotated[float, "1", "n, exponent of the depth", (1.0, 3.0)] = 1.5
+    damping: Annotated[float, "s/m", "lambda, damping relative to the force", (0.0, 1e3)] = 1.0
+
+    def __post_init__(self) -> None:
+        check(self, "hunt_crossley.")
+
+
+def law(kelvin_voigt: KelvinVoigt, hunt_crossley: HuntCrossley) -> Law:
+    """The law that is chosen."""
+    if hunt_crossley.enabled:
+        return hunt_crossley.stiffness, hunt_crossley.exponent, 0.0, hunt_crossley.damping
+    return kelvin_voigt.stiffness, 1.0, kelvin_voigt.damping, 0.0
+
+
+def rate(law: Law, deepest: float, m: float) -> float:
+    """The fastest that m kg on the surface can do down to a depth in m, 1/s; 0 if there is none."""
+    if deepest <= 0.0:
+        return 0.0
+    k, n, c, lam = law
+    depth = min(DEEPEST, deepest)
+    return max(sqrt(k * n * power(depth, n - 1.0) / m), (c + lam * k * power(depth, n)) / m)
+
+
+def energy(law: Law, depth: float) -> float:
+    """What is stored at a depth in m, J; none above the surface."""
+    k, n, _, _ = law
+    return k * power(depth, n + 1.0) / (n + 1.0) if depth > 0.0 else 0.0
+
+
+def mean_force(law: Law, before: float, after: float, d: float) -> float:
+    """f_c in N, held over d seconds in which the depth goes from before to after, in m.
+
+    The impulse is that of the law also where the contact begins or ends on the way.
+    """
+    if before <= 0.0 and after <= 0.0:
+        return 0.0
+    k, n, c, lam = law
+    start, end = max(0.0, before), max(0.0, after)
+    way = after - before
+    if abs(way) > SHORT * max(start, end):
+        spring = (energy(law, after) - energy(law, before)) / way
+    else:
+        spring = k * power(0.5 * (start + end), n)
+    return max(0.0, spring * (1.0 + lam * way / d) + c * (end - start) / d)
+
+
+def settled(found: float, before: float) -> bool:
+    """Whether an iteration need not go on from one contact force in N to the next."""
+    return abs(found - before) <= SETTLED * found

@@ -1,0 +1,155 @@
+"""Two-finger parallel gripper and a box that stands on a floor, Eq. (1):  m_j·x_j'' = u_j + f_cj.
+
+A push that the other finger does not answer shifts the box, or topples it. Signs as in fingers.py;
+tilt > 0 is over the right edge. Card: plant/README.md
+"""
+
+from dataclasses import dataclass
+from typing import Annotated, NamedTuple
+
+from . import box as standing
+from . import contact_laws, fingers, friction, substeps
+from .box import Box, Pushes, Shape
+from .contact_laws import HuntCrossley, KelvinVoigt
+from .fingers import Inputs as Inputs
+from .fingers import Pair as Pair
+
+ITERATIONS = 16
+"""To find the contact forces: each leaves 1/19 of the error, or less; 1/5 where the box tilts."""
+
+
+@dataclass(frozen=True, slots=True)
+class Params(fingers.Params):
+    """Parameters; a value outside its declared range raises ValueError."""
+
+    object_mass: Annotated[float, "kg", "m, mass of the object", (1e-3, 1e3)] = 0.05
+    object_height: Annotated[float, "m", "H, height of the object", (1e-3, 10.0)] = 0.1
+    contact_height: Annotated[
+        float, "m", "h, height of the fingertips above the floor", (0.0, 10.0)
+    ] = 0.05
+    floor_friction: Annotated[float, "1", "mu, friction of the object on the floor", (0.0, 1.0)] = (
+        0.3
+    )
+    kelvin_voigt: KelvinVoigt = KelvinVoigt(stiffness=10000.0, damping=20.0)
+    hunt_crossley: HuntCrossley = HuntCrossley(stiffness=200000.0)
+
+    def __post_init__(self) -> None:
+        fingers.Params.__post_init__(self)
+        if self.contact_height > self.object_height:
+            raise ValueError(
+                f"contact_height = {self.contact_height!r} m: must be from 0 to object_height, "
+                f"{self.object_height:g}"
+            )
+
+
+class State(NamedTuple):
+    """Fingertip positions in m, velocities in m/s, contact forces in N; the box; toppled so far."""
+
+    position: Pair
+    velocity: Pair
+    contact_force: Pair
+    box: Box
+    toppled: bool
+
+
+class Outputs(NamedTuple):
+    """Measured at the fingers and at the object; the gap of a finger that touches is zero."""
+
+    position: fingers.Position
+    velocity: fingers.Velocity
+    gap: fingers.Gap
+    contact_force: fingers.ContactForce
+    contact: fingers.Contact
+    object_position: fingers.ObjectPosition
+    tilt: Annotated[float, "rad", "theta, tilt of the object, to the right", 0.1, set()]
+    toppled: Annotated[bool, "", "the object has tilted past its balance", set()]
+
+
+def initial_state(p: Params, u: Inputs) -> State:
+    """All at rest, the fingers free of the object."""
+    box = Box(p.initial_object_position, 0.0, 0.0, 0.0)
+    return State(p.initial_position, (0.0, 0.0), (0.0, 0.0), box, False)
+
+
+def step(p: Params, x: State, u: Inputs, h: float) -> State:
+    """Advance fingers and box by h seconds (h > 0), the forces held."""
+    q, law = _shape(p), contact_laws.law(p.kelvin_voigt, p.hunt_crossley)
+    n = substeps.count(_rate(p, q, x, u, h), h)
+    forces, rubs = fingers.forces(p.actuator, u), friction.laws(p.friction)
+    for _ in range(n):
+        x = _substep(p, q, law, x, forces, rubs, h / n)
+    return x
+
+
+def outputs(p: Params, x: State, u: Inputs) -> Outputs:
+    """What the sensors see; no input reaches an output without a step."""
+    x_1, x_2 = x.position
+    q = _shape(p)
+    right, left = standing.faces(q, x.box)
+    return Outputs(
+        x.position,
+        x.velocity,
+        (max(0.0, x_1 - right), max(0.0, left - x_2)),
+        x.contact_force,
+        (x_1 <= right, x_2 >= left),
+        standing.centre(q, x.box),
+        x.box.tilt,
+        x.toppled,
+    )
+
+
+def _substep(
+    p: Params,
+    q: Shape,
+    law: contact_laws.Law,
+    x: State,
+    forces: Pair,
+    rubs: tuple[friction.Law, friction.Law],
+    d: float,
+) -> State:
+    """D seconds with the contact forces held; they and the ways under them found by iteration."""
+    m_1, m_2 = p.finger_mass
+    x_1, x_2 = x.position
+    v_1, v_2 = x.velocity
+    u_1, u_2 = forces
+    rub_1, rub_2 = rubs
+    right, left = standing.faces(q, x.box)
+    f_1, f_2 = x.contact_force[0], -x.contact_force[1]
+    for _ in range(ITERATIONS):
+        s_1, w_1 = friction.move(x_1, v_1, m_1, u_1 + f_1, rub_1, d)
+        s_2, w_2 = friction.move(-x_2, -v_2, m_2, f_2 - u_2, rub_2, d)
+        box = x.box if x.toppled else standing.advance(q, x.box, Pushes(f_2, f_1), d)
+        to_right, to_left = standing.faces(q, box)
+        found_1 = contact_laws.mean_force(law, right - x_1, to_right - s_1, d)
+        found_2 = contact_laws.mean_force(law, x_2 - left, -s_2 - to_left, d)
+        if contact_laws.settled(found_1, f_1) and contact_laws.settled(found_2, f_2):
+            break
+        f_1, f_2 = found_1, found_2
+    toppled = x.toppled or abs(box.tilt) >= standing.balance(q)
+    if toppled:
+        box = Box(box.x, box.tilt, 0.0, 0.0)
+    return State((s_1, -s_2), (w_1, 0.0 - w_2), (f_1, 0.0 - f_2), box, toppled)
+
+
+def _shape(p: Params) -> Shape:
+    return Shape(
+        0.5 * p.object_width,
+        0.5 * p.object_height,
+        p.object_mass,
+        p.floor_friction,
+        p.contact_height,
+    )
+
+
+def _rate(p: Params, q: Shape, x: State, u: Inputs, h: float) -> float:
+    """The fastest that a finger and the box can do within h seconds, 1/s."""
+    finger = min(p.finger_mass)
+    rub_1, rub_2 = friction.laws(p.friction)
+    law = contact_laws.law(p.kelvin_voigt, p.hunt_crossley)
+    both = 1.0 / (1.0 / finger + 2.0 / p.object_mass)
+    right, left = standing.faces(q, x.box)
+    reach_1, reach_2 = fingers.reach(p, x.velocity, u, h)
+    shift = h * (abs(x.box.v) + q.h * abs(x.box.w))
+    deepest = shift + max(right - x.position[0] + reach_1, x.position[1] - left + reach_2)
+    surface = contact_laws.rate(law, deepest, both)
+    return max(surface, friction.rate(rub_1, finger), friction.rate(rub_2, finger))

@@ -1,0 +1,247 @@
+"""The box on the floor: it sticks, slides, tilts, falls back; each by its equation."""
+
+from collections.abc import Iterator
+from itertools import islice
+from math import atan2, cos, sin
+
+import numpy as np
+import pytest
+from gripper_plant.box import (
+    GRAVITY,
+    Box,
+    Pushes,
+    Shape,
+    advance,
+    balance,
+    centre,
+    energy,
+    faces,
+)
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+QUICK = settings(deadline=None, derandomize=True, max_examples=60)
+
+UPRIGHT = Shape(b=0.035, a=0.05, m=0.05, mu=0.3, h=0.05)
+"""70 mm wide, 100 mm high, 50 g, pushed at its middle: it slides long before it would tilt."""
+
+ROUGH = UPRIGHT._replace(mu=0.9, h=0.08)
+"""On a rough floor, pushed near its top, it topples before it slides."""
+
+WEIGHT = UPRIGHT.m * GRAVITY
+REST = Box(0.0, 0.0, 0.0, 0.0)
+NOTHING = Pushes(0.0, 0.0)
+
+
+def run(q: Shape, box: Box, push: Pushes, d: float) -> Iterator[Box]:
+    while True:
+        box = advance(q, box, push, d)
+        yield box
+
+
+def after(q: Shape, box: Box, push: Pushes, d: float, n: int) -> Box:
+    return next(islice(run(q, box, push, d), n - 1, None))
+
+
+@st.composite
+def shapes(draw: st.DrawFn) -> Shape:
+    a = draw(st.floats(0.02, 0.1))
+    return Shape(
+        draw(st.floats(0.01, 0.1)),
+        a,
+        draw(st.floats(0.02, 2.0)),
+        draw(st.floats(0.0, 1.0)),
+        2.0 * a * draw(st.floats(0.0, 1.0)),
+    )
+
+
+@st.composite
+def boxes(draw: st.DrawFn) -> tuple[Shape, Box]:
+    """Flat or tilted, anywhere short of its balance, moving."""
+    q = draw(shapes())
+    tilt = draw(st.sampled_from([0.0, draw(st.floats(-0.9, 0.9))])) * balance(q)
+    w = draw(st.floats(-3.0, 3.0)) if tilt else 0.0
+    return q, Box(draw(st.floats(-0.1, 0.1)), tilt, draw(st.floats(-0.5, 0.5)), w)
+
+
+PUSHES = st.tuples(st.floats(0.0, 2.0), st.floats(0.0, 2.0))
+STEPS = st.floats(1e-5, 5e-4)
+
+
+# ------------------------------------------------------------------------ on its base
+
+
+def test_a_box_that_slides_stops_after_its_stopping_distance() -> None:
+    box = after(UPRIGHT, Box(0.02, 0.0, -0.4, 0.0), NOTHING, 1e-2, 20)
+    assert box.x == pytest.approx(0.02 - 0.4**2 / (2.0 * 0.3 * GRAVITY), rel=1e-12)
+    assert (box.v, box.tilt, box.w) == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_push_below_the_friction_of_the_floor_does_not_shift_it(way: float) -> None:
+    weak = 0.2999 * WEIGHT
+    push = Pushes(weak, 0.0) if way > 0.0 else Pushes(0.0, weak)
+    assert after(UPRIGHT, REST, push, 1e-3, 100) == REST
+
+
+def test_a_push_above_it_does() -> None:
+    box = after(UPRIGHT, REST, Pushes(0.4 * WEIGHT, 0.0), 1e-3, 100)
+    assert box.x == pytest.approx(0.5 * 0.1 * GRAVITY * 0.1**2, rel=1e-9)
+    assert box.tilt == 0.0
+
+
+def test_what_both_fingers_press_alike_does_not_shift_it() -> None:
+    assert after(UPRIGHT, REST, Pushes(50.0, 50.0), 1e-3, 100) == REST
+
+
+# --------------------------------------------------------------------------- on its edge
+
+
+def test_it_tilts_where_the_push_exceeds_m_g_w_over_2h() -> None:
+    threshold = WEIGHT * 2.0 * ROUGH.b / (2.0 * ROUGH.h)
+    assert threshold < ROUGH.mu * WEIGHT
+    for way in (1.0, -1.0):
+        below, above = (
+            Pushes(f, 0.0) if way > 0.0 else Pushes(0.0, f)
+            for f in (0.9999 * threshold, 1.0001 * threshold)
+        )
+        assert after(ROUGH, REST, below, 1e-4, 500) == REST
+        assert way * after(ROUGH, REST, above, 1e-4, 500).tilt > 0.0
+
+
+def test_a_sliding_box_tilts_by_its_own_friction_where_mu_exceeds_w_over_h() -> None:
+    """The floor's mu·m·g at the height of the centre against m·g·b."""
+    sliding = Box(0.0, 0.0, 0.5, 0.0)
+    for mu, tilts in ((0.99 * 0.035 / 0.05, False), (1.01 * 0.035 / 0.05, True)):
+        box = advance(UPRIGHT._replace(mu=mu), sliding, NOTHING, 1e-4)
+        assert (box.tilt > 0.0) is tilts
+
+
+def test_tilting_under_a_constant_push_is_that_of_the_equation() -> None:
+    """On an edge that sticks: 4/3·m·r^2·theta'' = Q - m·g·X."""
+    push = 0.25
+
+    def slope(_: float, z: list[float]) -> list[float]:
+        x = ROUGH.b * cos(z[0]) - ROUGH.a * sin(z[0])
+        arm = (ROUGH.h - 2.0 * ROUGH.b * sin(z[0])) / cos(z[0]) ** 2
+        inertia = 4.0 / 3.0 * ROUGH.m * (ROUGH.a**2 + ROUGH.b**2)
+        return [z[1], (push * arm - ROUGH.m * GRAVITY * x) / inertia]
+
+    motion = solve_ivp(slope, (0.0, 0.15), (0.0, 0.0), method="DOP853", rtol=1e-11, atol=1e-14)
+    box = after(ROUGH, REST, Pushes(push, 0.0), 1e-4, 1500)
+    assert box.tilt == pytest.approx(float(motion.y[0, -1]), rel=1e-5)
+    assert box.w == pytest.approx(float(motion.y[1, -1]), rel=1e-5)
+    assert (box.x, box.v) == (0.0, 0.0)
+    assert 0.05 < box.tilt < balance(ROUGH)
+
+
+def test_on_a_smooth_floor_the_centre_is_shifted_by_pushes_alone() -> None:
+    """No friction: the centre stays above where it was while the box falls back."""
+    q = UPRIGHT._replace(mu=0.0)
+    tilted = Box(0.0, 0.3, 0.0, 0.0)
+    box = after(q, tilted, NOTHING, 1e-4, 400)
+    assert 0.0 < box.tilt < 0.29
+    assert box.v != 0.0
+    assert centre(q, box) == pytest.approx(centre(q, tilted), abs=1e-8)
+
+
+def test_it_falls_back_flat_and_loses_the_energy_of_the_fall() -> None:
+    q = ROUGH._replace(mu=0.5)
+    states = list(islice(run(q, Box(0.0, 0.3, 0.0, 0.0), NOTHING, 1e-4), 3000))
+    assert states[0].tilt > 0.299
+    assert min(box.tilt for box in states) == 0.0
+    assert (states[-1].tilt, states[-1].v, states[-1].w) == (0.0, 0.0, 0.0)
+    assert energy(q, states[-1]) == 0.0
+
+
+def test_the_balance_is_where_the_centre_is_above_the_edge() -> None:
+    assert balance(UPRIGHT) == pytest.approx(atan2(0.035, 0.05))
+    for share, rises in ((0.999, False), (1.001, True)):
+        box = Box(0.0, share * balance(UPRIGHT), 0.0, 0.0)
+        assert (advance(UPRIGHT, box, NOTHING, 1e-3).tilt > box.tilt) is rises
+    over = Box(0.0, balance(UPRIGHT), 0.0, 0.0)
+    assert centre(UPRIGHT, over) == pytest.approx(0.035)
+
+
+def test_squeezing_a_tilted_box_rights_it() -> None:
+    """Both fingertips at one height: the box is narrowest there when it is upright."""
+    tilted = Box(0.0, 0.1, 0.0, 0.0)
+    squeezed = after(ROUGH, tilted, Pushes(5.0, 5.0), 1e-4, 50)
+    alone = after(ROUGH, tilted, NOTHING, 1e-4, 50)
+    assert 0.0 <= squeezed.tilt < alone.tilt
+
+
+def test_the_faces_at_the_height_of_the_fingertips() -> None:
+    """Corners turned about the edge, and the height h found on the lines between them."""
+    for tilt in (-0.4, 0.0, 0.3):
+        q, side = ROUGH, 1.0 if tilt >= 0.0 else -1.0
+        edge = side * q.b
+
+        def turned(x: float, z: float, edge: float = edge, tilt: float = tilt) -> np.ndarray:
+            arm = x - edge
+            return np.array(
+                [edge + arm * cos(tilt) + z * sin(tilt), z * cos(tilt) - arm * sin(tilt)]
+            )
+
+        found = []
+        for x in (q.b, -q.b):
+            low, high = turned(x, 0.0), turned(x, 2.0 * q.a)
+            share = (q.h - low[1]) / (high[1] - low[1])
+            found.append(float(low[0] + share * (high[0] - low[0])))
+        assert faces(q, Box(0.0, tilt, 0.0, 0.0)) == pytest.approx(tuple(found), rel=1e-12)
+        middle = turned(0.0, q.a)
+        assert centre(q, Box(0.0, tilt, 0.0, 0.0)) == pytest.approx(middle[0], abs=1e-15)
+
+
+# ---------------------------------------------------------------- for any motion at all
+
+
+@QUICK
+@given(boxes(), PUSHES, STEPS)
+def test_the_mirrored_box_does_exactly_the_mirrored_thing(
+    start: tuple[Shape, Box], push: tuple[float, float], d: float
+) -> None:
+    q, box = start
+    image = Box(*(-value for value in box))
+    for _ in range(20):
+        box = advance(q, box, Pushes(*push), d)
+        image = advance(q, image, Pushes(*push[::-1]), d)
+        assert image == Box(*(-value for value in box))
+
+
+@QUICK
+@given(boxes(), STEPS)
+def test_left_alone_it_never_gains_energy(start: tuple[Shape, Box], d: float) -> None:
+    """Flat not at all; on its edge what the midpoint rule errs by in a sub-step, third order."""
+    q, box = start
+    for _ in range(30):
+        before, box = box, advance(q, box, NOTHING, d)
+        fast = abs(before.w) + abs(before.v) / q.b + (GRAVITY / q.b) ** 0.5
+        slack = 0.0 if before.tilt == box.tilt == 0.0 else (fast * d) ** 3
+        assume(abs(box.tilt) < balance(q))
+        scale = q.m * GRAVITY * q.b + energy(q, before)
+        assert energy(q, box) - energy(q, before) <= (slack + 1e-14) * scale
+
+
+def test_the_order_of_convergence() -> None:
+    """Second, from flat and sliding through a tilt on an edge that slides."""
+    q = Shape(b=0.03, a=0.06, m=0.1, mu=0.1, h=0.11)
+    start, push, t = Box(0.0, 0.0, 1.0, 0.0), Pushes(0.6, 0.0), 0.04
+    steps = [50, 100, 200, 400]
+    fine = np.array(after(q, start, push, t / 12800, 12800))
+    assert fine[1] > 0.02
+    assert fine[2] != 0.0
+    errors = [float(np.abs(np.array(after(q, start, push, t / n, n)) - fine).max()) for n in steps]
+    order, _ = np.polyfit(np.log(steps), -np.log(errors), 1)
+    assert order == pytest.approx(2.0, abs=0.2)
+
+
+@QUICK
+@given(shapes(), st.floats(0.0, 1.0))
+def test_friction_of_the_floor_never_jams_the_edge(q: Shape, share: float) -> None:
+    """Painleve's paradox: for mu < 4/3 a sliding edge always has an acceleration."""
+    tilt = share * balance(q)
+    x, z = q.b * cos(tilt) - q.a * sin(tilt), q.b * sin(tilt) + q.a * cos(tilt)
+    r2 = q.a**2 + q.b**2
+    assert 4.0 / 3.0 * r2 - z * (z + q.mu * x) > 0.1 * r2
