@@ -55,4 +55,5 @@ def grasp_system() -> System:
 
 def with_bench(system: System) -> System:
     """The grasp as on the bench: the sensors with their electronics, friction identified."""
-    return system.with_values(tomllib.loads(BENCH.read_text("utf-8"))["values"])
+    values = tomllib.loads(BENCH.read_text("utf-8"))["values"]
+    return system.revised({}, values, ("swap", BENCH.name))

@@ -29,7 +29,7 @@ STEP = 0.01
 """Of the finite differences, as a share of a parameter's scale."""
 
 MOST = 60
-"""Points at which the residuals are found, at most; a fit of four parameters needs about eight."""
+"""Steps of the fit at most, a Jacobian each; a fit of four parameters takes about eight."""
 
 NEGLIGIBLE = 1e-6
 """A singular value of the scaled Jacobian so much smaller than the largest is none."""
@@ -121,7 +121,7 @@ def fit(residuals: Residuals, parameters: Sequence[Parameter], place: str) -> Fi
         jac=jacobian,
         bounds=(low, high),
         x_scale=scale,
-        ftol=1e-6,
+        ftol=1e-5,
         xtol=1e-4,
         gtol=1e-8,
         max_nfev=MOST,
