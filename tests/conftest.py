@@ -11,9 +11,12 @@ from types import ModuleType
 
 import pytest
 from fmi2 import Fmu
-from grasp_cosim import System
+from grasp_cosim import System, cli
 from grasp_cosim.grasp import SYSTEM
 from grasp_fmus import build as builder
+
+Run = Callable[..., tuple[int, str, str]]
+"""A command line without its program; exit code, standard output, standard error."""
 
 Load = Callable[[str], Fmu]
 UnpackIn = Callable[[str], Path]
@@ -45,6 +48,26 @@ def load(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Load:
 def grasp(fmus: Path) -> System:
     """The built-in grasp."""
     return System.load(SYSTEM, fmus)
+
+
+@pytest.fixture
+def command(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    grasp: System,
+    tmp_path: Path,
+) -> Run:
+    """Runs a command line in an empty folder; exit code, standard output, standard error."""
+    monkeypatch.chdir(tmp_path)
+    for module in ("frame", "evaluate"):
+        monkeypatch.setattr(f"grasp_cosim.cli.{module}.grasp_system", lambda: grasp)
+
+    def run(*arguments: str | Path) -> tuple[int, str, str]:
+        code = cli.main([*map(str, arguments)])
+        out, err = capsys.readouterr()
+        return code, out, err
+
+    return run
 
 
 @pytest.fixture

@@ -79,13 +79,18 @@ class Group(NamedTuple):
         return f"{self.prefix}_{self.plural}"
 
 
-def c_header(name: str, signature: Signature, starts: Mapping[str, Value] | None = None) -> str:
+def c_header(
+    name: str,
+    signature: Signature,
+    starts: Mapping[str, Value] | None = None,
+    descriptions: Mapping[str, str] | None = None,
+) -> str:
     """The header for the bench side of the proxy of the model of that name, as text in ASCII.
 
     starts are the start values of inputs and parameters by name, 0, false or empty where there is
-    none; those of others are of no account. Everything in the header is called by the model's name
-    in lower snake case, members by the variables' names with _ for what C cannot have; a name that
-    was given already gets _2, _3, ...
+    none; those of others are of no account. descriptions, by name, are for the comments. Everything
+    in the header is called by the model's name in lower snake case, members by the variables' names
+    with _ for what C cannot have; a name that was given already gets _2, _3, ...
 
     ValueError where the variables do not fit into a datagram, or a start value is none of its kind.
     """
@@ -93,11 +98,12 @@ def c_header(name: str, signature: Signature, starts: Mapping[str, Value] | None
     prefix = c_prefix(name)
     inputs, parameters, outputs = groups = [_group(prefix, signature, c) for c in _PLURALS]
     text_size = len(signature.text.encode())
+    said = descriptions or {}
     return Template(_named(TEMPLATE.read_text("utf-8"), prefix)).substitute(
         title=_comment(name),
         structs="\n".join(
-            [_struct(inputs), _defaults(inputs, starts or {}), _struct(parameters),
-             _defaults(parameters, starts or {}), _struct(outputs)]
+            [_struct(inputs, said), _defaults(inputs, starts or {}), _struct(parameters, said),
+             _defaults(parameters, starts or {}), _struct(outputs, said)]
         ),
         packing="\n".join(
             [_signature(prefix, signature), *map(_check, groups), _unpack(inputs),
@@ -152,9 +158,11 @@ def _suffixes(wanted: str) -> Iterator[str]:
     yield from (f"_{i}" for i in count(2))
 
 
-def _struct(group: Group) -> str:
-    lines = [f"    {_declaration(m):<40} /* {_comment(_described(m.variable))} */"
-             for m in group.members]  # fmt: skip
+def _struct(group: Group, descriptions: Mapping[str, str]) -> str:
+    lines = [
+        f"    {_declaration(m):<40} /* {_comment(_described(m.variable, descriptions))} */"
+        for m in group.members
+    ]
     none = f"    uint8_t none; /* the model has no {group.plural} */"
     return "\n".join(
         [f"/* {_MEANINGS[group.causality]} */", "typedef struct {", *(lines or [none]),
@@ -167,8 +175,10 @@ def _declaration(m: Member) -> str:
     return f"{_TYPES[m.variable.kind]} {m.identifier}{size};"
 
 
-def _described(v: WireVariable) -> str:
-    return f"{v.name}, {v.unit}" if v.unit else v.name
+def _described(v: WireVariable, descriptions: Mapping[str, str]) -> str:
+    named = f"{v.name}, {v.unit}" if v.unit else v.name
+    description = descriptions.get(v.name)
+    return f"{named}: {description.replace('·', '.')}" if description else named
 
 
 def _defaults(group: Group, starts: Mapping[str, Value]) -> str:

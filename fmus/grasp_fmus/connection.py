@@ -38,6 +38,8 @@ class Connection:
         self.client = client
         self.refusal: Refusal | None = None
         self.trouble = ""
+        self.sessions = 0
+        """Sessions begun."""
         self._clock = clock
         self._stage = NEW
         self._pending = b""
@@ -66,6 +68,7 @@ class Connection:
             self._stage = GREETING
         if self._stage == GREETING and self._ask(self._pending, deadline, repeat=True):
             self._stage = WELCOME
+            self.sessions += 1
         return self._stage > GREETING
 
     def initialise(self, time: float, values: Sequence[Value], deadline: int) -> bool:

@@ -81,8 +81,14 @@ _DIAGNOSTICS: tuple[tuple[str, type[Scalar], str, str], ...] = (
     ("out_of_order", int, "", "of these, those after the answer to a newer step: dropped"),
     ("duplicated", int, "", "answers that had come already"),
     ("rejected", int, "", "datagrams that were malformed, foreign or not authentic"),
+    ("sessions", int, "", "sessions begun; more than 1: the peer's model was set up anew"),
     ("round_trip_time", float, "s", "of the newest answer"),
-    ("age", float, "s", "simulation time since that which the outputs belong to"),
+    (
+        "age",
+        float,
+        "s",
+        "simulation time since that which the outputs belong to; below 0: the peer is ahead",
+    ),
 )
 """Name, kind, unit, description."""
 
@@ -157,6 +163,7 @@ class Fmi2Proxy(Slave):
         self._address = ("", 0, "")
         self._state = NOT_CONNECTED
         self._missed = 0
+        self._sessions = 1
         self._loss = ""
         self._enter(INSTANTIATED)
 
@@ -271,13 +278,18 @@ class Fmi2Proxy(Slave):
             raise RefusalError(f"{_peer(settings)}: {connection.refusal.text}")
         trouble = f" ({connection.trouble})" if connection.trouble else ""
         raise RefusalError(
-            f"no answer from {_peer(settings)} within {settings.connect_timeout:g} s{trouble}: "
-            f"start the peer first, e.g. grasp-cosim serve {self.original} --port {settings.port}"
+            f"no answer from {_peer(settings)} within {settings.connect_timeout:g} s{trouble}: is "
+            f"the peer running there, and has it {'the same' if settings.key_file else 'no'} key? "
+            f"e.g. grasp-cosim serve {self.original} --port {settings.port}"
         )
 
     def _note_answer(self, connection: Connection) -> None:
         if self._state == LOST:
-            self._log(WARNING, f"{_peer(self._read_settings())}: the peer answers again")
+            anew = " in a new session, its model set up anew" * (
+                connection.sessions > self._sessions
+            )
+            self._log(WARNING, f"{_peer(self._read_settings())}: the peer answers again{anew}")
+        self._sessions = connection.sessions
         self._state, self._missed = CONNECTED, 0
 
     def _note_miss(self, connection: Connection, settings: Settings) -> None:
@@ -333,7 +345,10 @@ class Fmi2Proxy(Slave):
         """Bring the diagnostics up to date; before the first step they would not settle."""
         client = connection.client
         c = client.counters
-        counts = (c.missed, self._missed, c.late, c.out_of_order, c.duplicated, c.rejected)
+        counts = (
+            c.missed, self._missed, c.late, c.out_of_order, c.duplicated, c.rejected,
+            connection.sessions,
+        )  # fmt: skip
         self._values[self._diagnostics] = [
             self._state,
             *(min(count, MOST) for count in counts),

@@ -57,7 +57,9 @@ def build_proxy(
     """
     name = target.stem
     if not _IDENTIFIER.fullmatch(name) or target.suffix != ".fmu":
-        raise ValueError(f"{target.name}: must be an identifier of C, letters, digits and _, .fmu")
+        raise ValueError(
+            f"{target.name}: must be NAME.fmu, NAME of letters, digits and _, no digit first"
+        )
     taken = [v.name for v in original.variables if v.name.startswith("proxy.")]
     if taken:
         raise ValueError(f"{original.file}: {taken[0]}: proxy. begins the names of a proxy's own")

@@ -311,6 +311,28 @@ def test_an_output_that_is_not_finite_is_a_failure(tmp_path: Path, clocked: Make
         it.proxy.step(0.0, STEP, starts(fmu))
 
 
+def test_what_is_dropped_is_said_once(fmus: Path, clocked: MakeClocked) -> None:
+    fmu = fmus / "ProximitySensor.fmu"
+    it = clocked(fmu, Serving(key=b"a key of 16 byte"))
+    for _ in range(3):
+        assert it.bench.answer(it.proxy.client.greet(1, 0), "somebody", it.now) is None
+    assert it.said == [
+        "a datagram from somebody that is none of this protocol, or with another kind of key, is "
+        "dropped"
+    ] or it.said == ["a datagram from somebody without the right key is dropped"]
+
+
+def test_a_bench_that_is_closed_says_where_its_session_ended(
+    fmus: Path, clocked: MakeClocked
+) -> None:
+    fmu = fmus / "ProximitySensor.fmu"
+    it = clocked(fmu, Serving(lockstep=True))
+    it.proxy.begin(1, starts(fmu))
+    it.proxy.step(0.0, STEP, starts(fmu))
+    it.bench.close()
+    assert it.said[-1] == "the session is over at t = 0.001 s: the bench is closed"
+
+
 def test_wrong_failsafe_values_are_refused(fmus: Path) -> None:
     plant = read_interface(fmus / "GripperPlant.fmu")
     with pytest.raises(InputError, match=r"failsafe force: no such input .* valid: force\[1\]"):

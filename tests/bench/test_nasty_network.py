@@ -153,3 +153,6 @@ def test_the_peer_started_anew(slow_grasp: System, tmp_path: Path, resume: bool)
         result = session.result()
     assert len(result.time) == 41
     assert (result["plant.gap[2]"][-1] == 0.25) != resume
+    assert result.metrics["proxies"]["plant"]["sessions"] == 1 + resume
+    assert any("plant: the peer was lost at t = " in line for line in result.log)
+    assert any("started anew" in line for line in result.log) == resume

@@ -180,6 +180,11 @@ def test_a_bounded_service_ends_by_itself(fmus: Path, capsys: pytest.CaptureFixt
     fmu = str(fmus / "ProximitySensor.fmu")
     assert cli.main(["serve", fmu, "--port", "0", "--duration", "0.01"]) == 0
     assert capsys.readouterr().out == "nothing came\n"
+    bounded = ["serve", fmu, "--port", "0", "--duration", "0.01", "--sessions", "1", "--json"]
+    assert cli.main(bounded) == 1
+    captured = capsys.readouterr()
+    assert json.loads(captured.out)["listening"].startswith("127.0.0.1:")
+    assert captured.err.endswith("grasp-cosim: 0 of 1 sessions in 0.01 s\n")
 
 
 @pytest.mark.parametrize(

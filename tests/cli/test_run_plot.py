@@ -1,37 +1,19 @@
 """run --plot: a picture of the grasp, one of the timing of a run in real time, or both."""
 
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from grasp_cosim import System, cli
-
-Run = Callable[..., tuple[int, str, str]]
+from conftest import Run
 
 
-@pytest.fixture
-def command(
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    grasp: System,
-    fmus: Path,
-    tmp_path: Path,
-) -> Run:
-    """Runs a command line in a folder with a sensor.toml; exit code, what was said on each."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("grasp_cosim.cli.frame.grasp_system", lambda: grasp)
+@pytest.fixture(autouse=True)
+def sensor_toml(tmp_path: Path, fmus: Path) -> None:
+    """A system that is no grasp."""
     (tmp_path / "sensor.toml").write_text(
         "[experiment]\nstep = 1e-3\nstop = 0.02\n"
         f'[components.sensor]\nfmu = "{fmus / "ProximitySensor.fmu"}"\nvalues = {{ gap = 0.02 }}\n'
     )
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        code = cli.main(list(arguments))
-        out, err = capsys.readouterr()
-        return code, out, err
-
-    return run
 
 
 @pytest.mark.parametrize(

@@ -2,36 +2,15 @@
 
 import json
 import os
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from grasp_cosim import System, cli
+from conftest import Run
 from grasp_cosim.cli.realtime import timing_lines
 from grasp_cosim.realtime.timing import Overrun, Spread, Timing
 from grasp_cosim.recording.load import load_run
 
-Run = Callable[..., tuple[int, str, str]]
 PACED = ("run", "--realtime", "--factor", "1000", "--step", "1e-3", "--stop", "0.5")
-
-
-@pytest.fixture
-def command(
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    grasp: System,
-    tmp_path: Path,
-) -> Run:
-    """Runs a command line in an empty folder; exit code, standard output, standard error."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("grasp_cosim.cli.frame.grasp_system", lambda: grasp)
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        code = cli.main(list(arguments))
-        out, err = capsys.readouterr()
-        return code, out, err
-
-    return run
 
 
 def test_the_timing_is_in_the_json_and_in_the_folder(command: Run, tmp_path: Path) -> None:
@@ -55,8 +34,8 @@ def test_people_are_told_how_it_kept_to_the_clock(command: Run) -> None:
     code, out, err = command(*PACED)
     assert (code, err) == (0, "")
     lines = out.splitlines()
-    (begin,) = (i for i, line in enumerate(lines) if line.startswith("real time: "))
-    assert "(asked for 1000), a step every 0.001 ms" in lines[begin]
+    (begin,) = (i for i, line in enumerate(lines) if line.startswith("paced at "))
+    assert "of real time, asked for 1000: a step every 0.001 ms" in lines[begin]
     assert lines[begin + 1].startswith("step computes         median ")
     assert lines[begin + 2].startswith("start is late by      median ")
     assert lines[begin + 3].startswith("overruns              500 of 500 steps; because of: ")
@@ -127,7 +106,7 @@ def timing(culprits: dict[str, int], granted: tuple[str, ...] = ()) -> Timing:
 
 def test_what_could_be_done_depends_on_who_is_to_blame() -> None:
     assert timing_lines(timing({})) == [
-        "real time: 1 times (asked for 1), a step every 1 ms",
+        "paced at 1 of real time, asked for 1: a step every 1 ms",
         "step computes         median 0.1  p99 0.2  p99.9 0.3  worst 0.4 ms at t = 0.5 s",
         "start is late by      median 0.1  p99 0.2  p99.9 0.3  worst 0.4 ms at t = 0.5 s",
         "overruns              none: every step ended within its period",
@@ -135,7 +114,7 @@ def test_what_could_be_done_depends_on_who_is_to_blame() -> None:
     lines = timing_lines(timing({"start": 3, "backlog": 9, "plant": 1}))[3:]
     assert lines[:2] == [
         "overruns              13 of 100 steps; because of: start 3, backlog 9, plant 1",
-        "  e.g.                at t = 0.003 s 0.2 ms late: start took 0.7 ms",
+        "  e.g.                at t = 0.003 s 0.2 ms late: it began late by 0.7 ms",
     ]
     assert "give the run a --priority and a --cpu of its own" in lines[2]
     assert len(timing_lines(timing({"start": 3}, ("CPU 1",)))) == 5

@@ -1,34 +1,13 @@
 """run --step-study: what it prints and writes, its exit codes, its mistakes in one line."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-from grasp_cosim import System, cli
+from conftest import Run
+from grasp_cosim import System
 from grasp_cosim.study.step_study import StepRun, StepStudy
-
-Run = Callable[..., tuple[int, str, str]]
-
-
-@pytest.fixture
-def command(
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    grasp: System,
-    tmp_path: Path,
-) -> Run:
-    """Runs a command line in an empty folder; exit code, standard output, standard error."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("grasp_cosim.cli.frame.grasp_system", lambda: grasp)
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        code = cli.main(list(arguments))
-        out, err = capsys.readouterr()
-        return code, out, err
-
-    return run
 
 
 @pytest.fixture

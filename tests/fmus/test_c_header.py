@@ -828,3 +828,9 @@ def test_the_constants_are_those_of_the_protocol() -> None:
     assert f"INT64_C({ALIVE})" in text
     assert "M_LARGEST_REASON = 256 " in text
     assert OUTPUTS == 6
+
+
+def test_descriptions_are_in_the_comments() -> None:
+    signature = Signature((WireVariable("gap", "Real", "input", "m"),))
+    header = c_header("M", signature, descriptions={"gap": "l, to the */ surface"})
+    assert "double gap;                              /* gap, m: l, to the * / surface */" in header

@@ -152,7 +152,8 @@ def test_nobody_there() -> None:
         line = refused(host, host.slave.enter_initialization_mode)
     assert line == (
         f"proxy, t = 0 s: no answer from 127.0.0.1:{port} within 0.1 s: "
-        f"start the peer first, e.g. grasp-cosim serve Original.fmu --port {port}"
+        f"is the peer running there, and has it no key? "
+        f"e.g. grasp-cosim serve Original.fmu --port {port}"
     )
 
 

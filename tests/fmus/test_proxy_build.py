@@ -46,6 +46,7 @@ OWN_OUTPUTS = {
     "proxy.out_of_order": "Integer",
     "proxy.duplicated": "Integer",
     "proxy.rejected": "Integer",
+    "proxy.sessions": "Integer",
     "proxy.round_trip_time": "Real",
     "proxy.age": "Real",
 }
@@ -477,7 +478,8 @@ def test_the_peers_side_as_a_c_header(fmus: Path, run: Run) -> None:
     assert run(original, *both) == (0, "P.fmu: new\nsub/bench.h: written\n", "")
     text = Path("sub/bench.h").read_text("ascii")
     starts = {n: v["start"] for n, v in variables(original).items() if v["start"] is not None}
-    assert text == c_header("GripperPlant", signature, starts)
+    said = {v.name: v.description for v in read_interface(original).variables}
+    assert text == c_header("GripperPlant", signature, starts, said)
     Path("P.fmu").unlink()
     code, out, _ = run(original, "--c-header", "other.h", "--json")
     assert (code, json.loads(out)) == (0, {"notes": [], "c_header": "other.h"})
@@ -494,10 +496,10 @@ def test_the_peers_side_as_a_c_header(fmus: Path, run: Run) -> None:
         (["ProximitySensor.fmu"], "proxy: must have -o FILE.fmu or --c-header FILE, or both"),
         (["-o", "P.fmu"], "Missing argument 'FMU'"),
         (["none.fmu", "-o", "P.fmu"], "none.fmu: no such FMU file"),
-        (["ProximitySensor.fmu", "-o", "my-proxy.fmu"], "my-proxy.fmu: must be an identifier of C"),
-        (["ProximitySensor.fmu", "-o", "2nd.fmu"], "2nd.fmu: must be an identifier of C"),
-        (["ProximitySensor.fmu", "-o", "Grün.fmu"], "Grün.fmu: must be an identifier of C"),
-        (["ProximitySensor.fmu", "-o", "P"], "P: must be an identifier of C"),
+        (["ProximitySensor.fmu", "-o", "my-proxy.fmu"], "my-proxy.fmu: must be NAME.fmu, NAME of"),
+        (["ProximitySensor.fmu", "-o", "2nd.fmu"], "2nd.fmu: must be NAME.fmu, NAME of"),
+        (["ProximitySensor.fmu", "-o", "Grün.fmu"], "Grün.fmu: must be NAME.fmu, NAME of letters"),
+        (["ProximitySensor.fmu", "-o", "P"], "P: must be NAME.fmu, NAME of letters"),
         (["ProximitySensor.fmu", "-o", "./ProximitySensor.fmu"], "is the original; must be"),
         (["ProximitySensor.fmu", "--c-header", "ProximitySensor.fmu"], "is the original; must be"),
         (["ProximitySensor.fmu", "-o", "P.fmu", "--c-header", "P.fmu"], "is the proxy; must be"),

@@ -133,7 +133,8 @@ def test_a_peer_that_is_not_there(fmu: Fmu) -> None:
         (said,) = instance.log
         assert said.text == (
             f"bench, t = 0 s: no answer from 127.0.0.1:{port} within 0.05 s: "
-            f"start the peer first, e.g. grasp-cosim serve Original.fmu --port {port}"
+            f"is the peer running there, and has it no key? "
+            f"e.g. grasp-cosim serve Original.fmu --port {port}"
         )
         assert (said.status, said.category) == (ERROR, "logStatusError")
 

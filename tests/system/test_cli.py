@@ -7,43 +7,20 @@ import re
 import subprocess
 import sys
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import Altered
-from grasp_cosim import System, cli, simulate
+from conftest import Altered, Run
+from grasp_cosim import System, simulate
 from grasp_cosim.grasp import CASES
 from grasp_fmus import documentation
-
-Run = Callable[..., tuple[int, str, str]]
 
 METRICS = {
     "time_to_contact", "time_difference", "impact_velocity", "peak_contact_force",
     "steady_contact_force", "object_shift", "target_position", "wall_time", "real_time_factor",
     "steps", "scheme", "step",
 }  # fmt: skip
-
-
-@pytest.fixture
-def command(
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    grasp: System,
-    tmp_path: Path,
-) -> Run:
-    """Runs a command line in an empty folder; exit code, standard output, standard error."""
-    monkeypatch.chdir(tmp_path)
-    for module in ("frame", "evaluate"):
-        monkeypatch.setattr(f"grasp_cosim.cli.{module}.grasp_system", lambda: grasp)
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        code = cli.main(list(arguments))
-        out, err = capsys.readouterr()
-        return code, out, err
-
-    return run
 
 
 def test_run_prints_one_json_object(command: Run, grasp: System) -> None:

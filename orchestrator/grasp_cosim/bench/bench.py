@@ -50,6 +50,15 @@ class Served:
     failures: int = 0
 
 
+DROPPED = {
+    "forged": "without the right key is dropped",
+    "malformed": "that is none of this protocol, or with another kind of key, is dropped",
+    "foreign": "of another interface, or of a session that is not known, is refused",
+    "busy": "of another proxy is refused while a session is under way",
+}
+"""What is said of the first datagram of a kind, by its counter."""
+
+
 class Bench:
     """Serves one FMU. Times are ns of a monotonic clock. Close it."""
 
@@ -72,10 +81,11 @@ class Bench:
         self._step_ns = 0
         self._heard: int | None = None  # the last request, while the watchdog watches
         self._own_failure = ""
+        self._said: set[str] = set()
 
     def close(self) -> None:
-        """Free the FMU."""
-        self._model.close()
+        """End the session under way, and free the FMU."""
+        self._end("the bench is closed")
 
     def counters(self) -> dict[str, int]:
         """What was done and what was received, by name."""
@@ -90,6 +100,7 @@ class Bench:
         """Do what a datagram says, whatever it holds; what to send back to its source."""
         action = self.peer.receive(datagram, now)
         if not isinstance(action, Request):
+            self._say_what_is_dropped(source)
             return action
         if action.kind == END:
             self._end("the proxy ended the session")
@@ -103,6 +114,13 @@ class Bench:
             return self.peer.outputs(self._model.outputs(), self._model.time)
         except (InputError, SimulationError, ValueError) as error:
             return self._fail(str(error))
+
+    def _say_what_is_dropped(self, source: str) -> None:
+        """The first time only: whoever looks for the reason of a silence looks here."""
+        for counter, count in self.peer.counters.as_dict().items():
+            if count and counter in DROPPED and counter not in self._said:
+                self._said.add(counter)
+                self._say(f"a datagram from {source} {DROPPED[counter]}")
 
     def _do(self, request: Request, now: int) -> None:
         if self._own_failure:

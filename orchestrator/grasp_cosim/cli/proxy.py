@@ -88,7 +88,9 @@ def proxy(
         if c_header is not None:
             starts = {v.name: _start(interface.by_name[v.name]) for v in signature.request}
             known = {name: start for name, start in starts.items() if start is not None}
-            write_file(c_header, header(interface.identifier, signature, known).encode())
+            said = {v.name: v.description for v in interface.variables}
+            text = header(interface.identifier, signature, known, said)
+            write_file(c_header, text.encode())
             lines.append(f"{c_header}: written")
             report["c_header"] = str(c_header)
     except ValueError as error:

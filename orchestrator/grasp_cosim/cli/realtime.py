@@ -54,8 +54,8 @@ def timing_lines(timing: Timing) -> list[str]:
     """How the run kept to the clock, for people."""
     parts, period = timing.parts, 1e3 * timing.period
     lines = [
-        f"real time: {timing.real_time_factor:.6g} times (asked for {timing.factor:g}), "
-        f"a step every {period:g} ms",
+        f"paced at {timing.real_time_factor:.4g} of real time, asked for {timing.factor:g}: a step "
+        f"every {period:g} ms",
         *(
             f"{label:22s}median {_ms(part.median)}  p99 {_ms(part.p99)}  p99.9 {_ms(part.p999)}  "
             f"worst {_ms(part.worst)} ms at t = {part.worst_at:.6g} s"
@@ -67,11 +67,12 @@ def timing_lines(timing: Timing) -> list[str]:
         return [*lines, "overruns              none: every step ended within its period"]
     blamed = ", ".join(f"{name} {count}" for name, count in timing.culprits.items())
     causes = [o for o in timing.listed if o.culprit != "backlog"] or timing.listed
-    worst = max(causes, key=lambda o: o.late)
+    worst = max(causes, key=lambda o: o.took)
+    what = "it began late by" if worst.culprit == "start" else f"{worst.culprit} took"
     lines += [
         f"overruns              {timing.overruns} of {timing.steps} steps; because of: {blamed}",
         f"  e.g.                at t = {worst.time:.6g} s {_ms(worst.late)} ms late: "
-        f"{worst.culprit} took {_ms(worst.took)} ms",
+        f"{what} {_ms(worst.took)} ms",
     ]
     return [*lines, *_advice(timing)]
 

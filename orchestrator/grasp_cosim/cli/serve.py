@@ -12,7 +12,7 @@ from ..bench.wire import shared_key
 from ..errors import InputError
 from ..system.description import in_nanoseconds
 from ..system.interface import read_interface
-from .frame import INTERRUPTED, fail, json_option, pair
+from .frame import INTERRUPTED, NEGATIVE, fail, json_option, pair
 from .signals import ended_by_signals
 
 PORT = 5501
@@ -55,7 +55,7 @@ def serve(
 
     It runs in real time, or with --lockstep one step at a request: then a loop over the proxy gives
     the same values as one without. Port 0 takes one that is free. What came is counted, and said
-    in the end. Exit code 130 where --sessions or --duration was cut short.
+    in the end. Exit code 1: --duration was over before --sessions; 130: cut short.
 
     \b
     Example: grasp-cosim serve fmus/build/GripperPlant.fmu --lockstep
@@ -82,12 +82,14 @@ def serve(
             server.serve(sessions, end)
         counters = bench.counters()
     if as_json:
-        click.echo(json.dumps(counters))
+        click.echo(json.dumps({"listening": at, **counters}))
     else:
         came_in = ", ".join(f"{name} {count}" for name, count in counters.items() if count)
         click.echo(came_in or "nothing came")
     if came and (sessions or duration):
         return fail("interrupted before --sessions or --duration ended it", INTERRUPTED)
+    if sessions and counters["sessions"] < sessions:
+        return fail(f"{counters['sessions']} of {sessions} sessions in {duration!r} s", NEGATIVE)
     return 0
 
 

@@ -24,8 +24,8 @@ EXPERIMENT = (
 SETTINGS = ("components", "wires", "events", "faults", "log", "rejections")
 """Those that are shown as lists of their own."""
 
-TIMING = "realtime"
-"""The entry that a paced run has more: its timing."""
+TIMING, PROXIES = "realtime", "proxies"
+"""The entries that a paced run has more, its timing, and one with proxies: the log has them."""
 
 _ABOUT_SIGNALS = ("units", "types", "descriptions")
 _UNITS = {"step": "s", "stop": "s", "wall_time": "s"}
@@ -46,7 +46,14 @@ def summary(run: Mapping[str, Any]) -> str:
 def metrics_table(run: Mapping[str, Any]) -> str:
     """The metrics of the grasp with a column per finger, then any others as they are."""
     known = [entry for entry in LABELS if entry[1] in run]
-    shown = {*(key for _, key, _, _ in LABELS), *EXPERIMENT, *SETTINGS, *_ABOUT_SIGNALS, TIMING}
+    shown = {
+        *(key for _, key, _, _ in LABELS),
+        *EXPERIMENT,
+        *SETTINGS,
+        *_ABOUT_SIGNALS,
+        TIMING,
+        PROXIES,
+    }
     others = [key for key in run if key not in shown]
     if not known and not others:
         return "<p>There are no metrics of this system.</p>"

@@ -21,6 +21,7 @@ from ..recording.dispatch import Dispatcher
 from ..recording.listener import Listener
 from ..recording.memory import MemoryListener
 from ..recording.result import Result
+from ..study.proxies import proxy_lines
 from ..system.checks import remarks
 from ..system.description import System
 from ..system.interface import Value
@@ -222,6 +223,7 @@ class Session:
             for name, r in master.rejections.items()
         )
         pending = master.scenario.pending() if self.complete else ()
+        memory, step = self._memory, self.system.step_ns / NANOSECONDS
         return (
             *self.system.notes,
             *remarks(self.system),
@@ -229,6 +231,7 @@ class Session:
             *master.scenario.log,
             *rejected,
             *pending,
+            *proxy_lines(memory.time, memory.signals, step),
         )
 
 

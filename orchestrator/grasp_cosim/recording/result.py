@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from ..realtime.timing import Timing
 from ..study.metrics import grasp_metrics
+from ..study.proxies import proxy_figures
 from ..system.description import System
 from ..system.parts import NANOSECONDS
 from .listener import Listener, Signal
@@ -64,7 +65,10 @@ class Result(Mapping[str, npt.NDArray[Any]]):
 
     @cached_property
     def metrics(self) -> Mapping[str, Any]:
-        """The figures of `run --json`; those of the grasp only if there is a gripper plant."""
+        """The figures of `run --json`.
+
+        Those of the grasp only if there is a gripper plant, those of proxies if there are any.
+        """
         simulated = float(self.time[-1])
         return {
             **grasp_metrics(self.time, self.signals),
@@ -75,6 +79,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
             "step": self.system.step_ns / NANOSECONDS,
             "stop": self.system.stop_ns / NANOSECONDS,
             "complete": self.complete,
+            **({"proxies": proxies} if (proxies := proxy_figures(self.time, self.signals)) else {}),
         }
 
     def to_csv(self, path: str | Path) -> None:

@@ -1,0 +1,83 @@
+"""What became of the proxies of a run, from the diagnostics that they put out at every step."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Signals = Mapping[str, npt.NDArray[Any]]
+Times = npt.NDArray[np.float64]
+
+_STATE = ".proxy.state"
+_LOST = 3
+"""The value of proxy.state while the peer is lost."""
+
+_COUNTS = ("missed", "late", "out_of_order", "duplicated", "rejected", "sessions")
+
+_LISTED = 5
+"""The most losses that are named."""
+
+_AHEAD = 10
+"""Steps that a peer's clock may be ahead of the run without a word."""
+
+
+def proxy_figures(time: Times, signals: Signals) -> dict[str, dict[str, Any]]:
+    """The figures of each proxy by component: counts at the end, and times in s.
+
+    lost and back are the communication points at which the peer was lost, and answered again;
+    ahead is how far its outputs were from the future at most.
+    """
+    return {name: _figures(time, _diagnostics(name, signals)) for name in _proxies(signals)}
+
+
+def proxy_lines(time: Times, signals: Signals, step: float) -> list[str]:
+    """What is worth knowing about the proxies, a line each; step is the run's, in s."""
+    lines = []
+    for name, figures in proxy_figures(time, signals).items():
+        lines += [f"{name}: {line}" for line in _lines(figures, len(time) - 1, step)]
+    return lines
+
+
+def _proxies(signals: Signals) -> list[str]:
+    return [name.removesuffix(_STATE) for name in signals if name.endswith(_STATE)]
+
+
+def _diagnostics(name: str, signals: Signals) -> Signals:
+    start = f"{name}.proxy."
+    return {key.removeprefix(start): v for key, v in signals.items() if key.startswith(start)}
+
+
+def _figures(time: Times, own: Signals) -> dict[str, Any]:
+    lost = own["state"] == _LOST
+    turns = np.diff(lost.astype(np.int8), prepend=0)
+    return {
+        **{name: int(own[name][-1]) for name in _COUNTS},
+        "most_in_a_row": int(own["consecutive_missed"].max()),
+        "round_trip_median": float(np.median(own["round_trip_time"])),
+        "round_trip_worst": float(own["round_trip_time"].max()),
+        "ahead": max(0.0, -float(own["age"].min())),
+        "lost": time[turns > 0].tolist(),
+        "back": time[turns < 0].tolist(),
+    }
+
+
+def _lines(f: Mapping[str, Any], steps: int, step: float) -> Iterator[str]:
+    for moment in f["lost"][:_LISTED]:
+        back = next((t for t in f["back"] if t > moment), None)
+        again = "not back" if back is None else f"back at t = {back:.9g} s"
+        yield f"the peer was lost at t = {moment:.9g} s, {again}; outputs as proxy.on_loss says"
+    if f["sessions"] > 1:
+        yield (
+            f"the peer was started anew, and its model set up from the start: {f['sessions']} "
+            "sessions in this run"
+        )
+    if f["ahead"] > _AHEAD * step:
+        yield (
+            f"the peer's clock was up to {f['ahead']:.3g} s ahead of the run, which did not keep up"
+        )
+    yield (
+        f"{f['missed']} of {steps} steps missed ({f['most_in_a_row']} in a row), {f['late']} "
+        f"answers late; round trip {1e3 * f['round_trip_median']:.3g} ms, at worst "
+        f"{1e3 * f['round_trip_worst']:.3g} ms"
+    )

@@ -1,0 +1,57 @@
+"""What is said of the proxies of a run, from made-up diagnostics."""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from grasp_cosim.study.proxies import proxy_figures, proxy_lines
+
+TIME: npt.NDArray[np.float64] = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
+
+
+def diagnostics(**values: list[float]) -> dict[str, npt.NDArray[Any]]:
+    quiet = dict.fromkeys(
+        ("missed", "consecutive_missed", "late", "out_of_order", "duplicated", "rejected", "age"),
+        [0.0] * 6,
+    )
+    usual = {**quiet, "state": [1] * 6, "sessions": [1] * 6, "round_trip_time": [0.001] * 6}
+    columns = {**usual, **values}
+    signals = {f"arm.proxy.{name}": np.array(column) for name, column in columns.items()}
+    return {"arm.angle": np.zeros(6), **signals}
+
+
+def test_a_run_without_proxies_has_nothing_to_say() -> None:
+    assert proxy_figures(TIME, {"arm.angle": TIME}) == {}
+    assert proxy_lines(TIME, {"arm.angle": TIME}, 0.1) == []
+
+
+def test_of_a_quiet_one_a_line() -> None:
+    assert proxy_lines(
+        TIME, diagnostics(round_trip_time=[0.0, 0.001, 0.001, 0.009, 0.001, 0.001]), 0.1
+    ) == ["arm: 0 of 5 steps missed (0 in a row), 0 answers late; round trip 1 ms, at worst 9 ms"]
+
+
+def test_a_loss_and_a_return_are_named() -> None:
+    signals = diagnostics(
+        state=[1, 2, 3, 3, 1, 3], missed=[0, 1, 2, 3, 3, 4], consecutive_missed=[0, 1, 2, 3, 0, 1],
+        sessions=[1, 1, 1, 1, 2, 2], age=[0.0, 0.1, 0.2, 0.3, 0.0, -2.5],
+    )  # fmt: skip
+    (figures,) = proxy_figures(TIME, signals).values()
+    assert figures["lost"] == [TIME[2], TIME[5]]
+    assert figures["back"] == [TIME[4]]
+    assert (figures["missed"], figures["most_in_a_row"], figures["ahead"]) == (4, 3, 2.5)
+    assert proxy_lines(TIME, signals, 0.1)[:-1] == [
+        "arm: the peer was lost at t = 0.2 s, back at t = 0.4 s; outputs as proxy.on_loss says",
+        "arm: the peer was lost at t = 0.5 s, not back; outputs as proxy.on_loss says",
+        "arm: the peer was started anew, and its model set up from the start: 2 sessions in this "
+        "run",
+        "arm: the peer's clock was up to 2.5 s ahead of the run, which did not keep up",
+    ]
+
+
+def test_many_losses_are_not_all_listed() -> None:
+    time: npt.NDArray[np.float64] = np.linspace(0.0, 3.9, 40)
+    signals = {
+        name: np.resize(column, 40) for name, column in diagnostics(state=[1, 3] * 3).items()
+    }
+    assert sum("lost at" in line for line in proxy_lines(time, signals, 0.1)) == 5
