@@ -4,35 +4,15 @@ import csv
 import json
 import re
 import tomllib
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from grasp_cosim import System, cli, simulate
+from conftest import Run
+from grasp_cosim import System, simulate
 from grasp_cosim.identification.fit import Estimate, Fit
 from grasp_cosim.recording.result import Result
 
-Run = Callable[..., tuple[int, str, str]]
-
 TRUE = {"plant.friction.coulomb[1]": 0.6, "plant.friction.coulomb[2]": 1.3}
-
-
-@pytest.fixture
-def command(
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    grasp: System,
-    tmp_path: Path,
-) -> Run:
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("grasp_cosim.cli.identify.grasp_system", lambda: grasp)
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        code = cli.main(["identify", *arguments])
-        out, err = capsys.readouterr()
-        return code, out, err
-
-    return run
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +23,9 @@ def recorded(grasp: System) -> Result:
 @pytest.mark.parametrize("kind", ["csv", "mf4"])
 def test_friction_from_a_log(command: Run, recorded: Result, kind: str) -> None:
     recorded.to_csv("signals.csv") if kind == "csv" else recorded.to_mdf("signals.mf4")
-    code, out, err = command("--log", f"signals.{kind}", "--out", "identified", "--json")
+    code, out, err = command(
+        "identify", "--log", f"signals.{kind}", "--out", "identified", "--json"
+    )
     assert (code, err) == (0, "")
     found = json.loads(out)
     assert found == json.loads(Path("identified/identification.json").read_text())
@@ -58,7 +40,9 @@ def test_friction_from_a_log(command: Run, recorded: Result, kind: str) -> None:
 
 def test_the_values_fit_into_a_system(command: Run, recorded: Result, grasp: System) -> None:
     recorded.to_csv("signals.csv")
-    code, out, _ = command("--log", "signals.csv", "--fit", "coulomb", "--out", "identified")
+    code, out, _ = command(
+        "identify", "--log", "signals.csv", "--fit", "coulomb", "--out", "identified"
+    )
     assert code == 0
     assert re.search(r"plant\.friction\.coulomb\[1\] +0\.6\d* N, \[0\.\d+, 0\.\d+\]", out)
     values = tomllib.loads(Path("identified/values.toml").read_text())["values"]
@@ -76,7 +60,7 @@ def test_contact_times_have_a_residual_for_every_row(
         "grasp_cosim.cli.identify.identify_from_times",
         lambda *_, **__: Fit((estimate,), np.linspace(-0.1, 0.1, 40), 9),
     )
-    code, out, _ = command("--fit", "coulomb")
+    code, out, _ = command("identify", "--fit", "coulomb")
     assert code == 0
     assert "the published experiments, 40 contact times" in out
     assert "0 N, at its lower bound" in out
@@ -99,7 +83,7 @@ def test_contact_times_have_a_residual_for_every_row(
 def test_wrong_input_is_one_line(
     command: Run, tmp_path: Path, arguments: tuple[str, ...], message: str
 ) -> None:
-    code, out, err = command(*arguments)
+    code, out, err = command("identify", *arguments)
     assert (code, out) == (2, "")
     assert err.startswith(f"grasp-cosim: {message}")
     assert len(err.splitlines()) == 1
@@ -111,5 +95,5 @@ def test_ctrl_c_is_130(command: Run, monkeypatch: pytest.MonkeyPatch) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr("grasp_cosim.cli.identify.identify_from_times", interrupted)
-    code, out, err = command()
+    code, out, err = command("identify")
     assert (code, out, err.split()) == (130, "", ["grasp-cosim:", "interrupted"])

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from grasp_cosim import InputError, System, cli
+from conftest import Run
+from grasp_cosim import InputError, System
 from grasp_cosim.grasp import BENCH, CASES, with_bench
 from grasp_cosim.published.bench import evaluate_bench, run_settings
 from grasp_cosim.published.tables import Setting
@@ -53,12 +54,9 @@ def test_a_system_that_the_preset_does_not_fit_is_refused(grasp: System) -> None
         with_bench(other)
 
 
-def test_run_takes_the_preset_too(
-    grasp: System, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("grasp_cosim.cli.frame.grasp_system", lambda: grasp)
-    assert cli.main(["run", "--bench", "--stop", "0.01", "--out", "results", "--json"]) == 0
+def test_run_takes_the_preset_too(command: Run) -> None:
+    code, _, _ = command("run", "--bench", "--stop", "0.01", "--out", "results", "--json")
+    assert code == 0
     values = json.loads(Path("results/run.json").read_text())["components"]["plant"]["values"]
     assert values["friction.coulomb[2]"] == pytest.approx(1.34, abs=0.01)
 
@@ -114,3 +112,22 @@ def test_everything_is_written(report: dict[str, Any], out: Path) -> None:
     assert "| brown/white | 2 | time difference | 0.15 |" in text
     with (out / "evaluation.csv").open() as file:
         assert len(list(csv.DictReader(file))) == 78
+
+
+@pytest.mark.parametrize(("holds", "code"), [(True, 0), (False, 1)])
+def test_a_claim_that_fails_is_exit_1(
+    command: Run, monkeypatch: pytest.MonkeyPatch, holds: bool, code: int
+) -> None:
+    made = {"rows": [], "rms": {"contact_times": 0.28}, "claims": [{"text": "It.", "holds": holds}]}
+
+    def evaluated(system: System, *_: object, **__: object) -> dict[str, Any]:
+        assert system.start("sensor_1.noise.enabled") == 1.0
+        return made
+
+    monkeypatch.setattr("grasp_cosim.cli.evaluate.evaluate_bench", evaluated)
+    found, out, _ = command("evaluate", "--bench")
+    assert found == code
+    assert out.startswith("holds  It.\n" if holds else "FAILS  It.\n")
+    assert "contact times 0.280" in out
+    found, out, _ = command("evaluate", "--bench", "--json")
+    assert (found, json.loads(out)) == (code, made)
