@@ -1,4 +1,4 @@
-"""The figures of the paper: Table I by object position, Table II by the colours of the surfaces."""
+"""The figures of the paper: its table by object position and its table of surface colours."""
 
 import csv
 import io
