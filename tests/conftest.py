@@ -59,7 +59,7 @@ def command(
 ) -> Run:
     """Runs a command line in an empty folder; exit code, standard output, standard error."""
     monkeypatch.chdir(tmp_path)
-    for module in ("frame", "evaluate"):
+    for module in ("frame", "evaluate", "identify"):
         monkeypatch.setattr(f"grasp_cosim.cli.{module}.grasp_system", lambda: grasp)
 
     def run(*arguments: str | Path) -> tuple[int, str, str]:

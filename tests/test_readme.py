@@ -43,7 +43,7 @@ def checkout(
     text = SYSTEM.read_text("utf-8").replace('fmu = "', 'fmu = "fmus/build/')
     (tmp_path / "my_system.toml").write_text(text, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    for module in ("frame", "evaluate"):
+    for module in ("frame", "evaluate", "identify"):
         monkeypatch.setattr(f"grasp_cosim.cli.{module}.grasp_system", lambda: grasp)
     write_ssp(grasp, tmp_path / "my_system.ssp")
     for written in ("signals.csv", "run.json"):

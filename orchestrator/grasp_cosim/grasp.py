@@ -1,5 +1,6 @@
-"""The built-in system: the published grasp, its FMUs and its cases."""
+"""The built-in system: the published grasp, its FMUs and its cases; the bench as a preset."""
 
+import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -9,6 +10,9 @@ from .system.description import System
 from .system.interface import Value
 
 SYSTEM = Path(__file__).parent / "grasp.toml"
+
+BENCH = Path(__file__).parent / "bench_preset.toml"
+"""The values that make the bench of the ideal grasp."""
 
 FMU_FOLDER = Path("fmus/build")
 """Where the FMUs are built, below the current folder."""
@@ -47,3 +51,9 @@ def grasp_system() -> System:
             "current folder, which must be one that can be written to"
         ) from error
     return System.load(SYSTEM, FMU_FOLDER)
+
+
+def with_bench(system: System) -> System:
+    """The grasp as on the bench: the sensors with their electronics, friction identified."""
+    values = tomllib.loads(BENCH.read_text("utf-8"))["values"]
+    return system.revised({}, values, ("swap", BENCH.name))

@@ -59,6 +59,8 @@ class Grasp:
     D_p: Pair = (0.6, -0.6)
     D_i: float = 14.0
     K_i: float = 98.0
+    B: Pair = (0.0, 0.0)
+    """Viscous friction of the fingers, which the paper's simulation leaves out."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,9 +187,9 @@ def _relative_intensity_rate(p: Grasp, y: State, j: int) -> float:
 
 
 def _actuator_force(p: Grasp, y: State, j: int, virtual: Motion) -> float:
-    """Eq. (7)."""
+    """Eq. (7), less viscous friction."""
     x, v = y[2 * j], y[2 * j + 1]
-    return -p.D_i * (v - virtual.v) - p.K_i * (x - virtual.x)
+    return -p.D_i * (v - virtual.v) - p.K_i * (x - virtual.x) - p.B[j] * v
 
 
 def _contact_force(p: Grasp, y: State, j: int, virtual: Motion, touching: bool) -> float:

@@ -8,7 +8,7 @@ from typing import NoReturn
 import click
 
 from ..errors import InputError, SimulationError
-from . import evaluate, fmus, proxy, qualify, relay, report, run, serve, ssp
+from . import evaluate, fmus, identify, proxy, qualify, relay, report, run, serve, ssp
 from .frame import FAILED, INTERRUPTED, WRONG, cli, fail
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EIO)
@@ -18,6 +18,7 @@ COMMANDS = (
     run.run,
     report.report,
     evaluate.evaluate,
+    identify.identify,
     qualify.qualify,
     ssp.ssp,
     proxy.proxy,

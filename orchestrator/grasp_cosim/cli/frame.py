@@ -26,6 +26,7 @@ def cli(debug: bool) -> None:
     grasp-cosim run [SYSTEM]         a closed loop; by default the published grasp, from FMUs
     grasp-cosim report RUN           a page and figures of a run that was recorded
     grasp-cosim evaluate             the published table and figures, side by side with ours
+    grasp-cosim identify             friction from contact times or from a recorded log
     grasp-cosim qualify FMU --as C   whether an FMU may take the place of component C
     grasp-cosim ssp SYSTEM -o FILE   a system as an SSP archive
     grasp-cosim proxy FMU -o FILE    an FMU with the same variables that talks to a peer

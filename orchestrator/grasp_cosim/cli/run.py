@@ -9,7 +9,7 @@ import click
 from ..errors import InputError, SimulationError
 from ..figures.plot import check_plot
 from ..figures.timing import draw_timing
-from ..grasp import CASES
+from ..grasp import CASES, with_bench
 from ..master.engine import ENGINES, Engine
 from ..master.simulation import MOST, simulate
 from ..recording.mdf import check_mdf
@@ -25,6 +25,7 @@ from .step_study import run_step_study
 @click.command()
 @click.argument("system", required=False, type=click.Path(path_type=Path))
 @click.option("--case", type=click.IntRange(0, 2), help="0 and 1: without layers 3 and 2, 3.")
+@click.option("--bench", is_flag=True, help="With the bench's friction and sensor electronics.")
 @click.option("--set", "settings", multiple=True, metavar="COMPONENT.VARIABLE=VALUE")
 @click.option("--swap", "swaps", multiple=True, metavar="COMPONENT=FMU")
 @click.option("--step", type=float, help="Communication step in s.")
@@ -50,6 +51,7 @@ from .step_study import run_step_study
 def run(
     system: Path | None,
     case: int | None,
+    bench: bool,
     settings: tuple[str, ...],
     swaps: tuple[str, ...],
     step: float | None,
@@ -82,6 +84,8 @@ def run(
     if mdf:
         check_mdf()
     chosen = load_system(system, step, stop)
+    if bench:
+        chosen = with_bench(chosen)
     fmus = dict(pair("--swap", text, "COMPONENT=FMU") for text in swaps)
     values: dict[str, Value] = {} if case is None else dict(CASES[case])
     values.update(pair("--set", text, "COMPONENT.VARIABLE=VALUE") for text in settings)

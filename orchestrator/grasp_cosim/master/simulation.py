@@ -299,7 +299,7 @@ def _drive(session: Session, progress: bool) -> None:
     """Step to the end, or until Ctrl-C."""
     total = session.system.stop_ns / NANOSECONDS
     with (
-        _interrupts(session.halt),
+        interrupts(session.halt),
         tqdm(
             total=total,
             unit="s",
@@ -349,7 +349,7 @@ def _interruptible() -> Iterator[None]:
 
 
 @contextmanager
-def _interrupts(interrupted: threading.Event) -> Iterator[None]:
+def interrupts(interrupted: threading.Event) -> Iterator[None]:
     """Collects Ctrl-C instead of raising it, which could happen inside a Python FMU."""
     if threading.current_thread() is not threading.main_thread():
         yield

@@ -1,10 +1,9 @@
 """What the paper says of its simulation, each as a statement that can fail."""
 
-from dataclasses import dataclass
 from typing import Any
 
-from ..recording.result import Result
 from ..system.description import System
+from .grasps import Claim, Runs, as_json, balances, off_centre, settled_force
 
 TIME_BAND = 0.10
 DIFFERENCE_BAND = 0.03
@@ -13,27 +12,6 @@ DIFFERENCE_BAND = 0.03
 
 TARGET_TOLERANCE = 1e-4
 """m; the target has converged when it is this close to the object's centre."""
-
-Claim = tuple[str, bool]
-"""A statement and whether it holds."""
-
-
-@dataclass(frozen=True, slots=True)
-class Run:
-    """One grasp of the evaluation; times in s, per finger."""
-
-    x_m: float
-    case: int
-    metrics: dict[str, Any]
-    times_at_sensor_contact: tuple[float, float]
-    overshoot: float
-    """m by which the target passes the centre of the object, seen from the start."""
-    result: Result | None
-    """Every signal, for the runs that the figures show."""
-
-
-Runs = dict[tuple[float, int], Run]
-"""By object position and case."""
 
 
 def check_claims(runs: Runs, rows: list[dict[str, Any]], system: System) -> list[dict[str, Any]]:
@@ -47,7 +25,7 @@ def check_claims(runs: Runs, rows: list[dict[str, Any]], system: System) -> list
         _claim_force(runs, system),
         _claim_target(runs),
     )
-    return [{"text": text, "holds": bool(holds)} for text, holds in claims]
+    return as_json(claims)
 
 
 def _claim_times(rows: list[dict[str, Any]]) -> Claim:
@@ -72,23 +50,14 @@ def _claim_simultaneous(runs: Runs) -> Claim:
     return (
         "Simultaneous contact: wherever the object is off centre, the fingers touch closer "
         "together in time in Case 2 than in Case 1.",
-        all(
-            runs[x_m, 2].metrics["time_difference"] < runs[x_m, 1].metrics["time_difference"]
-            for x_m in _off_centre(runs)
-        ),
+        all(runs[s, 2].apart < runs[s, 1].apart for s in off_centre(runs)),
     )
 
 
 def _claim_balance(runs: Runs) -> Claim:
-    def balanced(x_m: float) -> bool:
-        (near_1, far_1), (near_2, far_2) = (
-            runs[x_m, case].metrics["time_to_contact"] for case in (1, 2)
-        )
-        return bool(near_2 > near_1 and far_2 < far_1)
-
     return (
         "Off centre, Case 2 makes the nearer finger touch later and the farther one earlier.",
-        all(balanced(x_m) for x_m in _off_centre(runs)),
+        all(balances(runs, s) for s in off_centre(runs)),
     )
 
 
@@ -103,8 +72,7 @@ def _claim_impact(runs: Runs) -> Claim:
 
 
 def _claim_force(runs: Runs, system: System) -> Claim:
-    stiffness = system.start("controller.contact_force.stiffness")
-    settled = 0.5 * stiffness * system.start("plant.object_width")
+    settled = settled_force(system)
     worst = max(
         abs(force - settled) for r in runs.values() for force in r.metrics["steady_contact_force"]
     )
@@ -116,17 +84,13 @@ def _claim_force(runs: Runs, system: System) -> Claim:
 
 
 def _claim_target(runs: Runs) -> Claim:
-    case_2 = [runs[x_m, 2] for x_m in _off_centre(runs)]
+    case_2 = [runs[s, 2] for s in off_centre(runs)]
     return (
         "In Case 2 the target overshoots the centre of the object (by "
         f"{1e3 * min(r.overshoot for r in case_2):.1f} mm or more off centre) and converges to it.",
         all(
             r.overshoot > TARGET_TOLERANCE
-            and abs(r.metrics["target_position"] - r.x_m) < TARGET_TOLERANCE
+            and abs(r.metrics["target_position"] - r.setting.x_m) < TARGET_TOLERANCE
             for r in case_2
         ),
     )
-
-
-def _off_centre(runs: Runs) -> list[float]:
-    return sorted({x_m for x_m, _ in runs if x_m})

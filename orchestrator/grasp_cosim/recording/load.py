@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from ..errors import InputError, choices
 from ..realtime.timing import Timing
+from .mdf import check_mdf
 
 SIGNALS, SETTINGS = "signals.csv", "run.json"
 """The files of a run's folder."""
@@ -64,6 +65,53 @@ def load_run(folder: str | Path) -> Run:
             if "realtime" in settings
             else None
         ),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Log:
+    """Recorded signals by name on time in s, all float64, without what a run's folder adds."""
+
+    time: npt.NDArray[np.float64]
+    signals: Mapping[str, npt.NDArray[np.float64]]
+
+
+def load_log(path: Path) -> Log:
+    """The signals of a file: CSV with the column "time" and names, or ASAM MDF (.mf4).
+
+    InputError where it is missing, damaged or of another kind, or where asammdf is not installed.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: no such log; must be a .csv or .mf4 file")
+    if path.suffix.lower() == ".mf4":
+        return _mdf(path)
+    if path.suffix.lower() != ".csv":
+        raise InputError(f"{path}: must be a .csv or .mf4 file")
+    names, table = _table(path)
+    return Log(table[:, 0], dict(zip(names, table[:, 1:].T, strict=True)))
+
+
+def _mdf(path: Path) -> Log:
+    """Every channel of the first group that has samples, on its master."""
+    check_mdf()
+    from asammdf import MDF
+    from asammdf.blocks.utils import MdfException
+
+    try:
+        with MDF(path) as mdf:
+            channels = [c for c in mdf.iter_channels() if len(c.samples)]
+    except (MdfException, OSError, ValueError) as error:
+        raise InputError(f"{path}: is damaged, no MDF file: {error}") from error
+    if not channels:
+        raise InputError(f"{path}: no channel has samples; must be a recorded log")
+    time = channels[0].timestamps
+    return Log(
+        time,
+        {
+            c.name: c.samples.astype(np.float64)
+            for c in channels
+            if len(c.timestamps) == len(time) and c.samples.dtype.kind in "fiub"
+        },
     )
 
 

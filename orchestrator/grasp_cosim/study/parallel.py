@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from multiprocessing import get_context
 from typing import TypeVar
 
@@ -16,15 +17,24 @@ def run_all(
 ) -> Iterator[Run]:
     """The results of run(job), in the order of the jobs; run is a function of a module.
 
-    progress shows a bar, labelled what, on standard error if that is a terminal. The processes are
-    new ones: a fork of one that has loaded FMUs would share their state.
+    progress shows a bar, labelled what, on standard error if that is a terminal.
     """
     bar = tqdm(total=len(jobs), desc=what, unit="run", disable=None if progress else True)
-    with bar, ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+    with bar, processes(workers) as pool:
+        for result in pool.map(run, jobs):
+            bar.update()
+            yield result
+
+
+@contextmanager
+def processes(workers: int) -> Iterator[ProcessPoolExecutor]:
+    """Processes for several batches of runs; after an error, what has not begun is dropped.
+
+    They are new ones: a fork of one that has loaded FMUs would share their state.
+    """
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
         try:
-            for result in pool.map(run, jobs):
-                bar.update()
-                yield result
+            yield pool
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise

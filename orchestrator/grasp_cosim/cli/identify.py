@@ -1,0 +1,96 @@
+"""The command identify."""
+
+import json
+import os
+from pathlib import Path
+
+import click
+
+from ..errors import InputError
+from ..grasp import grasp_system
+from ..identification import report
+from ..identification.contact_times import (
+    identify_from_times,
+    published_contacts,
+    read_contacts,
+)
+from ..identification.fit import check_scipy
+from ..identification.log import GROUPS as IN_A_LOG
+from ..identification.log import identify_from_log
+from ..identification.parameters import DEFAULT, GROUPS, chosen
+from ..recording.load import load_log
+from ..recording.result import write_text
+from ..system.description import System
+from .frame import check_folder, json_option, pair
+
+
+@click.command()
+@click.option(
+    "--log", type=click.Path(path_type=Path), help="A recorded log, .csv or .mf4, to fit to."
+)
+@click.option(
+    "--times", type=click.Path(path_type=Path), help="Contact times: x_m,case,finger,time as CSV."
+)
+@click.option(
+    "--fit",
+    "groups",
+    multiple=True,
+    default=DEFAULT,
+    show_default=True,
+    metavar="|".join(GROUPS),
+    help="What is fitted; may be given several times.",
+)
+@click.option("--set", "settings", multiple=True, metavar="COMPONENT.VARIABLE=VALUE")
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for values and residuals.")
+@click.option("--workers", type=click.IntRange(1), default=os.cpu_count(), show_default="all cores")
+@json_option
+def identify(
+    log: Path | None,
+    times: Path | None,
+    groups: tuple[str, ...],
+    settings: tuple[str, ...],
+    out: Path | None,
+    workers: int,
+    as_json: bool,
+) -> int:
+    """Fit the fingers' friction to contact times, by default the published experimental ones.
+
+    \b
+    Example: grasp-cosim identify --fit coulomb --fit viscous --out identified
+    From a log: grasp-cosim identify --log results/signals.csv --fit coulomb
+    """
+    if log and times:
+        raise InputError(f"--log {log}: must not come with --times, which is other data")
+    check_scipy()
+    if out:
+        check_folder(out)
+    values = dict(pair("--set", text, "COMPONENT.VARIABLE=VALUE") for text in settings)
+    system = grasp_system().revised({}, values, ("--swap", "--set"))
+    found = _from_log(system, log, groups) if log else _from_times(system, times, groups, workers)
+    if out:
+        write_text(out / "values.toml", report.values_toml(found))
+        write_text(out / "residuals.csv", report.residuals_csv(found))
+        write_text(out / "identification.json", json.dumps(report.as_json(found), indent=2) + "\n")
+    click.echo(json.dumps(report.as_json(found)) if as_json else report.text(found))
+    return 0
+
+
+def _from_log(system: System, path: Path, groups: tuple[str, ...]) -> report.Identification:
+    parameters = chosen(groups, IN_A_LOG, f"--log {path}")
+    windows, fit = identify_from_log(system, load_log(path), parameters, str(path))
+    rows = [{"finger": w.finger, "time": float(t)} for w in windows for t in w.time]
+    return report.Identification(f"{path}, {len(rows)} windows", "N", fit, rows)
+
+
+def _from_times(
+    system: System, path: Path | None, groups: tuple[str, ...], workers: int
+) -> report.Identification:
+    contacts = read_contacts(path) if path else published_contacts()
+    parameters = chosen(groups, tuple(GROUPS), "identify")
+    fit = identify_from_times(system, contacts, parameters, workers, progress=True)
+    rows = [
+        {"condition": c.label, "case": c.case, "finger": c.finger, "measured": c.time}
+        for c in contacts
+    ]
+    name = str(path) if path else "the published experiments"
+    return report.Identification(f"{name}, {len(contacts)} contact times", "s", fit, rows)

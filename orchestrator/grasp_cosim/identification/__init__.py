@@ -1,0 +1,1 @@
+"""What the bench's friction must be, from contact times or from a recorded log."""

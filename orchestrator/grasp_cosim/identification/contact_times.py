@@ -1,0 +1,180 @@
+"""Friction from contact times: grasps with the sensors ideal, as the fit has them.
+
+The grasps run through the FMUs at STEP. With the sensors' electronics off, a contact time at STEP
+is within 2 ms of that at 0.1 ms, a hundredth of what the published times scatter by; the
+reflectances matter by their ratio alone, so that surfaces of equal colours are one grasp.
+"""
+
+import csv
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from tqdm import tqdm
+
+from ..errors import InputError, choices
+from ..grasp import CASES
+from ..published.tables import Row, Setting, experimental_rows
+from ..study.closing import close
+from ..study.metrics import FINGERS
+from ..study.parallel import processes
+from ..system.description import System
+from .fit import Fit, Parameter, Vector, check_scipy, fit
+from .parameters import RATIO
+
+STEP, STOP = 1e-3, 10.0
+"""s; a finger that has not touched at STOP counts as touching then."""
+
+COLUMNS = ("x_m", "case", "finger", "time")
+OPTIONAL = ("alpha_1", "alpha_2")
+"""Of a table of contact times."""
+
+Times = Sequence[float]
+Values = dict[str, float]
+
+
+class Grasp(NamedTuple):
+    """A grasp of a fit: x_m in m, alpha_2 over alpha_1, case, and the parameters by name."""
+
+    x_m: float
+    ratio: float
+    case: int
+    parameters: tuple[tuple[str, float], ...]
+
+
+Simulator = Callable[[Sequence[Grasp]], Iterable[Times]]
+"""The contact times of grasps in s, in their order."""
+
+
+class Contact(NamedTuple):
+    """A measured contact time in s; label says which row of the data it is."""
+
+    label: str
+    setting: Setting
+    case: int
+    finger: int
+    time: float
+
+
+def published_contacts() -> list[Contact]:
+    """The experimental position rows and those of two equal colours.
+
+    White on both sides is the row of x_m = 0.03 m once more, so it is left out.
+    """
+    return [_contact(row) for row in experimental_rows() if row.finger and _counts(row)]
+
+
+def read_contacts(path: Path) -> list[Contact]:
+    """A table of contact times: CSV with the columns x_m, case, finger, time, and, where the
+    surfaces are not alike, alpha_1 and alpha_2. InputError names the line that is wrong.
+    """
+    try:
+        lines = list(csv.DictReader(path.read_text("utf-8").splitlines(), strict=True))
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror}; must be a table of contact times") from error
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{path}: is no CSV: {error}") from error
+    names = list(lines[0]) if lines else []
+    if not set(COLUMNS) <= set(names) <= {*COLUMNS, *OPTIONAL}:
+        raise InputError(
+            f"{path}: the columns are {choices(names)}; must be {choices(COLUMNS)}, "
+            f"and may be {choices(OPTIONAL)}"
+        )
+    return [_read(f"{path}, line {i}", line) for i, line in enumerate(lines, start=2)]
+
+
+def identify_from_times(
+    system: System,
+    contacts: Sequence[Contact],
+    parameters: Sequence[Parameter],
+    workers: int,
+    progress: bool,
+) -> Fit:
+    """Fit the parameters to contact times, grasps in parallel; the residuals are in s.
+
+    progress counts the grasps on standard error if that is a terminal.
+    """
+    check_scipy()
+    system = system.with_experiment(STEP, STOP)
+    bar = tqdm(desc="grasps", unit="run", disable=None if progress else True)
+    with bar, processes(workers) as pool:
+
+        def simulate(grasps: Sequence[Grasp]) -> Iterable[Times]:
+            for times in pool.map(contact_times, [(system, grasp) for grasp in grasps]):
+                bar.update()
+                yield times
+
+        return fit_contacts(contacts, parameters, simulate)
+
+
+def fit_contacts(
+    contacts: Sequence[Contact], parameters: Sequence[Parameter], simulate: Simulator
+) -> Fit:
+    """Fit the parameters to contact times with what simulates grasps; equal grasps run once."""
+    measured = np.array([c.time for c in contacts])
+    known: dict[Grasp, Times] = {}
+
+    def residuals(points: Sequence[Vector]) -> list[Vector]:
+        wanted = [[_grasp(c, parameters, x) for c in contacts] for x in points]
+        new = list(dict.fromkeys(g for grasps in wanted for g in grasps if g not in known))
+        known.update(zip(new, simulate(new), strict=True))
+        return [
+            np.array([known[g][c.finger - 1] for g, c in zip(grasps, contacts, strict=True)])
+            - measured
+            for grasps in wanted
+        ]
+
+    return fit(residuals, parameters, "identify")
+
+
+def _grasp(c: Contact, parameters: Sequence[Parameter], x: Vector) -> Grasp:
+    values = tuple((p.name, float(value)) for p, value in zip(parameters, x, strict=True))
+    return Grasp(c.setting.x_m, c.setting.alpha_2 / c.setting.alpha_1, c.case, values)
+
+
+def contact_times(job: tuple[System, Grasp]) -> Times:
+    """When the fingers touch in a grasp with a system, in s; at STOP where one does not."""
+    system, grasp = job
+    values = dict(grasp.parameters)
+    own = values.get(RATIO, system.start(RATIO))
+    values |= {"plant.initial_object_position": grasp.x_m, RATIO: own * grasp.ratio}
+    result = close(system.with_values({**CASES[grasp.case], **values}), after=0.0)
+    return [STOP if t is None else float(t) for t in result.metrics["time_to_contact"]]
+
+
+def _counts(row: Row) -> bool:
+    if row.table == "position":
+        return True
+    _, alpha_1, alpha_2 = row.setting
+    return alpha_1 == alpha_2 != 1.0
+
+
+def _contact(row: Row) -> Contact:
+    where = f"x_m = {row.condition} m" if row.table == "position" else str(row.condition)
+    finger = row.finger or FINGERS[0]
+    return Contact(where, row.setting, row.case, finger, row.published)
+
+
+def _read(place: str, line: Mapping[str, str | None]) -> Contact:
+    numbers: Values = {}
+    for name, text in line.items():
+        try:
+            numbers[name] = float(text or "")
+        except ValueError:
+            raise InputError(f"{place}: {name} = {text!r}: must be a number") from None
+    case, finger = numbers["case"], numbers["finger"]
+    for name, valid in (("case", tuple(CASES)), ("finger", FINGERS)):
+        if numbers[name] not in valid:
+            raise InputError(
+                f"{place}: {name} = {numbers[name]:g}: must be one of {choices(valid)}"
+            )
+    alphas = [numbers.get(name, 1.0) for name in OPTIONAL]
+    if not (0.0 < numbers["time"] < STOP and min(alphas) > 0.0):
+        raise InputError(
+            f"{place}: time = {numbers['time']:g} s, alpha = {choices(alphas)}: the time must be "
+            f"greater than 0 and less than {STOP:g}, alpha_1 and alpha_2 greater than 0"
+        )
+    label = f"x_m = {numbers['x_m']:g} m"
+    setting = Setting(numbers["x_m"], alphas[0], alphas[1])
+    return Contact(label, setting, int(case), int(finger), numbers["time"])

@@ -1,0 +1,120 @@
+"""Friction from a recorded log: the momentum of each finger over short windows.
+
+Free of the object a finger obeys m·x'' = u - sgn(x')·F(|x'|), so that over a window of length T
+
+    r = (m·Δx' - ∫u dt) / T + sgn(x')·mean F(|x'|)
+    F(v) = F_C + (F_S - F_C)·exp(-(v/v_s)^2) + B·v
+
+is zero but for noise, in N. No signal is differentiated: noise of the velocity enters by its two
+ends over T. A window counts where the finger moves one way throughout and nothing touches it; no
+sample belongs to two windows, so that white noise leaves them independent.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import InputError, choices
+from ..recording.load import Log
+from ..study.metrics import CONTROLLER, FINGERS, PLANT
+from ..system.description import System
+from .fit import Fit, Parameter, Vector, fit
+from .parameters import FRICTION
+
+WINDOW = 0.02
+"""s; longer than a period of the bench's noise behind its 500 Hz filter, shorter than a grasp."""
+
+SLOWEST = 1e-4
+"""m/s; below, a window may be that of a finger at rest."""
+
+TOUCHED = 0.05
+"""N; a contact force above is one."""
+
+GROUPS = ("coulomb", "static", "viscous", "stribeck")
+"""What a log of the fingers says something about."""
+
+
+class Windows(NamedTuple):
+    """Of one finger: per window its start in s, its residual without friction in N, and its way,
+    1 or -1; and the speeds in m/s, a row per window.
+    """
+
+    finger: int
+    time: Vector
+    unexplained: Vector
+    way: Vector
+    speeds: Vector
+
+
+def identify_from_log(
+    system: System, log: Log, parameters: Sequence[Parameter], place: str
+) -> tuple[list[Windows], Fit]:
+    """Fit friction to a log; what is not fitted is as in the system, whose masses count.
+
+    The residuals are those of the windows in their order, of the right finger first.
+    InputError, naming the place, where a signal is missing or a finger does not move freely.
+    """
+    windows = [_windows(system, log, j, place) for j in FINGERS]
+    names = [p.name for p in parameters]
+
+    def at(x: Vector) -> Vector:
+        values = dict(zip(names, x.tolist(), strict=True))
+        return np.concatenate([_residuals(system, values, w) for w in windows])
+
+    return windows, fit(lambda points: [at(x) for x in points], parameters, place)
+
+
+def _windows(system: System, log: Log, finger: int, place: str) -> Windows:
+    mass = system.start(f"{PLANT}.finger_mass[{finger}]")
+    size = _samples(log.time, place)
+
+    def cut(signal: Vector) -> Vector:
+        """A row per window."""
+        return signal[: len(signal) // size * size].reshape(-1, size)
+
+    v, force, touch = (
+        cut(_signal(log, f"{name}[{finger}]", place))
+        for name in (f"{PLANT}.velocity", f"{CONTROLLER}.force", f"{PLANT}.contact_force")
+    )
+    time = cut(log.time)
+    way = np.sign(v[:, 0])
+    moving = (way[:, None] * v > SLOWEST).all(axis=1)
+    counts = moving & (np.abs(touch) <= TOUCHED).all(axis=1)
+    if not counts.any():
+        raise InputError(
+            f"{place}: finger {finger} does not move freely for {WINDOW:g} s, one way and faster "
+            f"than {SLOWEST:g} m/s; must be a log in which it does"
+        )
+    impulse = (force[:, :-1] * np.diff(time)).sum(axis=1)  # held between the samples
+    unexplained = (mass * (v[:, -1] - v[:, 0]) - impulse) / (time[:, -1] - time[:, 0])
+    return Windows(finger, time[counts, 0], unexplained[counts], way[counts], np.abs(v[counts]))
+
+
+def _residuals(system: System, values: Mapping[str, float], w: Windows) -> Vector:
+    def of(name: str) -> float:
+        key = FRICTION + name
+        return values[key] if key in values else system.start(key)
+
+    j = f"[{w.finger}]"
+    coulomb, v_s = of(f"coulomb{j}"), of("stribeck_velocity")
+    static = max(coulomb, of(f"static{j}"))
+    friction = coulomb + (static - coulomb) * np.exp(-((w.speeds / v_s) ** 2))
+    friction += of(f"viscous{j}") * w.speeds
+    return np.asarray(w.unexplained + w.way * friction.mean(axis=1))
+
+
+def _signal(log: Log, name: str, place: str) -> Vector:
+    if name not in log.signals:
+        raise InputError(f"{place}: no signal {name!r}; it has {choices(log.signals)}")
+    return log.signals[name]
+
+
+def _samples(time: Vector, place: str) -> int:
+    """The number of samples of a window, from the median step."""
+    step = float(np.median(np.diff(time))) if len(time) > 1 else np.inf
+    if not 0.0 < 2.0 * step <= WINDOW:
+        raise InputError(
+            f"{place}: a sample every {step:g} s; must be at most every {0.5 * WINDOW:g} s"
+        )
+    return int(WINDOW / step + 1e-6) + 1

@@ -1,0 +1,102 @@
+"""What was identified: for a terminal, as JSON, as values for a system, as a table of residuals."""
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from .fit import Estimate, Fit
+
+ASSUMPTIONS = (
+    "95 % confidence intervals of the linearised model, for residuals that are independent, of one "
+    "variance and without a bias"
+)
+
+SHOWN = 60
+"""So many residuals at most are printed; --json and --out have all."""
+
+
+@dataclass(frozen=True, slots=True)
+class Identification:
+    """A fit, what it was made from, and what its residuals belong to, in their unit."""
+
+    data: str
+    unit: str
+    fit: Fit
+    rows: Sequence[dict[str, Any]]
+
+
+def as_json(found: Identification) -> dict[str, Any]:
+    """The object of `identify --json`."""
+    return {
+        "data": found.data,
+        "parameters": [_parameter(e) for e in found.fit.estimates],
+        "assumptions": ASSUMPTIONS,
+        "rms": found.fit.rms,
+        "unit": found.unit,
+        "points": found.fit.points,
+        "rows": _rows(found),
+    }
+
+
+def text(found: Identification) -> str:
+    """The parameters, the root mean square, and the residuals unless they are many."""
+    lines = [f"{found.data}; {ASSUMPTIONS}", *(_line(e) for e in found.fit.estimates)]
+    lines.append(
+        f"residuals: root mean square {found.fit.rms:.4g} {found.unit} over {len(found.rows)}"
+    )
+    if len(found.rows) <= SHOWN:
+        lines += [
+            "  " + "  ".join(f"{key} {_short(value)}" for key, value in row.items())
+            for row in _rows(found)
+        ]
+    return "\n".join(lines)
+
+
+def values_toml(found: Identification) -> str:
+    """The estimates as a table [values], with where they are from as comments."""
+    lines = [
+        f"# {found.data}: root mean square of the residuals {found.fit.rms:.4g} {found.unit}",
+        "[values]",
+    ]
+    lines += [
+        f'"{e.name}" = {float(f"{e.value:.6g}")!r}  # {_about(e)}' for e in found.fit.estimates
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def residuals_csv(found: Identification) -> str:
+    """A line per residual."""
+    out = io.StringIO()
+    rows = _rows(found)
+    writer = csv.DictWriter(out, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return out.getvalue()
+
+
+def _rows(found: Identification) -> list[dict[str, Any]]:
+    return [
+        {**row, "residual": float(r)}
+        for row, r in zip(found.rows, found.fit.residuals, strict=True)
+    ]
+
+
+def _parameter(e: Estimate) -> dict[str, Any]:
+    interval = list(e.interval) if e.interval else None
+    return {**e._asdict(), "interval": interval}
+
+
+def _line(e: Estimate) -> str:
+    return f"  {e.name:32s}{e.value:10.4g} {_about(e)}"
+
+
+def _about(e: Estimate) -> str:
+    interval = f"[{e.interval[0]:.4g}, {e.interval[1]:.4g}]" if e.interval else ""
+    told = ": ".join(t for t in (interval, e.remark) if t)
+    return f"{e.unit}, {told}"
+
+
+def _short(value: object) -> str:
+    return f"{value:.3f}" if isinstance(value, float) else str(value)

@@ -1,0 +1,27 @@
+"""A grasp that is run no longer than it takes."""
+
+from ..master.simulation import interrupts, simulate
+from ..recording.result import Result
+from ..system.description import System
+from ..system.parts import NANOSECONDS
+from .metrics import FINGERS, PLANT
+
+LOOK = 0.05
+"""s; how often is asked whether both fingers touch."""
+
+
+def close(system: System, after: float) -> Result:
+    """Run a grasp until `after` seconds after both fingers touch, at the latest to its stop time.
+
+    The end is known to LOOK; the result is then not complete. KeyboardInterrupt on Ctrl-C.
+    """
+    steps = max(1, round(LOOK * NANOSECONDS / system.step_ns))
+    with simulate.session(system) as session, interrupts(session.halt):
+        end = system.stop_ns / NANOSECONDS
+        touching = False
+        while session.time < end and session.step(steps):
+            if session.halt.is_set():
+                raise KeyboardInterrupt
+            if not touching and all(session[f"{PLANT}.contact[{j}]"] for j in FINGERS):
+                touching, end = True, session.time + after
+        return session.result()

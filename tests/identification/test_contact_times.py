@@ -1,0 +1,138 @@
+"""Friction from contact times: of our own simulation, and of one in continuous time."""
+
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+
+import pytest
+from grasp_cosim import InputError, System
+from grasp_cosim.identification.contact_times import (
+    STEP,
+    STOP,
+    Contact,
+    Grasp,
+    contact_times,
+    fit_contacts,
+    identify_from_times,
+    published_contacts,
+    read_contacts,
+)
+from grasp_cosim.identification.fit import Fit
+from grasp_cosim.identification.parameters import GROUPS, RATIO, chosen
+from grasp_cosim.published.tables import Setting
+from reference import continuous
+
+TRUE = {"plant.friction.viscous[1]": 25.0, "plant.friction.viscous[2]": 8.0}
+X_M = 0.02
+CASES = (1, 2)
+
+Simulator = Callable[[Sequence[Grasp]], Iterable[Sequence[float]]]
+
+
+def simulator(system: System, step: float) -> Simulator:
+    """Through the FMUs, in this process."""
+    stepped = system.with_experiment(step=step, stop=STOP)
+    return lambda grasps: [contact_times((stepped, g)) for g in grasps]
+
+
+def contacts(times: Iterable[Sequence[float]]) -> list[Contact]:
+    return [
+        Contact("", Setting(X_M), case, finger, time)
+        for case, both in zip(CASES, times, strict=True)
+        for finger, time in enumerate(both, start=1)
+    ]
+
+
+def fitted(simulate: Simulator, measured: Sequence[Contact], group: str) -> Fit:
+    return fit_contacts(measured, chosen([group], tuple(GROUPS), "test"), simulate)
+
+
+@pytest.mark.slow
+def test_our_own_friction_comes_back(grasp: System) -> None:
+    simulated = simulator(grasp, 5e-3)
+    values = (("plant.friction.coulomb[1]", 0.5), ("plant.friction.coulomb[2]", 1.4))
+    measured = contacts(simulated([Grasp(X_M, 1.0, case, values) for case in CASES]))
+    found = fitted(simulated, measured, "coulomb")
+    assert [e.value for e in found.estimates] == pytest.approx([0.5, 1.4], abs=2e-3)
+
+
+@pytest.mark.slow
+def test_the_friction_of_a_solution_in_continuous_time_comes_back(grasp: System) -> None:
+    friction = tuple(TRUE.values())
+    solved = [
+        continuous.solve(continuous.Grasp(case=case, x_m=X_M, B=(friction[0], friction[1])), STOP)
+        for case in CASES
+    ]
+    measured = contacts([[t or STOP for t in s.contact_time] for s in solved])
+    found = fitted(simulator(grasp, STEP), measured, "viscous")
+    for e in found.estimates:
+        assert e.value == pytest.approx(TRUE[e.name], rel=0.02, abs=0.2)
+        assert e.interval is not None
+    assert found.rms < 2e-3  # s, which a contact time at STEP is off by
+
+
+def test_equal_grasps_run_once() -> None:
+    asked: list[Grasp] = []
+
+    def simulate(grasps: Sequence[Grasp]) -> list[list[float]]:
+        asked.extend(grasps)
+        return [[1.0 + dict(g.parameters)[RATIO] * g.ratio, 2.0] for g in grasps]
+
+    colours = [Setting(0.03, 0.57, 0.57), Setting(0.03), Setting(0.03, 1.0, 0.86)]
+    measured = [Contact("", s, 1, 1, 2.0 * s.alpha_2 / s.alpha_1) for s in colours]
+    fitted(simulate, measured, "ratio")
+    assert len(asked) == len(set(asked))
+    assert {g.ratio for g in asked} == {1.0, 0.86}
+
+
+def test_a_finger_that_does_not_touch_counts_at_the_end(grasp: System) -> None:
+    short = grasp.with_experiment(step=1e-3, stop=0.2)
+    assert contact_times((short, Grasp(0.03, 1.0, 1, ()))) == [STOP, STOP]
+
+
+def test_the_published_contacts_are_40_and_none_is_there_twice() -> None:
+    found = published_contacts()
+    assert len(found) == 40
+    assert len({(c.label, c.case, c.finger) for c in found}) == 40
+    times = {(c.label, c.case, c.finger): c.time for c in found}
+    assert times["x_m = 0.05 m", 1, 2] == 4.81
+    assert times["black/black", 2, 1] == 2.01
+    assert not any("white" in c.label for c in found)
+
+
+def test_a_table_of_contact_times_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "times.csv"
+    path.write_text("x_m,case,finger,time,alpha_1,alpha_2\n0.03,1,2,3.1,1,0.86\n")
+    assert read_contacts(path) == [Contact("x_m = 0.03 m", Setting(0.03, 1.0, 0.86), 1, 2, 3.1)]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (None, "No such file or directory; must be a table of contact times"),
+        ("", "the columns are none; must be x_m, case, finger, time, and may be"),
+        ("x_m,case,finger\n0,1,1\n", "must be x_m, case, finger, time"),
+        ("x_m,case,finger,time\n0,1,1,soon\n", "line 2: time = 'soon': must be a number"),
+        ("x_m,case,finger,time\n0,1,1\n", "line 2: time = None: must be a number"),
+        ("x_m,case,finger,time\n0,1,1,2\n0,3,1,2\n", "line 3: case = 3: must be one of 0, 1, 2"),
+        ("x_m,case,finger,time\n0,1,0,2\n", "line 2: finger = 0: must be one of 1, 2"),
+        ("x_m,case,finger,time\n0,1,1,-1\n", "line 2: time = -1 s, .*: the time must be greater"),
+    ],
+)
+def test_a_wrong_table_is_one_line(tmp_path: Path, text: str | None, message: str) -> None:
+    path = tmp_path / "times.csv"
+    if text is not None:
+        path.write_text(text)
+    with pytest.raises(InputError, match=message) as caught:
+        read_contacts(path)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.slow
+def test_processes_give_the_same_fit(grasp: System) -> None:
+    measured = contacts([[1.5, 3.2], [2.3, 2.5]])
+    parameters = chosen(["stribeck"], tuple(GROUPS), "test")
+    parallel = identify_from_times(grasp, measured, parameters, 1, progress=False)
+    here = fit_contacts(measured, parameters, simulator(grasp, STEP))
+    assert parallel.residuals.tobytes() == here.residuals.tobytes()
+    assert parallel.estimates == here.estimates
+    assert parallel.estimates[0].remark == "the data do not determine it"  # without friction

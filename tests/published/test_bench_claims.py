@@ -1,0 +1,139 @@
+"""Each claim of the experiments can fail."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from grasp_cosim import System
+from grasp_cosim.published.bench import bench_rms
+from grasp_cosim.published.bench_claims import check_bench_claims
+from grasp_cosim.published.evaluate import compared
+from grasp_cosim.published.grasps import Run, Runs
+from grasp_cosim.published.tables import Row, Setting, experimental_rows
+
+Judge = Callable[..., list[int]]
+
+PUBLISHED = experimental_rows()
+BROWN_WHITE = Setting(0.03, 0.86, 1.0)
+BLACK = Setting(0.03, 0.57, 0.57)
+
+
+@pytest.fixture
+def runs() -> Runs:
+    """The experiments as published, the colours alike; with what the tables do not tell."""
+    times: dict[tuple[Setting, int], list[float]] = {}
+    for row in PUBLISHED:
+        if row.finger and row.case:
+            times.setdefault((row.setting, row.case), []).append(row.published)
+    alike = {case: times[Setting(0.03), case] for case in (1, 2)}
+    made = {
+        (s, case): _run(s, case, (alike[case] if _coloured(s) else both)[:2])
+        for (s, case), both in times.items()
+    }
+    for setting, _ in list(made):
+        made[setting, 0] = _run(setting, 0, [0.1, 0.2])
+    return made
+
+
+def _coloured(s: Setting) -> bool:
+    return s.x_m == 0.03 and s.alpha_1 == s.alpha_2
+
+
+def _run(setting: Setting, case: int, times: list[float]) -> Run:
+    metrics = {
+        "time_to_contact": times,
+        "target_position": setting.x_m,
+    }
+    touch = (20.0, 40.0) if case == 0 else (2.0, 1.0)
+    return Run(setting, case, metrics, (0.0, 0.0), 0.005, touch, None)
+
+
+def changed(runs: Runs, setting: Setting, case: int, **metrics: Any) -> Runs:
+    run = runs[setting, case]
+    return {**runs, (setting, case): replace(run, metrics={**run.metrics, **metrics})}
+
+
+@pytest.fixture
+def judge(grasp: System) -> Judge:
+    """The numbers of the claims that fail."""
+
+    def failing(runs: Runs, contact_times: float = 0.2) -> list[int]:
+        claims = check_bench_claims(runs, PUBLISHED, {"contact_times": contact_times}, grasp)
+        assert len(claims) == 7
+        return [i for i, claim in enumerate(claims) if not claim["holds"]]
+
+    return failing
+
+
+def test_the_published_figures_hold_every_claim(judge: Judge, runs: Runs) -> None:
+    assert judge(runs) == []
+
+
+def test_contact_times_that_are_far_from_the_published_ones_fail(judge: Judge, runs: Runs) -> None:
+    assert judge(runs, 0.36) == [0]
+
+
+def test_one_row_that_is_not_closer_together_fails(judge: Judge, runs: Runs) -> None:
+    assert judge(changed(runs, Setting(0.0), 2, time_to_contact=[2.0, 2.5])) == [1]
+
+
+def test_a_nearer_finger_that_does_not_wait_fails(judge: Judge, runs: Runs) -> None:
+    assert judge(changed(runs, Setting(0.05), 2, time_to_contact=[1.30, 1.40])) == [2]
+
+
+def test_a_contact_time_that_depends_on_the_colour_fails(judge: Judge, runs: Runs) -> None:
+    assert judge(changed(runs, BLACK, 2, time_to_contact=[2.26, 2.25])) == [3]
+
+
+def test_brown_and_white_far_apart_fails(judge: Judge, runs: Runs) -> None:
+    assert judge(changed(runs, BROWN_WHITE, 2, time_to_contact=[2.0, 2.399])) == []
+    assert judge(changed(runs, BROWN_WHITE, 2, time_to_contact=[2.0, 2.401])) == [4]
+
+
+@pytest.mark.parametrize(("case", "force"), [(0, 3.0), (1, 3.6), (2, 3.6)])
+def test_an_impact_in_the_wrong_case_fails(
+    judge: Judge, runs: Runs, case: int, force: float
+) -> None:
+    key = Setting(0.01), case
+    assert judge({**runs, key: replace(runs[key], touch_forces=(force, 1.0))}) == [5]
+
+
+def test_a_target_that_stays_beside_the_centre_fails(judge: Judge, runs: Runs) -> None:
+    assert judge(changed(runs, Setting(0.04), 2, target_position=0.0395)) == [6]
+
+
+def test_a_target_that_does_not_overshoot_fails(judge: Judge, runs: Runs) -> None:
+    made = {**runs, (BLACK, 2): replace(runs[BLACK, 2], overshoot=0.0)}
+    assert judge(made) == [6]
+
+
+def test_where_colours_differ_the_target_may_stay_beside(judge: Judge, runs: Runs) -> None:
+    assert judge(changed(runs, BROWN_WHITE, 2, target_position=0.025)) == []
+
+
+def test_the_root_mean_squares_are_by_table_and_count_white_once(runs: Runs) -> None:
+    def rms(off: dict[tuple[float | str, int, int | None], float]) -> dict[str, float]:
+        published: list[Row] = PUBLISHED
+        exact = [{"difference": off.get((r.condition, r.case, r.finger), 0.0)} for r in published]
+        return bench_rms(published, exact)
+
+    assert rms({(0.05, 1, 2): 0.8}) == pytest.approx(
+        {
+            "contact_times": 0.8 / 40**0.5,
+            "equal_colours": 0.0,
+            "mixed_colours": 0.0,
+            "positions": 0.8 / 24**0.5,
+            "time_differences": 0.0,
+        }
+    )
+    assert rms({("white/white", 1, 2): 0.8})["contact_times"] == 0.0
+    assert rms({("brown/white", 1, 2): 0.8})["mixed_colours"] == pytest.approx(0.8 / 8**0.5)
+    assert rms({(0.02, 1, None): 0.8})["time_differences"] == pytest.approx(0.8 / 26**0.5)
+
+
+def test_a_row_is_compared_with_its_own_grasp(runs: Runs) -> None:
+    row = next(r for r in PUBLISHED if (r.condition, r.case, r.finger) == (0.04, 1, None))
+    made = changed(runs, Setting(0.04), 1, time_to_contact=[1.0, 3.0])
+    assert compared(row, made)["simulated"] == 2.0
+    assert compared(row, made)["difference"] == pytest.approx(-0.84)

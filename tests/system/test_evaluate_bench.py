@@ -1,0 +1,133 @@
+"""The published experiments on the bench preset."""
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from conftest import Run
+from grasp_cosim import InputError, System
+from grasp_cosim.grasp import BENCH, CASES, with_bench
+from grasp_cosim.published.bench import evaluate_bench, run_settings
+from grasp_cosim.published.tables import Setting
+from grasp_cosim.study.closing import close
+
+QUIET = {f"sensor_{j}.noise.enabled": False for j in (1, 2)}
+"""Noise acts by the sampled xi'/xi, so with it 1 ms steps are not the bench's."""
+
+
+@pytest.fixture(scope="module")
+def bench(grasp: System) -> System:
+    return with_bench(grasp)
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("results")
+
+
+@pytest.fixture(scope="module")
+def report(bench: System, out: Path) -> dict[str, Any]:
+    quiet = bench.with_values(QUIET).with_experiment(step=1e-3)
+    return evaluate_bench(quiet, out, workers=2, progress=False)
+
+
+def test_the_preset_has_every_stage_on_and_a_seed_for_each_sensor(bench: System) -> None:
+    for stage in ("ambient", "noise", "adc", "filter", "median"):
+        for j in (1, 2):
+            assert bench.start(f"sensor_{j}.{stage}.enabled") == 1.0
+    assert bench.start("sensor_1.noise.seed") != bench.start("sensor_2.noise.seed")
+    assert bench.step_ns == 100_000
+
+
+def test_the_preset_has_friction(bench: System) -> None:
+    assert bench.start("plant.friction.coulomb[2]") == pytest.approx(1.34, abs=0.01)
+    assert bench.start("plant.friction.viscous[1]") == pytest.approx(35.9, abs=0.1)
+
+
+def test_a_system_that_the_preset_does_not_fit_is_refused(grasp: System) -> None:
+    plant = replace(grasp.components[0], values={"force[1]": 0.0, "force[2]": 0.0})
+    other = replace(grasp, name="other.toml", components=(plant,), wires=())
+    with pytest.raises(InputError, match=rf"^{BENCH.name} sensor_1.*: no component 'sensor_1'"):
+        with_bench(other)
+
+
+def test_run_takes_the_preset_too(command: Run) -> None:
+    code, _, _ = command("run", "--bench", "--stop", "0.01", "--out", "results", "--json")
+    assert code == 0
+    values = json.loads(Path("results/run.json").read_text())["components"]["plant"]["values"]
+    assert values["friction.coulomb[2]"] == pytest.approx(1.34, abs=0.01)
+
+
+@pytest.mark.slow
+def test_a_setting_runs_in_every_case_and_once(bench: System) -> None:
+    quick = bench.with_values(QUIET).with_experiment(step=2e-3)
+    setting = Setting(0.05, 1.0, 0.86)
+    runs = run_settings(quick, [setting, setting], 1, progress=False)
+    assert list(runs) == [(setting, case) for case in CASES]
+    assert runs[setting, 2].apart < runs[setting, 1].apart
+
+
+@pytest.mark.slow
+def test_noise_hardly_moves_a_contact_at_the_steps_of_the_bench(bench: System) -> None:
+    values = {**CASES[2], "plant.initial_object_position": 0.05}
+    noisy, quiet = (
+        close(bench.with_values({**values, **more}), after=0.0).metrics["time_to_contact"]
+        for more in ({}, QUIET)
+    )
+    assert noisy != quiet
+    assert noisy == pytest.approx(quiet, abs=0.03)
+
+
+@pytest.mark.slow
+def test_every_claim_holds(report: dict[str, Any]) -> None:
+    assert len(report["claims"]) == 7
+    assert [claim for claim in report["claims"] if not claim["holds"]] == []
+
+
+@pytest.mark.slow
+def test_contact_times_are_as_near_as_the_fit_left_them(report: dict[str, Any]) -> None:
+    assert report["rms"]["contact_times"] == pytest.approx(0.277, abs=0.002)
+    assert report["rms"]["contact_times"] < 0.35
+
+
+@pytest.mark.slow
+def test_every_published_figure_has_its_row(report: dict[str, Any]) -> None:
+    assert len(report["rows"]) == (6 + 7) * 2 * 3
+    assert len(report["runs"]) == 12 * len(CASES)
+    for row in report["rows"]:
+        assert row["difference"] == row["simulated"] - row["published"]
+
+
+@pytest.mark.slow
+def test_everything_is_written(report: dict[str, Any], out: Path) -> None:
+    pictures = {"contact_forces.png", "target_position.png", "contact_times.png"}
+    names = {path.name for path in out.iterdir()}
+    assert names == {*pictures, "evaluation.csv", "evaluation.json", "report.md"}
+    assert json.loads((out / "evaluation.json").read_text()) == report
+    text = (out / "report.md").read_text()
+    assert all(f"]({name})" in text for name in pictures)
+    assert "| brown/white | 2 | time difference | 0.15 |" in text
+    with (out / "evaluation.csv").open() as file:
+        assert len(list(csv.DictReader(file))) == 78
+
+
+@pytest.mark.parametrize(("holds", "code"), [(True, 0), (False, 1)])
+def test_a_claim_that_fails_is_exit_1(
+    command: Run, monkeypatch: pytest.MonkeyPatch, holds: bool, code: int
+) -> None:
+    made = {"rows": [], "rms": {"contact_times": 0.28}, "claims": [{"text": "It.", "holds": holds}]}
+
+    def evaluated(system: System, *_: object, **__: object) -> dict[str, Any]:
+        assert system.start("sensor_1.noise.enabled") == 1.0
+        return made
+
+    monkeypatch.setattr("grasp_cosim.cli.evaluate.evaluate_bench", evaluated)
+    found, out, _ = command("evaluate", "--bench")
+    assert found == code
+    assert out.startswith("holds  It.\n" if holds else "FAILS  It.\n")
+    assert "contact times 0.280" in out
+    found, out, _ = command("evaluate", "--bench", "--json")
+    assert (found, json.loads(out)) == (code, made)
