@@ -48,11 +48,15 @@ def _draw_map(sweep: Sweep, wanted: Map, path: Path) -> None:
     x, y, z = (sweep.table.numbers(name) for name in (wanted.x, wanted.y, wanted.of))
     figure = new_figure(7.2, 5.0)
     axes = figure.subplots()
+    axes.set_axisbelow(True)
     options = {"norm": _norm(z), "cmap": "viridis"}
     cells = _cells(sweep.study, wanted, x, y, z)
     if cells:
         axes.set_facecolor(MISSING)
         shown: Any = axes.pcolormesh(*cells, shading="nearest", **options)
+        for values, scale in ((cells[0], axes.set_xscale), (cells[1], axes.set_yscale)):
+            if _geometric(values):
+                scale("log", base=2)
         if wanted.limit is not None and len(cells[0]) > 1 and len(cells[1]) > 1:
             axes.contour(*cells, levels=[wanted.limit], colors=RED, linewidths=1.5)
             axes.plot([], [], color=RED, label=_named(sweep.study, wanted.of, wanted.limit))
@@ -65,6 +69,8 @@ def _draw_map(sweep: Sweep, wanted: Map, path: Path) -> None:
     figure.colorbar(shown, ax=axes, label=_label(sweep.study, wanted.of))
     axes.set_xlabel(_label(sweep.study, wanted.x))
     finish(axes, _label(sweep.study, wanted.y), bool(axes.get_legend_handles_labels()[0]))
+    if cells:
+        axes.grid(visible=False)  # which would be on top of them
     axes.set_title(sweep.study.name, fontsize=10)
     save(figure, path)
 
@@ -83,6 +89,14 @@ def _cells(
     np.add.at(count, (row[there], column[there]), 1.0)
     mean = np.divide(total, count, out=np.full_like(total, np.nan), where=count > 0.0)
     return across, along, np.ma.masked_invalid(mean)
+
+
+def _geometric(values: Floats) -> bool:
+    """Whether rising values have one ratio, and more than two."""
+    if len(values) < 3 or values[0] <= 0.0:
+        return False
+    ratios = values[1:] / values[:-1]
+    return bool(np.ptp(ratios) < 1e-9 * ratios[0])
 
 
 def _norm(values: Floats) -> Any:
@@ -118,6 +132,7 @@ def _draw_distribution(axes: Axes, sweep: Sweep, name: str) -> None:
     if not len(there):
         raise InputError(f"{name!r}: no run has a number there, so it has no distribution to draw")
     low, middle, high = np.percentile(there, (2.5, 50.0, 97.5))
+    axes.set_axisbelow(True)
     axes.hist(there, bins=max(10, int(np.sqrt(len(there)))), color=BLUE, alpha=0.75)
     axes.axvline(middle, color=RED, label=f"median {middle:.3g}")
     axes.axvspan(low, high, color=GREY, alpha=0.15, label=f"95 %: {low:.3g} to {high:.3g}")

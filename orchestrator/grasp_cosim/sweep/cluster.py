@@ -71,7 +71,8 @@ def run_on_cluster(address: str, task: Task, jobs: Iterable[Job]) -> Generator[O
             indices[future.key] = job.index
             return future
 
-        done = dask.as_completed([submit(job) for job in islice(left, AHEAD)], raise_errors=False)
+        first = [submit(job) for job in islice(left, AHEAD)]
+        done = dask.as_completed(first, loop=client.loop, raise_errors=False)
         try:
             for future in done:
                 index = indices.pop(future.key)
