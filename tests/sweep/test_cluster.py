@@ -1,11 +1,12 @@
 """The same study on a Dask cluster on this machine: the same bits."""
 
 import sys
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 from grasp_cosim import InputError, System
-from grasp_cosim.sweep.cluster import ship, unpacked
+from grasp_cosim.sweep.cluster import run_on_cluster, ship, unpacked
 from grasp_cosim.sweep.design import Design
 from grasp_cosim.sweep.distributions import Uniform
 from grasp_cosim.sweep.run import Job, Task, run_job
@@ -39,10 +40,15 @@ def test_a_local_cluster_gives_the_same_bits(study: Study, tmp_path: Path) -> No
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=2, dashboard_address=None, host="127.0.0.1"
     ) as cluster:
-        there = sweep(study, tmp_path / "there", scheduler=cluster.scheduler_address)
+        address = cluster.scheduler_address
+        jobs = (Job(k, study.values(k)) for k in range(study.runs))
+        with closing(run_on_cluster(address, Task(study.system, ()), jobs)) as outcomes:
+            early = next(outcomes)  # the others are cancelled
+        there = sweep(study, tmp_path / "there", scheduler=address)
     here = sweep(study, tmp_path / "here", workers=2)
     assert here.failed == 0
     assert there.outcomes == here.outcomes
+    assert early == here.outcomes[early.index]
     files = [tmp_path / name / "runs.parquet" for name in ("there", "here")]
     assert files[0].read_bytes() == files[1].read_bytes()
 

@@ -88,6 +88,7 @@ WRONG = [
     ((parameter("sensor_1.gap", 0.5),), {}, "sensor_1.gap has two sources"),
     ((parameter("sensor_1.noise.seed", 0.5),), {}, "noise.seed = 0.5: must be a whole number"),
     ((replace(RATIO, distribution=Listed(("a",))),), {}, "'a': must be a number"),
+    ((replace(LEFT, variables=("sensor_1.adc.bits",)),), {}, "type Integer; must have values"),
     ((parameter("sensor_1.gain", 1.0, ratio_to=RATIO.variables[0]), RATIO), {}, "a ratio itself"),
     ((parameter("sensor_1.gain", 1.0, ratio_to="sensor_1.gone"),), {}, "sensor_1.gone"),
     ((MASS,), {"outputs": ("plant.force[1]",)}, r"no output 'plant.force\[1\]'"),

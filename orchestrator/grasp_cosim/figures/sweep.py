@@ -17,6 +17,7 @@ from .plot import BLUE, GREY, RED, finish, new_figure, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
 
 Floats = npt.NDArray[np.float64]
 
@@ -54,9 +55,12 @@ def _draw_map(sweep: Sweep, wanted: Map, path: Path) -> None:
     if cells:
         axes.set_facecolor(MISSING)
         shown: Any = axes.pcolormesh(*cells, shading="nearest", **options)
-        for values, scale in ((cells[0], axes.set_xscale), (cells[1], axes.set_yscale)):
-            if _geometric(values):
-                scale("log", base=2)
+        if _geometric(cells[0]):
+            axes.set_xscale("log")
+            _plain_ticks(axes.xaxis)
+        if _geometric(cells[1]):
+            axes.set_yscale("log")
+            _plain_ticks(axes.yaxis)
         if wanted.limit is not None and len(cells[0]) > 1 and len(cells[1]) > 1:
             axes.contour(*cells, levels=[wanted.limit], colors=RED, linewidths=1.5)
             axes.plot([], [], color=RED, label=_named(sweep.study, wanted.of, wanted.limit))
@@ -89,6 +93,15 @@ def _cells(
     np.add.at(count, (row[there], column[there]), 1.0)
     mean = np.divide(total, count, out=np.full_like(total, np.nan), where=count > 0.0)
     return across, along, np.ma.masked_invalid(mean)
+
+
+def _plain_ticks(axis: Axis) -> None:
+    """Numbers like 0.5, 1 and 2 on a logarithmic axis."""
+    from matplotlib.ticker import LogLocator, NullLocator
+
+    axis.set_major_locator(LogLocator(10.0, subs=(1.0, 1.5, 2.0, 3.0, 5.0, 7.0)))
+    axis.set_minor_locator(NullLocator())
+    axis.set_major_formatter("{x:g}")
 
 
 def _geometric(values: Floats) -> bool:

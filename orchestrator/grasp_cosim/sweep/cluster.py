@@ -80,7 +80,8 @@ def run_on_cluster(address: str, task: Task, jobs: Iterable[Job]) -> Generator[O
                 if isinstance(failure, dask.KilledWorker):
                     yield Outcome(index, {}, "the worker of the run died, several times")
                 elif failure is not None:
-                    raise SimulationError(f"--scheduler {address}: {failure}")
+                    said = str(failure).splitlines() or [type(failure).__name__]
+                    raise SimulationError(f"--scheduler {address}: {said[0]}")
                 else:
                     yield future.result()
                 job = next(left, None)

@@ -28,7 +28,7 @@ KINDS: tuple[str, ...] = get_args(Kind)
 EVEN = ("sobol", "saltelli")
 """Kinds whose points are spread evenly only where they are a power of two."""
 
-MOST = 1_000_000
+MOST = 100_000
 """Runs of a study at most."""
 
 Points = npt.NDArray[np.float64]

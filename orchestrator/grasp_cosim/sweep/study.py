@@ -216,7 +216,11 @@ class Study:
             if wrong:
                 raise InputError(f"{self.name}: {parameter.name}: {wrong[0]!r}: must be a number")
         for name in parameter.variables:
-            self.variable(name)
+            kind = self.variable(name).kind
+            if parameter.distribution.levels is None and kind != "Real":
+                raise InputError(
+                    f"{self.name}: {parameter.name}: {name} is of type {kind}; must have values"
+                )
         for value in parameter.distribution.extremes:
             values = self._driven({**point, parameter.name: value})
             for name in parameter.variables:
