@@ -8,7 +8,7 @@ from typing import NoReturn
 import click
 
 from ..errors import InputError, SimulationError
-from . import evaluate, fmus, identify, proxy, qualify, relay, report, run, serve, ssp
+from . import evaluate, fmus, identify, proxy, qualify, relay, report, run, serve, ssp, sweep
 from .frame import FAILED, INTERRUPTED, WRONG, cli, fail
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EIO)
@@ -20,6 +20,7 @@ COMMANDS = (
     evaluate.evaluate,
     identify.identify,
     qualify.qualify,
+    sweep.sweep,
     ssp.ssp,
     proxy.proxy,
     serve.serve,

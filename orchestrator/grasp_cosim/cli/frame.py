@@ -28,6 +28,7 @@ def cli(debug: bool) -> None:
     grasp-cosim evaluate             the published table and figures, side by side with ours
     grasp-cosim identify             friction from contact times or from a recorded log
     grasp-cosim qualify FMU --as C   whether an FMU may take the place of component C
+    grasp-cosim sweep STUDY          many runs, in parallel; begun again, it goes on
     grasp-cosim ssp SYSTEM -o FILE   a system as an SSP archive
     grasp-cosim proxy FMU -o FILE    an FMU with the same variables that talks to a peer
     grasp-cosim serve FMU            an FMU as a test bench, for a proxy

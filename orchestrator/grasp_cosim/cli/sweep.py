@@ -1,0 +1,93 @@
+"""The command sweep."""
+
+import json
+from pathlib import Path
+
+import click
+
+from ..errors import InputError
+from ..figures.plot import new_figure
+from ..figures.sweep import draw_sweep
+from ..sweep.read import read_study, study_file
+from ..sweep.sensitivity import Sensitivity
+from ..sweep.store import Store
+from ..sweep.sweep import RUNS, Sweep
+from ..sweep.sweep import sweep as run_study
+from .frame import INTERRUPTED, NEGATIVE, check_folder, fail, json_option, load_system
+
+
+@click.command()
+@click.argument("study")
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    help="Folder of the runs; by default the study's name, here.",
+)
+@click.option(
+    "--workers", type=click.IntRange(1), help="Processes; by default one for each processor."
+)
+@click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster, like tcp://host:8786.")
+@click.option("--plot", is_flag=True, help="Draw what the study asks for under [figures].")
+@json_option
+def sweep(
+    study: str,
+    out: Path | None,
+    workers: int | None,
+    scheduler: str | None,
+    plot: bool,
+    as_json: bool,
+) -> int:
+    """Do all runs of STUDY, a .toml file or a built-in one: reflectance_map, bench_monte_carlo.
+
+    Finished runs are kept in the folder: the same command goes on where it was ended.
+
+    \b
+    Example: grasp-cosim sweep reflectance_map --out map --plot
+    """
+    if workers is not None and scheduler is not None:
+        raise InputError("--workers: must not come with --scheduler, whose workers there are")
+    path = study_file(study)
+    folder = out or Path(path.stem)
+    check_folder(folder)
+    chosen = read_study(path, lambda system: load_system(system, None, None))
+    if plot:
+        new_figure(1.0, 1.0)  # says at once if matplotlib is missing
+    try:
+        done = run_study(chosen, folder, workers, scheduler, progress=True)
+    except KeyboardInterrupt:
+        kept = f"{Store(folder).kept()} of {chosen.runs} runs are kept in {folder}"
+        return fail(f"interrupted; {kept}, the same command goes on", INTERRUPTED)
+    drawn = draw_sweep(done, folder) if plot else []
+    for picture in drawn:
+        click.echo(f"drew {picture}", err=True)
+    click.echo(json.dumps(done.as_json()) if as_json else _as_text(done))
+    return NEGATIVE if done.failed == chosen.runs else 0
+
+
+def _as_text(done: Sweep) -> str:
+    lines = [
+        f"{done.study.name}: {len(done.outcomes)} runs, {done.resumed} of them done before, "
+        f"{done.failed} failed; in {done.folder / RUNS}"
+    ]
+    error = next((o for o in done.outcomes if o.error is not None), None)
+    if error is not None:
+        lines.append(f"the first that failed, {error.index}: {error.error}")
+    heads = ("runs", "least", "mean", "median", "greatest")
+    lines.append(f"{'':28s}" + "".join(f"{head:>12s}" for head in heads))
+    for name, row in done.table.summary().items():
+        numbers = ("-" if row[head] is None else f"{row[head]:.5g}" for head in heads)
+        lines.append(f"{name:28s}" + "".join(f"{number:>12s}" for number in numbers))
+    for found in done.sensitivities:
+        lines += _sensitivity_lines(found)
+    return "\n".join(lines)
+
+
+def _sensitivity_lines(found: Sensitivity) -> list[str]:
+    lines = [f"variance of {found.metric}, {found.rows} of {found.of} rows complete, 95 %:"]
+    for i in found.indices:
+        first, total = (
+            f"{value:6.3f} ({low:.3f} to {high:.3f})"
+            for value, (low, high) in ((i.first, i.first_interval), (i.total, i.total_interval))
+        )
+        lines.append(f"  {i.parameter:26s} alone {first:26s} in all {total}")
+    return lines

@@ -1,0 +1,132 @@
+"""Jobs spread over a Dask cluster (the optional extra `dask`), which must have grasp-cosim.
+
+The FMUs travel with the task: the cluster needs no folder of ours.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import tempfile
+import threading
+from collections.abc import Generator, Iterable
+from dataclasses import dataclass, replace
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError, SimulationError
+from .run import Job, Outcome, Task, run_job
+
+CONNECT = 10.0
+"""s, to find the scheduler and a worker."""
+
+AHEAD = 1000
+"""Jobs the scheduler is given before others have ended."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shipment:
+    """A task with the contents of its FMUs, one per component."""
+
+    task: Task
+    contents: tuple[bytes, ...]
+
+    @property
+    def key(self) -> str:
+        """A hash of what unpacked() makes of it."""
+        digest = hashlib.sha256()
+        for content in self.contents:
+            digest.update(hashlib.sha256(content).digest())
+        return digest.hexdigest()
+
+
+def ship(task: Task) -> Shipment:
+    """The task with its FMUs."""
+    return Shipment(task, tuple(c.fmu.read_bytes() for c in task.system.components))
+
+
+def run_on_cluster(address: str, task: Task, jobs: Iterable[Job]) -> Generator[Outcome, None, None]:
+    """The outcomes of the jobs, in the order in which they end; address like tcp://host:8786.
+
+    A worker does a run at a time: start it with --nthreads 1. Closing the iterator cancels the
+    rest. InputError without the extra, a scheduler or a worker; SimulationError where it is lost.
+    """
+    dask = check_cluster()
+    try:
+        client = dask.Client(address, timeout=CONNECT, set_as_default=False)
+    except (OSError, ValueError) as error:
+        text = str(error).splitlines()[0]
+        raise InputError(f"--scheduler {address}: {text}; must be one that runs") from error
+    with client:
+        try:
+            client.wait_for_workers(1, timeout=CONNECT)
+        except TimeoutError as error:
+            raise InputError(f"--scheduler {address}: no worker; must have at least one") from error
+        shipment = client.scatter(ship(task), broadcast=True)
+        left = iter(jobs)
+        indices: dict[str, int] = {}
+
+        def submit(job: Job) -> Any:
+            future = client.submit(run_shipped, shipment, job, pure=False)
+            indices[future.key] = job.index
+            return future
+
+        first = [submit(job) for job in islice(left, AHEAD)]
+        done = dask.as_completed(first, loop=client.loop, raise_errors=False)
+        try:
+            for future in done:
+                index = indices.pop(future.key)
+                failure = future.exception()
+                if isinstance(failure, dask.KilledWorker):
+                    yield Outcome(index, {}, "the worker of the run died, several times")
+                elif failure is not None:
+                    said = str(failure).splitlines() or [type(failure).__name__]
+                    raise SimulationError(f"--scheduler {address}: {said[0]}")
+                else:
+                    yield future.result()
+                job = next(left, None)
+                if job is not None:
+                    done.add(submit(job))
+        finally:
+            client.cancel(list(done.futures))
+
+
+def check_cluster() -> Any:
+    """The module distributed; InputError without it."""
+    try:
+        import distributed
+    except ImportError as error:
+        raise InputError(
+            "distributed is not installed, it talks to Dask clusters; "
+            "install it with: pip install 'grasp-cosim[dask]'"
+        ) from error
+    return distributed
+
+
+_unpacked: dict[str, tuple[tempfile.TemporaryDirectory[str], tuple[Path, ...]]] = {}
+"""The FMUs that this process has unpacked, by the key of their shipment."""
+
+_one_at_a_time = threading.Lock()
+"""All Python FMUs of a process share its modules, and a compiled loop keeps the others waiting."""
+
+
+def run_shipped(shipment: Shipment, job: Job) -> Outcome:
+    """What a worker of the cluster does."""
+    with _one_at_a_time:
+        return run_job(unpacked(shipment), job)
+
+
+def unpacked(shipment: Shipment) -> Task:
+    """The task with FMUs in a folder of this process, which goes with it."""
+    components = shipment.task.system.components
+    if shipment.key not in _unpacked:
+        folder = tempfile.TemporaryDirectory(prefix="grasp_sweep_")
+        paths = []
+        for i, (component, content) in enumerate(zip(components, shipment.contents, strict=True)):
+            paths.append(Path(folder.name, str(i), component.fmu.name))
+            paths[-1].parent.mkdir()
+            paths[-1].write_bytes(content)
+        _unpacked[shipment.key] = folder, tuple(paths)
+    paths_here = _unpacked[shipment.key][1]
+    moved = tuple(replace(c, fmu=path) for c, path in zip(components, paths_here, strict=True))
+    return replace(shipment.task, system=replace(shipment.task.system, components=moved))

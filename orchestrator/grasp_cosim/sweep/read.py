@@ -1,0 +1,266 @@
+"""A study from a TOML file.
+
+    system = "grasp.toml"           # or an .ssp, relative to this file; else the built-in one
+    case = 2                        # 0, 1 or 2, of a grasp; may be left out, as step and stop
+    step = 1e-3                     # s
+    stop = 3.0                      # s
+    seeds = ["sensor_1.noise.seed"] # get another whole number in each run
+    outputs = ["plant.gap[1]"]      # their last values are kept beside the metrics
+
+    [swap]                          # FMUs in the place of the system's, relative to this file
+    plant = "Vendor.fmu"
+
+    [values]                        # what is the same in all runs
+    "plant.object_width" = 0.07
+
+    [design]                        # see design.py
+    kind = "grid"                   # random, latin-hypercube, sobol, saltelli with runs and seed
+    seed = 1
+
+    [[parameters]]                  # what varies
+    name = "reflectance ratio"      # by default its variable
+    variables = ["sensor_1.reflectance"]
+    ratio_to = "sensor_2.reflectance"
+    geomspace = { from = 0.5, to = 2.0, count = 21 }
+
+    [figures]
+    map = { x = "reflectance ratio", y = "position", of = "time_difference", limit = 0.1 }
+    distributions = ["time_difference", "time_to_contact[1]"]
+
+A parameter has exactly one of: values = [...], linspace or geomspace = { from, to, count },
+uniform = { low, high }, normal = { mean, standard_deviation, low, high }.
+"""
+
+import math
+import tomllib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+from ..errors import InputError, choices
+from ..grasp import CASES
+from ..system.description import System
+from ..system.interface import Value
+from ..system.tables import as_table, check_keys
+from .design import Design
+from .distributions import Distribution, Listed, Normal, Uniform, spaced
+from .study import Map, Parameter, Pictures, Study
+
+STUDIES = Path(__file__).parent.parent / "studies"
+"""The folder of the built-in studies."""
+
+KEYS = {
+    "system", "case", "step", "stop", "seeds", "outputs", "swap", "values", "design", "parameters",
+    "figures",
+}  # fmt: skip
+
+Made = TypeVar("Made")
+Load = Callable[[Path | None], System]
+"""Reads a system; None stands for the built-in one."""
+
+MOST_LEVELS = 100_000
+"""Values of one parameter at most."""
+
+
+def built_in() -> list[str]:
+    """The names of the built-in studies."""
+    return sorted(path.stem for path in STUDIES.glob("*.toml"))
+
+
+def study_file(name: str) -> Path:
+    """The file of a study, given by its path or by the name of a built-in one."""
+    path = Path(name)
+    if path.suffix != ".toml" and name in built_in():
+        return STUDIES / f"{name}.toml"
+    if not path.is_file():
+        raise InputError(f"{path}: no such study; must be a .toml file or {choices(built_in())}")
+    return path
+
+
+def read_study(path: Path, load: Load) -> Study:
+    """The study of a TOML file; load reads its system. InputError where anything is wrong."""
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"{path}: not readable as TOML: {error}") from error
+    place = path.name
+    check_keys(place, table, KEYS)
+    design = as_table(f"{place}: [design]", table.get("design"))
+    check_keys(f"{place}: [design]", design, Design.__slots__)
+    if "kind" not in design:
+        raise InputError(f"{place}: [design]: no kind; must have one")
+    entries = table.get("parameters", [])
+    if not isinstance(entries, list):
+        raise InputError(f"{place}: parameters = {entries!r}: must be [[parameters]] tables")
+    seeds = _names(f"{place}: seeds", table.get("seeds", []))
+    random = design["kind"] != "grid" or seeds
+    if random and "seed" not in design:
+        raise InputError(f"{place}: [design]: no seed; must be a whole number, what is random")
+    parameters = tuple(
+        _parameter(f"{place}: parameters[{i}]", entry) for i, entry in enumerate(entries)
+    )
+    return Study(
+        place,
+        _system(place, table, path.parent, load, {v for p in parameters for v in p.variables}),
+        parameters,
+        _in(place, lambda: Design(**design)),
+        seeds,
+        _names(f"{place}: outputs", table.get("outputs", [])),
+        _pictures(f"{place}: [figures]", table.get("figures", {})),
+    )
+
+
+def _system(
+    place: str, table: Mapping[str, Any], folder: Path, load: Load, varied: set[str]
+) -> System:
+    """The system with what is the same in all runs."""
+    name = table.get("system")
+    if name is not None and not isinstance(name, str):
+        raise InputError(f"{place}: system = {name!r}: must be the path of a .toml or .ssp file")
+    case = table.get("case")
+    if isinstance(case, bool) or case not in (None, *CASES):
+        raise InputError(f"{place}: case = {case!r}: must be one of {choices(CASES)}")
+    swaps = as_table(f"{place}: [swap]", table.get("swap", {}))
+    for key, fmu in swaps.items():
+        if not isinstance(fmu, str):
+            raise InputError(f"{place}: [swap]: {key} = {fmu!r}: must be the path of an FMU")
+    fixed = as_table(f"{place}: [values]", table.get("values", {}))
+    for key, value in fixed.items():
+        _value(f"{place}: [values]: {key}", value)
+        if key in varied:
+            raise InputError(f"{place}: [values]: {key}: is varied by a parameter; must be one")
+    values: dict[str, Value] = {**({} if case is None else CASES[case]), **fixed}
+    system = load(None if name is None else folder / name)
+    revised = system.revised(
+        {key: folder / fmu for key, fmu in swaps.items()},
+        values,
+        (f"{place}: [swap]", f"{place}: [values]"),
+    )
+    return _in(place, lambda: revised.with_experiment(table.get("step"), table.get("stop")))
+
+
+def _parameter(place: str, entry: Any) -> Parameter:
+    entry = as_table(place, entry)
+    check_keys(place, entry, {"name", "variables", "ratio_to", *FORMS})
+    variables = _names(f"{place}: variables", entry.get("variables"))
+    if not variables:
+        raise InputError(f"{place}: variables = []: must have at least one")
+    name = entry.get("name", variables[0])
+    ratio_to = entry.get("ratio_to")
+    if not isinstance(name, str) or not name:
+        raise InputError(f"{place}: name = {name!r}: must be a string")
+    if ratio_to is not None and not isinstance(ratio_to, str):
+        raise InputError(f"{place}: ratio_to = {ratio_to!r}: must be 'component.variable'")
+    given = [form for form in FORMS if form in entry]
+    if len(given) != 1:
+        raise InputError(
+            f"{place}: {' and '.join(given) or 'no values'}; must have exactly one of "
+            f"{choices(FORMS)}"
+        )
+    distribution = FORMS[given[0]](f"{place}: {given[0]}", entry[given[0]])
+    return Parameter(name, variables, distribution, ratio_to)
+
+
+def _values(place: str, entry: Any) -> Listed:
+    if not isinstance(entry, list) or not entry or len(entry) > MOST_LEVELS:
+        raise InputError(f"{place} = {entry!r}: must be a list of values")
+    return Listed(tuple(_value(place, value) for value in entry))
+
+
+def _linspace(place: str, entry: Any) -> Listed:
+    return _spaced(place, entry, False)
+
+
+def _geomspace(place: str, entry: Any) -> Listed:
+    return _spaced(place, entry, True)
+
+
+def _spaced(place: str, entry: Any, logarithmic: bool) -> Listed:
+    first, last, count = _numbers(place, entry, ("from", "to", "count"))
+    if not count.is_integer() or not 2 <= count <= MOST_LEVELS:
+        raise InputError(f"{place}: count = {count:g}: must be a whole number 2 to {MOST_LEVELS}")
+    if logarithmic and not (first > 0.0 and last > 0.0):
+        raise InputError(f"{place}: from {first:g} to {last:g}: must be greater than 0")
+    return spaced(first, last, int(count), logarithmic)
+
+
+def _uniform(place: str, entry: Any) -> Uniform:
+    low, high = _numbers(place, entry, ("low", "high"))
+    _check_rising(place, low, high)
+    return Uniform(low, high)
+
+
+def _normal(place: str, entry: Any) -> Normal:
+    mean, deviation, low, high = _numbers(
+        place, entry, ("mean", "standard_deviation", "low", "high")
+    )
+    _check_rising(place, low, high)
+    if deviation <= 0.0:
+        raise InputError(f"{place}: standard_deviation = {deviation!r}: must be greater than 0")
+    if not low <= mean <= high:
+        raise InputError(f"{place}: mean = {mean!r}: must be from low, {low!r}, to high, {high!r}")
+    return Normal(mean, deviation, low, high)
+
+
+FORMS: Mapping[str, Callable[[str, Any], Distribution]] = {
+    "values": _values,
+    "linspace": _linspace,
+    "geomspace": _geomspace,
+    "uniform": _uniform,
+    "normal": _normal,
+}
+"""The ways to say what a parameter may be."""
+
+
+def _pictures(place: str, table: Any) -> Pictures:
+    table = as_table(place, table)
+    check_keys(place, table, Pictures.__slots__)
+    distributions = _names(f"{place}: distributions", table.get("distributions", []))
+    if "map" not in table:
+        return Pictures(None, distributions)
+    entry = as_table(f"{place}: map", table["map"])
+    check_keys(f"{place}: map", entry, Map.__slots__)
+    for key in ("x", "y", "of"):
+        if not isinstance(entry.get(key), str):
+            raise InputError(f"{place}: map: {key} = {entry.get(key)!r}: must be a name")
+    limit = entry.get("limit")
+    if limit is not None:
+        (limit,) = _numbers(f"{place}: map", {"limit": limit}, ("limit",))
+    return Pictures(Map(entry["x"], entry["y"], entry["of"], limit), distributions)
+
+
+def _check_rising(place: str, low: float, high: float) -> None:
+    if not low < high:
+        raise InputError(f"{place}: low = {low!r}, high = {high!r}: must have low below high")
+
+
+def _numbers(place: str, entry: Any, names: tuple[str, ...]) -> list[float]:
+    """The finite numbers of a table with exactly these names."""
+    table = as_table(place, entry)
+    check_keys(place, table, names)
+    for name in names:
+        number = table.get(name)
+        real = isinstance(number, float | int) and not isinstance(number, bool)
+        if number is None or not real or not math.isfinite(number):
+            raise InputError(f"{place}: {name} = {number!r}: must be a finite number")
+    return [float(table[name]) for name in names]
+
+
+def _names(place: str, entry: Any) -> tuple[str, ...]:
+    if not isinstance(entry, list) or not all(isinstance(name, str) for name in entry):
+        raise InputError(f"{place} = {entry!r}: must be a list of names")
+    return tuple(entry)
+
+
+def _value(place: str, value: Any) -> Value:
+    if not isinstance(value, float | int | bool | str):
+        raise InputError(f"{place} = {value!r}: must be a number, boolean or string")
+    return value
+
+
+def _in(place: str, make: Callable[[], Made]) -> Made:
+    """What make returns; its InputError begins with the place."""
+    try:
+        return make()
+    except InputError as error:
+        raise InputError(f"{place}: {error}") from error

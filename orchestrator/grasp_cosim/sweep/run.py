@@ -1,0 +1,70 @@
+"""One run of a study: what it needs, and what is kept of it."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ..errors import InputError, SimulationError
+from ..master.simulation import simulate
+from ..recording.result import Result
+from ..system.description import System
+from ..system.interface import Value
+
+BOOKKEEPING = {
+    "wall_time", "real_time_factor", "steps", "scheme", "step", "stop", "complete",
+}  # fmt: skip
+"""Metrics that are the same in all runs, or that another run of the same values does not have."""
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """What all runs share: the system, and the signals whose last value is kept."""
+
+    system: System
+    outputs: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """A run to do: its index, and the start values of variables."""
+
+    index: int
+    values: Mapping[str, Value]
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What a run came to: the metrics by column, or the error, one line."""
+
+    index: int
+    metrics: Mapping[str, Value | None]
+    error: str | None = None
+
+
+def run_job(task: Task, job: Job) -> Outcome:
+    """Run a job; one that fails is an outcome, too. KeyboardInterrupt where it was interrupted."""
+    try:
+        result = simulate(task.system.with_values(job.values))
+    except (InputError, SimulationError) as error:
+        return Outcome(job.index, {}, str(error))
+    if not result.complete:
+        raise KeyboardInterrupt
+    return Outcome(job.index, _kept(result, task.outputs))
+
+
+def _kept(result: Result, outputs: tuple[str, ...]) -> dict[str, Value | None]:
+    metrics = {k: v for k, v in result.metrics.items() if k not in BOOKKEEPING}
+    last = {name: result[name][-1].item() for name in outputs}
+    return dict(_flat("", {**metrics, **last}))
+
+
+def _flat(name: str, value: Any) -> Iterator[tuple[str, Value | None]]:
+    """Columns: lists as name[1], name[2], ..., tables as name.key."""
+    if isinstance(value, Mapping):
+        for key, entry in value.items():
+            yield from _flat(f"{name}.{key}" if name else key, entry)
+    elif isinstance(value, list | tuple):
+        for i, entry in enumerate(value, 1):
+            yield from _flat(f"{name}[{i}]", entry)
+    else:
+        yield name, value

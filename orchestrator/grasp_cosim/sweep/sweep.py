@@ -1,0 +1,128 @@
+"""A whole study: its runs, those done before left out, and what they come to."""
+
+import json
+import os
+from collections.abc import Generator, Iterator
+from contextlib import closing
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from tqdm import tqdm
+
+from ..errors import InputError
+from ..recording.result import write_text
+from .cluster import run_on_cluster
+from .run import Job, Outcome, Task
+from .sensitivity import Sensitivity, sensitivity
+from .store import Store
+from .study import Study
+from .table import Table, check_parquet, make_table, write_parquet
+from .workers import run_here
+
+RUNS = "runs.parquet"
+SENSITIVITY = "sensitivity.json"
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A study that is done. resumed is how many of its runs were there before."""
+
+    study: Study
+    folder: Path
+    outcomes: tuple[Outcome, ...]
+    resumed: int
+
+    @cached_property
+    def table(self) -> Table:
+        """A row per run."""
+        return make_table(self.study, self.outcomes)
+
+    @property
+    def failed(self) -> int:
+        """The number of runs with an error."""
+        return sum(outcome.error is not None for outcome in self.outcomes)
+
+    @cached_property
+    def sensitivities(self) -> tuple[Sensitivity, ...]:
+        """Of each metric that varies, in a saltelli design; of any other none."""
+        if self.study.design.kind != "saltelli":
+            return ()
+        names = [p.name for p in self.study.parameters]
+        found = (
+            sensitivity(name, names, self.table.numbers(name), self.study.design.seed)
+            for name in self.table.metrics
+        )
+        return tuple(s for s in found if s is not None)
+
+    def as_json(self) -> dict[str, Any]:
+        """The summary as plain values for JSON."""
+        return {
+            "study": self.study.name,
+            "design": self.study.design.kind,
+            "folder": str(self.folder),
+            "runs": len(self.outcomes),
+            "resumed": self.resumed,
+            "failed": self.failed,
+            "first_error": next((o.error for o in self.outcomes if o.error is not None), None),
+            "metrics": self.table.summary(),
+            "sensitivity": [s.as_json() for s in self.sensitivities],
+        }
+
+
+def sweep(
+    study: Study,
+    folder: Path,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    progress: bool = False,
+) -> Sweep:
+    """Do the runs of a study that its folder does not have yet, then write runs.parquet there.
+
+    workers are processes on this machine, by default as many as it has processors; with scheduler,
+    the address of a Dask cluster, the runs are done there. The results are the same to the bit.
+    A finished run is in the folder at once: after a kill the same call goes on. progress shows a
+    bar on standard error if that is a terminal.
+
+    InputError where the folder has another study's runs, or an extra is missing; SimulationError
+    where workers do not start or the cluster fails; KeyboardInterrupt at Ctrl-C.
+    """
+    check_parquet()
+    if workers is not None and workers < 1:
+        raise InputError(f"workers = {workers}: must be at least 1")
+    store = Store(folder)
+    done = store.open(study)
+    resumed = len(done)
+    left = (Job(i, study.values(i)) for i in range(study.runs) if i not in done)
+    task = Task(study.system, study.outputs)
+    bar = tqdm(
+        total=study.runs,
+        initial=resumed,
+        desc=study.name,
+        unit="run",
+        disable=None if progress else True,
+    )
+    with bar, closing(_outcomes(task, left, study.runs - resumed, workers, scheduler)) as outcomes:
+        for outcome in outcomes:
+            store.keep(outcome)
+            done[outcome.index] = outcome
+            bar.update()
+    finished = Sweep(study, folder, tuple(done[i] for i in range(study.runs)), resumed)
+    write_parquet(finished.table, study, folder / RUNS)
+    if finished.sensitivities:
+        found = [s.as_json() for s in finished.sensitivities]
+        write_text(folder / SENSITIVITY, json.dumps(found, indent=2) + "\n")
+    return finished
+
+
+def _outcomes(
+    task: Task, jobs: Iterator[Job], count: int, workers: int | None, scheduler: str | None
+) -> Generator[Outcome, None, None]:
+    """The outcomes of so many jobs, from the cluster or from here."""
+    if not count:
+        return
+    if scheduler is not None:
+        yield from run_on_cluster(scheduler, task, jobs)
+    else:
+        yield from run_here(task, jobs, min(workers or os.cpu_count() or 1, count))

@@ -1,0 +1,107 @@
+"""The runs of a study as a table, and as a Parquet file (pyarrow, in the extra `sweep`)."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import InputError, choices
+from ..recording.result import in_one_piece
+from .run import Outcome
+from .study import Study
+
+if TYPE_CHECKING:
+    import pyarrow as pa  # type: ignore[import-untyped]
+
+Column = Sequence[Any]
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns of equal length by name, None where there is no value; a row per run, by index."""
+
+    columns: Mapping[str, Column]
+    parameters: tuple[str, ...]
+    """The columns of what varied."""
+    metrics: tuple[str, ...]
+    """The columns of what came out."""
+
+    def numbers(self, name: str) -> npt.NDArray[np.float64]:
+        """A column as numbers, NaN where there is none; InputError where there is no such one."""
+        if name not in self.columns:
+            known = choices([*self.parameters, *self.metrics])
+            raise InputError(f"{name!r}: no such column of the results; valid: {known}")
+        values = self.columns[name]
+        return np.array([np.nan if v is None or isinstance(v, str) else float(v) for v in values])
+
+    def summary(self) -> dict[str, dict[str, float | int | None]]:
+        """Of each metric: how many runs have it, and its least, mean, median and greatest."""
+        return {name: _summary(self.numbers(name)) for name in self.metrics}
+
+
+def make_table(study: Study, outcomes: Sequence[Outcome]) -> Table:
+    """The table of outcomes, which are in the order of their indices."""
+    points = [study.point(outcome.index) for outcome in outcomes]
+    parameters = tuple(points[0]) if points else ()
+    metrics = tuple(dict.fromkeys(name for o in outcomes for name in o.metrics))
+    columns: dict[str, Column] = {"index": [o.index for o in outcomes]}
+    columns |= {name: [point[name] for point in points] for name in parameters}
+    columns |= {name: [o.metrics.get(name) for o in outcomes] for name in metrics}
+    columns["error"] = [o.error for o in outcomes]
+    return Table(columns, parameters, metrics)
+
+
+def write_parquet(table: Table, study: Study, path: Path) -> None:
+    """Write the table in one piece; equal tables make equal bytes. InputError without pyarrow."""
+    arrow, parquet = check_parquet()
+    arrays = {
+        name: arrow.array(column, type=_type(arrow, name, column))
+        for name, column in table.columns.items()
+    }
+    made = arrow.table(arrays).replace_schema_metadata(
+        {"grasp_cosim": json.dumps({"study": study.name, **study.identity})}
+    )
+    with in_one_piece(path) as part:
+        parquet.write_table(made, part)
+
+
+def check_parquet() -> tuple[Any, Any]:
+    """The modules pyarrow and pyarrow.parquet; InputError without them."""
+    try:
+        import pyarrow
+        import pyarrow.parquet  # type: ignore[import-untyped]
+    except ImportError as error:
+        raise InputError(
+            "pyarrow is not installed, it writes the results of studies; "
+            "install it with: pip install 'grasp-cosim[sweep]'"
+        ) from error
+    return pyarrow, pyarrow.parquet
+
+
+def _type(arrow: Any, name: str, column: Column) -> pa.DataType:
+    """The narrowest type that holds all values; numbers where there is none, but for errors."""
+    kinds = {type(value) for value in column if value is not None}
+    if name == "error" or str in kinds:
+        return arrow.string()
+    if kinds == {bool}:
+        return arrow.bool_()
+    return arrow.int64() if kinds == {int} else arrow.float64()
+
+
+def _summary(values: npt.NDArray[np.float64]) -> dict[str, float | int | None]:
+    there = values[np.isfinite(values)]
+    if not len(there):
+        return {"runs": 0, "least": None, "mean": None, "median": None, "greatest": None}
+    return {
+        "runs": len(there),
+        "least": float(there.min()),
+        "mean": float(there.mean()),
+        "median": float(np.median(there)),
+        "greatest": float(there.max()),
+    }

@@ -1,0 +1,160 @@
+"""The command sweep: its summary, and one line per mistake."""
+
+import json
+import re
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from grasp_cosim import System, cli
+from grasp_cosim.sweep.read import built_in, read_study, study_file
+
+Run = Callable[..., tuple[int, str, str]]
+
+HEAD = "case = 0\nstep = 1e-3\nstop = 0.02\n"
+GRID = '[design]\nkind = "grid"\n'
+WIDTH = '[[parameters]]\nname = "width"\nvariables = ["plant.object_width"]\n'
+MASS = '[[parameters]]\nvariables = ["plant.finger_mass[1]"]\nvalues = [0.5, 0.6]\n'
+VALUES = "values = [0.06, 0.07]\n"
+MAP = '[figures]\nmap = { x = "width", y = "plant.finger_mass[1]", of = "target_position" }\n'
+STUDY = f'{HEAD}{GRID}{WIDTH}{VALUES}{MASS}{MAP}distributions = ["target_position"]\n'
+
+
+@pytest.fixture
+def command(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    grasp: System,
+    tmp_path: Path,
+) -> Run:
+    """Runs `sweep` in an empty folder, of a study of that text; exit code, output, errors."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("grasp_cosim.cli.frame.grasp_system", lambda: grasp)
+
+    def run(text: str, *arguments: str) -> tuple[int, str, str]:
+        (tmp_path / "study.toml").write_text(text)
+        code = cli.main(["sweep", "study.toml", *arguments])
+        out, err = capsys.readouterr()
+        return code, out, err
+
+    return run
+
+
+def test_a_study_leaves_its_runs_and_pictures(command: Run, tmp_path: Path) -> None:
+    code, out, err = command(STUDY, "--workers", "1", "--plot", "--json")
+    summary = json.loads(out)
+    assert code == 0
+    assert (summary["study"], summary["design"]) == ("study.toml", "grid")
+    assert (summary["runs"], summary["resumed"], summary["failed"]) == (4, 0, 0)
+    assert summary["metrics"]["target_position"]["runs"] == 4
+    assert summary["metrics"]["time_difference"]["runs"] == 0
+    assert sorted(p.name for p in (tmp_path / "study").iterdir()) == [
+        "distributions.png", "map.png", "parts", "runs.parquet", "study.json",
+    ]  # fmt: skip
+    assert "drew study/map.png" in err
+    code, out, _ = command(STUDY, "--workers", "1")
+    assert code == 0
+    assert "study.toml: 4 runs, 4 of them done before, 0 failed; in study/runs.parquet" in out
+    assert re.search(r"^target_position +4 ", out, re.MULTILINE)
+    code, out, err = command(STUDY.replace("0.06, ", "0.065, "), "--json")
+    assert (code, out) == (2, "")
+    assert err.splitlines() == [
+        "grasp-cosim: study: has the runs of another study; --out must be another folder, or empty"
+    ]
+
+
+def test_where_every_run_fails_the_result_is_negative(command: Run) -> None:
+    narrow = STUDY.replace("values = [0.06, 0.07]", "values = [0.06]").replace(
+        "[0.5, 0.6]", "[0.5]"
+    )
+    text = narrow.replace("case = 0\n", 'case = 0\noutputs = ["plant.gap[1]"]\n')
+    position = '[[parameters]]\nvariables = ["plant.initial_object_position"]\nvalues = [0.2]\n'
+    code, out, _ = command(text.replace("[figures]", f"{position}[figures]"), "--workers", "1")
+    assert code == 1
+    assert re.search(r"1 runs, 0 of them done before, 1 failed", out)
+    assert re.search(r"^the first that failed, 0: plant: ", out, re.MULTILINE)
+
+
+WRONG = [
+    ("[design", "study.toml: not readable as TOML"),
+    ("colour = 1\n", "study.toml: unknown entry 'colour'; valid: case, design"),
+    (HEAD, r"study.toml: \[design\]: missing; must be a table"),
+    (f"{HEAD}[design]\n", "no kind; must have one"),
+    (f"{HEAD}{GRID}count = 3\n", "unknown entry 'count'; valid: kind, runs, seed"),
+    (f"{HEAD}{GRID}", r"no \[\[parameters\]\]; must be at least one"),
+    (f"{HEAD}{GRID}{WIDTH}", "no values; must have exactly one of values, linspace, geomspace"),
+    (f"{HEAD}{GRID}{WIDTH}{VALUES}uniform = 3\n", "values and uniform; must have exactly one"),
+    (f"{HEAD}{GRID}{WIDTH}values = 3\n", "values = 3: must be a list of values"),
+    (f"{HEAD}{GRID}{WIDTH}values = [[3]]\n", r"values = \[3\]: must be a number, boolean or"),
+    (f"{HEAD}{GRID}{WIDTH}uniform = {{ low = 0.05, high = 0.07 }}\n", "parameter 1 has no list"),
+    (f"{HEAD}{GRID}{WIDTH}uniform = {{ low = 0.07, high = 0.05 }}\n", "must have low below high"),
+    (f"{HEAD}{GRID}{WIDTH}uniform = {{ low = 0.07 }}\n", "high = None: must be a finite number"),
+    (f"{HEAD}{GRID}{WIDTH}linspace = {{ from = 0.05, to = 0.07, count = 1.5 }}\n", "count = 1.5"),
+    (f"{HEAD}{GRID}{WIDTH}geomspace = {{ from = 0, to = 0.07, count = 2 }}\n", "greater than 0"),
+    (
+        f"{HEAD}{GRID}{WIDTH}normal = {{ mean = 3, standard_deviation = 1, low = 0, high = 1 }}\n",
+        "mean = 3.0: must be from low, 0.0, to high, 1.0",
+    ),
+    (
+        f"{HEAD}{GRID}{WIDTH}normal = {{ mean = 0, standard_deviation = 0, low = 0, high = 1 }}\n",
+        "standard_deviation = 0.0: must be greater than 0",
+    ),
+    (f'{HEAD}[design]\nkind = "random"\n{WIDTH}{VALUES}', "no seed; must be a whole number"),
+    (f'{HEAD}[design]\nkind = "sobol"\nseed = 1\nruns = 3\n{WIDTH}{VALUES}', "a power of two"),
+    (f"seeds = 3\n{HEAD}{GRID}{WIDTH}{VALUES}", "seeds = 3: must be a list of names"),
+    (f"system = 3\n{HEAD}{GRID}{WIDTH}{VALUES}", "system = 3: must be the path"),
+    (f'system = "no.toml"\n{HEAD}{GRID}{WIDTH}{VALUES}', "no.toml: no such system file"),
+    (
+        f"{GRID}{WIDTH}{VALUES}".replace("[des", "case = 3\n[des"),
+        "case = 3: must be one of 0, 1, 2",
+    ),
+    (f"step = 0\n{GRID}{WIDTH}{VALUES}", "study.toml: step = 0 s: must be a number greater than"),
+    (f"{HEAD}{GRID}{WIDTH}{VALUES}[swap]\nplant = 3\n", "plant = 3: must be the path of an FMU"),
+    (f'{HEAD}{GRID}{WIDTH}{VALUES}[swap]\nplant = "x.fmu"\n', "x.fmu: no such FMU file"),
+    (f'{HEAD}{GRID}{WIDTH}{VALUES}[values]\n"plant.x" = 3\n', r"\[values\] plant.x: .*no input"),
+    (
+        f'{HEAD}{GRID}{WIDTH}{VALUES}[values]\n"plant.object_width" = 0.07\n',
+        r"\[values\]: plant.object_width: is varied by a parameter",
+    ),
+    (f'{HEAD}{GRID}{WIDTH}{VALUES}[figures]\nmap = {{ x = "a" }}\n', "map: y = None: must be a"),
+]
+
+
+@pytest.mark.parametrize(("text", "message"), WRONG)
+def test_wrong_input_is_one_line_and_exit_2(
+    command: Run, tmp_path: Path, text: str, message: str
+) -> None:
+    code, out, err = command(text, "--json")
+    assert (code, out) == (2, "")
+    assert len(err.splitlines()) == 1
+    assert err.startswith("grasp-cosim: ")
+    assert re.search(message, err), err
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["study.toml"]
+
+
+def test_no_such_study_names_the_built_in_ones(command: Run) -> None:
+    code = cli.main(["sweep", "map"])
+    assert code == 2
+    assert built_in() == ["bench_monte_carlo", "reflectance_map"]
+
+
+def test_a_cluster_has_its_own_workers(command: Run) -> None:
+    code, _, err = command(STUDY, "--workers", "2", "--scheduler", "tcp://127.0.0.1:1")
+    assert code == 2
+    assert "--workers: must not come with --scheduler" in err
+
+
+def test_no_pyarrow_is_one_line(command: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    code, _, err = command(STUDY)
+    assert code == 2
+    assert err.endswith("install it with: pip install 'grasp-cosim[sweep]'\n")
+
+
+@pytest.mark.parametrize("name", ["bench_monte_carlo", "reflectance_map"])
+def test_a_built_in_study_fits_the_grasp(name: str, grasp: System) -> None:
+    study = read_study(study_file(name), lambda _: grasp)
+    assert study.runs >= 200
+    for index in (0, study.runs - 1):
+        study.system.with_values(study.values(index))
