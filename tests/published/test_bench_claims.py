@@ -87,8 +87,8 @@ def test_a_contact_time_that_depends_on_the_colour_fails(judge: Judge, runs: Run
 
 
 def test_brown_and_white_far_apart_fails(judge: Judge, runs: Runs) -> None:
-    assert judge(changed(runs, BROWN_WHITE, 2, time_to_contact=[2.0, 2.399])) == []
-    assert judge(changed(runs, BROWN_WHITE, 2, time_to_contact=[2.0, 2.401])) == [4]
+    assert judge(changed(runs, BROWN_WHITE, 2, time_to_contact=[2.0, 2.389])) == []
+    assert judge(changed(runs, BROWN_WHITE, 2, time_to_contact=[2.0, 2.391])) == [4]
 
 
 @pytest.mark.parametrize(("case", "force"), [(0, 3.0), (1, 3.6), (2, 3.6)])
