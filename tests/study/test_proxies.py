@@ -55,3 +55,13 @@ def test_many_losses_are_not_all_listed() -> None:
         name: np.resize(column, 40) for name, column in diagnostics(state=[1, 3] * 3).items()
     }
     assert sum("lost at" in line for line in proxy_lines(time, signals, 0.1)) == 5
+
+
+def test_steps_are_counted_though_not_each_is_recorded() -> None:
+    (line,) = proxy_lines(TIME, diagnostics(), 0.01)
+    assert line.startswith("arm: 0 of 50 steps missed")
+
+
+def test_without_a_row_there_is_nothing_to_say() -> None:
+    nothing = {name: column[:0] for name, column in diagnostics().items()}
+    assert proxy_lines(TIME[:0], nothing, 0.1) == []

@@ -81,7 +81,7 @@ class Bench:
         self._step_ns = 0
         self._heard: int | None = None  # the last request, while the watchdog watches
         self._own_failure = ""
-        self._said: set[str] = set()
+        self._unsaid = dict(DROPPED)
 
     def close(self) -> None:
         """End the session under way, and free the FMU."""
@@ -117,10 +117,8 @@ class Bench:
 
     def _say_what_is_dropped(self, source: str) -> None:
         """The first time only: whoever looks for the reason of a silence looks here."""
-        for counter, count in self.peer.counters.as_dict().items():
-            if count and counter in DROPPED and counter not in self._said:
-                self._said.add(counter)
-                self._say(f"a datagram from {source} {DROPPED[counter]}")
+        for counter in [c for c in self._unsaid if getattr(self.peer.counters, c)]:
+            self._say(f"a datagram from {source} {self._unsaid.pop(counter)}")
 
     def _do(self, request: Request, now: int) -> None:
         if self._own_failure:

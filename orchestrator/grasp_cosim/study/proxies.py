@@ -28,14 +28,16 @@ def proxy_figures(time: Times, signals: Signals) -> dict[str, dict[str, Any]]:
     lost and back are the communication points at which the peer was lost, and answered again;
     ahead is how far its outputs were from the future at most.
     """
-    return {name: _figures(time, _diagnostics(name, signals)) for name in _proxies(signals)}
+    proxies = _proxies(signals) if len(time) else []
+    return {name: _figures(time, _diagnostics(name, signals)) for name in proxies}
 
 
 def proxy_lines(time: Times, signals: Signals, step: float) -> list[str]:
     """What is worth knowing about the proxies, a line each; step is the run's, in s."""
     lines = []
     for name, figures in proxy_figures(time, signals).items():
-        lines += [f"{name}: {line}" for line in _lines(figures, len(time) - 1, step)]
+        steps = round(float(time[-1]) / step)  # of which not each need be recorded
+        lines += [f"{name}: {line}" for line in _lines(figures, steps, step)]
     return lines
 
 
