@@ -2,6 +2,8 @@
 
 import ctypes
 import math
+import tempfile
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -229,3 +231,24 @@ def test_a_token_that_differs_does_not_load(
         InputError, match=r"^part: .*native.fmu does not load: wrong (GUID|inst.*)$"
     ):
         load(component)
+
+
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_what_is_extracted_is_what_this_machine_uses(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, version: str
+) -> None:
+    fmu = build(tmp_path, version=version)
+    with zipfile.ZipFile(fmu, "a") as archive:
+        binaries = [name for name in archive.namelist() if name.startswith("binaries/")]
+        for other in ("binaries/win64/x.dll", "documentation/x", "sources/x.c", "extra/x/y"):
+            archive.writestr(other, "")
+    folder = tmp_path / "extracted"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    instance = load(Component("part", fmu, {}))
+    files = {
+        p.relative_to(folder).as_posix().partition("/")[2] for p in folder.rglob("*") if p.is_file()
+    }
+    instance.close()
+    assert files == {"modelDescription.xml", "extra/x/y", *binaries}
+    assert not list(folder.iterdir())

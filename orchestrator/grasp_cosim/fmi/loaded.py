@@ -46,6 +46,9 @@ _OF_KIND: Mapping[str, Callable[[Any], Value]] = {
 }
 
 
+_OF_THIS_MACHINE = tuple(f"binaries/{name}/" for name in (fmpy.platform, fmpy.platform_tuple))
+_UNUSED = ("documentation/", "sources/", "binaries/")
+
 LOGGER = logging.getLogger(__name__)
 """Gets what FMUs log, too; the process of a component prints it."""
 
@@ -110,7 +113,7 @@ class LoadedInstance(ABC):
 
     def _load(self, folder: Path) -> Any:
         try:
-            fmpy.extract(self.interface.path, folder)
+            fmpy.extract(self.interface.path, folder, _used_here)
         except Exception as error:  # FMPy and zipfile raise whatever they like
             raise InputError(f"{self.name}: {self.interface.path} is damaged: {error}") from error
         self._python = (self._resources / "slavemodule.txt").exists()
@@ -271,6 +274,11 @@ class LoadedInstance(ABC):
         said = [own.sub("", text, count=1) for text in (*self._unread, *self._read_log())]
         self._unread.clear()
         return [text for text in said if not _PYTHONFMU_PREFIX.match(text)] or said
+
+
+def _used_here(member: str) -> bool:
+    """Whether a file of an FMU is of use to an instance here; binaries for others are not."""
+    return member.startswith(_OF_THIS_MACHINE) or not member.startswith(_UNUSED)
 
 
 def as_reason(said: list[str]) -> str:
