@@ -1,15 +1,15 @@
 """How much faster two workers are than one: rounds of whole grasps at 1 ms, one after the other.
 
-The processor time of the workers is shown, too: where it is less than their wall time together,
-the machine had other work, and the ratio is of what was left of it.
+Beside it stands how much faster two processes are at plain arithmetic, right before and after: it
+is what the machine has to give at that time.
 """
 
 import argparse
 import os
-import resource
 import statistics
 import tempfile
 import time
+from multiprocessing import get_context
 from pathlib import Path
 
 from grasp_cosim import System
@@ -26,17 +26,30 @@ RATIO = Parameter(
 )
 
 
-def timed(study: Study, folder: Path, workers: int) -> tuple[float, float, Sweep]:
-    """Wall and processor time of a sweep in s, with the start of its processes, and the sweep."""
-    start, used = time.perf_counter(), processor_time()
+def timed(study: Study, folder: Path, workers: int) -> tuple[float, Sweep]:
+    """Wall time of a sweep in s, with the start of its processes, and the sweep."""
+    start = time.perf_counter()
     done = sweep(study, folder, workers)
-    return time.perf_counter() - start, processor_time() - used, done
+    return time.perf_counter() - start, done
 
 
-def processor_time() -> float:
-    """Of all ended children, s."""
-    children = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return children.ru_utime + children.ru_stime
+def arithmetic(seconds: float) -> float:
+    """Additions per second, over so many seconds."""
+    start, total, additions = time.perf_counter(), 0.0, 0
+    while (passed := time.perf_counter() - start) < seconds:
+        for i in range(10_000):
+            total += i * 0.5
+        additions += 10_000
+    return additions / passed
+
+
+def machine(seconds: float = 2.0) -> float:
+    """How many times as much plain arithmetic two processes do as one."""
+    with get_context("spawn").Pool(2) as pool:
+        pool.map(arithmetic, [0.1] * 4, chunksize=1)
+        one = [pool.apply(arithmetic, (seconds,)) for _ in range(2)]
+        two = pool.map(arithmetic, [seconds] * 2, chunksize=1)
+    return 2.0 * sum(two) / sum(one)
 
 
 def main() -> None:
@@ -46,30 +59,38 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=10)
     parser.add_argument("--step", type=float, default=1e-3)
     given = parser.parse_args()
-    ratios = []
+    ratios, given_by_machine, walls = [], [], {1: 0.0, 2: 0.0}
     with tempfile.TemporaryDirectory(prefix="grasp_bench_") as name:
         build(Path(name, "fmus"))
         system = System.load(SYSTEM, Path(name, "fmus")).with_values(CASES[2])
         system = system.with_experiment(step=given.step)
         print(f"{given.runs} grasps a round, step {given.step:g} s, {os.cpu_count()} processors\n")
-        print(
-            "| round | 1 worker, s | processor | 2 workers, s | processor | times as fast | load |"
-        )
-        print("|---|---|---|---|---|---|---|", flush=True)
+        print("| round | 1 worker, s | 2 workers, s | times as fast | plain arithmetic | load |")
+        print("|---|---|---|---|---|---|", flush=True)
+        before = machine()
         for k in range(given.rounds):
             study = Study("bench", system, (POSITION, RATIO), Design("random", given.runs, k))
-            load = os.getloadavg()[0]
-            one, used_one, first = timed(study, Path(name, f"{k}-1"), 1)
-            two, used_two, second = timed(study, Path(name, f"{k}-2"), 2)
+            load, found = os.getloadavg()[0], {}
+            for workers in (1, 2) if k % 2 else (2, 1):
+                found[workers] = timed(study, Path(name, f"{k}-{workers}"), workers)
+                walls[workers] += found[workers][0]
+            (one, first), (two, second) = found[1], found[2]
             if first.outcomes != second.outcomes or first.failed:
                 raise RuntimeError("one and two workers differ")
+            after = machine()
             ratios.append(one / two)
+            given_by_machine.append(0.5 * (before + after))
+            before = after
             print(
-                f"| {k + 1} | {one:.1f} | {used_one:.1f} | {two:.1f} | {used_two:.1f} "
-                f"| {one / two:.2f} | {load:.2f} |",
+                f"| {k + 1} | {one:.1f} | {two:.1f} | {one / two:.2f} "
+                f"| {given_by_machine[-1]:.2f} | {load:.2f} |",
                 flush=True,
             )
-    print(f"\nmedian: {statistics.median(ratios):.2f} times")
+    print(
+        f"\nmedian: {statistics.median(ratios):.2f} times; "
+        f"plain arithmetic: {statistics.median(given_by_machine):.2f} times; "
+        f"all rounds together: {walls[1] / walls[2]:.2f} times"
+    )
 
 
 if __name__ == "__main__":
