@@ -63,11 +63,14 @@ def _name(f: Field) -> str:
 
 
 def _start(f: Field) -> str:
-    starts = ["" if s is None else str(s).lower() for s in f.starts]
+    names = {number: name for name, number in f.enumeration.items} if f.enumeration else {}
+    starts = ["" if s is None else names.get(s, str(s).lower()) for s in f.starts]
     return starts[0] if len(set(starts)) == 1 else ", ".join(starts)
 
 
 def _range(f: Field) -> str:
+    if f.enumeration:
+        return ", ".join(name for name, _ in f.enumeration.items)
     return f"{f.limits[0]:g} to {f.limits[1]:g}" if f.limits else ""
 
 

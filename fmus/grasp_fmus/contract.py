@@ -5,7 +5,8 @@ Every field of Params, Inputs and Outputs carries
 
     name: Annotated[type, unit, description, ...] = default
 
-with float, bool, a tuple of them, or (in Params) int or another such class as its type. A tuple
+with float, bool, a tuple of them, or (in Params) int, an IntEnum or another such class as its type.
+An IntEnum is an enumeration of FMI, its members in lower case are the names of the items. A tuple
 becomes name[1], name[2], a nested class name.field. After the description follow, in any order,
 
 - for a parameter its range (lowest, highest), and "tunable" if it may change at run time;
@@ -18,9 +19,10 @@ becomes name[1], name[2], a nested class name.field. After the description follo
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, is_dataclass
 from dataclasses import fields as dataclass_fields
+from enum import IntEnum
 from typing import Annotated, Any, Protocol, get_args, get_origin, get_type_hints
 
-from .variable import Causality, Scalar, Variable
+from .variable import Causality, Enumeration, Scalar, Variable
 
 
 class Block(Protocol):
@@ -67,6 +69,7 @@ class Field:
     feedthrough: frozenset[str]
     initial_feedthrough: frozenset[str]
     start: Any
+    enumeration: Enumeration | None = None
 
     @property
     def names(self) -> list[str]:
@@ -121,6 +124,7 @@ def variables(fields: list[Field]) -> list[Variable]:
             f.nominal,
             dependencies=tuple(now.get(name, ())),
             initial_dependencies=(*initially[name], *parameters) if name in initially else (),
+            enumeration=f.enumeration,
         )
         for f in fields
         for name, start in zip(f.names, f.starts, strict=True)
@@ -211,10 +215,15 @@ def _build(cls: type[Any], path: tuple[str, ...], values: dict[tuple[str, ...], 
         **{
             f.name: _build(hints[f.name], (*path, f.name), values)
             if is_dataclass(hints[f.name])
-            else values[(*path, f.name)]
+            else _typed(hints[f.name], values[(*path, f.name)])
             for f in dataclass_fields(cls)
         }
     )
+
+
+def _typed(kind: Any, value: Any) -> Any:
+    """The value, as a member where the type is an enumeration."""
+    return kind(value) if isinstance(kind, type) and issubclass(kind, IntEnum) else value
 
 
 def _parameters(params: Any, path: tuple[str, ...]) -> Iterator[Field]:
@@ -239,6 +248,12 @@ def _field(path: tuple[str, ...], causality: Causality, hint: Any, start: Any) -
     base, unit, description, *rest = get_args(hint)
     size = len(get_args(base)) if get_origin(base) is tuple else None
     kind = get_args(base)[0] if size else base
+    limits = next((r for r in rest if isinstance(r, tuple)), None)
+    enumeration = None
+    if issubclass(kind, IntEnum):
+        items = tuple((member.name.lower(), int(member)) for member in kind)
+        enumeration = Enumeration(kind.__name__, items)
+        limits, kind, start = (min(kind), max(kind)), int, int(start)
     reached_from = [frozenset(r) for r in rest if isinstance(r, (set, frozenset))]
     if causality == "output" and not reached_from:
         raise TypeError(f"{name}: must have the set of inputs that reach it without a step")
@@ -254,10 +269,11 @@ def _field(path: tuple[str, ...], causality: Causality, hint: Any, start: Any) -
         size,
         unit,
         description,
-        limits=next((r for r in rest if isinstance(r, tuple)), None),
+        limits=limits,
         tunable="tunable" in rest,
         nominal=nominal,
         feedthrough=reached_from[0] if reached_from else frozenset(),
         initial_feedthrough=reached_from[-1] if reached_from else frozenset(),
         start=start,
+        enumeration=enumeration,
     )

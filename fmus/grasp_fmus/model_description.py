@@ -8,7 +8,7 @@ from typing import NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from .host_log import CATEGORIES, DISCARD, ERROR
-from .variable import TYPES, Scalar, Variable
+from .variable import Scalar, Variable
 
 
 class Unit(NamedTuple):
@@ -96,6 +96,7 @@ def model_description(d: Description, guid: str) -> bytes:
     capabilities = {key: _literal(value) for key, value in d.capabilities.items()}
     SubElement(root, "CoSimulation", {"modelIdentifier": d.name, **capabilities})
     _add_units(root, d)
+    _add_enumerations(root, d)
     categories = SubElement(root, "LogCategories")
     for status in d.statuses:
         SubElement(categories, "Category", name=CATEGORIES[status])
@@ -137,6 +138,18 @@ def _add_units(root: Element, d: Description) -> None:
             SubElement(element, "DisplayUnit", name=display, factor=repr(factor))
 
 
+def _add_enumerations(root: Element, d: Description) -> None:
+    used = dict.fromkeys(v.enumeration for v in d.variables if v.enumeration)
+    if not used:
+        return
+    definitions = SubElement(root, "TypeDefinitions")
+    for enumeration in used:
+        simple = SubElement(definitions, "SimpleType", name=enumeration.name)
+        parent = SubElement(simple, "Enumeration")
+        for name, number in enumeration.items:
+            SubElement(parent, "Item", name=name, value=str(number))
+
+
 def _add_variable(parent: Element, v: Variable, units: Mapping[str, Unit]) -> None:
     element = SubElement(
         parent,
@@ -150,7 +163,7 @@ def _add_variable(parent: Element, v: Variable, units: Mapping[str, Unit]) -> No
         element.set("description", v.description)
     if v.causality != "input":
         element.set("initial", _initial(v))
-    SubElement(element, TYPES[v.kind], _attributes(v, units))
+    SubElement(element, v.type, _attributes(v, units))
 
 
 def _initial(v: Variable) -> str:
@@ -162,6 +175,8 @@ def _initial(v: Variable) -> str:
 def _attributes(v: Variable, units: Mapping[str, Unit]) -> dict[str, str]:
     """Of its type's element."""
     attributes: dict[str, str] = {}
+    if v.enumeration:
+        attributes["declaredType"] = v.enumeration.name
     if v.kind is float and v.unit:
         attributes["unit"] = v.unit
         if v.unit in units and (display := units[v.unit].display):

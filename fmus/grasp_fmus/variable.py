@@ -16,12 +16,21 @@ TYPES: dict[type[Scalar], Literal["Real", "Boolean", "Integer", "String"]] = {
 
 
 @dataclass(frozen=True, slots=True)
+class Enumeration:
+    """A type of whole numbers that have names: the items, in the order they are shown in."""
+
+    name: str
+    items: tuple[tuple[str, int], ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Variable:
     """A scalar variable; its value reference is its place among all.
 
     limits are what a host may set. dependencies are the variables that reach an output without a
     step, initial_dependencies those that do so in initialisation mode, by name. relative says that
-    it is a difference, to which the offset of a unit does not apply.
+    it is a difference, to which the offset of a unit does not apply. An integer may be of an
+    enumeration.
     """
 
     name: str
@@ -36,6 +45,12 @@ class Variable:
     relative: bool = False
     dependencies: tuple[str, ...] = ()
     initial_dependencies: tuple[str, ...] = ()
+    enumeration: Enumeration | None = None
+
+    @property
+    def type(self) -> str:
+        """What FMI calls its type."""
+        return "Enumeration" if self.enumeration else TYPES[self.kind]
 
     @property
     def in_unit(self) -> str:

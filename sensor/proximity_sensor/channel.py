@@ -10,7 +10,7 @@ for bit. Card: sensor/README.md
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from . import (
     ambient_light,
@@ -22,6 +22,7 @@ from . import (
     optics,
     sliding_median,
     stripes,
+    surfaces,
 )
 from .optics import outputs as seen
 
@@ -46,6 +47,9 @@ class Params(optics.Params):
     filter: low_pass.Params = low_pass.Params()
     median: sliding_median.Params = sliding_median.Params()
     sampling: clock.Params = clock.Params()
+    surface: Annotated[
+        surfaces.Surface, "", "a surface by name; custom has the reflectance given", "tunable"
+    ] = surfaces.Surface.CUSTOM
 
     def __post_init__(self) -> None:
         optics.Params.__post_init__(self)
@@ -55,6 +59,11 @@ class Params(optics.Params):
                 f"filter.cutoff = {self.filter.cutoff!r} Hz: must be below half of sampling.rate, "
                 f"{highest:g}"
             )
+
+    @cached_property
+    def alpha(self) -> float:
+        """The reflectance of the surface named, or the one given."""
+        return surfaces.REFLECTANCE.get(self.surface, self.reflectance)
 
     @cached_property
     def sampled(self) -> bool:

@@ -27,6 +27,11 @@ class Params:
             if not low <= value <= high:
                 raise ValueError(f"{name} = {value!r} {unit}: must be from {low:g} to {high:g}")
 
+    @property
+    def alpha(self) -> float:
+        """The reflectance that counts."""
+        return self.reflectance
+
 
 class Inputs(NamedTuple):
     """What the sensor looks at."""
@@ -57,4 +62,4 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     """Eq. (9). The spacer keeps the object off the element: a gap below zero reads as zero."""
     l = 0.0 if u.gap < 0.0 else u.gap
-    return Outputs(p.gain * p.reflectance / (l + p.offset_distance) ** p.diffusion_exponent)
+    return Outputs(p.gain * p.alpha / (l + p.offset_distance) ** p.diffusion_exponent)

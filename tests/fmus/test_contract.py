@@ -1,6 +1,7 @@
 """What annotations come to: fields, who reaches whom, and what a declaration must have."""
 
 from dataclasses import dataclass
+from enum import IntEnum
 from types import SimpleNamespace
 from typing import Annotated, Any, NamedTuple
 
@@ -12,7 +13,9 @@ from grasp_fmus.contract import (
     feedthrough,
     packer,
     unpacker,
+    variables,
 )
+from grasp_fmus.variable import Enumeration
 
 Pair = tuple[float, float]
 
@@ -255,3 +258,34 @@ def test_a_block_may_have_no_inputs() -> None:
     fields = declared(block(inputs=NoInputs, outputs=Source))
     assert packer(NoInputs, fields)([None]) == NoInputs()
     assert feedthrough(fields, initially=True) == {"level": []}
+
+
+class Colour(IntEnum):
+    RED = 1
+    DARK_BLUE = 4
+
+
+@dataclass(frozen=True)
+class Coloured:
+    colour: Annotated[Colour, "", "a choice", "tunable"] = Colour.DARK_BLUE
+
+
+def test_an_int_enum_is_an_enumeration() -> None:
+    (field,) = (f for f in declared(block(params=Coloured)) if f.causality == "parameter")
+    assert field.enumeration == Enumeration("Colour", (("red", 1), ("dark_blue", 4)))
+    assert (field.kind, field.limits, field.starts) == (int, (1, 4), [4])
+    (variable,) = (v for v in variables([field]))
+    assert (variable.type, variable.kind) == ("Enumeration", int)
+
+
+def test_the_block_gets_the_member_of_an_enumeration() -> None:
+    fields = declared(block(params=Coloured))
+    values = [None] * (len([n for f in fields for n in f.names]) - 1)
+    assert build_params(block(params=Coloured), fields, [*values, 1]) == Coloured(Colour.RED)
+
+
+def test_a_number_between_the_items_is_refused_by_the_block() -> None:
+    fields = declared(block(params=Coloured))
+    values = [None] * (len([n for f in fields for n in f.names]) - 1)
+    with pytest.raises(ValueError, match="3 is not a valid Colour"):
+        build_params(block(params=Coloured), fields, [*values, 3])

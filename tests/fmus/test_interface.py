@@ -63,6 +63,7 @@ filter.enabled                parameter  Boolean  -      false
 filter.cutoff                 parameter  Real     Hz     500.0
 median.enabled                parameter  Boolean  -      false
 sampling.rate                 parameter  Real     Hz     10000.0
+surface                       parameter  Integer  -      0
 """
 CONTROLLER = """
 position[1]                   input      Real     m      0.11

@@ -9,6 +9,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import fields as dataclass_fields
 from dataclasses import is_dataclass, replace
+from enum import IntEnum
 from math import inf
 from pathlib import Path
 from types import ModuleType
@@ -26,6 +27,7 @@ from grasp_controller import series
 from gripper_plant import compliant, movable, rigid
 from lxml import etree  # type: ignore[import-untyped]
 from proximity_sensor import channel
+from proximity_sensor.surfaces import Surface
 
 BLOCKS: dict[str, ModuleType] = {
     "GraspController": series,
@@ -157,7 +159,7 @@ def test_default_experiment(root: Element) -> None:
 
 
 def test_every_scalar_of_the_block_is_a_variable(root: Element, name: str) -> None:
-    types = {bool: "Boolean", int: "Integer", float: "Real"}
+    types = {bool: "Boolean", int: "Integer", float: "Real", Surface: "Enumeration"}
     expected = {n: (d.causality, types[d.kind]) for n, d in declarations(BLOCKS[name]).items()}
     found = {n: (v.attrib["causality"], v[0].tag) for n, v in variables(root).items()}
     assert list(found.items()) == list(expected.items())
@@ -214,14 +216,24 @@ def test_only_a_real_is_continuous(root: Element) -> None:
             assert variable.attrib["variability"] == kind, n
 
 
-def test_reflectance_alone_is_tunable(fmus: Path) -> None:
+def test_the_surface_alone_is_tunable(fmus: Path) -> None:
     tunable = [
         (name, n)
         for name in BLOCKS
         for n, v in variables(read(fmus, name)).items()
         if v.attrib["variability"] == "tunable"
     ]
-    assert tunable == [("ProximitySensor", "reflectance")]
+    assert tunable == [("ProximitySensor", "reflectance"), ("ProximitySensor", "surface")]
+
+
+def test_surfaces_are_chosen_by_name(fmus: Path) -> None:
+    root = read(fmus, "ProximitySensor")
+    (choice,) = variables(root)["surface"]
+    assert (choice.tag, choice.attrib["start"]) == ("Enumeration", "0")
+    (simple,) = root.iterfind("TypeDefinitions/SimpleType")
+    assert simple.attrib["name"] == choice.attrib["declaredType"]
+    items = {i.attrib["name"]: int(i.attrib["value"]) for i in simple.iter("Item")}
+    assert items == {"custom": 0, "white": 1, "blue": 2, "red": 3, "brown": 4, "black": 5}
 
 
 def test_start_values_are_the_defaults_of_the_block(root: Element, name: str) -> None:
@@ -245,6 +257,11 @@ def test_min_and_max_are_the_range_of_the_parameter(root: Element, name: str) ->
         for n, d in declarations(BLOCKS[name]).items()
         for limits in d.rest
         if isinstance(limits, tuple)
+    }
+    expected |= {
+        n: (min(d.kind), max(d.kind))
+        for n, d in declarations(BLOCKS[name]).items()
+        if issubclass(d.kind, IntEnum)
     }
     assert expected
     found = {

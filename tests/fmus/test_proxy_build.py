@@ -274,6 +274,8 @@ def test_the_proxy_of_an_fmu_of_fmi_3(tmp_path: Path, run: Run) -> None:
     made = Path("TheProxy.fmu")
     check(original, made)
     assert variables(made)["u_Enumeration"]["kind"] == "Integer"
+    items = [read_interface(fmu).by_name["u_Enumeration"].items for fmu in (original, made)]
+    assert items == [{"one": 1, "two": 2}] * 2
     assert variables(made)["u_Float32"]["kind"] == "Real"
     capabilities = read(made).find("CoSimulation")
     assert capabilities is not None

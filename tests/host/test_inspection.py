@@ -211,7 +211,7 @@ def test_the_keys_of_the_report(valve: Report) -> None:
     ]  # fmt: skip
     assert set(valve["variables"][0]) == {
         "name", "causality", "variability", "initial", "type", "dimensions", "unit",
-        "display_unit", "start", "min", "max", "nominal", "dependencies", "description",
+        "display_unit", "start", "min", "max", "nominal", "items", "dependencies", "description",
     }  # fmt: skip
 
 
@@ -232,6 +232,7 @@ def test_the_declared_type_fills_in(valve: Report) -> None:
     assert [p_out[key] for key in keys] == ["kPa", "mbar", 1.0, "inf", 50.0]
     mode = valve["variables"][6]
     assert (mode["type"], mode["min"], mode["max"]) == ("Enumeration", 1, 2)
+    assert (mode["items"], p_in["items"]) == ({"open": 1, "shut": 2}, None)
 
 
 def test_dependencies_not_declared_are_not_none_at_all(valve: Report) -> None:
@@ -255,8 +256,8 @@ def test_every_column(valve: Report) -> None:
     }  # fmt: skip
     assert rows["mode"] == {
         "name": "mode", "causality": "parameter", "variability": "tunable",
-        "type": "Enumeration", "unit": "", "start": "2", "range": "1 to 2", "dependencies": "",
-        "description": "",
+        "type": "Enumeration", "unit": "", "start": "2", "range": "open, shut",
+        "dependencies": "", "description": "",
     }  # fmt: skip
     assert [rows[name]["range"] for name in ("p_out", "flow", "state", "stages")] == [
         "1 to inf", "up to 5", "", "from 1",

@@ -2,6 +2,7 @@
 
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 from grasp_cosim import InputError, System
@@ -63,6 +64,7 @@ WRONG = [
     ("object_width = 0.07", "object_width = '7 cm'", "must be a finite number from 0 to 10 m"),
     ("object_width = 0.07", "object_width = true", "must be a finite number from 0 to 10 m"),
     ("object_width = 0.07", "object_width = [0.07]", "must be a number, boolean or string"),
+    ("object_width = 0.07", "object_width = 'brown'", "must be a finite number from 0 to 10 m"),
     ("[experiment]", "[experiment", "not readable as TOML"),
 ]
 
@@ -123,6 +125,20 @@ def test_text_is_converted_to_the_declared_type(grasp: System) -> None:
     )
     assert changed.component("controller", "test").values == {"impact_reduction.enabled": False}
     assert changed.component("sensor_1", "test").values == {"reflectance": 0.86}
+
+
+def test_an_item_of_an_enumeration_by_its_name_or_number(grasp: System) -> None:
+    for given in ("brown", 4, "4"):
+        changed = grasp.with_values({"sensor_1.surface": given})
+        assert changed.component("sensor_1", "test").values == {"surface": 4}
+
+
+@pytest.mark.parametrize("given", ["green", "BROWN", 6, -1, 4.5, True])
+def test_no_item_of_an_enumeration(grasp: System, given: Any) -> None:
+    items = "custom, white, blue, red, brown, black"
+    message = f"sensor_1.surface: surface = {given!r}: must be one of {items}"
+    with pytest.raises(InputError, match=re.escape(message)):
+        grasp.with_values({"sensor_1.surface": given})
 
 
 def test_an_output_cannot_be_set(grasp: System) -> None:

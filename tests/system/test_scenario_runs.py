@@ -222,6 +222,18 @@ def test_what_a_session_sets_is_what_an_event_sets(grasp: System) -> None:
     assert result.log == whole.log == ("t = 0.02 s: sensor_1.reflectance = 0.6",)
 
 
+def test_a_surface_set_by_name_has_its_reflectance(grasp: System) -> None:
+    results = []
+    for name, value in (("sensor_1.reflectance", 0.86), ("sensor_1.surface", "brown")):
+        with simulate.session(grasp, step=STEP, stop=0.1) as session:
+            session.step(20)
+            session.set(name, value)
+            session.step(80)
+            results.append(session.result())
+    by_number, by_name = results
+    assert bits(by_name) == bits(by_number) != bits(run(grasp, 0.1))
+
+
 def test_what_did_not_happen_is_in_the_log(grasp: System) -> None:
     event = Event({REFLECTANCE: 0.6}, at_ns=10_000_000)
     with simulate.session(replace(grasp, events=(event,)), step=STEP, stop=0.01) as session:

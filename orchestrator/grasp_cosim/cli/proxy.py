@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 from grasp_fmus.model_description import Experiment, Unit
 from grasp_fmus.proxy import DEFAULTS, Settings
+from grasp_fmus.variable import Enumeration
 from grasp_fmus.variable import Variable as ProxyVariable
 
 from ..bench.wire import wire_signature
@@ -164,6 +165,7 @@ def _variable(interface: Interface, v: Variable, known: set[str]) -> ProxyVariab
         None if v.kind != "Real" or v.nominal == 1.0 else v.nominal,
         v.relative,
         initial_dependencies=initially,
+        enumeration=Enumeration(v.enumeration.name, v.enumeration.items) if v.enumeration else None,
     )
 
 

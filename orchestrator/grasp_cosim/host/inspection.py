@@ -154,9 +154,17 @@ def _variable(
         "display_unit": declared["displayUnit"],
         "start": _start(v, element),
         **{key: _typed(v.type, declared[key]) for key in ("min", "max", "nominal")},
+        "items": _items(v),
         "dependencies": known.get(element.get("name")) if v.causality == "output" else None,
         "description": v.description,
     }
+
+
+def _items(v: Any) -> dict[str, Any] | None:
+    """Of an enumeration, its numbers by name."""
+    if v.type != "Enumeration" or not v.declaredType:
+        return None
+    return {item.name: _typed("Integer", item.value) for item in v.declaredType.items}
 
 
 def _start(v: Any, element: ElementTree.Element) -> Any:
@@ -186,7 +194,7 @@ def _row(v: Mapping[str, Any]) -> list[str]:
     cells = {
         **v,
         "type": v["type"] + (f"{v['dimensions']}" if v["dimensions"] else ""),
-        "range": range_ if low or high else "",
+        "range": ", ".join(v["items"]) if v["items"] else range_ if low or high else "",
         "dependencies": declared if v["causality"] == "output" else "",
     }
     return [_shown(cells[column]) for column in COLUMNS]

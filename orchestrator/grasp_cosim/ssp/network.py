@@ -17,7 +17,6 @@ from functools import cached_property
 from ..errors import InputError, choices
 from ..system.interface import Interface, Variable
 from ..system.units import Unit
-from .declared import Declared
 from .tree import ComponentElement, Connection, Connector, End, SystemElement
 from .units import change, same
 
@@ -47,11 +46,10 @@ class Hop:
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A component: its element, its interface under the FMU's own names, and what is beyond."""
+    """A component: its element, and its interface under the FMU's own names."""
 
     element: ComponentElement
     interface: Interface
-    declared: Declared
 
     def unit(self, name: str) -> Unit | None:
         """The unit that the FMU declares for a variable and defines."""

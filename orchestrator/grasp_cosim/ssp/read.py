@@ -24,7 +24,6 @@ from ..system.interface import Value, read_interface
 from ..system.parts import NANOSECONDS, Component, Initialisation, Port, Wire
 from .annotation import TYPE, Beside, Extras, read_extras
 from .archive import STRUCTURE, Archive
-from .declared import declared
 from .document import at, child, children, parse, qualified
 from .network import (
     Carried,
@@ -86,7 +85,7 @@ def _part(archive: Archive, element: ComponentElement) -> Part:
     except InputError as error:
         reason = str(error).removeprefix(f"{path}: ")
         raise InputError(f"{place}: {element.source}: {reason}") from error
-    return Part(element, interface, declared(path))
+    return Part(element, interface)
 
 
 def _extras(file: str, root: Any) -> Extras | None:
@@ -245,7 +244,7 @@ def _step(
         return in_nanoseconds("step", given)
     if extras:
         return extras.step_ns
-    declared_steps = sorted({part.declared.step for part in parts if part.declared.step})
+    declared_steps = sorted({part.interface.step for part in parts if part.interface.step})
     for step in declared_steps:
         if not 0.0 < step * NANOSECONDS <= stop_ns:
             continue

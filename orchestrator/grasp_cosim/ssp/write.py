@@ -24,7 +24,6 @@ from ..system.parts import NANOSECONDS, Component, Port, Wire
 from ..system.units import Unit
 from .annotation import extras_of, write_extras
 from .archive import RESOURCES, STRUCTURE, write_archive
-from .declared import declared
 from .document import VERSION, add, new, to_bytes
 from .units import change, same, write_units
 
@@ -94,8 +93,7 @@ def _values_entry(component: Component, entries: dict[str, bytes]) -> str:
         variable = interface.by_name[name]
         own = component.rename.get(name, name)
         element = add(parameters, "ssv:Parameter", name=own)
-        items = declared(component.fmu).items.get(own, {})
-        labels = [label for label, number in items.items() if number == value]
+        labels = [label for label, number in variable.items.items() if number == value]
         if labels:
             add(element, "ssv:Enumeration", value=labels[0])
             continue
@@ -156,7 +154,7 @@ def _write_component(
     connectors = add(element, "ssd:Connectors") if variables else None
     for variable in variables:
         connector = add(connectors, "ssd:Connector", name=variable.name, kind=variable.causality)
-        if variable.name in declared(component.fmu).items:
+        if variable.items:
             continue  # an enumeration: its items are in the FMU, so that the type may be left out
         unit = _unit(component, variable, units)
         add(connector, f"ssc:{variable.kind}", **({"unit": unit.name} if unit else {}))
@@ -166,9 +164,12 @@ def _write_component(
 
 
 def _connected(component: Component) -> list[Variable]:
-    """The variables that get a connector: those of a kind and causality that SSP has, too."""
+    """The variables that get a connector: those of a kind and causality that SSP has, too.
+
+    A parameter needs none to be set; libcosim refuses one whose type, an enumeration, it ignores.
+    """
     variables = read_interface(component.fmu).of(*_CAUSALITIES)
-    return [variable for variable in variables if variable.supported]
+    return [v for v in variables if v.supported and not (v.items and v.causality == "parameter")]
 
 
 def _write_connection(connections: Any, system: System, wire: Wire) -> None:

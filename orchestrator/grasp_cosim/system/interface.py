@@ -40,6 +40,14 @@ def limits(fmi_type: str, version: str) -> tuple[float, float]:
 
 
 @dataclass(frozen=True, slots=True)
+class Enumeration:
+    """A type of whole numbers that have names."""
+
+    name: str
+    items: tuple[tuple[str, int], ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Variable:
     """A variable; unit is None and start, low, high are absent where none is declared.
 
@@ -48,7 +56,8 @@ class Variable:
     initial_dependencies the same in initialisation mode. shape is () but for an array. low and high
     are what is declared; beyond that a value must fit into its type. nominal is the magnitude that
     its values are compared with, 1 where none is declared, as FMI has it. relative says that it is
-    a difference, to which the offset of a unit does not apply.
+    a difference, to which the offset of a unit does not apply. enumeration is the type
+    of an Enumeration.
     """
 
     name: str
@@ -67,6 +76,12 @@ class Variable:
     description: str = ""
     nominal: float = 1.0
     relative: bool = False
+    enumeration: Enumeration | None = None
+
+    @property
+    def items(self) -> dict[str, int]:
+        """Of an Enumeration, its numbers by name; empty for any other."""
+        return dict(self.enumeration.items) if self.enumeration else {}
 
     @property
     def supported(self) -> bool:
@@ -99,6 +114,8 @@ class Interface:
     """Whether a step may end early, FMI 3.0."""
     once_per_process: bool = False
     """Whether a process can have one instance of it only."""
+    step: float | None = None
+    """The communication step in s that its default experiment names."""
 
     @cached_property
     def by_name(self) -> dict[str, Variable]:
@@ -137,8 +154,8 @@ class Interface:
     def parse(self, place: str, name: str, value: Value, text: bool = False) -> Value:
         """The value for input or parameter name, checked against type, range and finiteness.
 
-        place names where the value comes from. With text, a string may stand for a number or a
-        boolean, as on a command line.
+        place names where the value comes from. An item of an enumeration may be given by its name.
+        With text, a string may stand for a number or a boolean, as on a command line.
         """
         settable = [v.name for v in self.of(*SETTABLE)]
         if name not in settable:
@@ -152,11 +169,13 @@ class Interface:
                 f"{place}: {name} = {value!r}: {name} is of type {variable.nature}, which cannot "
                 "be set; must be left out, it keeps the start value of its FMU"
             )
-        converted = None
+        given, converted = value, None
+        if isinstance(value, str):
+            value = variable.items.get(value, value)
         if text or variable.kind == "String" or not isinstance(value, str):
             converted = _convert(variable, value, self.version)
         if converted is None:
-            raise InputError(f"{place}: {name} = {value!r}: must be {_expected(variable)}")
+            raise InputError(f"{place}: {name} = {given!r}: must be {_expected(variable)}")
         return converted
 
 
@@ -189,7 +208,7 @@ def check_rename(rename: Mapping[str, str], names: Collection[str], path: Path, 
 @lru_cache(maxsize=64)
 def _read(path: Path, modified: int) -> Interface:
     model, root, files = read_description(path)
-    version = model.fmiVersion
+    version, experiment = model.fmiVersion, model.defaultExperiment
     if version.partition(".")[0] not in ("2", "3"):
         raise InputError(f"{path}: FMI {version}; must be an FMI 2.0 or 3.0 co-simulation FMU")
     if model.coSimulation is None:
@@ -197,6 +216,8 @@ def _read(path: Path, modified: int) -> Interface:
         raise InputError(f"{path}: for {kind} only; must be a co-simulation FMU")
     try:
         variables, units = tuple(_variables(model, root)), tuple(read_units(root))
+        step = experiment.stepSize if experiment else None
+        step = None if step is None else float(step)
     except ValueError as error:
         raise InputError(f"{path}: not a readable FMU: {error}") from error
     return Interface(
@@ -211,6 +232,7 @@ def _read(path: Path, modified: int) -> Interface:
         "resources/slavemodule.txt" in files,
         model.coSimulation.mightReturnEarlyFromDoStep,
         model.coSimulation.canBeInstantiatedOnlyOncePerProcess,
+        step,
     )
 
 
@@ -287,7 +309,15 @@ def _variable(
         v.description or "",
         abs(float(declared["nominal"] or 1.0)) or 1.0,
         _relative(v, element),
+        _enumeration(v),
     )
+
+
+def _enumeration(v: Any) -> Enumeration | None:
+    declared = v.declaredType if v.type == "Enumeration" else None
+    if not declared:
+        return None
+    return Enumeration(declared.name, tuple((i.name, int(i.value)) for i in declared.items))
 
 
 def _relative(v: Any, element: ElementTree.Element) -> bool:
@@ -350,6 +380,8 @@ def _expected(variable: Variable) -> str:
         return "true or false"
     if variable.kind == "String":
         return "a string"
+    if variable.items:
+        return f"one of {choices(variable.items)}"
     noun = "a whole number" if variable.kind == "Integer" else "a finite number"
     if variable.type not in ("Real", "Float64", "Integer"):
         noun = f"{noun} of type {variable.type}"

@@ -63,13 +63,24 @@ def _mended(root: ElementTree.Element) -> bytes:
         for t in root.iterfind("TypeDefinitions/*")
     }
     for element in root.iterfind("ModelVariables//*"):
-        declared = types.get(element.attrib.pop("declaredType", None), {})
+        declared = types.get(element.get("declaredType"), {})
         element.attrib.update({**declared, **element.attrib})
     mended = copy.deepcopy(root)
-    for definitions in (*mended.findall("TypeDefinitions"), *mended.findall("UnitDefinitions")):
+    kept = {t.get("name") for t in mended.iterfind("TypeDefinitions/*") if _is_enumeration(t)}
+    for element in mended.iterfind("ModelVariables//*[@declaredType]"):
+        if element.get("declaredType") not in kept:
+            del element.attrib["declaredType"]
+    for definitions in mended.findall("TypeDefinitions"):
+        for simple in [t for t in definitions if t.get("name") not in kept]:
+            definitions.remove(simple)
+    for definitions in mended.findall("UnitDefinitions"):
         mended.remove(definitions)
     for element in mended.iterfind("ModelVariables/*"):
         element.attrib.setdefault("initial", "")  # causality and variability do not match
     for element in mended.iterfind("ModelStructure//*[@dependencies]"):
         element.set("dependencies", " ".join(element.get("dependencies", "").split()))
     return ElementTree.tostring(mended)
+
+
+def _is_enumeration(definition: ElementTree.Element) -> bool:
+    return definition.tag == "EnumerationType" or definition.find("Enumeration") is not None
