@@ -14,6 +14,7 @@ ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text("utf-8")
 COMMANDS = re.findall(r"^    \.venv/bin/(grasp-cosim .*?)(?:\s+#.*)?$", README, re.MULTILINE)
 EXAMPLES = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+OUTPUTS = re.findall(r"```\n(\d+ steps of .*?)```", README, re.DOTALL)
 TABLES = re.findall(r"```toml\n(.*?)```", README, re.DOTALL)
 
 
@@ -76,6 +77,16 @@ def test_example(checkout: Path, capsys: pytest.CaptureFixture[str], example: st
     assert "] m\n0.2 (" in out
     assert "sensor_2.reflectance = 0.5" in out
     assert (checkout / "results/signals.csv").is_file()
+
+
+def test_what_a_run_ends_with(checkout: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """All but how fast it was."""
+    (shown,) = OUTPUTS
+    assert cli.main(["run"]) == 0
+    found = capsys.readouterr().out
+    first, *rest = shown.splitlines()
+    assert found.splitlines()[1:] == rest
+    assert found.startswith(first.rpartition(", ")[0])
 
 
 def test_the_scenario_runs(checkout: Path) -> None:

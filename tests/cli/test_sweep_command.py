@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import pyarrow.parquet as pq  # type: ignore[import-untyped]
 import pytest
 from grasp_cosim import System, cli
 from grasp_cosim.sweep.read import built_in, read_study, study_file
@@ -62,6 +63,22 @@ def test_a_study_leaves_its_runs_and_pictures(command: Run, tmp_path: Path) -> N
     assert err.splitlines() == [
         "grasp-cosim: study: has the runs of another study; --out must be another folder, or empty"
     ]
+
+
+def test_what_is_true_or_false_counts_as_1_or_0(command: Run, fmus: Path) -> None:
+    """A cup that takes damage from the impact, and one that takes a hundred times as much."""
+    swap = f"[swap]\nplant = '{fmus / 'GripperPlantCompliant.fmu'}'\n"
+    limit = '[[parameters]]\nvariables = ["plant.squeeze_limit"]\nvalues = [0.001, 0.1]\n'
+    text = f"{HEAD}{GRID}{swap}{limit}".replace("stop = 0.02", "stop = 0.2")
+    code, out, _ = command(text, "--workers", "1", "--json")
+    assert code == 0
+    metrics = json.loads(out)["metrics"]
+    assert metrics["damaged"] == {
+        "runs": 2, "least": 0.0, "mean": 0.5, "median": 0.5, "greatest": 1.0,
+    }  # fmt: skip
+    assert 0.001 < metrics["squeeze"]["least"] == metrics["squeeze"]["greatest"] < 0.1
+    assert metrics["settling_time[1]"]["runs"] == 0
+    assert pq.read_table("study/runs.parquet")["damaged"].to_pylist() == [True, False]
 
 
 def test_where_every_run_fails_the_result_is_negative(command: Run) -> None:

@@ -132,6 +132,17 @@ def test_metrics_and_settings_are_there() -> None:
     assert "not complete" not in text
 
 
+def test_metrics_of_the_object_are_in_degrees_and_words() -> None:
+    run = grasp_run()
+    more = {"object_tilt": 0.5, "toppled": False, "squeeze": 0.006, "damaged": True}
+    text = Elements(page_html(replace(run, settings={**run.settings, **more}), "r")).visible
+    for expected in (
+        "object tilt28.6479deg", "object toppledno", "object squeezed by6.0000mm",
+        "object damagedyes",
+    ):  # fmt: skip
+        assert expected in text
+
+
 def test_a_run_that_was_broken_off_says_so() -> None:
     run = grasp_run()
     broken = replace(run, settings={**run.settings, "complete": False})
@@ -140,9 +151,9 @@ def test_a_run_that_was_broken_off_says_so() -> None:
 
 def test_metrics_without_a_label_are_shown_as_they_are() -> None:
     run = ring_run(["a"])
-    more = replace(run, settings={**run.settings, "settling_time": 0.125, "bands": {"low": 1}})
+    more = replace(run, settings={**run.settings, "margin_left": 0.125, "bands": {"low": 1}})
     text = Elements(page_html(more, "results")).visible
-    assert "settling time0.1250" in text
+    assert "margin left0.1250" in text
     assert "bandslow = 1" in text
 
 

@@ -7,7 +7,9 @@ from pathlib import Path
 import pytest
 from conftest import Altered
 from grasp_cosim import InputError, SimulationError, System
+from grasp_cosim.grasp import CASES
 from grasp_cosim.study.bands import Bands, Given
+from grasp_cosim.study.metrics import OF_OBJECT
 from grasp_cosim.study.qualify import Compared, qualify
 from grasp_cosim.study.verdict import as_bands, as_json, as_text
 
@@ -43,7 +45,7 @@ def test_a_copy_is_qualified_without_any_deviation(short: System) -> None:
     assert found.numerics == NUMERICS
     assert found.failure is None
     assert len(found.signals) >= 21
-    assert len(found.metrics) == 11
+    assert len(found.metrics) == 17
     assert {c.deviation for c in (*found.signals, *found.metrics)} == {0.0}
     assert all(c.band.source == "derived" for c in (*found.signals, *found.metrics))
     assert by_name(found.signals)["plant.gap[1]"].band.time == 0.002  # two steps
@@ -176,6 +178,32 @@ def test_a_blocked_candidate_is_not_run(short: System, fmus: Path) -> None:
     assert "blocks  missing" in as_text(found)
 
 
+def test_metrics_of_the_object_that_only_one_of_two_plants_has(short: System, fmus: Path) -> None:
+    """The box that moves, then the rigid object, tell of no squeeze: nothing to compare."""
+    soft = short.swap("plant", fmus / "GripperPlantCompliant.fmu")
+    for system, plant in ((short, "Compliant"), (soft, ""), (soft, "Movable")):
+        found = qualify(system, "plant", fmus / f"GripperPlant{plant}.fmu", isolation="none")
+        assert len(found.metrics) == 17
+        assert not any(c.name in OF_OBJECT for c in found.metrics)
+    assert set(found.uncompared) == {"plant.squeeze", "plant.damaged"}
+
+
+def test_damage_is_a_difference(grasp: System, fmus: Path, altered: Altered) -> None:
+    """A cup of a tenth of the limit takes damage from the impact of Case 0."""
+    fmu = altered(
+        "GripperPlantCompliant",
+        "gripper_plant/compliant.py",
+        "(0.0, 10.0)\n    ] = 0.01",
+        "(0.0, 10.0)\n    ] = 0.001",
+    )
+    cup = grasp.swap("plant", fmus / "GripperPlantCompliant.fmu").with_values(dict(CASES[0]))
+    found = qualify(cup.with_experiment(step=1e-3, stop=0.3), "plant", fmu, isolation="none")
+    metrics = by_name(found.metrics)
+    assert len(metrics) == 19
+    assert (metrics["damaged"].original, metrics["damaged"].candidate) == (0.0, 1.0)
+    assert [c.name for c in found.outside] == ["plant.damaged", "damaged"]
+
+
 @pytest.mark.slow
 def test_a_whole_grasp_with_another_stabilisation_of_the_contact(
     grasp: System, altered: Altered
@@ -210,4 +238,4 @@ def test_json_holds_all_of_it(short: System, heavy: Path) -> None:
         "original", "candidate", "span",
     }  # fmt: skip
     assert worst["ratio"] == pytest.approx(worst["deviation"] / worst["band"])
-    assert report["metrics"][0]["unit"] in ("s", "m", "m/s", "N")
+    assert {m["unit"] for m in report["metrics"]} == {"s", "m", "m/s", "N", "N.s", "1"}

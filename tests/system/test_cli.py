@@ -17,9 +17,9 @@ from grasp_cosim.grasp import CASES
 from grasp_fmus import documentation
 
 METRICS = {
-    "time_to_contact", "time_difference", "impact_velocity", "peak_contact_force",
-    "steady_contact_force", "object_shift", "target_position", "wall_time", "real_time_factor",
-    "steps", "scheme", "step",
+    "time_to_contact", "time_difference", "impact_velocity", "impact_impulse",
+    "peak_contact_force", "steady_contact_force", "force_overshoot", "settling_time",
+    "object_shift", "target_position", "wall_time", "real_time_factor", "steps", "scheme", "step",
 }  # fmt: skip
 
 
@@ -34,6 +34,21 @@ def test_run_prints_one_json_object(command: Run, grasp: System) -> None:
     assert metrics["time_to_contact"][1] is None
     assert metrics["time_difference"] is None
     assert (metrics["steps"], metrics["step"], metrics["scheme"]) == (2000, 1e-4, "sequential")
+
+
+def test_run_prints_a_table_with_what_the_plant_tells_of_the_object(
+    command: Run, fmus: Path
+) -> None:
+    plant = f"plant={fmus / 'GripperPlantCompliant.fmu'}"
+    arguments = ("--stop", "0.2", "--case", "0", "--step", "1e-3")
+    code, out, _ = command("run", *arguments, "--swap", plant)
+    assert code == 0
+    table = {line[:22].rstrip(): line[22:] for line in out.splitlines()[1:]}
+    assert list(table)[-3:] == ["object shift", "object squeezed by", "object damaged"]
+    assert table["object damaged"] == "      no"
+    assert re.fullmatch(r"   0\.100      none s", table["time to contact"])
+    assert re.fullmatch(r" 5\d\d\.\d{3}      none mm/s", table["impact velocity"])
+    assert "object damaged" not in command("run", *arguments)[1]
 
 
 def test_run_takes_all_options(command: Run, grasp: System) -> None:

@@ -1,12 +1,13 @@
 """The grasp of an object that gives, and of one that moves: what each layer spares it."""
 
-from math import tanh
+from math import atan, tanh
 from pathlib import Path
 
 import numpy as np
 import pytest
 from grasp_cosim import Result, System, simulate
 from grasp_cosim.grasp import CASES
+from grasp_cosim.study.metrics import CLOSING, FINGERS, IMPACT_WINDOW
 from grasp_cosim.system.interface import Value
 
 Values = dict[str, Value]
@@ -36,6 +37,7 @@ def test_a_soft_object_is_pressed_no_harder_than_it_is_held(
     metrics = grasped(grasp, fmu, 2, 4.0, SOFT[law]).metrics
     peak, steady = metrics["peak_contact_force"], metrics["steady_contact_force"]
     assert peak == pytest.approx(steady, rel=1e-3)
+    assert metrics["force_overshoot"] == pytest.approx([0.0, 0.0], abs=1e-3)
     impact = grasped(grasp, fmu, 0, 0.3, SOFT[law]).metrics["peak_contact_force"]
     assert max(impact) > 2.0 * max(steady)
 
@@ -55,9 +57,10 @@ def test_case_1_topples_what_case_2_grasps(grasp: System, fmus: Path) -> None:
     rough: Values = {"plant.floor_friction": 0.8, "plant.contact_height": 0.08}
     fmu = fmus / "GripperPlantMovable.fmu"
     one, two = (grasped(grasp, fmu, case, 2.2, rough) for case in (1, 2))
-    assert one["plant.toppled"][-1]
-    assert not two["plant.toppled"][-1]
-    assert np.abs(two["plant.tilt"]).max() < 1e-3
+    assert one.metrics["toppled"] is True
+    assert one.metrics["object_tilt"] >= atan(0.07 / 0.1)  # W/H, its balance
+    assert two.metrics["toppled"] is False
+    assert two.metrics["object_tilt"] < 1e-3
 
 
 def test_unequal_reflectances_carry_a_free_object_away(grasp: System, fmus: Path) -> None:
@@ -72,3 +75,48 @@ def test_unequal_reflectances_carry_a_free_object_away(grasp: System, fmus: Path
     distance = 0.3 * 0.05 * 9.80665 / (2.0 * 98.0)
     x = result["plant.object_position"]
     assert x[-201] - x[-1] == pytest.approx(0.2 * (f_s - 36.0 * distance) / 12.0, rel=1e-2)
+
+
+@pytest.mark.parametrize("case", [1, 2])
+def test_the_impact_on_an_object_that_moves_is_as_fast_as_the_gap_closes(
+    grasp: System, fmus: Path, case: int
+) -> None:
+    """In Case 1 the second finger gives way before the object that the first one pushes."""
+    system = grasp.swap("plant", fmus / "GripperPlantMovable.fmu").with_values({**CASES[case]})
+    result = simulate(system, step=2e-4, stop=2.0)
+    metrics = result.metrics
+    for j in FINGERS:
+        free = np.arange(-6, 0) + int(np.flatnonzero(result[f"plant.contact[{j}]"])[0])
+        t, gap = result.time[free], result[f"plant.gap[{j}]"][free]
+        closes = np.polynomial.Polynomial.fit(t, gap, 2)
+        assert metrics["impact_velocity"][j - 1] == pytest.approx(-closes.deriv()(t[-1]), rel=0.01)
+        touch = min(closes.roots().real, key=lambda root: abs(root - t[-1]))
+        assert metrics["time_to_contact"][j - 1] == pytest.approx(touch, abs=1e-5)
+    own = result["plant.velocity[2]"][free[-1]]
+    assert (own < 0.0) == (case == 1)
+    assert metrics["impact_velocity"][1] > own + 3e-3
+
+
+@pytest.mark.parametrize("plant", ["", "Compliant", "Movable"])
+def test_the_impulse_of_an_impact_is_what_it_takes_from_the_finger(
+    grasp: System, fmus: Path, plant: str
+) -> None:
+    """The momentum lost and what the actuator gives; a plant tells the last force of each step."""
+    system = grasp.swap("plant", fmus / f"GripperPlant{plant}.fmu").with_values({**CASES[0]})
+    result = simulate(system, step=1e-4, stop=0.3)
+    for j in FINGERS:
+        touch = result.metrics["time_to_contact"][j - 1]
+        begin = int(np.flatnonzero(result[f"plant.contact[{j}]"])[0]) - 1
+        rows = slice(begin, begin + round(IMPACT_WINDOW / 1e-4) + 1)
+        ends = (result.time[begin], touch + IMPACT_WINDOW)
+        before, after = np.interp(ends, result.time, CLOSING[j] * result[f"plant.velocity[{j}]"])
+        driven = 1e-4 * CLOSING[j] * result[f"controller.force[{j}]"][rows].sum()
+        expected = 0.5 * (before - after) + driven
+        assert result.metrics["impact_impulse"][j - 1] == pytest.approx(expected, rel=0.02)
+
+
+def test_a_soft_object_is_squeezed_as_far_as_its_springs_give(grasp: System, fmus: Path) -> None:
+    """k = 1 N/mm on either side; the last of its way takes the fingers a while."""
+    metrics = grasped(grasp, fmus / "GripperPlantCompliant.fmu", 2, 4.0, {}).metrics
+    assert metrics["squeeze"] == pytest.approx(sum(metrics["peak_contact_force"]) / 1e3, rel=5e-3)
+    assert metrics["damaged"] is False

@@ -148,13 +148,20 @@ def _summary(result: Result) -> str:
         f"{m['steps']} steps of {1e3 * m['step']:g} ms, {m['scheme']}, "
         f"{m['real_time_factor']:.2f} times as fast as real time"
     ]
-    if "time_to_contact" in m:
-        lines += [
-            f"{label:22s}{_numbers(m[key], factor)} {unit}" for label, key, factor, unit in LABELS
-        ]
+    lines += [
+        f"{label:22s}{_numbers(m[key], factor)} {unit}".rstrip()
+        for label, key, factor, unit in LABELS
+        if key in m
+    ]
     return "\n".join([*lines, *(timing_lines(result.timing) if result.timing else ())])
 
 
 def _numbers(value: Any, factor: float) -> str:
     values = value if isinstance(value, list) else [value]
-    return "  ".join("    none" if v is None else f"{factor * v:8.3f}" for v in values)
+    return "  ".join(_number(v, factor) for v in values)
+
+
+def _number(value: float | bool | None, factor: float) -> str:
+    if isinstance(value, bool):
+        return f"{'yes' if value else 'no':>8}"
+    return "    none" if value is None else f"{factor * value:8.3f}"

@@ -3,9 +3,10 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ..study.metrics import IMPACT_WINDOW
 from ..system.description import System
 from .claims import TARGET_TOLERANCE
-from .grasps import TOUCH, Claim, Run, Runs, as_json, balances, off_centre, settled_force
+from .grasps import Claim, Run, Runs, as_json, balances, off_centre, settled_force
 from .tables import REFLECTANCE_X_M, Row, Setting
 
 RMS_BAND = 0.35
@@ -94,9 +95,9 @@ def _claim_impact(runs: Runs, settled: float) -> Claim:
     soft = max(max(r.touch_forces) for r in runs.values() if r.case > 0)
     hard = min(min(r.touch_forces) for r in runs.values() if r.case == 0)
     return (
-        f"Case 0 has an impact, Cases 1 and 2 have none: within {1e3 * TOUCH:.0f} ms of touching "
-        f"every contact force rises above the settled {settled:.2f} N in Case 0 (to {hard:.1f} N "
-        f"or more) and none does in Cases 1 and 2 (to {soft:.1f} N or less).",
+        f"Case 0 has an impact, Cases 1 and 2 have none: within {1e3 * IMPACT_WINDOW:.0f} ms of "
+        f"touching every contact force rises above the settled {settled:.2f} N in Case 0 (to "
+        f"{hard:.1f} N or more) and none does in Cases 1 and 2 (to {soft:.1f} N or less).",
         soft < settled < hard,
     )
 

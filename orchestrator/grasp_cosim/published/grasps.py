@@ -9,15 +9,12 @@ import numpy as np
 
 from ..errors import InputError
 from ..recording.result import Result
-from ..study.metrics import FINGERS, PLANT, time_at_gap
+from ..study.metrics import FINGERS, IMPACT_WINDOW, PLANT, time_at_gap
 from ..system.description import System
 from .tables import REFLECTANCE_X_M, Setting
 
 SENSOR_CONTACT = 0.37e-3
 """m; the gap at which contact, were it declared there, would explain the published times best."""
-
-TOUCH = 0.02
-"""s; an impact is over by then, the grasp presses within a second."""
 
 Claim = tuple[str, bool]
 """A statement and whether it holds."""
@@ -34,7 +31,7 @@ class Run:
     overshoot: float
     """m by which the target passes the centre of the object, seen from the start."""
     touch_forces: tuple[float, float]
-    """The highest contact force within TOUCH of touching, in N."""
+    """The highest contact force within IMPACT_WINDOW of touching, in N."""
     result: Result | None
     """Every signal, for the runs that the figures show."""
 
@@ -72,7 +69,7 @@ def as_run(result: Result, setting: Setting, case: int) -> Run:
 
 def _touch_force(result: Result, finger: int) -> float:
     touch = result.metrics["time_to_contact"][finger - 1]
-    near = (result.time >= touch) & (result.time <= touch + TOUCH)
+    near = (result.time >= touch) & (result.time <= touch + IMPACT_WINDOW)
     return float(np.abs(result[f"{PLANT}.contact_force[{finger}]"][near]).max())
 
 

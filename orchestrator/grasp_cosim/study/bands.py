@@ -141,17 +141,18 @@ def signal_band(
 def metric_band(
     value: float | None,
     again: Iterable[float | None],
-    shift: float,
+    least: float,
     given: Given | None = None,
 ) -> Band:
     """The band of a metric from its value and those of the same run with other numerics.
 
-    shift is what the time allowed for signals makes of it: that time where the metric is one, else
-    0. None is the value of a moment that never comes.
+    least is the smallest derived width where that is not a share of the value: of a time the shift
+    allowed for signals, of a share of something else SHARE. None is the value of a moment that
+    never comes.
     """
     size = abs(value or 0.0)
     apart = [abs(other - value) for other in again if other is not None and value is not None]
-    width = max(shift, SHARE * size, SMALL, BOTH * max(apart, default=0.0))
+    width = max(least, SHARE * size, SMALL, BOTH * max(apart, default=0.0))
     derived = Band(width, 0.0, "derived")
     return given.band(size, derived) if given else derived
 

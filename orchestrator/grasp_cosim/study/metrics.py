@@ -1,13 +1,15 @@
 """Figures of merit of a grasp, from the recorded signals of a gripper plant and its controller."""
 
 from collections.abc import Iterable, Mapping
-from typing import Any
+from math import copysign, degrees
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 Signals = Mapping[str, npt.NDArray[Any]]
 Times = npt.NDArray[np.float64]
+Forces = npt.NDArray[np.float64]
 
 PLANT = "plant"
 CONTROLLER = "controller"
@@ -17,30 +19,68 @@ CLOSING = {1: -1.0, 2: 1.0}
 
 _PER_FINGER = ("position", "velocity", "gap", "contact_force", "contact")
 
-UNITS: Mapping[str, str] = {
+UNITS: Mapping[str, str | None] = {
     "time_to_contact": "s",
     "time_difference": "s",
     "impact_velocity": "m/s",
+    "impact_impulse": "N.s",
     "peak_contact_force": "N",
     "steady_contact_force": "N",
-    "object_shift": "m",
+    "force_overshoot": "1",
+    "settling_time": "s",
     "target_position": "m",
+    "object_shift": "m",
+    "object_tilt": "rad",
+    "toppled": None,
+    "squeeze": "m",
+    "damaged": None,
 }
-"""The units of the metrics of a grasp."""
+"""The units of the metrics of a grasp; None where one is true or false."""
+
+OF_OBJECT: Mapping[str, str] = {
+    "object_tilt": "tilt",
+    "toppled": "toppled",
+    "squeeze": "squeeze",
+    "damaged": "damaged",
+}
+"""The metrics that are there only if the plant has an output for them: its name."""
+
+IMPACT_WINDOW = 0.02
+"""s from first contact; an impact is over by then, the grasp presses within a second."""
 
 STEADY_WINDOW = 0.1
 """The steady contact force is the mean over the last so many seconds."""
+
+SETTLED = 0.02
+"""A force has settled once it stays so near to the steady one, as a share of that."""
 
 LABELS = (
     ("time to contact", "time_to_contact", 1.0, "s"),
     ("time difference", "time_difference", 1.0, "s"),
     ("impact velocity", "impact_velocity", 1e3, "mm/s"),
+    ("impact impulse", "impact_impulse", 1e3, "mN.s"),
     ("peak contact force", "peak_contact_force", 1.0, "N"),
     ("steady contact force", "steady_contact_force", 1.0, "N"),
+    ("force overshoot", "force_overshoot", 1e2, "%"),
+    ("settling time", "settling_time", 1.0, "s"),
     ("target position", "target_position", 1e3, "mm"),
     ("object shift", "object_shift", 1e3, "mm"),
+    ("object tilt", "object_tilt", degrees(1.0), "deg"),
+    ("object toppled", "toppled", 1.0, ""),
+    ("object squeezed by", "squeeze", 1e3, "mm"),
+    ("object damaged", "damaged", 1.0, ""),
 )
 """The metrics as they are shown: label, name, factor and unit."""
+
+
+class FirstContact(NamedTuple):
+    """When a finger first touches in s, how fast its gap closes then in m/s, the first row that
+    has it touching.
+    """
+
+    time: float
+    speed: float
+    row: int
 
 
 def is_grasp(signals: Iterable[str]) -> bool:
@@ -54,37 +94,119 @@ def grasp_metrics(time: Times, signals: Signals) -> dict[str, Any]:
     """The metrics of `run --json`, or none where the system is not a grasp."""
     if not is_grasp(signals):
         return {}
-    contacts = [first_contact(time, signals, j) for j in FINGERS]
-    times = [None if c is None else c[0] for c in contacts]
-    forces = [np.abs(signals[f"{PLANT}.contact_force[{j}]"]) for j in FINGERS]
-    steady = time >= time[-1] - STEADY_WINDOW
+    fingers = [_of_finger(time, signals, j) for j in FINGERS]
+    first, second = (finger["time_to_contact"] for finger in fingers)
     shift = signals[f"{PLANT}.object_position"] - signals[f"{PLANT}.object_position"][0]
     return {
-        "time_to_contact": times,
-        "time_difference": None if None in times else abs(times[1] - times[0]),  # type: ignore[operator]
-        "impact_velocity": [None if c is None or c[1] <= 0.0 else c[1] for c in contacts],
-        "peak_contact_force": [float(f.max()) for f in forces],
-        "steady_contact_force": [float(f[steady].mean()) for f in forces],
-        "object_shift": float(np.abs(shift).max()),
+        **{name: [finger[name] for finger in fingers] for name in fingers[0]},
+        "time_difference": None if first is None or second is None else abs(second - first),
         "target_position": float(signals[f"{CONTROLLER}.target_position"][-1]),
+        "object_shift": float(np.abs(shift).max()),
+        **_of_object(signals),
     }
 
 
-def first_contact(time: Times, signals: Signals, finger: int) -> tuple[float, float] | None:
-    """Time in s and closing speed in m/s at which a finger first touches; None if it never does.
+def _of_finger(time: Times, signals: Signals, finger: int) -> dict[str, float | None]:
+    """The metrics of one finger; what begins with its first contact is None where it has none.
+
+    A steady force that is 0 at any time is none to compare with: the finger does not hold on.
+    """
+    force = np.abs(signals[f"{PLANT}.contact_force[{finger}]"])
+    last = force[time >= time[-1] - STEADY_WINDOW]
+    held = float(last.mean()) if last.min() > 0.0 else None
+    contact = first_contact(time, signals, finger)
+    moment, speed, row = contact or (None, 0.0, len(time))
+    after = time[row:] - (moment or 0.0)  # empty where it never touches
+    return {
+        "time_to_contact": moment,
+        "impact_velocity": speed if speed > 0.0 else None,
+        "impact_impulse": impulse(after, force[row:], IMPACT_WINDOW),
+        "peak_contact_force": float(force.max()),
+        "steady_contact_force": float(last.mean()),
+        "force_overshoot": overshoot(force[row:], held),
+        "settling_time": settling_time(after, force[row:], held),
+    }
+
+
+def _of_object(signals: Signals) -> dict[str, float | bool]:
+    """The largest tilt and squeeze, either way, and whether it ever toppled or was damaged."""
+    there = {name: f"{PLANT}.{output}" for name, output in OF_OBJECT.items()}
+    largest = {name: np.abs(signals[s]).max() for name, s in there.items() if s in signals}
+    return {n: bool(v) if UNITS[n] is None else float(v) for n, v in largest.items()}
+
+
+def impulse(after: Times, force: Forces, window: float) -> float | None:
+    """Impulse in N.s of a force in N over a window in s from first contact; None if it ends sooner.
+
+    after are the seconds since then. Until the first sample the force is taken as it is there, as
+    one that begins with a jump has it.
+    """
+    if not len(after) or after[-1] < window:
+        return None
+    inner = after[(after > 0.0) & (after < window)]
+    times = np.concatenate(([0.0], inner, [window]))
+    return float(np.trapezoid(np.interp(times, after, force), times))
+
+
+def overshoot(force: Forces, steady: float | None) -> float | None:
+    """By what share of the steady force in N a force since contact exceeds it at most; 0 if never.
+
+    None without a contact, or without a steady force.
+    """
+    return None if steady is None or not len(force) else max(0.0, float(force.max()) / steady - 1.0)
+
+
+def settling_time(after: Times, force: Forces, steady: float | None) -> float | None:
+    """Seconds since contact from which on a force is within SETTLED of the steady one, both in N.
+
+    after are the seconds since then, at which the force is given. None where it is not within
+    throughout the last STEADY_WINDOW, without a contact, or without a steady force.
+    """
+    if steady is None or not len(after) or after[-1] < STEADY_WINDOW:
+        return None
+    error = force - steady
+    outside = np.flatnonzero(np.abs(error) > SETTLED * steady)
+    if not len(outside):
+        return 0.0
+    k = int(outside[-1])
+    if after[k] >= after[-1] - STEADY_WINDOW:
+        return None
+    edge = copysign(SETTLED * steady, error[k])
+    fraction = (error[k] - edge) / (error[k] - error[k + 1])
+    return float(after[k] + fraction * (after[k + 1] - after[k]))
+
+
+def first_contact(time: Times, signals: Signals, finger: int) -> FirstContact | None:
+    """How a finger first touches; None if it never does.
 
     Between the last free communication point and the first one in contact, the moment is where
-    the gap runs out at the speed of the last free point.
+    the gap runs out at the rate of the last free point.
     """
     touching = np.flatnonzero(signals[f"{PLANT}.contact[{finger}]"])
     if not len(touching):
         return None
-    k = max(int(touching[0]) - 1, 0)
-    speed = float(CLOSING[finger] * signals[f"{PLANT}.velocity[{finger}]"][k])
+    row = int(touching[0])
+    k = max(row - 1, 0)
+    own = float(CLOSING[finger] * signals[f"{PLANT}.velocity[{finger}]"][k])
+    speed = own - _surface_speed(time, signals, finger, k)
     gap = max(float(signals[f"{PLANT}.gap[{finger}]"][k]), 0.0)
-    span = float(time[touching[0]] - time[k])
+    span = float(time[row] - time[k])
     wait = min(gap / speed, span) if speed > 0.0 else span
-    return float(time[k]) + wait, speed
+    return FirstContact(float(time[k]) + wait, speed, row)
+
+
+def _surface_speed(time: Times, signals: Signals, finger: int, k: int) -> float:
+    """How fast the object's surface goes ahead of a finger that is free up to row k, in m/s.
+
+    What the finger moved less what the gap shrank, over the last interval between two values that
+    the plant gave: one with a longer step of its own holds them. 0 where there was none yet.
+    """
+    gap = signals[f"{PLANT}.gap[{finger}]"][: k + 1]
+    given = np.flatnonzero(np.diff(gap, prepend=np.nan))[-2:]
+    if len(given) < 2:
+        return 0.0
+    surface = CLOSING[finger] * signals[f"{PLANT}.position[{finger}]"][given] + gap[given]
+    return float((surface[1] - surface[0]) / (time[given[1]] - time[given[0]]))
 
 
 def time_at_gap(time: Times, signals: Signals, finger: int, gap: float) -> float | None:

@@ -21,7 +21,7 @@ from ..system.interface import Value
 from ..system.parts import NANOSECONDS, Isolation
 from .bands import SHARE, Band, Bands, check_patterns, entry_for, metric_band, signal_band
 from .interface_difference import Difference
-from .metrics import UNITS, grasp_metrics
+from .metrics import OF_OBJECT, UNITS, grasp_metrics
 from .swap import Swap, prepare_swap
 from .tube import Curve, curve, deviation
 from .unit_conversion import IDENTITY
@@ -245,16 +245,25 @@ class _Judge:
         return tuple(sorted(found, key=lambda c: -c.ratio))
 
     def metrics(self, candidate: Curves) -> tuple[Compared, ...]:
-        """All metrics of the original; one that the candidate's run lacks is None there."""
+        """All metrics of the original; one that the candidate's run lacks is None there.
+
+        But for those of the object for which the candidate has no such output as the original.
+        """
         values, theirs = _values(self.original), _values(candidate)
         others = [_values(run) for run in self.again]
         found = []
         for name, value in values.items():
-            shift = self.shift if UNITS[_plain(name)] == "s" else 0.0
+            if name in OF_OBJECT and name not in theirs:
+                continue
             given = entry_for(self.bands.metrics, name, _plain(name))
-            band = metric_band(value, [run.get(name) for run in others], shift, given)
+            least = self._least(UNITS[_plain(name)])
+            band = metric_band(value, [run.get(name) for run in others], least, given)
             found.append(_metric(name, band, value, theirs.get(name)))
         return tuple(sorted(found, key=lambda c: -c.ratio))
+
+    def _least(self, unit: str | None) -> float:
+        """The smallest derived width of a metric in that unit, see metric_band."""
+        return self.shift if unit == "s" else SHARE if unit == "1" else 0.0
 
     def _signal(self, name: str, candidate: Curve) -> Compared:
         reference = self.original[name]
@@ -284,17 +293,20 @@ def _metric(name: str, band: Band, original: float | None, candidate: float | No
 
 
 def _values(curves: Curves) -> dict[str, float | None]:
-    """The grasp's metrics by name, like time_to_contact[1] where there is one per finger."""
+    """The grasp's metrics by name, like time_to_contact[1] where there is one per finger.
+
+    One that is true or false is 1 or 0, as such a signal is.
+    """
     if not curves:
         return {}
     time = next(iter(curves.values())).time
-    found: dict[str, float | None] = {}
+    found: dict[str, float | bool | None] = {}
     for name, value in grasp_metrics(time, {n: c.values for n, c in curves.items()}).items():
         if isinstance(value, list):
             found.update({f"{name}[{i}]": v for i, v in enumerate(value, start=1)})
         else:
             found[name] = value
-    return found
+    return {name: None if value is None else float(value) for name, value in found.items()}
 
 
 def _plain(metric: str) -> str:

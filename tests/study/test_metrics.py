@@ -1,0 +1,288 @@
+"""The metrics of a grasp against solutions in closed form, and where there is nothing to tell."""
+
+from collections.abc import Callable
+from math import cos, exp, log, pi, sin, sqrt
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from grasp_cosim.study.metrics import (
+    IMPACT_WINDOW,
+    LABELS,
+    OF_OBJECT,
+    SETTLED,
+    UNITS,
+    first_contact,
+    grasp_metrics,
+)
+from scipy.optimize import brentq
+
+Array = npt.NDArray[np.float64]
+Motion = Callable[[float], float]
+
+OPENING = {1: 1.0, 2: -1.0}
+SURFACE = 0.035
+"""m; where the surface of the object is at first, on either side."""
+
+MASS, STIFFNESS, DAMPING = 0.5, 1000.0, 10.0
+SPEED, START = 0.3, 0.05001234
+"""m/s and m of a finger that flies on to the surface."""
+
+
+def recorded(
+    time: Array,
+    finger: Motion,
+    velocity: Motion,
+    surface: Motion,
+    force: Motion,
+) -> dict[str, npt.NDArray[Any]]:
+    """Two fingers, one the mirror image of the other; motions are in the opening direction."""
+    x, v, s, f = (
+        np.array([motion(t) for t in time]) for motion in (finger, velocity, surface, force)
+    )
+    signals: dict[str, npt.NDArray[Any]] = {
+        "plant.object_position": np.zeros(len(time)),
+        "controller.target_position": np.zeros(len(time)),
+    }
+    for j, side in OPENING.items():
+        signals |= {
+            f"plant.position[{j}]": side * x,
+            f"plant.velocity[{j}]": side * v,
+            f"plant.gap[{j}]": np.maximum(x - s, 0.0),
+            f"plant.contact[{j}]": x <= s,
+            f"plant.contact_force[{j}]": side * f,
+        }
+    return signals
+
+
+def every(step: float, end: float) -> Array:
+    """Points in time."""
+    return step * np.arange(round(end / step) + 1, dtype=np.float64)
+
+
+def pressed(force: Motion, end: float, step: float = 1e-3, touch: float = 0.1004) -> dict[str, Any]:
+    """The metrics where fingers of 0.1 m/s touch, and a force of the time since then begins."""
+    time = every(step, end)
+    return grasp_metrics(
+        time,
+        recorded(
+            time,
+            lambda t: SURFACE + 0.1 * max(touch - t, 0.0),
+            lambda t: -0.1 if t < touch else 0.0,
+            lambda _: SURFACE,
+            lambda t: force(t - touch) if t >= touch else 0.0,
+        ),
+    )
+
+
+def impact(step: float) -> tuple[Array, dict[str, npt.NDArray[Any]]]:
+    """A mass that flies on to a Kelvin-Voigt surface and has not left it after the window."""
+    touch, w, decay = (START - SURFACE) / SPEED, *oscillation()
+
+    def depth(t: float) -> float:
+        return SPEED / w * exp(-decay * t) * sin(w * t)
+
+    def rate(t: float) -> float:
+        return SPEED * exp(-decay * t) * (cos(w * t) - decay / w * sin(w * t))
+
+    time = every(step, 0.09)
+    return time, recorded(
+        time,
+        lambda t: START - SPEED * t if t < touch else SURFACE - depth(t - touch),
+        lambda t: -SPEED if t < touch else -rate(t - touch),
+        lambda _: SURFACE,
+        lambda t: 0.0 if t < touch else STIFFNESS * depth(t - touch) + DAMPING * rate(t - touch),
+    )
+
+
+def oscillation() -> tuple[float, float]:
+    """Frequency in rad/s and decay in 1/s of the mass on the surface."""
+    decay = 0.5 * DAMPING / MASS
+    return sqrt(STIFFNESS / MASS - decay * decay), decay
+
+
+def test_the_impulse_of_an_impact_is_the_momentum_that_it_takes() -> None:
+    w, decay = oscillation()
+    t = IMPACT_WINDOW
+    left = SPEED * exp(-decay * t) * (cos(w * t) - decay / w * sin(w * t))
+    metrics = grasp_metrics(*impact(1e-4))
+    assert metrics["impact_impulse"] == pytest.approx([MASS * (SPEED - left)] * 2, rel=2e-5)
+    assert metrics["impact_velocity"] == pytest.approx([SPEED] * 2, rel=1e-9)
+    assert metrics["time_to_contact"] == pytest.approx([(START - SURFACE) / SPEED] * 2, abs=1e-9)
+
+
+def test_the_impulse_errs_in_proportion_to_the_square_of_the_step() -> None:
+    """Though the force begins with a jump between two samples."""
+    w, decay = oscillation()
+    t = IMPACT_WINDOW
+    exact = MASS * SPEED * (1.0 - exp(-decay * t) * (cos(w * t) - decay / w * sin(w * t)))
+    for step in (4e-3, 1e-3, 2.5e-4, 6.25e-5):
+        found = grasp_metrics(*impact(step))["impact_impulse"][0]
+        steepest = SPEED * (STIFFNESS + DAMPING * DAMPING / MASS)  # N/s, of the force
+        assert abs(found - exact) < steepest * step * step
+
+
+@pytest.mark.parametrize("zeta", [0.1, 0.3, 0.5, 0.7, 0.9])
+def test_a_step_response_of_second_order(zeta: float) -> None:
+    w_0, steady = 40.0, 3.0
+    w = w_0 * sqrt(1.0 - zeta * zeta)
+
+    def off(t: float) -> float:
+        return exp(-zeta * w_0 * t) * (cos(w * t) + zeta * w_0 / w * sin(w * t))
+
+    metrics = pressed(lambda t: steady * (1.0 - off(t)), end=9.0)
+    expected = exp(-pi * zeta / sqrt(1.0 - zeta * zeta))
+    assert metrics["force_overshoot"] == pytest.approx([expected] * 2, abs=5e-4)
+    # off(t) has its extremes at multiples of pi/w; the last one out of the band is known
+    last = max(k for k in range(60) if k == 0 or exp(-zeta * w_0 * k * pi / w) > SETTLED)
+    settled = brentq(lambda t: abs(off(t)) - SETTLED, last * pi / w, (last + 1) * pi / w - 1e-9)
+    assert metrics["settling_time"] == pytest.approx([settled] * 2, abs=1e-4)
+    assert metrics["steady_contact_force"] == pytest.approx([steady] * 2, rel=1e-9)
+
+
+def test_a_step_response_of_first_order_does_not_overshoot() -> None:
+    tau = 0.2
+    metrics = pressed(lambda t: 2.0 * (1.0 - exp(-t / tau)), end=8.0)
+    assert metrics["settling_time"] == pytest.approx([tau * log(1.0 / SETTLED)] * 2, abs=1e-5)
+    assert metrics["force_overshoot"] == pytest.approx([0.0, 0.0], abs=1e-12)
+
+
+def test_a_force_that_is_there_at_once_has_settled_at_once() -> None:
+    metrics = pressed(lambda _: 2.0, end=1.0)
+    assert metrics["settling_time"] == [0.0, 0.0]
+    assert metrics["impact_impulse"] == pytest.approx([2.0 * IMPACT_WINDOW] * 2, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "force",
+    [
+        lambda t: t,
+        lambda t: 2.0 if t < 0.52 else 2.2,
+        lambda t: 2.0 + 0.1 * sin(100.0 * t),
+    ],
+    ids=["still rising", "a step in the last 0.1 s", "an oscillation"],
+)
+def test_a_force_that_does_not_stay_has_not_settled(force: Motion) -> None:
+    metrics = pressed(force, end=0.7)
+    assert metrics["settling_time"] == [None, None]
+    assert metrics["force_overshoot"][0] > 0.0
+
+
+def test_a_finger_that_has_let_go_has_no_steady_force_to_exceed() -> None:
+    metrics = pressed(lambda t: 2.0 if t < 0.3 else 0.0, end=1.0)
+    assert metrics["steady_contact_force"] == [0.0, 0.0]
+    assert metrics["force_overshoot"] == metrics["settling_time"] == [None, None]
+    assert metrics["impact_impulse"] == pytest.approx([2.0 * IMPACT_WINDOW] * 2, rel=1e-12)
+
+
+def test_a_finger_that_lets_go_in_the_end_has_no_steady_force_to_exceed() -> None:
+    """The mean of the last 0.1 s is still one: 2 N for half of it."""
+    metrics = pressed(lambda t: 2.0 if t < 0.85 else 0.0, end=1.0)
+    assert metrics["steady_contact_force"] == pytest.approx([1.0] * 2, rel=0.03)
+    assert metrics["force_overshoot"] == metrics["settling_time"] == [None, None]
+
+
+def test_a_finger_that_never_touches() -> None:
+    metrics = pressed(lambda _: 2.0, end=0.05)
+    for name in (
+        "time_to_contact", "impact_velocity", "impact_impulse", "force_overshoot", "settling_time",
+    ):  # fmt: skip
+        assert metrics[name] == [None, None]
+    assert metrics["time_difference"] is None
+    assert metrics["peak_contact_force"] == metrics["steady_contact_force"] == [0.0, 0.0]
+
+
+def test_an_impact_that_is_not_recorded_to_its_end_has_no_impulse() -> None:
+    assert pressed(lambda _: 2.0, end=0.119)["impact_impulse"] == [None, None]
+    assert pressed(lambda _: 2.0, end=0.122)["impact_impulse"] != [None, None]
+
+
+@pytest.mark.parametrize("step", [1e-3, 1e-4])
+@pytest.mark.parametrize(
+    ("closing", "fleeing"),
+    [(0.05, 0.0), (0.05, 0.03), (0.05, -0.02), (0.0, -0.02), (-0.01, -0.02)],
+    ids=["fixed", "it flees", "it comes", "it meets a finger at rest", "it catches up"],
+)
+def test_the_speed_of_an_impact_is_relative_to_the_surface(
+    closing: float, fleeing: float, step: float
+) -> None:
+    """Both at an even speed, so the moment and the speed are exact."""
+    time = every(step, 2.0)
+    signals = recorded(
+        time,
+        lambda t: SURFACE + 0.01003 - closing * t,
+        lambda _: -closing,
+        lambda t: SURFACE - fleeing * t,
+        lambda _: 0.0,
+    )
+    metrics = grasp_metrics(time, signals)
+    assert metrics["impact_velocity"] == pytest.approx([closing - fleeing] * 2, rel=1e-9)
+    expected = 0.01003 / (closing - fleeing)
+    assert metrics["time_to_contact"] == pytest.approx([expected] * 2, abs=1e-9)
+
+
+def test_the_speed_of_an_impact_on_a_surface_that_speeds_up() -> None:
+    """The surface's speed is that in the middle of the last free interval, half a step before."""
+    step, a = 1e-3, 0.4
+    time = every(step, 1.0)
+    signals = recorded(
+        time,
+        lambda _: SURFACE + 0.0101,
+        lambda _: 0.0,
+        lambda t: SURFACE + 0.5 * a * t * t,
+        lambda _: 0.0,
+    )
+    touch = sqrt(2.0 * 0.0101 / a)
+    metrics = grasp_metrics(time, signals)
+    assert metrics["impact_velocity"] == pytest.approx([a * touch] * 2, abs=1.5 * a * step)
+    assert metrics["time_to_contact"] == pytest.approx([touch] * 2, abs=step)
+
+
+def test_a_plant_that_holds_its_outputs_has_the_same_speed_of_impact() -> None:
+    """One with ten times the step of the experiment."""
+    time = every(1e-4, 0.3)
+    own = np.repeat(time[::10], 10)[: len(time)]
+    signals = recorded(
+        own,
+        lambda t: SURFACE + 0.01003 - 0.05 * t,
+        lambda _: -0.05,
+        lambda t: SURFACE + 0.02 * t,
+        lambda _: 0.0,
+    )
+    for j in OPENING:
+        found = first_contact(time, signals, j)
+        assert found is not None
+        assert found.speed == pytest.approx(0.07, rel=1e-9)
+
+
+def test_fingers_that_touch_from_the_start() -> None:
+    time = every(1e-3, 0.5)
+    signals = recorded(time, lambda _: SURFACE, lambda _: 0.0, lambda _: SURFACE, lambda _: 1.5)
+    metrics = grasp_metrics(time, signals)
+    assert metrics["time_to_contact"] == [0.0, 0.0]
+    assert metrics["impact_velocity"] == [None, None]
+    assert metrics["impact_impulse"] == pytest.approx([1.5 * IMPACT_WINDOW] * 2, rel=1e-12)
+    assert metrics["settling_time"] == [0.0, 0.0]
+
+
+def test_the_object_has_the_metrics_that_the_plant_has_outputs_for() -> None:
+    time, signals = impact(1e-3)
+    assert not set(OF_OBJECT) & set(grasp_metrics(time, signals))
+    tilt, never, once = (np.zeros(len(time)), *np.zeros((2, len(time)), bool))
+    tilt[10:13], once[20] = (0.1, -0.3, 0.2), True
+    moved = grasp_metrics(
+        time, signals | {"plant.tilt": tilt, "plant.toppled": once, "plant.squeeze": tilt + 0.3}
+    )
+    assert moved["object_tilt"] == 0.3
+    assert moved["squeeze"] == pytest.approx(0.5)
+    assert moved["toppled"] is True
+    assert "damaged" not in moved
+    assert grasp_metrics(time, signals | {"plant.damaged": never})["damaged"] is False
+
+
+def test_every_metric_has_a_unit_and_a_label() -> None:
+    time, signals = impact(1e-3)
+    signals |= {f"plant.{output}": np.zeros(len(time)) for output in OF_OBJECT.values()}
+    named = [name for _, name, _, _ in LABELS]
+    assert sorted(grasp_metrics(time, signals)) == sorted(UNITS) == sorted(named)
