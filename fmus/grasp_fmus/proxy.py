@@ -22,11 +22,9 @@ from .base import (
 from .connection import Connection
 from .host_log import WARNING
 from .link.client import Client
-from .link.message import FAILED, STRING_SIZE, read_key
+from .link.message import FAILED, PORT, STRING_SIZE, read_key
 from .link.signature import Kind, Signature, WireVariable
 from .variable import TYPES, Scalar, Variable
-
-HOST, PORT = "127.0.0.1", 5501
 
 TIMEOUT = 0.01
 """s. The step of the original is no measure: 0.1 ms is less than many a network needs."""
@@ -44,7 +42,7 @@ _NANOSECONDS = 1e9
 class Settings(NamedTuple):
     """The parameters proxy.*, but for those of the outputs."""
 
-    host: str = HOST
+    host: str = "127.0.0.1"
     port: int = PORT
     timeout: float = TIMEOUT
     connect_timeout: float = 5.0

@@ -1,4 +1,5 @@
-"""Run as a program: starts processes that serve an FMU in lockstep, fast, as all is imported once.
+"""Run as a program: starts processes that serve an FMU in lockstep, fast, as all is imported once,
+what is in the FMU as well.
 
 For each line on standard input it starts one, and prints its process id and its port. A process
 that is not wanted any more is killed by its id; all end with this one's standard input.
@@ -11,11 +12,13 @@ from pathlib import Path
 
 from grasp_cosim.bench.bench import Bench, Serving
 from grasp_cosim.bench.server import Server
+from grasp_cosim.fmi.load import load_here
 from grasp_cosim.system.interface import read_interface
 
 
 def main(fmu: str) -> None:
     interface = read_interface(Path(fmu))
+    load_here(interface.identifier, interface).close()
     children: list[int] = []
     for line in sys.stdin:
         if line.startswith("end "):

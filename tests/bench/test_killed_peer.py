@@ -23,7 +23,7 @@ from proxies import build_proxy
 MOMENTS, PORTION = 200, 50
 TOLERATED = 3
 TIMEOUT = 0.02
-PATIENCE = 1.0
+PATIENCE = 0.5
 """s that a proxy waits for a peer that is killed before the run has begun."""
 
 STEPS = 150

@@ -216,7 +216,7 @@ def test_nothing_sticks_out_of_a_narrow_or_wide_window(
 @pytest.mark.parametrize("width", [420, 1101])
 def test_the_charts_of_a_paced_run_fit(width: int, tmp_path: Path) -> None:
     """A narrow window, and two narrow columns: nothing sticks out, no label covers another one,
-    curves and dots are inside the charts.
+    curves and marks are inside the charts, the table of the parts is not cut.
     """
     html = page_html(replace(grasp_run(), timing=paced(steps=2000)), "results")
     act = """
@@ -227,7 +227,8 @@ def test_the_charts_of_a_paced_run_fit(width: int, tmp_path: Path) -> None:
       return [root.scrollWidth - innerWidth, charts.map((chart) => {
         const place = box(chart), plot = box(chart.querySelector("svg"));
         const texts = [...chart.querySelectorAll("text")].map(box);
-        const drawn = [...chart.querySelectorAll("polyline, circle")].map(box);
+        const marks = [...chart.querySelectorAll("circle, rect.late")];
+        const drawn = [...chart.querySelectorAll("polyline"), ...marks].map(box);
         return {
           covered: texts.filter((a, i) => !texts.slice(i + 1).every((b) => apart(a, b))).length,
           outside: texts.filter((a) => a.left < place.left || a.right > place.right + 8).length,
@@ -235,12 +236,14 @@ def test_the_charts_of_a_paced_run_fit(width: int, tmp_path: Path) -> None:
             || a.bottom < plot.top || a.top > plot.bottom).length,
           curves: chart.querySelectorAll("polyline").length,
           widest: Math.max(0, ...drawn.map((a) => a.width)) / plot.width,
-          dots: chart.querySelectorAll("circle").length,
+          dots: marks.length,
         };
-      })];
+      }), (([table]) => table.scrollWidth - table.clientWidth)(
+        document.querySelectorAll("#timing .scroll"))];
     """
-    beyond, (distributions, overruns) = in_browser(html, act, tmp_path, size=(width, 1200))
+    beyond, (distributions, overruns), cut = in_browser(html, act, tmp_path, size=(width, 1200))
     assert beyond <= 0
+    assert cut <= 0
     for chart in (distributions, overruns):
         assert (chart["covered"], chart["outside"], chart["astray"]) == (0, 0, 0)
     assert distributions["curves"] == 9

@@ -84,6 +84,28 @@ def test_the_first_overruns_are_listed(hiccups: int, listed: int, title: str, sh
     assert ("counted only" in html) == (listed < hiccups)
 
 
+def test_what_each_mark_of_a_late_step_stands_for_is_said() -> None:
+    """By its shape and colour, the most frequent first; of all its steps, listed or not."""
+    culprits = {"backlog": 4, "plant": 3, "start": 2, "between": 1, "recording": 1, "sensor_2": 1}
+    late = [Overrun(k, 0.1, 3e-4, name, 2e-3) for k, name in enumerate(culprits)][:5]
+    timing = replace(
+        paced(steps=3000, hiccups=0), overruns=12, listed=tuple(late), culprits=culprits
+    )
+    html = timing_html(timing, 3.0)
+    (key,) = re.findall(r'<ul class="marks">(.*?)</ul>', html)
+    assert re.findall(r'<li class="([^"]*)">([^<]*)</li>', key) == [
+        ("square lmuted dash2", "4 × backlog"), ("dot lc0 dash0", "3 × plant"),
+        ("ring link dash1", "2 × late start"), ("square link dash2", "1 × between steps"),
+        ("ring lmuted dash1", "1 × recording"),
+    ]  # fmt: skip
+    marks = re.findall(r'class="late ([^"]*)"><title>[^,]*, (.*?) took', html)
+    assert sorted(marks) == [
+        ("dot lc0 dash0", "plant"), ("ring link dash1", "late start"),
+        ("ring lmuted dash1", "recording"), ("square link dash2", "between steps"),
+        ("square lmuted dash2", "backlog"),
+    ]  # fmt: skip
+
+
 def test_without_overruns_there_is_no_list_and_no_chart_of_them() -> None:
     html = timing_html(paced(steps=3000, hiccups=0), 3.0)
     assert "<summary>" not in html

@@ -17,6 +17,7 @@ from time import monotonic, sleep
 from typing import IO, NamedTuple
 
 import pytest
+from grasp_cosim.bench.model import MOST_LOST
 from grasp_fmus.c_header import c_header, c_prefix
 from grasp_fmus.contract import Field, declared
 from grasp_fmus.link.client import Client, Verdict
@@ -729,16 +730,46 @@ def test_the_plant_in_c_to_the_last_bit(target: Path) -> None:
     assert expected[8:10] == [False, False]
 
 
-def test_steps_lost_on_the_way_are_made_up_for(target: Path) -> None:
-    p, u = rigid.Params(), rigid.Inputs((-1.0, 1.0))
-    expected = rigid.step(p, rigid.step(p, rigid.initial_state(p, u), u, 0.3), u, 0.1)
+@pytest.mark.parametrize(("lost", "made_up"), [(3.0, [1, 1, 1]), (2.25, [1, 1, 0.25])])
+def test_steps_lost_on_the_way_are_made_up_for(
+    target: Path, lost: float, made_up: list[float]
+) -> None:
+    """In steps of the length that is asked for; one long one would meet the object otherwise."""
+    p, u, h = rigid.Params(), rigid.Inputs((-2.3, 1.9)), 2**-4
+    x = rigid.initial_state(p, u)
+    at_once = rigid.step(p, rigid.step(p, x, u, lost * h), u, h)
+    for part in (*made_up, 1):
+        x = rigid.step(p, x, u, part * h)
+    assert rigid.outputs(p, x, u) != rigid.outputs(p, at_once, u)
     with Target(target) as bench:
         bench.begin()
         for k in range(3):
-            bench.client.step(0.1 * k, 0.1, bench.values(), 0)
-        request = bench.client.step(0.3, 0.1, bench.values((-1.0, 1.0)), 0)
+            bench.client.step(h * k, h, bench.values(), 0)
+        request = bench.client.step(lost * h, h, bench.values(u.force), 0)
         assert bench.ask(request) is Verdict.ANSWERED
-        assert bench.client.outputs == flat(rigid.outputs(p, expected, u))
+        assert bench.client.outputs == flat(rigid.outputs(p, x, u))
+
+
+@pytest.mark.parametrize(
+    ("time", "why"),
+    [
+        (100_001 * 2**-4, "more steps were lost than are made up for"),
+        (-(2**-4), "the time went back"),
+    ],
+)
+def test_a_step_from_elsewhere_fails(target: Path, time: float, why: str) -> None:
+    h = 2**-4
+    with Target(target) as bench:
+        bench.begin()
+        assert bench.ask(bench.client.step(time, h, bench.values(), 0)) is Verdict.REFUSED
+        assert bench.client.refusal is not None
+        assert bench.client.refusal.text == f"the peer failed: {why}"
+        bench.begin(session=2)
+        assert bench.ask(bench.client.step(0.0, h, bench.values(), 0)) is Verdict.ANSWERED
+
+
+def test_as_many_steps_are_made_up_for_as_by_the_bench_in_python() -> None:
+    assert f"#define M_MOST_LOST {float(MOST_LOST)} " in c_header("M", EVERY_KIND)
 
 
 def test_a_model_that_fails_says_why(target: Path) -> None:

@@ -25,7 +25,7 @@ NAMES = (
     "GripperPlantMovable",
     "ProximitySensor",
 )
-BEFORE, CYCLES = 1000, 2000
+BEFORE, CYCLES = 500, 1500
 """The first cycles fill caches; growth is counted from there to the last."""
 
 WARM, CALLS = 100, 500

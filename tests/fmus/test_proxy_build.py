@@ -18,11 +18,9 @@ from conftest import Load
 from fmpy.validation import validate_fmu
 from grasp_cosim import cli
 from grasp_cosim.bench.wire import wire_signature
-from grasp_cosim.cli.serve import PORT
 from grasp_cosim.system.interface import read_interface
 from grasp_fmus.c_header import c_header
 from grasp_fmus.documentation import icon
-from grasp_fmus.proxy import DEFAULTS
 
 Proxy = Callable[..., Path]
 Run = Callable[..., tuple[int, str, str]]
@@ -394,10 +392,6 @@ def test_start_values_of_its_own(fmus: Path, proxy: Proxy) -> None:
     made = variables(proxy(fmus / "ProximitySensor.fmu", *options))
     names = ("proxy.host", "proxy.port", "proxy.timeout")
     assert [made[name]["start"] for name in names] == ["192.0.2.7", 6000, 0.002]
-
-
-def test_serve_listens_where_a_proxy_asks() -> None:
-    assert DEFAULTS.port == PORT
 
 
 def test_capabilities(fmus: Path, proxy: Proxy) -> None:

@@ -174,6 +174,47 @@ def test_an_option_that_is_none_is_refused(wrong: dict[str, Any], message: str) 
         Realtime(**wrong)
 
 
+@pytest.mark.parametrize(
+    ("listed", "there"), [("0", [0]), ("0-1", [0, 1]), ("0,2-4,9", [0, 2, 3, 4, 9])]
+)
+def test_a_cpu_that_is_not_there_is_refused(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, listed: str, there: list[int]
+) -> None:
+    (tmp_path / "online").write_text(f"{listed}\n")
+    monkeypatch.setattr("grasp_cosim.realtime.options.ONLINE", tmp_path / "online")
+    valid = ", ".join(map(str, there))
+    for cpu in range(12):
+        if cpu in there:
+            assert Realtime(cpu=cpu).cpu == cpu
+            continue
+        with pytest.raises(
+            InputError, match=f"^cpu = {cpu}: no such CPU here; must be .* {valid}$"
+        ):
+            Realtime(cpu=cpu)
+
+
+def test_where_a_system_does_not_list_its_cpus_any_may_be_asked_for(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("grasp_cosim.realtime.options.ONLINE", tmp_path / "none")
+    assert Realtime(cpu=99).cpu == 99
+
+
+@pytest.mark.parametrize("engine", ["python", "auto"])
+def test_a_halted_session_does_not_wait_and_does_no_step(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, engine: Engine
+) -> None:
+    """The second step would begin only after 1000 s."""
+    mock = Mock(tmp_path, "a", lambda u, t: t)
+    monkeypatch.setattr("grasp_cosim.master.simulation.load", lambda component: mock)
+    pace = Realtime(factor=1e-4)
+    with simulate.session(make_system([mock], [], 10), engine=engine, realtime=pace) as session:
+        assert session.step()
+        session.halt.set()
+        assert not session.step()
+        assert (session.time, session.complete) == (0.1, False)
+
+
 @pytest.mark.parametrize("factor", [1e-12, 1e9])
 def test_a_period_that_no_clock_can_keep_is_refused(grasp: System, factor: float) -> None:
     with pytest.raises(InputError, match=r"a step of 0\.0001 s would begin every .* 1 ns to a yea"):

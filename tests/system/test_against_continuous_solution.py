@@ -191,8 +191,10 @@ GRASPS = st.builds(
 def test_contact_times_of_any_grasp(case: int, drawn: Grasp) -> None:
     """An error in time is one in position over the speed of approach: without a bound on the speed
     there is none on the time. Grasps that crawl to the surface, or miss it, are left out.
+
+    Steps four times as long, so four times the error, keep the same tolerance.
     """
     g = replace(drawn, case=case)
     speeds = _reference(g).closing_speed
     assume(all(speed is not None and speed >= SLOWEST for speed in speeds))
-    assert _contact_times(g, STEP) == pytest.approx(_reference_times(g), abs=TOLERANCE)
+    assert _contact_times(g, 4.0 * STEP) == pytest.approx(_reference_times(g), abs=TOLERANCE)

@@ -21,7 +21,8 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def report(grasp: System, out: Path) -> dict[str, Any]:
-    return evaluate(grasp, out, workers=2, progress=False)
+    """At 0.5 ms, where a contact time is within 1 ms of that at the published 0.1 ms."""
+    return evaluate(grasp.with_experiment(step=5e-4), out, workers=2, progress=False)
 
 
 def test_contact_times_are_within_a_tenth_of_a_second(report: dict[str, Any]) -> None:

@@ -30,7 +30,7 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def report(bench: System, out: Path) -> dict[str, Any]:
-    quiet = bench.with_values(QUIET).with_experiment(step=1e-3)
+    quiet = bench.with_values(QUIET).with_experiment(step=2e-3)
     return evaluate_bench(quiet, out, workers=2, progress=False)
 
 

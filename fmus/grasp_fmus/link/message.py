@@ -22,6 +22,8 @@ HEAD = struct.Struct(f"<4sHBB{HASH_SIZE}sQQQddqII")
 TAG_SIZE = 32
 LARGEST = 65_507
 """Bytes of a UDP datagram over IPv4."""
+PORT = 5501
+"""Where a peer listens if nobody says otherwise."""
 
 STRING_SIZE = 128
 SMALLEST_KEY = 16

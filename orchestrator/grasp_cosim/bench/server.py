@@ -5,11 +5,14 @@ import socket
 import time
 from typing import Self
 
-from grasp_fmus.link.message import LARGEST
+from grasp_fmus.link.message import LARGEST, PORT
 
 from ..system.parts import NANOSECONDS
 from .address import Address, listening, resolved, text
 from .bench import Bench, Say
+
+DEFAULT_ADDRESS: Address = ("127.0.0.1", PORT)
+"""Where a bench listens if nobody says otherwise: where a proxy looks for it."""
 
 BURST = 64
 """The most datagrams that are taken before the bench's clock is looked at again."""

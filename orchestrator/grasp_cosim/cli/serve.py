@@ -7,7 +7,7 @@ import click
 
 from ..bench.address import is_loopback, text
 from ..bench.bench import Bench, Serving
-from ..bench.server import Server
+from ..bench.server import DEFAULT_ADDRESS, Server
 from ..bench.wire import shared_key
 from ..errors import InputError
 from ..system.description import in_nanoseconds
@@ -15,14 +15,13 @@ from ..system.interface import read_interface
 from .frame import INTERRUPTED, NEGATIVE, fail, json_option, pair
 from .signals import ended_by_signals
 
-PORT = 5501
-"""Where a bench listens if nobody says otherwise."""
-
 
 @click.command()
 @click.argument("fmu", type=click.Path(path_type=Path))
-@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen at.")
-@click.option("--port", type=click.IntRange(0, 65535), default=PORT, show_default=True)
+@click.option("--host", default=DEFAULT_ADDRESS[0], show_default=True, help="Address to listen at.")
+@click.option(
+    "--port", type=click.IntRange(0, 65535), default=DEFAULT_ADDRESS[1], show_default=True
+)
 @click.option("--lockstep", is_flag=True, help="Step when asked, not by the clock.")
 @click.option("--step", type=float, help="Own step in s; default: that of the proxy.")
 @click.option(

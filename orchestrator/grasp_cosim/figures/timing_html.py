@@ -6,7 +6,7 @@ that stay as they are; only curves are in a drawing of their own, which is stret
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from html import escape
 
 from ..realtime.timing import Timing
@@ -31,6 +31,9 @@ from .timing_curves import (
     quantiles,
     unlisted,
 )
+
+MARKS = ("dot", "ring", "square")
+"""The marks of late steps, by Look.dash."""
 
 MOST_ROWS = 50
 """So many overruns are in the table."""
@@ -223,21 +226,40 @@ def _overruns(timing: Timing, end: float) -> str:
         return ""
     look = looks(timing)
     low, high = late_decades(listed)
+    by_rank = [name for name, _ in culprits(timing)]
     parts = [*_times("y", low, high), *_run_time(end), *_unlisted(timing, end)]
-    rank = {name: k for k, (name, _) in enumerate(culprits(timing))}
-    for o in sorted(listed, key=lambda o: rank[o.culprit]):  # the rarest on top
+    for o in sorted(listed, key=lambda o: by_rank.index(o.culprit)):  # the rarest on top
         x, y = _percent(o.time, end), 100.0 - 100.0 * place(o.late, low, high)
         text = (
             f"t = {number(o.time, 9)} s: {duration(o.late)} late, "
             f"{label(o.culprit)} took {duration(o.took)}"
         )
-        kind = "ring" if look[o.culprit].dash else "dot"
-        parts.append(
-            f'<circle class="{kind} {_classes(look[o.culprit])}" '
-            f'cx="{x:.2f}%" cy="{y:.2f}%" r="3"><title>{escape(text)}</title></circle>'
-        )
+        parts.append(_mark(look[o.culprit], x, y, escape(text)))
     chart = _chart("how late steps ended over the time of the run", parts)
-    return f"<figure><figcaption>How late steps ended, over the run</figcaption>{chart}</figure>"
+    caption = "How late steps ended, and what was to blame"
+    return f"<figure><figcaption>{caption}</figcaption>{chart}{_marks_key(timing, look)}</figure>"
+
+
+def _mark(look: Look, x: float, y: float, title: str) -> str:
+    """The mark of a late step, its middle in per cent; the title when the pointer is over it."""
+    kind = f"{MARKS[look.dash]} {_classes(look)}"
+    if MARKS[look.dash] == "square":
+        shape, end = f'rect x="{x:.2f}%" y="{y:.2f}%" width="6" height="6"', "rect"
+    else:
+        shape, end = f'circle cx="{x:.2f}%" cy="{y:.2f}%" r="3"', "circle"
+    return f'<{shape} class="late {kind}"><title>{title}</title></{end}>'
+
+
+def _marks_key(timing: Timing, look: Mapping[str, Look]) -> str:
+    """What the marks stand for, the most frequent first; with all their steps, listed or not."""
+    drawn = {o.culprit for o in timing.listed}
+    items = (
+        f'<li class="{MARKS[look[name].dash]} {_classes(look[name])}">'
+        f"{count(times)} × {escape(label(name))}</li>"
+        for name, times in culprits(timing)
+        if name in drawn
+    )
+    return f'<ul class="marks">{"".join(items)}</ul>'
 
 
 def _percent(t: float, end: float) -> float:

@@ -138,7 +138,9 @@ class Session:
         return self._master.steps_done == self._master.total_steps and not self._failed
 
     def step(self, steps: int = 1) -> bool:
-        """Do a number of communication steps, fewer at the end; False if none was left to do.
+        """Do a number of communication steps, fewer at the end; False if none was done.
+
+        None is where the stop time was reached before, or where halt ended the wait for the first.
 
         SimulationError, with what was recorded as its result, where an FMU fails. After that, and
         after an interruption such as Ctrl-C, the FMUs are not at one time: InputError.

@@ -4,12 +4,16 @@ import math
 from dataclasses import dataclass
 from fractions import Fraction
 from numbers import Real
+from pathlib import Path
 from typing import Literal, get_args
 
 from ..errors import InputError, choices
 
 Overrun = Literal["catch-up", "continue", "stop"]
 OVERRUNS: tuple[str, ...] = get_args(Overrun)
+
+ONLINE = Path("/sys/devices/system/cpu/online")
+"""Where Linux lists the CPUs that it runs, as in 0-3,6."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +30,7 @@ class Realtime:
     priority: int | None = None
     """Of SCHED_FIFO, 1 to 99; None leaves the scheduling as it is."""
     cpu: int | None = None
-    """The number of the CPU to stay on; None leaves it to the operating system."""
+    """The number of the CPU to stay on, one of this machine; None leaves it to the system."""
     lock_memory: bool = False
     """Keep the memory of the process from being swapped out."""
 
@@ -38,6 +42,8 @@ class Realtime:
             raise InputError(f"overrun = {self.overrun!r}: must be one of {choices(OVERRUNS)}")
         _check_whole("priority", self.priority, 1, 99)
         _check_whole("cpu", self.cpu, 0, 2**16)
+        if self.cpu is not None:
+            _check_cpu(self.cpu)
         if not isinstance(self.lock_memory, bool):
             raise InputError(f"lock_memory = {self.lock_memory!r}: must be True or False")
 
@@ -64,3 +70,15 @@ def _check_whole(name: str, value: int | None, least: int, most: int) -> None:
         return
     if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
         raise InputError(f"{name} = {value!r}: must be a whole number from {least} to {most}")
+
+
+def _check_cpu(cpu: int) -> None:
+    """InputError where Linux runs no such CPU; other systems do not list theirs."""
+    try:
+        listed = ONLINE.read_text("ascii")
+    except OSError:
+        return
+    ends = [tuple(map(int, part.split("-"))) for part in listed.split(",")]
+    online = [number for span in ends for number in range(span[0], span[-1] + 1)]
+    if cpu not in online:
+        raise InputError(f"cpu = {cpu}: no such CPU here; must be one of {choices(online)}")
