@@ -1,6 +1,7 @@
 """What several tests share: the FMUs, built once per test process, and the built-in system."""
 
 import importlib
+import importlib.util
 import shutil
 import sys
 import tempfile
@@ -15,12 +16,31 @@ from grasp_cosim import System, cli
 from grasp_cosim.grasp import SYSTEM
 from grasp_fmus import build as builder
 
+PACKAGES = {"GripperPlantMuJoCo": "mujoco"}
+"""What an FMU needs besides Python: without it, it cannot be run."""
+
 Run = Callable[..., tuple[int, str, str]]
 """A command line without its program; exit code, standard output, standard error."""
 
 Load = Callable[[str], Fmu]
 UnpackIn = Callable[[str], Path]
 Altered = Callable[[str, str, str, str], Path]
+
+
+def skip_where_it_cannot_run(name: str) -> None:
+    """Skip a test of an FMU for want of a package."""
+    if package := PACKAGES.get(name):
+        reason = f"NO {package}: {name} cannot be run; python -m pip install '.[{package}]'"
+        pytest.importorskip(package, reason=reason)
+
+
+def runnable(fmus: Path) -> list[Path]:
+    """The FMUs that can be run here."""
+    return [
+        fmu
+        for fmu in sorted(fmus.glob("*.fmu"))
+        if fmu.stem not in PACKAGES or importlib.util.find_spec(PACKAGES[fmu.stem])
+    ]
 
 
 @pytest.fixture(scope="session")
@@ -37,6 +57,7 @@ def load(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Load:
     loaded: dict[str, Fmu] = {}
 
     def fmu(name: str) -> Fmu:
+        skip_where_it_cannot_run(name)
         if name not in loaded:
             loaded[name] = Fmu(fmus / f"{name}.fmu", tmp_path_factory.mktemp(name))
         return loaded[name]
