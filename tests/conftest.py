@@ -1,7 +1,6 @@
 """What several tests share: the FMUs, built once per test process, and the built-in system."""
 
 import importlib
-import importlib.util
 import shutil
 import sys
 import tempfile
@@ -15,9 +14,7 @@ from fmi2 import Fmu
 from grasp_cosim import System, cli
 from grasp_cosim.grasp import SYSTEM
 from grasp_fmus import build as builder
-
-PACKAGES = {"GripperPlantMuJoCo": "mujoco"}
-"""What an FMU needs besides Python: without it, it cannot be run."""
+from packages import skip_where_it_cannot_run
 
 Run = Callable[..., tuple[int, str, str]]
 """A command line without its program; exit code, standard output, standard error."""
@@ -25,22 +22,6 @@ Run = Callable[..., tuple[int, str, str]]
 Load = Callable[[str], Fmu]
 UnpackIn = Callable[[str], Path]
 Altered = Callable[[str, str, str, str], Path]
-
-
-def skip_where_it_cannot_run(name: str) -> None:
-    """Skip a test of an FMU for want of a package."""
-    if package := PACKAGES.get(name):
-        reason = f"NO {package}: {name} cannot be run; python -m pip install '.[{package}]'"
-        pytest.importorskip(package, reason=reason)
-
-
-def runnable(fmus: Path) -> list[Path]:
-    """The FMUs that can be run here."""
-    return [
-        fmu
-        for fmu in sorted(fmus.glob("*.fmu"))
-        if fmu.stem not in PACKAGES or importlib.util.find_spec(PACKAGES[fmu.stem])
-    ]
 
 
 @pytest.fixture(scope="session")

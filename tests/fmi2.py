@@ -102,8 +102,8 @@ class Instance:
         """Set values and go through initialisation."""
         assert self.setup() == OK
         for name, value in values.items():
-            set_one = self.switch if name in self.fmu.booleans else self.set
-            assert set_one({name: value}) == OK
+            flag = name in self.fmu.booleans
+            assert (self.switch({name: bool(value)}) if flag else self.set({name: value})) == OK
         assert (self.enter(), self.exit()) == (OK, OK)
         return self
 

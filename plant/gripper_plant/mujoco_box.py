@@ -229,8 +229,7 @@ def _timesteps(p: Params, x: State, forces: Pair, h: float) -> int:
     wanted = h / p.timestep
     if wanted > MOST_TIMESTEPS:
         raise ArithmeticError(
-            f"{wanted:g} timesteps of MuJoCo of {p.timestep:g} s: must be at most "
-            f"{MOST_TIMESTEPS}"
+            f"{wanted:g} timesteps of MuJoCo of {p.timestep:g} s: must be at most {MOST_TIMESTEPS}"
         )
     n = max(1, ceil(wanted - 1e-9))
     radius = p.fingertip_radius

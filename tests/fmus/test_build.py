@@ -21,7 +21,7 @@ NAMES = [
 ]
 FMUS = [f"{name}.fmu" for name in NAMES]
 CHECKED = [name for name in NAMES if name != "GripperPlantMuJoCo"]
-"""Those with cross-check files: the other needs a package, and it is that which they would check."""
+"""Those with cross-check files; of the other they would check the package that it needs."""
 
 FILES = sorted(
     [*FMUS, *(f"{name}{end}" for name in CHECKED for end in ("_in.csv", "_ref.csv", "_ref.opt"))]

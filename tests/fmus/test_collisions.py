@@ -11,8 +11,9 @@ from pathlib import Path
 from zipfile import ZipFile
 
 import pytest
-from conftest import Altered, Load, runnable
+from conftest import Altered, Load
 from fmi2 import OK, Fmu, Instance
+from packages import runnable
 
 TESTS = Path(__file__).parents[1]
 ROOT = TESTS.parent

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import skip_where_it_cannot_run
 from fmi2 import ERROR, OK, Fmu, Instance
+from packages import skip_where_it_cannot_run
 
 NAMES = (
     "GraspController",

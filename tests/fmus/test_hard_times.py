@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 from fmi2 import ERROR, OK, Fmu, Instance
+from packages import runnable
 
 ROUNDS = 10
 MANY = 200

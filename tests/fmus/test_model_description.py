@@ -19,12 +19,13 @@ from zipfile import ZipFile
 
 import fmpy
 import pytest
-from conftest import Load, skip_where_it_cannot_run
+from conftest import Load
 from fmi2 import OK, Instance
 from fmpy.validation import validate_fmu
 from grasp_controller import series
 from gripper_plant import compliant, movable, mujoco_box, rigid
 from lxml import etree  # type: ignore[import-untyped]
+from packages import skip_where_it_cannot_run
 from proximity_sensor import channel
 
 BLOCKS: dict[str, ModuleType] = {

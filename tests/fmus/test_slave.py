@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import skip_where_it_cannot_run
 from fmpy import extract, read_model_description, simulate_fmu
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
 from grasp_controller import series
 from gripper_plant import compliant, movable, mujoco_box, rigid
+from packages import skip_where_it_cannot_run
 from proximity_sensor import channel
 
 BLOCKS: dict[str, Any] = {
