@@ -180,13 +180,16 @@ def mjcf(p: Params) -> str:
     b, a = _halves(p)
     r, h, m, mu = p.fingertip_radius, p.contact_height, p.object_mass, p.floor_friction
     turning = m * (a * a + b * b) / 3.0
-    softness = f'"{p.contact_time_constant!r} 1" solimp="{IMPEDANCE!r} {IMPEDANCE!r} 1"'
-    fingers_ = "".join(
+    contact, rubbing = (
+        f'solref{of}="{p.contact_time_constant!r} 1" solimp{of}="{IMPEDANCE!r} {IMPEDANCE!r} 1"'
+        for of in ("", "friction")
+    )
+    hand = "".join(
         f"""
     <body pos="0 0 {h!r}">
       <inertial pos="0 0 0" mass="{mass!r}" diaginertia="1 1 1"/>
       <joint type="slide" axis="1 0 0" damping="{viscous!r}" frictionloss="{coulomb!r}"
-        solreffriction={softness.replace("solimp", "solimpfriction")}/>
+        {rubbing}/>
       <geom name="finger {j}" type="sphere" pos="{side * r!r} 0 0" size="{r!r}"/>
     </body>"""
         for j, side, mass, viscous, coulomb in (
@@ -211,15 +214,15 @@ def mjcf(p: Params) -> str:
     <geom contype="0" conaffinity="0"/>
   </default>
   <worldbody>
-    <geom name="floor" type="plane" size="1 1 1"/>{fingers_}
+    <geom name="floor" type="plane" size="1 1 1"/>{hand}
     <body pos="{place}">{"" if p.object_fixed else moving}
       <geom name="box" type="box" size="{b!r} {a!r} {a!r}"/>
     </body>
   </worldbody>
   <contact>
-    <pair geom1="finger 1" geom2="box" condim="1" solref={softness}/>
-    <pair geom1="finger 2" geom2="box" condim="1" solref={softness}/>
-    <pair geom1="floor" geom2="box" condim="3" friction="{mu!r} {mu!r}" solref={softness}/>
+    <pair geom1="finger 1" geom2="box" condim="1" {contact}/>
+    <pair geom1="finger 2" geom2="box" condim="1" {contact}/>
+    <pair geom1="floor" geom2="box" condim="3" friction="{mu!r} {mu!r}" {contact}/>
   </contact>
 </mujoco>"""
 

@@ -12,6 +12,7 @@ import subprocess
 import sys
 from collections import Counter
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -114,12 +115,18 @@ def cycle(fmu: Fmu, k: int) -> None:
             assert instance.call("Terminate") == OK
 
 
+@cache
+def _mallinfo() -> Callable[[], Any]:
+    """Loaded once: each loading makes a class, for which Python's own tables grow at times."""
+    function = ctypes.CDLL(None).mallinfo2
+    function.restype = _Malloc
+    return function
+
+
 def memory() -> dict[str, int]:
     """What Python's own objects and malloc hold."""
     gc.collect()
-    libc = ctypes.CDLL(None)
-    libc.mallinfo2.restype = _Malloc
-    malloc = libc.mallinfo2()
+    malloc = _mallinfo()()
     return {"blocks": sys.getallocatedblocks(), "malloc": malloc.uordblks + malloc.hblkhd}
 
 

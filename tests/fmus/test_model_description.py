@@ -533,13 +533,17 @@ SWITCHES: dict[str, list[dict[str, bool]]] = {
 }
 
 
+DRAWS = {"GripperPlantMuJoCo": 1}
+"""Parameters that are drawn, where not five: each change of one is a model to compile."""
+
+
 def moments(name: str) -> Iterator[tuple[Any, Any, Any]]:
     """Parameters, state and inputs of a block, at the start and under way."""
     skip_where_it_cannot_run(name)
     block: Any = BLOCKS[name]
     rng = random.Random(name)
     for switches in SWITCHES[name]:
-        for p in (params_at_random(block, rng, switches) for _ in range(5)):
+        for p in (params_at_random(block, rng, switches) for _ in range(DRAWS.get(name, 5))):
             u = inputs_at_random(block, rng)
             x = block.initial_state(p, u)
             yield p, x, u
