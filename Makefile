@@ -28,7 +28,7 @@ bench: .venv/dev
 	$(BIN)/python -m benchmarks.masters
 
 cards: .venv/run
-	$(BIN)/python -m grasp_fmus.cards plant/README.md=gripper_plant.rigid,gripper_plant.compliant,gripper_plant.movable \
+	$(BIN)/python -m grasp_fmus.cards plant/README.md=gripper_plant.rigid,gripper_plant.compliant,gripper_plant.movable,gripper_plant.mujoco_box \
 		sensor/README.md=proximity_sensor.channel controller/README.md=grasp_controller.series
 
 .venv/run: pyproject.toml constraints.txt

@@ -61,6 +61,19 @@ def gripper_plant_movable(axes: Axes) -> None:
     _arrow(axes, 56, 92, 46, 0, RED, 16)
 
 
+def gripper_plant_mujoco(axes: Axes) -> None:
+    """The object as a mesh, as a simulator of bodies shows it."""
+    _gripper(axes)
+    _box(axes, 84, 24, 88, 108, AMBER)
+    for y in (78, 114):
+        axes.plot([102, 154], [y, y - 36], color=WHITE, lw=6, solid_capstyle="round")
+    frame = [(102, 42), (154, 42), (154, 114), (102, 114)]
+    axes.add_patch(Polygon(frame, fill=False, edgecolor=WHITE, lw=6, joinstyle="round"))
+    axes.plot([102, 154], [78, 78], color=WHITE, lw=6, solid_capstyle="round")
+    _arrow(axes, 56, 78, 26, 0, RED, 16)
+    _arrow(axes, 200, 78, -26, 0, BLUE, 16)
+
+
 def proximity_sensor(axes: Axes) -> None:
     """The face of a sensor, its cone of light on a surface, a ray that comes back."""
     axes.add_patch(Polygon([(62, 178), (210, 236), (210, 84)], color=AMBER, alpha=0.5, lw=0))
@@ -98,6 +111,7 @@ ICONS: dict[str, Callable[[Axes], None]] = {
     "GripperPlant": gripper_plant,
     "GripperPlantCompliant": gripper_plant_compliant,
     "GripperPlantMovable": gripper_plant_movable,
+    "GripperPlantMuJoCo": gripper_plant_mujoco,
     "ProximitySensor": proximity_sensor,
     "GraspController": grasp_controller,
     "Proxy": proxy,

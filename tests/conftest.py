@@ -14,6 +14,7 @@ from fmi2 import Fmu
 from grasp_cosim import System, cli
 from grasp_cosim.grasp import SYSTEM
 from grasp_fmus import build as builder
+from packages import skip_where_it_cannot_run
 
 Run = Callable[..., tuple[int, str, str]]
 """A command line without its program; exit code, standard output, standard error."""
@@ -37,6 +38,7 @@ def load(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Load:
     loaded: dict[str, Fmu] = {}
 
     def fmu(name: str) -> Fmu:
+        skip_where_it_cannot_run(name)
         if name not in loaded:
             loaded[name] = Fmu(fmus / f"{name}.fmu", tmp_path_factory.mktemp(name))
         return loaded[name]

@@ -101,7 +101,9 @@ class Instance:
     def initialise(self, **values: float) -> "Instance":
         """Set values and go through initialisation."""
         assert self.setup() == OK
-        assert [self.set({name: value}) for name, value in values.items()] == [OK] * len(values)
+        for name, value in values.items():
+            flag = name in self.fmu.booleans
+            assert (self.switch({name: bool(value)}) if flag else self.set({name: value})) == OK
         assert (self.enter(), self.exit()) == (OK, OK)
         return self
 
@@ -110,6 +112,10 @@ class Instance:
 
     def set(self, values: dict[str, float]) -> int:
         return self.set_real([self.fmu.references[name] for name in values], values.values())
+
+    def switch(self, values: dict[str, bool]) -> int:
+        """Set Boolean variables."""
+        return self.set_boolean([self.fmu.references[name] for name in values], values.values())
 
     def set_real(self, references: Sequence[int], values: Iterable[float]) -> int:
         n = len(references)

@@ -12,7 +12,7 @@ ROOT = Path(__file__).parent.parent
 @pytest.mark.parametrize(
     ("folder", "package", "blocks"),
     [
-        ("plant", "gripper_plant", ["rigid", "compliant", "movable"]),
+        ("plant", "gripper_plant", ["rigid", "compliant", "movable", "mujoco_box"]),
         ("sensor", "proximity_sensor", ["channel"]),
         ("controller", "grasp_controller", ["series"]),
     ],

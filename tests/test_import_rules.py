@@ -48,7 +48,14 @@ def test_a_block_imports_the_standard_library_only(folder: str, package: str) ->
         for file, name in imports(ROOT / folder / package)
         if name not in sys.stdlib_module_names
     }
-    assert not foreign
+    assert foreign == ({("mujoco_box.py", "mujoco")} if package == "gripper_plant" else set())
+
+
+def test_mujoco_is_imported_where_it_is_used_and_not_before() -> None:
+    tree = ast.parse((ROOT / "plant/gripper_plant/mujoco_box.py").read_text("utf-8"))
+    at_once = [node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)]
+    assert at_once
+    assert not [node for node in at_once if "import mujoco" in ast.unparse(node)]
 
 
 def test_the_orchestrator_imports_no_physics_and_no_pythonfmu() -> None:
@@ -79,6 +86,7 @@ def test_the_fmu_adapter_knows_no_physics_but_for_the_scripts() -> None:
         ("GripperPlant.py", "gripper_plant"),
         ("GripperPlantCompliant.py", "gripper_plant"),
         ("GripperPlantMovable.py", "gripper_plant"),
+        ("GripperPlantMuJoCo.py", "gripper_plant"),
         ("ProximitySensor.py", "proximity_sensor"),
         ("GraspController.py", "grasp_controller"),
     }

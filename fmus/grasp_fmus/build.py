@@ -58,12 +58,15 @@ def build(out: Path, bind_python: str | None = None) -> list[Built]:
     """Build the FMUs into the folder out, in alphabetical order, with their cross-check files.
 
     bind_python is a Python executable to whose libpython the FMUs are bound, for hosts that are not
-    Python. An FMU that is there already with the same content is left alone.
+    Python. An FMU that is there already with the same content is left alone. One that needs other
+    packages has no cross-check files: it would be these that they check, and only where they are.
     """
     built = []
     for script in sorted(SCRIPTS.glob("*.py")):
         built.append(build_fmu(script, out, bind_python))
-        for name, data in cross_check_files(script.stem, _slave(script).block).items():
+        slave = _slave(script)
+        files = {} if slave.requires else cross_check_files(script.stem, slave.block)
+        for name, data in files.items():
             if not (out / name).is_file() or (out / name).read_bytes() != data:
                 write_file(out / name, data)
     return built
@@ -80,6 +83,7 @@ def build_fmu(script: Path, out: Path, bind_python: str | None = None) -> Built:
         _card(slave.block),
         metadata.version("grasp-cosim"),
         bound_library(bind_python),
+        requires=slave.requires,
     )
     template = members(description, html, icon(name), _sources(script), bind_python)
     return write_fmu(template, out / f"{name}.fmu")

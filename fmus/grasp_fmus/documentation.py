@@ -42,7 +42,7 @@ td:first-child { white-space: nowrap; }
 $card
 <h2>How the host must find Python</h2>
 <p>This FMU runs Python code inside the binary of pythonfmu, in the process of the host: 64 bit, on
-Linux or Windows, Python 3.11 or newer. No packages need to be installed.</p>
+Linux or Windows, Python 3.11 or newer. $packages</p>
 <table>
 <thead>
 <tr><th>host</th><th>what it needs</th></tr>
@@ -118,10 +118,12 @@ def page(
     version: str,
     library: Path | None = None,
     making: Making = BLOCK,
+    requires: Sequence[str] = (),
 ) -> str:
     """documentation/index.html of the FMU name, from its card in Markdown.
 
-    library is the libpython to which the FMU is bound, if it is.
+    library is the libpython to which the FMU is bound, if it is; requires are the extras of
+    grasp-cosim, each called as its package, that it needs in the host's Python.
 
     The page stands alone: links and pictures of the card point to nothing in an FMU and come out as
     their text, HTML in it as it is written. The result is XML as well.
@@ -136,8 +138,19 @@ def page(
             if library
             else Template(_ANY).substitute(command=making.command)
         ),
+        packages=_packages(requires),
         steps=making.steps,
         states=making.states,
+    )
+
+
+def _packages(requires: Sequence[str]) -> str:
+    if not requires:
+        return "No packages need to be installed."
+    extras = escape(",".join(requires))
+    return (
+        f"That Python must have the package <code>{extras}</code>; "
+        f"<code>python -m pip install 'grasp-cosim[{extras}]'</code> installs it."
     )
 
 

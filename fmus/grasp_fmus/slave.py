@@ -5,7 +5,7 @@ they agree with the inputs in initialisation mode and after every set.
 """
 
 from math import inf, isfinite
-from typing import Any
+from typing import Any, ClassVar
 
 from .base import (
     INSTANTIATED,
@@ -24,6 +24,8 @@ class Fmi2Slave(Slave):
     """A block as an FMI 2.0 co-simulation slave; a subclass names the block."""
 
     block: Block
+    requires: ClassVar[tuple[str, ...]] = ()
+    """Packages that the block imports when its first state is made; not packed."""
 
     def _prepare(self) -> None:
         self._fields = declared(self.block)
@@ -38,13 +40,14 @@ class Fmi2Slave(Slave):
             packer(self.block.Inputs, self._fields),
             unpacker(self._fields),
         )
-        self._state = self.block.initial_state(self.block.Params(), self.block.Inputs())
+        self._state = self._initial_state(self.block.Params(), self.block.Inputs())
         self._enter(INSTANTIATED)
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Advance the block by step_size seconds with the inputs as they are.
 
-        Returns False, and stays where it is, if the outputs would not be finite.
+        Returns False, and stays where it is, if the outputs would not be finite, or if the block
+        gives a reason of its own: a plain ArithmeticError.
         """
         try:
             if not (
@@ -63,9 +66,11 @@ class Fmi2Slave(Slave):
                 state = step(params, self._state, inputs, step_size)
                 values = unpack(evaluate(params, state, inputs))
             except ArithmeticError as error:
-                return self._discard(step_size, f"{type(error).__name__}: {error}")
+                own = type(error) is ArithmeticError
+                fault = f"{type(error).__name__}: {error}: must be finite"
+                return self._discard(step_size, str(error) if own else fault)
             if not isfinite(sum(values)) and (text := self._not_finite(values)):
-                return self._discard(step_size, text)
+                return self._discard(step_size, f"{text}: must be finite")
         except BaseException as error:
             raise self._reported(error) from None
         self._state = state
@@ -122,7 +127,7 @@ class Fmi2Slave(Slave):
 
     def _discard(self, step_size: float, text: str) -> bool:
         self._inputs = None
-        self._log(DISCARD, f"step of {step_size} s: {text}: must be finite")
+        self._log(DISCARD, f"step of {step_size} s: {text}")
         return False
 
     # The block
@@ -131,12 +136,18 @@ class Fmi2Slave(Slave):
         """Work out the outputs; before the end of initialisation the initial state as well."""
         self._read()
         if self._phase < STEPPING:
-            self._state = self.block.initial_state(self._params, self._inputs)
+            self._state = self._initial_state(self._params, self._inputs)
         _, evaluate, _, unpack = self._functions
         values = unpack(evaluate(self._params, self._state, self._inputs))
         if not isfinite(sum(values)) and (text := self._not_finite(values)):
             raise RefusalError(f"{text}: must be finite")
         self._values[self._outputs] = values
+
+    def _initial_state(self, params: Any, inputs: Any) -> Any:
+        try:
+            return self.block.initial_state(params, inputs)
+        except ImportError as error:
+            raise RefusalError(str(error)) from error
 
     def _read(self) -> None:
         """Params and Inputs from the list of values."""

@@ -13,6 +13,7 @@ from zipfile import ZipFile
 import pytest
 from conftest import Altered, Load
 from fmi2 import OK, Fmu, Instance
+from packages import runnable
 
 TESTS = Path(__file__).parents[1]
 ROOT = TESTS.parent
@@ -23,6 +24,7 @@ BLOCKS = {
     "GripperPlant": ROOT / "plant" / "gripper_plant",
     "GripperPlantCompliant": ROOT / "plant" / "gripper_plant",
     "GripperPlantMovable": ROOT / "plant" / "gripper_plant",
+    "GripperPlantMuJoCo": ROOT / "plant" / "gripper_plant",
     "ProximitySensor": ROOT / "sensor" / "proximity_sensor",
 }
 ADAPTER = ROOT / "fmus" / "grasp_fmus"
@@ -88,7 +90,8 @@ def test_a_packed_module_imports_the_standard_library_and_packed_ones(
         for module in imports(ast.parse(text, file))
     }
     ours = {module for module in imported if module not in sys.stdlib_module_names}
-    assert ours == {f"{BLOCKS[name].name}_{content}", f"grasp_fmus_{content}"}
+    at_need = {"mujoco"} if BLOCKS[name].name == "gripper_plant" else set()
+    assert ours == {f"{BLOCKS[name].name}_{content}", f"grasp_fmus_{content}", *at_need}
 
 
 def imports(tree: ast.AST) -> Iterator[str]:
@@ -122,6 +125,11 @@ PARAMETERS: dict[str, list[dict[str, float]]] = {
         {},
         {"object_mass": 0.2, "floor_friction": 0.6, "initial_object_position": 0.0},
         {"finger_mass[2]": 0.2, "friction.static[1]": 0.5},
+    ],
+    "GripperPlantMuJoCo": [
+        {"object_fixed": False},
+        {"object_mass": 0.2, "floor_friction": 0.6, "initial_object_position": 0.0},
+        {"finger_mass[2]": 0.2, "friction.coulomb[1]": 0.5},
     ],
     "ProximitySensor": [{}, {"reflectance": 0.3}, {"gain": 0.01, "diffusion_exponent": 2.0}],
 }
@@ -224,13 +232,14 @@ import proximity_sensor.optics
 import grasp_controller.series
 import grasp_fmus.slave, grasp_fmus.contract, grasp_fmus.snapshot, grasp_fmus.host_log
 sys.path.insert(0, str(Path(grasp_fmus.__file__).parent / "scripts"))
-import GraspController, GripperPlant, GripperPlantCompliant, GripperPlantMovable, ProximitySensor
+import GraspController, GripperPlant, GripperPlantCompliant, GripperPlantMovable
+import GripperPlantMuJoCo, ProximitySensor
 MODULES = {
     name: module for name, module in sys.modules.items()
     if name.partition(".")[0] in (
         "gripper_plant", "proximity_sensor", "grasp_controller", "grasp_fmus",
         "GraspController", "GripperPlant", "GripperPlantCompliant", "GripperPlantMovable",
-        "ProximitySensor",
+        "GripperPlantMuJoCo", "ProximitySensor",
     )
 }
 assert len(MODULES) > 15
@@ -280,7 +289,7 @@ def plain(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
     """The results in a host that has imported nothing of ours."""
     nothing = 'assert not {m for m in sys.modules if m.startswith(("grasp", "gripper", "prox"))}'
     folder = tmp_path_factory.mktemp("plain")
-    printed = run(HOST.format(before=nothing), folder, *sorted(fmus.glob("*.fmu")))
+    printed = run(HOST.format(before=nothing), folder, *runnable(fmus))
     assert len(set(printed.splitlines())) > 250
     return printed
 
@@ -289,7 +298,7 @@ def plain(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
 def test_a_host_does_not_change_what_an_fmu_computes(
     fmus: Path, plain: str, tmp_path: Path, host: str
 ) -> None:
-    printed = run(HOST.format(before=HOSTS[host]), tmp_path, *sorted(fmus.glob("*.fmu")))
+    printed = run(HOST.format(before=HOSTS[host]), tmp_path, *runnable(fmus))
     assert printed == plain
 
 

@@ -20,6 +20,7 @@ BLOCKS = {
     "GripperPlant": ("plant", "gripper_plant.rigid"),
     "GripperPlantCompliant": ("plant", "gripper_plant.compliant"),
     "GripperPlantMovable": ("plant", "gripper_plant.movable"),
+    "GripperPlantMuJoCo": ("plant", "gripper_plant.mujoco_box"),
     "ProximitySensor": ("sensor", "proximity_sensor.channel"),
     "GraspController": ("controller", "grasp_controller.series"),
 }
@@ -158,6 +159,13 @@ def test_the_page_stands_alone(html: str) -> None:
     assert "<!--" not in html
     assert "&lt;!--" not in html
     assert set(links(html)) == {f"licenses/{file}" for file in licences()}
+
+
+def test_packages_that_the_host_must_have_are_named() -> None:
+    html = page("Name", "Summary", "", "1.2.3", requires=("one", "two"))
+    section = sections(html)["How the host must find Python"]
+    assert "must have the package one,two; python -m pip install 'grasp-cosim[one,two]'" in section
+    assert "No packages" not in section
 
 
 def test_headings_go_down_a_level() -> None:

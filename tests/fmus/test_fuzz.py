@@ -19,6 +19,7 @@ NAMES = (
     "GripperPlant",
     "GripperPlantCompliant",
     "GripperPlantMovable",
+    "GripperPlantMuJoCo",
     "ProximitySensor",
     "GraspController",
 )

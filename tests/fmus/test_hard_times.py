@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 from fmi2 import ERROR, OK, Fmu, Instance
+from packages import runnable
 
 ROUNDS = 10
 MANY = 200
@@ -106,7 +107,7 @@ HOSTS: dict[str, Any] = {
 @pytest.mark.parametrize("host", HOSTS)
 def test_the_host_lives(fmus: Path, tmp_path: Path, host: str) -> None:
     done = subprocess.run(
-        [sys.executable, __file__, host, tmp_path, *sorted(fmus.glob("*.fmu"))],
+        [sys.executable, __file__, host, tmp_path, *runnable(fmus)],
         env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])},
         capture_output=True, text=True, timeout=120,
     )  # fmt: skip

@@ -24,8 +24,9 @@ from conftest import Load
 from fmi2 import OK, Instance
 from fmpy.validation import validate_fmu
 from grasp_controller import series
-from gripper_plant import compliant, movable, rigid
+from gripper_plant import compliant, movable, mujoco_box, rigid
 from lxml import etree  # type: ignore[import-untyped]
+from packages import skip_where_it_cannot_run
 from proximity_sensor import channel
 from proximity_sensor.surfaces import Surface
 
@@ -34,6 +35,7 @@ BLOCKS: dict[str, ModuleType] = {
     "GripperPlant": rigid,
     "GripperPlantCompliant": compliant,
     "GripperPlantMovable": movable,
+    "GripperPlantMuJoCo": mujoco_box,
     "ProximitySensor": channel,
 }
 SCHEMA = Path(fmpy.__file__).parent / "schema" / "fmi2" / "fmi2ModelDescription.xsd"
@@ -373,6 +375,7 @@ PAPER = {
     "GripperPlant": PLANT,
     "GripperPlantCompliant": PLANT,
     "GripperPlantMovable": PLANT,
+    "GripperPlantMuJoCo": PLANT,
     "ProximitySensor": {
         "gap": "l",
         "intensity": "xi",
@@ -512,7 +515,7 @@ def inputs_at_random(block: Any, rng: random.Random) -> Any:
     return u
 
 
-def params_at_random(block: Any, rng: random.Random, **switches: bool) -> Any:
+def params_at_random(block: Any, rng: random.Random, switches: dict[str, bool]) -> Any:
     """Around the start values, within what the block accepts."""
     p = block.Params()
     for name, start in scalars(p).items():
@@ -522,32 +525,42 @@ def params_at_random(block: Any, rng: random.Random, **switches: bool) -> Any:
         except ValueError:
             continue
     for name, on in switches.items():
-        p = with_scalar(p, f"{name}.enabled", on)
+        p = with_scalar(p, name, on)
     return p
 
 
 SWITCHES: dict[str, list[dict[str, bool]]] = {
     "GraspController": [
-        {"simultaneous_contact": a, "impact_reduction": b}
+        {"simultaneous_contact.enabled": a, "impact_reduction.enabled": b}
         for a in (False, True)
         for b in (False, True)
     ],
     "GripperPlant": [{}],
-    "GripperPlantCompliant": [{"hunt_crossley": on} for on in (False, True)],
-    "GripperPlantMovable": [{"hunt_crossley": on} for on in (False, True)],
+    "GripperPlantCompliant": [{"hunt_crossley.enabled": on} for on in (False, True)],
+    "GripperPlantMovable": [{"hunt_crossley.enabled": on} for on in (False, True)],
+    "GripperPlantMuJoCo": [{"object_fixed": on} for on in (False, True)],
     "ProximitySensor": [
-        {"pattern": a, "ambient": b, "noise": b, "adc": b, "filter": b, "median": c}
+        {
+            "pattern.enabled": a,
+            **{f"{stage}.enabled": b for stage in ("ambient", "noise", "adc", "filter")},
+            "median.enabled": c,
+        }
         for a, b, c in ((False, False, False), (True, False, False), (True, True, False))
     ],
 }
 
 
+DRAWS = {"GripperPlantMuJoCo": 1}
+"""Parameters that are drawn, where not five: each change of one is a model to compile."""
+
+
 def moments(name: str) -> Iterator[tuple[Any, Any, Any]]:
     """Parameters, state and inputs of a block, at the start and under way."""
+    skip_where_it_cannot_run(name)
     block: Any = BLOCKS[name]
     rng = random.Random(name)
     for switches in SWITCHES[name]:
-        for p in (params_at_random(block, rng, **switches) for _ in range(5)):
+        for p in (params_at_random(block, rng, switches) for _ in range(DRAWS.get(name, 5))):
             u = inputs_at_random(block, rng)
             x = block.initial_state(p, u)
             yield p, x, u
@@ -626,9 +639,7 @@ def test_the_fmu_depends_on_what_it_declares(load: Load, root: Element, name: st
     rng = random.Random(1)
     for switches in SWITCHES[name]:
         with Instance(fmu) as instance:
-            for layer, on in switches.items():
-                reference = fmu.references[f"{layer}.enabled"]
-                assert instance.set_boolean([reference], [on]) == OK
+            assert instance.switch(switches) == OK
             assert (instance.setup(), instance.enter()) == (OK, OK)
             seen = [("InitialUnknowns", responses(instance))]
             assert instance.exit() == OK

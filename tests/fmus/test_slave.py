@@ -9,13 +9,15 @@ from fmpy import extract, read_model_description, simulate_fmu
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
 from grasp_controller import series
-from gripper_plant import compliant, movable, rigid
+from gripper_plant import compliant, movable, mujoco_box, rigid
+from packages import skip_where_it_cannot_run
 from proximity_sensor import channel
 
 BLOCKS: dict[str, Any] = {
     "GripperPlant": rigid,
     "GripperPlantCompliant": compliant,
     "GripperPlantMovable": movable,
+    "GripperPlantMuJoCo": mujoco_box,
     "ProximitySensor": channel,
     "GraspController": series,
 }
@@ -53,6 +55,7 @@ class Host:
 
 @pytest.mark.parametrize("name", BLOCKS)
 def test_runs_in_plain_fmpy(fmus: Path, name: str) -> None:
+    skip_where_it_cannot_run(name)
     result: Any = simulate_fmu(fmus / f"{name}.fmu", stop_time=0.01, validate=True)
     assert len(result) > 10
     assert all(np.isfinite(result[column]).all() for column in result.dtype.names)
@@ -137,6 +140,7 @@ def test_a_host_outlives_what_a_block_refuses(fmus: Path, tmp_path: Path) -> Non
 def test_start_values_are_those_of_the_block(
     fmus: Path, tmp_path: Path, name: str, block: Any
 ) -> None:
+    skip_where_it_cannot_run(name)
     with Host(fmus / f"{name}.fmu", tmp_path) as host:
         host.slave.enterInitializationMode()
         u = block.Inputs()

@@ -14,16 +14,18 @@ NAMES = (
     "GripperPlant",
     "GripperPlantCompliant",
     "GripperPlantMovable",
+    "GripperPlantMuJoCo",
     "ProximitySensor",
     "GraspController",
 )
 
-PLANTS = NAMES[:3]
+PLANTS = NAMES[:4]
 
 PARAMETERS = {
     "GripperPlant": {"finger_mass[1]": 0.7, "object_width": 0.06},
     "GripperPlantCompliant": {"finger_mass[1]": 0.7, "kelvin_voigt.stiffness": 800.0},
     "GripperPlantMovable": {"object_mass": 0.04, "friction.coulomb[2]": 0.1},
+    "GripperPlantMuJoCo": {"object_mass": 0.04, "object_fixed": False, "friction.coulomb[2]": 0.1},
     "ProximitySensor": {"offset_distance": 0.006},
     "GraspController": {"contact_force.stiffness": 90.0, "impact_reduction.mass": 1.3},
 }

@@ -179,6 +179,7 @@ def test_our_controller(fmus: Path) -> None:
         "GripperPlant",
         "GripperPlantCompliant",
         "GripperPlantMovable",
+        "GripperPlantMuJoCo",
         "ProximitySensor",
         "GraspController",
     ],

@@ -218,6 +218,7 @@ def test_build_names_what_it_built(command: Run, tmp_path: Path) -> None:
         "GripperPlant.fmu",
         "GripperPlantCompliant.fmu",
         "GripperPlantMovable.fmu",
+        "GripperPlantMuJoCo.fmu",
         "ProximitySensor.fmu",
     ]
     assert all((tmp_path / p).is_file() for p in built)
@@ -231,7 +232,7 @@ def test_the_built_in_grasp_builds_its_fmus(tmp_path: Path) -> None:
     assert json.loads(done.stdout)["steps"] == 100
     assert sorted(p.name for p in (tmp_path / "fmus/build").glob("*.fmu")) == [
         "GraspController.fmu", "GripperPlant.fmu", "GripperPlantCompliant.fmu",
-        "GripperPlantMovable.fmu", "ProximitySensor.fmu",
+        "GripperPlantMovable.fmu", "GripperPlantMuJoCo.fmu", "ProximitySensor.fmu",
     ]  # fmt: skip
 
 

@@ -48,6 +48,10 @@ print("freed")
 """
 
 
+_REPEATED = re.compile(r"^\[FATAL\] .*\nfailed, for the reason logged before\n", re.MULTILINE)
+"""What pythonfmu adds to the reason that an FMU of ours gives."""
+
+
 @dataclass(frozen=True, slots=True)
 class Finding:
     """What one check found; fix is a command or an instruction to copy."""
@@ -354,6 +358,7 @@ def trial(fmu: Unpacked, timeout: float = 60.0) -> Verdict:
     arguments = ["-u", "-c", _TRIAL, str(fmu.folder), fmu.guid, fmu.binary.stem]
     code, said = _run(sys.executable, *arguments, timeout=timeout, cwd=fmu.folder)
     said = said.replace(f"{fmu.folder}/", "").replace("Failed to instantiate model\n", "")
+    said = _REPEATED.sub("", said)
     last = ["", *filter(None, map(str.strip, said.splitlines()))][-1]
     if code is None:
         return "problem", f"does not load and instantiate within {timeout:g} s", None

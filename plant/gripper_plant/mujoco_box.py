@@ -1,0 +1,308 @@
+"""Two-finger parallel gripper and a box, computed by MuJoCo: a contact that is none of ours.
+
+The box is fixed, as in rigid.py, or stands free on a floor, as in movable.py. Signs as in
+fingers.py; tilt > 0 is over the right edge. mujoco is imported when the first state is made, so
+that all else works without it. Card: plant/README.md
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from math import atan2, ceil, cos, hypot, sin
+from typing import Annotated, Any, NamedTuple
+
+from . import fingers
+from .fingers import Inputs as Inputs
+from .fingers import Pair as Pair
+
+GRAVITY = 9.80665
+"""m/s^2."""
+
+IMPEDANCE = 0.9999
+"""MuJoCo's d of every constraint: the share of a force that it answers before it gives."""
+
+THINNEST = 1e-9
+"""m; half the width that a box without one has in MuJoCo."""
+
+MOST_TIMESTEPS = 100_000
+"""In a communication step."""
+
+MISSING = (
+    "mujoco is not installed in the Python that runs this plant; "
+    "must be: python -m pip install 'grasp-cosim[mujoco]'"
+)
+
+Coordinates = tuple[float, float, float, float, float]
+"""Of finger 1, of finger 2 (x); of the middle of the box (x, z), in m; its tilt in rad."""
+
+
+@dataclass(frozen=True, slots=True)
+class Params(fingers.Params):
+    """Parameters; a value outside its declared range raises ValueError."""
+
+    object_fixed: Annotated[bool, "", "the object is fixed; off, it stands free on a floor"] = True
+    object_mass: Annotated[float, "kg", "m, mass of the object", (1e-3, 1e3)] = 0.05
+    object_height: Annotated[float, "m", "H, height of the object", (1e-3, 10.0)] = 0.1
+    contact_height: Annotated[
+        float, "m", "h, height of the fingertips above the floor", (0.0, 10.0)
+    ] = 0.05
+    floor_friction: Annotated[float, "1", "mu, friction of the object on the floor", (0.0, 1.0)] = (
+        0.3
+    )
+    fingertip_radius: Annotated[float, "m", "R, radius of the fingertips", (1e-4, 1.0)] = 0.005
+    contact_time_constant: Annotated[
+        float, "s", "T, time constant in which a contact settles", (2e-5, 0.1)
+    ] = 0.005
+    timestep: Annotated[float, "s", "longest timestep of MuJoCo", (1e-5, 1e-3)] = 1e-4
+
+    def __post_init__(self) -> None:
+        fingers.Params.__post_init__(self)
+        if self.contact_height > self.object_height:
+            raise ValueError(
+                f"contact_height = {self.contact_height!r} m: must be from 0 to object_height, "
+                f"{self.object_height:g}"
+            )
+        if self.contact_time_constant < 2.0 * self.timestep:
+            raise ValueError(
+                f"contact_time_constant = {self.contact_time_constant!r} s: must be from twice the "
+                f"timestep, {2.0 * self.timestep:g}, to 0.1"
+            )
+        pairs = zip(self.friction.coulomb, self.friction.static, strict=True)
+        for j, (coulomb, static) in enumerate(pairs, 1):
+            if static > coulomb:
+                raise ValueError(
+                    f"friction.static[{j}] = {static!r} N: must be from 0 to "
+                    f"friction.coulomb[{j}], {coulomb:g}: MuJoCo has no breakaway force above it"
+                )
+
+
+class State(NamedTuple):
+    """All that MuJoCo goes on from: coordinates, their rates, and what its solver begins with."""
+
+    q: Coordinates
+    v: Coordinates
+    acceleration: Coordinates
+    contact_force: Pair
+    toppled: bool
+
+
+class Outputs(NamedTuple):
+    """Measured at the fingers and at the object; the gap of a finger that touches is zero."""
+
+    position: fingers.Position
+    velocity: fingers.Velocity
+    gap: fingers.Gap
+    contact_force: fingers.ContactForce
+    contact: fingers.Contact
+    object_position: fingers.ObjectPosition
+    tilt: Annotated[float, "rad", "theta, tilt of the object, to the right", 0.1, set()]
+    toppled: Annotated[bool, "", "the object has tilted past its balance", set()]
+
+
+class Simulator(NamedTuple):
+    """A model of MuJoCo, its data, and the arrays in there that a step goes through."""
+
+    step: Callable[..., None]
+    model: Any
+    data: Any
+    q: Any
+    v: Any
+    acceleration: Any
+    force: Any
+    constraint_force: Any
+
+
+def initial_state(p: Params, u: Inputs) -> State:
+    """All at rest, the fingers free of the object. ImportError where there is no MuJoCo."""
+    idle = _idle(p)
+    if not idle:
+        idle.append(_simulator(p))
+    x_1, x_2 = p.initial_position
+    q = (x_1, x_2, p.initial_object_position, 0.5 * p.object_height, 0.0)
+    none = (0.0, 0.0, 0.0, 0.0, 0.0)
+    return State(q, none, none, (0.0, 0.0), False)
+
+
+def step(p: Params, x: State, u: Inputs, h: float) -> State:
+    """Advance fingers and box by h seconds (h > 0), the forces held.
+
+    A plain ArithmeticError says why MuJoCo could not.
+    """
+    forces = fingers.forces(p.actuator, u)
+    n = _timesteps(p, x, forces, h)
+    idle = _idle(p)
+    try:
+        s = idle.pop()
+    except IndexError:  # another thread has it
+        s = _simulator(p)
+    size = len(s.q)
+    s.model.opt.timestep = h / n
+    s.q[:] = x.q[:size]
+    s.v[:] = x.v[:size]
+    s.acceleration[:] = x.acceleration[:size]
+    s.force[:2] = forces
+    s.step(s.model, s.data, n)
+    q = (*s.q.tolist(), *x.q[size:])
+    after = State(
+        q,
+        (*s.v.tolist(), *x.v[size:]),
+        (*s.acceleration.tolist(), *x.acceleration[size:]),
+        _contact_forces(p, s),
+        x.toppled or (not p.object_fixed and abs(q[4]) >= _balance(p)),
+    )
+    idle.append(s)
+    return after
+
+
+def outputs(p: Params, x: State, u: Inputs) -> Outputs:
+    """What the sensors see; no input reaches an output without a step."""
+    x_1, x_2, middle, _, tilt = x.q
+    radius = p.fingertip_radius
+    gap_1, gap_2 = _distance(p, x.q, x_1 + radius), _distance(p, x.q, x_2 - radius)
+    return Outputs(
+        (x_1, x_2),
+        (x.v[0], x.v[1]),
+        (max(0.0, gap_1), max(0.0, gap_2)),
+        x.contact_force,
+        (gap_1 <= 0.0, gap_2 <= 0.0),
+        middle,
+        tilt,
+        x.toppled,
+    )
+
+
+def mjcf(p: Params) -> str:
+    """The model in MuJoCo's own format.
+
+    Only what is paired touches: fingertips and box without friction, box and floor with it.
+    """
+    m_1, m_2 = p.finger_mass
+    b, a = _halves(p)
+    r, h, m, mu = p.fingertip_radius, p.contact_height, p.object_mass, p.floor_friction
+    turning = m * (a * a + b * b) / 3.0
+    contact, rubbing = (
+        f'solref{of}="{p.contact_time_constant!r} 1" solimp{of}="{IMPEDANCE!r} {IMPEDANCE!r} 1"'
+        for of in ("", "friction")
+    )
+    hand = "".join(
+        f"""
+    <body pos="0 0 {h!r}">
+      <inertial pos="0 0 0" mass="{mass!r}" diaginertia="1 1 1"/>
+      <joint type="slide" axis="1 0 0" damping="{viscous!r}" frictionloss="{coulomb!r}"
+        {rubbing}/>
+      <geom name="finger {j}" type="sphere" pos="{side * r!r} 0 0" size="{r!r}"/>
+    </body>"""
+        for j, side, mass, viscous, coulomb in (
+            (1, 1.0, m_1, p.friction.viscous[0], p.friction.coulomb[0]),
+            (2, -1.0, m_2, p.friction.viscous[1], p.friction.coulomb[1]),
+        )
+    )
+    moving = f"""
+      <inertial pos="0 0 0" mass="{m!r}" diaginertia="{turning!r} {turning!r} {turning!r}"/>
+      <joint type="slide" axis="1 0 0"/>
+      <joint type="slide" axis="0 0 1"/>
+      <joint type="hinge" axis="0 1 0"/>"""
+    place = f"{p.initial_object_position!r} 0 {a!r}" if p.object_fixed else "0 0 0"
+    return f"""
+<mujoco>
+  <option integrator="Euler" solver="Newton" cone="elliptic" tolerance="1e-12"
+    gravity="0 0 {-GRAVITY!r}">
+    <flag autoreset="disable"/>
+  </option>
+  <size memory="256K"/>
+  <default>
+    <geom contype="0" conaffinity="0"/>
+  </default>
+  <worldbody>
+    <geom name="floor" type="plane" size="1 1 1"/>{hand}
+    <body pos="{place}">{"" if p.object_fixed else moving}
+      <geom name="box" type="box" size="{b!r} {a!r} {a!r}"/>
+    </body>
+  </worldbody>
+  <contact>
+    <pair geom1="finger 1" geom2="box" condim="1" {contact}/>
+    <pair geom1="finger 2" geom2="box" condim="1" {contact}/>
+    <pair geom1="floor" geom2="box" condim="3" friction="{mu!r} {mu!r}" {contact}/>
+  </contact>
+</mujoco>"""
+
+
+def _timesteps(p: Params, x: State, forces: Pair, h: float) -> int:
+    """How many timesteps within h seconds; none of them takes a finger past where it touches."""
+    wanted = h / p.timestep
+    if wanted > MOST_TIMESTEPS:
+        raise ArithmeticError(
+            f"{wanted:g} timesteps of MuJoCo of {p.timestep:g} s: must be at most {MOST_TIMESTEPS}"
+        )
+    n = max(1, ceil(wanted - 1e-9))
+    radius = p.fingertip_radius
+    for j, (v, u, m) in enumerate(zip(x.v[:2], forces, p.finger_mass, strict=True), 1):
+        way = (abs(v) + h * abs(u) / m) * h / n
+        if not way <= radius:
+            raise ArithmeticError(
+                f"finger {j} could go {way:g} m within a timestep of MuJoCo: must be at most "
+                f"fingertip_radius, {radius:g} m"
+            )
+    return n
+
+
+def _contact_forces(p: Params, s: Simulator) -> Pair:
+    """What the box does to the fingers in N: all constraints' forces but that of friction."""
+    f_1, f_2 = s.constraint_force[:2].tolist()
+    c_1, c_2 = p.friction.coulomb
+    if c_1 > 0.0 or c_2 > 0.0:
+        rubs = s.data.efc_force  # begins with a row per joint that rubs
+        f_1 -= float(rubs[0]) if c_1 > 0.0 else 0.0
+        f_2 -= float(rubs[int(c_1 > 0.0)]) if c_2 > 0.0 else 0.0
+    return max(0.0, f_1), min(0.0, f_2)
+
+
+def _distance(p: Params, q: Coordinates, centre: float) -> float:
+    """From a fingertip with its centre there to the box, m; below zero it has sunk in."""
+    _, _, x, z, tilt = q
+    b, a = _halves(p)
+    right, up = centre - x, p.contact_height - z
+    across = abs(right * cos(tilt) - up * sin(tilt)) - b
+    along = abs(right * sin(tilt) + up * cos(tilt)) - a
+    outside = hypot(max(0.0, across), max(0.0, along))
+    return outside + min(0.0, max(across, along)) - p.fingertip_radius
+
+
+def _balance(p: Params) -> float:
+    """The tilt in rad from which the box topples: its centre is above the edge."""
+    b, a = _halves(p)
+    return atan2(b, a)
+
+
+def _halves(p: Params) -> tuple[float, float]:
+    """Half the width and half the height of the box, m."""
+    return max(THINNEST, 0.5 * p.object_width), 0.5 * p.object_height
+
+
+@lru_cache(maxsize=32)
+def _idle(p: Params) -> list[Simulator]:
+    """The simulators of these parameters that no step is using.
+
+    What an instance is stands in its State alone: a step may take any of them. MuJoCo lets other
+    threads run while it computes, so none serves two steps at once.
+    """
+    return []
+
+
+def _simulator(p: Params) -> Simulator:
+    try:
+        import mujoco
+    except ImportError as error:
+        raise ImportError(f"{MISSING} ({error})") from error
+    model = mujoco.MjModel.from_xml_string(mjcf(p))
+    data = mujoco.MjData(model)
+    return Simulator(
+        mujoco.mj_step,
+        model,
+        data,
+        data.qpos,
+        data.qvel,
+        data.qacc_warmstart,
+        data.qfrc_applied,
+        data.qfrc_constraint,
+    )
