@@ -20,6 +20,17 @@ DOCS = ROOT / "docs"
 BLOCKS = re.compile(r"```(console|toml|python)\n(.*?)```", re.DOTALL)
 
 
+INDENTED = [
+    command
+    for name in ("layers", "limits", "your_plant")
+    for command in re.findall(
+        r"^    (grasp-cosim .*?)(?:\s+#.*)?$",
+        (DOCS / f"{name}.md").read_text("utf-8"),
+        re.MULTILINE,
+    )
+]
+
+
 def load_tutorials() -> Any:
     spec = importlib.util.spec_from_file_location("tutorials", DOCS / "tutorials.py")
     assert spec is not None
@@ -71,6 +82,14 @@ def checked(name: str, checkout: Path) -> tuple[list[Any], Any]:
         assert new.shape == kept.shape
         assert (abs(new - kept).max(axis=-1) > 0.1).mean() < 1e-3, f"{picture}: docs/tutorials.py"
     return tables, do
+
+
+def test_the_commands_at_the_beginnings_work(checkout: Path) -> None:
+    assert [command.split()[1] for command in INDENTED] == ["run", "run", "build", "run"]
+    for command in INDENTED:
+        short = ["--stop", "0.01"] if command.split()[1] == "run" else []
+        assert cli.main([*shlex.split(command)[1:], *short]) == 0, command
+    assert (checkout / "case_0/grasp.png").is_file()
 
 
 @pytest.mark.slow
@@ -160,8 +179,8 @@ def assert_formulas(carried: Any, converter: Any, friction: Any) -> None:
         assert signals["plant.gap[1]"][slowest] == pytest.approx(blind, abs=0.1e-3)
     (holds,) = said("limits", r"Friction above K_i·W/2 = ([\d.]+) N")
     assert holds == pytest.approx(98.0 * 0.035, abs=1e-12)
-    assert friction["4"].signals["plant.gap[1]"][-1] == pytest.approx(4.0 / 98.0 - 0.035, abs=2e-4)
-    assert not friction["4"].signals["plant.contact[1]"].any()
+    assert friction["5"].signals["plant.gap[1]"][-1] == pytest.approx(5.0 / 98.0 - 0.035, abs=2e-4)
+    assert not friction["5"].signals["plant.contact[1]"].any()
 
 
 def assert_loop(loop: Any) -> None:
@@ -184,15 +203,18 @@ def assert_loop(loop: Any) -> None:
 def test_your_plant(checkout: Path, capsys: pytest.CaptureFixture[str]) -> None:
     vendor(checkout / "fmus/build/GripperPlant.fmu", checkout / "vendor.fmu")
     source = (DOCS / "spring_plant.py").read_text("utf-8")
+    excerpts = 0
     for kind, block in BLOCKS.findall(page("your_plant")):
         if kind == "python":
             assert block in source
+            excerpts += 1
         elif kind == "console":
             try_commands(block, capsys)
         elif block.startswith("[signals]"):
             (checkout / "bands.toml").write_text(block, encoding="utf-8")
         else:
             change_component(checkout / "my_system.toml", block)
+    assert excerpts == 2
     assert (checkout / "vendor/report.html").is_file()
     (lines,) = said("your_plant", r"about (\d+) lines")
     assert len(source.splitlines()) == pytest.approx(lines, abs=10)
