@@ -38,7 +38,8 @@ def checkout(
     tmp_path: Path, fmus: Path, grasp: System, recorded: Path, monkeypatch: pytest.MonkeyPatch
 ) -> Path:
     """A folder like the repository: built FMUs, a vendor's FMU, systems and a run of one's own."""
-    (tmp_path / "orchestrator").symlink_to(ROOT / "orchestrator")
+    for folder in ("docs", "orchestrator"):
+        (tmp_path / folder).symlink_to(ROOT / folder)
     shutil.copytree(fmus, tmp_path / "fmus/build")
     shutil.copy(fmus / "GripperPlant.fmu", tmp_path / "vendor.fmu")
     text = SYSTEM.read_text("utf-8").replace('fmu = "', 'fmu = "fmus/build/')
@@ -53,7 +54,7 @@ def checkout(
 
 
 def test_there_is_something_to_try() -> None:
-    assert len(COMMANDS) == 19
+    assert len(COMMANDS) == 20
     assert len(EXAMPLES) == 1
 
 

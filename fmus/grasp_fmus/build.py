@@ -40,7 +40,9 @@ BINARIES = Path(pythonfmu.__file__).parent / "resources" / "binaries"
 HASH = "CONTENT_HASH"
 """Stands for the content hash until it is known."""
 
-_IMPORT = re.compile(r"^from (\w+)", re.MULTILINE)
+IMPORT = re.compile(r"^from (\w+)", re.MULTILINE)
+"""An import in a script."""
+
 _DATE = (1980, 1, 1, 0, 0, 0)
 
 
@@ -92,13 +94,14 @@ def build_fmu(script: Path, out: Path, bind_python: str | None = None) -> Built:
 def members(
     description: Description,
     html: str,
-    picture: bytes,
+    picture: bytes | None,
     sources: Mapping[str, bytes],
     bind_python: str | None,
 ) -> dict[str, bytes]:
     """The files of an FMU, with HASH in the place of the content hash.
 
-    sources are its script NAME.py and, by their paths, the files of the packages that it imports.
+    picture is its icon, if it has one. sources are its script NAME.py and, by their paths, the
+    files of the packages that it imports.
     """
     name = description.name
     script = f"{name}.py"
@@ -106,7 +109,7 @@ def members(
         sources = {**sources, script: preamble(bind_python).encode() + sources[script]}
     return {
         "modelDescription.xml": model_description(description, HASH),
-        "model.png": picture,
+        **({"model.png": picture} if picture else {}),
         "documentation/index.html": html.encode(),
         **{f"documentation/licenses/{file}": text for file, text in licences().items()},
         f"binaries/linux64/{name}.so": _linux_binary(bind_python),
@@ -153,14 +156,20 @@ def _sources(script: Path) -> dict[str, bytes]:
     """The script and the files of the packages it imports, by their path."""
     text = script.read_bytes()
     sources = {script.name: text}
-    for package in dict.fromkeys(_IMPORT.findall(text.decode())):
-        if package == __package__:
-            sources |= own_files(ADAPTER)
-            continue
-        folder = _folder(package)
-        for file in sorted(folder.rglob("*.py")):
-            sources[f"{package}/{file.relative_to(folder).as_posix()}"] = file.read_bytes()
+    for package in dict.fromkeys(IMPORT.findall(text.decode())):
+        sources |= package_files(package)
     return sources
+
+
+def package_files(package: str) -> dict[str, bytes]:
+    """The files of a package by their path in an FMU; of this one, what runs in there."""
+    if package == __package__:
+        return own_files(ADAPTER)
+    folder = _folder(package)
+    return {
+        f"{package}/{file.relative_to(folder).as_posix()}": file.read_bytes()
+        for file in sorted(folder.rglob("*.py"))
+    }
 
 
 def _folder(package: str) -> Path:

@@ -18,6 +18,7 @@ from .frame import NEGATIVE, check_folder, json_option
 
 
 @click.command()
+@click.argument("block", required=False, type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path), help=f"Default: {FMU_FOLDER}")
 @click.option(
     "--bind-python",
@@ -27,8 +28,11 @@ from .frame import NEGATIVE, check_folder, json_option
     help=f"For hosts that are not Python: bind to libpython. Default of --out: {BOUND_FOLDER}",
 )
 @json_option
-def build(out: Path | None, bind_python: str | None, as_json: bool) -> int:
+def build(block: Path | None, out: Path | None, bind_python: str | None, as_json: bool) -> int:
     """Build the FMUs: three plants, GripperPlant*, then ProximitySensor and GraspController.
+
+    With BLOCK, a Python file: the FMU of that block alone, spring_plant.py becomes SpringPlant.fmu.
+    docs/your_plant.md shows one.
 
     Says what is not as it was built last. --bind-python adds the libpython of PYTHON, by default
     of this one, to what the FMUs load.
@@ -36,6 +40,7 @@ def build(out: Path | None, bind_python: str | None, as_json: bool) -> int:
     \b
     Example: grasp-cosim build --out /tmp/fmus
     """
+    from grasp_fmus.block_build import build_block
     from grasp_fmus.build import build as build_fmus
 
     if bind_python == "":
@@ -43,7 +48,9 @@ def build(out: Path | None, bind_python: str | None, as_json: bool) -> int:
     folder = out or (BOUND_FOLDER if bind_python else FMU_FOLDER)
     check_folder(folder)
     try:
-        built = build_fmus(folder, bind_python)
+        built = (
+            [build_block(block, folder, bind_python)] if block else build_fmus(folder, bind_python)
+        )
     except ValueError as error:
         raise InputError(f"build: {error}") from error
     if as_json:

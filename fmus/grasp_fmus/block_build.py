@@ -1,0 +1,162 @@
+"""Builds the FMU of a block that is a Python file of one's own, wherever that is.
+
+The file is all there is to write: the script is made here, the documentation is the docstring and
+the table of the variables.
+"""
+
+import ast
+import inspect
+import re
+import sys
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from importlib import metadata
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from .build import HASH, IMPORT, SCRIPTS, Built, bound_library, members, package_files, write_fmu
+from .cards import BEGIN, variable_tables
+from .contract import declared, unpacker, variables
+from .documentation import page
+from .model_description import Description
+from .variable import Variable
+
+PARTS = ("Params", "Inputs", "State", "Outputs", "initial_state", "step", "outputs")
+"""What a block has."""
+
+KINDS = (float, bool, int)
+"""What its variables may be."""
+
+STEP = 1e-3
+"""s; how far a block is advanced to see whether it works."""
+
+_IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+
+
+def build_block(file: Path, out: Path, bind_python: str | None = None) -> Built:
+    """Build the FMU of the block in a file into the folder out: spring_plant.py, SpringPlant.fmu.
+
+    The block may import the standard library, and from the packages of the blocks in SCRIPTS.
+    bind_python is as in build(). ValueError, one line, where the file is no such block.
+    """
+    if file.suffix != ".py" or not _IDENTIFIER.fullmatch(file.stem):
+        raise ValueError(f"{file}: must be NAME.py, NAME of letters, digits and _, a letter first")
+    name = "".join(word[:1].upper() + word[1:] for word in file.stem.split("_"))
+    if (SCRIPTS / f"{name}.py").exists():
+        raise ValueError(f"{file}: {name}.fmu is one of the FMUs that come with this package")
+    text = file.read_bytes()
+    tree = _parsed(file, text)
+    packages = _packages(file, tree)
+    with _run(file, tree) as block:
+        summary, _, rest = inspect.cleandoc(block.__doc__ or "").partition("\n")
+        if not summary:
+            raise ValueError(f"{file}: must begin with a docstring; its first line says what it is")
+        description = Description(name, summary.rstrip("."), _variables(file, block))
+        card = f"{rest.strip()}\n\n{BEGIN}{variable_tables({name: block})}"
+    version, library = metadata.version("grasp-cosim"), bound_library(bind_python)
+    html = page(name, description.summary, card, version, library)
+    sources = {f"{name}.py": _script(name, file.stem).encode(), f"{file.stem}_block.py": text}
+    for package in (__package__, *packages):
+        sources |= package_files(package)
+    return write_fmu(members(description, html, None, sources, bind_python), out / f"{name}.fmu")
+
+
+def _script(name: str, stem: str) -> str:
+    return (
+        f"import {stem}_block_{HASH} as block_module\n"
+        f"from {__package__} import slave\n\n\n"
+        f"class {name}(slave.Fmi2Slave):\n"
+        f"    block = block_module\n"
+    )
+
+
+def _parsed(file: Path, text: bytes) -> ast.Module:
+    try:
+        return ast.parse(text, str(file))
+    except (SyntaxError, ValueError) as error:
+        line = f" line {error.lineno}:" if isinstance(error, SyntaxError) else ""
+        raise ValueError(f"{file}:{line} is no Python: {error.args[0]}") from error
+
+
+def _packages(file: Path, tree: ast.Module) -> list[str]:
+    """The packages that the FMU must bring along; ValueError where a module could not be packed."""
+    ours = {p for s in SCRIPTS.glob("*.py") for p in IMPORT.findall(s.read_text("utf-8"))}
+    ours.discard(__package__)
+    found = set()
+    for line, module, packable in _imports(tree):
+        package = module.partition(".")[0]
+        if package in sys.stdlib_module_names:
+            continue
+        if package not in ours:
+            raise ValueError(
+                f"{file}: line {line}: imports {module}, which would not be in the FMU; must be "
+                f"of the standard library, or of {', '.join(sorted(ours))}"
+            )
+        if not packable:
+            raise ValueError(
+                f"{file}: line {line}: {package} must be imported at the top level, as: "
+                f"from {package} import ..."
+            )
+        found.add(package)
+    return sorted(found)
+
+
+def _imports(tree: ast.Module) -> Iterator[tuple[int, str, bool]]:
+    """Line and module of every import, and whether its name can be changed for that in the FMU."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield node.lineno, alias.name, False
+        elif isinstance(node, ast.ImportFrom):
+            module = "." * node.level + (node.module or "")
+            yield node.lineno, module, node.col_offset == 0
+
+
+@contextmanager
+def _run(file: Path, tree: ast.Module) -> Iterator[Any]:
+    """The module of a file, which is among the imported ones meanwhile: annotations need that."""
+    name = f"{file.stem}_block"
+    module = ModuleType(name)
+    before = sys.modules.get(name)
+    sys.modules[name] = module
+    try:
+        code = compile(tree, str(file), "exec")
+        _tried(file, "import", lambda: exec(code, vars(module)))  # noqa: S102 - the user's own file
+        missing = [part for part in PARTS if not hasattr(module, part)]
+        if missing:
+            raise ValueError(f"{file}: has no {', '.join(missing)}; a block has {', '.join(PARTS)}")
+        yield module
+    finally:
+        del sys.modules[name]
+        if before:
+            sys.modules[name] = before
+
+
+def _variables(file: Path, block: Any) -> list[Variable]:
+    """The variables of a block that works at its start values."""
+    p, u = _tried(file, "Params()", block.Params), _tried(file, "Inputs()", block.Inputs)
+    fields = _tried(file, "declaration", lambda: declared(block))
+    found: list[Variable] = _tried(file, "declaration", lambda: variables(fields))
+    listed = unpacker(fields)
+    x = _tried(file, "initial_state()", lambda: block.initial_state(p, u))
+    _tried(file, "outputs()", lambda: listed(block.outputs(p, x, u)))
+    x = _tried(file, "step()", lambda: block.step(p, x, u, STEP))
+    _tried(file, "outputs()", lambda: listed(block.outputs(p, x, u)))
+    for v in found:
+        if v.kind not in KINDS:
+            kinds = ", ".join(kind.__name__ for kind in KINDS)
+            raise ValueError(f"{file}: {v.name} is {v.kind}: must be of {kinds}, or a tuple of one")
+    return found
+
+
+def _tried(file: Path, what: str, function: Callable[[], Any]) -> Any:
+    """What a function of the user's returns; ValueError says what went wrong in it, and where."""
+    try:
+        return function()
+    except Exception as error:
+        frames = traceback.extract_tb(error.__traceback__)
+        lines = [frame.lineno for frame in frames if frame.filename == str(file)]
+        place = f" line {lines[-1]}:" if lines else ""
+        raise ValueError(f"{file}:{place} {what}: {type(error).__name__}: {error}") from error

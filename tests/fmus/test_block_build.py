@@ -1,0 +1,162 @@
+"""The FMU of a block that is one file of the user's own."""
+
+import zipfile
+from math import exp
+from pathlib import Path
+
+import pytest
+from conftest import Run
+from fmi2 import OK, Fmu, Instance
+from grasp_fmus.block_build import build_block
+from grasp_fmus.build import Built
+
+LAG = '''"""A first-order lag.
+
+    T·y' = u - y
+"""
+
+from dataclasses import dataclass
+from math import exp
+from typing import Annotated, NamedTuple
+
+
+@dataclass(frozen=True)
+class Params:
+    time_constant: Annotated[float, "s", "T, time constant", (1e-3, 1e3)] = 0.5
+
+
+class Inputs(NamedTuple):
+    u: Annotated[float, "N", "what it follows", 1.0] = 1.0
+
+
+class State(NamedTuple):
+    y: float
+
+
+class Outputs(NamedTuple):
+    y: Annotated[float, "N", "what follows", 1.0, set()]
+
+
+def initial_state(p, u):
+    return State(0.0)
+
+
+def step(p, x, u, h):
+    return State(u.u + (x.y - u.u) * exp(-h / p.time_constant))
+
+
+def outputs(p, x, u):
+    return Outputs(x.y)
+'''
+
+
+def write(folder: Path, text: str, name: str = "first_order_lag.py") -> Path:
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def answer(path: Path, folder: Path) -> float:
+    """Its output after 0.3 s of one step."""
+    with Instance(Fmu(path, folder)) as instance:
+        instance.initialise()
+        assert instance.step(0.0, 0.3) == OK
+        return instance.get("y")[0]
+
+
+def test_a_file_becomes_an_fmu(tmp_path: Path) -> None:
+    built = build_block(write(tmp_path, LAG), tmp_path / "out")
+    assert built == Built(tmp_path / "out/FirstOrderLag.fmu", "new", ())
+    assert answer(built.path, tmp_path / "a") == pytest.approx(1.0 - exp(-0.6), abs=1e-15)
+    assert [p.name for p in (tmp_path / "out").iterdir()] == ["FirstOrderLag.fmu"]
+
+
+def test_it_brings_its_documentation(tmp_path: Path) -> None:
+    with zipfile.ZipFile(build_block(write(tmp_path, LAG), tmp_path).path) as archive:
+        page = archive.read("documentation/index.html").decode()
+    assert "<h1>FirstOrderLag</h1>\n<p>A first-order lag.</p>" in page
+    assert "T·y' = u - y" in page
+    assert "<code>time_constant</code>" in page
+
+
+def test_a_change_is_built_and_both_run_in_one_process(tmp_path: Path) -> None:
+    file = write(tmp_path, LAG)
+    before = build_block(file, tmp_path / "1")
+    assert build_block(file, tmp_path / "1").status == "unchanged"
+    write(tmp_path, LAG.replace("= 0.5", "= 0.6"))
+    after = build_block(file, tmp_path / "2")
+    assert answer(before.path, tmp_path / "a") == pytest.approx(1.0 - exp(-0.6), abs=1e-15)
+    assert answer(after.path, tmp_path / "b") == pytest.approx(1.0 - exp(-0.5), abs=1e-15)
+
+
+def test_packages_of_our_blocks_come_along(tmp_path: Path) -> None:
+    text = LAG.replace("from math", "from gripper_plant import substeps\nfrom math")
+    text = text.replace("State(0.0)", "State(float(substeps.count(30.0, 1.0)))")
+    built = build_block(write(tmp_path, text), tmp_path)
+    with zipfile.ZipFile(built.path) as archive:
+        assert any(name.startswith("resources/gripper_plant_") for name in archive.namelist())
+    expected = 1.0 + 299.0 * exp(-0.6)  # 30 1/s over 1 s, sub-steps of 0.1
+    assert answer(built.path, tmp_path / "a") == pytest.approx(expected, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "said"),
+    [
+        ("from math", "import numpy\nfrom math", "line 7: imports numpy, which would not be in "),
+        ("from math", "from .x import y\nfrom math", "line 7: imports .x, which would not be in "),
+        (
+            "from math",
+            "import gripper_plant\nfrom math",
+            "line 7: gripper_plant must be imported at the top level, as: from gripper_plant ",
+        ),
+        ("def step(", "def step((", "line 32: is no Python: "),
+        ("from math", "1 / 0\nfrom math", "line 7: import: ZeroDivisionError: division by zero"),
+        ("def step", "def advance", "has no step; a block has Params, Inputs, State, Outputs, "),
+        ("= 1.0\n", "\n", "Inputs(): TypeError: "),
+        ('follows", 1.0, ', 'follows", ', "declaration: TypeError: y: must have a nominal value"),
+        ("y: Annotated[float,", "y: Annotated[str,", "y is <class 'str'>: must be of float"),
+        ("State(0.0)", "Stat(0.0)", "line 29: initial_state(): NameError: name 'Stat' is not "),
+        ("x.y - u.u", "x.y - u.v", "line 33: step(): AttributeError: 'Inputs' object has no "),
+        ("Outputs(x.y)", "(x.y, x.y)", "outputs(): ValueError: too many values to unpack"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_one_line(
+    command: Run, tmp_path: Path, before: str, after: str, said: str
+) -> None:
+    assert LAG.count(before) == 1
+    file = write(tmp_path, LAG.replace(before, after))
+    code, out, err = command("build", file, "--out", "out")
+    assert (code, out) == (2, "")
+    assert err.startswith(f"grasp-cosim: build: {file}: {said}")
+    assert err.count("\n") == 1
+    assert not list(tmp_path.glob("out/*"))
+
+
+def test_a_block_must_say_what_it_is(command: Run, tmp_path: Path) -> None:
+    file = write(tmp_path, LAG.partition('"""\n\n')[2])
+    assert command("build", file)[2].startswith(f"grasp-cosim: build: {file}: must begin with a ")
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("1st.py", "must be NAME.py"),
+        ("lag.txt", "must be NAME.py"),
+        ("gripper_plant.py", "GripperPlant.fmu is one of the FMUs that come with this package"),
+    ],
+)
+def test_a_name_that_does_not_do(command: Run, tmp_path: Path, name: str, said: str) -> None:
+    file = write(tmp_path, LAG, name)
+    code, _, err = command("build", file)
+    assert code == 2
+    assert err.startswith(f"grasp-cosim: build: {file}: {said}")
+
+
+def test_a_file_that_is_not_there(command: Run) -> None:
+    assert command("build", "lag.py")[2] == "grasp-cosim: lag.py: No such file or directory\n"
+
+
+def test_the_command_builds_this_one_alone(command: Run, tmp_path: Path) -> None:
+    code, out, _ = command("build", write(tmp_path, LAG))
+    assert (code, out) == (0, "fmus/build/FirstOrderLag.fmu: new\n")
+    assert [p.name for p in (tmp_path / "fmus/build").iterdir()] == ["FirstOrderLag.fmu"]
