@@ -24,6 +24,14 @@ UnpackIn = Callable[[str], Path]
 Altered = Callable[[str, str, str, str], Path]
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The slow ones first: in the end no process waits for another longer than a quick one takes.
+
+    What shares a result that takes long to make is a group of xdist's: it stays in one process.
+    """
+    items.sort(key=lambda item: item.get_closest_marker("slow") is None)
+
+
 @pytest.fixture(scope="session")
 def fmus(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder with the freshly built FMUs."""

@@ -17,7 +17,7 @@ from native_fmus import needs_gcc
 pytestmark = [needs_gcc, pytest.mark.slow]
 
 RUNS = 160
-ENDLESS = 10_000
+ENDLESS = 2000
 """Runs that nobody waits for."""
 
 

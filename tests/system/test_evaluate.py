@@ -9,7 +9,7 @@ import pytest
 from grasp_cosim import System
 from grasp_cosim.published.evaluate import evaluate
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("evaluate")]
 
 SHARED = Path(__file__).parents[3] / "shared" / "paper" / "table_position.csv"
 

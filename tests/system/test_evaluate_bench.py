@@ -14,6 +14,8 @@ from grasp_cosim.published.bench import evaluate_bench, run_settings
 from grasp_cosim.published.tables import Setting
 from grasp_cosim.study.closing import close
 
+pytestmark = pytest.mark.xdist_group("evaluate_bench")
+
 QUIET = {f"sensor_{j}.noise.enabled": False for j in (1, 2)}
 """Noise acts by the sampled xi'/xi, so with it 1 ms steps are not the bench's."""
 
