@@ -14,7 +14,7 @@ run: .venv/run
 	$(BIN)/grasp-cosim evaluate --out results
 
 test: .venv/dev
-	$(BIN)/python -m pytest -n 2 --dist loadgroup
+	$(BIN)/python -m pytest -n 2 --maxschedchunk 1
 
 check: .venv/dev
 	$(BIN)/ruff check .

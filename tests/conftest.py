@@ -1,6 +1,8 @@
 """What several tests share: the FMUs, built once per test process, and the built-in system."""
 
+import fcntl
 import importlib
+import os
 import shutil
 import sys
 import tempfile
@@ -20,16 +22,32 @@ Run = Callable[..., tuple[int, str, str]]
 """A command line without its program; exit code, standard output, standard error."""
 
 Load = Callable[[str], Fmu]
+MadeOnce = Callable[[str, Callable[[Path], object]], Path]
 UnpackIn = Callable[[str], Path]
 Altered = Callable[[str, str, str, str], Path]
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """The slow ones first: in the end no process waits for another longer than a quick one takes.
-
-    What shares a result that takes long to make is a group of xdist's: it stays in one process.
-    """
+    """The slow ones first: in the end no process waits for another for long."""
     items.sort(key=lambda item: item.get_closest_marker("slow") is None)
+
+
+@pytest.fixture(scope="session")
+def made_once(tmp_path_factory: pytest.TempPathFactory) -> MadeOnce:
+    """A folder that is filled once for all test processes: by its name, and what fills it."""
+    base = tmp_path_factory.getbasetemp()
+    base = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+
+    def folder(name: str, fill: Callable[[Path], object]) -> Path:
+        with (base / f"{name}.lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not (base / name).exists():
+                part = tmp_path_factory.mktemp(name)
+                fill(part)
+                part.rename(base / name)
+        return base / name
+
+    return folder
 
 
 @pytest.fixture(scope="session")

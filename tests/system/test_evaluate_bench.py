@@ -7,33 +7,43 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import Run
+from conftest import MadeOnce, Run
 from grasp_cosim import InputError, System
 from grasp_cosim.grasp import BENCH, CASES, with_bench
 from grasp_cosim.published.bench import evaluate_bench, run_settings
 from grasp_cosim.published.tables import Setting
 from grasp_cosim.study.closing import close
 
-pytestmark = pytest.mark.xdist_group("evaluate_bench")
-
 QUIET = {f"sensor_{j}.noise.enabled": False for j in (1, 2)}
 """Noise acts by the sampled xi'/xi, so with it 1 ms steps are not the bench's."""
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def bench(grasp: System) -> System:
     return with_bench(grasp)
 
 
-@pytest.fixture(scope="module")
-def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("results")
+@pytest.fixture(scope="session")
+def made(bench: System, made_once: MadeOnce) -> Path:
+    """The folder with what is written, and what is returned beside it."""
+
+    def fill(folder: Path) -> None:
+        quiet = bench.with_values(QUIET).with_experiment(step=2e-3)
+        report = evaluate_bench(quiet, folder / "out", workers=2, progress=False)
+        (folder / "returned.json").write_text(json.dumps(report))
+
+    return made_once("evaluate_bench", fill)
 
 
-@pytest.fixture(scope="module")
-def report(bench: System, out: Path) -> dict[str, Any]:
-    quiet = bench.with_values(QUIET).with_experiment(step=2e-3)
-    return evaluate_bench(quiet, out, workers=2, progress=False)
+@pytest.fixture(scope="session")
+def out(made: Path) -> Path:
+    return made / "out"
+
+
+@pytest.fixture(scope="session")
+def report(made: Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((made / "returned.json").read_text())
+    return found
 
 
 def test_the_preset_has_every_stage_on_and_a_seed_for_each_sensor(bench: System) -> None:
