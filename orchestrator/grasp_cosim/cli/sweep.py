@@ -13,6 +13,7 @@ from ..sweep.sensitivity import Sensitivity
 from ..sweep.store import Store
 from ..sweep.sweep import RUNS, Sweep
 from ..sweep.sweep import sweep as run_study
+from ..sweep.table import STATISTICS
 from .frame import INTERRUPTED, NEGATIVE, check_folder, fail, json_option, load_system
 
 
@@ -72,11 +73,10 @@ def _as_text(done: Sweep) -> str:
     error = next((o for o in done.outcomes if o.error is not None), None)
     if error is not None:
         lines.append(f"the first that failed, {error.index}: {error.error}")
-    heads = ("runs", "least", "mean", "median", "greatest")
-    lines.append(f"{'':28s}" + "".join(f"{head:>12s}" for head in heads))
+    lines.append(f"{'':28s}" + "".join(f"{head:>11s}" for head in ("runs", *STATISTICS)))
     for name, row in done.table.summary().items():
-        numbers = ("-" if row[head] is None else f"{row[head]:.5g}" for head in heads)
-        lines.append(f"{name:28s}" + "".join(f"{number:>12s}" for number in numbers))
+        numbers = ("-" if number is None else f"{number:.5g}" for number in row.values())
+        lines.append(f"{name:28s}" + "".join(f"{number:>11s}" for number in numbers))
     for found in done.sensitivities:
         lines += _sensitivity_lines(found)
     return "\n".join(lines)
