@@ -87,6 +87,7 @@ def read_study(path: Path, load: Load) -> Study:
     """The study of a TOML file; load reads its system. InputError where anything is wrong."""
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
+        repr(table)  # where a hexadecimal number is longer than Python writes, it says so here
     except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"{path}: not readable as TOML: {error}") from error
     place = path.name
