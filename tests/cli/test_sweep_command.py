@@ -91,7 +91,10 @@ WRONG = [
     (f"{HEAD}{GRID}{WIDTH}{VALUES}uniform = 3\n", "values and uniform; must have exactly one"),
     (f"{HEAD}{GRID}{WIDTH}values = 3\n", "values = 3: must be a list of values"),
     (f"{HEAD}{GRID}{WIDTH}values = [[3]]\n", r"values = \[3\]: must be a number, boolean or"),
-    (f"{HEAD}{GRID}{WIDTH}uniform = {{ low = 0.05, high = 0.07 }}\n", "parameter 1 has no list"),
+    (
+        f"{HEAD}{GRID}{WIDTH}uniform = {{ low = 0.05, high = 0.07 }}\n",
+        "study.toml: design: parameter 1 has",
+    ),
     (f"{HEAD}{GRID}{WIDTH}uniform = {{ low = 0.07, high = 0.05 }}\n", "must have low below high"),
     (f"{HEAD}{GRID}{WIDTH}uniform = {{ low = 0.07 }}\n", "high = None: must be a finite number"),
     (f"{HEAD}{GRID}{WIDTH}linspace = {{ from = 0.05, to = 0.07, count = 1.5 }}\n", "count = 1.5"),
@@ -157,7 +160,14 @@ def test_wrong_input_is_one_line_and_exit_2(
 def test_no_such_study_names_the_built_in_ones(command: Run) -> None:
     code = cli.main(["sweep", "map"])
     assert code == 2
-    assert built_in() == ["bench_monte_carlo", "reflectance_map"]
+    assert built_in() == ["bench_monte_carlo", "grasp_sensitivity", "reflectance_map"]
+
+
+def test_a_plot_of_nothing_is_refused_before_the_runs(command: Run, tmp_path: Path) -> None:
+    code, _, err = command(f"{HEAD}{GRID}{WIDTH}{VALUES}", "--plot")
+    assert (code, err.count("\n")) == (2, 1)
+    assert "--plot: study.toml has no [figures]; must say what to draw" in err
+    assert not (tmp_path / "study").exists()
 
 
 def test_a_cluster_has_its_own_workers(command: Run) -> None:
@@ -196,7 +206,7 @@ def test_a_bench_that_does_not_fit_is_one_line(tmp_path: Path, grasp: System) ->
         read_study(path, lambda _: bare)
 
 
-@pytest.mark.parametrize("name", ["bench_monte_carlo", "reflectance_map"])
+@pytest.mark.parametrize("name", ["bench_monte_carlo", "grasp_sensitivity", "reflectance_map"])
 def test_a_built_in_study_fits_the_grasp(name: str, grasp: System) -> None:
     study = read_study(study_file(name), lambda _: grasp)
     assert study.runs >= 200

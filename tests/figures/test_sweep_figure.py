@@ -12,6 +12,7 @@ from grasp_cosim.sweep.distributions import Uniform, spaced
 from grasp_cosim.sweep.run import Outcome
 from grasp_cosim.sweep.study import Map, Parameter, Pictures, Study
 from grasp_cosim.sweep.sweep import Sweep
+from matplotlib.figure import Figure
 
 RATIO = Parameter(
     "ratio", ("sensor_1.reflectance",), spaced(0.5, 2.0, 5, True), "sensor_2.reflectance"
@@ -118,6 +119,12 @@ def test_any_name_is_drawn(grasp: System, tmp_path: Path) -> None:
     assert drawn(sweep, tmp_path) == ["map.png", "distributions.png"]
 
 
-def test_a_limit_that_no_run_comes_near_draws_no_line(grasp: System, tmp_path: Path) -> None:
-    far = Pictures(replace(MAP, limit=1e6))
-    assert drawn(made(grasp, GRID, far), tmp_path) == ["map.png"]
+@pytest.mark.parametrize(("limit", "lines"), [(0.1, ["time difference = 0.1 s"]), (1e6, [])])
+def test_a_limit_is_named_where_a_line_is_drawn(
+    grasp: System, monkeypatch: pytest.MonkeyPatch, limit: float, lines: list[str]
+) -> None:
+    figures: list[Figure] = []
+    monkeypatch.setattr("grasp_cosim.figures.sweep.save", lambda figure, _: figures.append(figure))
+    draw_sweep(made(grasp, GRID, Pictures(replace(MAP, limit=limit))), Path())
+    legend = figures[0].axes[0].get_legend()
+    assert ([text.get_text() for text in legend.get_texts()] if legend else []) == lines

@@ -11,6 +11,7 @@ from ..figures.sweep import draw_sweep
 from ..sweep.read import read_study, study_file
 from ..sweep.sensitivity import Sensitivity
 from ..sweep.store import Store
+from ..sweep.study import Pictures
 from ..sweep.sweep import RUNS, Sweep
 from ..sweep.sweep import sweep as run_study
 from ..sweep.table import STATISTICS
@@ -38,7 +39,7 @@ def sweep(
     plot: bool,
     as_json: bool,
 ) -> int:
-    """Do all runs of STUDY, a .toml file or a built-in one: reflectance_map, bench_monte_carlo.
+    """Do all runs of STUDY: a .toml file, or reflectance_map, grasp_sensitivity, bench_monte_carlo.
 
     Finished runs are kept in the folder: the same command goes on where it was ended.
 
@@ -51,6 +52,8 @@ def sweep(
     folder = out or Path(path.stem)
     check_folder(folder)
     chosen = read_study(path, lambda system: load_system(system, None, None))
+    if plot and chosen.pictures == Pictures():
+        raise InputError(f"--plot: {path.name} has no [figures]; must say what to draw")
     if plot:
         new_figure(1.0, 1.0)  # says at once if matplotlib is missing
     try:

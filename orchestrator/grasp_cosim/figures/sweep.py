@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..study.metrics import UNITS
-from ..sweep.study import Map, Study
+from ..sweep.study import METRICS, Map, Study
 from ..sweep.sweep import Sweep
 from .plot import BLUE, GREY, RED, finish, new_figure, save
 
@@ -81,7 +82,9 @@ def _draw_map(sweep: Sweep, wanted: Map, path: Path) -> None:
         axes.fill([], [], color=MISSING, label=f"no {_plain(wanted.of)}")
     if np.isfinite(z).any():
         mean = "mean of " if cells and len(z) > cells[2].size else ""
-        figure.colorbar(shown, ax=axes, label=mean + _label(sweep.study, wanted.of))
+        bar = figure.colorbar(shown, ax=axes, label=mean + _label(sweep.study, wanted.of))
+        if bar.ax.get_yscale() == "log":
+            _plain_ticks(bar.ax.yaxis, (1.0, 2.0, 5.0))
     axes.set_xlabel(_label(sweep.study, wanted.x))
     finish(axes, _label(sweep.study, wanted.y), bool(axes.get_legend_handles_labels()[0]))
     if cells:
@@ -112,11 +115,11 @@ def _crosses(values: npt.NDArray[Any], limit: float) -> bool:
     return bool(wide and values.min() < limit < values.max())
 
 
-def _plain_ticks(axis: Axis) -> None:
+def _plain_ticks(axis: Axis, steps: Sequence[float] = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)) -> None:
     """Numbers like 0.5, 1 and 2 on a logarithmic axis."""
     from matplotlib.ticker import LogLocator, NullLocator
 
-    axis.set_major_locator(LogLocator(10.0, subs=(1.0, 1.5, 2.0, 3.0, 5.0, 7.0)))
+    axis.set_major_locator(LogLocator(10.0, subs=steps))
     axis.set_minor_locator(NullLocator())
     axis.set_major_formatter("{x:g}")
 
@@ -156,18 +159,23 @@ def _draw_distributions(sweep: Sweep, metrics: Sequence[str], path: Path) -> Non
 
 def _draw_distribution(axes: Axes, sweep: Sweep, name: str) -> None:
     """A histogram, with the median and the span that 90 % of the runs are in."""
+    from matplotlib.ticker import MaxNLocator
+
     values = _numbers(sweep, name)
     there = values[np.isfinite(values)]
     axes.set_xlabel(_label(sweep.study, name))
     axes.set_axisbelow(True)
     if len(there):
         low, middle, high = np.percentile(there, (5.0, 50.0, 95.0))
-        axes.hist(there, bins=_edges(there).tolist(), color=BLUE, alpha=0.75)
+        axes.hist(there, bins=_edges(there).tolist(), color=BLUE, alpha=0.75, zorder=2.0)
         axes.axvline(middle, color=RED, label=f"median {middle:.4g}")
-        axes.axvspan(low, high, color=GREY, alpha=0.15, label=f"90 %: {low:.4g} to {high:.4g}")
+        label = f"90 %: {low:.4g} to {high:.4g}"
+        axes.axvspan(low, high, color=GREY, alpha=0.15, linewidth=0.0, zorder=0.0, label=label)
     missing = len(values) - len(there)
     if missing:
         axes.plot([], [], " ", label=f"none in {_runs(missing)}")
+    axes.yaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.xaxis.set_major_locator(MaxNLocator(5))
     finish(axes, "runs")
 
 
@@ -213,4 +221,6 @@ def _unit(study: Study, name: str) -> str | None:
 
 def _plain(name: str) -> str:
     """A name as it is read, of which matplotlib makes no formula."""
-    return (name if "." in name else name.replace("_", " ")).replace("$", r"\$")
+    if name in METRICS:
+        name = re.sub(r"\[(\d)\]$", r", finger \1", name).replace("_", " ")
+    return name.replace("$", r"\$")

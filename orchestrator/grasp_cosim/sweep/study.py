@@ -90,7 +90,10 @@ class Study:
         for parameter in sorted(self.parameters, key=_is_ratio):  # whose references come first
             self._check_values(parameter)
         self._check_pictures()
-        self.design.total(self._levels)
+        try:
+            self.design.total(self._levels)
+        except InputError as error:
+            raise InputError(f"{self.name}: {error}") from error
         self.system.with_values(self.values(0))
 
     @property
