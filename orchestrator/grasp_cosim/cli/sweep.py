@@ -78,7 +78,7 @@ def _as_text(done: Sweep) -> str:
         lines.append(f"the first that failed, {error.index}: {error.error}")
     lines.append(f"{'':28s}" + "".join(f"{head:>11s}" for head in ("runs", *STATISTICS)))
     for name, row in done.table.summary().items():
-        numbers = ("-" if number is None else f"{number:.5g}" for number in row.values())
+        numbers = ("-" if number is None else f"{number:.4g}" for number in row.values())
         lines.append(f"{name:28s}" + "".join(f"{number:>11s}" for number in numbers))
     for found in done.sensitivities:
         lines += _sensitivity_lines(found)
