@@ -167,7 +167,10 @@ def _draw_distribution(axes: Axes, sweep: Sweep, name: str) -> None:
     axes.set_axisbelow(True)
     if len(there):
         low, middle, high = np.percentile(there, (5.0, 50.0, 95.0))
-        axes.hist(there, bins=_edges(there).tolist(), color=BLUE, alpha=0.75, zorder=2.0)
+        edges = _edges(there)
+        if len(edges) == 2:  # one bar, which is no spread, with room beside it
+            axes.set_xlim(edges[0] - 5.0 * np.ptp(edges), edges[1] + 5.0 * np.ptp(edges))
+        axes.hist(there, bins=edges.tolist(), color=BLUE, alpha=0.75, zorder=2.0)
         axes.axvline(middle, color=RED, label=f"median {middle:.4g}")
         label = f"90 %: {low:.4g} to {high:.4g}"
         axes.axvspan(low, high, color=GREY, alpha=0.15, linewidth=0.0, zorder=0.0, label=label)
