@@ -4,11 +4,13 @@ import json
 import re
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pyarrow.parquet as pq  # type: ignore[import-untyped]
 import pytest
-from grasp_cosim import System, cli
+from grasp_cosim import InputError, System, cli
+from grasp_cosim.grasp import with_bench
 from grasp_cosim.sweep.read import built_in, read_study, study_file
 
 Run = Callable[..., tuple[int, str, str]]
@@ -51,7 +53,7 @@ def test_a_study_leaves_its_runs_and_pictures(command: Run, tmp_path: Path) -> N
     assert summary["metrics"]["target_position"]["runs"] == 4
     assert summary["metrics"]["time_difference"]["runs"] == 0
     assert sorted(p.name for p in (tmp_path / "study").iterdir()) == [
-        "distributions.png", "map.png", "parts", "runs.parquet", "study.json",
+        "distributions.png", "lock", "map.png", "parts", "runs.parquet", "study.json",
     ]  # fmt: skip
     assert "drew study/map.png" in err
     code, out, _ = command(STUDY, "--workers", "1")
@@ -87,15 +89,17 @@ def test_where_every_run_fails_the_result_is_negative(command: Run) -> None:
     )
     text = narrow.replace("case = 0\n", 'case = 0\noutputs = ["plant.gap[1]"]\n')
     position = '[[parameters]]\nvariables = ["plant.initial_object_position"]\nvalues = [0.2]\n'
-    code, out, _ = command(text.replace("[figures]", f"{position}[figures]"), "--workers", "1")
+    text = text.replace("[figures]", f"{position}[figures]")
+    code, out, _ = command(text, "--workers", "1", "--plot")
     assert code == 1
     assert re.search(r"1 runs, 0 of them done before, 1 failed", out)
+    assert sorted(p.name for p in Path("study").glob("*.png")) == ["distributions.png", "map.png"]
     assert re.search(r"^the first that failed, 0: plant: ", out, re.MULTILINE)
 
 
 WRONG = [
     ("[design", "study.toml: not readable as TOML"),
-    ("colour = 1\n", "study.toml: unknown entry 'colour'; valid: case, design"),
+    ("colour = 1\n", "study.toml: unknown entry 'colour'; valid: bench, case, design"),
     (HEAD, r"study.toml: \[design\]: missing; must be a table"),
     (f"{HEAD}[design]\n", "no kind; must have one"),
     (f"{HEAD}{GRID}count = 3\n", "unknown entry 'count'; valid: kind, runs, seed"),
@@ -104,7 +108,10 @@ WRONG = [
     (f"{HEAD}{GRID}{WIDTH}{VALUES}uniform = 3\n", "values and uniform; must have exactly one"),
     (f"{HEAD}{GRID}{WIDTH}values = 3\n", "values = 3: must be a list of values"),
     (f"{HEAD}{GRID}{WIDTH}values = [[3]]\n", r"values = \[3\]: must be a number, boolean or"),
-    (f"{HEAD}{GRID}{WIDTH}uniform = {{ low = 0.05, high = 0.07 }}\n", "parameter 1 has no list"),
+    (
+        f"{HEAD}{GRID}{WIDTH}uniform = {{ low = 0.05, high = 0.07 }}\n",
+        "study.toml: design: parameter 1 has",
+    ),
     (f"{HEAD}{GRID}{WIDTH}uniform = {{ low = 0.07, high = 0.05 }}\n", "must have low below high"),
     (f"{HEAD}{GRID}{WIDTH}uniform = {{ low = 0.07 }}\n", "high = None: must be a finite number"),
     (f"{HEAD}{GRID}{WIDTH}linspace = {{ from = 0.05, to = 0.07, count = 1.5 }}\n", "count = 1.5"),
@@ -132,9 +139,26 @@ WRONG = [
     (f'{HEAD}{GRID}{WIDTH}{VALUES}[values]\n"plant.x" = 3\n', r"\[values\] plant.x: .*no input"),
     (
         f'{HEAD}{GRID}{WIDTH}{VALUES}[values]\n"plant.object_width" = 0.07\n',
-        r"\[values\]: plant.object_width: is varied by a parameter",
+        r"\[values\]: plant.object_width: is varied by",
     ),
     (f'{HEAD}{GRID}{WIDTH}{VALUES}[figures]\nmap = {{ x = "a" }}\n', "map: y = None: must be a"),
+    ("[" * 10_000, "study.toml: not readable as TOML"),
+    (f"stop = 1{'0' * 5000}\n", "study.toml: not readable as TOML: Exceeds the limit"),
+    (f"bench = 1\n{HEAD}{GRID}{WIDTH}{VALUES}", "bench = 1: must be true or false"),
+    (f'{HEAD}{GRID}{WIDTH}{VALUES}name = "a\\nb"\n'.replace('name = "width"\n', ""), "of one line"),
+    (f"{HEAD}{GRID}{WIDTH}linspace = {{ from = 1{'0' * 400}, to = 1, count = 2 }}\n", "finite num"),
+    (f"{HEAD}{GRID}{WIDTH}uniform = {{ low = -1e308, high = 1e308 }}\n", "nearer to each other"),
+    (f"{HEAD}{GRID}{WIDTH}linspace = {{ from = -1e308, to = 1e308, count = 2 }}\n", "nearer to"),
+    (
+        f"{GRID}{WIDTH}normal = {{ mean = 1, standard_deviation = 9e9, low = 0, high = 2 }}\n",
+        "standard_deviation = 9000000000.0: must be at most 1e\\+06 times high - low, or the form",
+    ),
+    (
+        f'seeds = ["sensor_1.noise.seed"]\n{HEAD}{GRID}seed = 1\n{WIDTH}{VALUES}[values]\n'
+        '"sensor_1.noise.seed" = 3\n',
+        "sensor_1.noise.seed: is varied by",
+    ),
+    (f"{STUDY}".replace('["target_position"]', '["tilt"]'), "figures: no column 'tilt' in the res"),
 ]
 
 
@@ -153,7 +177,14 @@ def test_wrong_input_is_one_line_and_exit_2(
 def test_no_such_study_names_the_built_in_ones(command: Run) -> None:
     code = cli.main(["sweep", "map"])
     assert code == 2
-    assert built_in() == ["bench_monte_carlo", "reflectance_map"]
+    assert built_in() == ["bench_monte_carlo", "grasp_sensitivity", "reflectance_map"]
+
+
+def test_a_plot_of_nothing_is_refused_before_the_runs(command: Run, tmp_path: Path) -> None:
+    code, _, err = command(f"{HEAD}{GRID}{WIDTH}{VALUES}", "--plot")
+    assert (code, err.count("\n")) == (2, 1)
+    assert "--plot: study.toml has no [figures]; must say what to draw" in err
+    assert not (tmp_path / "study").exists()
 
 
 def test_a_cluster_has_its_own_workers(command: Run) -> None:
@@ -169,7 +200,30 @@ def test_no_pyarrow_is_one_line(command: Run, monkeypatch: pytest.MonkeyPatch) -
     assert err.endswith("install it with: pip install 'grasp-cosim[sweep]'\n")
 
 
-@pytest.mark.parametrize("name", ["bench_monte_carlo", "reflectance_map"])
+def test_a_study_of_the_bench_is_that_of_run_bench(tmp_path: Path, grasp: System) -> None:
+    path = tmp_path / "study.toml"
+    path.write_text(
+        f"bench = true\n{STUDY}".replace(
+            "[figures]", '[values]\n"sensor_1.adc.bits" = 12\n[figures]'
+        )
+    )
+    study = read_study(path, lambda _: grasp)
+    off = {"controller.simultaneous_contact.enabled": False, "sensor_1.adc.bits": 12}
+    off |= {"controller.impact_reduction.enabled": False}
+    expected = with_bench(grasp).with_values(off).with_experiment(step=1e-3, stop=0.02)
+    assert study.system.components == expected.components
+
+
+def test_a_bench_that_does_not_fit_is_one_line(tmp_path: Path, grasp: System) -> None:
+    path = tmp_path / "study.toml"
+    path.write_text(f"bench = true\n{STUDY}")
+    plant = replace(grasp.components[0], values={"force[1]": 0.0, "force[2]": 0.0})
+    bare = replace(grasp, components=(plant,), wires=())
+    with pytest.raises(InputError, match=r"^study.toml: bench = true: bench_preset.toml sensor_1"):
+        read_study(path, lambda _: bare)
+
+
+@pytest.mark.parametrize("name", ["bench_monte_carlo", "grasp_sensitivity", "reflectance_map"])
 def test_a_built_in_study_fits_the_grasp(name: str, grasp: System) -> None:
     study = read_study(study_file(name), lambda _: grasp)
     assert study.runs >= 200

@@ -94,6 +94,11 @@ def test_a_finger_that_does_not_touch_counts_at_the_end(grasp: System) -> None:
     assert contact_times((short, Grasp(0.03, 1.0, 1, ()))) == [STOP, STOP]
 
 
+def test_a_grasp_that_is_refused_says_which(grasp: System) -> None:
+    with pytest.raises(InputError, match=r"^x_m = 5 m, Case 1: plant: .*must fit between"):
+        contact_times((grasp, Grasp(5.0, 1.0, 1, ())))
+
+
 def test_the_published_contacts_are_40_and_none_is_there_twice() -> None:
     found = published_contacts()
     assert len(found) == 40
@@ -106,7 +111,7 @@ def test_the_published_contacts_are_40_and_none_is_there_twice() -> None:
 
 def test_a_table_of_contact_times_is_read(tmp_path: Path) -> None:
     path = tmp_path / "times.csv"
-    path.write_text("x_m,case,finger,time,alpha_1,alpha_2\n0.03,1,2,3.1,1,0.86\n")
+    path.write_text("\ufeffx_m, case,finger,time,alpha_1,alpha_2\n0.03,1,2,3.1, 1,0.86\n", "utf-8")
     assert read_contacts(path) == [Contact("x_m = 0.03 m", Setting(0.03, 1.0, 0.86), 1, 2, 3.1)]
 
 
@@ -117,7 +122,13 @@ def test_a_table_of_contact_times_is_read(tmp_path: Path) -> None:
         ("", "the columns are none; must be x_m, case, finger, time, and may be"),
         ("x_m,case,finger\n0,1,1\n", "must be x_m, case, finger, time"),
         ("x_m,case,finger,time\n0,1,1,soon\n", "line 2: time = 'soon': must be a number"),
-        ("x_m,case,finger,time\n0,1,1\n", "line 2: time = None: must be a number"),
+        ("x_m,case,finger,time\n0,1,1\n", "line 2: 3 entries; must be 4, as many as columns"),
+        ("x_m,case,finger,time\n0,1,1,2,9\n", "line 2: 5 entries; must be 4"),
+        ("x_m,case,finger,time\n\n0,1,1,soon\n", "line 3: time = 'soon': must be a number"),
+        ("x_m,case,finger,time\n", "has no line below its columns; must have contact times"),
+        ("x_m,x_m,case,finger,time\n0,0,1,1,2\n", "the columns are x_m, x_m, .*, once each"),
+        ("x_m,case,finger,time\nnan,1,1,2\n", "line 2: x_m = nan: must be a finite number"),
+        ("x_m,case,finger,time,alpha_1\n0,1,1,2,inf\n", "alpha_1 = inf: must be a finite number"),
         ("x_m,case,finger,time\n0,1,1,2\n0,3,1,2\n", "line 3: case = 3: must be one of 0, 1, 2"),
         ("x_m,case,finger,time\n0,1,0,2\n", "line 2: finger = 0: must be one of 1, 2"),
         ("x_m,case,finger,time\n0,1,1,-1\n", "line 2: time = -1 s, .*: the time must be greater"),

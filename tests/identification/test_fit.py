@@ -90,6 +90,17 @@ def test_too_few_figures_are_refused() -> None:
         fit(lambda points: [np.zeros(2) for _ in points], [parameter("a"), parameter("b")], "test")
 
 
+@pytest.mark.parametrize("value", [np.nan, np.inf, 1e200])
+def test_residuals_whose_squares_are_not_finite_are_refused(value: float) -> None:
+    measured = decay(3.0, 0.7)
+    measured[7] = value
+    with pytest.raises(
+        InputError, match=r"^test: .* not finite at a = 1, b = 1; must be"
+    ) as caught:
+        fitted(measured)
+    assert "\n" not in str(caught.value)
+
+
 def test_a_fit_that_does_not_come_to_rest_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("grasp_cosim.identification.fit.MOST", 1)
     with pytest.raises(SimulationError, match="has not come to rest after 1 steps"):

@@ -1,5 +1,6 @@
 """Friction from a log: of our own simulation with noise, and of a model that scipy integrates."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -149,6 +150,64 @@ def test_a_log_that_is_too_coarse_is_refused(grasp: System, recorded: Log) -> No
     coarse = Log(recorded.time[::20], {k: v[::20] for k, v in recorded.signals.items()})
     with pytest.raises(InputError, match=r"^test: a sample every 0.02 s; must be at most every"):
         identified(grasp, coarse)
+
+
+@pytest.mark.parametrize("name", ["plant.velocity[1]", "controller.force[2]"])
+@pytest.mark.parametrize("value", [np.nan, -np.inf])
+def test_a_sample_that_is_no_number_is_named(
+    grasp: System, recorded: Log, name: str, value: float
+) -> None:
+    spoilt = recorded.signals[name].copy()
+    spoilt[[40, 41]] = value
+    log = replace(recorded, signals={**recorded.signals, name: spoilt})
+    message = (
+        rf"^test: {re.escape(name)} = {value} at 0.04 s, one of 2 such samples; must be finite"
+    )
+    with pytest.raises(InputError, match=message):
+        identified(grasp, log)
+
+
+@pytest.mark.parametrize("size", [0, 1])
+def test_a_log_of_a_sample_is_refused(grasp: System, recorded: Log, size: int) -> None:
+    log = Log(recorded.time[:size], {k: v[:size] for k, v in recorded.signals.items()})
+    with pytest.raises(InputError, match=rf"^test: {size} samples; must be at least two"):
+        identified(grasp, log)
+
+
+@pytest.mark.parametrize("value", [0.0, np.nan, np.inf])
+def test_time_that_does_not_grow_is_refused(grasp: System, recorded: Log, value: float) -> None:
+    time = recorded.time.copy()
+    time[50] = value
+    with pytest.raises(InputError, match=r"^test: the time must be finite and grow from sample to"):
+        identified(grasp, replace(recorded, time=time))
+
+
+def test_a_window_with_a_sample_missing_does_not_count(grasp: System, recorded: Log) -> None:
+    """Rows left out while a finger turned round would else look like one way throughout."""
+    kept = np.ones(len(recorded.time), dtype=bool)
+    kept[100:400] = False
+    gone = Log(recorded.time[kept], {k: v[kept] for k, v in recorded.signals.items()})
+    windows, _ = identify_from_log(grasp, gone, chosen(["coulomb"], GROUPS, "test"), "test")
+    for w in windows:
+        assert not ((w.time > recorded.time[100] - 0.021) & (w.time < recorded.time[100])).any()
+        assert (w.time > recorded.time[400]).any()
+    for e in identified(grasp, gone).estimates:
+        assert e.value == pytest.approx(TRUE[e.name], rel=5e-3, abs=5e-3), e.name
+
+
+@pytest.mark.parametrize("error", [IndexError("list\nindex"), KeyError((0, 1))])
+def test_whatever_asammdf_stumbles_over_is_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: Exception
+) -> None:
+    def stumble(path: Path) -> None:
+        raise error
+
+    monkeypatch.setattr("asammdf.MDF", stumble)
+    (tmp_path / "log.mf4").touch()
+    name = type(error).__name__
+    with pytest.raises(InputError, match=rf"log.mf4: is damaged, no MDF file: {name}: ") as caught:
+        load_log(tmp_path / "log.mf4")
+    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """What a run leaves behind, and the files that it writes."""
 
+import errno
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 from grasp_cosim import Result, SimulationError, System, simulate
 from grasp_cosim.recording.load import load_run
-from grasp_cosim.recording.result import Rejection
+from grasp_cosim.recording.result import Rejection, in_one_piece
 from grasp_cosim.recording.settings import settings
 from recording.rows import full_disk
 
@@ -101,3 +102,17 @@ def test_a_result_of_integers_is_written_as_integers(result: Result, tmp_path: P
     counts = np.arange(len(result.time), dtype=np.int64)
     replace(result, signals={"a.n": counts}, units={"a.n": None}).to_csv(tmp_path / "s.csv")
     assert (tmp_path / "s.csv").read_text().splitlines()[-1] == "0.1,1000"
+
+
+def test_a_file_that_cannot_be_written_is_named_and_not_left_behind(tmp_path: Path) -> None:
+    """A write to a full disk fails without saying which file it was."""
+
+    def fill() -> None:
+        with in_one_piece(tmp_path / "a.json") as part:
+            part.write_text("half")
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    with pytest.raises(OSError, match="No space left on device") as caught:
+        fill()
+    assert (caught.value.errno, caught.value.filename) == (errno.ENOSPC, str(tmp_path / "a.json"))
+    assert list(tmp_path.iterdir()) == []

@@ -3,6 +3,7 @@
 import sys
 from contextlib import closing
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from grasp_cosim import InputError, System
@@ -59,6 +60,19 @@ def test_without_dask_it_is_said(
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(InputError, match=r"pip install 'grasp-cosim\[dask\]'"):
         sweep(study, tmp_path / "out", scheduler="tcp://127.0.0.1:8786")
+
+
+def test_a_client_that_fails_without_a_word_is_named(
+    study: Study, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def client(*_: object, **__: object) -> None:
+        raise TimeoutError
+
+    monkeypatch.setitem(sys.modules, "distributed", SimpleNamespace(Client=client))
+    with pytest.raises(
+        InputError, match="--scheduler tcp://x: TimeoutError; must be one that runs"
+    ):
+        list(run_on_cluster("tcp://x", Task(study.system, ()), [Job(0, {})]))
 
 
 def test_an_address_that_is_none(study: Study, tmp_path: Path) -> None:

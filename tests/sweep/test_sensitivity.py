@@ -2,8 +2,11 @@
 
 import numpy as np
 import pytest
+from grasp_cosim import System
 from grasp_cosim.sweep.design import Design
+from grasp_cosim.sweep.distributions import Uniform
 from grasp_cosim.sweep.sensitivity import Floats, indices, sensitivity
+from grasp_cosim.sweep.study import Parameter, Study
 from scipy.stats import sobol_indices
 
 NAMES = ["a", "b", "c"]
@@ -51,6 +54,42 @@ def test_a_row_with_a_failed_run_is_left_out(values: Floats) -> None:
     assert (found.rows, found.of) == (1024 - 2, 1024)
     rows = np.delete(values.reshape(-1, 5), [1, 100], axis=0)
     assert [i.first for i in found.indices] == indices(rows)[0].tolist()
+
+
+@pytest.mark.parametrize("scale", [1e-300, 1e300])
+def test_they_do_not_depend_on_the_unit(values: Floats, scale: float) -> None:
+    few, scaled = (sensitivity("y", NAMES, v[:320], 1) for v in (values, scale * values))
+    assert few is not None
+    assert scaled is not None
+    for one, other in zip(few.indices, scaled.indices, strict=True):
+        assert other.first == pytest.approx(one.first, rel=1e-9, abs=1e-12)
+        assert other.total_interval == pytest.approx(one.total_interval, rel=1e-9, abs=1e-12)
+
+
+def test_noise_is_no_part_of_any_parameter_s_effect(grasp: System) -> None:
+    """A value of the noise belongs to its seeds, as in a sensor; x alone acts besides it."""
+    x, inert = (
+        Parameter(name, (f"plant.finger_mass[{j}]",), Uniform(0.4, 0.6))
+        for j, name in enumerate(("x", "inert"), start=1)
+    )
+    seeds = ("sensor_1.noise.seed", "sensor_2.noise.seed")
+    study = Study("made", grasp, (x, inert), Design("saltelli", 256, 1), seeds)
+
+    def value(k: int) -> float:
+        point = study.point(k)
+        noise = [np.random.default_rng(int(point[seed])).uniform(-0.1, 0.1) for seed in seeds]
+        return float(point["x"]) + float(sum(noise))
+
+    found = sensitivity("y", ["x", "inert"], np.array([value(k) for k in range(study.runs)]), 1)
+    assert found is not None
+    share = 1.0 / 3.0  # of x: a variance of 0.2^2/12, and the two of noise have it each
+    assert [i.first for i in found.indices] == pytest.approx([share, 0.0], abs=0.08)
+    assert [i.total for i in found.indices] == pytest.approx([share, 0.0], abs=0.08)
+
+
+def test_rounding_is_no_variance() -> None:
+    noise = np.random.default_rng(1).integers(0, 3, 40) * np.finfo(float).eps
+    assert sensitivity("y", NAMES, 3.0 + noise, 1) is None
 
 
 @pytest.mark.parametrize("value", [3.0, np.nan])

@@ -1,11 +1,14 @@
 """The folder of a study: bound to it, and whole after whatever happened."""
 
 import json
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from grasp_cosim import InputError, System
+from grasp_cosim import InputError, SimulationError, System
 from grasp_cosim.sweep.design import Design
 from grasp_cosim.sweep.distributions import Uniform
 from grasp_cosim.sweep.run import Outcome
@@ -39,8 +42,11 @@ def test_half_a_part_is_no_part(study: Study, tmp_path: Path) -> None:
     store.open(study)
     torn = tmp_path / "parts/0000003.json.99.part"
     torn.write_text('{"index": 3, "metr')
+    theirs = tmp_path / "download.part"
+    theirs.touch()
     assert store.open(study) == {}
     assert not torn.exists()
+    assert theirs.exists()
 
 
 def test_another_study_is_refused_in_one_line(study: Study, tmp_path: Path) -> None:
@@ -53,6 +59,77 @@ def test_another_study_is_refused_in_one_line(study: Study, tmp_path: Path) -> N
     fmu.write_bytes(study.system.component("plant", "").fmu.read_bytes() + b" ")
     with pytest.raises(InputError, match="the same study with other FMUs; --out must be"):
         store.open(replace(study, system=study.system.swap("plant", fmu)))
+
+
+HOLD = """
+import fcntl, sys, time
+file = open(sys.argv[1], "w")
+fcntl.flock(file, fcntl.LOCK_EX)
+print(12345, file=file, flush=True)
+print("locked", flush=True)
+time.sleep(60)
+"""
+
+
+def test_a_folder_is_one_process_s_until_that_ends_however(tmp_path: Path) -> None:
+    store = Store(tmp_path / "new")
+    with store.locked():
+        assert (tmp_path / "new/lock").read_text() == f"{os.getpid()}\n"
+        with pytest.raises(InputError, match=rf"process {os.getpid()} is doing runs in it; must"):
+            Store(tmp_path / "new").locked().__enter__()
+    other = subprocess.Popen(
+        [sys.executable, "-c", HOLD, str(tmp_path / "new/lock")], stdout=subprocess.PIPE
+    )
+    with other:
+        assert other.stdout
+        assert other.stdout.readline() == b"locked\n"
+        with pytest.raises(InputError, match="new: process 12345 is doing runs") as caught:
+            store.locked().__enter__()
+        assert "\n" not in str(caught.value)
+        other.kill()
+    with store.locked():
+        assert store.kept() == 0
+
+
+def test_a_part_that_cannot_be_written_is_one_line(study: Study, tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    store.open(study)
+    store.keep(OUTCOMES[0])
+    (tmp_path / "parts/0000007.json").mkdir()
+    with pytest.raises(
+        SimulationError, match=r"0000007.json: .*; 2 runs are kept, the same command goes on$"
+    ):
+        store.keep(OUTCOMES[1])
+    assert not list(tmp_path.rglob("*.part"))
+
+
+PARTS = [
+    '{"index": 2, "metrics": {}}',  # another run's
+    '{"index": true, "metrics": {}}',
+    '{"index": 1, "metrics": 3}',
+    '{"index": 1, "metrics": {"a": [1]}}',
+    '{"index": 1, "metrics": {}, "error": 3}',
+    '{"index": 1, "metrics": {}, "more": 3}',
+    "[" * 10_000,
+    "",
+]
+
+
+@pytest.mark.parametrize("text", PARTS)
+def test_a_part_that_is_no_run_is_refused(study: Study, tmp_path: Path, text: str) -> None:
+    store = Store(tmp_path)
+    store.open(study)
+    (tmp_path / "parts/0000001.json").write_text(text)
+    with pytest.raises(InputError, match=r"0000001.json: not readable as a run: .*must be removed"):
+        store.open(study)
+
+
+def test_a_run_beyond_the_last_is_refused(study: Study, tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    store.open(study)
+    store.keep(Outcome(study.runs, {}))
+    with pytest.raises(InputError, match=r"0000020.json: not readable as a run: index = 20; must"):
+        store.open(study)
 
 
 def test_what_is_not_ours_is_refused(study: Study, tmp_path: Path) -> None:

@@ -7,7 +7,8 @@ import pytest
 from grasp_cosim import InputError, System
 from grasp_cosim.sweep.design import Design
 from grasp_cosim.sweep.distributions import Listed, Uniform
-from grasp_cosim.sweep.study import Map, Parameter, Pictures, Study
+from grasp_cosim.sweep.run import Job, Task, run_job
+from grasp_cosim.sweep.study import METRICS, Map, Parameter, Pictures, Study
 
 RATIO = Parameter("ratio", ("sensor_1.reflectance",), Uniform(0.5, 2.0), "sensor_2.reflectance")
 LEFT = Parameter("left", ("sensor_2.reflectance",), Uniform(0.5, 1.0))
@@ -94,7 +95,16 @@ WRONG = [
     ((MASS,), {"outputs": ("plant.force[1]",)}, r"no output 'plant.force\[1\]'"),
     ((MASS,), {"seeds": ("sensor_1.seed",)}, "has no variable 'seed'"),
     ((MASS,), {"seeds": ("plant.finger_mass[1]",)}, r"variable 'plant.finger_mass\[1\]' twice"),
-    ((MASS,), {"pictures": Pictures(Map("mass", "x", "y"))}, "no parameter 'x'; valid: mass"),
+    ((MASS,), {"pictures": Pictures(Map("mass", "x", "y"))}, "'x' with numbers; valid: mass"),
+    ((replace(MASS, name="peak_contact_force[1]"),), {}, "is the name of a result or seed; must"),
+    ((replace(MASS, name=SEEDS[0]),), {"seeds": SEEDS}, "noise.seed': is the name of a result or"),
+    ((replace(MASS, name="proxies.plant.lost"),), {}, "is the name of a result"),
+    ((MASS,), {"seeds": ("plant.object_width",)}, "object_width is of type Real; must be an Int"),
+    ((MASS,), {"pictures": Pictures(None, ("time",))}, "no column 'time' in the results; valid: m"),
+    ((parameter("sensor_1.gain", 1.0, ratio_to="sensor_1.noise.enabled"),), {}, "of type Boolean"),
+    ((parameter("sensor_1.gain", 10**400, ratio_to="sensor_2.gain"),), {}, "must be a number, and"),
+    ((parameter("sensor_1.gain", 1.0, ratio_to="plant.gap[1]"),), {}, "p: ratio_to: plant.gap"),
+    ((RATIO, replace(LEFT, distribution=Uniform(0.5, 9.0))), {}, "reflectance = 18.0: must be a f"),
 ]  # fmt: skip
 
 
@@ -110,3 +120,8 @@ def test_what_is_no_study(
 def test_seeds_must_fit(grasp: System) -> None:
     with pytest.raises(InputError, match=r"seeds: 50 of them, from 1 to 32; must be fewer runs"):
         Study("made", grasp, (MASS,), RANDOM, ("sensor_1.adc.bits",))
+
+
+def test_the_columns_of_a_grasp_are_those_that_a_run_leaves(grasp: System) -> None:
+    task = Task(grasp.with_experiment(step=1e-3, stop=0.01), ())
+    assert set(run_job(task, Job(0, {})).metrics) == set(METRICS)

@@ -11,8 +11,10 @@ from ..figures.sweep import draw_sweep
 from ..sweep.read import read_study, study_file
 from ..sweep.sensitivity import Sensitivity
 from ..sweep.store import Store
+from ..sweep.study import Pictures
 from ..sweep.sweep import RUNS, Sweep
 from ..sweep.sweep import sweep as run_study
+from ..sweep.table import STATISTICS
 from .frame import INTERRUPTED, NEGATIVE, check_folder, fail, json_option, load_system
 
 
@@ -37,7 +39,7 @@ def sweep(
     plot: bool,
     as_json: bool,
 ) -> int:
-    """Do all runs of STUDY, a .toml file or a built-in one: reflectance_map, bench_monte_carlo.
+    """Do all runs of STUDY: a .toml file, or reflectance_map, grasp_sensitivity, bench_monte_carlo.
 
     Finished runs are kept in the folder: the same command goes on where it was ended.
 
@@ -50,6 +52,8 @@ def sweep(
     folder = out or Path(path.stem)
     check_folder(folder)
     chosen = read_study(path, lambda system: load_system(system, None, None))
+    if plot and chosen.pictures == Pictures():
+        raise InputError(f"--plot: {path.name} has no [figures]; must say what to draw")
     if plot:
         new_figure(1.0, 1.0)  # says at once if matplotlib is missing
     try:
@@ -72,11 +76,10 @@ def _as_text(done: Sweep) -> str:
     error = next((o for o in done.outcomes if o.error is not None), None)
     if error is not None:
         lines.append(f"the first that failed, {error.index}: {error.error}")
-    heads = ("runs", "least", "mean", "median", "greatest")
-    lines.append(f"{'':28s}" + "".join(f"{head:>12s}" for head in heads))
+    lines.append(f"{'':28s}" + "".join(f"{head:>11s}" for head in ("runs", *STATISTICS)))
     for name, row in done.table.summary().items():
-        numbers = ("-" if row[head] is None else f"{row[head]:.5g}" for head in heads)
-        lines.append(f"{name:28s}" + "".join(f"{number:>12s}" for number in numbers))
+        numbers = ("-" if number is None else f"{number:.4g}" for number in row.values())
+        lines.append(f"{name:28s}" + "".join(f"{number:>11s}" for number in numbers))
     for found in done.sensitivities:
         lines += _sensitivity_lines(found)
     return "\n".join(lines)

@@ -6,14 +6,14 @@ reflectances matter by their ratio alone, so that surfaces of equal colours are 
 """
 
 import csv
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from tqdm import tqdm
 
-from ..errors import InputError, choices
+from ..errors import InputError, SimulationError, choices
 from ..grasp import CASES
 from ..published.tables import Row, Setting, experimental_rows
 from ..study.closing import close
@@ -70,18 +70,23 @@ def read_contacts(path: Path) -> list[Contact]:
     surfaces are not alike, alpha_1 and alpha_2. InputError names the line that is wrong.
     """
     try:
-        lines = list(csv.DictReader(path.read_text("utf-8").splitlines(), strict=True))
+        text = path.read_text("utf-8-sig")  # with the mark that spreadsheets begin with, or without
+        reader = csv.reader(text.splitlines(), strict=True)
+        lines = [(reader.line_num, [cell.strip() for cell in line]) for line in reader if line]
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}; must be a table of contact times") from error
     except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: is no CSV: {error}") from error
-    names = list(lines[0]) if lines else []
-    if not set(COLUMNS) <= set(names) <= {*COLUMNS, *OPTIONAL}:
+    names = lines[0][1] if lines else []
+    wrong = not set(COLUMNS) <= set(names) <= {*COLUMNS, *OPTIONAL}
+    if wrong or len(set(names)) < len(names):
         raise InputError(
             f"{path}: the columns are {choices(names)}; must be {choices(COLUMNS)}, "
-            f"and may be {choices(OPTIONAL)}"
+            f"and may be {choices(OPTIONAL)}, once each"
         )
-    return [_read(f"{path}, line {i}", line) for i, line in enumerate(lines, start=2)]
+    if len(lines) == 1:
+        raise InputError(f"{path}: has no line below its columns; must have contact times")
+    return [_read(f"{path}, line {number}", names, line) for number, line in lines[1:]]
 
 
 def identify_from_times(
@@ -139,7 +144,11 @@ def contact_times(job: tuple[System, Grasp]) -> Times:
     values = dict(grasp.parameters)
     own = values.get(RATIO, system.start(RATIO))
     values |= {"plant.initial_object_position": grasp.x_m, RATIO: own * grasp.ratio}
-    result = close(system.with_values({**CASES[grasp.case], **values}), after=0.0)
+    try:
+        result = close(system.with_values({**CASES[grasp.case], **values}), after=0.0)
+    except (InputError, SimulationError) as error:
+        error.args = (f"x_m = {grasp.x_m:g} m, Case {grasp.case}: {error}",)
+        raise
     return [STOP if t is None else float(t) for t in result.metrics["time_to_contact"]]
 
 
@@ -156,13 +165,17 @@ def _contact(row: Row) -> Contact:
     return Contact(where, row.setting, row.case, finger, row.published)
 
 
-def _read(place: str, line: Mapping[str, str | None]) -> Contact:
+def _read(place: str, names: Sequence[str], line: Sequence[str]) -> Contact:
+    if len(line) != len(names):
+        raise InputError(f"{place}: {len(line)} entries; must be {len(names)}, as many as columns")
     numbers: Values = {}
-    for name, text in line.items():
+    for name, text in zip(names, line, strict=True):
         try:
-            numbers[name] = float(text or "")
+            numbers[name] = float(text)
         except ValueError:
             raise InputError(f"{place}: {name} = {text!r}: must be a number") from None
+        if not np.isfinite(numbers[name]):
+            raise InputError(f"{place}: {name} = {text}: must be a finite number")
     case, finger = numbers["case"], numbers["finger"]
     for name, valid in (("case", tuple(CASES)), ("finger", FINGERS)):
         if numbers[name] not in valid:

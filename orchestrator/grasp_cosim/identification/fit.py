@@ -88,8 +88,8 @@ def check_scipy() -> None:
 def fit(residuals: Residuals, parameters: Sequence[Parameter], place: str) -> Fit:
     """The parameters that make the sum of the squared residuals least; place names the data.
 
-    InputError where there are no more residuals than parameters, SimulationError where the fit
-    does not come to rest.
+    InputError where there are no more residuals than parameters or one is not finite,
+    SimulationError where the fit does not come to rest.
     """
     check_scipy()
     from scipy.optimize import least_squares
@@ -98,10 +98,22 @@ def fit(residuals: Residuals, parameters: Sequence[Parameter], place: str) -> Fi
     scale = np.array([p.scale for p in parameters])
     points = 0
 
+    def finite(points: Sequence[Vector]) -> Sequence[Vector]:
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = residuals(points)
+            wrong = [x for x, r in zip(points, found, strict=True) if not np.isfinite(r @ r)]
+        if wrong:
+            at = ", ".join(f"{p.name} = {v:.6g}" for p, v in zip(parameters, wrong[0], strict=True))
+            raise InputError(
+                f"{place}: the squares of the residuals are not finite at {at}; must be figures of "
+                "a grasp"
+            )
+        return found
+
     def at(x: Vector) -> Vector:
         nonlocal points
         points += 1
-        (found,) = residuals([x])
+        (found,) = finite([x])
         if len(found) <= len(parameters):
             raise InputError(
                 f"{place}: {len(found)} figures for {len(parameters)} parameters; must be more"
@@ -112,7 +124,7 @@ def fit(residuals: Residuals, parameters: Sequence[Parameter], place: str) -> Fi
         nonlocal points
         points += len(x)
         steps = np.where(x + STEP * scale > high, -STEP, STEP) * scale
-        here, *moved = residuals([x, *(x + row for row in np.diag(steps))])
+        here, *moved = finite([x, *(x + row for row in np.diag(steps))])
         return np.column_stack([(m - here) / h for m, h in zip(moved, steps, strict=True)])
 
     found = least_squares(

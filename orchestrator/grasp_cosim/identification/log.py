@@ -6,8 +6,8 @@ Free of the object a finger obeys m·x'' = u - sgn(x')·F(|x'|), so that over a 
     F(v) = F_C + (F_S - F_C)·exp(-(v/v_s)^2) + B·v
 
 is zero but for noise, in N. No signal is differentiated: noise of the velocity enters by its two
-ends over T. A window counts where the finger moves one way throughout and nothing touches it; no
-sample belongs to two windows, so that white noise leaves them independent.
+ends over T. A window counts where the finger moves one way throughout, nothing touches it and no
+sample is missing; none belongs to two windows, so that white noise leaves them independent.
 """
 
 from collections.abc import Mapping, Sequence
@@ -31,6 +31,9 @@ SLOWEST = 1e-4
 TOUCHED = 0.05
 """N; a contact force above is one."""
 
+GAP = 1.5
+"""Median steps between two samples; where it is more, one is missing."""
+
 GROUPS = ("coulomb", "static", "viscous", "stribeck")
 """What a log of the fingers says something about."""
 
@@ -53,7 +56,8 @@ def identify_from_log(
     """Fit friction to a log; what is not fitted is as in the system, whose masses count.
 
     The residuals are those of the windows in their order, of the right finger first.
-    InputError, naming the place, where a signal is missing or a finger does not move freely.
+    InputError, naming the place, where a signal is missing or has what is no number, the time does
+    not grow, or a finger does not move freely.
     """
     windows = [_windows(system, log, j, place) for j in FINGERS]
     names = [p.name for p in parameters]
@@ -67,7 +71,8 @@ def identify_from_log(
 
 def _windows(system: System, log: Log, finger: int, place: str) -> Windows:
     mass = system.start(f"{PLANT}.finger_mass[{finger}]")
-    size = _samples(log.time, place)
+    step = _step(log.time, place)
+    size = int(WINDOW / step + 1e-6) + 1
 
     def cut(signal: Vector) -> Vector:
         """A row per window."""
@@ -80,7 +85,8 @@ def _windows(system: System, log: Log, finger: int, place: str) -> Windows:
     time = cut(log.time)
     way = np.sign(v[:, 0])
     moving = (way[:, None] * v > SLOWEST).all(axis=1)
-    counts = moving & (np.abs(touch) <= TOUCHED).all(axis=1)
+    whole = (np.diff(time) <= GAP * step).all(axis=1)
+    counts = whole & moving & (np.abs(touch) <= TOUCHED).all(axis=1)
     if not counts.any():
         raise InputError(
             f"{place}: finger {finger} does not move freely for {WINDOW:g} s, one way and faster "
@@ -107,14 +113,26 @@ def _residuals(system: System, values: Mapping[str, float], w: Windows) -> Vecto
 def _signal(log: Log, name: str, place: str) -> Vector:
     if name not in log.signals:
         raise InputError(f"{place}: no signal {name!r}; it has {choices(log.signals)}")
-    return log.signals[name]
+    signal = log.signals[name]
+    wrong = np.flatnonzero(~np.isfinite(signal))
+    if len(wrong):
+        first = wrong[0]
+        raise InputError(
+            f"{place}: {name} = {signal[first]} at {log.time[first]:g} s, one of {len(wrong)} "
+            "such samples; must be finite, or such rows be left out"
+        )
+    return signal
 
 
-def _samples(time: Vector, place: str) -> int:
-    """The number of samples of a window, from the median step."""
-    step = float(np.median(np.diff(time))) if len(time) > 1 else np.inf
+def _step(time: Vector, place: str) -> float:
+    """The median step in s."""
+    if len(time) < 2:
+        raise InputError(f"{place}: {len(time)} samples; must be at least two")
+    if not (np.diff(time) > 0.0).all() or not np.isfinite(time).all():
+        raise InputError(f"{place}: the time must be finite and grow from sample to sample")
+    step = float(np.median(np.diff(time)))
     if not 0.0 < 2.0 * step <= WINDOW:
         raise InputError(
             f"{place}: a sample every {step:g} s; must be at most every {0.5 * WINDOW:g} s"
         )
-    return int(WINDOW / step + 1e-6) + 1
+    return step

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import logging
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -95,13 +96,14 @@ def _mdf(path: Path) -> Log:
     """Every channel of the first group that has samples, on its master."""
     check_mdf()
     from asammdf import MDF
-    from asammdf.blocks.utils import MdfException
 
+    logging.getLogger("asammdf").setLevel(logging.CRITICAL)  # what is wrong is ours to say
     try:
         with MDF(path) as mdf:
             channels = [c for c in mdf.iter_channels() if len(c.samples)]
-    except (MdfException, OSError, ValueError) as error:
-        raise InputError(f"{path}: is damaged, no MDF file: {error}") from error
+    except Exception as error:  # of a damaged file it raises whatever it stumbles over
+        said = " ".join(f"{type(error).__name__}: {error}".split())
+        raise InputError(f"{path}: is damaged, no MDF file: {said}") from error
     if not channels:
         raise InputError(f"{path}: no channel has samples; must be a recorded log")
     time = channels[0].timestamps
@@ -110,7 +112,7 @@ def _mdf(path: Path) -> Log:
         {
             c.name: c.samples.astype(np.float64)
             for c in channels
-            if len(c.timestamps) == len(time) and c.samples.dtype.kind in "fiub"
+            if c.samples.shape == time.shape and c.samples.dtype.kind in "fiub"
         },
     )
 

@@ -55,8 +55,7 @@ def run_on_cluster(address: str, task: Task, jobs: Iterable[Job]) -> Generator[O
     try:
         client = dask.Client(address, timeout=CONNECT, set_as_default=False)
     except (OSError, ValueError) as error:
-        text = str(error).splitlines()[0]
-        raise InputError(f"--scheduler {address}: {text}; must be one that runs") from error
+        raise InputError(f"--scheduler {address}: {_said(error)}; must be one that runs") from error
     with client:
         try:
             client.wait_for_workers(1, timeout=CONNECT)
@@ -80,8 +79,7 @@ def run_on_cluster(address: str, task: Task, jobs: Iterable[Job]) -> Generator[O
                 if isinstance(failure, dask.KilledWorker):
                     yield Outcome(index, {}, "the worker of the run died, several times")
                 elif failure is not None:
-                    said = str(failure).splitlines() or [type(failure).__name__]
-                    raise SimulationError(f"--scheduler {address}: {said[0]}")
+                    raise SimulationError(f"--scheduler {address}: {_said(failure)}")
                 else:
                     yield future.result()
                 job = next(left, None)
@@ -89,6 +87,11 @@ def run_on_cluster(address: str, task: Task, jobs: Iterable[Job]) -> Generator[O
                     done.add(submit(job))
         finally:
             client.cancel(list(done.futures))
+
+
+def _said(error: BaseException) -> str:
+    """The first line of an error, or its name where it has none."""
+    return (str(error).splitlines() or [type(error).__name__])[0]
 
 
 def check_cluster() -> Any:

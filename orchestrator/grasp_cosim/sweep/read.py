@@ -1,10 +1,12 @@
 """A study from a TOML file.
 
     system = "grasp.toml"           # or an .ssp, relative to this file; else the built-in one
+    bench = true                    # the grasp as on the bench, as in `run --bench`; else false
     case = 2                        # 0, 1 or 2, of a grasp; may be left out, as step and stop
     step = 1e-3                     # s
     stop = 3.0                      # s
-    seeds = ["sensor_1.noise.seed"] # get another whole number in each run
+    seeds = ["sensor_1.noise.seed"] # get another whole number in each run (in each two of a row of
+                                    # a saltelli design: noise is no part of a parameter's effect)
     outputs = ["plant.gap[1]"]      # their last values are kept beside the metrics
 
     [swap]                          # FMUs in the place of the system's, relative to this file
@@ -32,13 +34,14 @@ uniform = { low, high }, normal = { mean, standard_deviation, low, high }.
 """
 
 import math
+import sys
 import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
 from ..errors import InputError, choices
-from ..grasp import CASES
+from ..grasp import CASES, with_bench
 from ..system.description import System
 from ..system.interface import Value
 from ..system.tables import as_table, check_keys
@@ -50,8 +53,8 @@ STUDIES = Path(__file__).parent.parent / "studies"
 """The folder of the built-in studies."""
 
 KEYS = {
-    "system", "case", "step", "stop", "seeds", "outputs", "swap", "values", "design", "parameters",
-    "figures",
+    "system", "bench", "case", "step", "stop", "seeds", "outputs", "swap", "values", "design",
+    "parameters", "figures",
 }  # fmt: skip
 
 Made = TypeVar("Made")
@@ -60,6 +63,9 @@ Load = Callable[[Path | None], System]
 
 MOST_LEVELS = 100_000
 """Values of one parameter at most."""
+
+WIDEST = 1e6
+"""A normal distribution of which so little is left keeps 9 digits of its quantiles."""
 
 
 def built_in() -> list[str]:
@@ -81,7 +87,8 @@ def read_study(path: Path, load: Load) -> Study:
     """The study of a TOML file; load reads its system. InputError where anything is wrong."""
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        repr(table)  # where a hexadecimal number is longer than Python writes, it says so here
+    except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"{path}: not readable as TOML: {error}") from error
     place = path.name
     check_keys(place, table, KEYS)
@@ -101,7 +108,9 @@ def read_study(path: Path, load: Load) -> Study:
     )
     return Study(
         place,
-        _system(place, table, path.parent, load, {v for p in parameters for v in p.variables}),
+        _system(
+            place, table, path.parent, load, {*seeds, *(v for p in parameters for v in p.variables)}
+        ),
         parameters,
         _in(place, lambda: Design(**design)),
         seeds,
@@ -117,6 +126,9 @@ def _system(
     name = table.get("system")
     if name is not None and not isinstance(name, str):
         raise InputError(f"{place}: system = {name!r}: must be the path of a .toml or .ssp file")
+    bench = table.get("bench", False)
+    if not isinstance(bench, bool):
+        raise InputError(f"{place}: bench = {bench!r}: must be true or false")
     case = table.get("case")
     if isinstance(case, bool) or case not in (None, *CASES):
         raise InputError(f"{place}: case = {case!r}: must be one of {choices(CASES)}")
@@ -128,12 +140,18 @@ def _system(
     for key, value in fixed.items():
         _value(f"{place}: [values]: {key}", value)
         if key in varied:
-            raise InputError(f"{place}: [values]: {key}: is varied by a parameter; must be one")
-    values: dict[str, Value] = {**({} if case is None else CASES[case]), **fixed}
+            raise InputError(
+                f"{place}: [values]: {key}: is varied by [[parameters]] or seeds, too; must be in "
+                "one of them"
+            )
     system = load(None if name is None else folder / name)
+    if bench:
+        system = _in(f"{place}: bench = true", lambda: with_bench(system))
+    if case is not None:
+        system = system.revised({}, CASES[case], ("", f"{place}: case = {case}"))
     revised = system.revised(
         {key: folder / fmu for key, fmu in swaps.items()},
-        values,
+        fixed,
         (f"{place}: [swap]", f"{place}: [values]"),
     )
     return _in(place, lambda: revised.with_experiment(table.get("step"), table.get("stop")))
@@ -147,8 +165,8 @@ def _parameter(place: str, entry: Any) -> Parameter:
         raise InputError(f"{place}: variables = []: must have at least one")
     name = entry.get("name", variables[0])
     ratio_to = entry.get("ratio_to")
-    if not isinstance(name, str) or not name:
-        raise InputError(f"{place}: name = {name!r}: must be a string")
+    if not isinstance(name, str) or not name.strip() or not name.isprintable():
+        raise InputError(f"{place}: name = {name!r}: must be a string of one line")
     if ratio_to is not None and not isinstance(ratio_to, str):
         raise InputError(f"{place}: ratio_to = {ratio_to!r}: must be 'component.variable'")
     given = [form for form in FORMS if form in entry]
@@ -181,6 +199,8 @@ def _spaced(place: str, entry: Any, logarithmic: bool) -> Listed:
         raise InputError(f"{place}: count = {count:g}: must be a whole number 2 to {MOST_LEVELS}")
     if logarithmic and not (first > 0.0 and last > 0.0):
         raise InputError(f"{place}: from {first:g} to {last:g}: must be greater than 0")
+    if not math.isfinite(last - first):
+        raise InputError(f"{place}: from {first:g} to {last:g}: must be nearer to each other")
     return spaced(first, last, int(count), logarithmic)
 
 
@@ -197,6 +217,11 @@ def _normal(place: str, entry: Any) -> Normal:
     _check_rising(place, low, high)
     if deviation <= 0.0:
         raise InputError(f"{place}: standard_deviation = {deviation!r}: must be greater than 0")
+    if deviation > WIDEST * (high - low):
+        raise InputError(
+            f"{place}: standard_deviation = {deviation!r}: must be at most {WIDEST:g} times high - "
+            "low, or the form uniform, which it comes to"
+        )
     if not low <= mean <= high:
         raise InputError(f"{place}: mean = {mean!r}: must be from low, {low!r}, to high, {high!r}")
     return Normal(mean, deviation, low, high)
@@ -232,6 +257,8 @@ def _pictures(place: str, table: Any) -> Pictures:
 def _check_rising(place: str, low: float, high: float) -> None:
     if not low < high:
         raise InputError(f"{place}: low = {low!r}, high = {high!r}: must have low below high")
+    if not math.isfinite(high - low):
+        raise InputError(f"{place}: low = {low!r}, high = {high!r}: must be nearer to each other")
 
 
 def _numbers(place: str, entry: Any, names: tuple[str, ...]) -> list[float]:
@@ -241,7 +268,7 @@ def _numbers(place: str, entry: Any, names: tuple[str, ...]) -> list[float]:
     for name in names:
         number = table.get(name)
         real = isinstance(number, float | int) and not isinstance(number, bool)
-        if number is None or not real or not math.isfinite(number):
+        if number is None or not real or not abs(number) <= sys.float_info.max:
             raise InputError(f"{place}: {name} = {number!r}: must be a finite number")
     return [float(table[name]) for name in names]
 

@@ -4,7 +4,8 @@
     S_Ti = mean((f_A - f_ABi)^2) / (2·V)                  total, Jansen 1999
 
 as scipy.stats.sobol_indices has them, which takes a power of two of rows: not what is left where
-a run failed, with which its whole row goes.
+a run failed, with which its whole row goes. The intervals are of a bootstrap over rows as if these
+were independent; those of a Sobol sequence are spread more evenly, so the intervals are wide.
 """
 
 from collections.abc import Sequence
@@ -21,6 +22,9 @@ RESAMPLES = 200
 
 COVER = (2.5, 97.5)
 """%, of the intervals."""
+
+ROUNDING = 1e-12
+"""Values that are so near to each other, as a share of the greatest, do not vary."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,12 +76,12 @@ def sensitivity(
     width = len(parameters) + 2
     rows = values.reshape(-1, width)
     complete = rows[np.isfinite(rows).all(axis=1)]
-    if len(complete) < 2 or np.ptp(complete[:, :2]) == 0.0:
+    if len(complete) < 2 or not _varies(complete):
         return None
     first, total = indices(complete)
     generator = np.random.default_rng([seed, RESAMPLES])
     drawn = generator.integers(len(complete), size=(RESAMPLES, len(complete)))
-    again = [indices(complete[d]) for d in drawn if np.ptp(complete[d, :2]) > 0.0]
+    again = [indices(complete[d]) for d in drawn if _varies(complete[d])]
     spread = np.percentile(np.array(again), COVER, axis=0)  # (2, first and total, parameters)
     return Sensitivity(
         metric,
@@ -96,9 +100,16 @@ def sensitivity(
     )
 
 
+def _varies(rows: Floats) -> bool:
+    """Whether f_A and f_B have a variance beyond rounding."""
+    values = rows[:, :2]
+    return bool(np.ptp(values) > ROUNDING * np.abs(values).max())
+
+
 def indices(rows: Floats) -> tuple[Floats, Floats]:
     """First-order and total indices of rows f_A, f_B, f_AB1, f_AB2, ..."""
-    centred = rows - rows[:, :2].mean()
+    scaled = rows / np.abs(rows).max()  # the squares of what is tiny would be zero
+    centred = scaled - scaled[:, :2].mean()
     a, b, ab = centred[:, :1], centred[:, 1:2], centred[:, 2:]
     variance = float(np.var(centred[:, :2]))
     first = (b * (ab - a)).mean(axis=0) / variance

@@ -1,16 +1,22 @@
 """The folder of a study: what it is of, and a part per finished run, each written in one piece."""
 
+import fcntl
 import json
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
-from ..errors import InputError
+from ..errors import InputError, SimulationError
 from ..recording.result import write_text
 from .run import Outcome
 from .study import Study
 
 STUDY = "study.json"
 PARTS = "parts"
+LOCK = "lock"
 FORMAT = 1
 
 
@@ -20,10 +26,26 @@ class Store:
 
     folder: Path
 
+    @contextmanager
+    def locked(self) -> Iterator[None]:
+        """Keep other processes out of the folder, which is made where there is none.
+
+        The lock goes with the process, however that ends; its file stays. InputError where another
+        one has it, OSError where the file system knows no locks.
+        """
+        self.folder.mkdir(parents=True, exist_ok=True)
+        descriptor = os.open(self.folder / LOCK, os.O_RDWR | os.O_CREAT, 0o666)
+        try:
+            self._lock(descriptor)
+            yield
+        finally:
+            os.close(descriptor)
+
     def open(self, study: Study) -> dict[int, Outcome]:
         """Bind the folder to the study, if it is new; the outcomes that it has, by index.
 
-        InputError where it belongs to another study, or to other FMUs.
+        For who has it locked. InputError where it belongs to another study, or to other FMUs, or
+        has what is no run of it.
         """
         path, parts = self.folder / STUDY, self.folder / PARTS
         bound = {"format": FORMAT, **study.identity}
@@ -34,19 +56,39 @@ class Store:
         else:
             write_text(path, json.dumps(bound, indent=2) + "\n")
         parts.mkdir(exist_ok=True)
-        for torn in parts.glob("*.part"):
+        for torn in (*parts.glob("*.json.*.part"), *self.folder.glob(f"{STUDY}.*.part")):
             torn.unlink()
-        found = (_read(part) for part in sorted(parts.glob("*.json")))
+        found = (_read(part, study.runs) for part in sorted(parts.glob("*.json")))
         return {outcome.index: outcome for outcome in found}
 
     def keep(self, outcome: Outcome) -> None:
-        """Write a part: from then on, the run is finished."""
-        path = self.folder / PARTS / f"{outcome.index:07d}.json"
-        write_text(path, json.dumps(asdict(outcome)) + "\n")
+        """Write a part: from then on, the run is finished. SimulationError where that fails."""
+        path = self.folder / PARTS / _name(outcome.index)
+        try:
+            write_text(path, json.dumps(asdict(outcome)) + "\n")
+        except OSError as error:
+            raise SimulationError(
+                f"{path}: {error.strerror}; {self.kept()} runs are kept, the same command goes on"
+            ) from error
 
     def kept(self) -> int:
         """The number of finished runs."""
         return sum(1 for _ in (self.folder / PARTS).glob("*.json"))
+
+    def _lock(self, descriptor: int) -> None:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            os.truncate(descriptor, 0)
+            os.write(descriptor, f"{os.getpid()}\n".encode())
+        except BlockingIOError as error:
+            holder = os.read(descriptor, 20).decode("ascii", "replace").strip()
+            which = f"process {holder}" if holder else "another process"
+            raise InputError(
+                f"{self.folder}: {which} is doing runs in it; must end first, or --out be another "
+                "folder"
+            ) from error
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(self.folder / LOCK)) from error
 
     def _check(self, path: Path, bound: dict[str, object]) -> None:
         try:
@@ -62,10 +104,34 @@ class Store:
         )
 
 
-def _read(path: Path) -> Outcome:
+def _name(index: int) -> str:
+    """The file of a run's part."""
+    return f"{index:07d}.json"
+
+
+def _read(path: Path, runs: int) -> Outcome:
+    """The outcome in a part of a study of so many runs."""
     try:
-        return Outcome(**json.loads(path.read_text(encoding="utf-8")))
-    except (OSError, UnicodeDecodeError, ValueError, TypeError) as error:
+        outcome = Outcome(**json.loads(path.read_text(encoding="utf-8")))
+        _check_outcome(outcome, path.name, runs)
+    except (OSError, UnicodeDecodeError, ValueError, TypeError, RecursionError) as error:
         raise InputError(
             f"{path}: not readable as a run: {error}; must be removed, the run is then done again"
         ) from error
+    return outcome
+
+
+def _check_outcome(outcome: Outcome, name: str, runs: int) -> None:
+    """ValueError where it is not what keep() writes to a file of that name."""
+    index, metrics, error = outcome.index, outcome.metrics, outcome.error
+    whole = isinstance(index, int) and not isinstance(index, bool)
+    if not whole or not 0 <= index < runs or _name(index) != name:
+        raise ValueError(f"index = {index!r}")
+    if not isinstance(metrics, dict) or not all(map(_is_metric, metrics.values())):
+        raise ValueError(f"metrics = {metrics!r}")
+    if error is not None and not isinstance(error, str):
+        raise ValueError(f"error = {error!r}")
+
+
+def _is_metric(value: Any) -> bool:
+    return value is None or isinstance(value, float | int | str)

@@ -2,7 +2,8 @@
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+import sys
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import Any
@@ -11,14 +12,24 @@ import numpy as np
 
 from ..errors import InputError, choices
 from ..recording.settings import settings
-from ..study.metrics import UNITS, is_grasp
+from ..study.metrics import FINGERS, UNITS, is_grasp
 from ..system.description import System
 from ..system.interface import Value, Variable
 from .design import MOST, Design, Points
 from .distributions import Distribution
 
-RESERVED = ("index", "error", *UNITS)
+PER_FINGER = ("time_to_contact", "impact_velocity", "peak_contact_force", "steady_contact_force")
+METRICS = (
+    *(f"{name}[{j}]" for name in PER_FINGER for j in FINGERS),
+    *(name for name in UNITS if name not in PER_FINGER),
+)
+"""Columns of the results of a grasp."""
+
+RESERVED = ("index", "error", *UNITS, *METRICS)
 """Columns of the results that no parameter may be called."""
+
+PROXIES = "proxies."
+"""How columns begin that a system with proxies has besides."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +67,9 @@ class Pictures:
 class Study:
     """A checked study. The system has the fixed values already.
 
-    seeds are variables that get another whole number in each run, each its own; outputs are
-    signals whose last value is kept beside the metrics. InputError where anything does not fit.
+    seeds are variables that get another whole number in each run, each its own, but see _noise();
+    outputs are signals whose last value is kept beside the metrics. InputError where anything does
+    not fit.
     """
 
     name: str
@@ -73,9 +85,15 @@ class Study:
             raise InputError(f"{self.name}: no [[parameters]]; must be at least one")
         self._check_names()
         self._check_outputs()
-        for parameter in self.parameters:
+        for name in self.seeds:
+            self._check_seed(name)
+        for parameter in sorted(self.parameters, key=_is_ratio):  # whose references come first
             self._check_values(parameter)
-        self.design.total(self._levels)
+        self._check_pictures()
+        try:
+            self.design.total(self._levels)
+        except InputError as error:
+            raise InputError(f"{self.name}: {error}") from error
         self.system.with_values(self.values(0))
 
     @property
@@ -90,7 +108,7 @@ class Study:
             p.name: p.distribution.at(float(u)) for p, u in zip(self.parameters, row, strict=True)
         }
         for k, name in enumerate(self.seeds):
-            values[name] = self._first_seed + index * len(self.seeds) + k
+            values[name] = self._first_seed + self._noise(index) * len(self.seeds) + k
         return values
 
     def values(self, index: int) -> dict[str, Value]:
@@ -155,10 +173,20 @@ class Study:
             )
         return low + int(np.random.default_rng([self.design.seed, MOST]).integers(room))
 
+    def _noise(self, index: int) -> int:
+        """Which runs share their seeds: in a row of a saltelli design A and all A with one of B.
+
+        Noise is then another parameter that stays while one changes, not a part of each's effect.
+        """
+        if self.design.kind != "saltelli":
+            return index
+        row, place = divmod(index, len(self.parameters) + 2)
+        return 2 * row + (place == 1)
+
     def _driven(self, point: Mapping[str, Value]) -> dict[str, Value]:
         """The variables by the parameters: first those that stand alone, then the ratios."""
         values: dict[str, Value] = {}
-        for p in sorted(self.parameters, key=lambda p: p.ratio_to is not None):
+        for p in sorted(self.parameters, key=_is_ratio):
             value = point[p.name]
             if p.ratio_to is not None:
                 reference = values.get(p.ratio_to)
@@ -174,9 +202,13 @@ class Study:
             twice = next((n for n in listed if listed.count(n) > 1), None)
             if twice is not None:
                 raise InputError(f"{self.name}: {what} {twice!r} twice; must be there once")
-        wrong = next((n for n in names if n in RESERVED or n in self.outputs), None)
+        taken = {*RESERVED, *self.outputs, *self.seeds}
+        wrong = next((n for n in names if n in taken or n.startswith(PROXIES)), None)
         if wrong is not None:
-            raise InputError(f"{self.name}: parameter {wrong!r}: is the name of a result")
+            raise InputError(
+                f"{self.name}: parameter {wrong!r}: is the name of a result or seed; must be "
+                "another name"
+            )
         ratios = {v for p in self.parameters if p.ratio_to is not None for v in p.variables}
         for p in self.parameters:
             if p.ratio_to in ratios:
@@ -184,17 +216,44 @@ class Study:
                     f"{self.name}: {p.name}: ratio_to = {p.ratio_to!r}: must not be set by a "
                     "ratio itself"
                 )
+
+    def _check_pictures(self) -> None:
+        """What is to be drawn will be there, and be numbers."""
+        numeric = [
+            p.name
+            for p in self.parameters
+            if not any(isinstance(x, str) for x in p.distribution.extremes)
+        ]
+        results = [*(METRICS if is_grasp(self._declared) else ()), *self.outputs]
+        columns = [*numeric, *self.seeds, *results]
         picture = self.pictures.map
-        for name in (picture.x, picture.y) if picture else ():
-            if name not in names:
+        if picture:
+            for name in (picture.x, picture.y):
+                if name not in numeric:
+                    raise InputError(
+                        f"{self.name}: figures.map: no parameter {name!r} with numbers; valid: "
+                        f"{choices(numeric)}"
+                    )
+            if picture.x == picture.y:
                 raise InputError(
-                    f"{self.name}: figures.map: no parameter {name!r}; valid: {choices(names)}"
+                    f"{self.name}: figures.map: x = y = {picture.x!r}; must be two parameters"
+                )
+        for name in (*([picture.of] if picture else ()), *self.pictures.distributions):
+            if name not in columns and not name.startswith(PROXIES):
+                raise InputError(
+                    f"{self.name}: figures: no column {name!r} in the results; valid: "
+                    f"{choices(columns)}"
                 )
 
-    def _check_outputs(self) -> None:
-        declared = [
+    @property
+    def _declared(self) -> list[str]:
+        """All outputs."""
+        return [
             f"{c.name}.{v.name}" for c in self.system.components for v in c.interface.of("output")
         ]
+
+    def _check_outputs(self) -> None:
+        declared = self._declared
         for name in self.outputs:
             if name not in declared:
                 raise InputError(
@@ -206,27 +265,55 @@ class Study:
                 "with a gripper plant and a controller"
             )
 
+    def _check_seed(self, name: str) -> None:
+        kind = self.variable(name).kind
+        if kind != "Integer":
+            raise InputError(f"{self.name}: seeds: {name} is of type {kind}; must be an Integer")
+
     def _check_values(self, parameter: Parameter) -> None:
-        """The extremes of a parameter, where all others have their first ones, are valid."""
-        point = {p.name: p.distribution.extremes[0] for p in self.parameters}
-        if parameter.ratio_to is not None:
-            self.system.start(parameter.ratio_to)
-            numbers = parameter.distribution.extremes
-            wrong = [x for x in numbers if isinstance(x, bool | str)]
-            if wrong:
-                raise InputError(f"{self.name}: {parameter.name}: {wrong[0]!r}: must be a number")
+        """What the variables may be set to is of their types and in their ranges."""
+        place = f"{self.name}: {parameter.name}"
         for name in parameter.variables:
             kind = self.variable(name).kind
             if parameter.distribution.levels is None and kind != "Real":
-                raise InputError(
-                    f"{self.name}: {parameter.name}: {name} is of type {kind}; must have values"
-                )
-        for value in parameter.distribution.extremes:
-            values = self._driven({**point, parameter.name: value})
+                raise InputError(f"{place}: {name} is of type {kind}; must have values")
+        for value in self._extremes(parameter, place):
             for name in parameter.variables:
                 component, _, variable = name.partition(".")
                 interface = self.system.component(component, self.name).interface
-                interface.parse(f"{self.name}: {parameter.name}", variable, values[name])
+                interface.parse(place, variable, value)
+
+    def _extremes(self, parameter: Parameter, place: str) -> Iterator[Value]:
+        """Values of the variables that must be valid for all to be."""
+        extremes = parameter.distribution.extremes
+        if parameter.ratio_to is None:
+            yield from extremes
+            return
+        kind = self.variable(parameter.ratio_to).kind
+        if kind not in ("Real", "Integer"):
+            raise InputError(
+                f"{place}: ratio_to = {parameter.ratio_to!r}: is of type {kind}; must be a number"
+            )
+        for x in extremes:
+            if isinstance(x, bool | str) or not abs(x) <= sys.float_info.max:
+                raise InputError(f"{place}: {x!r}: must be a number, and finite")
+        for reference in self._references(parameter.ratio_to, place):
+            yield from (float(x) * reference for x in extremes)
+
+    def _references(self, name: str, place: str) -> tuple[float, ...]:
+        """The least and the greatest that a ratio may refer to."""
+        for p in self.parameters:
+            if name in p.variables:
+                numbers = [float(x) for x in p.distribution.extremes]
+                return min(numbers), max(numbers)
+        try:
+            return (self.system.start(name),)
+        except InputError as error:
+            raise InputError(f"{place}: ratio_to: {error}") from error
+
+
+def _is_ratio(parameter: Parameter) -> bool:
+    return parameter.ratio_to is not None
 
 
 def _described(distribution: Distribution) -> Sequence[Any]:

@@ -85,13 +85,22 @@ def sweep(
     A finished run is in the folder at once: after a kill the same call goes on. progress shows a
     bar on standard error if that is a terminal.
 
-    InputError where the folder has another study's runs, or an extra is missing; SimulationError
-    where workers do not start or the cluster fails; KeyboardInterrupt at Ctrl-C.
+    InputError where the folder has another study's runs, or another process is at it, or an extra
+    is missing; SimulationError where workers do not start, the cluster fails or a run cannot be
+    written; KeyboardInterrupt at Ctrl-C.
     """
     check_parquet()
     if workers is not None and workers < 1:
         raise InputError(f"workers = {workers}: must be at least 1")
     store = Store(folder)
+    with store.locked():
+        return _finish(study, store, workers, scheduler, progress)
+
+
+def _finish(
+    study: Study, store: Store, workers: int | None, scheduler: str | None, progress: bool
+) -> Sweep:
+    """sweep() in a folder that is ours alone."""
     done = store.open(study)
     resumed = len(done)
     left = (Job(i, study.values(i)) for i in range(study.runs) if i not in done)
@@ -108,11 +117,11 @@ def sweep(
             store.keep(outcome)
             done[outcome.index] = outcome
             bar.update()
-    finished = Sweep(study, folder, tuple(done[i] for i in range(study.runs)), resumed)
-    write_parquet(finished.table, study, folder / RUNS)
+    finished = Sweep(study, store.folder, tuple(done[i] for i in range(study.runs)), resumed)
+    write_parquet(finished.table, study, store.folder / RUNS)
     if finished.sensitivities:
         found = [s.as_json() for s in finished.sensitivities]
-        write_text(folder / SENSITIVITY, json.dumps(found, indent=2) + "\n")
+        write_text(store.folder / SENSITIVITY, json.dumps(found, indent=2) + "\n")
     return finished
 
 

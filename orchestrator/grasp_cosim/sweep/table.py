@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,10 +16,10 @@ from ..recording.result import in_one_piece
 from .run import Outcome
 from .study import Study
 
-if TYPE_CHECKING:
-    import pyarrow as pa  # type: ignore[import-untyped]
-
 Column = Sequence[Any]
+
+STATISTICS = ("least", "p5", "median", "p95", "greatest", "mean")
+"""What is said of a metric, besides how many runs have one."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,9 @@ class Table:
         return np.array([np.nan if v is None or isinstance(v, str) else float(v) for v in values])
 
     def summary(self) -> dict[str, dict[str, float | int | None]]:
-        """Of each metric: how many runs have it, and its least, mean, median and greatest."""
+        """Of each metric: how many runs have a finite one, its least and greatest, its mean, and
+        the values below which 5 %, 50 % and 95 % lie.
+        """
         return {name: _summary(self.numbers(name)) for name in self.metrics}
 
 
@@ -58,12 +60,11 @@ def make_table(study: Study, outcomes: Sequence[Outcome]) -> Table:
 
 
 def write_parquet(table: Table, study: Study, path: Path) -> None:
-    """Write the table in one piece; equal tables make equal bytes. InputError without pyarrow."""
+    """Write the table in one piece; equal tables make equal bytes. InputError without pyarrow,
+    OSError where it cannot be written.
+    """
     arrow, parquet = check_parquet()
-    arrays = {
-        name: arrow.array(column, type=_type(arrow, name, column))
-        for name, column in table.columns.items()
-    }
+    arrays = {name: _array(arrow, name, column) for name, column in table.columns.items()}
     made = arrow.table(arrays).replace_schema_metadata(
         {"grasp_cosim": json.dumps({"study": study.name, **study.identity})}
     )
@@ -74,7 +75,7 @@ def write_parquet(table: Table, study: Study, path: Path) -> None:
 def check_parquet() -> tuple[Any, Any]:
     """The modules pyarrow and pyarrow.parquet; InputError without them."""
     try:
-        import pyarrow
+        import pyarrow  # type: ignore[import-untyped]
         import pyarrow.parquet  # type: ignore[import-untyped]
     except ImportError as error:
         raise InputError(
@@ -84,24 +85,25 @@ def check_parquet() -> tuple[Any, Any]:
     return pyarrow, pyarrow.parquet
 
 
-def _type(arrow: Any, name: str, column: Column) -> pa.DataType:
-    """The narrowest type that holds all values; numbers where there is none, but for errors."""
-    kinds = {type(value) for value in column if value is not None}
+def _array(arrow: Any, name: str, column: Column) -> Any:
+    """The column with the narrowest type that holds all values; numbers where there is none."""
+    there = [value for value in column if value is not None]
+    kinds = {type(value) for value in there}
     if name == "error" or str in kinds:
-        return arrow.string()
+        return arrow.array(column, type=arrow.string())
     if kinds == {bool}:
-        return arrow.bool_()
-    return arrow.int64() if kinds == {int} else arrow.float64()
+        return arrow.array(column, type=arrow.bool_())
+    if kinds == {int} and min(there) >= -(2**63) and max(there) < 2**63:
+        return arrow.array(column, type=arrow.int64())
+    if kinds == {int} and min(there) >= 0 and max(there) < 2**64:
+        return arrow.array(column, type=arrow.uint64())
+    numbers = [None if value is None else float(value) for value in column]
+    return arrow.array(numbers, type=arrow.float64())
 
 
 def _summary(values: npt.NDArray[np.float64]) -> dict[str, float | int | None]:
     there = values[np.isfinite(values)]
     if not len(there):
-        return {"runs": 0, "least": None, "mean": None, "median": None, "greatest": None}
-    return {
-        "runs": len(there),
-        "least": float(there.min()),
-        "mean": float(there.mean()),
-        "median": float(np.median(there)),
-        "greatest": float(there.max()),
-    }
+        return {"runs": 0, **dict.fromkeys(STATISTICS)}
+    found = (there.min(), *np.percentile(there, (5.0, 50.0, 95.0)), there.max(), there.mean())
+    return {"runs": len(there), **dict(zip(STATISTICS, map(float, found), strict=True))}
