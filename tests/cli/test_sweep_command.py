@@ -76,7 +76,8 @@ def test_what_is_true_or_false_counts_as_1_or_0(command: Run, fmus: Path) -> Non
     assert code == 0
     metrics = json.loads(out)["metrics"]
     assert metrics["damaged"] == {
-        "runs": 2, "least": 0.0, "mean": 0.5, "median": 0.5, "greatest": 1.0,
+        "runs": 2, "least": 0.0, "p5": 0.05, "median": 0.5, "p95": 0.95, "greatest": 1.0,
+        "mean": 0.5,
     }  # fmt: skip
     assert 0.001 < metrics["squeeze"]["least"] == metrics["squeeze"]["greatest"] < 0.1
     assert metrics["settling_time[1]"]["runs"] == 0

@@ -8,7 +8,7 @@ from grasp_cosim import InputError, System
 from grasp_cosim.sweep.design import Design
 from grasp_cosim.sweep.distributions import Listed, Uniform
 from grasp_cosim.sweep.run import Job, Task, run_job
-from grasp_cosim.sweep.study import METRICS, Map, Parameter, Pictures, Study
+from grasp_cosim.sweep.study import METRICS, Map, Parameter, Pictures, Study, grasp_columns
 
 RATIO = Parameter("ratio", ("sensor_1.reflectance",), Uniform(0.5, 2.0), "sensor_2.reflectance")
 LEFT = Parameter("left", ("sensor_2.reflectance",), Uniform(0.5, 1.0))
@@ -122,6 +122,17 @@ def test_seeds_must_fit(grasp: System) -> None:
         Study("made", grasp, (MASS,), RANDOM, ("sensor_1.adc.bits",))
 
 
-def test_the_columns_of_a_grasp_are_those_that_a_run_leaves(grasp: System) -> None:
-    task = Task(grasp.with_experiment(step=1e-3, stop=0.01), ())
-    assert set(run_job(task, Job(0, {})).metrics) == set(METRICS)
+@pytest.mark.parametrize("plant", ["GripperPlant", "GripperPlantCompliant", "GripperPlantMovable"])
+def test_the_columns_of_a_grasp_are_those_that_a_run_leaves(
+    grasp: System, fmus: Path, plant: str
+) -> None:
+    system = grasp.swap("plant", fmus / f"{plant}.fmu").with_experiment(step=1e-3, stop=0.01)
+    outputs = [f"{c.name}.{v.name}" for c in system.components for v in c.interface.of("output")]
+    found = run_job(Task(system, ()), Job(0, {})).metrics
+    assert sorted(found) == sorted(grasp_columns(outputs))
+    assert set(found) <= set(METRICS)
+
+
+def test_a_picture_of_what_the_plant_does_not_tell(grasp: System) -> None:
+    with pytest.raises(InputError, match="figures: no column 'squeeze' in the results; valid: "):
+        Study("made", grasp, (MASS,), RANDOM, pictures=Pictures(distributions=("squeeze",)))

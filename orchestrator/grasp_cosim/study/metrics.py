@@ -37,6 +37,12 @@ UNITS: Mapping[str, str | None] = {
 }
 """The units of the metrics of a grasp; None where one is true or false."""
 
+OF_FINGERS = (
+    "time_to_contact", "impact_velocity", "impact_impulse", "peak_contact_force",
+    "steady_contact_force", "force_overshoot", "settling_time",
+)  # fmt: skip
+"""The metrics of which each finger has one."""
+
 OF_OBJECT: Mapping[str, str] = {
     "object_tilt": "tilt",
     "toppled": "toppled",

@@ -61,7 +61,7 @@ def run_on_cluster(address: str, task: Task, jobs: Iterable[Job]) -> Generator[O
             client.wait_for_workers(1, timeout=CONNECT)
         except TimeoutError as error:
             raise InputError(f"--scheduler {address}: no worker; must have at least one") from error
-        shipment = client.scatter(ship(task), broadcast=True)
+        shipment = client.scatter(ship(task), broadcast=True, hash=False)
         left = iter(jobs)
         indices: dict[str, int] = {}
 

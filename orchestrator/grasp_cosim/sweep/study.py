@@ -12,24 +12,31 @@ import numpy as np
 
 from ..errors import InputError, choices
 from ..recording.settings import settings
-from ..study.metrics import FINGERS, UNITS, is_grasp
+from ..study.metrics import FINGERS, OF_FINGERS, OF_OBJECT, PLANT, UNITS, is_grasp
 from ..system.description import System
 from ..system.interface import Value, Variable
 from .design import MOST, Design, Points
 from .distributions import Distribution
 
-PER_FINGER = ("time_to_contact", "impact_velocity", "peak_contact_force", "steady_contact_force")
 METRICS = (
-    *(f"{name}[{j}]" for name in PER_FINGER for j in FINGERS),
-    *(name for name in UNITS if name not in PER_FINGER),
+    *(f"{name}[{j}]" for name in OF_FINGERS for j in FINGERS),
+    *(name for name in UNITS if name not in OF_FINGERS),
 )
-"""Columns of the results of a grasp."""
+"""Columns of the results of a grasp; those of the object only where the plant has the outputs."""
 
 RESERVED = ("index", "error", *UNITS, *METRICS)
 """Columns of the results that no parameter may be called."""
 
 PROXIES = "proxies."
 """How columns begin that a system with proxies has besides."""
+
+
+def grasp_columns(outputs: Sequence[str]) -> list[str]:
+    """The metrics' columns of a system with these outputs, none where it is not a grasp."""
+    if not is_grasp(outputs):
+        return []
+    there = {name for name, output in OF_OBJECT.items() if f"{PLANT}.{output}" in outputs}
+    return [name for name in METRICS if name not in OF_OBJECT or name in there]
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,7 +231,7 @@ class Study:
             for p in self.parameters
             if not any(isinstance(x, str) for x in p.distribution.extremes)
         ]
-        results = [*(METRICS if is_grasp(self._declared) else ()), *self.outputs]
+        results = [*grasp_columns(self._declared), *self.outputs]
         columns = [*numeric, *self.seeds, *results]
         picture = self.pictures.map
         if picture:
