@@ -13,6 +13,7 @@ from ..identification.contact_times import (
     identify_from_times,
     published_contacts,
     read_contacts,
+    scatter,
 )
 from ..identification.fit import check_scipy
 from ..identification.log import GROUPS as IN_A_LOG
@@ -93,4 +94,5 @@ def _from_times(
         for c in contacts
     ]
     name = str(path) if path else "the published experiments"
-    return report.Identification(f"{name}, {len(contacts)} contact times", "s", fit, rows)
+    data = f"{name}, {len(contacts)} contact times"
+    return report.Identification(data, "s", fit, rows, scatter(contacts))

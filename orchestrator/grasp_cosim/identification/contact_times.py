@@ -6,6 +6,7 @@ reflectances matter by their ratio alone, so that surfaces of equal colours are 
 """
 
 import csv
+import math
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -131,6 +132,23 @@ def fit_contacts(
         ]
 
     return fit(residuals, parameters, "identify")
+
+
+def scatter(contacts: Sequence[Contact]) -> float | None:
+    """The standard deviation in s of times that were measured in equal grasps, pooled.
+
+    It is the pure error of an analysis of the lack of fit: what no model can explain. None where no
+    grasp was repeated.
+    """
+    equal: dict[tuple[float, float, int, int], list[float]] = {}
+    for c in contacts:
+        ratio = c.setting.alpha_2 / c.setting.alpha_1
+        equal.setdefault((c.setting.x_m, ratio, c.case, c.finger), []).append(c.time)
+    repeated = [np.array(times) for times in equal.values() if len(times) > 1]
+    if not repeated:
+        return None
+    squares = sum(float(np.sum((times - times.mean()) ** 2)) for times in repeated)
+    return math.sqrt(squares / sum(len(times) - 1 for times in repeated))
 
 
 def _grasp(c: Contact, parameters: Sequence[Parameter], x: Vector) -> Grasp:

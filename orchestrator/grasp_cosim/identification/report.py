@@ -25,6 +25,8 @@ class Identification:
     unit: str
     fit: Fit
     rows: Sequence[dict[str, Any]]
+    scatter: float | None = None
+    """Standard deviation of data that were measured under equal conditions, if any were."""
 
 
 def as_json(found: Identification) -> dict[str, Any]:
@@ -34,6 +36,7 @@ def as_json(found: Identification) -> dict[str, Any]:
         "parameters": [_parameter(e) for e in found.fit.estimates],
         "assumptions": ASSUMPTIONS,
         "rms": found.fit.rms,
+        "scatter": found.scatter,
         "unit": found.unit,
         "points": found.fit.points,
         "rows": _rows(found),
@@ -46,6 +49,10 @@ def text(found: Identification) -> str:
     lines.append(
         f"residuals: root mean square {found.fit.rms:.4g} {found.unit} over {len(found.rows)}"
     )
+    if found.scatter is not None:
+        lines.append(
+            f"equal conditions scatter by {found.scatter:.3g} {found.unit}, which no fit explains"
+        )
     if len(found.rows) <= SHOWN:
         lines += [
             "  " + "  ".join(f"{key} {_short(value)}" for key, value in row.items())
