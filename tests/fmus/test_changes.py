@@ -22,7 +22,7 @@ CLOCK = "proximity_sensor/clock.py"
 GAIN = "(0.0, 1e6)] = 0.0024"
 EXPONENT = '"n, diffusion exponent", (0.1, 10.0)]'
 OUTPUT = '    intensity: Annotated[float, "V", "xi, offset-compensated output", 0.1, {"gap"}]\n'
-FORMULA = "p.gain * p.reflectance / (l + p.offset_distance) ** p.diffusion_exponent"
+FORMULA = "p.gain * p.alpha / (l + p.offset_distance) ** p.diffusion_exponent"
 RATE = "(1.0, 1e6)] = 10_000.0\n"
 
 DESCRIPTION, SOURCE = "modelDescription.xml: changed", f"resources/{OPTICS}: changed"
@@ -141,7 +141,12 @@ def test_a_change_is_reported_once(build: Build) -> None:
                 (CLOCK, RATE,
                  f'{RATE}    jitter: Annotated[float, "s", "jitter", (0.0, 1.0)] = 0.0\n'),
             ],
-            ["sampling.jitter: added", DESCRIPTION, f"resources/{CLOCK}: changed"],
+            [
+                "sampling.jitter: added",
+                "surface: valueReference 25 -> 26",
+                DESCRIPTION,
+                f"resources/{CLOCK}: changed",
+            ],
             id="variable added",
         ),
         pytest.param(

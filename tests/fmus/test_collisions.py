@@ -176,7 +176,10 @@ def test_two_builds_of_one_fmu_run_their_own_code(
 ) -> None:
     """Alive at the same time and step by step in turn; whichever came first."""
     other = altered(
-        "ProximitySensor", "proximity_sensor/optics.py", "p.gain * p.ref", "2.0 * p.gain * p.ref"
+        "ProximitySensor",
+        "proximity_sensor/optics.py",
+        "p.gain * p.alpha",
+        "2.0 * p.gain * p.alpha",
     )
     ours = Fmu(fmus / "ProximitySensor.fmu", tmp_path / "ours")
     theirs = Fmu(other, tmp_path / "theirs")

@@ -94,7 +94,11 @@ WRONG_EVENTS = [
     ("at = 0.5", "at = nan", "at = nan s: must be a number from 0"),
     ("at = 0.5", "at = 'now'", "at = 'now' s: must be a number"),
     ("at = 0.5", "at = 1.5e-9", "must be a whole number of nanoseconds"),
-    ('"sensor_1.reflectance" = 0.6', "", r"set is empty; valid: sensor_1.reflectance, sensor_2.re"),
+    (
+        '"sensor_1.reflectance" = 0.6',
+        "",
+        r"set is empty; valid: sensor_1.reflectance, sensor_1.surf",
+    ),
     ('set = { "sensor_1.reflectance" = 0.6 }', "", r"events\[0\]: set: missing; must be a table"),
     ('"sensor_1.reflectance" = 0.6', "reflectance = 0.6", "must be 'component.variable'"),
     (
@@ -107,7 +111,7 @@ WRONG_EVENTS = [
         "sensor_1.reflectance",
         "sensor_1.reflection",
         r"set\.sensor_1\.reflection: not there; must be a tunable parameter or an input "
-        r"without a wire; valid: sensor_1\.reflectance, sensor_2\.reflectance$",
+        r"without a wire; valid: sensor_1\.reflectance, sensor_1\.surface, ",
     ),
     ("sensor_1.reflectance", "sensor_1.gain", "is a fixed parameter; must be a tunable parameter"),
     ("sensor_1.reflectance", "sensor_1.intensity", "is a continuous output; must be a tunable"),
