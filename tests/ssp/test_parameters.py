@@ -211,7 +211,7 @@ REFUSED = [
     (given("length Real 2 N"), "N cannot be converted to m"),
     (given("length Real 2 cm"), "unit 'cm' is not defined; valid: m, mm, N, K, degC"),
     (given("length Binary 00"), "type Binary is not supported; valid: Real, Integer"),
-    (given("mode Enumeration up"), "a.mode = 'up': must be one of off, on"),
+    (given("mode Enumeration up"), "parameter 'mode': mode = 'up': must be one of off, on"),
     (given("length Real 1; length Real 2"), "parameter 'length': there are two; must be one"),
     (
         given("x Real 1", mapping(("x", "length", ""), ("x", "length", ""))),

@@ -1,12 +1,14 @@
 """The system description: a mistake is one line with the place and the valid choices."""
 
 import re
+import zipfile
 from pathlib import Path
 from typing import Any
 
 import pytest
 from grasp_cosim import InputError, System
 from grasp_cosim.grasp import SYSTEM
+from grasp_cosim.study.swap import prepare_swap
 from grasp_cosim.system.parts import Port
 
 TEXT = SYSTEM.read_text("utf-8")
@@ -139,6 +141,50 @@ def test_no_item_of_an_enumeration(grasp: System, given: Any) -> None:
     message = f"sensor_1.surface: surface = {given!r}: must be one of {items}"
     with pytest.raises(InputError, match=re.escape(message)):
         grasp.with_values({"sensor_1.surface": given})
+
+
+def other_sensor(fmus: Path, folder: Path, **numbers: int) -> Path:
+    """A sensor whose surfaces have other numbers; one of 0 is not there."""
+    path = folder / "Other.fmu"
+    with zipfile.ZipFile(fmus / "ProximitySensor.fmu") as old, zipfile.ZipFile(path, "w") as new:
+        for name in old.namelist():
+            data = old.read(name).decode("latin-1")
+            if name == "modelDescription.xml":
+                for item, number in numbers.items():
+                    changed = f'<Item name="{item}" value="{number}" />' if number else ""
+                    data, count = re.subn(f'<Item name="{item}" value="[0-9]" />', changed, data)
+                    assert count == 1
+            new.writestr(name, data.encode("latin-1"))
+    return path
+
+
+def test_a_number_between_the_items_is_none(grasp: System, fmus: Path, tmp_path: Path) -> None:
+    swapped = grasp.swap("sensor_1", other_sensor(fmus, tmp_path, red=0))
+    with pytest.raises(InputError, match="surface = 3: must be one of custom, white, blue, brown"):
+        swapped.with_values({"sensor_1.surface": 3})
+
+
+def test_a_swap_does_not_change_what_a_value_stands_for(
+    grasp: System, fmus: Path, tmp_path: Path
+) -> None:
+    brown = grasp.with_values({"sensor_1.surface": "brown"})
+    other = other_sensor(fmus, tmp_path, brown=5, black=4)
+    message = (
+        "swap sensor_1: surface = 4 is brown in ProximitySensor.fmu and black in Other.fmu; must "
+        "be set anew, as one of custom, white, blue, red, brown, black"
+    )
+    with pytest.raises(InputError, match=f"^{re.escape(message)}$"):
+        brown.swap("sensor_1", other)
+    anew = brown.revised({"sensor_1": other}, {"sensor_1.surface": "brown"}, ("swap", "set"))
+    assert anew.start("sensor_1.surface") == 5.0
+    assert grasp.swap("sensor_1", other).start("sensor_1.surface") == 0.0
+    white = grasp.with_values({"sensor_1.surface": "white"}).swap("sensor_1", other)
+    assert white.start("sensor_1.surface") == 1.0
+    (found,) = prepare_swap(brown, "sensor_1", other, {}, {}, "none").differences
+    assert (found.severity, found.kind, found.variable) == ("blocks", "items", "surface")
+    assert found.text == "has other items; not as before: brown, black"
+    (found,) = prepare_swap(grasp, "sensor_1", other, {}, {}, "none").differences
+    assert found.severity == "warns"
 
 
 def test_an_output_cannot_be_set(grasp: System) -> None:

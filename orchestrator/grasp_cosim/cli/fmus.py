@@ -29,7 +29,7 @@ from .frame import NEGATIVE, check_folder, json_option
 )
 @json_option
 def build(block: Path | None, out: Path | None, bind_python: str | None, as_json: bool) -> int:
-    """Build the FMUs: three plants, GripperPlant*, then ProximitySensor and GraspController.
+    """Build the FMUs: the plants, GripperPlant*, then ProximitySensor and GraspController.
 
     With BLOCK, a Python file: the FMU of that block alone, spring_plant.py becomes SpringPlant.fmu.
     docs/your_plant.md shows one.
@@ -38,7 +38,8 @@ def build(block: Path | None, out: Path | None, bind_python: str | None, as_json
     of this one, to what the FMUs load.
 
     \b
-    Example: grasp-cosim build --out /tmp/fmus
+    Example: grasp-cosim build --out my_fmus
+    Your own: grasp-cosim build docs/spring_plant.py
     """
     from grasp_fmus.block_build import build_block
     from grasp_fmus.build import build as build_fmus

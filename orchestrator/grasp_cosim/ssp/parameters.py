@@ -265,13 +265,8 @@ def _value(network: Network, node: Node, given: Parameter) -> Value:
         raise InputError(
             f"{given.place}: {node} is {variable.causality}; only inputs and parameters are set"
         )
-    if given.type == "Enumeration" and variable.items:
-        if given.value not in variable.items:
-            raise InputError(
-                f"{given.place}: {node} = {given.value!r}: must be one of {choices(variable.items)}"
-            )
-        return variable.items[str(given.value)]
-    _check_type(given, node, variable)
+    if not (given.type == "Enumeration" and variable.items):
+        _check_type(given, node, variable)
     return part.interface.parse(given.place, node.name, given.value)
 
 

@@ -21,8 +21,8 @@ from .unit_conversion import IDENTITY, Conversion, Units, conversion
 Severity = Literal["blocks", "warns", "notes"]
 SEVERITIES: tuple[Severity, ...] = ("blocks", "warns", "notes")
 Kind = Literal[
-    "missing", "extra", "type", "causality", "variability", "unit", "range", "start", "dependency",
-    "capability", "system",
+    "missing", "extra", "type", "causality", "variability", "unit", "range", "items", "start",
+    "dependency", "capability", "system",
 ]  # fmt: skip
 Described = Mapping[str, Any]
 """A variable as inspect_fmu() gives it."""
@@ -217,6 +217,8 @@ def _changed(
         yield _unit(old, new, use, change)
     if change is not None and family(old["type"]) in {"Real", "Integer"}:
         yield from _range(old, new, use, change)
+    if old["items"] and new["items"] and old["items"] != new["items"]:
+        yield _items(old, new, use)
     if settable(old) and settable(new):
         yield from _start(old, new, use, change)
 
@@ -277,6 +279,15 @@ def _range(old: Described, new: Described, use: Use, change: Conversion) -> Iter
         severity: Severity = "notes" if old["causality"] == "output" else "warns"
         text = f"takes {now[0]:g} to {now[1]:g}{unit} instead of {was[0]:g} to {was[1]:g}{unit}"
         yield Difference(severity, "range", name, text, *declared)
+
+
+def _items(old: Described, new: Described, use: Use) -> Difference:
+    """Of two enumerations; what the system gives or takes are numbers."""
+    name, was, now = old["name"], old["items"], new["items"]
+    moved = [item for item in was if now.get(item) != was[item]]
+    severity: Severity = "blocks" if moved and use.uses(name) else "warns" if moved else "notes"
+    text = f"has other items; not as before: {choices(moved)}"
+    return Difference(severity, "items", name, text, was, now)
 
 
 def _start(

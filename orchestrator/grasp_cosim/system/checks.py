@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError, choices
-from .interface import SUPPORTED, Variable, limits
-from .parts import LOOPS, NANOSECONDS, Port, Wire
+from .interface import SUPPORTED, Value, Variable, limits
+from .parts import LOOPS, NANOSECONDS, Component, Port, Wire
 from .units import conversion
 
 if TYPE_CHECKING:
@@ -28,6 +29,24 @@ def check_components(system: System) -> None:
                     'of which a process can have one only; must have isolation = "process" but '
                     "for one"
                 )
+
+
+def check_items(was: Component, now: Component, variables: Sequence[str], place: str) -> None:
+    """InputError where a value that a component keeps stands for another item in its new FMU."""
+    before, after = was.interface.by_name, now.interface.by_name
+    for name in variables:
+        items = [v[name].items if name in v else {} for v in (before, after)]
+        label, meant = (_label(known, now.values[name]) for known in items)
+        if all(items) and label != meant:
+            raise InputError(
+                f"{place}: {name} = {now.values[name]!r} is {label} in {was.fmu.name} and "
+                f"{meant or 'nothing'} in {now.fmu.name}; must be set anew, as one of "
+                f"{choices(items[1])}"
+            )
+
+
+def _label(items: Mapping[str, int], value: Value) -> str | None:
+    return next((name for name, number in items.items() if number == value), None)
 
 
 def check_wires(system: System) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from ..errors import InputError, choices
-from .checks import check_components, check_initialisation, check_steps, check_wires
+from .checks import check_components, check_initialisation, check_items, check_steps, check_wires
 from .interface import Value
 from .parts import NANOSECONDS, Component, Event, Fault, Initialisation, Wire
 from .scenario_checks import check_scenario
@@ -125,6 +125,9 @@ class System:
             component = components[name]
             parsed = component.interface.parse(place, variable, value, text=True)
             components[name] = replace(component, values={**component.values, variable: parsed})
+        for name in fmus:
+            kept = [v for v in components[name].values if f"{name}.{v}" not in values]
+            check_items(self.component(name, name), components[name], kept, f"{places[0]} {name}")
         return replace(self, components=tuple(components.values()))
 
     def with_experiment(

@@ -56,8 +56,8 @@ class Variable:
     initial_dependencies the same in initialisation mode. shape is () but for an array. low and high
     are what is declared; beyond that a value must fit into its type. nominal is the magnitude that
     its values are compared with, 1 where none is declared, as FMI has it. relative says that it is
-    a difference, to which the offset of a unit does not apply. enumeration is the type
-    of an Enumeration.
+    a difference, to which the offset of a unit does not apply. enumeration is the type of an
+    Enumeration.
     """
 
     name: str
@@ -352,6 +352,7 @@ def _convert(variable: Variable, value: Value, version: str) -> Value | None:
         return None
     low, high = limits(variable.type, version)
     fits = low <= number <= high and variable.low <= number <= variable.high
+    fits = fits and (not variable.items or number in variable.items.values())
     return number if fits else None
 
 
