@@ -149,3 +149,15 @@ def _imported_from(folder: Path, package: str) -> Iterator[None]:
         sys.path.remove(str(folder))
         taken_out()
         sys.modules.update(ours)
+
+
+@pytest.fixture
+def checkout(tmp_path: Path, fmus: Path, grasp: System, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder like the repository, as far as its pages need it, and the current one."""
+    for name in ("orchestrator", "docs"):
+        (tmp_path / name).symlink_to(Path(__file__).parents[1] / name)
+    shutil.copytree(fmus, tmp_path / "fmus/build")
+    monkeypatch.chdir(tmp_path)
+    for module in ("frame", "evaluate", "identify"):
+        monkeypatch.setattr(f"grasp_cosim.cli.{module}.grasp_system", lambda: grasp)
+    return tmp_path

@@ -4,7 +4,6 @@ import csv
 import os
 import re
 import shlex
-import shutil
 import socket
 import subprocess
 import sys
@@ -16,7 +15,7 @@ from typing import Self
 
 import native_fmus
 import pytest
-from grasp_cosim import System, cli
+from grasp_cosim import cli
 
 ROOT = Path(__file__).parent.parent
 PAGE = (ROOT / "docs/handoff.md").read_text("utf-8")
@@ -122,17 +121,6 @@ def columns(path: Path) -> dict[str, tuple[str, ...]]:
     with path.open(encoding="utf-8", newline="") as file:
         names, *rows = csv.reader(file)
     return dict(zip(names, zip(*rows, strict=True), strict=True))
-
-
-@pytest.fixture
-def checkout(tmp_path: Path, fmus: Path, grasp: System, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder like the repository, as far as the page needs it."""
-    for name in ("orchestrator", "docs"):
-        (tmp_path / name).symlink_to(ROOT / name)
-    shutil.copytree(fmus, tmp_path / "fmus/build")
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("grasp_cosim.cli.frame.grasp_system", lambda: grasp)
-    return tmp_path
 
 
 @pytest.mark.slow

@@ -34,23 +34,15 @@ def _folder(path: Path) -> Path:
 
 
 @pytest.fixture
-def checkout(
-    tmp_path: Path, fmus: Path, grasp: System, recorded: Path, monkeypatch: pytest.MonkeyPatch
-) -> Path:
-    """A folder like the repository: built FMUs, a vendor's FMU, systems and a run of one's own."""
-    for folder in ("docs", "orchestrator"):
-        (tmp_path / folder).symlink_to(ROOT / folder)
-    shutil.copytree(fmus, tmp_path / "fmus/build")
-    shutil.copy(fmus / "GripperPlant.fmu", tmp_path / "vendor.fmu")
+def user(checkout: Path, grasp: System, recorded: Path) -> Path:
+    """A checkout with a vendor's FMU, systems and a run of one's own."""
+    shutil.copy(checkout / "fmus/build/GripperPlant.fmu", checkout / "vendor.fmu")
     text = SYSTEM.read_text("utf-8").replace('fmu = "', 'fmu = "fmus/build/')
-    (tmp_path / "my_system.toml").write_text(text, encoding="utf-8")
-    monkeypatch.chdir(tmp_path)
-    for module in ("frame", "evaluate", "identify"):
-        monkeypatch.setattr(f"grasp_cosim.cli.{module}.grasp_system", lambda: grasp)
-    write_ssp(grasp, tmp_path / "my_system.ssp")
+    (checkout / "my_system.toml").write_text(text, encoding="utf-8")
+    write_ssp(grasp, checkout / "my_system.ssp")
     for written in ("signals.csv", "run.json"):
-        shutil.copy(recorded / written, _folder(tmp_path / "results"))
-    return tmp_path
+        shutil.copy(recorded / written, _folder(checkout / "results"))
+    return checkout
 
 
 def test_there_is_something_to_try() -> None:
@@ -59,7 +51,7 @@ def test_there_is_something_to_try() -> None:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_command(checkout: Path, command: str) -> None:
+def test_command(user: Path, command: str) -> None:
     arguments = shlex.split(command)
     if arguments[1] in ("run", "qualify"):
         arguments += ["--stop", "0.01"]
@@ -70,17 +62,17 @@ def test_command(checkout: Path, command: str) -> None:
 
 
 @pytest.mark.parametrize("example", EXAMPLES)
-def test_example(checkout: Path, capsys: pytest.CaptureFixture[str], example: str) -> None:
+def test_example(user: Path, capsys: pytest.CaptureFixture[str], example: str) -> None:
     assert "stop=3.0" in example
     exec(example.replace("stop=3.0", "stop=2.0"), {})
     out = capsys.readouterr().out
     assert out.startswith("[1.")
     assert "] m\n0.2 (" in out
     assert "sensor_2.reflectance = 0.5" in out
-    assert (checkout / "results/signals.csv").is_file()
+    assert (user / "results/signals.csv").is_file()
 
 
-def test_what_a_run_ends_with(checkout: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_a_run_ends_with(user: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """All but how fast it was."""
     (shown,) = OUTPUTS
     assert cli.main(["run"]) == 0
@@ -90,22 +82,22 @@ def test_what_a_run_ends_with(checkout: Path, capsys: pytest.CaptureFixture[str]
     assert found.startswith(first.rpartition(", ")[0])
 
 
-def test_the_scenario_runs(checkout: Path) -> None:
+def test_the_scenario_runs(user: Path) -> None:
     """The events and faults of the README, appended to a system of one's own."""
     (scenario,) = (table for table in TABLES if "[[events]]" in table)
-    path = checkout / "my_system.toml"
+    path = user / "my_system.toml"
     path.write_text(path.read_text("utf-8") + scenario, encoding="utf-8")
     log = simulate(System.load(path), step=1e-3, stop=1.2).log
     assert [line.partition(": ")[0] for line in log] == ["t = 0.5 s", "t = 0.5 s", "t = 1 s"]
 
 
-def test_the_keys_of_a_component_are_read(checkout: Path) -> None:
+def test_the_keys_of_a_component_are_read(user: Path) -> None:
     (keys,) = (table for table in TABLES if "[components.plant]" in table)
     keys = keys.replace("GapRight", "gap[1]").replace("GapLeft", "gap[2]")
-    text = (checkout / "my_system.toml").read_text("utf-8")
+    text = (user / "my_system.toml").read_text("utf-8")
     own = re.sub(r"\[components\.plant\]\n.*?\n(?=\n)", lambda _: keys, text, flags=re.DOTALL)
-    (checkout / "my_system.toml").write_text(own, encoding="utf-8")
-    plant = System.load(checkout / "my_system.toml").component("plant", "test")
+    (user / "my_system.toml").write_text(own, encoding="utf-8")
+    plant = System.load(user / "my_system.toml").component("plant", "test")
     assert (plant.step_ns, plant.isolation, len(plant.rename)) == (1_000_000, "process", 2)
 
 

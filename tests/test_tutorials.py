@@ -5,7 +5,6 @@ import math
 import re
 import runpy
 import shlex
-import shutil
 import subprocess
 import zipfile
 from pathlib import Path
@@ -38,17 +37,6 @@ def load_tutorials() -> Any:
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
-
-
-@pytest.fixture
-def checkout(tmp_path: Path, fmus: Path, grasp: System, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder like the repository, as far as the pages need it."""
-    for name in ("orchestrator", "docs"):
-        (tmp_path / name).symlink_to(ROOT / name)
-    shutil.copytree(fmus, tmp_path / "fmus/build")
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("grasp_cosim.cli.frame.grasp_system", lambda: grasp)
-    return tmp_path
 
 
 def page(name: str) -> str:
