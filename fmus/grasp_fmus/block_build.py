@@ -46,9 +46,8 @@ def build_block(file: Path, out: Path, bind_python: str | None = None) -> Built:
     name = "".join(word[:1].upper() + word[1:] for word in file.stem.split("_"))
     if (SCRIPTS / f"{name}.py").exists():
         raise ValueError(f"{file}: {name}.fmu is one of the FMUs that come with this package")
-    text = file.read_bytes()
-    tree = _parsed(file, text)
-    packages = _packages(file, tree)
+    text, tree = _parsed(file)
+    packages = _packages(file, text, tree)
     with _run(file, tree) as block:
         summary, _, rest = inspect.cleandoc(block.__doc__ or "").partition("\n")
         if not summary:
@@ -57,7 +56,10 @@ def build_block(file: Path, out: Path, bind_python: str | None = None) -> Built:
         card = f"{rest.strip()}\n\n{BEGIN}{variable_tables({name: block})}"
     version, library = metadata.version("grasp-cosim"), bound_library(bind_python)
     html = page(name, description.summary, card, version, library)
-    sources = {f"{name}.py": _script(name, file.stem).encode(), f"{file.stem}_block.py": text}
+    sources = {
+        f"{name}.py": _script(name, file.stem).encode(),
+        f"{file.stem}_block.py": text.encode(),
+    }
     for package in (__package__, *packages):
         sources |= package_files(package)
     return write_fmu(members(description, html, None, sources, bind_python), out / f"{name}.fmu")
@@ -72,20 +74,25 @@ def _script(name: str, stem: str) -> str:
     )
 
 
-def _parsed(file: Path, text: bytes) -> ast.Module:
+def _parsed(file: Path) -> tuple[str, ast.Module]:
+    """Text and syntax tree of a file; every line of the text ends in a line feed."""
     try:
-        return ast.parse(text, str(file))
+        text = file.read_text("utf-8")
+        return text, ast.parse(text.encode(), str(file))
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{file}: byte {error.start}: must be UTF-8") from error
     except (SyntaxError, ValueError) as error:
         line = f" line {error.lineno}:" if isinstance(error, SyntaxError) else ""
         raise ValueError(f"{file}:{line} is no Python: {error.args[0]}") from error
 
 
-def _packages(file: Path, tree: ast.Module) -> list[str]:
+def _packages(file: Path, text: str, tree: ast.Module) -> list[str]:
     """The packages that the FMU must bring along; ValueError where a module could not be packed."""
     ours = {p for s in SCRIPTS.glob("*.py") for p in IMPORT.findall(s.read_text("utf-8"))}
     ours.discard(__package__)
     found = set()
-    for line, module, packable in _imports(tree):
+    renamed = {text.count("\n", 0, match.start()) + 1 for match in IMPORT.finditer(text)}
+    for line, module, packable in _imports(tree, renamed):
         package = module.partition(".")[0]
         if package in sys.stdlib_module_names:
             continue
@@ -96,22 +103,25 @@ def _packages(file: Path, tree: ast.Module) -> list[str]:
             )
         if not packable:
             raise ValueError(
-                f"{file}: line {line}: {package} must be imported at the top level, as: "
-                f"from {package} import ..."
+                f"{file}: line {line}: {package} must be imported at the top level, with single "
+                f"spaces, as: from {package} import ..."
             )
         found.add(package)
     return sorted(found)
 
 
-def _imports(tree: ast.Module) -> Iterator[tuple[int, str, bool]]:
-    """Line and module of every import, and whether its name can be changed for that in the FMU."""
+def _imports(tree: ast.Module, renamed: set[int]) -> Iterator[tuple[int, str, bool]]:
+    """Line and module of every import, and whether its name is changed for that in the FMU.
+
+    renamed are the lines in which IMPORT finds one.
+    """
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             for alias in node.names:
                 yield node.lineno, alias.name, False
         elif isinstance(node, ast.ImportFrom):
             module = "." * node.level + (node.module or "")
-            yield node.lineno, module, node.col_offset == 0
+            yield node.lineno, module, node.col_offset == 0 and node.lineno in renamed
 
 
 @contextmanager

@@ -99,6 +99,30 @@ def test_packages_of_our_blocks_come_along(tmp_path: Path) -> None:
     assert answer(built.path, tmp_path / "a") == pytest.approx(expected, rel=1e-14)
 
 
+@pytest.mark.parametrize("between", ["  ", "\t", " \\\n "])
+def test_an_import_that_would_take_the_package_of_the_host_is_refused(
+    command: Run, tmp_path: Path, between: str
+) -> None:
+    text = LAG.replace("from math", f"from{between}gripper_plant import substeps\nfrom math")
+    file = write(tmp_path, text)
+    assert command("build", file, "--out", "out") == (
+        2,
+        "",
+        f"grasp-cosim: build: {file}: line 7: gripper_plant must be imported at the top level, "
+        "with single spaces, as: from gripper_plant import ...\n",
+    )
+    assert not list(tmp_path.glob("out/*"))
+
+
+@pytest.mark.parametrize("end", ["\r\n", "\r"])
+def test_any_ends_of_lines_do(tmp_path: Path, end: str) -> None:
+    text = LAG.replace("from math", "from gripper_plant import substeps\nfrom math")
+    file = tmp_path / "first_order_lag.py"
+    file.write_bytes(text.replace("\n", end).encode())
+    path = build_block(file, tmp_path).path
+    assert build_block(write(tmp_path, text), tmp_path) == Built(path, "unchanged", ())
+
+
 @pytest.mark.parametrize(
     ("before", "after", "said"),
     [
@@ -107,7 +131,7 @@ def test_packages_of_our_blocks_come_along(tmp_path: Path) -> None:
         (
             "from math",
             "import gripper_plant\nfrom math",
-            "line 7: gripper_plant must be imported at the top level, as: from gripper_plant ",
+            "line 7: gripper_plant must be imported at the top level, with single spaces, ",
         ),
         ("def step(", "def step((", "line 32: is no Python: "),
         ("from math", "1 / 0\nfrom math", "line 7: import: ZeroDivisionError: division by zero"),
