@@ -26,9 +26,6 @@ from .variable import Variable
 PARTS = ("Params", "Inputs", "State", "Outputs", "initial_state", "step", "outputs")
 """What a block has."""
 
-KINDS = (float, bool, int)
-"""What its variables may be."""
-
 STEP = 1e-3
 """s; how far a block is advanced to see whether it works."""
 
@@ -154,10 +151,6 @@ def _variables(file: Path, block: Any) -> list[Variable]:
     _tried(file, "outputs()", lambda: listed(block.outputs(p, x, u)))
     x = _tried(file, "step()", lambda: block.step(p, x, u, STEP))
     _tried(file, "outputs()", lambda: listed(block.outputs(p, x, u)))
-    for v in found:
-        if v.kind not in KINDS:
-            kinds = ", ".join(kind.__name__ for kind in KINDS)
-            raise ValueError(f"{file}: {v.name} is {v.kind}: must be of {kinds}, or a tuple of one")
     return found
 
 
