@@ -10,10 +10,10 @@ import re
 import sys
 import traceback
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from importlib import metadata
 from pathlib import Path
-from types import ModuleType
+from types import CodeType, ModuleType
 from typing import Any
 
 from .build import HASH, IMPORT, SCRIPTS, Built, bound_library, members, package_files, write_fmu
@@ -41,8 +41,9 @@ def build_block(file: Path, out: Path, bind_python: str | None = None) -> Built:
     if file.suffix != ".py" or not _IDENTIFIER.fullmatch(file.stem):
         raise ValueError(f"{file}: must be NAME.py, NAME of letters, digits and _, a letter first")
     name = "".join(word[:1].upper() + word[1:] for word in file.stem.split("_"))
-    if (SCRIPTS / f"{name}.py").exists():
-        raise ValueError(f"{file}: {name}.fmu is one of the FMUs that come with this package")
+    for ours in (script.stem for script in SCRIPTS.glob("*.py")):
+        if ours.lower() == name.lower():  # the same file on Windows
+            raise ValueError(f"{file}: {ours}.fmu is one of the FMUs that come with this package")
     text, tree = _parsed(file)
     packages = _packages(file, text, tree)
     with _run(file, tree) as block:
@@ -79,7 +80,8 @@ def _parsed(file: Path) -> tuple[str, ast.Module]:
     except UnicodeDecodeError as error:
         raise ValueError(f"{file}: byte {error.start}: must be UTF-8") from error
     except (SyntaxError, ValueError) as error:
-        line = f" line {error.lineno}:" if isinstance(error, SyntaxError) else ""
+        number = getattr(error, "lineno", None)  # there is none for a NUL byte
+        line = f" line {number}:" if number else ""
         raise ValueError(f"{file}:{line} is no Python: {error.args[0]}") from error
 
 
@@ -123,22 +125,29 @@ def _imports(tree: ast.Module, renamed: set[int]) -> Iterator[tuple[int, str, bo
 
 @contextmanager
 def _run(file: Path, tree: ast.Module) -> Iterator[Any]:
-    """The module of a file, which is among the imported ones meanwhile: annotations need that."""
+    """The module of a file, which is among the imported ones meanwhile: annotations need that.
+
+    What it prints goes to standard error.
+    """
     name = f"{file.stem}_block"
     module = ModuleType(name)
     before = sys.modules.get(name)
     sys.modules[name] = module
     try:
-        code = compile(tree, str(file), "exec")
-        _tried(file, "import", lambda: exec(code, vars(module)))  # noqa: S102 - the user's own file
-        missing = [part for part in PARTS if not hasattr(module, part)]
-        if missing:
-            raise ValueError(f"{file}: has no {', '.join(missing)}; a block has {', '.join(PARTS)}")
-        yield module
+        with redirect_stdout(sys.stderr):
+            _tried(file, "import", lambda: _execute(compile(tree, str(file), "exec"), module))
+            missing = ", ".join(part for part in PARTS if not hasattr(module, part))
+            if missing:
+                raise ValueError(f"{file}: has no {missing}; a block has {', '.join(PARTS)}")
+            yield module
     finally:
         del sys.modules[name]
         if before:
             sys.modules[name] = before
+
+
+def _execute(code: CodeType, module: ModuleType) -> None:
+    exec(code, vars(module))  # noqa: S102 - the user's own file
 
 
 def _variables(file: Path, block: Any) -> list[Variable]:
@@ -158,8 +167,9 @@ def _tried(file: Path, what: str, function: Callable[[], Any]) -> Any:
     """What a function of the user's returns; ValueError says what went wrong in it, and where."""
     try:
         return function()
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         frames = traceback.extract_tb(error.__traceback__)
         lines = [frame.lineno for frame in frames if frame.filename == str(file)]
         place = f" line {lines[-1]}:" if lines else ""
-        raise ValueError(f"{file}:{place} {what}: {type(error).__name__}: {error}") from error
+        said = " ".join(str(error).splitlines())
+        raise ValueError(f"{file}:{place} {what}: {type(error).__name__}: {said}") from error

@@ -1,5 +1,6 @@
 """The FMU of a block that is one file of the user's own."""
 
+import json
 import zipfile
 from math import exp
 from pathlib import Path
@@ -135,6 +136,14 @@ def test_any_ends_of_lines_do(tmp_path: Path, end: str) -> None:
         ),
         ("def step(", "def step((", "line 32: is no Python: "),
         ("from math", "1 / 0\nfrom math", "line 7: import: ZeroDivisionError: division by zero"),
+        ("from math", "raise SystemExit(3)\nfrom math", "line 7: import: SystemExit: 3"),
+        (
+            "from math",
+            "raise ValueError('a\\nb\\r\\nc')\nfrom math",
+            "line 7: import: ValueError: a b c",
+        ),
+        ("from math", "return\nfrom math", "import: SyntaxError: 'return' outside function"),
+        ("from math", "\0\nfrom math", "is no Python: source code string cannot contain null "),
         ("def step", "def advance", "has no step; a block has Params, Inputs, State, Outputs, "),
         ("= 1.0\n", "\n", "Inputs(): TypeError: "),
         ('follows", 1.0, ', 'follows", ', "declaration: TypeError: y: must have a nominal value"),
@@ -168,6 +177,7 @@ def test_a_block_must_say_what_it_is(command: Run, tmp_path: Path) -> None:
         ("1st.py", "must be NAME.py"),
         ("lag.txt", "must be NAME.py"),
         ("gripper_plant.py", "GripperPlant.fmu is one of the FMUs that come with this package"),
+        ("GRIPPERplant.py", "GripperPlant.fmu is one of the FMUs that come with this package"),
     ],
 )
 def test_a_name_that_does_not_do(command: Run, tmp_path: Path, name: str, said: str) -> None:
@@ -185,3 +195,18 @@ def test_the_command_builds_this_one_alone(command: Run, tmp_path: Path) -> None
     code, out, _ = command("build", write(tmp_path, LAG))
     assert (code, out) == (0, "fmus/build/FirstOrderLag.fmu: new\n")
     assert [p.name for p in (tmp_path / "fmus/build").iterdir()] == ["FirstOrderLag.fmu"]
+
+
+def test_what_the_file_prints_is_not_among_the_results(command: Run, tmp_path: Path) -> None:
+    text = LAG.replace("from math", "print('imported')\nfrom math")
+    text = text.replace("    return State(0.0)", "    print('started')\n    return State(0.0)")
+    code, out, err = command("build", write(tmp_path, text), "--json")
+    assert (code, json.loads(out)["fmus"]) == (0, ["fmus/build/FirstOrderLag.fmu"])
+    assert err == "imported\nstarted\n"
+
+
+def test_a_file_must_be_utf_8(command: Run, tmp_path: Path) -> None:
+    file = tmp_path / "lag.py"
+    file.write_bytes(LAG.encode("latin-1"))
+    said = f"grasp-cosim: build: {file}: byte {LAG.index('·')}: must be UTF-8\n"
+    assert command("build", file) == (2, "", said)
