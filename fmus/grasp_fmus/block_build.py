@@ -11,7 +11,9 @@ import sys
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
+from functools import partial
 from importlib import metadata
+from math import inf, isfinite, isnan
 from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any
@@ -155,12 +157,79 @@ def _variables(file: Path, block: Any) -> list[Variable]:
     p, u = _tried(file, "Params()", block.Params), _tried(file, "Inputs()", block.Inputs)
     fields = _tried(file, "declaration", lambda: declared(block))
     found: list[Variable] = _tried(file, "declaration", lambda: variables(fields))
+    _tried(file, "declaration", lambda: _check_declaration(found))
+    first = _tried(file, "initial_state()", lambda: block.initial_state(p, u))
+    kinds = _tried(file, "initial_state()", lambda: _kinds(first))
+    second = _tried(file, "step()", lambda: block.step(p, first, u, STEP))
+    _tried(file, "step()", lambda: _check_kinds(_kinds(second), kinds))
     listed = unpacker(fields)
-    x = _tried(file, "initial_state()", lambda: block.initial_state(p, u))
-    _tried(file, "outputs()", lambda: listed(block.outputs(p, x, u)))
-    x = _tried(file, "step()", lambda: block.step(p, x, u, STEP))
-    _tried(file, "outputs()", lambda: listed(block.outputs(p, x, u)))
+    outputs = [v for v in found if v.causality == "output"]
+    for x in (first, second):
+        values = _tried(file, "outputs()", partial(lambda x: listed(block.outputs(p, x, u)), x))
+        _tried(file, "outputs()", partial(_check_outputs, outputs, values))
     return found
+
+
+def _check_declaration(found: list[Variable]) -> None:
+    """ValueError where a name or a start value is none of FMI's."""
+    names = set()
+    for v in found:
+        if v.name in names:
+            raise ValueError(f"{v.name}: is there twice; inputs, outputs, parameters share names")
+        names.add(v.name)
+        if not v.name.isascii():
+            raise ValueError(f"{v.name}: must be of ASCII letters, digits and _")
+        if v.causality != "output":
+            _check_start(v, v.start)
+
+
+def _check_start(v: Variable, start: Any) -> None:
+    _check_type(v, start, (v.kind,))
+    low, high = v.limits or (-inf, inf)
+    if not (low <= start <= high and isfinite(start)):
+        raise ValueError(f"{v.name} = {start!r}{v.in_unit}: must be {v.allowed}")
+
+
+def _check_type(v: Variable, value: Any, kinds: tuple[type[Any], ...]) -> None:
+    if type(value) not in kinds:
+        raise ValueError(f"{v.name} = {value!r}: must be of type {v.kind.__name__}")
+
+
+def _check_outputs(outputs: list[Variable], values: list[Any]) -> None:
+    for v, value in zip(outputs, values, strict=True):
+        _check_type(v, value, (float, int) if v.kind is float else (v.kind,))
+        if not isfinite(value):
+            raise ValueError(f"{v.name} = {value!r}{v.in_unit}: must be finite")
+
+
+def _kinds(state: Any) -> dict[str, type[Any]]:
+    """The types of the scalars in a state, by name; ValueError where it could not be saved."""
+    kinds = {}
+    for name, value in _scalars("State", state):
+        if not isinstance(value, (float, int)):
+            raise ValueError(f"{name} = {value!r}: must be float, bool, int, or a tuple of those")
+        if isnan(value):
+            raise ValueError(f"{name} = {value!r}: must be a number")
+        kinds[name] = type(value)
+    return kinds
+
+
+def _scalars(name: str, value: Any) -> Iterator[tuple[str, Any]]:
+    if isinstance(value, tuple):
+        fields = getattr(value, "_fields", None)
+        labels = [f".{f}" for f in fields] if fields else [f"[{i + 1}]" for i in range(len(value))]
+        for label, item in zip(labels, value, strict=True):
+            yield from _scalars(f"{name}{label}", item)
+    else:
+        yield name, value
+
+
+def _check_kinds(kinds: dict[str, type[Any]], before: dict[str, type[Any]]) -> None:
+    """ValueError where a saved state would not come back as it was: 0.5 as 0, by an int."""
+    for name in {**before, **kinds}:
+        kind, like = (k[name].__name__ if name in k else "not there" for k in (kinds, before))
+        if kind != like:
+            raise ValueError(f"{name} is {kind}: must be as initial_state() makes it, {like}")
 
 
 def _tried(file: Path, what: str, function: Callable[[], Any]) -> Any:

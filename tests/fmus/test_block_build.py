@@ -152,6 +152,50 @@ def test_any_ends_of_lines_do(tmp_path: Path, end: str) -> None:
         ("State(0.0)", "Stat(0.0)", "line 29: initial_state(): NameError: name 'Stat' is not "),
         ("x.y - u.u", "x.y - u.v", "line 33: step(): AttributeError: 'Inputs' object has no "),
         ("Outputs(x.y)", "(x.y, x.y)", "outputs(): ValueError: too many values to unpack"),
+        ("exp(-h / p.time_constant)", "float('nan')", "step(): ValueError: State.y = nan: must "),
+        ("Outputs(x.y)", "Outputs(x.y - 1e999)", "outputs(): ValueError: y = -inf N: must be fini"),
+        (
+            "Outputs(x.y)",
+            "Outputs(x.y * float('inf') if x.y else x.y)",
+            "outputs(): ValueError: y = inf N: must be finite",
+        ),
+        ("Outputs(x.y)", "Outputs('a')", "outputs(): ValueError: y = 'a': must be of type float"),
+        ("Outputs(x.y)", "Outputs(x.y > 0)", "outputs(): ValueError: y = False: must be of type "),
+        (
+            "class Outputs(NamedTuple):\n    y:",
+            "class Outputs(NamedTuple):\n    u:",
+            "declaration: ValueError: u: is there twice; inputs, outputs, parameters share names",
+        ),
+        (
+            "class Outputs(NamedTuple):\n    y:",
+            "class Outputs(NamedTuple):\n    ÿ:",
+            "declaration: ValueError: ÿ: must be of ASCII letters, digits and _",
+        ),
+        (
+            "= 0.5",
+            "= 5e3",
+            "declaration: ValueError: time_constant = 5000.0 s: must be from 0.001 to 1000 s",
+        ),
+        ("] = 1.0", "] = 1e999", "declaration: ValueError: u = inf N: must be a finite number"),
+        ("] = 1.0", "] = 1", "declaration: ValueError: u = 1: must be of type float"),
+        ("] = 1.0", "] = None", "declaration: ValueError: u = None: must be of type float"),
+        ("] = 1.0", "] = 'a'", "declaration: ValueError: u = 'a': must be of type float"),
+        ("State(0.0)", "State([0.0])", "initial_state(): ValueError: State.y = [0.0]: must be "),
+        (
+            "State(0.0)",
+            "State((0.0, None))",
+            "initial_state(): ValueError: State.y[2] = None: must be float, bool, int, or a tuple ",
+        ),
+        (
+            "return State(0.0)",
+            "return State(0)",
+            "step(): ValueError: State.y is float: must be as initial_state() makes it, int",
+        ),
+        (
+            "State(u.u + (x.y - u.u) * exp(-h / p.time_constant))",
+            "State((1.0, 2.0))",
+            "step(): ValueError: State.y is not there: must be as initial_state() makes it, float",
+        ),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_one_line(
