@@ -334,8 +334,7 @@ class Slave(metaclass=Once):
                         f"{v.name} = {value!r}: must have {low:g} to {high:g} bytes in UTF-8"
                     )
             elif not (low <= value <= high and isfinite(value)):
-                allowed = f"from {low:g} to {high:g}{v.in_unit}" if v.limits else "a finite number"
-                raise RefusalError(f"{v.name} = {value!r}{v.in_unit}: must be {allowed}")
+                raise RefusalError(f"{v.name} = {value!r}{v.in_unit}: must be {v.allowed}")
 
     # Reports
 

@@ -10,10 +10,12 @@ import re
 import sys
 import traceback
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
+from functools import partial
 from importlib import metadata
+from math import inf, isfinite, isnan
 from pathlib import Path
-from types import ModuleType
+from types import CodeType, ModuleType
 from typing import Any
 
 from .build import HASH, IMPORT, SCRIPTS, Built, bound_library, members, package_files, write_fmu
@@ -25,9 +27,6 @@ from .variable import Variable
 
 PARTS = ("Params", "Inputs", "State", "Outputs", "initial_state", "step", "outputs")
 """What a block has."""
-
-KINDS = (float, bool, int)
-"""What its variables may be."""
 
 STEP = 1e-3
 """s; how far a block is advanced to see whether it works."""
@@ -44,11 +43,11 @@ def build_block(file: Path, out: Path, bind_python: str | None = None) -> Built:
     if file.suffix != ".py" or not _IDENTIFIER.fullmatch(file.stem):
         raise ValueError(f"{file}: must be NAME.py, NAME of letters, digits and _, a letter first")
     name = "".join(word[:1].upper() + word[1:] for word in file.stem.split("_"))
-    if (SCRIPTS / f"{name}.py").exists():
-        raise ValueError(f"{file}: {name}.fmu is one of the FMUs that come with this package")
-    text = file.read_bytes()
-    tree = _parsed(file, text)
-    packages = _packages(file, tree)
+    for ours in (script.stem for script in SCRIPTS.glob("*.py")):
+        if ours.lower() == name.lower():  # the same file on Windows
+            raise ValueError(f"{file}: {ours}.fmu is one of the FMUs that come with this package")
+    text, tree = _parsed(file)
+    packages = _packages(file, text, tree)
     with _run(file, tree) as block:
         summary, _, rest = inspect.cleandoc(block.__doc__ or "").partition("\n")
         if not summary:
@@ -57,7 +56,10 @@ def build_block(file: Path, out: Path, bind_python: str | None = None) -> Built:
         card = f"{rest.strip()}\n\n{BEGIN}{variable_tables({name: block})}"
     version, library = metadata.version("grasp-cosim"), bound_library(bind_python)
     html = page(name, description.summary, card, version, library)
-    sources = {f"{name}.py": _script(name, file.stem).encode(), f"{file.stem}_block.py": text}
+    sources = {
+        f"{name}.py": _script(name, file.stem).encode(),
+        f"{file.stem}_block.py": text.encode(),
+    }
     for package in (__package__, *packages):
         sources |= package_files(package)
     return write_fmu(members(description, html, None, sources, bind_python), out / f"{name}.fmu")
@@ -72,20 +74,26 @@ def _script(name: str, stem: str) -> str:
     )
 
 
-def _parsed(file: Path, text: bytes) -> ast.Module:
+def _parsed(file: Path) -> tuple[str, ast.Module]:
+    """Text and syntax tree of a file; every line of the text ends in a line feed."""
     try:
-        return ast.parse(text, str(file))
+        text = file.read_text("utf-8")
+        return text, ast.parse(text.encode(), str(file))
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{file}: byte {error.start}: must be UTF-8") from error
     except (SyntaxError, ValueError) as error:
-        line = f" line {error.lineno}:" if isinstance(error, SyntaxError) else ""
+        number = getattr(error, "lineno", None)  # there is none for a NUL byte
+        line = f" line {number}:" if number else ""
         raise ValueError(f"{file}:{line} is no Python: {error.args[0]}") from error
 
 
-def _packages(file: Path, tree: ast.Module) -> list[str]:
+def _packages(file: Path, text: str, tree: ast.Module) -> list[str]:
     """The packages that the FMU must bring along; ValueError where a module could not be packed."""
     ours = {p for s in SCRIPTS.glob("*.py") for p in IMPORT.findall(s.read_text("utf-8"))}
     ours.discard(__package__)
     found = set()
-    for line, module, packable in _imports(tree):
+    renamed = {text.count("\n", 0, match.start()) + 1 for match in IMPORT.finditer(text)}
+    for line, module, packable in _imports(tree, renamed):
         package = module.partition(".")[0]
         if package in sys.stdlib_module_names:
             continue
@@ -96,42 +104,52 @@ def _packages(file: Path, tree: ast.Module) -> list[str]:
             )
         if not packable:
             raise ValueError(
-                f"{file}: line {line}: {package} must be imported at the top level, as: "
-                f"from {package} import ..."
+                f"{file}: line {line}: {package} must be imported at the top level, with single "
+                f"spaces, as: from {package} import ..."
             )
         found.add(package)
     return sorted(found)
 
 
-def _imports(tree: ast.Module) -> Iterator[tuple[int, str, bool]]:
-    """Line and module of every import, and whether its name can be changed for that in the FMU."""
+def _imports(tree: ast.Module, renamed: set[int]) -> Iterator[tuple[int, str, bool]]:
+    """Line and module of every import, and whether its name is changed for that in the FMU.
+
+    renamed are the lines in which IMPORT finds one.
+    """
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             for alias in node.names:
                 yield node.lineno, alias.name, False
         elif isinstance(node, ast.ImportFrom):
             module = "." * node.level + (node.module or "")
-            yield node.lineno, module, node.col_offset == 0
+            yield node.lineno, module, node.col_offset == 0 and node.lineno in renamed
 
 
 @contextmanager
 def _run(file: Path, tree: ast.Module) -> Iterator[Any]:
-    """The module of a file, which is among the imported ones meanwhile: annotations need that."""
+    """The module of a file, which is among the imported ones meanwhile: annotations need that.
+
+    What it prints goes to standard error.
+    """
     name = f"{file.stem}_block"
     module = ModuleType(name)
     before = sys.modules.get(name)
     sys.modules[name] = module
     try:
-        code = compile(tree, str(file), "exec")
-        _tried(file, "import", lambda: exec(code, vars(module)))  # noqa: S102 - the user's own file
-        missing = [part for part in PARTS if not hasattr(module, part)]
-        if missing:
-            raise ValueError(f"{file}: has no {', '.join(missing)}; a block has {', '.join(PARTS)}")
-        yield module
+        with redirect_stdout(sys.stderr):
+            _tried(file, "import", lambda: _execute(compile(tree, str(file), "exec"), module))
+            missing = ", ".join(part for part in PARTS if not hasattr(module, part))
+            if missing:
+                raise ValueError(f"{file}: has no {missing}; a block has {', '.join(PARTS)}")
+            yield module
     finally:
         del sys.modules[name]
         if before:
             sys.modules[name] = before
+
+
+def _execute(code: CodeType, module: ModuleType) -> None:
+    exec(code, vars(module))  # noqa: S102 - the user's own file
 
 
 def _variables(file: Path, block: Any) -> list[Variable]:
@@ -139,24 +157,88 @@ def _variables(file: Path, block: Any) -> list[Variable]:
     p, u = _tried(file, "Params()", block.Params), _tried(file, "Inputs()", block.Inputs)
     fields = _tried(file, "declaration", lambda: declared(block))
     found: list[Variable] = _tried(file, "declaration", lambda: variables(fields))
+    _tried(file, "declaration", lambda: _check_declaration(found))
+    first = _tried(file, "initial_state()", lambda: block.initial_state(p, u))
+    kinds = _tried(file, "initial_state()", lambda: _kinds(first))
+    second = _tried(file, "step()", lambda: block.step(p, first, u, STEP))
+    _tried(file, "step()", lambda: _check_kinds(_kinds(second), kinds))
     listed = unpacker(fields)
-    x = _tried(file, "initial_state()", lambda: block.initial_state(p, u))
-    _tried(file, "outputs()", lambda: listed(block.outputs(p, x, u)))
-    x = _tried(file, "step()", lambda: block.step(p, x, u, STEP))
-    _tried(file, "outputs()", lambda: listed(block.outputs(p, x, u)))
-    for v in found:
-        if v.kind not in KINDS:
-            kinds = ", ".join(kind.__name__ for kind in KINDS)
-            raise ValueError(f"{file}: {v.name} is {v.kind}: must be of {kinds}, or a tuple of one")
+    outputs = [v for v in found if v.causality == "output"]
+    for x in (first, second):
+        values = _tried(file, "outputs()", partial(lambda x: listed(block.outputs(p, x, u)), x))
+        _tried(file, "outputs()", partial(_check_outputs, outputs, values))
     return found
+
+
+def _check_declaration(found: list[Variable]) -> None:
+    """ValueError where a name or a start value is none of FMI's."""
+    names = set()
+    for v in found:
+        if v.name in names:
+            raise ValueError(f"{v.name}: is there twice; inputs, outputs, parameters share names")
+        names.add(v.name)
+        if not v.name.isascii():
+            raise ValueError(f"{v.name}: must be of ASCII letters, digits and _")
+        if v.causality != "output":
+            _check_start(v, v.start)
+
+
+def _check_start(v: Variable, start: Any) -> None:
+    _check_type(v, start, (v.kind,))
+    low, high = v.limits or (-inf, inf)
+    if not (low <= start <= high and isfinite(start)):
+        raise ValueError(f"{v.name} = {start!r}{v.in_unit}: must be {v.allowed}")
+
+
+def _check_type(v: Variable, value: Any, kinds: tuple[type[Any], ...]) -> None:
+    if type(value) not in kinds:
+        raise ValueError(f"{v.name} = {value!r}: must be of type {v.kind.__name__}")
+
+
+def _check_outputs(outputs: list[Variable], values: list[Any]) -> None:
+    for v, value in zip(outputs, values, strict=True):
+        _check_type(v, value, (float, int) if v.kind is float else (v.kind,))
+        if not isfinite(value):
+            raise ValueError(f"{v.name} = {value!r}{v.in_unit}: must be finite")
+
+
+def _kinds(state: Any) -> dict[str, type[Any]]:
+    """The types of the scalars in a state, by name; ValueError where it could not be saved."""
+    kinds = {}
+    for name, value in _scalars("State", state):
+        if not isinstance(value, (float, int)):
+            raise ValueError(f"{name} = {value!r}: must be float, bool, int, or a tuple of those")
+        if isnan(value):
+            raise ValueError(f"{name} = {value!r}: must be a number")
+        kinds[name] = type(value)
+    return kinds
+
+
+def _scalars(name: str, value: Any) -> Iterator[tuple[str, Any]]:
+    if isinstance(value, tuple):
+        fields = getattr(value, "_fields", None)
+        labels = [f".{f}" for f in fields] if fields else [f"[{i + 1}]" for i in range(len(value))]
+        for label, item in zip(labels, value, strict=True):
+            yield from _scalars(f"{name}{label}", item)
+    else:
+        yield name, value
+
+
+def _check_kinds(kinds: dict[str, type[Any]], before: dict[str, type[Any]]) -> None:
+    """ValueError where a saved state would not come back as it was: 0.5 as 0, by an int."""
+    for name in {**before, **kinds}:
+        kind, like = (k[name].__name__ if name in k else "not there" for k in (kinds, before))
+        if kind != like:
+            raise ValueError(f"{name} is {kind}: must be as initial_state() makes it, {like}")
 
 
 def _tried(file: Path, what: str, function: Callable[[], Any]) -> Any:
     """What a function of the user's returns; ValueError says what went wrong in it, and where."""
     try:
         return function()
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         frames = traceback.extract_tb(error.__traceback__)
         lines = [frame.lineno for frame in frames if frame.filename == str(file)]
         place = f" line {lines[-1]}:" if lines else ""
-        raise ValueError(f"{file}:{place} {what}: {type(error).__name__}: {error}") from error
+        said = " ".join(str(error).splitlines())
+        raise ValueError(f"{file}:{place} {what}: {type(error).__name__}: {said}") from error

@@ -233,8 +233,13 @@ def _archive(members: Mapping[str, bytes]) -> bytes:
 
 
 def write_file(target: Path, data: bytes) -> None:
-    """Write a file in one piece, with its folder."""
+    """Write a file in one piece, with its folder; OSError names the target."""
     target.parent.mkdir(parents=True, exist_ok=True)
     part = target.with_name(f"{target.name}.{os.getpid()}.part")
-    part.write_bytes(data)
-    part.replace(target)
+    try:
+        part.write_bytes(data)
+        part.replace(target)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(target)) from error
+    finally:
+        part.unlink(missing_ok=True)

@@ -5,9 +5,10 @@ Every field of Params, Inputs and Outputs carries
 
     name: Annotated[type, unit, description, ...] = default
 
-with float, bool, a tuple of them, or (in Params) int, an IntEnum or another such class as its type.
-An IntEnum is an enumeration of FMI, its members in lower case are the names of the items. A tuple
-becomes name[1], name[2], a nested class name.field. After the description follow, in any order,
+with float, bool, a tuple of one of them, or (in Params) int, an IntEnum or another such class as
+its type. An IntEnum is an enumeration of FMI, its members in lower case are the names of the items.
+A tuple becomes name[1], name[2], a nested class name.field. After the description follow, in any
+order,
 
 - for a parameter its range (lowest, highest), and "tunable" if it may change at run time;
 - for a real input or output its nominal value, a float;
@@ -87,7 +88,7 @@ class Field:
         """That of its scalar variables, as FMI calls it."""
         if self.causality == "parameter":
             return "tunable" if self.tunable else "fixed"
-        return "discrete" if self.kind is bool else "continuous"
+        return "continuous" if self.kind is float else "discrete"
 
 
 def declared(block: Block) -> list[Field]:
@@ -241,13 +242,29 @@ def _fields(cls: type[Any], causality: Causality, starts: dict[str, Any]) -> Ite
         yield _field((name,), causality, hint, starts.get(name))
 
 
+def _kind(name: str, causality: Causality, base: Any) -> type[Any]:
+    """The type of the scalars of a field of the type base; TypeError where it may not have that."""
+    items = set(get_args(base)) if get_origin(base) is tuple else {base}
+    is_parameter = causality == "parameter"
+    kinds: tuple[type[Any], ...] = (float, bool, int) if is_parameter else (float, bool)
+    for kind in kinds:
+        if items == {kind}:
+            return kind
+    if is_parameter and isinstance(base, type) and issubclass(base, IntEnum):
+        return base
+    got = base.__name__ if isinstance(base, type) else base
+    valid = ", ".join(kind.__name__ for kind in kinds)
+    besides = ", or an IntEnum" if is_parameter else ""
+    raise TypeError(f"{name} is {got}: must be {valid}, a tuple of one of them{besides}")
+
+
 def _field(path: tuple[str, ...], causality: Causality, hint: Any, start: Any) -> Field:
     name = ".".join(path)
     if get_origin(hint) is not Annotated:
         raise TypeError(f"{name}: no unit and description; declare it as Annotated[...]")
     base, unit, description, *rest = get_args(hint)
     size = len(get_args(base)) if get_origin(base) is tuple else None
-    kind = get_args(base)[0] if size else base
+    kind = _kind(name, causality, base)
     limits = next((r for r in rest if isinstance(r, tuple)), None)
     enumeration = None
     if issubclass(kind, IntEnum):

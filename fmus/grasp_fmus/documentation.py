@@ -148,8 +148,10 @@ def _packages(requires: Sequence[str]) -> str:
     if not requires:
         return "No packages need to be installed."
     extras = escape(",".join(requires))
+    *others, last = (f"<code>{escape(name)}</code>" for name in requires)
+    packages = f"packages {', '.join(others)} and {last}" if others else f"package {last}"
     return (
-        f"That Python must have the package <code>{extras}</code>; "
+        f"That Python must have the {packages}; "
         f"<code>python -m pip install 'grasp-cosim[{extras}]'</code> installs it."
     )
 

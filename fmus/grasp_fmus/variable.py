@@ -56,3 +56,11 @@ class Variable:
     def in_unit(self) -> str:
         """Its unit after a number, with a space before it; empty where it has none."""
         return f" {self.unit}" if self.unit else ""
+
+    @property
+    def allowed(self) -> str:
+        """What number it may be, in words: from 0.001 to 1000 kg."""
+        if not self.limits:
+            return "a finite number"
+        low, high = self.limits
+        return f"from {low:g} to {high:g}{self.in_unit}"

@@ -1,5 +1,6 @@
 """The FMU of a block that is one file of the user's own."""
 
+import json
 import zipfile
 from math import exp
 from pathlib import Path
@@ -99,6 +100,30 @@ def test_packages_of_our_blocks_come_along(tmp_path: Path) -> None:
     assert answer(built.path, tmp_path / "a") == pytest.approx(expected, rel=1e-14)
 
 
+@pytest.mark.parametrize("between", ["  ", "\t", " \\\n "])
+def test_an_import_that_would_take_the_package_of_the_host_is_refused(
+    command: Run, tmp_path: Path, between: str
+) -> None:
+    text = LAG.replace("from math", f"from{between}gripper_plant import substeps\nfrom math")
+    file = write(tmp_path, text)
+    assert command("build", file, "--out", "out") == (
+        2,
+        "",
+        f"grasp-cosim: build: {file}: line 7: gripper_plant must be imported at the top level, "
+        "with single spaces, as: from gripper_plant import ...\n",
+    )
+    assert not list(tmp_path.glob("out/*"))
+
+
+@pytest.mark.parametrize("end", ["\r\n", "\r"])
+def test_any_ends_of_lines_do(tmp_path: Path, end: str) -> None:
+    text = LAG.replace("from math", "from gripper_plant import substeps\nfrom math")
+    file = tmp_path / "first_order_lag.py"
+    file.write_bytes(text.replace("\n", end).encode())
+    path = build_block(file, tmp_path).path
+    assert build_block(write(tmp_path, text), tmp_path) == Built(path, "unchanged", ())
+
+
 @pytest.mark.parametrize(
     ("before", "after", "said"),
     [
@@ -107,17 +132,70 @@ def test_packages_of_our_blocks_come_along(tmp_path: Path) -> None:
         (
             "from math",
             "import gripper_plant\nfrom math",
-            "line 7: gripper_plant must be imported at the top level, as: from gripper_plant ",
+            "line 7: gripper_plant must be imported at the top level, with single spaces, ",
         ),
         ("def step(", "def step((", "line 32: is no Python: "),
         ("from math", "1 / 0\nfrom math", "line 7: import: ZeroDivisionError: division by zero"),
+        ("from math", "raise SystemExit(3)\nfrom math", "line 7: import: SystemExit: 3"),
+        (
+            "from math",
+            "raise ValueError('a\\nb\\r\\nc')\nfrom math",
+            "line 7: import: ValueError: a b c",
+        ),
+        ("from math", "return\nfrom math", "import: SyntaxError: 'return' outside function"),
+        ("from math", "\0\nfrom math", "is no Python: source code string cannot contain null "),
         ("def step", "def advance", "has no step; a block has Params, Inputs, State, Outputs, "),
         ("= 1.0\n", "\n", "Inputs(): TypeError: "),
         ('follows", 1.0, ', 'follows", ', "declaration: TypeError: y: must have a nominal value"),
-        ("y: Annotated[float,", "y: Annotated[str,", "y is <class 'str'>: must be of float"),
+        ("u: Annotated[float,", "u: Annotated[int,", "declaration: TypeError: u is int: must be "),
+        ("y: Annotated[float,", "y: Annotated[str,", "declaration: TypeError: y is str: must be "),
         ("State(0.0)", "Stat(0.0)", "line 29: initial_state(): NameError: name 'Stat' is not "),
         ("x.y - u.u", "x.y - u.v", "line 33: step(): AttributeError: 'Inputs' object has no "),
         ("Outputs(x.y)", "(x.y, x.y)", "outputs(): ValueError: too many values to unpack"),
+        ("exp(-h / p.time_constant)", "float('nan')", "step(): ValueError: State.y = nan: must "),
+        ("Outputs(x.y)", "Outputs(x.y - 1e999)", "outputs(): ValueError: y = -inf N: must be fini"),
+        (
+            "Outputs(x.y)",
+            "Outputs(x.y * float('inf') if x.y else x.y)",
+            "outputs(): ValueError: y = inf N: must be finite",
+        ),
+        ("Outputs(x.y)", "Outputs('a')", "outputs(): ValueError: y = 'a': must be of type float"),
+        ("Outputs(x.y)", "Outputs(x.y > 0)", "outputs(): ValueError: y = False: must be of type "),
+        (
+            "class Outputs(NamedTuple):\n    y:",
+            "class Outputs(NamedTuple):\n    u:",
+            "declaration: ValueError: u: is there twice; inputs, outputs, parameters share names",
+        ),
+        (
+            "class Outputs(NamedTuple):\n    y:",
+            "class Outputs(NamedTuple):\n    ÿ:",
+            "declaration: ValueError: ÿ: must be of ASCII letters, digits and _",
+        ),
+        (
+            "= 0.5",
+            "= 5e3",
+            "declaration: ValueError: time_constant = 5000.0 s: must be from 0.001 to 1000 s",
+        ),
+        ("] = 1.0", "] = 1e999", "declaration: ValueError: u = inf N: must be a finite number"),
+        ("] = 1.0", "] = 1", "declaration: ValueError: u = 1: must be of type float"),
+        ("] = 1.0", "] = None", "declaration: ValueError: u = None: must be of type float"),
+        ("] = 1.0", "] = 'a'", "declaration: ValueError: u = 'a': must be of type float"),
+        ("State(0.0)", "State([0.0])", "initial_state(): ValueError: State.y = [0.0]: must be "),
+        (
+            "State(0.0)",
+            "State((0.0, None))",
+            "initial_state(): ValueError: State.y[2] = None: must be float, bool, int, or a tuple ",
+        ),
+        (
+            "return State(0.0)",
+            "return State(0)",
+            "step(): ValueError: State.y is float: must be as initial_state() makes it, int",
+        ),
+        (
+            "State(u.u + (x.y - u.u) * exp(-h / p.time_constant))",
+            "State((1.0, 2.0))",
+            "step(): ValueError: State.y is not there: must be as initial_state() makes it, float",
+        ),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_one_line(
@@ -143,6 +221,7 @@ def test_a_block_must_say_what_it_is(command: Run, tmp_path: Path) -> None:
         ("1st.py", "must be NAME.py"),
         ("lag.txt", "must be NAME.py"),
         ("gripper_plant.py", "GripperPlant.fmu is one of the FMUs that come with this package"),
+        ("GRIPPERplant.py", "GripperPlant.fmu is one of the FMUs that come with this package"),
     ],
 )
 def test_a_name_that_does_not_do(command: Run, tmp_path: Path, name: str, said: str) -> None:
@@ -160,3 +239,26 @@ def test_the_command_builds_this_one_alone(command: Run, tmp_path: Path) -> None
     code, out, _ = command("build", write(tmp_path, LAG))
     assert (code, out) == (0, "fmus/build/FirstOrderLag.fmu: new\n")
     assert [p.name for p in (tmp_path / "fmus/build").iterdir()] == ["FirstOrderLag.fmu"]
+
+
+def test_what_the_file_prints_is_not_among_the_results(command: Run, tmp_path: Path) -> None:
+    text = LAG.replace("from math", "print('imported')\nfrom math")
+    text = text.replace("    return State(0.0)", "    print('started')\n    return State(0.0)")
+    code, out, err = command("build", write(tmp_path, text), "--json")
+    assert (code, json.loads(out)["fmus"]) == (0, ["fmus/build/FirstOrderLag.fmu"])
+    assert err == "imported\nstarted\n"
+
+
+def test_a_file_must_be_utf_8(command: Run, tmp_path: Path) -> None:
+    file = tmp_path / "lag.py"
+    file.write_bytes(LAG.encode("latin-1"))
+    said = f"grasp-cosim: build: {file}: byte {LAG.index('·')}: must be UTF-8\n"
+    assert command("build", file) == (2, "", said)
+
+
+def test_a_folder_in_the_place_of_the_fmu(command: Run, tmp_path: Path) -> None:
+    (tmp_path / "out/FirstOrderLag.fmu").mkdir(parents=True)
+    code, out, err = command("build", write(tmp_path, LAG), "--out", "out")
+    assert (code, out) == (2, "")
+    assert err == "grasp-cosim: out/FirstOrderLag.fmu: Is a directory\n"
+    assert [p.name for p in (tmp_path / "out").iterdir()] == ["FirstOrderLag.fmu"]

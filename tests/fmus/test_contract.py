@@ -278,6 +278,85 @@ def test_an_int_enum_is_an_enumeration() -> None:
     assert (variable.type, variable.kind) == ("Enumeration", int)
 
 
+class Choice(NamedTuple):
+    colour: Annotated[Colour, "", "a choice"] = Colour.RED
+
+
+class WholeNumber(NamedTuple):
+    number: Annotated[int, "", "a number"] = 1
+
+
+class WholeNumbers(NamedTuple):
+    number: Annotated[tuple[int, int], "", "two numbers"] = (1, 2)
+
+
+class Chosen(NamedTuple):
+    colour: Annotated[Colour, "", "a choice", set()]
+
+
+class Optional(NamedTuple):
+    gap: Annotated[float | None, "m", "a distance", 0.1] = None
+
+
+class Mixed(NamedTuple):
+    both: Annotated[tuple[float, bool], "m", "a distance, and whether it is one", 0.1, set()]
+
+
+class AnyNumber(NamedTuple):
+    gap: Annotated[tuple[float, ...], "m", "distances", 0.1] = ()
+
+
+class NoNumber(NamedTuple):
+    gap: Annotated[tuple[()], "m", "distances", 0.1] = ()
+
+
+@dataclass(frozen=True)
+class Colours:
+    colours: Annotated[tuple[Colour, Colour], "", "two choices"] = (Colour.RED, Colour.RED)
+
+
+@dataclass(frozen=True)
+class OptionalParameter:
+    mass: Annotated[float | None, "kg", "a mass", (0.5, 7.0)] = None
+
+
+@dataclass(frozen=True)
+class Text:
+    title: Annotated[str, "", "a text"] = ""
+
+
+@pytest.mark.parametrize(
+    ("parts", "message"),
+    [
+        ({"inputs": Choice}, "colour is Colour: "),
+        ({"inputs": WholeNumber}, "number is int: "),
+        ({"inputs": WholeNumbers}, r"number is tuple\[int, int\]: "),
+        ({"outputs": Chosen}, "colour is Colour: "),
+        ({"inputs": Optional}, r"gap is float \| None: "),
+        ({"outputs": Mixed}, r"both is tuple\[float, bool\]: "),
+        ({"inputs": AnyNumber}, r"gap is tuple\[float, ...\]: "),
+        ({"inputs": NoNumber}, r"gap is tuple\[\(\)\]: "),
+    ],
+)
+def test_an_input_or_output_is_real_or_boolean(parts: dict[str, Any], message: str) -> None:
+    with pytest.raises(TypeError, match=f"^{message}must be float, bool, a tuple of one of them$"):
+        declared(block(**parts))
+
+
+@pytest.mark.parametrize(
+    ("params", "message"),
+    [
+        (Colours, r"colours is tuple\[.*Colour, .*Colour\]: "),
+        (OptionalParameter, r"mass is float \| None: "),
+        (Text, "title is str: "),
+    ],
+)
+def test_a_parameter_may_be_a_whole_number_or_a_choice_as_well(params: Any, message: str) -> None:
+    valid = "must be float, bool, int, a tuple of one of them, or an IntEnum"
+    with pytest.raises(TypeError, match=f"^{message}{valid}$"):
+        declared(block(params=params))
+
+
 def test_the_block_gets_the_member_of_an_enumeration() -> None:
     fields = declared(block(params=Coloured))
     values = [None] * (len([n for f in fields for n in f.names]) - 1)

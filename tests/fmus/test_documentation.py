@@ -161,10 +161,18 @@ def test_the_page_stands_alone(html: str) -> None:
     assert set(links(html)) == {f"licenses/{file}" for file in licences()}
 
 
-def test_packages_that_the_host_must_have_are_named() -> None:
-    html = page("Name", "Summary", "", "1.2.3", requires=("one", "two"))
+@pytest.mark.parametrize(
+    ("requires", "said"),
+    [
+        (("one",), "package one; python -m pip install 'grasp-cosim[one]'"),
+        (("one", "two"), "packages one and two; python -m pip install 'grasp-cosim[one,two]'"),
+        (("a", "b", "c"), "packages a, b and c; python -m pip install 'grasp-cosim[a,b,c]'"),
+    ],
+)
+def test_packages_that_the_host_must_have_are_named(requires: tuple[str, ...], said: str) -> None:
+    html = page("Name", "Summary", "", "1.2.3", requires=requires)
     section = sections(html)["How the host must find Python"]
-    assert "must have the package one,two; python -m pip install 'grasp-cosim[one,two]'" in section
+    assert f"That Python must have the {said} installs it." in section
     assert "No packages" not in section
 
 
