@@ -154,6 +154,24 @@ def test_an_impact_is_that_of_a_critical_damper_that_does_not_hold() -> None:
 def test_a_finger_lets_go_without_being_held() -> None:
     x = after(NEAR, start(NEAR), (-2.0, 2.0), 1e-3, 1000)
     forces = [x.contact_force for x in islice(run(NEAR, x, (1.0, -1.0), 1e-4), 500)]
+@pytest.mark.parametrize("width", [0.07, 0.01, 0.001])
+def test_an_impact_goes_through_the_box_above_the_speed_on_the_card(width: float) -> None:
+    """It sinks in by v·T/e; from where its centre is past that of the box, it is pushed on."""
+    near = (0.5 * width + 0.005, -0.5 * width - 0.005)
+    p = replace(NEAR, object_width=width, initial_position=near, timestep=1e-5)
+    limit = e * (0.5 * width + p.fingertip_radius) / p.contact_time_constant
+    for share, through in ((0.95, False), (1.05, True)):
+        x = after(p, moving(p, x_1=-share * limit), (0.0, 0.0), 1e-4, 300)
+        assert x.q[0] < -0.5 * width if through else x.q[0] > 0.5 * width
+
+
+def test_near_its_top_a_slower_impact_goes_through_the_box() -> None:
+    p = replace(NEAR, contact_height=0.095, timestep=1e-5)
+    for speed, through in ((5.0, False), (10.0, True)):
+        x = after(p, moving(p, x_1=-speed), (0.0, 0.0), 1e-4, 300)
+        assert x.q[0] < -0.035 if through else x.q[0] > 0.035
+
+
     assert all(f_1 >= 0.0 >= f_2 for f_1, f_2 in forces)
     assert forces[-1] == (0.0, 0.0)
 
