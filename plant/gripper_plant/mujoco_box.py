@@ -28,8 +28,8 @@ MOST_TIMESTEPS = 100_000
 """In a communication step."""
 
 MISSING = (
-    "mujoco is not installed in the Python that runs this plant; "
-    "must be: python -m pip install 'grasp-cosim[mujoco]'"
+    "mujoco is not installed, it computes this plant; "
+    "install it with: pip install 'grasp-cosim[mujoco]'"
 )
 
 Coordinates = tuple[float, float, float, float, float]
@@ -113,7 +113,7 @@ class Simulator(NamedTuple):
 
 
 def initial_state(p: Params, u: Inputs) -> State:
-    """All at rest, the fingers free of the object. ImportError where there is no MuJoCo."""
+    """All at rest, the fingers free of the object. ImportError without MuJoCo."""
     idle = _idle(p)
     if not idle:
         idle.append(_simulator(p))
@@ -293,7 +293,9 @@ def _simulator(p: Params) -> Simulator:
     try:
         import mujoco
     except ImportError as error:
-        raise ImportError(f"{MISSING} ({error})") from error
+        absent = isinstance(error, ModuleNotFoundError) and error.name == "mujoco"
+        reason = MISSING if absent else f"mujoco does not load: {' '.join(str(error).split())}"
+        raise ImportError(reason) from error
     model = mujoco.MjModel.from_xml_string(mjcf(p))
     data = mujoco.MjData(model)
     return Simulator(

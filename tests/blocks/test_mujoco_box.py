@@ -1,9 +1,11 @@
 """Fingers and a box in MuJoCo, against what can be worked out by hand."""
 
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice
 from math import e, exp, inf, nan, pi
+from pathlib import Path
 from random import Random
 from threading import Thread
 from typing import Any
@@ -378,6 +380,30 @@ def test_what_does_not_go_together_is_refused(values: dict[str, Any], text: str)
 
 
 @pytest.mark.parametrize(
+@pytest.mark.parametrize(
+    ("raised", "text"),
+    [
+        ('ModuleNotFoundError("No module named \'mujoco\'", name="mujoco")',
+         "mujoco is not installed, it computes this plant; "
+         "install it with: pip install 'grasp-cosim[mujoco]'"),
+        ('ModuleNotFoundError("No module named \'numpy\'", name="numpy")',
+         "mujoco does not load: No module named 'numpy'"),
+        ('ImportError("libmujoco.so: cannot open shared object file.\\n  Repair it.")',
+         "mujoco does not load: libmujoco.so: cannot open shared object file. Repair it."),
+    ],
+)  # fmt: skip
+def test_a_mujoco_that_is_not_there_and_one_that_is_broken(
+    raised: str, text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "mujoco.py").write_text(f"raise {raised}\n", encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "mujoco")
+    mujoco_box._idle.cache_clear()
+    with pytest.raises(ImportError) as caught:
+        start(NEAR)
+    assert str(caught.value) == text
+
+
     ("force", "h", "text"),
     [
         ((0.0, 0.0), 11.0, "110000 timesteps of MuJoCo of 0.0001 s: must be at most 100000"),
