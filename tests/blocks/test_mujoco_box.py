@@ -14,8 +14,9 @@ import numpy as np
 import pytest
 from blocks.gripper import assert_ranges_are_checked
 from gripper_plant import fingers, friction, mujoco_box
+from gripper_plant.box import GRAVITY
 from gripper_plant.fingers import Pair
-from gripper_plant.mujoco_box import GRAVITY, IMPEDANCE, Inputs, Outputs, Params, State
+from gripper_plant.mujoco_box import IMPEDANCE, Inputs, Outputs, Params, State
 
 mujoco: Any = pytest.importorskip("mujoco", reason="NO mujoco: pip install '.[mujoco]'")
 
@@ -153,9 +154,6 @@ def test_an_impact_is_that_of_a_critical_damper_that_does_not_hold() -> None:
     assert impulse == pytest.approx(0.5 * (0.1 + x.v[0]), rel=1e-9)
 
 
-def test_a_finger_lets_go_without_being_held() -> None:
-    x = after(NEAR, start(NEAR), (-2.0, 2.0), 1e-3, 1000)
-    forces = [x.contact_force for x in islice(run(NEAR, x, (1.0, -1.0), 1e-4), 500)]
 @pytest.mark.parametrize("width", [0.07, 0.01, 0.001])
 def test_an_impact_goes_through_the_box_above_the_speed_on_the_card(width: float) -> None:
     """It sinks in by v·T/e; from where its centre is past that of the box, it is pushed on."""
@@ -174,6 +172,9 @@ def test_near_its_top_a_slower_impact_goes_through_the_box() -> None:
         assert x.q[0] < -0.035 if through else x.q[0] > 0.035
 
 
+def test_a_finger_lets_go_without_being_held() -> None:
+    x = after(NEAR, start(NEAR), (-2.0, 2.0), 1e-3, 1000)
+    forces = [x.contact_force for x in islice(run(NEAR, x, (1.0, -1.0), 1e-4), 500)]
     assert all(f_1 >= 0.0 >= f_2 for f_1, f_2 in forces)
     assert forces[-1] == (0.0, 0.0)
 
@@ -380,7 +381,6 @@ def test_what_does_not_go_together_is_refused(values: dict[str, Any], text: str)
 
 
 @pytest.mark.parametrize(
-@pytest.mark.parametrize(
     ("raised", "text"),
     [
         ('ModuleNotFoundError("No module named \'mujoco\'", name="mujoco")',
@@ -404,6 +404,7 @@ def test_a_mujoco_that_is_not_there_and_one_that_is_broken(
     assert str(caught.value) == text
 
 
+@pytest.mark.parametrize(
     ("force", "h", "text"),
     [
         ((0.0, 0.0), 11.0, "110000 timesteps of MuJoCo of 0.0001 s: must be at most 100000"),
