@@ -79,9 +79,11 @@ def initial_state(p: Params, u: Inputs) -> State:
 
 
 def step(p: Params, s: State, u: Inputs, h: float) -> State:
-    """Advance by h seconds (h > 0), the forces u held, in sub-steps that resolve the faces."""
+    """Advance by h seconds (h > 0), u held, in sub-steps that resolve the faces and the spring."""
     lightest = min(*p.finger_mass, p.object_mass)
-    rate = max((2.0 * p.face_stiffness / lightest) ** 0.5, 2.0 * p.face_damping / lightest)
+    stiffness = 2.0 * p.face_stiffness + p.spring_stiffness
+    damping = 2.0 * p.face_damping + p.spring_damping
+    rate = max((stiffness / lightest) ** 0.5, damping / lightest)
     n = max(1, ceil(10.0 * rate * h))
     for _ in range(n):
         s = _substep(p, s, u, h / n)

@@ -13,10 +13,11 @@ their horizontal parts, Q their moment about the edge. The mirrored box tilts to
 Card: plant/README.md
 """
 
+from dataclasses import dataclass
 from math import atan2, copysign, cos, sin, tan
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
-from . import friction
+from . import fingers, friction
 from .contact import time_to_contact
 
 GRAVITY = 9.80665
@@ -27,6 +28,41 @@ PIECES = 4
 
 A box that does more than that within one rattles, and what is left of the sub-step is not resolved.
 """
+
+
+@dataclass(frozen=True, slots=True)
+class Params(fingers.Params):
+    """Parameters of every plant with a box; a value outside its range raises ValueError."""
+
+    object_mass: Annotated[float, "kg", "m, mass of the object", (1e-3, 1e3)] = 0.05
+    object_height: Annotated[float, "m", "H, height of the object", (1e-3, 10.0)] = 0.1
+    contact_height: Annotated[
+        float, "m", "h, height of the fingertips above the floor", (0.0, 10.0)
+    ] = 0.05
+    floor_friction: Annotated[float, "1", "mu, friction of the object on the floor", (0.0, 1.0)] = (
+        0.3
+    )
+
+    def __post_init__(self) -> None:
+        fingers.Params.__post_init__(self)
+        if self.contact_height > self.object_height:
+            raise ValueError(
+                f"contact_height = {self.contact_height!r} m: must be from 0 to object_height, "
+                f"{self.object_height:g}"
+            )
+
+
+class Outputs(NamedTuple):
+    """Measured at the fingers and at the object; the gap of a finger that touches is zero."""
+
+    position: fingers.Position
+    velocity: fingers.Velocity
+    gap: fingers.Gap
+    contact_force: fingers.ContactForce
+    contact: fingers.Contact
+    object_position: fingers.ObjectPosition
+    tilt: Annotated[float, "rad", "theta, tilt of the object, to the right", 0.1, set()]
+    toppled: Annotated[bool, "", "the object has tilted past its balance", set()]
 
 
 class Shape(NamedTuple):
@@ -53,6 +89,17 @@ class Pushes(NamedTuple):
 
     left: float
     right: float
+
+
+def shape(p: Params) -> Shape:
+    """The box and its floor as the parameters have them."""
+    return Shape(
+        0.5 * p.object_width,
+        0.5 * p.object_height,
+        p.object_mass,
+        p.floor_friction,
+        p.contact_height,
+    )
 
 
 def balance(q: Shape) -> float:

@@ -5,11 +5,12 @@ tilt > 0 is over the right edge. Card: plant/README.md
 """
 
 from dataclasses import dataclass
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
 from . import box as standing
 from . import contact_laws, fingers, friction, substeps
 from .box import Box, Pushes, Shape
+from .box import Outputs as Outputs
 from .contact_laws import HuntCrossley, KelvinVoigt
 from .fingers import Inputs as Inputs
 from .fingers import Pair as Pair
@@ -19,27 +20,11 @@ ITERATIONS = 16
 
 
 @dataclass(frozen=True, slots=True)
-class Params(fingers.Params):
+class Params(standing.Params):
     """Parameters; a value outside its declared range raises ValueError."""
 
-    object_mass: Annotated[float, "kg", "m, mass of the object", (1e-3, 1e3)] = 0.05
-    object_height: Annotated[float, "m", "H, height of the object", (1e-3, 10.0)] = 0.1
-    contact_height: Annotated[
-        float, "m", "h, height of the fingertips above the floor", (0.0, 10.0)
-    ] = 0.05
-    floor_friction: Annotated[float, "1", "mu, friction of the object on the floor", (0.0, 1.0)] = (
-        0.3
-    )
     kelvin_voigt: KelvinVoigt = KelvinVoigt(stiffness=10000.0, damping=20.0)
     hunt_crossley: HuntCrossley = HuntCrossley(stiffness=200000.0)
-
-    def __post_init__(self) -> None:
-        fingers.Params.__post_init__(self)
-        if self.contact_height > self.object_height:
-            raise ValueError(
-                f"contact_height = {self.contact_height!r} m: must be from 0 to object_height, "
-                f"{self.object_height:g}"
-            )
 
 
 class State(NamedTuple):
@@ -52,19 +37,6 @@ class State(NamedTuple):
     toppled: bool
 
 
-class Outputs(NamedTuple):
-    """Measured at the fingers and at the object; the gap of a finger that touches is zero."""
-
-    position: fingers.Position
-    velocity: fingers.Velocity
-    gap: fingers.Gap
-    contact_force: fingers.ContactForce
-    contact: fingers.Contact
-    object_position: fingers.ObjectPosition
-    tilt: Annotated[float, "rad", "theta, tilt of the object, to the right", 0.1, set()]
-    toppled: Annotated[bool, "", "the object has tilted past its balance", set()]
-
-
 def initial_state(p: Params, u: Inputs) -> State:
     """All at rest, the fingers free of the object."""
     box = Box(p.initial_object_position, 0.0, 0.0, 0.0)
@@ -73,7 +45,7 @@ def initial_state(p: Params, u: Inputs) -> State:
 
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
     """Advance fingers and box by h seconds (h > 0), the forces held."""
-    q, law = _shape(p), contact_laws.law(p.kelvin_voigt, p.hunt_crossley)
+    q, law = standing.shape(p), contact_laws.law(p.kelvin_voigt, p.hunt_crossley)
     n = substeps.count(_rate(p, q, x, u, h), h)
     forces, rubs = fingers.forces(p.actuator, u), friction.laws(p.friction)
     for _ in range(n):
@@ -84,7 +56,7 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     """What the sensors see; no input reaches an output without a step."""
     x_1, x_2 = x.position
-    q = _shape(p)
+    q = standing.shape(p)
     right, left = standing.faces(q, x.box)
     return Outputs(
         x.position,
@@ -129,16 +101,6 @@ def _substep(
     if toppled:
         box = Box(box.x, box.tilt, 0.0, 0.0)
     return State((s_1, -s_2), (w_1, 0.0 - w_2), (f_1, 0.0 - f_2), box, toppled)
-
-
-def _shape(p: Params) -> Shape:
-    return Shape(
-        0.5 * p.object_width,
-        0.5 * p.object_height,
-        p.object_mass,
-        p.floor_friction,
-        p.contact_height,
-    )
 
 
 def _rate(p: Params, q: Shape, x: State, u: Inputs, h: float) -> float:

@@ -8,15 +8,15 @@ that all else works without it. Card: plant/README.md
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from math import atan2, ceil, cos, hypot, sin
+from math import ceil, cos, hypot, sin
 from typing import Annotated, Any, NamedTuple
 
+from . import box as standing
 from . import fingers
+from .box import Outputs as Outputs
+from .box import Shape
 from .fingers import Inputs as Inputs
 from .fingers import Pair as Pair
-
-GRAVITY = 9.80665
-"""m/s^2."""
 
 IMPEDANCE = 0.9999
 """MuJoCo's d of every constraint: the share of a force that it answers before it gives."""
@@ -28,8 +28,8 @@ MOST_TIMESTEPS = 100_000
 """In a communication step."""
 
 MISSING = (
-    "mujoco is not installed in the Python that runs this plant; "
-    "must be: python -m pip install 'grasp-cosim[mujoco]'"
+    "mujoco is not installed, it computes this plant; "
+    "install it with: pip install 'grasp-cosim[mujoco]'"
 )
 
 Coordinates = tuple[float, float, float, float, float]
@@ -37,18 +37,10 @@ Coordinates = tuple[float, float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Params(fingers.Params):
+class Params(standing.Params):
     """Parameters; a value outside its declared range raises ValueError."""
 
     object_fixed: Annotated[bool, "", "the object is fixed; off, it stands free on a floor"] = True
-    object_mass: Annotated[float, "kg", "m, mass of the object", (1e-3, 1e3)] = 0.05
-    object_height: Annotated[float, "m", "H, height of the object", (1e-3, 10.0)] = 0.1
-    contact_height: Annotated[
-        float, "m", "h, height of the fingertips above the floor", (0.0, 10.0)
-    ] = 0.05
-    floor_friction: Annotated[float, "1", "mu, friction of the object on the floor", (0.0, 1.0)] = (
-        0.3
-    )
     fingertip_radius: Annotated[float, "m", "R, radius of the fingertips", (1e-4, 1.0)] = 0.005
     contact_time_constant: Annotated[
         float, "s", "T, time constant in which a contact settles", (2e-5, 0.1)
@@ -56,12 +48,7 @@ class Params(fingers.Params):
     timestep: Annotated[float, "s", "longest timestep of MuJoCo", (1e-5, 1e-3)] = 1e-4
 
     def __post_init__(self) -> None:
-        fingers.Params.__post_init__(self)
-        if self.contact_height > self.object_height:
-            raise ValueError(
-                f"contact_height = {self.contact_height!r} m: must be from 0 to object_height, "
-                f"{self.object_height:g}"
-            )
+        standing.Params.__post_init__(self)
         if self.contact_time_constant < 2.0 * self.timestep:
             raise ValueError(
                 f"contact_time_constant = {self.contact_time_constant!r} s: must be from twice the "
@@ -86,19 +73,6 @@ class State(NamedTuple):
     toppled: bool
 
 
-class Outputs(NamedTuple):
-    """Measured at the fingers and at the object; the gap of a finger that touches is zero."""
-
-    position: fingers.Position
-    velocity: fingers.Velocity
-    gap: fingers.Gap
-    contact_force: fingers.ContactForce
-    contact: fingers.Contact
-    object_position: fingers.ObjectPosition
-    tilt: Annotated[float, "rad", "theta, tilt of the object, to the right", 0.1, set()]
-    toppled: Annotated[bool, "", "the object has tilted past its balance", set()]
-
-
 class Simulator(NamedTuple):
     """A model of MuJoCo, its data, and the arrays in there that a step goes through."""
 
@@ -113,7 +87,7 @@ class Simulator(NamedTuple):
 
 
 def initial_state(p: Params, u: Inputs) -> State:
-    """All at rest, the fingers free of the object. ImportError where there is no MuJoCo."""
+    """All at rest, the fingers free of the object. ImportError without MuJoCo."""
     idle = _idle(p)
     if not idle:
         idle.append(_simulator(p))
@@ -148,7 +122,7 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
         (*s.v.tolist(), *x.v[size:]),
         (*s.acceleration.tolist(), *x.acceleration[size:]),
         _contact_forces(p, s),
-        x.toppled or (not p.object_fixed and abs(q[4]) >= _balance(p)),
+        x.toppled or (not p.object_fixed and abs(q[4]) >= standing.balance(_shape(p))),
     )
     idle.append(s)
     return after
@@ -177,8 +151,8 @@ def mjcf(p: Params) -> str:
     Only what is paired touches: fingertips and box without friction, box and floor with it.
     """
     m_1, m_2 = p.finger_mass
-    b, a = _halves(p)
-    r, h, m, mu = p.fingertip_radius, p.contact_height, p.object_mass, p.floor_friction
+    b, a, m, mu, h = _shape(p)
+    r = p.fingertip_radius
     turning = m * (a * a + b * b) / 3.0
     contact, rubbing = (
         f'solref{of}="{p.contact_time_constant!r} 1" solimp{of}="{IMPEDANCE!r} {IMPEDANCE!r} 1"'
@@ -206,7 +180,7 @@ def mjcf(p: Params) -> str:
     return f"""
 <mujoco>
   <option integrator="Euler" solver="Newton" cone="elliptic" tolerance="1e-12"
-    gravity="0 0 {-GRAVITY!r}">
+    gravity="0 0 {-standing.GRAVITY!r}">
     <flag autoreset="disable"/>
   </option>
   <size memory="256K"/>
@@ -260,23 +234,18 @@ def _contact_forces(p: Params, s: Simulator) -> Pair:
 def _distance(p: Params, q: Coordinates, centre: float) -> float:
     """From a fingertip with its centre there to the box, m; below zero it has sunk in."""
     _, _, x, z, tilt = q
-    b, a = _halves(p)
-    right, up = centre - x, p.contact_height - z
+    b, a, _, _, h = _shape(p)
+    right, up = centre - x, h - z
     across = abs(right * cos(tilt) - up * sin(tilt)) - b
     along = abs(right * sin(tilt) + up * cos(tilt)) - a
     outside = hypot(max(0.0, across), max(0.0, along))
     return outside + min(0.0, max(across, along)) - p.fingertip_radius
 
 
-def _balance(p: Params) -> float:
-    """The tilt in rad from which the box topples: its centre is above the edge."""
-    b, a = _halves(p)
-    return atan2(b, a)
-
-
-def _halves(p: Params) -> tuple[float, float]:
-    """Half the width and half the height of the box, m."""
-    return max(THINNEST, 0.5 * p.object_width), 0.5 * p.object_height
+def _shape(p: Params) -> Shape:
+    """The box as MuJoCo has it, never without a width."""
+    q = standing.shape(p)
+    return q._replace(b=max(THINNEST, q.b))
 
 
 @lru_cache(maxsize=32)
@@ -293,7 +262,9 @@ def _simulator(p: Params) -> Simulator:
     try:
         import mujoco
     except ImportError as error:
-        raise ImportError(f"{MISSING} ({error})") from error
+        absent = isinstance(error, ModuleNotFoundError) and error.name == "mujoco"
+        reason = MISSING if absent else f"mujoco does not load: {' '.join(str(error).split())}"
+        raise ImportError(reason) from error
     model = mujoco.MjModel.from_xml_string(mjcf(p))
     data = mujoco.MjData(model)
     return Simulator(

@@ -44,7 +44,7 @@ def position(p: Params, x: State) -> float:
 
 def stored(p: Params, x: State) -> float:
     """Energy of fingers, box and contacts, J."""
-    q, law = movable._shape(p), contact_laws.law(p.kelvin_voigt, p.hunt_crossley)
+    q, law = standing.shape(p), contact_laws.law(p.kelvin_voigt, p.hunt_crossley)
     right, left = standing.faces(q, x.box)
     kinetic = sum(0.5 * m * v * v for m, v in zip(p.finger_mass, x.velocity, strict=True))
     depths = (right - x.position[0], x.position[1] - left)
@@ -95,14 +95,14 @@ def test_a_push_near_the_top_topples_it_for_good() -> None:
         y = movable.outputs(TALL, x, Inputs())
         seen.append((y.toppled, y.tilt > 0.0))
     assert seen[1:] == [(True, True), (True, True)]
-    assert y.tilt == pytest.approx(standing.balance(movable._shape(TALL)), rel=0.02)
+    assert y.tilt == pytest.approx(standing.balance(standing.shape(TALL)), rel=0.02)
 
 
 def test_a_short_push_tilts_it_and_it_falls_back() -> None:
     pushed = after(TALL, start(TALL), (0.0, 1.0), 1e-4, 1010)
     states = list(islice(run(TALL, pushed, (0.0, -8.0), 1e-4), 6000))
     x, tilts = states[-1], [x.box.tilt for x in states]
-    assert 0.01 < max(tilts) < standing.balance(movable._shape(TALL))
+    assert 0.01 < max(tilts) < standing.balance(standing.shape(TALL))
     assert tilts[-1] == 0.0
     assert not x.toppled
     assert x.contact_force == (0.0, 0.0)

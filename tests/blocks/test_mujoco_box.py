@@ -1,9 +1,11 @@
 """Fingers and a box in MuJoCo, against what can be worked out by hand."""
 
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice
 from math import e, exp, inf, nan, pi
+from pathlib import Path
 from random import Random
 from threading import Thread
 from typing import Any
@@ -12,8 +14,9 @@ import numpy as np
 import pytest
 from blocks.gripper import assert_ranges_are_checked
 from gripper_plant import fingers, friction, mujoco_box
+from gripper_plant.box import GRAVITY
 from gripper_plant.fingers import Pair
-from gripper_plant.mujoco_box import GRAVITY, IMPEDANCE, Inputs, Outputs, Params, State
+from gripper_plant.mujoco_box import IMPEDANCE, Inputs, Outputs, Params, State
 
 mujoco: Any = pytest.importorskip("mujoco", reason="NO mujoco: pip install '.[mujoco]'")
 
@@ -149,6 +152,24 @@ def test_an_impact_is_that_of_a_critical_damper_that_does_not_hold() -> None:
     assert deepest == pytest.approx(0.1 * 0.005 / e, rel=0.01)
     assert x.v[0] == pytest.approx(0.1 / e**2, rel=0.01)
     assert impulse == pytest.approx(0.5 * (0.1 + x.v[0]), rel=1e-9)
+
+
+@pytest.mark.parametrize("width", [0.07, 0.01, 0.001])
+def test_an_impact_goes_through_the_box_above_the_speed_on_the_card(width: float) -> None:
+    """It sinks in by v·T/e; from where its centre is past that of the box, it is pushed on."""
+    near = (0.5 * width + 0.005, -0.5 * width - 0.005)
+    p = replace(NEAR, object_width=width, initial_position=near, timestep=1e-5)
+    limit = e * (0.5 * width + p.fingertip_radius) / p.contact_time_constant
+    for share, through in ((0.95, False), (1.05, True)):
+        x = after(p, moving(p, x_1=-share * limit), (0.0, 0.0), 1e-4, 300)
+        assert x.q[0] < -0.5 * width if through else x.q[0] > 0.5 * width
+
+
+def test_near_its_top_a_slower_impact_goes_through_the_box() -> None:
+    p = replace(NEAR, contact_height=0.095, timestep=1e-5)
+    for speed, through in ((5.0, False), (10.0, True)):
+        x = after(p, moving(p, x_1=-speed), (0.0, 0.0), 1e-4, 300)
+        assert x.q[0] < -0.035 if through else x.q[0] > 0.035
 
 
 def test_a_finger_lets_go_without_being_held() -> None:
@@ -356,6 +377,30 @@ def test_ranges() -> None:
 def test_what_does_not_go_together_is_refused(values: dict[str, Any], text: str) -> None:
     with pytest.raises(ValueError, match=r".+") as caught:
         replace(Params(), **values)
+    assert str(caught.value) == text
+
+
+@pytest.mark.parametrize(
+    ("raised", "text"),
+    [
+        ('ModuleNotFoundError("No module named \'mujoco\'", name="mujoco")',
+         "mujoco is not installed, it computes this plant; "
+         "install it with: pip install 'grasp-cosim[mujoco]'"),
+        ('ModuleNotFoundError("No module named \'numpy\'", name="numpy")',
+         "mujoco does not load: No module named 'numpy'"),
+        ('ImportError("libmujoco.so: cannot open shared object file.\\n  Repair it.")',
+         "mujoco does not load: libmujoco.so: cannot open shared object file. Repair it."),
+    ],
+)  # fmt: skip
+def test_a_mujoco_that_is_not_there_and_one_that_is_broken(
+    raised: str, text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "mujoco.py").write_text(f"raise {raised}\n", encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "mujoco")
+    mujoco_box._idle.cache_clear()
+    with pytest.raises(ImportError) as caught:
+        start(NEAR)
     assert str(caught.value) == text
 
 

@@ -12,8 +12,8 @@ from fmi2 import DISCARD, OK, Instance
 
 NAME = "GripperPlantMuJoCo"
 MISSING = (
-    "mujoco is not installed in the Python that runs this plant; must be: "
-    "python -m pip install 'grasp-cosim[mujoco]' (No module named 'mujoco')"
+    "mujoco is not installed, it computes this plant; "
+    "install it with: pip install 'grasp-cosim[mujoco]'"
 )
 
 
@@ -44,7 +44,7 @@ def test_a_step_that_mujoco_cannot_take_is_discarded(
 def environment(tmp_path: Path) -> dict[str, str]:
     """Of a Python without MuJoCo, and of all that it starts."""
     (tmp_path / "none").mkdir()
-    text = "raise ModuleNotFoundError(\"No module named 'mujoco'\")\n"
+    text = "raise ModuleNotFoundError(\"No module named 'mujoco'\", name='mujoco')\n"
     (tmp_path / "none" / "mujoco.py").write_text(text)
     path = [str(tmp_path / "none"), *sys.path]
     return {**os.environ, "PYTHONPATH": os.pathsep.join(path)}

@@ -198,6 +198,15 @@ def test_an_impact_that_is_not_recorded_to_its_end_has_no_impulse() -> None:
     assert pressed(lambda _: 2.0, end=0.122)["impact_impulse"] != [None, None]
 
 
+@pytest.mark.parametrize(("step", "there"), [(0.019, True), (0.021, False), (0.1, False)])
+def test_an_impact_between_two_samples_has_no_impulse(step: float, there: bool) -> None:
+    """The window begins 1 us before a sample: two within it, or that one."""
+    metrics = pressed(lambda _: 2.0, end=50 * step, step=step, touch=10 * step - 1e-6)
+    assert metrics["impact_impulse"] == (
+        pytest.approx([2.0 * IMPACT_WINDOW] * 2, rel=1e-9) if there else [None, None]
+    )
+
+
 @pytest.mark.parametrize("step", [1e-3, 1e-4])
 @pytest.mark.parametrize(
     ("closing", "fleeing"),
@@ -254,6 +263,63 @@ def test_a_plant_that_holds_its_outputs_has_the_same_speed_of_impact() -> None:
         found = first_contact(time, signals, j)
         assert found is not None
         assert found.speed == pytest.approx(0.07, rel=1e-9)
+
+
+@pytest.mark.parametrize("held", [1, 10])
+def test_a_surface_that_has_come_to_rest_has_no_speed(held: int) -> None:
+    """It comes, rests for 0.4 s with the finger ahead of it, and is then touched in one step.
+
+    Whether each step of the plant is recorded, or each ten times.
+    """
+    time = every(1e-4, 0.7)
+    own = np.repeat(time[::held], held)[: len(time)]
+    signals = recorded(
+        own,
+        lambda t: SURFACE + (0.0021 if t < 0.6 else 0.00199),
+        lambda t: 0.0 if t < 0.599 else -0.2,
+        lambda t: SURFACE + 0.01 * min(t, 0.2),
+        lambda _: 0.0,
+    )
+    for j in OPENING:
+        found = first_contact(time, signals, j)
+        assert found is not None
+        assert found.row == 6000
+        assert found.speed == pytest.approx(0.2, rel=1e-9)
+
+
+@pytest.mark.parametrize("held", [1, 10])
+def test_a_surface_that_a_finger_keeps_up_with_has_its_speed(held: int) -> None:
+    """A constant gap for 0.4 s, behind a surface that has fled faster until then."""
+    time = every(1e-4, 0.7)
+    own = np.repeat(time[::held], held)[: len(time)]
+    signals = recorded(
+        own,
+        lambda t: SURFACE + 0.001 - 0.05 * t - (0.0 if t < 0.6 else 0.0211),
+        lambda t: -0.05 if t < 0.599 else -0.15,
+        lambda t: SURFACE - 0.05 * t - 0.1 * min(t, 0.2),
+        lambda _: 0.0,
+    )
+    for j in OPENING:
+        found = first_contact(time, signals, j)
+        assert found is not None
+        assert found.row == 6000
+        assert found.speed == pytest.approx(0.15 - 0.05, rel=1e-6)
+
+
+def test_the_steps_of_the_plant_are_seen_at_any_of_its_outputs() -> None:
+    """Finger 1 and its surface rest from the start but for one jump; finger 2 moves throughout."""
+    time = every(1e-3, 0.5)
+    signals = recorded(
+        time,
+        lambda _: SURFACE + 0.01,
+        lambda _: 0.0,
+        lambda t: SURFACE + (0.0 if t < 0.4 else 0.004 if t < 0.401 else 0.01),
+        lambda _: 0.0,
+    )
+    signals["plant.position[2]"] = -0.1 + 0.01 * time
+    found = first_contact(time, signals, 1)
+    assert found is not None
+    assert found.speed == pytest.approx(0.004 / 1e-3, rel=1e-9)
 
 
 def test_fingers_that_touch_from_the_start() -> None:

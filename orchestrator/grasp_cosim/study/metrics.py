@@ -17,7 +17,15 @@ FINGERS = (1, 2)
 CLOSING = {1: -1.0, 2: 1.0}
 """Direction in which a finger closes."""
 
-_PER_FINGER = ("position", "velocity", "gap", "contact_force", "contact")
+_OUTPUTS = (
+    f"{PLANT}.object_position",
+    *(
+        f"{PLANT}.{name}[{j}]"
+        for name in ("position", "velocity", "gap", "contact_force", "contact")
+        for j in FINGERS
+    ),
+)
+"""What every gripper plant puts out."""
 
 UNITS: Mapping[str, str | None] = {
     "time_to_contact": "s",
@@ -91,9 +99,7 @@ class FirstContact(NamedTuple):
 
 def is_grasp(signals: Iterable[str]) -> bool:
     """Whether signals of these names are those of a gripper plant and its controller."""
-    names = set(signals)
-    wanted = ["object_position", *(f"{v}[{j}]" for v in _PER_FINGER for j in FINGERS)]
-    return names >= {f"{CONTROLLER}.target_position", *(f"{PLANT}.{name}" for name in wanted)}
+    return set(signals) >= {f"{CONTROLLER}.target_position", *_OUTPUTS}
 
 
 def grasp_metrics(time: Times, signals: Signals) -> dict[str, Any]:
@@ -142,12 +148,12 @@ def _of_object(signals: Signals) -> dict[str, float | bool]:
 
 
 def impulse(after: Times, force: Forces, window: float) -> float | None:
-    """Impulse in N.s of a force in N over a window in s from first contact; None if it ends sooner.
+    """Impulse in N.s of a force in N over a window in s from first contact.
 
     after are the seconds since then. Until the first sample the force is taken as it is there, as
-    one that begins with a jump has it.
+    one that begins with a jump has it. None if it ends sooner, or with fewer than two samples.
     """
-    if not len(after) or after[-1] < window:
+    if np.count_nonzero(after <= window) < 2 or after[-1] < window:
         return None
     inner = after[(after > 0.0) & (after < window)]
     times = np.concatenate(([0.0], inner, [window]))
@@ -204,15 +210,27 @@ def first_contact(time: Times, signals: Signals, finger: int) -> FirstContact | 
 def _surface_speed(time: Times, signals: Signals, finger: int, k: int) -> float:
     """How fast the object's surface goes ahead of a finger that is free up to row k, in m/s.
 
-    What the finger moved less what the gap shrank, over the last interval between two values that
-    the plant gave: one with a longer step of its own holds them. 0 where there was none yet.
+    What the finger moved less what the gap shrank, over the last whole step of the plant, which
+    may be longer than that of the system and holds its outputs in between. 0 where there was none.
     """
-    gap = signals[f"{PLANT}.gap[{finger}]"][: k + 1]
-    given = np.flatnonzero(np.diff(gap, prepend=np.nan))[-2:]
+    given = _given(signals, k)
     if len(given) < 2:
         return 0.0
-    surface = CLOSING[finger] * signals[f"{PLANT}.position[{finger}]"][given] + gap[given]
-    return float((surface[1] - surface[0]) / (time[given[1]] - time[given[0]]))
+    own = int(np.diff(given).min())
+    last = k - (k - int(given[-1])) % own  # it may have stepped since, and nothing moved
+    rows = [last - own, last]
+    gap = signals[f"{PLANT}.gap[{finger}]"][rows]
+    surface = CLOSING[finger] * signals[f"{PLANT}.position[{finger}]"][rows] + gap
+    return float((surface[1] - surface[0]) / (time[last] - time[last - own]))
+
+
+def _given(signals: Signals, k: int) -> npt.NDArray[np.intp]:
+    """The rows up to row k that have other outputs of the plant than the one before; the first."""
+    changed = np.zeros(k + 1, bool)
+    changed[0] = True
+    for name in _OUTPUTS:
+        changed[1:] |= np.diff(signals[name][: k + 1]) != 0
+    return np.flatnonzero(changed)
 
 
 def time_at_gap(time: Times, signals: Signals, finger: int, gap: float) -> float | None:
