@@ -158,7 +158,7 @@ def test_a_state_of_another_fmu_is_refused(load: Load) -> None:
 
 @pytest.mark.parametrize("name", PLANTS)
 @given(
-    forces=st.lists(st.floats(-50.0, 50.0), min_size=2, max_size=2),
+    forces=st.lists(st.floats(-40.0, 40.0), min_size=2, max_size=2),
     steps=st.integers(0, 60),
     size=st.sampled_from([1e-4, 1e-3, 7e-3]),
 )
@@ -166,7 +166,10 @@ def test_a_state_of_another_fmu_is_refused(load: Load) -> None:
 def test_any_moment_can_be_restored(
     load: Load, name: str, forces: list[float], steps: int, size: float
 ) -> None:
-    """In flight, in contact, leaving: from a drawn moment on, twice the same bits."""
+    """In flight, in contact, leaving: from a drawn moment on, twice the same bits.
+
+    In 80 steps 40 N bring a finger to 45 m/s; the MuJoCo plant refuses more than 50 m/s.
+    """
     with Instance(load(name)).initialise() as instance:
         assert instance.set({"force[1]": forces[0], "force[2]": forces[1]}) == OK
         time = 0.0
