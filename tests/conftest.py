@@ -79,16 +79,21 @@ def grasp(fmus: Path) -> System:
 
 
 @pytest.fixture
+def built_in(grasp: System, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Commands take the FMUs of this test process instead of building them into their folder."""
+    for module in ("frame", "evaluate", "identify"):
+        monkeypatch.setattr(f"grasp_cosim.cli.{module}.grasp_system", lambda: grasp)
+
+
+@pytest.fixture
 def command(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
-    grasp: System,
+    built_in: None,
     tmp_path: Path,
 ) -> Run:
     """Runs a command line in an empty folder; exit code, standard output, standard error."""
     monkeypatch.chdir(tmp_path)
-    for module in ("frame", "evaluate", "identify"):
-        monkeypatch.setattr(f"grasp_cosim.cli.{module}.grasp_system", lambda: grasp)
 
     def run(*arguments: str | Path) -> tuple[int, str, str]:
         code = cli.main([*map(str, arguments)])
@@ -152,12 +157,10 @@ def _imported_from(folder: Path, package: str) -> Iterator[None]:
 
 
 @pytest.fixture
-def checkout(tmp_path: Path, fmus: Path, grasp: System, monkeypatch: pytest.MonkeyPatch) -> Path:
+def checkout(tmp_path: Path, fmus: Path, built_in: None, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder like the repository, as far as its pages need it, and the current one."""
     for name in ("orchestrator", "docs"):
         (tmp_path / name).symlink_to(Path(__file__).parents[1] / name)
     shutil.copytree(fmus, tmp_path / "fmus/build")
     monkeypatch.chdir(tmp_path)
-    for module in ("frame", "evaluate", "identify"):
-        monkeypatch.setattr(f"grasp_cosim.cli.{module}.grasp_system", lambda: grasp)
     return tmp_path

@@ -25,21 +25,12 @@ STUDY = f'{HEAD}{GRID}{WIDTH}{VALUES}{MASS}{MAP}distributions = ["target_positio
 
 
 @pytest.fixture
-def command(
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    grasp: System,
-    tmp_path: Path,
-) -> Run:
+def command(command: Run, tmp_path: Path) -> Run:
     """Runs `sweep` in an empty folder, of a study of that text; exit code, output, errors."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("grasp_cosim.cli.frame.grasp_system", lambda: grasp)
 
     def run(text: str, *arguments: str) -> tuple[int, str, str]:
         (tmp_path / "study.toml").write_text(text)
-        code = cli.main(["sweep", "study.toml", *arguments])
-        out, err = capsys.readouterr()
-        return code, out, err
+        return command("sweep", "study.toml", *arguments)
 
     return run
 
