@@ -19,6 +19,9 @@ from proxies import build_proxy, serving, wait_until
 
 STEP = 0.01
 STEPS = 300
+SPARE = 20
+"""Steps that are left at the end, for a step whose answer is in time."""
+
 CLEAN = 12
 """The datagrams at the beginning, which pass in both directions: HELLO and INITIALISE."""
 
@@ -30,7 +33,7 @@ def network(conditions: Conditions, *outages: Outage) -> Network:
     both: dict[Direction, Conditions] = dict.fromkeys(DIRECTIONS, conditions)
     for seed in count(1):
         found = Network(both, outages, seed=seed)
-        clean = (*range(1, CLEAN), *range(STEPS - 5, STEPS + 2 * CLEAN))
+        clean = (*range(1, CLEAN), *range(STEPS - 5, STEPS + SPARE + CLEAN))
         if all(len(found.fate(d, n)) == 1 for d in DIRECTIONS for n in clean):
             return found
     raise AssertionError
@@ -52,7 +55,20 @@ def behind_a_relay(
 
 @pytest.fixture(scope="module")
 def slow_grasp(grasp: System) -> System:
-    return grasp.with_experiment(step=STEP, stop=STEP * STEPS)
+    return grasp.with_experiment(step=STEP, stop=STEP * (STEPS + SPARE))
+
+
+def simulated(system: System, name: str) -> Result:
+    """Up to a step whose answer is in time: all answers that arrive have come by then."""
+    with simulate.session(system) as session:
+        session.step(STEPS)
+        while session[f"{name}.proxy.consecutive_missed"]:
+            assert session.step(1)
+        return session.result()
+
+
+def dropped(log: list[Entry], direction: Direction) -> int:
+    return sum(e.direction == direction and e.delay is None for e in log)
 
 
 @pytest.mark.slow
@@ -66,29 +82,24 @@ def test_with_losses_and_jitter_the_grasp_completes_and_every_datagram_is_accoun
         f"{name}.proxy.misses_tolerated": 1000,
     }
     with behind_a_relay(slow_grasp, name, tmp_path, network(BAD), log) as (system, server, relay):
-        result = simulate(system.with_values(values))
+        result = simulated(system.with_values(values), name)
         wait_until(lambda: server.bench.counters()["sessions"] == 1)
         peer, counters = server.bench.counters(), relay.counters
-    requests = counters["request"].received - 1  # but for END
-    begun = requests - STEPS  # HELLO and INITIALISE, all answered
-    assert begun < CLEAN
-
-    def lost(direction: Direction) -> int:
-        """Of the requests to step, or of the answers to them."""
-        return sum(e.direction == direction and e.fate == "lost" and e.number > begun for e in log)
+    steps = len(result.time) - 1
+    assert counters["request"].received - 1 - steps < CLEAN  # HELLO and INITIALISE, and END
 
     def copies(direction: Direction) -> int:
-        return sum(e.direction == direction and e.copy == 1 and e.number > begun for e in log)
+        return sum(e.direction == direction and e.copy == 1 for e in log)
 
-    assert lost("request") > 0
-    assert lost("reply") > 0
-    assert last(result, f"{name}.proxy.missed") - last(result, f"{name}.proxy.late") == lost(
-        "request"
-    ) + lost("reply")
+    requests_lost, replies_lost = (dropped(log, direction) for direction in DIRECTIONS)
+    assert requests_lost > 0
+    assert replies_lost > 0
+    missed, late = last(result, f"{name}.proxy.missed"), last(result, f"{name}.proxy.late")
+    assert missed - late == requests_lost + replies_lost
     assert last(result, f"{name}.proxy.duplicated") == copies("reply")
     assert last(result, f"{name}.proxy.rejected") == 0
     assert peer["duplicated"] + peer["stale"] == copies("request") + (
-        STEPS - lost("request") - peer["steps"]
+        steps - requests_lost - peer["steps"]
     )
     assert result["plant.contact[1]"][-1]
     assert result["plant.contact[2]"][-1]
@@ -101,27 +112,30 @@ def last(result: Result, name: str) -> int:
 
 
 def test_the_peer_out_of_reach_for_a_while_and_back(slow_grasp: System, tmp_path: Path) -> None:
-    """Twenty requests get nowhere; the peer makes up for them with what comes after."""
+    """Ten requests get nowhere; the peer makes up for them with what comes after."""
     log: list[Entry] = []
-    gone = Network(outages=(Outage(100, 120),))
+    gone = Network(outages=(Outage(100, 110),))
     values: dict[str, Value] = {
-        "plant.proxy.timeout": 0.05,
+        "plant.proxy.timeout": 0.1,
         "plant.proxy.on_loss": "hold",
         "plant.proxy.resume": True,
     }
     with behind_a_relay(slow_grasp, "plant", tmp_path, gone, log) as (system, _, _):
-        result = simulate(system.with_values(values))
+        result = simulated(system.with_values(values), "plant")
     state, row = result["plant.proxy.state"], result["plant.proxy.consecutive_missed"]
     lost = np.flatnonzero(state == 3)
-    assert len(lost) >= 17  # of the 20 the first three are tolerated
+    assert len(lost) >= 7  # of the ten the first three are tolerated
     assert row[lost[0]] == 4
     assert list(state[lost[0] - 4 : lost[0] + 1]) == [1, 2, 2, 2, 3]
-    held = result["plant.position[1]"][lost[0] - 4 : lost[-1] + 1]
-    assert (held == held[0]).all()
+    position, late = result["plant.position[1]"], result["plant.proxy.late"]
+    kept = np.flatnonzero((row > 0) & (np.diff(late, prepend=0) == 0))  # a late answer is taken
+    assert (position[kept] == position[kept - 1]).all()
     assert state[-1] == 1
     assert result["plant.contact[1]"][-1]
-    missed, late = last(result, "plant.proxy.missed"), last(result, "plant.proxy.late")
-    assert missed - late == 20
+    # An answer that is late by a busy machine may fall into the outage as well
+    assert dropped(log, "request") == 10
+    missed = last(result, "plant.proxy.missed")
+    assert missed - last(result, "plant.proxy.late") == 10 + dropped(log, "reply")
 
 
 @pytest.mark.parametrize("resume", [True, False])

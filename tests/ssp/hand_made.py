@@ -185,7 +185,7 @@ def archive(
         for name, description in fmus.items():
             inner = folder / "inner.zip"
             with zipfile.ZipFile(inner, "w") as packed:
-                packed.writestr("modelDescription.xml", description)
+                packed.writestr(zipfile.ZipInfo("modelDescription.xml"), description)
             file.write(inner, f"resources/{name}.fmu")
         for entry, content in (files or {}).items():
             file.writestr(entry, content)
