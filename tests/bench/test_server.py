@@ -8,6 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
+import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -174,6 +175,19 @@ def test_wrong_input_is_one_line(
     assert captured.out == ""
     assert captured.err.count("\n") == 1
     assert message in captured.err
+
+
+def test_an_fmu_that_does_not_load_is_not_offered(
+    fmus: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    empty = tmp_path / "empty.fmu"
+    with zipfile.ZipFile(fmus / "GripperPlant.fmu") as good, zipfile.ZipFile(empty, "w") as file:
+        file.writestr("modelDescription.xml", good.read("modelDescription.xml"))
+    assert cli.main(["serve", str(empty), "--port", "0", "--duration", "0.01"]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1
+    assert f"GripperPlant: {empty} does not load: " in captured.err
 
 
 def test_a_bounded_service_ends_by_itself(fmus: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -65,7 +65,10 @@ class Bench:
     def __init__(
         self, interface: Interface, serving: Serving = Serving(), say: Say = lambda _: None
     ) -> None:
-        """Say gets a line for whatever happens. InputError where the FMU cannot be served so."""
+        """Say gets a line for whatever happens.
+
+        InputError where the FMU cannot be served so, SimulationError where it cannot be set up.
+        """
         signature, self.notes = wire_signature(interface)
         self.served = Served()
         self._serving, self._say = serving, say
@@ -75,6 +78,7 @@ class Bench:
             raise InputError(str(error)) from error
         self._failsafe = _failsafe(interface, self.peer, serving.failsafe)
         self._model = Model(interface, signature)
+        self._model.try_out()  # rather now than in the first session, where the proxy waits
         self._values: list[Value] = []
         self._in_session = False
         self._deadline: int | None = None  # of the next own step

@@ -43,6 +43,10 @@ class Model:
         """Whether there is an instance that has begun to step."""
         return self._instance is not None and self._stepping
 
+    def try_out(self) -> None:
+        """Make an instance and free it, to see that this can be done."""
+        load_here(self.interface.identifier, self.interface).close()
+
     def initialise(self, time: float, values: Sequence[Value], fresh: bool) -> None:
         """Set values in initialisation mode; fresh makes a new instance that starts at time, s."""
         if fresh or self._instance is None:
