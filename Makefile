@@ -13,8 +13,9 @@ run: .venv/run
 	$(BIN)/grasp-cosim build
 	$(BIN)/grasp-cosim evaluate --out results
 
+# Tests start hundreds of Pythons: none should compile all modules anew, whatever the environment.
 test: .venv/dev
-	$(BIN)/python -m pytest -n 2 --maxschedchunk 1
+	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 2 --maxschedchunk 1
 
 check: .venv/dev
 	$(BIN)/ruff check .

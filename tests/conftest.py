@@ -1,4 +1,4 @@
-"""What several tests share: the FMUs, built once per test process, and the built-in system."""
+"""What several tests share: the FMUs, built once, and the built-in system."""
 
 import fcntl
 import importlib
@@ -51,11 +51,9 @@ def made_once(tmp_path_factory: pytest.TempPathFactory) -> MadeOnce:
 
 
 @pytest.fixture(scope="session")
-def fmus(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def fmus(made_once: MadeOnce) -> Path:
     """The folder with the freshly built FMUs."""
-    folder = tmp_path_factory.mktemp("fmus")
-    builder.build(folder)
-    return folder
+    return made_once("fmus", builder.build)
 
 
 @pytest.fixture(scope="session")

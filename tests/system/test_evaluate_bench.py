@@ -73,11 +73,10 @@ def test_run_takes_the_preset_too(command: Run) -> None:
     assert values["friction.coulomb[2]"] == pytest.approx(1.34, abs=0.01)
 
 
-@pytest.mark.slow
-def test_a_setting_runs_in_every_case_and_once(bench: System) -> None:
-    quick = bench.with_values(QUIET).with_experiment(step=2e-3)
+def test_a_setting_runs_in_every_case_and_once(grasp: System) -> None:
     setting = Setting(0.05, 1.0, 0.86)
-    runs = run_settings(quick, [setting, setting], 1, progress=False)
+    coarse = grasp.with_experiment(step=2e-3)
+    runs = run_settings(coarse, [setting, setting], 1, progress=False)
     assert list(runs) == [(setting, case) for case in CASES]
     assert runs[setting, 2].apart < runs[setting, 1].apart
 
