@@ -27,6 +27,9 @@ FORCE_LIMIT = 12.0
 BEFORE, AFTER, NEAR = 0.015, 0.03, 0.05
 """s before and after a contact in a close-up; contacts that are nearer than NEAR share one."""
 
+DPI = 130
+"""Of the pictures."""
+
 MOST_NAMED = 12
 """So many lines at most get a legend."""
 
@@ -214,13 +217,19 @@ def new_figure(width: float, height: float) -> Figure:
             "matplotlib is not installed, it draws the figures; "
             "install it with: pip install 'grasp-cosim[plot]'"
         ) from error
-    return Figure(figsize=(width, height), layout="constrained")
+    return Figure(figsize=(width, height), dpi=DPI, layout="constrained")
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write the figure as a PNG under a temporary name, then rename it."""
+    """Write the figure as a PNG under a temporary name, then rename it.
+
+    Not by savefig(), which draws a figure with a layout twice.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    canvas: Any = FigureCanvasAgg(figure)
     with in_one_piece(path) as part:
-        figure.savefig(part, format="png", dpi=130, metadata={"Software": None})
+        canvas.print_png(part, metadata={"Software": None})
 
 
 def finish(axes: Axes, label: str, legend: bool = True) -> None:
