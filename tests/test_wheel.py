@@ -25,12 +25,15 @@ def python(*arguments: str, cwd: Path, path: Path | None = None) -> str:
 def test_wheel_runs_in_an_empty_folder(tmp_path: Path) -> None:
     dist, site, empty = tmp_path / "dist", tmp_path / "site", tmp_path / "empty"
     empty.mkdir()
-    python("-m", "build", "--wheel", "--no-isolation", "--outdir", str(dist), str(ROOT), cwd=ROOT)
+    build = f"import hatchling.build; hatchling.build.build_wheel({str(dist)!r})"
+    python("-c", build, cwd=ROOT)
     (wheel,) = dist.glob("*.whl")
-    python("-m", "pip", "install", "-q", "--no-deps", "--target", str(site), str(wheel), cwd=empty)
-    where = python("-c", "import grasp_cosim; print(grasp_cosim.__file__)", cwd=empty, path=site)
+    pip = ("-m", "pip", "install", "-q", "--no-deps", "--no-index", "--no-compile")
+    python(*pip, "--target", str(site), str(wheel), cwd=empty)
+    find = "from importlib.util import find_spec; print(find_spec('grasp_cosim').origin)"
+    where = python("-c", find, cwd=empty, path=site)
     assert Path(where.strip()).is_relative_to(site)
-    run = ("run", "--stop", "0.2", "--out", "results", "--json")
+    run = ("run", "--stop", "0.2", "--engine", "python", "--out", "results", "--json")
     out = python("-m", "grasp_cosim", *run, cwd=empty, path=site)
     assert json.loads(out)["steps"] == 2000
     python("-m", "grasp_cosim", "report", "results", cwd=empty, path=site)
