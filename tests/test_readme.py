@@ -51,7 +51,8 @@ def test_there_is_something_to_try() -> None:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_command(user: Path, command: str) -> None:
+def test_command(user: Path, command: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("os.cpu_count", lambda: 1)  # a step study starts no processes
     arguments = shlex.split(command)
     if arguments[1] in ("run", "qualify"):
         arguments += ["--stop", "0.01"]

@@ -4,7 +4,6 @@ import csv
 import json
 import math
 import re
-import subprocess
 import sys
 import zipfile
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import Any
 
 import pytest
 from conftest import Altered, Run
-from grasp_cosim import System, simulate
+from grasp_cosim import System, cli, simulate
 from grasp_cosim.grasp import CASES
 from grasp_fmus import documentation
 
@@ -224,12 +223,12 @@ def test_build_names_what_it_built(command: Run, tmp_path: Path) -> None:
     assert all((tmp_path / p).is_file() for p in built)
 
 
-def test_the_built_in_grasp_builds_its_fmus(tmp_path: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "grasp_cosim", "run", "--stop", "0.01", "--json"],
-        cwd=tmp_path, capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    assert json.loads(done.stdout)["steps"] == 100
+def test_the_built_in_grasp_builds_its_fmus(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["run", "--stop", "0.01", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["steps"] == 100
     assert sorted(p.name for p in (tmp_path / "fmus/build").glob("*.fmu")) == [
         "GraspController.fmu", "GripperPlant.fmu", "GripperPlantCompliant.fmu",
         "GripperPlantMovable.fmu", "GripperPlantMuJoCo.fmu", "ProximitySensor.fmu",
