@@ -21,6 +21,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, is_dataclass
 from dataclasses import fields as dataclass_fields
 from enum import IntEnum
+from functools import cache
 from typing import Annotated, Any, Protocol, get_args, get_origin, get_type_hints
 
 from .variable import Causality, Enumeration, Scalar, Variable
@@ -211,7 +212,7 @@ def build_params(block: Block, fields: list[Field], values: list[Any]) -> Any:
 
 
 def _build(cls: type[Any], path: tuple[str, ...], values: dict[tuple[str, ...], Any]) -> Any:
-    hints = get_type_hints(cls)
+    hints = _types(cls)  # type: ignore[arg-type]  # any type can be hashed
     return cls(
         **{
             f.name: _build(hints[f.name], (*path, f.name), values)
@@ -220,6 +221,12 @@ def _build(cls: type[Any], path: tuple[str, ...], values: dict[tuple[str, ...], 
             for f in dataclass_fields(cls)
         }
     )
+
+
+@cache
+def _types(cls: type[Any]) -> dict[str, Any]:
+    """The types of its fields by name; read once, as Params are made whenever one is set."""
+    return get_type_hints(cls)
 
 
 def _typed(kind: Any, value: Any) -> Any:

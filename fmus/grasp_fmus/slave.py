@@ -4,8 +4,10 @@ Outputs are worked out when they are asked for, from the state and the inputs of
 they agree with the inputs in initialisation mode and after every set.
 """
 
+from collections.abc import Callable
+from functools import cache
 from math import inf, isfinite
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 from .base import (
     INSTANTIATED,
@@ -15,9 +17,26 @@ from .base import (
     Slave,
     reported,
 )
-from .contract import Block, build_params, count, declared, packer, unpacker, variables
+from .contract import Block, Field, build_params, count, declared, packer, unpacker, variables
 from .host_log import DISCARD
 from .snapshot import Snapshot, from_bytes, to_bytes
+from .variable import Variable
+
+
+class _Shape(NamedTuple):
+    """What the instances of a block have in common."""
+
+    fields: list[Field]
+    variables: list[Variable]
+    functions: tuple[Callable[..., Any], ...]
+
+
+@cache
+def _shape(block: Block) -> _Shape:
+    """Made once: that takes longer than all the rest of an instance."""
+    fields = declared(block)
+    functions = (block.step, block.outputs, packer(block.Inputs, fields), unpacker(fields))
+    return _Shape(fields, variables(fields), functions)
 
 
 class Fmi2Slave(Slave):
@@ -28,18 +47,13 @@ class Fmi2Slave(Slave):
     """Packages that the block imports when its first state is made; not packed."""
 
     def _prepare(self) -> None:
-        self._fields = declared(self.block)
-        self._variables = variables(self._fields)
+        self._fields, self._variables, self._functions = _shape(
+            self.block  # type: ignore[arg-type]  # a module can be hashed
+        )
         self._values = [v.start for v in self._variables]
         self._first_output = count(self._fields, "input")
         self._first_parameter = count(self._fields, "input", "output")
         self._outputs = slice(self._first_output, self._first_parameter)
-        self._functions = (
-            self.block.step,
-            self.block.outputs,
-            packer(self.block.Inputs, self._fields),
-            unpacker(self._fields),
-        )
         self._state = self._initial_state(self.block.Params(), self.block.Inputs())
         self._enter(INSTANTIATED)
 
