@@ -1,5 +1,5 @@
-"""Run as a program: starts processes that serve an FMU in lockstep, fast, as all is imported once,
-what is in the FMU as well.
+"""Run as a program: starts processes that serve an FMU in lockstep, fast, as each is a copy of one
+in which the FMU has been tried out and all is imported.
 
 For each line on standard input it starts one, and prints its process id and its port. A process
 that is not wanted any more is killed by its id; all end with this one's standard input.
@@ -8,17 +8,17 @@ that is not wanted any more is killed by its id; all end with this one's standar
 import os
 import signal
 import sys
+import tempfile
 from pathlib import Path
 
 from grasp_cosim.bench.bench import Bench, Serving
 from grasp_cosim.bench.server import Server
-from grasp_cosim.fmi.load import load_here
 from grasp_cosim.system.interface import read_interface
 
 
 def main(fmu: str) -> None:
     interface = read_interface(Path(fmu))
-    load_here(interface.identifier, interface).close()
+    bench = Bench(interface, Serving(lockstep=True))
     children: list[int] = []
     for line in sys.stdin:
         if line.startswith("end "):
@@ -31,7 +31,7 @@ def main(fmu: str) -> None:
         reading, writing = os.pipe()
         child = os.fork()
         if not child:
-            with Server(Bench(interface, Serving(lockstep=True))) as server:
+            with Server(bench) as server:
                 os.write(writing, str(server.address[1]).encode())
                 server.serve()
             os._exit(0)
@@ -46,4 +46,6 @@ def main(fmu: str) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    with tempfile.TemporaryDirectory() as folder:  # who is killed removes nothing
+        tempfile.tempdir = folder
+        main(sys.argv[1])

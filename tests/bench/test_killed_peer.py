@@ -22,8 +22,8 @@ from proxies import build_proxy
 
 MOMENTS, PORTION = 200, 50
 TOLERATED = 3
-TIMEOUT = 0.02
-PATIENCE = 0.5
+TIMEOUT = 0.01
+PATIENCE = 0.2
 """s that a proxy waits for a peer that is killed before the run has begun."""
 
 STEPS = 150
