@@ -11,12 +11,13 @@ from grasp_cosim import System, simulate
 from grasp_cosim.bench.bench import Serving
 from proxies import build_proxy, serving
 
-STOP = 2.0  # past the contacts
+STEP, STOP = 4e-3, 2.0
+"""s; past the contacts, in steps as long as the grasp takes them."""
 
 
 @pytest.fixture(scope="module")
 def stepped(grasp: System) -> System:
-    return grasp.with_experiment(step=1e-3, stop=STOP)
+    return grasp.with_experiment(step=STEP, stop=STOP)
 
 
 @contextmanager
