@@ -33,7 +33,7 @@ def test_wheel_runs_in_an_empty_folder(tmp_path: Path) -> None:
     find = "from importlib.util import find_spec; print(find_spec('grasp_cosim').origin)"
     where = python("-c", find, cwd=empty, path=site)
     assert Path(where.strip()).is_relative_to(site)
-    run = ("run", "--stop", "0.2", "--engine", "python", "--out", "results", "--json")
+    run = ("run", "--stop", "0.2", "--out", "results", "--json")
     out = python("-m", "grasp_cosim", *run, cwd=empty, path=site)
     assert json.loads(out)["steps"] == 2000
     python("-m", "grasp_cosim", "report", "results", cwd=empty, path=site)

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from grasp_cosim.grasp import SYSTEM
 from grasp_cosim.system.interface import read_interface
 from native_fmus import build, needs_gcc
 
@@ -13,8 +14,7 @@ FULL = Path("/dev/full")
 
 
 def run(*arguments: str, output: int | None = subprocess.PIPE) -> subprocess.CompletedProcess[str]:
-    """The command run; its Python loop spares each process to load the compiled one."""
-    command = [sys.executable, "-m", "grasp_cosim", "run", *arguments, "--engine", "python"]
+    command = [sys.executable, "-m", "grasp_cosim", *arguments]
     return subprocess.run(
         command, stdout=output, stderr=subprocess.PIPE, text=True, timeout=120, check=False
     )
@@ -30,7 +30,7 @@ def test_what_an_fmu_prints_does_not_get_into_the_json(tmp_path: Path) -> None:
         "[experiment]\nstep = 0.01\nstop = 0.02\n"
         f'[components.a]\nfmu = "{fmu.name}"\nvalues = {{ {given} }}\n'
     )
-    done = run(str(tmp_path / "system.toml"), "--json")
+    done = run("run", str(tmp_path / "system.toml"), "--json")
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["steps"] == 2
     assert "native FMU 2.0 instantiated" in done.stderr
@@ -38,12 +38,10 @@ def test_what_an_fmu_prints_does_not_get_into_the_json(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(not FULL.exists(), reason="this system has no /dev/full")
 def test_a_full_disk_is_no_wrong_input(fmus: Path, tmp_path: Path) -> None:
-    (tmp_path / "system.toml").write_text(
-        "[experiment]\nstep = 0.01\nstop = 0.02\n"
-        f'[components.a]\nfmu = "{fmus / "ProximitySensor.fmu"}"\nvalues = {{ gap = 0.02 }}\n'
-    )
+    text = SYSTEM.read_text("utf-8").replace('fmu = "', f'fmu = "{fmus}/')
+    (tmp_path / "grasp.toml").write_text(text)
     with FULL.open("w") as full:
-        done = run(str(tmp_path / "system.toml"), output=full.fileno())
+        done = run("run", str(tmp_path / "grasp.toml"), "--stop", "0.001", output=full.fileno())
     assert done.returncode == 3
     assert "No space left on device" in done.stderr
     assert "Traceback" not in done.stderr

@@ -32,7 +32,7 @@ def qualification(grasp: System, names: int, end: int = 101) -> Qualification:
     return Qualification(swap, tuple(compared), runs=(original, candidate))
 
 
-@pytest.mark.parametrize(("names", "end"), [(2, 40), (ROWS + 3, 101), (3, 1)])
+@pytest.mark.parametrize(("names", "end"), [(1, 101), (2, 40), (ROWS + 3, 101), (3, 1)])
 def test_it_is_drawn(grasp: System, tmp_path: Path, names: int, end: int) -> None:
     path = tmp_path / "qualification.png"
     draw_qualification(qualification(grasp, names, end), path)
@@ -40,16 +40,14 @@ def test_it_is_drawn(grasp: System, tmp_path: Path, names: int, end: int) -> Non
 
 
 def test_a_band_without_end_is_not_drawn(grasp: System, tmp_path: Path) -> None:
-    found = qualification(grasp, 1)
+    found = qualification(grasp, 2)
     loose = [replace(c, band=Band(np.inf, 0.01, "given")) for c in found.signals]
     draw_qualification(replace(found, signals=tuple(loose)), tmp_path / "loose.png")
     assert (tmp_path / "loose.png").stat().st_size > 10_000
 
 
 def test_the_same_qualification_is_the_same_picture(grasp: System, tmp_path: Path) -> None:
-    found = qualification(grasp, 1)
+    found = qualification(grasp, 2)
     for name in ("a.png", "b.png"):
         draw_qualification(found, tmp_path / name)
-    drawn = (tmp_path / "a.png").read_bytes()
-    assert drawn.startswith(b"\x89PNG")
-    assert drawn == (tmp_path / "b.png").read_bytes()
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()

@@ -155,6 +155,7 @@ import _ctypes, sys
 from pathlib import Path
 sys.path.insert(0, sys.argv[1])
 from bare_host import Host, run
+closed = []
 for k in range(2):
     for fmu in sys.argv[2:]:
         host = Host(fmu, Path(f"{fmu}.{k}"))
@@ -162,16 +163,17 @@ for k in range(2):
         host.end()
         if (k, fmu) != (1, sys.argv[-1]):  # which a host may just leave to the end
             _ctypes.dlclose(host._library._handle)
+            closed.append(f"{fmu}.{k}")
 maps = Path("/proc/self/maps").read_text()
-print(sum(f"{fmu}.{k}" in maps for k in range(2) for fmu in sys.argv[2:]))
+print(sum(library in maps for library in closed))
 """
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(not shutil.which("valgrind"), reason="NO valgrind")
 def test_a_library_ends_in_peace_with_the_process_or_before(fmus: Path, tmp_path: Path) -> None:
-    """All but the first and the last are really unloaded before; the first is kept by its unique
-    symbols, of libstdc++. pythonfmu 0.7.0 alone: invalid reads in finalizePythonInterpreter.
+    """All that are closed but the first are really unloaded; its unique symbols, of libstdc++, keep
+    that one. pythonfmu 0.7.0 alone: invalid reads in finalizePythonInterpreter.
     """
     names = ["ProximitySensor.fmu", "GripperPlant.fmu"]
     copies = [str(shutil.copy(fmus / name, tmp_path)) for name in names]
@@ -181,7 +183,8 @@ def test_a_library_ends_in_peace_with_the_process_or_before(fmus: Path, tmp_path
         env={**os.environ, "PYTHONMALLOC": "malloc"}, capture_output=True, text=True,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    assert int(done.stdout) <= 2
+    assert "ERROR SUMMARY: 0 errors" in done.stderr
+    assert int(done.stdout) <= 1
 
 
 # Bound
