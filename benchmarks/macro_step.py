@@ -14,7 +14,7 @@ import numpy as np
 from grasp_cosim import simulate
 from grasp_cosim.fmi.instance import Call
 from grasp_cosim.fmi.load import load
-from grasp_cosim.grasp import grasp_system
+from grasp_cosim.grasp.system import grasp_system
 from grasp_cosim.master.engine import Engine, has_numba, make_loop
 from grasp_cosim.master.loop import STEP
 from grasp_cosim.master.master import Master

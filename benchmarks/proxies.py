@@ -16,8 +16,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from grasp_cosim import System, cli, simulate
-from grasp_cosim.grasp import grasp_system
-from grasp_cosim.system.interface import Value
+from grasp_cosim.grasp.system import grasp_system
+from grasp_cosim.interface.interface import Value
 
 STEPS = 2000
 ROUNDS = 5

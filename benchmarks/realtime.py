@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from grasp_cosim import Realtime, System, simulate
 from grasp_cosim.cli.realtime import timing_lines
-from grasp_cosim.grasp import grasp_system
+from grasp_cosim.grasp.system import grasp_system
 from grasp_cosim.realtime.meter import BEGIN, DUE
 from grasp_cosim.realtime.pacer import Pacer
 from grasp_cosim.realtime.privileges import privileges

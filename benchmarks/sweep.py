@@ -13,7 +13,7 @@ from multiprocessing import get_context
 from pathlib import Path
 
 from grasp_cosim import System
-from grasp_cosim.grasp import CASES, SYSTEM
+from grasp_cosim.grasp.system import CASES, SYSTEM
 from grasp_cosim.sweep.design import Design
 from grasp_cosim.sweep.distributions import Uniform
 from grasp_cosim.sweep.study import Parameter, Study

@@ -70,7 +70,7 @@ def variables(folder: Path) -> dict[str, list[Any]]:
 def ours(folder: Path, engine: str) -> Master:
     """grasp-cosim; every output in memory."""
     grasp_cosim = importlib.import_module("grasp_cosim")
-    grasp = importlib.import_module("grasp_cosim.grasp")
+    grasp = importlib.import_module("grasp_cosim.grasp.system")
     session = grasp_cosim.simulate.session(
         grasp_cosim.System.load(grasp.SYSTEM, folder),
         step=STEP,

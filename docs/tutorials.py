@@ -19,7 +19,10 @@ from typing import Any
 
 import numpy as np
 from grasp_cosim import cli
-from grasp_cosim.figures.plot import (
+from grasp_cosim.files import write_text
+from grasp_cosim.grasp.metrics import CLOSING, FINGERS
+from grasp_cosim.recording.load import Run, load_run
+from grasp_cosim.report.plot import (
     BLUE,
     COLOR,
     GREY,
@@ -30,9 +33,6 @@ from grasp_cosim.figures.plot import (
     new_figure,
     save,
 )
-from grasp_cosim.recording.load import Run, load_run
-from grasp_cosim.recording.result import write_text
-from grasp_cosim.study.metrics import CLOSING, FINGERS
 
 HERE = Path(__file__).parent
 

@@ -14,7 +14,7 @@ from types import ModuleType
 import pytest
 from fmi2 import Fmu
 from grasp_cosim import System, cli
-from grasp_cosim.grasp import SYSTEM
+from grasp_cosim.grasp.system import SYSTEM
 from grasp_fmus import build as builder
 from packages import skip_where_it_cannot_run
 

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from grasp_cosim import System
+from grasp_cosim.interface.interface import read_interface
 from grasp_cosim.sweep.read import read_study
 from grasp_cosim.sweep.study import Study
-from grasp_cosim.system.interface import read_interface
 from native_fmus import build
 
 STARTS = {"u_Boolean": "false", "u_String": "''", "u_Enumeration": "1", "u_Real": "2.0"}

@@ -9,11 +9,11 @@ import numpy as np
 import numpy.typing as npt
 from grasp_cosim import SimulationError, System
 from grasp_cosim.fmi.instance import DISCARD, Call
+from grasp_cosim.interface.interface import Interface, Value, Variable, read_interface
 from grasp_cosim.master.engine import Engine
 from grasp_cosim.master.master import Master
 from grasp_cosim.recording.dispatch import Dispatcher
 from grasp_cosim.recording.memory import MemoryListener
-from grasp_cosim.system.interface import Interface, Value, Variable, read_interface
 from grasp_cosim.system.parts import Component, Wire
 
 Function = Callable[[float, float], float]

@@ -100,7 +100,7 @@ def test_layers(checkout: Path) -> None:
 
 def test_the_switch_in_a_system_file_makes_case_1(checkout: Path, grasp: System) -> None:
     (switch,) = (block for kind, block in BLOCKS.findall(page("layers")) if kind == "toml")
-    text = (ROOT / "orchestrator/grasp_cosim/grasp.toml").read_text("utf-8")
+    text = (ROOT / "orchestrator/grasp_cosim/grasp/grasp.toml").read_text("utf-8")
     text = text.replace('fmu = "', 'fmu = "fmus/build/')
     head, _, _ = text.partition("[components.controller]")
     (checkout / "my_system.toml").write_text(head + switch, encoding="utf-8")

@@ -11,14 +11,7 @@ from time import monotonic_ns
 from typing import Any, NamedTuple
 from weakref import finalize
 
-from .base import (
-    INITIALISING,
-    INSTANTIATED,
-    STEPPING,
-    RefusalError,
-    Slave,
-    reported,
-)
+from .base import INITIALISING, INSTANTIATED, STEPPING, RefusalError, Slave, reported
 from .connection import Connection
 from .host_log import WARNING
 from .link.client import Client

@@ -9,14 +9,7 @@ from functools import cache
 from math import inf, isfinite
 from typing import Any, ClassVar, NamedTuple
 
-from .base import (
-    INSTANTIATED,
-    STEPPING,
-    TIME_TOLERANCE,
-    RefusalError,
-    Slave,
-    reported,
-)
+from .base import INSTANTIATED, STEPPING, TIME_TOLERANCE, RefusalError, Slave, reported
 from .contract import Block, Field, build_params, count, declared, packer, unpacker, variables
 from .host_log import DISCARD
 from .snapshot import Snapshot, from_bytes, to_bytes

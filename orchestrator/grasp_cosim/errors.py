@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -19,14 +18,6 @@ class SimulationError(Exception):
 
     result: Result | None = None
     """What was recorded until then."""
-
-
-def check_fmu_file(path: Path) -> None:
-    """InputError where there is no file at path."""
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder; must be an FMU, a file")
-    if not path.is_file():
-        raise InputError(f"{path}: no such FMU file")
 
 
 def choices(names: Iterable[object], limit: int = 24) -> str:

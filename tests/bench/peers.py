@@ -11,9 +11,9 @@ import sys
 import tempfile
 from pathlib import Path
 
-from grasp_cosim.bench.bench import Bench, Serving
-from grasp_cosim.bench.server import Server
-from grasp_cosim.system.interface import read_interface
+from grasp_cosim.hil.bench import Bench, Serving
+from grasp_cosim.hil.server import Server
+from grasp_cosim.interface.interface import read_interface
 
 
 def main(fmu: str) -> None:

@@ -10,11 +10,11 @@ from pathlib import Path
 import native_fmus
 import numpy as np
 import pytest
-from grasp_cosim.bench.bench import BACKLOG, Bench, Serving
-from grasp_cosim.bench.wire import wire_signature
 from grasp_cosim.errors import InputError
 from grasp_cosim.fmi.load import load_here
-from grasp_cosim.system.interface import Value, read_interface
+from grasp_cosim.hil.bench import BACKLOG, Bench, Serving
+from grasp_cosim.hil.wire import wire_signature
+from grasp_cosim.interface.interface import Value, read_interface
 from proxies import HandProxy
 
 MS = 1_000_000

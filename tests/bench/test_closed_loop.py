@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from grasp_cosim import System, simulate
-from grasp_cosim.bench.bench import Serving
+from grasp_cosim.hil.bench import Serving
 from proxies import build_proxy, serving
 
 STEP, STOP = 4e-3, 2.0

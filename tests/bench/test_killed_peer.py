@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 from grasp_cosim import SimulationError, System, simulate
 from grasp_cosim.errors import InputError
+from grasp_cosim.interface.interface import Value
 from grasp_cosim.recording.result import Result
-from grasp_cosim.system.interface import Value
 from proxies import build_proxy
 
 MOMENTS, PORTION = 200, 50

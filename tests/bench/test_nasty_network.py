@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from grasp_cosim import System, simulate
-from grasp_cosim.bench.bench import Serving
-from grasp_cosim.bench.network import DIRECTIONS, Conditions, Direction, Network, Outage
-from grasp_cosim.bench.relay import Relay, relaying
-from grasp_cosim.bench.server import Server
-from grasp_cosim.bench.traffic import Entry
+from grasp_cosim.hil.bench import Serving
+from grasp_cosim.hil.network import DIRECTIONS, Conditions, Direction, Network, Outage
+from grasp_cosim.hil.relay import Relay, relaying
+from grasp_cosim.hil.server import Server
+from grasp_cosim.hil.traffic import Entry
+from grasp_cosim.interface.interface import Value
 from grasp_cosim.recording.result import Result
-from grasp_cosim.system.interface import Value
 from proxies import build_proxy, serving, wait_until
 
 STEP = 0.01

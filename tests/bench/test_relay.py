@@ -15,11 +15,11 @@ from pathlib import Path
 import pytest
 from echo_peer import EchoPeer, client
 from grasp_cosim import cli
-from grasp_cosim.bench.address import Address
-from grasp_cosim.bench.network import DIRECTIONS, Conditions, Network, Outage
-from grasp_cosim.bench.relay import MOST_CLIENTS, Relay, relaying
-from grasp_cosim.bench.traffic import Counters, Entry
 from grasp_cosim.errors import InputError
+from grasp_cosim.hil.address import Address
+from grasp_cosim.hil.network import DIRECTIONS, Conditions, Network, Outage
+from grasp_cosim.hil.relay import MOST_CLIENTS, Relay, relaying
+from grasp_cosim.hil.traffic import Counters, Entry
 from proxies import wait_until
 
 NASTY = Conditions(jitter=0.002, loss=0.2, duplicate=0.2, reorder=0.2, reorder_by=0.005)

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from grasp_cosim.bench.network import DIRECTIONS, Conditions, Direction, Network, Outage
-from grasp_cosim.bench.traffic import Counters, Entry, Traffic
 from grasp_cosim.errors import InputError
+from grasp_cosim.hil.network import DIRECTIONS, Conditions, Direction, Network, Outage
+from grasp_cosim.hil.traffic import Counters, Entry, Traffic
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats

@@ -15,11 +15,11 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim import cli
-from grasp_cosim.bench.bench import Bench, Serving
-from grasp_cosim.bench.server import Server
-from grasp_cosim.bench.wire import wire_signature
 from grasp_cosim.errors import InputError
-from grasp_cosim.system.interface import read_interface
+from grasp_cosim.hil.bench import Bench, Serving
+from grasp_cosim.hil.server import Server
+from grasp_cosim.hil.wire import wire_signature
+from grasp_cosim.interface.interface import read_interface
 from grasp_fmus.link.message import LARGEST
 from proxies import HandProxy, UdpAsk, serving, wait_until
 

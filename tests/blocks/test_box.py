@@ -6,17 +6,7 @@ from math import atan2, cos, sin
 
 import numpy as np
 import pytest
-from gripper_plant.box import (
-    GRAVITY,
-    Box,
-    Pushes,
-    Shape,
-    advance,
-    balance,
-    centre,
-    energy,
-    faces,
-)
+from gripper_plant.box import GRAVITY, Box, Pushes, Shape, advance, balance, centre, energy, faces
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp

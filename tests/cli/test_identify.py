@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from conftest import Run
 from grasp_cosim import System, simulate
-from grasp_cosim.identification.fit import Estimate, Fit
+from grasp_cosim.grasp.identification.fit import Estimate, Fit
 from grasp_cosim.recording.result import Result
 
 TRUE = {"plant.friction.coulomb[1]": 0.6, "plant.friction.coulomb[2]": 1.3}

@@ -6,8 +6,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from grasp_cosim.grasp import SYSTEM
-from grasp_cosim.system.interface import read_interface
+from grasp_cosim.grasp.system import SYSTEM
+from grasp_cosim.interface.interface import read_interface
 from native_fmus import build, needs_gcc
 
 FULL = Path("/dev/full")

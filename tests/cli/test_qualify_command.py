@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from conftest import Altered
 from grasp_cosim import System, cli
-from grasp_cosim.study.bands import read_bands
+from grasp_cosim.qualification.bands import read_bands
 
 Run = Callable[..., tuple[int, str, str]]
 

@@ -9,8 +9,8 @@ import pytest
 from figures.runs import grasp_run, ring_run, write_run
 from figures.timings import paced
 from grasp_cosim import System, cli, simulate
-from grasp_cosim.figures.page import page_html
 from grasp_cosim.recording.load import load_run
+from grasp_cosim.report.page import page_html
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from conftest import Run
 from grasp_cosim import System
-from grasp_cosim.study.step_study import StepRun, StepStudy
+from grasp_cosim.convergence.step_study import StepRun, StepStudy
 
 
 @pytest.fixture

@@ -49,7 +49,7 @@ def run_node(scripts: Sequence[str], body: str, given: Any, folder: Path) -> Any
     node = shutil.which("node")
     if node is None:
         pytest.skip("node is not installed")
-    page = files("grasp_cosim.figures") / "page"
+    page = files("grasp_cosim.report") / "page"
     lines = [(page / name).read_text("utf-8") for name in scripts]
     lines += [
         'const input = JSON.parse(require("fs").readFileSync(0, "utf8"));',

@@ -7,7 +7,7 @@ import pytest
 from figures.javascript import in_browser
 from figures.runs import CENTRE, TOUCH, WIDTH, grasp_run, position, ring_run
 from figures.timings import paced
-from grasp_cosim.figures.page import page_html
+from grasp_cosim.report.page import page_html
 
 pytestmark = pytest.mark.slow
 

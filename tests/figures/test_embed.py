@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from figures.javascript import run_node
-from grasp_cosim.figures.embed import fit, packed
+from grasp_cosim.report.embed import fit, packed
 
 AWKWARD = [0.0, -0.0, 1.0, -1.0, 5e-324, 1.7976931348623157e308, np.inf, -np.inf, np.nan, 0.1, 1e-9]
 

@@ -12,8 +12,8 @@ from figures.runs import grasp_run, ring_run
 from figures.test_embed import unpacked
 from figures.timings import paced
 from grasp_cosim.errors import InputError
-from grasp_cosim.figures.page import page_html, write_page
 from grasp_cosim.recording.load import Run
+from grasp_cosim.report.page import page_html, write_page
 
 EMPTY = {"meta", "link", "input", "br"}
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from figures.runs import TOUCH, grasp_run, ring_run
-from grasp_cosim.figures import plot
 from grasp_cosim.recording.load import Run
+from grasp_cosim.report import plot
 from matplotlib.figure import Figure
 
 

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from grasp_cosim import System
-from grasp_cosim.figures.qualification import ROWS, draw_qualification
-from grasp_cosim.study.bands import Band
-from grasp_cosim.study.qualify import Compared, Qualification
-from grasp_cosim.study.swap import Swap
-from grasp_cosim.study.tube import Curve
+from grasp_cosim.qualification.bands import Band
+from grasp_cosim.qualification.qualify import Compared, Qualification
+from grasp_cosim.qualification.swap import Swap
+from grasp_cosim.qualification.tube import Curve
+from grasp_cosim.report.qualification import ROWS, draw_qualification
 
 pytest.importorskip("matplotlib")
 

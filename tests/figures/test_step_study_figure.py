@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
-from grasp_cosim.figures.step_study import draw_step_study
-from grasp_cosim.study.step_study import StepRun, StepStudy
+from grasp_cosim.convergence.step_study import StepRun, StepStudy
+from grasp_cosim.report.step_study import draw_step_study
 
 Times = tuple[float | None, float | None]
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim import InputError, System
-from grasp_cosim.figures.sweep import draw_sweep
+from grasp_cosim.report.sweep import draw_sweep
 from grasp_cosim.sweep.design import Design
 from grasp_cosim.sweep.distributions import Uniform, spaced
 from grasp_cosim.sweep.run import Outcome
@@ -124,7 +124,7 @@ def test_a_limit_is_named_where_a_line_is_drawn(
     grasp: System, monkeypatch: pytest.MonkeyPatch, limit: float, lines: list[str]
 ) -> None:
     figures: list[Figure] = []
-    monkeypatch.setattr("grasp_cosim.figures.sweep.save", lambda figure, _: figures.append(figure))
+    monkeypatch.setattr("grasp_cosim.report.sweep.save", lambda figure, _: figures.append(figure))
     draw_sweep(made(grasp, GRID, Pictures(replace(MAP, limit=limit))), Path())
     legend = figures[0].axes[0].get_legend()
     assert ([text.get_text() for text in legend.get_texts()] if legend else []) == lines

@@ -6,7 +6,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from figures.timings import PERIOD, paced
-from grasp_cosim.figures.timing_curves import (
+from grasp_cosim.realtime.timing import Histogram, Overrun, Spread, Timing
+from grasp_cosim.report.timing_curves import (
     Curve,
     axes,
     culprits,
@@ -19,7 +20,6 @@ from grasp_cosim.figures.timing_curves import (
     place,
     unlisted,
 )
-from grasp_cosim.realtime.timing import Histogram, Overrun, Spread, Timing
 
 
 def of_times(times: list[float], edges: list[float]) -> Timing:

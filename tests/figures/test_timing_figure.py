@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from figures.timings import PERIOD, paced
-from grasp_cosim.figures import timing as drawn
-from grasp_cosim.figures.plot import RED
-from grasp_cosim.figures.timing import COLORS, draw_timing
-from grasp_cosim.figures.timing_curves import looks
 from grasp_cosim.realtime.timing import Overrun, Timing
+from grasp_cosim.report import timing as drawn
+from grasp_cosim.report.plot import RED
+from grasp_cosim.report.timing import COLORS, draw_timing
+from grasp_cosim.report.timing_curves import looks
 from matplotlib.colors import same_color
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D

@@ -7,9 +7,9 @@ import pytest
 from figures.runs import grasp_run, ring_run
 from figures.test_page import Elements
 from figures.timings import paced
-from grasp_cosim.figures.page import page_html
-from grasp_cosim.figures.timing_html import timing_html
 from grasp_cosim.realtime.timing import Overrun, Spread
+from grasp_cosim.report.page import page_html
+from grasp_cosim.report.timing_html import timing_html
 
 
 def rows(html: str) -> list[list[str]]:

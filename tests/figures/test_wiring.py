@@ -6,7 +6,7 @@ import re
 import xml.etree.ElementTree as ET
 
 import pytest
-from grasp_cosim.figures.wiring import Link, wiring_svg
+from grasp_cosim.report.wiring import Link, wiring_svg
 
 SVG = "{http://www.w3.org/2000/svg}"
 Box = tuple[float, float, float, float]

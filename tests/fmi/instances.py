@@ -11,7 +11,7 @@ import numpy.typing as npt
 import pytest
 from grasp_cosim.fmi.instance import Instance, dtype
 from grasp_cosim.fmi.load import load
-from grasp_cosim.system.interface import Value, Variable
+from grasp_cosim.interface.interface import Value, Variable
 from grasp_cosim.system.parts import Component, Isolation
 from native_fmus import TYPES, build
 

@@ -17,8 +17,8 @@ import pytest
 from conftest import Load
 from fmpy.validation import validate_fmu
 from grasp_cosim import cli
-from grasp_cosim.bench.wire import wire_signature
-from grasp_cosim.system.interface import read_interface
+from grasp_cosim.hil.wire import wire_signature
+from grasp_cosim.interface.interface import read_interface
 from grasp_fmus.c_header import c_header
 from grasp_fmus.documentation import icon
 

@@ -15,8 +15,8 @@ import pytest
 from conftest import UnpackIn
 from fmpy.fmi2 import FMU2Slave
 from grasp_cosim.errors import InputError
-from grasp_cosim.host import doctor
-from grasp_cosim.host.doctor import Finding, Unpacked, Verdict, examine, unpack
+from grasp_cosim.inspection import doctor
+from grasp_cosim.inspection.doctor import Finding, Unpacked, Verdict, examine, unpack
 
 Changes = dict[str, bytes | None]
 Opened = Callable[..., Unpacked]

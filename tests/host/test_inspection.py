@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 import fmpy
 import pytest
 from grasp_cosim.errors import InputError
-from grasp_cosim.host.inspection import COLUMNS, FLAGS, as_text, inspect_fmu
+from grasp_cosim.inspection.inspection import COLUMNS, FLAGS, as_text, inspect_fmu
 
 Archive = Callable[..., Path]
 Report = dict[str, Any]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim import InputError, System
-from grasp_cosim.identification.contact_times import (
+from grasp_cosim.grasp.identification.contact_times import (
     STEP,
     STOP,
     Contact,
@@ -18,9 +18,9 @@ from grasp_cosim.identification.contact_times import (
     read_contacts,
     scatter,
 )
-from grasp_cosim.identification.fit import Fit
-from grasp_cosim.identification.parameters import GROUPS, RATIO, chosen
-from grasp_cosim.published.tables import Setting
+from grasp_cosim.grasp.identification.fit import Fit
+from grasp_cosim.grasp.identification.parameters import GROUPS, RATIO, chosen
+from grasp_cosim.grasp.published.tables import Setting
 from reference import continuous
 
 TRUE = {"plant.friction.viscous[1]": 25.0, "plant.friction.viscous[2]": 8.0}

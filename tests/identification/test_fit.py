@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from grasp_cosim import InputError, SimulationError
-from grasp_cosim.identification.fit import Fit, Parameter, Vector, fit
+from grasp_cosim.grasp.identification.fit import Fit, Parameter, Vector, fit
 
 X = np.linspace(0.0, 2.0, 40)
 SIGMA = 0.05
@@ -102,7 +102,7 @@ def test_residuals_whose_squares_are_not_finite_are_refused(value: float) -> Non
 
 
 def test_a_fit_that_does_not_come_to_rest_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("grasp_cosim.identification.fit.MOST", 1)
+    monkeypatch.setattr("grasp_cosim.grasp.identification.fit.MOST", 1)
     with pytest.raises(SimulationError, match="has not come to rest after 1 steps"):
         fitted(decay(3.0, 0.7))
 

@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from grasp_cosim import InputError, System, simulate
-from grasp_cosim.identification.fit import Fit
-from grasp_cosim.identification.log import GROUPS, identify_from_log
-from grasp_cosim.identification.parameters import chosen
+from grasp_cosim.grasp.identification.fit import Fit
+from grasp_cosim.grasp.identification.log import GROUPS, identify_from_log
+from grasp_cosim.grasp.identification.parameters import chosen
 from grasp_cosim.recording.load import Log, load_log
 from scipy.integrate import solve_ivp
 

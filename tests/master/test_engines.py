@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from grasp_cosim import InputError, SimulationError, System, simulate
 from grasp_cosim.fmi import instance
-from grasp_cosim.grasp import CASES
+from grasp_cosim.grasp.system import CASES
 from grasp_cosim.master import compiled
 from grasp_cosim.master.engine import Engine
 from grasp_cosim.recording.result import Rejection, Result

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from grasp_cosim import InputError, SimulationError, System
 from grasp_cosim.fmi.instance import Instance
+from grasp_cosim.interface.interface import Interface, Value, Variable
 from grasp_cosim.master.scenario import Scenario
 from grasp_cosim.system import parts
-from grasp_cosim.system.interface import Interface, Value, Variable
 from grasp_cosim.system.parts import Component, Condition, Event, Fault, Port, Relation, Wire
 
 STEP = 100_000_000

@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 from grasp_cosim import System
-from grasp_cosim.published.bench import bench_rms
-from grasp_cosim.published.bench_claims import check_bench_claims
-from grasp_cosim.published.evaluate import compared
-from grasp_cosim.published.grasps import Run, Runs
-from grasp_cosim.published.tables import Row, Setting, experimental_rows
+from grasp_cosim.grasp.published.bench import bench_rms
+from grasp_cosim.grasp.published.bench_claims import check_bench_claims
+from grasp_cosim.grasp.published.evaluate import compared
+from grasp_cosim.grasp.published.grasps import Run, Runs
+from grasp_cosim.grasp.published.tables import Row, Setting, experimental_rows
 
 Judge = Callable[..., list[int]]
 

@@ -5,7 +5,7 @@ from importlib.resources import files
 from pathlib import Path
 
 import pytest
-from grasp_cosim.published.tables import Row, Setting, experimental_rows, simulated_rows
+from grasp_cosim.grasp.published.tables import Row, Setting, experimental_rows, simulated_rows
 
 SHARED = Path(__file__).parents[3] / "shared" / "paper"
 
@@ -40,7 +40,7 @@ def test_the_simulated_rows_are_the_other_half() -> None:
 
 @pytest.mark.parametrize("name", ["table_position.csv", "table_reflectance.csv"])
 def test_a_difference_is_that_of_its_times(name: str) -> None:
-    text = files("grasp_cosim.published").joinpath(name).read_text("utf-8")
+    text = files("grasp_cosim.grasp.published").joinpath(name).read_text("utf-8")
     for line in csv.DictReader(text.splitlines()):
         for case in (1, 2):
             first, second, apart = (float(line[f"case{case}_{n}"]) for n in ("t1", "t2", "dt"))

@@ -13,12 +13,12 @@ from typing import Any
 
 import pytest
 from grasp_cosim import InputError, Realtime, System, simulate
-from grasp_cosim.figures.tables import metrics_table
 from grasp_cosim.fmi.instance import CLOCK
 from grasp_cosim.master.engine import Engine
 from grasp_cosim.realtime.pacer import HAS_CLOCK
 from grasp_cosim.realtime.timing import Timing
 from grasp_cosim.recording.load import load_run
+from grasp_cosim.report.tables import metrics_table
 from mocks import Mock, make_system
 
 FAST = Realtime(factor=1e4)

@@ -8,11 +8,11 @@ import numpy.typing as npt
 import pytest
 from grasp_controller import series
 from grasp_cosim import System
+from grasp_cosim.interface.interface import Interface, read_interface
+from grasp_cosim.interface.units import Unit
 from grasp_cosim.recording.energy import Bond, ExchangeEnergy, bonds
 from grasp_cosim.system import parts
-from grasp_cosim.system.interface import Interface, read_interface
 from grasp_cosim.system.parts import Component, Port, Wire
-from grasp_cosim.system.units import Unit
 from gripper_plant import rigid
 from hypothesis import given, settings
 from hypothesis import strategies as st

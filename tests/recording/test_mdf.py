@@ -11,7 +11,7 @@ import pytest
 from grasp_cosim import InputError, SimulationError, System
 from grasp_cosim.recording.listener import Signal
 from grasp_cosim.recording.mdf import PIECE, MdfListener
-from grasp_cosim.recording.settings import settings
+from grasp_cosim.system.settings import settings
 from recording.rows import SIGNALS, SYSTEM, full_disk, peak, play, rows
 
 asammdf = pytest.importorskip("asammdf")

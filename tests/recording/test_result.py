@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from grasp_cosim import Result, SimulationError, System, simulate
+from grasp_cosim.files import in_one_piece
 from grasp_cosim.recording.load import load_run
-from grasp_cosim.recording.result import Rejection, in_one_piece
-from grasp_cosim.recording.settings import settings
+from grasp_cosim.recording.result import Rejection
+from grasp_cosim.system.settings import settings
 from recording.rows import full_disk
 
 

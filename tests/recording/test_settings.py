@@ -5,8 +5,8 @@ from dataclasses import replace
 from typing import Any
 
 from grasp_cosim import System
-from grasp_cosim.recording.settings import settings
 from grasp_cosim.system.parts import Condition, Event, Fault, Port, Wire
+from grasp_cosim.system.settings import settings
 
 
 def test_the_settings_of_the_grasp(grasp: System) -> None:

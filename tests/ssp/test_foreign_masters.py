@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from grasp_cosim import System, simulate
-from grasp_cosim.grasp import CASES
+from grasp_cosim.grasp.system import CASES
 from grasp_cosim.ssp.write import write_ssp
 
 STEP = 1e-3  # s

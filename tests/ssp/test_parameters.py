@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim import InputError, System
-from grasp_cosim.system.interface import Value
+from grasp_cosim.interface.interface import Value
 from ssp.hand_made import (
     archive,
     bind,

@@ -7,18 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from grasp_cosim import InputError, System, simulate
+from grasp_cosim.interface.interface import Value
 from grasp_cosim.ssp.document import parse
 from grasp_cosim.ssp.write import SET, write_ssp
-from grasp_cosim.system.interface import Value
-from grasp_cosim.system.parts import (
-    Component,
-    Condition,
-    Event,
-    Fault,
-    Initialisation,
-    Port,
-    Wire,
-)
+from grasp_cosim.system.parts import Component, Condition, Event, Fault, Initialisation, Port, Wire
 from ssp.hand_made import archive, component, connect, fmu, structure, system
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from grasp_cosim.errors import InputError
-from grasp_cosim.study.bands import (
+from grasp_cosim.qualification.bands import (
     BOTH,
     SHARE,
     SMALL,
@@ -18,7 +18,7 @@ from grasp_cosim.study.bands import (
     read_bands,
     signal_band,
 )
-from grasp_cosim.study.tube import Curve
+from grasp_cosim.qualification.tube import Curve
 
 TIME = np.linspace(0.0, 1.0, 101, dtype=np.float64)
 SINE = Curve(TIME, 2.0 + np.sin(2.0 * np.pi * TIME))

@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 from grasp_cosim import System, simulate
+from grasp_cosim.grasp.closing import LOOK, close
 from grasp_cosim.master.simulation import Session
-from grasp_cosim.study.closing import LOOK, close
 
 STEP = 2e-3
 CASE_0 = {

@@ -4,7 +4,7 @@ import math
 from itertools import accumulate
 
 import pytest
-from grasp_cosim.study.convergence import converge
+from grasp_cosim.convergence.extrapolation import converge
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

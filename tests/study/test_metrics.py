@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from grasp_cosim.study.metrics import (
+from grasp_cosim.grasp.metrics import (
     IMPACT_WINDOW,
     LABELS,
     OF_OBJECT,

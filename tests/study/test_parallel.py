@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim.errors import InputError
-from grasp_cosim.study.parallel import run_all
+from grasp_cosim.parallel import run_all
 
 
 def _process(job: int) -> tuple[int, int]:

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 from conftest import Altered
 from grasp_cosim import InputError, SimulationError, System
-from grasp_cosim.grasp import CASES
-from grasp_cosim.study.bands import Bands, Given
-from grasp_cosim.study.metrics import OF_OBJECT
-from grasp_cosim.study.qualify import Compared, qualify
-from grasp_cosim.study.verdict import as_bands, as_json, as_text
+from grasp_cosim.grasp.metrics import OF_OBJECT
+from grasp_cosim.grasp.system import CASES
+from grasp_cosim.qualification.bands import Bands, Given
+from grasp_cosim.qualification.qualify import Compared, qualify
+from grasp_cosim.qualification.verdict import as_bands, as_json, as_text
 
 NUMERICS = ("every second sample", "step 0.002 s", "scheme jacobi")
 
@@ -108,7 +108,7 @@ def test_a_band_for_nothing_is_a_wrong_input(short: System, table: str) -> None:
 def test_a_written_band_file_gives_the_same_verdict(
     short: System, heavy: Path, tmp_path: Path
 ) -> None:
-    from grasp_cosim.study.bands import read_bands
+    from grasp_cosim.qualification.bands import read_bands
 
     first = qualify(short, "plant", heavy, isolation="none")
     (tmp_path / "bands.toml").write_text(as_bands(first))
@@ -157,7 +157,7 @@ def test_an_original_that_fails_is_no_verdict(short: System, altered: Altered) -
 
 
 def test_ctrl_c_is_no_verdict(short: System, monkeypatch: pytest.MonkeyPatch) -> None:
-    import grasp_cosim.study.qualify as module
+    import grasp_cosim.qualification.qualify as module
 
     class Interrupted:
         complete = False

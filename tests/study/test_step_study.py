@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from grasp_controller import series
 from grasp_cosim import System, simulate
+from grasp_cosim.convergence.extrapolation import Convergence, converge
+from grasp_cosim.convergence.step_study import StepRun, StepStudy, run_step, step_study
 from grasp_cosim.errors import InputError, SimulationError
-from grasp_cosim.study.convergence import Convergence, converge
-from grasp_cosim.study.metrics import FINGERS, first_contact
-from grasp_cosim.study.step_study import StepRun, StepStudy, run_step, step_study
+from grasp_cosim.grasp.metrics import FINGERS, first_contact
 from gripper_plant import rigid
 from proximity_sensor import optics
 from reference.continuous import Grasp, solve

@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 from grasp_cosim.errors import InputError
-from grasp_cosim.study.interface_difference import capability_differences, family
-from grasp_cosim.study.swap import Swap, prepare_swap
-from grasp_cosim.study.unit_conversion import conversion
+from grasp_cosim.interface.conversion import conversion
+from grasp_cosim.interface.units import Unit
+from grasp_cosim.qualification.interface_difference import capability_differences, family
+from grasp_cosim.qualification.swap import Swap, prepare_swap
 from grasp_cosim.system.description import System
 from grasp_cosim.system.parts import Condition, Event, Fault, Initialisation, Port, Wire
-from grasp_cosim.system.units import Unit
 from study.made import DEPENDENCIES, PLANT, changed, without, write_fmu, write_system
 
 GAP = Port("plant", "gap")

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from grasp_controller import contact_force, impact_reduction, series, simultaneous_contact
-from grasp_cosim.study.metrics import FINGERS, first_contact
+from grasp_cosim.grasp.metrics import FINGERS, first_contact
 from gripper_plant import rigid
 from hypothesis import Phase, assume, given, settings
 from hypothesis import strategies as st

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from conftest import Altered, Run
 from grasp_cosim import System, cli, simulate
-from grasp_cosim.grasp import CASES
+from grasp_cosim.grasp.system import CASES
 from grasp_fmus import documentation
 
 METRICS = {

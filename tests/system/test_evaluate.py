@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 from conftest import MadeOnce
 from grasp_cosim import System, simulate
-from grasp_cosim.grasp import CASES
-from grasp_cosim.published.evaluate import evaluate
+from grasp_cosim.grasp.published.evaluate import evaluate
+from grasp_cosim.grasp.system import CASES
 
 pytestmark = pytest.mark.slow
 

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from grasp_cosim import Result, System, simulate
-from grasp_cosim.grasp import CASES
-from grasp_cosim.study.metrics import CLOSING, FINGERS, IMPACT_WINDOW
-from grasp_cosim.system.interface import Value
+from grasp_cosim.grasp.metrics import CLOSING, FINGERS, IMPACT_WINDOW
+from grasp_cosim.grasp.system import CASES
+from grasp_cosim.interface.interface import Value
 
 Values = dict[str, Value]
 

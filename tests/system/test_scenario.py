@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim import InputError, System
-from grasp_cosim.grasp import SYSTEM
+from grasp_cosim.grasp.system import SYSTEM
+from grasp_cosim.interface.interface import Interface, Kind, Variable
 from grasp_cosim.system import parts
-from grasp_cosim.system.interface import Interface, Kind, Variable
 from grasp_cosim.system.parts import Component, Condition, Event, Fault, Initialisation, Port, Wire
 from grasp_cosim.system.scenario import event_entry, fault_entry, read_events, read_faults
 from hypothesis import given, settings

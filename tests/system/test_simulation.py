@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from conftest import Altered, UnpackIn
 from grasp_cosim import InputError, SimulationError, System, simulate
-from grasp_cosim.grasp import CASES, SYSTEM
+from grasp_cosim.grasp.system import CASES, SYSTEM
 
 SHORT = 0.05
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim import InputError, System
+from grasp_cosim.interface.units import BASE, Unit, conversion
 from grasp_cosim.system.checks import wire_transform
 from grasp_cosim.system.parts import Component, Port, Wire
-from grasp_cosim.system.units import BASE, Unit, conversion
 from hypothesis import given
 from hypothesis import strategies as st
 

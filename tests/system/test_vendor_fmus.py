@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from grasp_cosim import InputError, System, simulate
+from grasp_cosim.interface.interface import limits, read_interface
 from grasp_cosim.system.checks import remarks, wire_transform
-from grasp_cosim.system.interface import limits, read_interface
 from native_fmus import TYPES, build, needs_gcc
 
 pytestmark = needs_gcc

@@ -8,10 +8,11 @@ from typing import Any
 
 import click
 
-from ..grasp import grasp_system, with_bench
-from ..published.bench import evaluate_bench
-from ..published.evaluate import evaluate as run_evaluation
-from .frame import NEGATIVE, check_folder, json_option
+from ..files import check_folder
+from ..grasp.published.bench import evaluate_bench
+from ..grasp.published.evaluate import evaluate as run_evaluation
+from ..grasp.system import grasp_system, with_bench
+from .frame import NEGATIVE, json_option
 
 
 @click.command()

@@ -8,13 +8,14 @@ from pathlib import Path
 import click
 
 from ..errors import InputError
-from ..grasp import BOUND_FOLDER, FMU_FOLDER
-from ..host.doctor import as_json as findings_json
-from ..host.doctor import as_text as findings_text
-from ..host.doctor import examine
-from ..host.inspection import as_text as inspection_text
-from ..host.inspection import inspect_fmu
-from .frame import NEGATIVE, check_folder, json_option
+from ..files import check_folder
+from ..grasp.system import BOUND_FOLDER, FMU_FOLDER
+from ..inspection.doctor import as_json as findings_json
+from ..inspection.doctor import as_text as findings_text
+from ..inspection.doctor import examine
+from ..inspection.inspection import as_text as inspection_text
+from ..inspection.inspection import inspect_fmu
+from .frame import NEGATIVE, json_option
 
 
 @click.command()

@@ -1,13 +1,12 @@
 """What the commands share: the group, exit codes, errors as one line."""
 
-import tempfile
 import traceback
 from pathlib import Path
 
 import click
 
 from ..errors import InputError
-from ..grasp import grasp_system
+from ..grasp.system import grasp_system
 from ..system.description import System
 
 NEGATIVE, WRONG, FAILED, INTERRUPTED = 1, 2, 3, 130
@@ -48,18 +47,6 @@ def load_system(path: Path | None, step: float | None, stop: float | None) -> Sy
     for note in system.notes:
         click.echo(note, err=True)
     return system
-
-
-def check_folder(folder: Path) -> None:
-    """InputError where files could not be written to the folder, which need not exist."""
-    nearest = folder.absolute()
-    while not nearest.exists():
-        nearest = nearest.parent
-    try:
-        with tempfile.TemporaryFile(dir=nearest):
-            pass
-    except OSError as error:
-        raise InputError(f"--out {folder}: cannot write to {nearest}: {error.strerror}") from error
 
 
 def pair(option: str, text: str, form: str) -> tuple[str, str]:

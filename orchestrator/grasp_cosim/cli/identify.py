@@ -7,22 +7,22 @@ from pathlib import Path
 import click
 
 from ..errors import InputError
-from ..grasp import grasp_system
-from ..identification import report
-from ..identification.contact_times import (
+from ..files import check_folder, write_text
+from ..grasp.identification import report
+from ..grasp.identification.contact_times import (
     identify_from_times,
     published_contacts,
     read_contacts,
     scatter,
 )
-from ..identification.fit import check_scipy
-from ..identification.log import GROUPS as IN_A_LOG
-from ..identification.log import identify_from_log
-from ..identification.parameters import DEFAULT, GROUPS, chosen
+from ..grasp.identification.fit import check_scipy
+from ..grasp.identification.log import GROUPS as IN_A_LOG
+from ..grasp.identification.log import identify_from_log
+from ..grasp.identification.parameters import DEFAULT, GROUPS, chosen
+from ..grasp.system import grasp_system
 from ..recording.load import load_log
-from ..recording.result import write_text
 from ..system.description import System
-from .frame import check_folder, json_option, pair
+from .frame import json_option, pair
 
 
 @click.command()

@@ -13,12 +13,13 @@ from grasp_fmus.proxy import DEFAULTS, Settings
 from grasp_fmus.variable import Enumeration
 from grasp_fmus.variable import Variable as ProxyVariable
 
-from ..bench.wire import wire_signature
 from ..errors import InputError
-from ..host.inspection import inspect_fmu
-from ..system.interface import Interface, Value, Variable, read_interface
-from ..system.units import BASE
-from .frame import check_folder, json_option
+from ..files import check_folder
+from ..hil.wire import wire_signature
+from ..inspection.inspection import inspect_fmu
+from ..interface.interface import Interface, Value, Variable, read_interface
+from ..interface.units import BASE
+from .frame import json_option
 
 if TYPE_CHECKING:
     from grasp_fmus.proxy_build import Original

@@ -6,17 +6,17 @@ from typing import cast
 
 import click
 
-from ..figures.plot import new_figure
-from ..figures.qualification import draw_qualification
-from ..recording.result import write_text
-from ..study import verdict
-from ..study.bands import read_bands
-from ..study.qualify import Qualification
-from ..study.qualify import qualify as run_qualification
+from ..files import check_folder, write_text
+from ..interface.interface import Value
+from ..qualification import verdict
+from ..qualification.bands import read_bands
+from ..qualification.qualify import Qualification
+from ..qualification.qualify import qualify as run_qualification
+from ..report.plot import new_figure
+from ..report.qualification import draw_qualification
 from ..system.description import SCHEMES
-from ..system.interface import Value
 from ..system.parts import ISOLATIONS, Isolation
-from .frame import NEGATIVE, check_folder, json_option, load_system, pair
+from .frame import NEGATIVE, json_option, load_system, pair
 
 
 @click.command()

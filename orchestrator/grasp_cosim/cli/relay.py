@@ -10,11 +10,11 @@ from pathlib import Path
 
 import click
 
-from ..bench.address import Address, is_loopback, text
-from ..bench.network import DIRECTIONS, Conditions, Network, Outage, check_time
-from ..bench.relay import Relay
-from ..bench.traffic import Entry, Log
 from ..errors import InputError
+from ..hil.address import Address, is_loopback, text
+from ..hil.network import DIRECTIONS, Conditions, Network, Outage, check_time
+from ..hil.relay import Relay
+from ..hil.traffic import Entry, Log
 from .frame import INTERRUPTED, fail, json_option
 from .signals import ended_by_signals
 

@@ -6,12 +6,13 @@ from pathlib import Path
 import click
 
 from ..errors import InputError
-from ..figures.page import write_page
-from ..figures.plot import plot_run, plot_signals
-from ..figures.timing import draw_timing
+from ..files import check_folder
+from ..grasp.metrics import is_grasp
 from ..recording.load import load_run
-from ..study.metrics import is_grasp
-from .frame import check_folder, json_option
+from ..report.page import write_page
+from ..report.plot import plot_run, plot_signals
+from ..report.timing import draw_timing
+from .frame import json_option
 
 
 @click.command()

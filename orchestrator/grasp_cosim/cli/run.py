@@ -7,17 +7,18 @@ from typing import Any
 import click
 
 from ..errors import InputError, SimulationError
-from ..figures.plot import check_plot
-from ..figures.timing import draw_timing
-from ..grasp import CASES, with_bench
+from ..files import check_folder
+from ..grasp.metrics import LABELS, is_grasp
+from ..grasp.system import CASES, with_bench
+from ..interface.interface import Value
 from ..master.engine import ENGINES, Engine
 from ..master.simulation import MOST, simulate
 from ..recording.mdf import check_mdf
 from ..recording.result import Result
-from ..study.metrics import LABELS, is_grasp
+from ..report.plot import check_plot
+from ..report.timing import draw_timing
 from ..system.description import SCHEMES
-from ..system.interface import Value
-from .frame import INTERRUPTED, check_folder, fail, json_option, load_system, pair
+from .frame import INTERRUPTED, fail, json_option, load_system, pair
 from .realtime import chosen_realtime, realtime_options, timing_lines
 from .step_study import run_step_study
 

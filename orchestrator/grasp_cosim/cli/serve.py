@@ -5,13 +5,13 @@ from pathlib import Path
 
 import click
 
-from ..bench.address import is_loopback, text
-from ..bench.bench import Bench, Serving
-from ..bench.server import DEFAULT_ADDRESS, Server
-from ..bench.wire import shared_key
 from ..errors import InputError
+from ..hil.address import is_loopback, text
+from ..hil.bench import Bench, Serving
+from ..hil.server import DEFAULT_ADDRESS, Server
+from ..hil.wire import shared_key
+from ..interface.interface import read_interface
 from ..system.description import in_nanoseconds
-from ..system.interface import read_interface
 from .frame import INTERRUPTED, NEGATIVE, fail, json_option, pair
 from .signals import ended_by_signals
 

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import click
 
-from .frame import check_folder, json_option, load_system
+from ..files import check_folder
+from .frame import json_option, load_system
 
 
 @click.command()

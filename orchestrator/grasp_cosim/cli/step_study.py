@@ -6,12 +6,12 @@ from pathlib import Path
 
 import click
 
-from ..figures.plot import new_figure
-from ..figures.step_study import draw_step_study
-from ..recording.result import write_text
-from ..study.step_study import TOLERANCE, check_study, step_study
+from ..convergence.step_study import TOLERANCE, check_study, step_study
+from ..files import check_folder, write_text
+from ..report.plot import new_figure
+from ..report.step_study import draw_step_study
 from ..system.description import System
-from .frame import NEGATIVE, check_folder
+from .frame import NEGATIVE
 
 
 def run_step_study(

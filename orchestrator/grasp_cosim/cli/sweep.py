@@ -6,8 +6,9 @@ from pathlib import Path
 import click
 
 from ..errors import InputError
-from ..figures.plot import new_figure
-from ..figures.sweep import draw_sweep
+from ..files import check_folder
+from ..report.plot import new_figure
+from ..report.sweep import draw_sweep
 from ..sweep.read import read_study, study_file
 from ..sweep.sensitivity import Sensitivity
 from ..sweep.store import Store
@@ -15,7 +16,7 @@ from ..sweep.study import Pictures
 from ..sweep.sweep import RUNS, Sweep
 from ..sweep.sweep import sweep as run_study
 from ..sweep.table import STATISTICS
-from .frame import INTERRUPTED, NEGATIVE, check_folder, fail, json_option, load_system
+from .frame import INTERRUPTED, NEGATIVE, fail, json_option, load_system
 
 
 @click.command()

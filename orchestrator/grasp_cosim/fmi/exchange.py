@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..system.interface import Interface, Variable
+from ..interface.interface import Interface, Variable
 from .instance import dtype
 
 STEP, FETCH, CALL = b"S", b"F", b"C"

@@ -21,7 +21,7 @@ from fmpy.fmi2 import (
 )
 from fmpy.logging import addLoggerProxy
 
-from ..system.interface import Value
+from ..interface.interface import Value
 from .instance import STEP_2, TRANSFER_2, Call, Native
 from .loaded import KEPT, LOGGER, LoadedInstance
 

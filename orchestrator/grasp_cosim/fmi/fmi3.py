@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from fmpy.fmi3 import FMU3Slave
 
-from ..system.interface import Interface, Value
+from ..interface.interface import Interface, Value
 from .instance import EARLY, STEP_3, TRANSFER_3, WARNING, Call, Native
 from .loaded import KEPT, LOGGER, LoadedInstance
 

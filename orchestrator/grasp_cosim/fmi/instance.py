@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..errors import SimulationError
-from ..system.interface import Interface, Value, Variable
+from ..interface.interface import Interface, Value, Variable
 
 STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
 OK, WARNING, DISCARD, ERROR, FATAL = 0, 1, 2, 3, 4

@@ -1,6 +1,6 @@
 """From a component to a running instance of its FMU."""
 
-from ..system.interface import Interface
+from ..interface.interface import Interface
 from ..system.parts import Component
 from .fmi2 import FmuInstance
 from .fmi3 import Fmi3Instance

@@ -27,7 +27,7 @@ import numpy.typing as npt
 from fmpy.fmi1 import FMICallException
 
 from ..errors import InputError, SimulationError
-from ..system.interface import Interface, Value, Variable
+from ..interface.interface import Interface, Value, Variable
 from .instance import DISCARD, EARLY, ERROR, FATAL, OK, STATUS, TRANSFER_3, Call, Native
 
 _PYTHON_FUNCTION = ctypes.PYFUNCTYPE(ctypes.c_int)

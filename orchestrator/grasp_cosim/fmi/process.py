@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..errors import InputError, SimulationError
-from ..system.interface import Interface, Value, Variable
+from ..interface.interface import Interface, Value, Variable
 from .child import Child
 from .exchange import FETCH, STEP
 from .instance import EARLY, WARNING, Call

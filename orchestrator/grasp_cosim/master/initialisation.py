@@ -13,9 +13,9 @@ import numpy.typing as npt
 
 from ..errors import InputError, choices
 from ..fmi.instance import Instance
+from ..interface.interface import Value, Variable
 from ..system.checks import transforms
 from ..system.description import System
-from ..system.interface import Value, Variable
 from ..system.parts import Initialisation, Port, Wire
 from .scenario import INITIAL
 

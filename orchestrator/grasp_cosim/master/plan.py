@@ -13,10 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ..fmi.instance import Call, Instance, dtype
+from ..interface.interface import Variable
 from ..realtime.pacer import Pacer
 from ..system.checks import transforms
 from ..system.description import System
-from ..system.interface import Variable
 from ..system.parts import NANOSECONDS, Port, Wire
 from .faults import FaultFunction
 from .loop import CALL, COPY, LOAD, LOAD_LONG, RAISED, SCALE, STEP, STORE

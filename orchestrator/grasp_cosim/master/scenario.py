@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 from ..fmi.instance import Instance
+from ..interface.interface import Value, Variable
 from ..system.description import System
-from ..system.interface import Value, Variable
 from ..system.parts import NANOSECONDS, Condition, Event, Port, literal
 from ..system.scenario_checks import check_setting
 from .faults import INITIAL, FaultFunction, Window, fault_functions, first_step

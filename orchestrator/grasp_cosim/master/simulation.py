@@ -14,17 +14,17 @@ from tqdm import tqdm
 from ..errors import InputError, SimulationError, choices
 from ..fmi.instance import Instance
 from ..fmi.load import load
+from ..interface.interface import Value
 from ..realtime.options import Realtime
 from ..realtime.pacer import Pacer
 from ..realtime.privileges import Privileges, privileges
 from ..recording.dispatch import Dispatcher
 from ..recording.listener import Listener
 from ..recording.memory import MemoryListener
+from ..recording.proxies import proxy_lines
 from ..recording.result import Result
-from ..study.proxies import proxy_lines
 from ..system.checks import remarks
 from ..system.description import System
-from ..system.interface import Value
 from ..system.parts import NANOSECONDS, Component, Port
 from .engine import Engine
 from .master import Master

@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from ..errors import InputError, SimulationError
+from ..files import in_one_piece, unwritable
 from ..system.description import System
 from .listener import Signal, times
-from .result import in_one_piece
 
 PIECE = 1024
 """Rows turned into text at once; a block may be long."""
@@ -86,8 +86,3 @@ def lines(columns: Iterable[Iterable[float]]) -> str:
     """A line per row of the columns, each value as Python's repr has it."""
     texts = (map(repr, column) for column in columns)
     return "\n".join(map(",".join, zip(*texts, strict=True))) + "\n"
-
-
-def unwritable(path: Path, error: OSError) -> str:
-    """The message for a file that cannot be written."""
-    return f"{path}: cannot be written: {error.strerror}"

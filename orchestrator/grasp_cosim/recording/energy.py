@@ -39,8 +39,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from ..interface.interface import Interface, Variable
 from ..system.description import System
-from ..system.interface import Interface, Variable
 from ..system.parts import Component, Port, Wire
 from .listener import Signal
 

@@ -12,11 +12,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ..errors import InputError, SimulationError
+from ..files import in_one_piece, unwritable
 from ..system.description import System
-from .csv import unwritable
+from ..system.settings import settings
 from .listener import Signal, times
-from .result import in_one_piece
-from .settings import settings
 
 if TYPE_CHECKING:
     import asammdf

@@ -1,9 +1,7 @@
 """What a simulation leaves behind: every output at every communication point."""
 
 import json
-import os
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -12,13 +10,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..files import in_one_piece, write_text
+from ..grasp.metrics import grasp_metrics
 from ..realtime.timing import Timing
-from ..study.metrics import grasp_metrics
-from ..study.proxies import proxy_figures
 from ..system.description import System
 from ..system.parts import NANOSECONDS
+from ..system.settings import settings
 from .listener import Listener, Signal
-from .settings import settings
+from .proxies import proxy_figures
 
 KINDS = {"f": "Real", "i": "Integer", "b": "Boolean"}
 """The kind of a signal by the kind of its column's element type."""
@@ -140,28 +139,6 @@ class Result(Mapping[str, npt.NDArray[Any]]):
 
     def plot(self, path: str | Path) -> None:
         """Draw the grasp as a PNG; InputError without matplotlib or without a gripper plant."""
-        from ..figures.plot import plot_run  # which needs this module
+        from ..report.plot import plot_run  # which needs this module
 
         plot_run(self, Path(path))
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a file in one piece: there is never half of it."""
-    with in_one_piece(path) as part:
-        part.write_text(text, encoding="utf-8")
-
-
-@contextmanager
-def in_one_piece(path: Path) -> Iterator[Path]:
-    """A temporary name beside path to write to; it takes the place of path at the end."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f"{path.name}.{os.getpid()}.part")
-    try:
-        yield part
-        part.replace(path)
-    except OSError as error:  # a write that fails does not say where
-        if error.errno is None or error.filename:
-            raise
-        raise OSError(error.errno, os.strerror(error.errno), str(path)) from error
-    finally:
-        part.unlink(missing_ok=True)

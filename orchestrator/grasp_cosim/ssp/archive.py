@@ -21,7 +21,7 @@ from threading import Lock
 from urllib.parse import unquote, urlsplit
 
 from ..errors import InputError, choices
-from ..recording.result import in_one_piece
+from ..files import in_one_piece
 
 STRUCTURE = "SystemStructure.ssd"
 RESOURCES = "resources/"

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from ..errors import InputError, choices
-from ..system.interface import Interface, Variable
-from ..system.units import Unit
+from ..interface.interface import Interface, Variable
+from ..interface.units import Unit
 from .tree import ComponentElement, Connection, Connector, End, SystemElement
 from .units import change, same
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ..errors import InputError, choices
-from ..system.interface import SETTABLE, Value, Variable
-from ..system.units import Unit
+from ..interface.interface import SETTABLE, Value, Variable
+from ..interface.units import Unit
 from .archive import Archive
 from .document import at, checked, children, is_true, parse, short
 from .network import Carried, Network, Node, Path, kind_of

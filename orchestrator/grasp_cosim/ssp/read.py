@@ -19,23 +19,13 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from ..errors import InputError, choices
+from ..interface.interface import Value, read_interface
 from ..system.description import System, in_nanoseconds
-from ..system.interface import Value, read_interface
 from ..system.parts import NANOSECONDS, Component, Initialisation, Port, Wire
 from .annotation import TYPE, Beside, Extras, read_extras
 from .archive import STRUCTURE, Archive
 from .document import at, child, children, parse, qualified
-from .network import (
-    Carried,
-    Hop,
-    Network,
-    Node,
-    Part,
-    Path,
-    components_of,
-    kind_of,
-    read_network,
-)
+from .network import Carried, Hop, Network, Node, Part, Path, components_of, kind_of, read_network
 from .order import flow_order
 from .parameters import read_settings
 from .tree import ComponentElement, read_system

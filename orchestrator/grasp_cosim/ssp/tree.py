@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..errors import InputError, choices
-from ..system.units import Unit
+from ..interface.units import Unit
 from .document import at, child, children, is_true, short
 
 FMU = "application/x-fmu-sharedlibrary"

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from ..errors import InputError
-from ..system.units import BASE, Unit, conversion
+from ..interface.units import BASE, Unit, conversion
 from .document import add, at, child, children
 
 

@@ -18,10 +18,10 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
+from ..interface.interface import Value, Variable, read_interface
+from ..interface.units import Unit
 from ..system.description import System
-from ..system.interface import Value, Variable, read_interface
 from ..system.parts import NANOSECONDS, Component, Port, Wire
-from ..system.units import Unit
 from .annotation import extras_of, write_extras
 from .archive import RESOURCES, STRUCTURE, write_archive
 from .document import VERSION, add, new, to_bytes

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..errors import InputError
-from ..system.interface import Value
+from ..interface.interface import Value
 
 
 class Distribution(Protocol):

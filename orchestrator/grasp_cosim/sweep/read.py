@@ -40,16 +40,16 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
+from ..checks import as_table, check_keys
 from ..errors import InputError, choices
-from ..grasp import CASES, with_bench
+from ..grasp.system import CASES, with_bench
+from ..interface.interface import Value
 from ..system.description import System
-from ..system.interface import Value
-from ..system.tables import as_table, check_keys
 from .design import Design
 from .distributions import Distribution, Listed, Normal, Uniform, spaced
 from .study import Map, Parameter, Pictures, Study
 
-STUDIES = Path(__file__).parent.parent / "studies"
+STUDIES = Path(__file__).parent.parent / "grasp" / "studies"
 """The folder of the built-in studies."""
 
 KEYS = {

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..errors import InputError, SimulationError
+from ..interface.interface import Value
 from ..master.simulation import simulate
 from ..recording.result import Result
 from ..system.description import System
-from ..system.interface import Value
 
 BOOKKEEPING = {
     "wall_time", "real_time_factor", "steps", "scheme", "step", "stop", "complete",

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError, SimulationError
-from ..recording.result import write_text
+from ..files import write_text
 from .run import Outcome
 from .study import Study
 

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, choices
-from ..recording.settings import settings
-from ..study.metrics import FINGERS, OF_FINGERS, OF_OBJECT, PLANT, UNITS, is_grasp
+from ..grasp.metrics import FINGERS, OF_FINGERS, OF_OBJECT, PLANT, UNITS, is_grasp
+from ..interface.interface import Value, Variable
 from ..system.description import System
-from ..system.interface import Value, Variable
+from ..system.settings import settings
 from .design import MOST, Design, Points
 from .distributions import Distribution
 

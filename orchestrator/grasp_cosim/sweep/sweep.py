@@ -12,7 +12,7 @@ from typing import Any
 from tqdm import tqdm
 
 from ..errors import InputError
-from ..recording.result import write_text
+from ..files import write_text
 from .cluster import run_on_cluster
 from .run import Job, Outcome, Task
 from .sensitivity import Sensitivity, sensitivity

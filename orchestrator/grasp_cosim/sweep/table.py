@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..errors import InputError, choices
-from ..recording.result import in_one_piece
+from ..files import in_one_piece
 from .run import Outcome
 from .study import Study
 

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError, choices
-from .interface import SUPPORTED, Value, Variable, limits
+from ..interface.interface import SUPPORTED, Value, Variable, limits
+from ..interface.units import conversion
 from .parts import LOOPS, NANOSECONDS, Component, Port, Wire
-from .units import conversion
 
 if TYPE_CHECKING:
     from .description import System

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from ..errors import InputError, choices
+from ..interface.interface import Value
 from .checks import check_components, check_initialisation, check_items, check_steps, check_wires
-from .interface import Value
 from .parts import NANOSECONDS, Component, Event, Fault, Initialisation, Wire
 from .scenario_checks import check_scenario
 

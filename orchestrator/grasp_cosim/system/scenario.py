@@ -45,10 +45,10 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
+from ..checks import as_table, check_keys
 from ..errors import InputError, choices
 from .description import in_nanoseconds
 from .parts import NANOSECONDS, RANDOM, Condition, Event, Fault, Port, Wire
-from .tables import as_table, check_keys
 
 _CONDITION = re.compile(r"(.+?\S)\s*(<=|>=|==|!=|<|>)\s*([^<>=!\s]+)")
 

@@ -12,8 +12,8 @@ from ..errors import InputError, choices
 from .parts import FAULTS, NANOSECONDS, RANDOM, RELATIONS, Condition, Event, Fault, Port
 
 if TYPE_CHECKING:
+    from ..interface.interface import Value
     from .description import System
-    from .interface import Value
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,12 +30,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from ..checks import as_table, check_keys
 from ..errors import InputError, choices
+from ..interface.interface import read_interface
 from .description import System, as_scheme, in_nanoseconds
-from .interface import read_interface
 from .parts import ISOLATIONS, Component, Initialisation, Isolation, Port, Wire
 from .scenario import read_events, read_faults
-from .tables import as_table, check_keys
 
 
 def read_toml(path: Path, fmus: Path | None = None) -> System:

@@ -1,0 +1,1 @@
+"""The grasp of the paper on top of the co-simulation core."""

@@ -1,0 +1,211 @@
+"""Friction from contact times: grasps with the sensors ideal, as the fit has them.
+
+The grasps run through the FMUs at STEP. With the sensors' electronics off, a contact time at STEP
+is within 2 ms of that at 0.1 ms, a hundredth of what the published times scatter by; the
+reflectances matter by their ratio alone, so that surfaces of equal colours are one grasp.
+"""
+
+import csv
+import math
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from tqdm import tqdm
+
+from ...errors import InputError, SimulationError, choices
+from ...parallel import processes
+from ...system.description import System
+from ..closing import close
+from ..metrics import FINGERS
+from ..published.tables import Row, Setting, experimental_rows
+from ..system import CASES
+from .fit import Fit, Parameter, Vector, check_scipy, fit
+from .parameters import RATIO
+
+STEP, STOP = 1e-3, 10.0
+"""s; a finger that has not touched at STOP counts as touching then."""
+
+COLUMNS = ("x_m", "case", "finger", "time")
+OPTIONAL = ("alpha_1", "alpha_2")
+"""Of a table of contact times."""
+
+Times = Sequence[float]
+Values = dict[str, float]
+
+
+class Grasp(NamedTuple):
+    """A grasp of a fit: x_m in m, alpha_2 over alpha_1, case, and the parameters by name."""
+
+    x_m: float
+    ratio: float
+    case: int
+    parameters: tuple[tuple[str, float], ...]
+
+
+Simulator = Callable[[Sequence[Grasp]], Iterable[Times]]
+"""The contact times of grasps in s, in their order."""
+
+
+class Contact(NamedTuple):
+    """A measured contact time in s; label says which row of the data it is."""
+
+    label: str
+    setting: Setting
+    case: int
+    finger: int
+    time: float
+
+
+def published_contacts() -> list[Contact]:
+    """The experimental position rows and those of two equal colours.
+
+    White on both sides is the row of x_m = 0.03 m once more, so it is left out.
+    """
+    return [_contact(row) for row in experimental_rows() if row.finger and _counts(row)]
+
+
+def read_contacts(path: Path) -> list[Contact]:
+    """A table of contact times: CSV with the columns x_m, case, finger, time, and, where the
+    surfaces are not alike, alpha_1 and alpha_2. InputError names the line that is wrong.
+    """
+    try:
+        text = path.read_text("utf-8-sig")  # with the mark that spreadsheets begin with, or without
+        reader = csv.reader(text.splitlines(), strict=True)
+        lines = [(reader.line_num, [cell.strip() for cell in line]) for line in reader if line]
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror}; must be a table of contact times") from error
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{path}: is no CSV: {error}") from error
+    names = lines[0][1] if lines else []
+    wrong = not set(COLUMNS) <= set(names) <= {*COLUMNS, *OPTIONAL}
+    if wrong or len(set(names)) < len(names):
+        raise InputError(
+            f"{path}: the columns are {choices(names)}; must be {choices(COLUMNS)}, "
+            f"and may be {choices(OPTIONAL)}, once each"
+        )
+    if len(lines) == 1:
+        raise InputError(f"{path}: has no line below its columns; must have contact times")
+    return [_read(f"{path}, line {number}", names, line) for number, line in lines[1:]]
+
+
+def identify_from_times(
+    system: System,
+    contacts: Sequence[Contact],
+    parameters: Sequence[Parameter],
+    workers: int,
+    progress: bool,
+) -> Fit:
+    """Fit the parameters to contact times, grasps in parallel; the residuals are in s.
+
+    progress counts the grasps on standard error if that is a terminal.
+    """
+    check_scipy()
+    system = system.with_experiment(STEP, STOP)
+    bar = tqdm(desc="grasps", unit="run", disable=None if progress else True)
+    with bar, processes(workers) as pool:
+
+        def simulate(grasps: Sequence[Grasp]) -> Iterable[Times]:
+            for times in pool.map(contact_times, [(system, grasp) for grasp in grasps]):
+                bar.update()
+                yield times
+
+        return fit_contacts(contacts, parameters, simulate)
+
+
+def fit_contacts(
+    contacts: Sequence[Contact], parameters: Sequence[Parameter], simulate: Simulator
+) -> Fit:
+    """Fit the parameters to contact times with what simulates grasps; equal grasps run once."""
+    measured = np.array([c.time for c in contacts])
+    known: dict[Grasp, Times] = {}
+
+    def residuals(points: Sequence[Vector]) -> list[Vector]:
+        wanted = [[_grasp(c, parameters, x) for c in contacts] for x in points]
+        new = list(dict.fromkeys(g for grasps in wanted for g in grasps if g not in known))
+        known.update(zip(new, simulate(new), strict=True))
+        return [
+            np.array([known[g][c.finger - 1] for g, c in zip(grasps, contacts, strict=True)])
+            - measured
+            for grasps in wanted
+        ]
+
+    return fit(residuals, parameters, "identify")
+
+
+def scatter(contacts: Sequence[Contact]) -> float | None:
+    """The standard deviation in s of times that were measured in equal grasps, pooled.
+
+    It is the pure error of an analysis of the lack of fit: what no model can explain. None where no
+    grasp was repeated.
+    """
+    equal: dict[tuple[float, float, int, int], list[float]] = {}
+    for c in contacts:
+        ratio = c.setting.alpha_2 / c.setting.alpha_1
+        equal.setdefault((c.setting.x_m, ratio, c.case, c.finger), []).append(c.time)
+    repeated = [np.array(times) for times in equal.values() if len(times) > 1]
+    if not repeated:
+        return None
+    squares = sum(float(np.sum((times - times.mean()) ** 2)) for times in repeated)
+    return math.sqrt(squares / sum(len(times) - 1 for times in repeated))
+
+
+def _grasp(c: Contact, parameters: Sequence[Parameter], x: Vector) -> Grasp:
+    values = tuple((p.name, float(value)) for p, value in zip(parameters, x, strict=True))
+    return Grasp(c.setting.x_m, c.setting.alpha_2 / c.setting.alpha_1, c.case, values)
+
+
+def contact_times(job: tuple[System, Grasp]) -> Times:
+    """When the fingers touch in a grasp with a system, in s; at STOP where one does not."""
+    system, grasp = job
+    values = dict(grasp.parameters)
+    own = values.get(RATIO, system.start(RATIO))
+    values |= {"plant.initial_object_position": grasp.x_m, RATIO: own * grasp.ratio}
+    try:
+        result = close(system.with_values({**CASES[grasp.case], **values}), after=0.0)
+    except (InputError, SimulationError) as error:
+        error.args = (f"x_m = {grasp.x_m:g} m, Case {grasp.case}: {error}",)
+        raise
+    return [STOP if t is None else float(t) for t in result.metrics["time_to_contact"]]
+
+
+def _counts(row: Row) -> bool:
+    if row.table == "position":
+        return True
+    _, alpha_1, alpha_2 = row.setting
+    return alpha_1 == alpha_2 != 1.0
+
+
+def _contact(row: Row) -> Contact:
+    where = f"x_m = {row.condition} m" if row.table == "position" else str(row.condition)
+    finger = row.finger or FINGERS[0]
+    return Contact(where, row.setting, row.case, finger, row.published)
+
+
+def _read(place: str, names: Sequence[str], line: Sequence[str]) -> Contact:
+    if len(line) != len(names):
+        raise InputError(f"{place}: {len(line)} entries; must be {len(names)}, as many as columns")
+    numbers: Values = {}
+    for name, text in zip(names, line, strict=True):
+        try:
+            numbers[name] = float(text)
+        except ValueError:
+            raise InputError(f"{place}: {name} = {text!r}: must be a number") from None
+        if not np.isfinite(numbers[name]):
+            raise InputError(f"{place}: {name} = {text}: must be a finite number")
+    case, finger = numbers["case"], numbers["finger"]
+    for name, valid in (("case", tuple(CASES)), ("finger", FINGERS)):
+        if numbers[name] not in valid:
+            raise InputError(
+                f"{place}: {name} = {numbers[name]:g}: must be one of {choices(valid)}"
+            )
+    alphas = [numbers.get(name, 1.0) for name in OPTIONAL]
+    if not (0.0 < numbers["time"] < STOP and min(alphas) > 0.0):
+        raise InputError(
+            f"{place}: time = {numbers['time']:g} s, alpha = {choices(alphas)}: the time must be "
+            f"greater than 0 and less than {STOP:g}, alpha_1 and alpha_2 greater than 0"
+        )
+    label = f"x_m = {numbers['x_m']:g} m"
+    setting = Setting(numbers["x_m"], alphas[0], alphas[1])
+    return Contact(label, setting, int(case), int(finger), numbers["time"])

@@ -1,0 +1,100 @@
+"""The grasps of an evaluation, and what both evaluations claim of them."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError
+from ...recording.result import Result
+from ...system.description import System
+from ..metrics import FINGERS, IMPACT_WINDOW, PLANT, time_at_gap
+from .tables import REFLECTANCE_X_M, Setting
+
+SENSOR_CONTACT = 0.37e-3
+"""m; the gap at which contact, were it declared there, would explain the published times best."""
+
+Claim = tuple[str, bool]
+"""A statement and whether it holds."""
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One grasp of an evaluation; times in s, per finger."""
+
+    setting: Setting
+    case: int
+    metrics: dict[str, Any]
+    times_at_sensor_contact: tuple[float, float]
+    overshoot: float
+    """m by which the target passes the centre of the object, seen from the start."""
+    touch_forces: tuple[float, float]
+    """The highest contact force within IMPACT_WINDOW of touching, in N."""
+    result: Result | None
+    """Every signal, for the runs that the figures show."""
+
+    @property
+    def times(self) -> tuple[float, float]:
+        """When the fingers touch, in s."""
+        first, second = self.metrics["time_to_contact"]
+        return first, second
+
+    @property
+    def apart(self) -> float:
+        """The time difference of contact in s."""
+        first, second = self.times
+        return abs(second - first)
+
+
+Runs = dict[tuple[Setting, int], Run]
+"""By setting and case."""
+
+
+def as_run(result: Result, setting: Setting, case: int) -> Run:
+    """What an evaluation keeps of a grasp; InputError where a finger does not touch."""
+    moments = [time_at_gap(result.time, result.signals, j, SENSOR_CONTACT) for j in FINGERS]
+    first, second = moments
+    if first is None or second is None or None in result.metrics["time_to_contact"]:
+        raise InputError(
+            f"evaluate: x_m = {setting.x_m} m, Case {case}: a finger does not reach the object"
+        )
+    target = result["controller.target_position"]
+    beyond = float(np.max((target - setting.x_m) * math.copysign(1.0, setting.x_m)))
+    shown = result if setting == Setting(REFLECTANCE_X_M) else None
+    right, left = (_touch_force(result, j) for j in FINGERS)
+    return Run(setting, case, dict(result.metrics), (first, second), beyond, (right, left), shown)
+
+
+def _touch_force(result: Result, finger: int) -> float:
+    touch = result.metrics["time_to_contact"][finger - 1]
+    near = (result.time >= touch) & (result.time <= touch + IMPACT_WINDOW)
+    return float(np.abs(result[f"{PLANT}.contact_force[{finger}]"][near]).max())
+
+
+def off_centre(runs: Runs) -> list[Setting]:
+    """The settings in which the object is not in the middle of the fingers."""
+    return sorted({setting for setting, _ in runs if setting.x_m})
+
+
+def balances(runs: Runs, setting: Setting) -> bool:
+    """Whether Case 2 makes the nearer finger, the first, later and the farther one earlier."""
+    (near_1, far_1), (near_2, far_2) = (runs[setting, case].times for case in (1, 2))
+    return near_2 > near_1 and far_2 < far_1
+
+
+def settled_force(system: System) -> float:
+    """K_i·W/2 in N, with which a finger presses in the end where friction does not hold it."""
+    stiffness = system.start("controller.contact_force.stiffness")
+    return 0.5 * stiffness * system.start("plant.object_width")
+
+
+def as_json(claims: Iterable[Claim]) -> list[dict[str, Any]]:
+    """The claims of `evaluate --json`."""
+    return [{"text": text, "holds": bool(holds)} for text, holds in claims]
+
+
+def steady(metrics: dict[str, Any]) -> dict[str, Any]:
+    """The metrics that are the same in every repetition."""
+    return {k: v for k, v in metrics.items() if k not in ("wall_time", "real_time_factor")}

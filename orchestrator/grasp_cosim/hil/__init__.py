@@ -1,0 +1,1 @@
+"""The other side of a proxy, and a bad network."""

@@ -1,0 +1,208 @@
+"""A bench stand-in without its socket: an FMU that does what requests say, or its own clock."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field
+
+from grasp_fmus.link.message import END, INITIALISE
+from grasp_fmus.link.peer import Peer, Request
+
+from ..errors import InputError, SimulationError
+from ..interface.interface import Interface, Value
+from ..system.description import LONGEST
+from ..system.parts import NANOSECONDS
+from .model import Model
+from .wire import wire_signature
+
+BACKLOG = 1_000_000_000
+"""ns by which the model's own clock may be late; beyond that it goes on from now."""
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Serving:
+    """How to serve; InputError where that cannot be.
+
+    lockstep: step on request; else by an own clock, in steps of step_ns or of the length that the
+    proxy asks for. watchdog_ns: without a request for so long the inputs go to what failsafe says,
+    else to their start values; a model that steps on request then stands still.
+    """
+
+    lockstep: bool = False
+    step_ns: int | None = None
+    watchdog_ns: int = 100_000_000
+    failsafe: Mapping[str, Value] = field(default_factory=dict)
+    key: bytes | None = None
+
+
+@dataclass(slots=True)
+class Served:
+    """What was done beside what the peer counts.
+
+    own_steps: steps by the own clock; skipped: those that it left out, being too late;
+    watchdog: how often it put the inputs to their failsafe values.
+    """
+
+    sessions: int = 0
+    own_steps: int = 0
+    skipped: int = 0
+    watchdog: int = 0
+    failures: int = 0
+
+
+DROPPED = {
+    "forged": "without the right key is dropped",
+    "malformed": "that is none of this protocol, or with another kind of key, is dropped",
+    "foreign": "of another interface, or of a session that is not known, is refused",
+    "busy": "of another proxy is refused while a session is under way",
+}
+"""What is said of the first datagram of a kind, by its counter."""
+
+
+class Bench:
+    """Serves one FMU. Times are ns of a monotonic clock. Close it."""
+
+    def __init__(
+        self, interface: Interface, serving: Serving = Serving(), say: Say = lambda _: None
+    ) -> None:
+        """Say gets a line for whatever happens.
+
+        InputError where the FMU cannot be served so, SimulationError where it cannot be set up.
+        """
+        signature, self.notes = wire_signature(interface)
+        self.served = Served()
+        self._serving, self._say = serving, say
+        try:
+            self.peer = Peer(signature, serving.key)
+        except ValueError as error:
+            raise InputError(str(error)) from error
+        self._failsafe = _failsafe(interface, self.peer, serving.failsafe)
+        self._model = Model(interface, signature)
+        self._model.try_out()  # rather now than in the first session, where the proxy waits
+        self._values: list[Value] = []
+        self._in_session = False
+        self._deadline: int | None = None  # of the next own step
+        self._step_ns = 0
+        self._heard: int | None = None  # the last request, while the watchdog watches
+        self._own_failure = ""
+        self._unsaid = dict(DROPPED)
+
+    def close(self) -> None:
+        """End the session under way, and free the FMU."""
+        self._end("the bench is closed")
+
+    def counters(self) -> dict[str, int]:
+        """What was done and what was received, by name."""
+        return {**asdict(self.served), **self.peer.counters.as_dict()}
+
+    def due(self) -> int | None:
+        """When look() has something to do next; None: not before the next datagram."""
+        watchdog = None if self._heard is None else self._heard + self._serving.watchdog_ns
+        return min((m for m in (self._deadline, watchdog) if m is not None), default=None)
+
+    def answer(self, datagram: bytes, source: str, now: int) -> bytes | None:
+        """Do what a datagram says, whatever it holds; what to send back to its source."""
+        action = self.peer.receive(datagram, now)
+        if not isinstance(action, Request):
+            self._say_what_is_dropped(source)
+            return action
+        if action.kind == END:
+            self._end("the proxy ended the session")
+            return None
+        if action.fresh:
+            self._end("another session takes its place")
+            self._in_session = True
+            self._say(f"a session of {source} begins at t = {action.time:.9g} s")
+        try:
+            self._do(action, now)
+            return self.peer.outputs(self._model.outputs(), self._model.time)
+        except (InputError, SimulationError, ValueError) as error:
+            return self._fail(str(error))
+
+    def _say_what_is_dropped(self, source: str) -> None:
+        """The first time only: whoever looks for the reason of a silence looks here."""
+        for counter in [c for c in self._unsaid if getattr(self.peer.counters, c)]:
+            self._say(f"a datagram from {source} {self._unsaid.pop(counter)}")
+
+    def _do(self, request: Request, now: int) -> None:
+        if self._own_failure:
+            raise SimulationError(self._own_failure)
+        self._values = request.values
+        if request.kind == INITIALISE:
+            self._model.initialise(request.time, request.values, request.fresh)
+        elif self._serving.lockstep:
+            self._model.step(request.time, request.step, request.values)
+        else:
+            step_ns = self._own_step(request.step)
+            self._heard = now
+            self._model.begin()
+            self._model.set(request.values)
+            if self._deadline is None:
+                self._step_ns = step_ns
+                self._deadline = now + step_ns
+
+    def _own_step(self, asked: float) -> int:
+        """The step of the own clock in ns, where the proxy asks for one in s."""
+        if self._serving.step_ns is not None:
+            return self._serving.step_ns
+        if not 1.0 <= asked * NANOSECONDS <= LONGEST * NANOSECONDS:
+            raise SimulationError(
+                f"step of {asked!r} s: must be from 1 ns to {LONGEST:g} s, to be the own step"
+            )
+        return round(asked * NANOSECONDS)
+
+    def look(self, now: int) -> None:
+        """Do what is due by the own clock."""
+        try:
+            if self._heard is not None and now - self._heard >= self._serving.watchdog_ns:
+                self._heard = None
+                self.served.watchdog += 1
+                self._say(f"no request for {self._serving.watchdog_ns / 1e9:g} s: inputs failsafe")
+                for i, value in self._failsafe.items():
+                    self._values[i] = value
+                self._model.set(self._values)
+            if self._deadline is not None and now >= self._deadline:
+                self._model.advance(self._model.time, self._step_ns / NANOSECONDS)
+                self.served.own_steps += 1
+                self._deadline += self._step_ns
+                if now - self._deadline > BACKLOG:
+                    skipped = (now - self._deadline) // self._step_ns
+                    self.served.skipped += skipped
+                    self._deadline += skipped * self._step_ns
+        except (InputError, SimulationError) as error:
+            self._own_failure = str(error)
+            self._say(self._own_failure)
+            self._deadline = self._heard = None
+
+    def _fail(self, reason: str) -> bytes:
+        self.served.failures += 1
+        self._end(reason)
+        return self.peer.failed(reason)
+
+    def _end(self, reason: str) -> None:
+        """End the session under way, if there is one."""
+        was_one, self._in_session = self._in_session, False
+        self._deadline = self._heard = None
+        self._own_failure = ""
+        self._model.close()
+        if was_one:
+            self.served.sessions += 1
+            self._say(f"the session is over at t = {self._model.time:.9g} s: {reason}")
+
+
+def _failsafe(interface: Interface, peer: Peer, values: Mapping[str, Value]) -> dict[int, Value]:
+    """The values that the watchdog sets, by their place in a request."""
+    places = {v.name: i for i, v in enumerate(peer.signature.of("input"))}
+    for name in values:
+        if name not in places:
+            raise InputError(
+                f"failsafe {name}: no such input of {interface.path.name}; "
+                f"valid: {', '.join(places) or 'none'}"
+            )
+    zero: dict[str, Value] = {"Real": 0.0, "Integer": 0, "Boolean": False, "String": ""}
+    found: dict[int, Value] = {}
+    for name, place in places.items():
+        start = interface.by_name[name].start
+        chosen = values.get(name, zero[interface.by_name[name].kind] if start is None else start)
+        found[place] = interface.parse(f"failsafe {name}", name, chosen, text=True)
+    return found

@@ -1,0 +1,225 @@
+"""An FMU as a peer runs it: set up anew by each session, stepped with the values of a request."""
+
+from collections.abc import Callable, Mapping, Sequence
+from math import isclose, isfinite
+
+import numpy as np
+import numpy.typing as npt
+from grasp_fmus.link.signature import Signature, WireVariable
+
+from ..errors import SimulationError
+from ..fmi.instance import DISCARD, EARLY, WARNING, Instance, dtype
+from ..fmi.load import load_here
+from ..interface.interface import Interface, Value, Variable
+from ..master.rejection import finish_step
+
+MOST_LOST = 100_000
+"""The most steps that are made up for at once."""
+
+TOLERANCE = 1e-9
+"""s by which a request's time may differ from the model's; relative to the time it is 1e-12."""
+
+
+class Model:
+    """One FMU with at most one instance. Close it.
+
+    SimulationError or InputError where the FMU fails; it must then be set up anew.
+    """
+
+    def __init__(self, interface: Interface, signature: Signature) -> None:
+        self.interface = interface
+        self.time = 0.0
+        self._signature = signature
+        self._outputs = [interface.by_name[v.name] for v in signature.answer]
+        self._instance: Instance | None = None
+        self._stepping = False
+        self._values: list[Value] = []
+        self._clock = np.zeros(1)
+        self._step = 0.0
+        self._bound: Callable[[], int] | None = None
+
+    @property
+    def running(self) -> bool:
+        """Whether there is an instance that has begun to step."""
+        return self._instance is not None and self._stepping
+
+    def try_out(self) -> None:
+        """Make an instance and free it, to see that this can be done."""
+        load_here(self.interface.identifier, self.interface).close()
+
+    def initialise(self, time: float, values: Sequence[Value], fresh: bool) -> None:
+        """Set values in initialisation mode; fresh makes a new instance that starts at time, s."""
+        if fresh or self._instance is None:
+            self._set_up(time, values)
+        else:
+            self._set_changed(values)
+
+    def step(self, time: float, step: float, values: Sequence[Value]) -> None:
+        """Step from time over step, both in s, with these values.
+
+        What is missing before time is made up for first, in steps of the same length.
+        """
+        self.begin()
+        self.set(values)
+        self._catch_up(time, step)
+        self.advance(time, step)
+
+    def begin(self) -> None:
+        """Leave initialisation mode, if not done before."""
+        if not self._stepping:
+            self._required().exit_initialization()
+            self._stepping = True
+
+    def set(self, values: Sequence[Value]) -> None:
+        """Set inputs, and the parameters that are not what they were."""
+        self._put(values)
+        self._set_changed(values, parameters_only=True)
+
+    def advance(self, time: float, step: float) -> None:
+        """Advance by step from time, both in s, with the values as they are."""
+        instance = self._required()
+        self._clock[0] = time
+        status = self._stepper(step)()
+        if status in (DISCARD, EARLY):
+            finish_step(instance, status, time, time + step)
+        elif status > WARNING:
+            raise instance.failure(status, time)
+        self.time = time + step
+
+    def outputs(self) -> list[Value]:
+        """The outputs now, in the order of the signature."""
+        instance = self._required()
+        values = self._get() if self._stepping else instance.get(self._outputs)
+        for v, value in zip(self._outputs, values, strict=True):
+            if isinstance(value, float) and not isfinite(value):
+                raise SimulationError(
+                    f"{self.interface.path.name}: {v.name} = {value} at t = {self.time:.9g} s: "
+                    "must be finite"
+                )
+        return values
+
+    def close(self) -> None:
+        """End and free the instance."""
+        instance, self._instance, self._stepping = self._instance, None, False
+        if instance is not None:
+            instance.close()
+
+    def _required(self) -> Instance:
+        if self._instance is None:
+            raise SimulationError(f"{self.interface.path.name}: stepped before it was initialised")
+        return self._instance
+
+    def _set_up(self, time: float, values: Sequence[Value]) -> None:
+        self.close()
+        self._instance = instance = load_here(self.interface.identifier, self.interface)
+        starts = {v.name: x for v, x in zip(self._signature.request, values, strict=True)}
+        instance.enter_initialization(starts, None, time)
+        self._values, self.time = list(values), time
+        inputs, answer = self._signature.of("input"), self._signature.answer
+        self._put = _putter(instance, inputs)
+        self._get = _getter(instance, answer)
+        self._step, self._bound = 0.0, None
+
+    def _set_changed(self, values: Sequence[Value], parameters_only: bool = False) -> None:
+        changed = [
+            (self.interface.by_name[v.name], new)
+            for v, old, new in zip(self._signature.request, self._values, values, strict=True)
+            if not _same(old, new) and not (parameters_only and v.causality == "input")
+        ]
+        self._values = list(values)
+        if changed:
+            self._required().set([v for v, _ in changed], [new for _, new in changed])
+
+    def _catch_up(self, time: float, step: float) -> None:
+        if isclose(time, self.time, rel_tol=1e-12, abs_tol=TOLERANCE):
+            return
+        missing = (time - self.time) / step
+        if not 0.0 < missing <= MOST_LOST:
+            raise SimulationError(
+                f"{self.interface.path.name}: step from {time:.9g} s: must be from "
+                f"{self.time:.9g} s, or at most {MOST_LOST} steps later"
+            )
+        begin = self.time
+        whole = int(missing + 0.5) if abs(missing - round(missing)) < 1e-3 else int(missing) + 1
+        for k in range(whole):
+            at = begin + k * step
+            self.advance(at, (time if k == whole - 1 else begin + (k + 1) * step) - at)
+
+    def _stepper(self, step: float) -> Callable[[], int]:
+        if self._bound is None or step != self._step:
+            self._step = step
+            self._bound = self._required().stepper(self._clock, step).python
+        return self._bound
+
+
+def _same(old: Value, new: Value) -> bool:
+    return type(old) is type(new) and old == new
+
+
+def _by_type(
+    instance: Instance, variables: Sequence[WireVariable]
+) -> Mapping[str, list[tuple[int, Variable]]]:
+    """Place and variable by FMI type."""
+    found: dict[str, list[tuple[int, Variable]]] = {}
+    for i, v in enumerate(variables):
+        variable = instance.interface.by_name[v.name]
+        found.setdefault(variable.type, []).append((i, variable))
+    return found
+
+
+def _buffer(instance: Instance, fmi_type: str, size: int) -> npt.NDArray[np.generic]:
+    return np.zeros(size, dtype(instance.interface.version, fmi_type))
+
+
+def _checked(instance: Instance, status: int) -> None:
+    if status > WARNING:
+        raise instance.failure(status, 0.0)
+
+
+def _putter(
+    instance: Instance, variables: Sequence[WireVariable]
+) -> Callable[[Sequence[Value]], None]:
+    """A function that sets these variables from the beginning of a list of values."""
+    parts, texts = [], []
+    for fmi_type, found in _by_type(instance, variables).items():
+        if fmi_type == "String":
+            texts += found
+            continue
+        data = _buffer(instance, fmi_type, len(found))
+        call = instance.transfer("set", [v for _, v in found], data).python
+        parts.append((data, [i for i, _ in found], call))
+
+    def put(values: Sequence[Value]) -> None:
+        for data, places, call in parts:
+            data[:] = [values[i] for i in places]
+            _checked(instance, call())
+        if texts:
+            instance.set([v for _, v in texts], [values[i] for i, _ in texts])
+
+    return put
+
+
+def _getter(instance: Instance, variables: Sequence[WireVariable]) -> Callable[[], list[Value]]:
+    """A function that gets the values of these variables, in their order."""
+    parts, texts = [], []
+    kinds = {"Real": float, "Integer": int, "Boolean": bool}
+    for fmi_type, found in _by_type(instance, variables).items():
+        if fmi_type == "String":
+            texts += found
+            continue
+        data = _buffer(instance, fmi_type, len(found))
+        call = instance.transfer("get", [v for _, v in found], data).python
+        parts.append((data, [i for i, _ in found], kinds[found[0][1].kind], call))
+    values: list[Value] = [0.0] * len(variables)
+
+    def get() -> list[Value]:
+        for data, places, kind, call in parts:
+            _checked(instance, call())
+            for i, value in zip(places, data.tolist(), strict=True):
+                values[i] = kind(value)
+        if texts:
+            for (i, _), value in zip(texts, instance.get([v for _, v in texts]), strict=True):
+                values[i] = value
+        return list(values)
+
+    return get

@@ -1,0 +1,68 @@
+"""From an FMU's interface to what a proxy of it and its peer exchange."""
+
+from math import isfinite
+from pathlib import Path
+from typing import Literal
+
+from grasp_fmus.link.message import check_size, read_key
+from grasp_fmus.link.signature import ORDER, Causality, Signature, WireVariable
+
+from ..errors import InputError
+from ..interface.interface import Interface, Variable
+
+WIDE = ("UInt32", "Int64", "UInt64")
+"""Integer types that an Integer of FMI 2.0 does not hold."""
+
+
+def wire_signature(interface: Interface) -> tuple[Signature, list[str]]:
+    """The signature of an FMU, and a note for each parameter that is left out.
+
+    InputError where an input or output cannot be exchanged.
+    """
+    taken: list[WireVariable] = []
+    notes = []
+    for v in interface.of(*ORDER, "structuralParameter"):
+        reason = _obstacle(v)
+        if reason is None:
+            taken.append(WireVariable(v.name, _kind(v), _causality(v), v.unit))
+        elif v.causality in ("input", "output"):
+            raise InputError(
+                f"{interface.path}: {v.causality} {v.name} is {reason}, which a proxy cannot "
+                "exchange; must be a scalar of 64 bit floating point, 32 bit, Boolean or String"
+            )
+        else:
+            notes.append(f"{interface.path.name}: parameter {v.name} is {reason}: left out")
+    try:
+        signature = Signature(tuple(taken))
+        check_size(signature)
+    except ValueError as error:
+        raise InputError(f"{interface.path}: {error}") from error
+    return signature, notes
+
+
+def shared_key(path: Path) -> bytes:
+    """The key in a file; InputError where it is too short to be one."""
+    try:
+        return read_key(path)
+    except ValueError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def _obstacle(v: Variable) -> str | None:
+    if v.causality == "structuralParameter":
+        return "structural"
+    if not v.supported:
+        return f"of type {v.nature}"
+    if v.type in WIDE:
+        return f"of type {v.type}"
+    if v.kind == "Real" and v.start is not None and not isfinite(float(v.start)):
+        return f"{v.start} at the start"
+    return None
+
+
+def _kind(v: Variable) -> Literal["Real", "Integer", "Boolean", "String"]:
+    return v.kind  # type: ignore[return-value]  # the others are not supported
+
+
+def _causality(v: Variable) -> Causality:
+    return v.causality  # type: ignore[return-value]  # these are all that were asked for

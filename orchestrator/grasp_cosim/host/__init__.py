@@ -1,1 +1,0 @@
-"""What an FMU needs of this machine, and what it says about itself."""

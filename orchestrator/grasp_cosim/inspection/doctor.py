@@ -1,0 +1,387 @@
+"""Whether this machine loads an FMU: what would crash a host, found before, each with its fix."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import asdict, dataclass
+from importlib.machinery import ModuleSpec
+from pathlib import Path
+from shlex import quote
+from shutil import which
+from typing import Literal
+from xml.etree import ElementTree
+
+import fmpy
+
+from ..errors import InputError, choices
+from ..files import check_fmu_file
+from .packed_imports import imports
+
+Status = Literal["ok", "warning", "problem"]
+Verdict = tuple[Status, str, str | None]
+"""What a check says: status, text, and the fix where one is needed."""
+
+LINUX = sys.platform == "linux"
+VERSION = f"{sys.version_info.major}.{sys.version_info.minor}"
+LIBPYTHON = f"libpython{VERSION}{getattr(sys, 'abiflags', '')}.so.1.0"
+"""What a host that is not Python needs of this Python."""
+
+_PROCESSORS = {3: "x86", 40: "ARM", 62: "x86-64", 183: "AArch64", 243: "RISC-V"}
+_PACKAGES = {"cv2": "opencv-python", "sklearn": "scikit-learn", "yaml": "pyyaml"}
+"""Processors by their number in ELF; packages that are not called as their module."""
+
+_TRIAL = """
+import sys
+from fmpy.fmi2 import FMU2Slave
+folder, guid, identifier = sys.argv[1:]
+try:
+    fmu = FMU2Slave(guid=guid, unzipDirectory=folder, modelIdentifier=identifier)
+    fmu.instantiate(loggingOn=True)
+except Exception as error:
+    sys.exit(str(error))
+fmu.freeInstance()
+print("freed")
+"""
+
+
+_REPEATED = re.compile(r"^\[FATAL\] .*\nfailed, for the reason logged before\n", re.MULTILINE)
+"""What pythonfmu adds to the reason that an FMU of ours gives."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """What one check found; fix is a command or an instruction to copy."""
+
+    check: str
+    status: Status
+    text: str
+    fix: str | None
+
+
+def examine(fmu: Path | None) -> list[Finding]:
+    """Check this machine and, unless it is None, the FMU, which is also loaded in a child process.
+
+    InputError where fmu is no readable FMU.
+    """
+    if fmu is None:
+        return list(_machine(python=True))
+    with tempfile.TemporaryDirectory(prefix="grasp_doctor_") as folder:
+        unpacked = unpack(fmu, Path(folder))
+        verdicts = {name: check(unpacked) for name, check in CHECKS.items()}
+        found = [Finding(name, *verdict) for name, verdict in verdicts.items() if verdict]
+        return [*_machine(unpacked.python), *found]
+
+
+def as_text(findings: Iterable[Finding]) -> str:
+    """One line each, a fix below its finding."""
+    return "\n".join(
+        f"{f.status:8s} {f.check:12s} {f.text}" + (f"\n{'':21s} fix: {f.fix}" if f.fix else "")
+        for f in findings
+    )
+
+
+def as_json(findings: Iterable[Finding]) -> list[dict[str, str | None]]:
+    """The findings as objects with the keys check, status, text and fix."""
+    return [asdict(finding) for finding in findings]
+
+
+def _machine(python: bool) -> Iterator[Finding]:
+    """The checks without an FMU; python: also those that matter to Python FMUs only."""
+    yield Finding("python", *interpreter(sys.version_info[:3], sys.maxsize))
+    folder = Path(tempfile.gettempdir())
+    noexec = LINUX and bool(os.statvfs(folder).f_flag & os.ST_NOEXEC)
+    yield Finding("temp folder", *temporary_folder(folder, noexec, python))
+    if python and LINUX:
+        yield Finding("libpython", *libpython(find_libpython()))
+        yield Finding("python3", *python_on_path(which("python3")))
+    if python:
+        yield Finding("environment", *environment(os.environ))
+
+
+def interpreter(version: tuple[int, ...], largest: int) -> Verdict:
+    """The running Python: its version and sys.maxsize."""
+    wide = largest > 2**32
+    text = f"{'.'.join(map(str, version))}, {64 if wide else 32} bit, {sys.executable}"
+    if version >= (3, 11) and wide:
+        return "ok", text, None
+    return "problem", f"{text}; must be 64 bit, 3.11 or newer", "install a 64 bit Python"
+
+
+def temporary_folder(folder: Path, noexec: bool, python: bool) -> Verdict:
+    """The folder where FMPy and most hosts unpack an FMU and load it from."""
+    path = folder.as_posix().removeprefix(folder.drive)
+    odd = "".join(dict.fromkeys(re.findall(r"[^\w/ .~-]", path, re.ASCII)))
+    if noexec:
+        text = f"{folder} is mounted with noexec: no FMU loads from there"
+        return "problem", text, "mkdir -p ~/tmp && export TMPDIR=~/tmp"
+    if python and odd:
+        text = f"{folder}: a Python FMU crashes its host on {odd!r} in this path"
+        return "problem", text, "export TMPDIR=/tmp"
+    return "ok", f"{folder}, where FMUs are unpacked", None
+
+
+def find_libpython() -> str | None:
+    """The path of this Python's shared library."""
+    beside = Path(sys.base_prefix, "lib", LIBPYTHON)
+    if beside.is_file():
+        return str(beside)
+    known = _run("/sbin/ldconfig", "-p")[1]
+    found = re.search(rf"^\s*{re.escape(LIBPYTHON)} .*=> (.+)$", known, re.MULTILINE)
+    return found[1] if found else None
+
+
+def libpython(path: str | None) -> Verdict:
+    """The library with which a host that is not Python runs Python FMUs."""
+    if path:
+        return "ok", path, None
+    text = f"no {LIBPYTHON}: hosts that are not Python cannot run Python FMUs"
+    return "warning", text, f"sudo apt install libpython{VERSION}, or what your system calls it"
+
+
+def python_on_path(python3: str | None) -> Verdict:
+    """The python3 on the PATH: an embedded Python looks for its modules beside it."""
+    code = "import sys; print('%d.%d.%d' % sys.version_info[:3])"
+    version = _run(python3, "-c", code)[1].strip() if python3 else ""
+    if version.startswith(f"{VERSION}."):
+        return "ok", f"{version}, {python3}", None
+    text = f"{version or 'none that starts'} on the PATH, not {VERSION}: hosts that are not Python"
+    fix = f"export PATH={quote(str(Path(sys.executable).parent))}:$PATH"
+    return "warning", f"{text} do not find the packages of this Python", fix
+
+
+def environment(environ: Mapping[str, str]) -> Verdict:
+    """PYTHONHOME and PYTHONPATH, which the Python in every host obeys."""
+    home = environ.get("PYTHONHOME", "").partition(":")[0]
+    if home and LINUX and not Path(home, f"lib/python{VERSION}").is_dir():
+        text = f"PYTHONHOME={home} has no lib/python{VERSION}: a Python FMU ends its host"
+        return "warning", text, "unset PYTHONHOME"
+    for entry in filter(None, environ.get("PYTHONPATH", "").split(os.pathsep)):
+        of = re.search(r"python(3\.\d+)", entry)
+        if (of and of[1] != VERSION) or not (Path(entry).is_absolute() and Path(entry).exists()):
+            text = f"PYTHONPATH holds {entry}: relative, not there, or of another Python"
+            return "warning", text, "unset PYTHONPATH"
+    return "ok", "PYTHONHOME and PYTHONPATH do no harm", None
+
+
+def _processor(path: Path) -> str:
+    """The processor for which a binary is made, from its ELF header; empty where it is missing."""
+    if not path.is_file():
+        return ""
+    with path.open("rb") as file:
+        header = file.read(20)
+    if not LINUX:
+        return "a binary"
+    if header[:4] != b"\x7fELF" or len(header) < 20:
+        return "no ELF file"
+    number = int.from_bytes(header[18:], "little")
+    return f"{_PROCESSORS.get(number, f'ELF machine {number}')}, {32 * header[4]} bit"
+
+
+HERE = _processor(Path(sys.executable))
+RUNS = "FMI 2.0, CoSimulation"
+"""The processor of this Python, and what the master runs."""
+
+
+def _run(*command: str, timeout: float = 20.0, cwd: Path | None = None) -> tuple[int | None, str]:
+    """Exit code, None where it does not start or end in time, and output of a program."""
+    try:
+        done = subprocess.run(  # noqa: S603  an FMU's code runs: that is the trial
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+            encoding="utf-8", errors="replace", cwd=cwd, timeout=timeout, check=False,
+        )  # fmt: skip
+    except (OSError, subprocess.TimeoutExpired):
+        return None, ""
+    return done.returncode, done.stdout
+
+
+@dataclass(frozen=True, slots=True)
+class Unpacked:
+    """An unpacked FMU: what its description says, and the binary it would have to have here."""
+
+    folder: Path
+    kind: str
+    tool: str
+    guid: str
+    binary: Path
+    linked: str
+    """What the dynamic linker says of the binary outside of Python; empty where it cannot tell."""
+    python: bool
+    """Whether pythonfmu made it, in any version."""
+
+
+def unpack(fmu: Path, folder: Path) -> Unpacked:
+    """Unpack an FMU to a folder; InputError where it is none."""
+    check_fmu_file(fmu)
+    try:
+        fmpy.extract(fmu, folder)
+        # the FMU's code is run, so its XML is no more of a danger
+        root = ElementTree.parse(folder / "modelDescription.xml").getroot()  # noqa: S314
+    except Exception as error:  # FMPy and zipfile raise whatever they like
+        reason = " ".join(str(error).replace(f"{folder}/", "").split())
+        raise InputError(f"{fmu}: not a readable FMU: {reason}") from error
+    version = root.get("fmiVersion", "unknown")
+    kinds = {e.tag: e for e in root if e.tag in ("CoSimulation", "ModelExchange")}
+    identifier = kinds[min(kinds)].get("modelIdentifier", "") if kinds else ""
+    system = fmpy.platform_tuple if version.startswith("3") else fmpy.platform
+    binary = folder / "binaries" / system / f"{identifier}{fmpy.sharedLibraryExtension}"
+    made = [folder / "resources" / name for name in ("slavemodule.txt", "pythonfmu")]
+    return Unpacked(
+        folder,
+        kind=", ".join([f"FMI {version}", *sorted(kinds)]),
+        tool=root.get("generationTool", "an unknown tool"),
+        guid=root.get("guid", ""),
+        binary=binary,
+        linked=_run("env", "LC_ALL=C", "ldd", "-r", str(binary))[1] if LINUX else "",
+        python=any(p.exists() for p in made)
+        or (binary.is_file() and b"/slavemodule.txt" in binary.read_bytes()),
+    )
+
+
+def description(fmu: Unpacked) -> Verdict:
+    """FMI version and kind, and whether FMPy accepts the description."""
+    source = "Python" if fmu.python else "native, so nothing of Python is checked"
+    text = f"{fmu.kind}, made by {fmu.tool}; {source}"
+    if not fmu.kind.startswith(RUNS):
+        return "problem", f"{text}; must be {RUNS}", "export it again as FMI 2.0 for co-simulation"
+    try:
+        fmpy.read_model_description(fmu.folder)
+    except Exception as error:  # FMPy raises whatever it likes
+        text = f"FMPy refuses modelDescription.xml: {' '.join(str(error).split())}"
+        return "problem", text, "correct the description where the FMU is made"
+    return "ok", text, None
+
+
+def binary(fmu: Unpacked) -> Verdict:
+    """Whether there is a binary for this system and processor."""
+    wanted, its = fmu.binary.relative_to(fmu.folder).as_posix(), _processor(fmu.binary)
+    if its == HERE:
+        return "ok", f"{wanted}, {its}", None
+    if its:
+        return "problem", f"{wanted} is {its}; must be {HERE}", f"build it again for {HERE}"
+    fix = f"build it again for {fmu.binary.parent.name}"
+    if any(fmu.folder.glob("sources/*.c")):
+        fix = "fmpy compile FMU"
+    elif fmu.python:
+        fix += " (pythonfmu 0.7.0 does for linux64 and win64)"
+    there = choices(sorted(f"{p.parent.name}/{p.name}" for p in fmu.folder.glob("binaries/*/*")))
+    return "problem", f"no {wanted}; there is: {there}", fix
+
+
+def host(fmu: Unpacked) -> Verdict | None:
+    """Whether the binary of a Python FMU finds libpython in a host that is not Python."""
+    bound = re.search(r"(libpython\S+) => (not found|\S+)", fmu.linked)
+    path = find_libpython()
+    if bound and bound[2] != "not found":
+        return "ok", f"bound to {bound[1]}, found at {bound[2]}", None
+    if bound:
+        fix = "build it again with pythonfmu 0.7.0, which is bound to no version of Python"
+        if path and Path(path).with_name(bound[1]).exists():
+            fix = f"export LD_LIBRARY_PATH={quote(str(Path(path).parent))}"
+        here = f"/{bound[1]}\n" in Path("/proc/self/maps").read_text()
+        text = f"bound to {bound[1]}, which hosts that are not Python do not find"
+        return "warning" if here else "problem", text if here else f"{text}, nor this one", fix
+    if not re.search("undefined symbol: _?Py", fmu.linked):
+        return None
+    fix = f"LD_PRELOAD={quote(path or LIBPYTHON)} HOST"
+    if "grasp-cosim" in fmu.tool:
+        fix += ", or grasp-cosim build --bind-python"
+    text = "bound to no libpython: hosts that are not Python miss the symbol _Py_NoneStruct"
+    return "warning", text, fix
+
+
+def libraries(fmu: Unpacked) -> Verdict | None:
+    """Whether the dynamic linker finds what the binary needs besides libpython."""
+    if not re.search("=>|statically linked", fmu.linked):
+        return None
+    missing = re.findall(r"(\S+) => not found", fmu.linked)
+    others = [name for name in missing if not name.startswith("libpython")]
+    newer = dict.fromkeys(re.findall(r"version `(\S+)' not found", fmu.linked))
+    symbols = re.findall(r"undefined symbol: (?!_?Py)(\S+)", fmu.linked)
+    if others and fmu.binary.with_name(others[0]).exists():
+        fix = f"patchelf --set-rpath '$ORIGIN' {fmu.binary.name}, and pack the FMU again"
+        return "problem", f"not found though packed: {choices(others)}", fix
+    if others:
+        return "problem", f"not found: {choices(others)}", "install the packages that hold them"
+    if newer:
+        return "problem", f"not on this system: {choices(newer)}", "build it again on this system"
+    if symbols and not missing:
+        fix = "link the binary with the libraries that define them"
+        return "problem", f"undefined symbols: {choices(symbols, 5)}", fix
+    return "ok", f"the dynamic linker finds all{' others' if missing else ''}", None
+
+
+def script(fmu: Unpacked) -> Verdict | None:
+    """Whether the script is there, parses here with what it imports, and has what it imports."""
+    if not fmu.python:
+        return None
+    resources, fix = fmu.folder / "resources", "build it again with pythonfmu"
+    named = resources / "slavemodule.txt"
+    name = named.read_text("utf-8", "replace").partition("\n")[0] if named.is_file() else ""
+    if not (name and (resources / f"{name}.py").is_file()):
+        return "problem", f"no script: resources/slavemodule.txt names {name or 'none'}", fix
+    outside, errors = imports(resources, name)
+    if errors:
+        return "problem", f"no Python {VERSION}: {errors[0]}", "correct it and build the FMU again"
+    outside -= sys.stdlib_module_names
+    if missing := sorted(name for name in outside if not _spec(name)):
+        fix = f"{quote(sys.executable)} -m pip install"
+        fix = " ".join([fix, *(_PACKAGES.get(name, name) for name in missing)])
+        return "problem", f"imports what is neither packed nor installed: {choices(missing)}", fix
+    text = f"resources/{name}.py imports, besides the standard library: {choices(sorted(outside))}"
+    return "ok", text, None
+
+
+def modules(fmu: Unpacked) -> Verdict | None:
+    """Whether a packed module shares its name, for all Python FMUs of a host share sys.modules."""
+    if not fmu.python:
+        return None
+    files = [*fmu.folder.glob("resources/*.py"), *fmu.folder.glob("resources/*/__init__.py")]
+    names = {p.parent.name if p.stem == "__init__" else p.stem for p in files}
+    for name in sorted(names - {"pythonfmu"}):
+        spec = _spec(name)
+        other = "the standard library" if name in sys.stdlib_module_names else spec and spec.origin
+        if other:
+            text = f"packs {name!r}, which is in {other} too: the first one imported serves both"
+            return "warning", text, f"give {name!r} a name of its own and build the FMU again"
+    return "ok", "no packed module has the name of another", None
+
+
+def trial(fmu: Unpacked, timeout: float = 60.0) -> Verdict:
+    """Load, instantiate and free the FMU in a child process, which gets timeout in s."""
+    if not fmu.kind.startswith(RUNS) or _processor(fmu.binary) != HERE:
+        return "warning", "not loaded: of another kind than this master, or without a binary", None
+    started = time.monotonic()
+    arguments = ["-u", "-c", _TRIAL, str(fmu.folder), fmu.guid, fmu.binary.stem]
+    code, said = _run(sys.executable, *arguments, timeout=timeout, cwd=fmu.folder)
+    said = said.replace(f"{fmu.folder}/", "").replace("Failed to instantiate model\n", "")
+    said = _REPEATED.sub("", said)
+    last = ["", *filter(None, map(str.strip, said.splitlines()))][-1]
+    if code is None:
+        return "problem", f"does not load and instantiate within {timeout:g} s", None
+    if code < 0:
+        when = (
+            "after it was freed"
+            if last == "freed"
+            else f"when instantiated; it says {last or 'nothing'}"
+        )
+        return "problem", f"crashes with {signal.Signals(-code).name} {when}", None
+    if code or last != "freed":
+        return "problem", f"does not instantiate: {last or 'no reason given'}", None
+    return "ok", f"loads, instantiates and frees in {time.monotonic() - started:.1f} s", None
+
+
+CHECKS: dict[str, Callable[[Unpacked], Verdict | None]] = {
+    "fmu": description, "binary": binary, "host": host, "libraries": libraries,
+    "script": script, "modules": modules, "trial": trial,
+}  # fmt: skip
+"""The checks of an FMU; None where one does not apply."""
+
+
+def _spec(name: str) -> ModuleSpec | None:
+    """What this Python would import under a name; sys.modules may hold what it did before."""
+    return next(filter(None, (f.find_spec(name, None) for f in sys.meta_path)), None)

@@ -1,0 +1,1 @@
+"""What a metric is: a function of recorded signals."""

@@ -1,0 +1,1 @@
+"""Whether an FMU may take the place of another."""

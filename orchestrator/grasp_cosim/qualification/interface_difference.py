@@ -1,0 +1,400 @@
+"""What a candidate declares otherwise than the FMU it is to replace, and what that means here.
+
+A difference blocks where the closed loop could not run, or would not be the same experiment: a port
+that is wired is missing, of another type or direction, or in a unit that cannot be converted. It
+warns where results may differ, and is a note where nothing in this system depends on it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import inf, isclose
+from typing import Any, Literal
+
+from ..errors import choices
+from ..interface.conversion import IDENTITY, Conversion, Units, conversion
+from ..interface.interface import SUPPORTED, Value
+from ..system.description import System
+from ..system.parts import NANOSECONDS, Port
+
+Severity = Literal["blocks", "warns", "notes"]
+SEVERITIES: tuple[Severity, ...] = ("blocks", "warns", "notes")
+Kind = Literal[
+    "missing", "extra", "type", "causality", "variability", "unit", "range", "items", "start",
+    "dependency", "capability", "system",
+]  # fmt: skip
+Described = Mapping[str, Any]
+"""A variable as inspect_fmu() gives it."""
+
+COMPARED = ("input", "output", "parameter", "structuralParameter")
+"""Other variables are an FMU's own business."""
+
+LOST: Mapping[str, tuple[Severity, str]] = {
+    "canGetAndSetFMUstate": (
+        "warns",
+        "its state cannot be saved: a step that fails is not retried",
+    ),
+    "canSerializeFMUstate": ("notes", "its state cannot be written to a file"),
+    "providesDirectionalDerivative": ("notes", "it gives no derivatives"),
+}
+"""Capabilities of the original that may be missed."""
+
+GAINED: Mapping[str, tuple[Severity, str]] = {
+    "needsExecutionTool": ("warns", "it runs only where its tool is installed"),
+    "canBeInstantiatedOnlyOncePerProcess": ("warns", "one instance per process"),
+    "mightReturnEarlyFromDoStep": ("warns", "it may end a step before its end"),
+}
+"""Declarations of a candidate that restrict it."""
+
+SAME = 1e-12
+"""Relative; starts and limits this close are the same number, written or converted otherwise."""
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """One difference; variable is the system's name, or that of a capability.
+
+    original and candidate are what the two declare, ready for JSON, each in its own unit.
+    """
+
+    severity: Severity
+    kind: Kind
+    variable: str
+    text: str
+    original: Any = None
+    candidate: Any = None
+
+
+@dataclass(frozen=True, slots=True)
+class Use:
+    """What a system does with the variables of a component, by the system's names.
+
+    values are what the original is given. stated are variables for which the system states other
+    numbers in the unit of the original: in events, conditions, faults and factors of wires. tuned
+    are those that events set. loops is what is done with an algebraic loop.
+    """
+
+    component: str
+    wired: frozenset[str]
+    values: Mapping[str, Value]
+    stated: frozenset[str]
+    tuned: frozenset[str]
+    step: float
+    loops: str
+
+    def uses(self, name: str) -> bool:
+        """Whether the system depends on the variable."""
+        return name in self.wired or name in self.values or name in self.stated
+
+
+@dataclass(frozen=True, slots=True)
+class Declared:
+    """What an FMU declares, as inspect_fmu() gives it, under the system's names, and its units."""
+
+    report: Mapping[str, Any]
+    units: Units
+
+    @property
+    def variables(self) -> dict[str, Described]:
+        """The variables by name."""
+        return {v["name"]: v for v in self.report["variables"]}
+
+
+def use_of(system: System, name: str) -> Use:
+    """What the system does with the component of that name."""
+    component = system.component(name, system.name)
+    ends = [(port, wire) for wire in system.wires for port in (wire.source, wire.target)]
+    scaled = [p for p, wire in ends if (wire.factor, wire.offset) != (None, None)]
+    faulty = {fault.target for fault in system.faults}
+    through = [p for p, wire in ends if wire.target in faulty]
+    tuned = [port for event in system.events for port in event.set]
+    conditions = [*(e.when for e in system.events), *(f.when for f in system.faults)]
+    asked = [condition.port for condition in conditions if condition]
+
+    def own(ports: Sequence[Port]) -> frozenset[str]:
+        return frozenset(p.variable for p in ports if p.component == name)
+
+    return Use(
+        name,
+        own([port for port, _ in ends]),
+        component.values,
+        own([*scaled, *through, *tuned, *asked]),
+        own(tuned),
+        (component.step_ns or system.step_ns) / NANOSECONDS,
+        system.initialisation.loops,
+    )
+
+
+def renamed(report: Mapping[str, Any], rename: Mapping[str, str]) -> dict[str, Any]:
+    """The report of inspect_fmu() under the system's names; rename maps those to the FMU's."""
+    names = {own: new for new, own in rename.items()}
+    variables = [
+        {
+            **v,
+            "name": names.get(v["name"], v["name"]),
+            "dependencies": v["dependencies"] and [names.get(d, d) for d in v["dependencies"]],
+        }
+        for v in report["variables"]
+    ]
+    return {**report, "variables": variables}
+
+
+def interface_differences(
+    original: Declared, candidate: Declared, use: Use, given: Mapping[str, Value]
+) -> list[Difference]:
+    """All differences of variables and capabilities, in the order of the original's variables.
+
+    given are values, in the candidate's unit, for variables that only the candidate has.
+    """
+    ours, theirs = original.variables, candidate.variables
+    found: list[Difference] = []
+    for name, variable in ours.items():
+        if variable["causality"] not in COMPARED:
+            continue
+        if name in theirs:
+            change = conversion(
+                original.units, variable["unit"], candidate.units, theirs[name]["unit"]
+            )
+            found += _changed(variable, theirs[name], use, change)
+        else:
+            found.append(_missing(variable, use, theirs.values()))
+    found += [
+        _extra(variable, use, given)
+        for name, variable in theirs.items()
+        if name not in ours and variable["causality"] in COMPARED
+    ]
+    return found + list(capability_differences(original.report, candidate.report, use.step))
+
+
+def _missing(old: Described, use: Use, theirs: Iterable[Described]) -> Difference:
+    name, causality = old["name"], old["causality"]
+    if use.uses(name):
+        alike = [v["name"] for v in theirs if v["causality"] == causality]
+        how = "wired" if name in use.wired else "set" if name in use.values else "used"
+        text = (
+            f"{causality} is {how} in the system, but missing; if it has another name: "
+            f"--rename '{name}=NAME'; its {causality}s: {choices(alike, 8)}"
+        )
+        return Difference("blocks", "missing", name, text)
+    severity: Severity = "warns" if causality == "output" else "notes"
+    return Difference(severity, "missing", name, f"{causality} is missing")
+
+
+def _extra(new: Described, use: Use, given: Mapping[str, Value]) -> Difference:
+    name, causality = new["name"], new["causality"]
+    if causality == "input" and not _supported(new):
+        return Difference("notes", "extra", name, "new input that keeps its start value")
+    if causality == "input" and name not in given:
+        text = f"new input without a source; give it a value: --set '{use.component}.{name}=VALUE'"
+        return Difference("blocks", "extra", name, text)
+    return Difference("notes", "extra", name, f"new {causality}")
+
+
+def _changed(
+    old: Described, new: Described, use: Use, change: Conversion | None
+) -> Iterator[Difference]:
+    """Of a variable that both have; change is from the old unit to the new, None for no way."""
+    name = old["name"]
+    used = use.uses(name)
+    serious: Severity = "blocks" if used else "warns"
+    if family(old["type"]) != family(new["type"]):
+        text = f"is {new['type']}, must be {old['type']}"
+        yield Difference(serious, "type", name, text, old["type"], new["type"])
+        return
+    if old["dimensions"] != new["dimensions"]:
+        text = f"has dimensions {new['dimensions']}, must have {old['dimensions']}"
+        yield Difference(serious, "type", name, text, old["dimensions"], new["dimensions"])
+        return
+    if new["type"] == "Float32" != old["type"]:
+        text = "is Float32: 7 digits instead of 16"
+        yield Difference("warns", "type", name, text, old["type"], new["type"])
+    if old["causality"] != new["causality"]:
+        yield _causality(old, new, use)
+    elif old["variability"] != new["variability"]:
+        yield _variability(old, new, use)
+    if old["unit"] != new["unit"]:
+        yield _unit(old, new, use, change)
+    if change is not None and family(old["type"]) in {"Real", "Integer"}:
+        yield from _range(old, new, use, change)
+    if old["items"] and new["items"] and old["items"] != new["items"]:
+        yield _items(old, new, use)
+    if settable(old) and settable(new):
+        yield from _start(old, new, use, change)
+
+
+def _causality(old: Described, new: Described, use: Use) -> Difference:
+    name, was, now = old["name"], old["causality"], new["causality"]
+    lonely = now == "input" and name not in use.wired and name not in use.values
+    value_only = settable(old) and settable(new) and name not in use.wired
+    severity: Severity = "blocks" if lonely or (use.uses(name) and not value_only) else "warns"
+    more = f", or have a value: --set '{use.component}.{name}=VALUE'" if lonely else ""
+    text = f"is {_a(now)}, must be {_a(was)}{more}"
+    return Difference(severity, "causality", name, text, was, now)
+
+
+def _variability(old: Described, new: Described, use: Use) -> Difference:
+    name, was, now = old["name"], old["variability"], new["variability"]
+    if name in use.tuned and now in ("fixed", "constant"):
+        text = f"is {now}, but an event sets it; must be {was}"
+        return Difference("blocks", "variability", name, text, was, now)
+    severity: Severity = "notes" if settable(old) and old["causality"] != "input" else "warns"
+    return Difference(severity, "variability", name, f"is {now} instead of {was}", was, now)
+
+
+def _unit(old: Described, new: Described, use: Use, change: Conversion | None) -> Difference:
+    name, was, now = old["name"], old["unit"], new["unit"]
+    used: Severity = "blocks" if use.uses(name) else "warns"
+    if change is None:
+        severity, text = used, f"is in {now}, which cannot be converted to {was}"
+    elif was is None or now is None:
+        severity = "notes" if {was, now} == {None, "1"} else "warns"
+        text = f"unit {now or 'not declared'} instead of {was or 'not declared'}: taken as the same"
+    elif change == IDENTITY:
+        severity, text = "notes", f"unit {now} instead of {was}, which is the same"
+    elif name in use.stated:
+        severity = "blocks"
+        text = f"is in {now}, but an event, a fault or the factor of a wire is meant in {was}"
+    elif name in use.values:
+        severity, value = "warns", float(use.values[name])
+        text = f"unit {now} instead of {was}: {value:.9g} {was} becomes {change(value):.9g} {now}"
+    else:
+        severity, text = "warns", f"unit {now} instead of {was}: converted"
+    return Difference(severity, "unit", name, text, was, now)
+
+
+def _range(old: Described, new: Described, use: Use, change: Conversion) -> Iterator[Difference]:
+    """Of what the original takes or gives, that which the candidate does not declare valid."""
+    name, unit = old["name"], f" {new['unit']}" if new["unit"] else ""
+    was = [change(_limit(old["min"], -inf)), change(_limit(old["max"], inf))]
+    now = [_limit(new["min"], -inf), _limit(new["max"], inf)]
+    declared = [old["min"], old["max"]], [new["min"], new["max"]]
+    value = change(float(use.values[name])) if name in use.values else now[0]
+    if not now[0] <= value <= now[1]:
+        text = (
+            f"value {value:.9g}{unit} is set in the system; must be {now[0]:g} to {now[1]:g}{unit}"
+        )
+        yield Difference("blocks", "range", name, text, *declared)
+    elif _less(was[0], now[0]) or _less(now[1], was[1]):
+        severity: Severity = "notes" if old["causality"] == "output" else "warns"
+        text = f"takes {now[0]:g} to {now[1]:g}{unit} instead of {was[0]:g} to {was[1]:g}{unit}"
+        yield Difference(severity, "range", name, text, *declared)
+
+
+def _items(old: Described, new: Described, use: Use) -> Difference:
+    """Of two enumerations; what the system gives or takes are numbers."""
+    name, was, now = old["name"], old["items"], new["items"]
+    moved = [item for item in was if now.get(item) != was[item]]
+    severity: Severity = "blocks" if moved and use.uses(name) else "warns" if moved else "notes"
+    text = f"has other items; not as before: {choices(moved)}"
+    return Difference(severity, "items", name, text, was, now)
+
+
+def _start(
+    old: Described, new: Described, use: Use, change: Conversion | None
+) -> Iterator[Difference]:
+    name, was, now = old["name"], old["start"], new["start"]
+    if name in use.values or _same(was, now, change):
+        return
+    severity: Severity = "notes" if name in use.wired else "warns"
+    units = [f" {v['unit']}" if v["unit"] else "" for v in (new, old)]
+    text = f"starts with {_shown(now)}{units[0]} instead of {_shown(was)}{units[1]}"
+    yield Difference(severity, "start", name, text, was, now)
+
+
+def capability_differences(
+    original: Mapping[str, Any], candidate: Mapping[str, Any], step: float
+) -> Iterator[Difference]:
+    """Of the reports of inspect_fmu(): version, kind and step capability; step in s is the one
+    the component is to make.
+    """
+    versions = original["fmi_version"], candidate["fmi_version"]
+    if versions[0] != versions[1]:
+        text = f"FMI {versions[1]} instead of {versions[0]}"
+        yield Difference("notes", "capability", "fmiVersion", text, *versions)
+    if "co-simulation" not in candidate["kinds"]:
+        text = f"is for {choices(candidate['kinds'])}; must be for co-simulation"
+        yield Difference(
+            "blocks", "capability", "kind", text, original["kinds"], candidate["kinds"]
+        )
+        return
+    ours, theirs = _flags(original), _flags(candidate)
+    for flags, lost in ((LOST, True), (GAINED, False)):
+        for flag, (severity, text) in flags.items():
+            was, now = bool(ours.get(_plain(flag))), bool(theirs.get(_plain(flag)))
+            if was != now and was == lost:
+                yield Difference(severity, "capability", flag, text, was, now)
+    yield from _steps(ours, theirs, candidate["default_experiment"]["step_size"], step)
+
+
+def _steps(
+    ours: Mapping[str, Any], theirs: Mapping[str, Any], default: Any, step: float
+) -> Iterator[Difference]:
+    flag = "canHandleVariableCommunicationStepSize"
+    if ours.get(_plain(flag)) and not theirs.get(_plain(flag)):
+        own = _limit(default, step)
+        severity: Severity = "notes" if isclose(own, step, rel_tol=SAME) else "warns"
+        text = f"steps of one size only: {step:g} s here, its default is {_shown(default)} s"
+        yield Difference(severity, "capability", flag, text, True, False)
+    internal = theirs.get(_plain("fixedInternalStepSize"))
+    size = _limit(internal, 0.0)
+    if size > 0.0 and not isclose(step / size, max(1, round(step / size)), rel_tol=1e-9):
+        text = f"steps by {size:g} s inside, of which the step of {step:g} s is no whole multiple"
+        was = ours.get(_plain("fixedInternalStepSize"))
+        yield Difference("warns", "capability", "fixedInternalStepSize", text, was, internal)
+
+
+def family(type_: str) -> str:
+    """What the system makes of an FMI type of any version: Real, Integer, Boolean, ..."""
+    if type_.startswith(("Real", "Float")):
+        return "Real"
+    return "Integer" if type_.startswith(("Int", "UInt", "Enumeration")) else type_
+
+
+def settable(variable: Described) -> bool:
+    """Whether it can be given a value."""
+    return variable["causality"] in ("input", "parameter", "structuralParameter")
+
+
+def _supported(variable: Described) -> bool:
+    """Whether the master can set it; it leaves other inputs alone."""
+    return family(variable["type"]) in SUPPORTED and not variable["dimensions"]
+
+
+def _flags(report: Mapping[str, Any]) -> dict[str, Any]:
+    return {_plain(flag): value for flag, value in report["capabilities"].items()}
+
+
+def _plain(flag: str) -> str:
+    """A capability by a name that FMI 2 and 3 have in common."""
+    return flag.lower().removesuffix("s")
+
+
+def _limit(declared: Any, absent: float) -> float:
+    """A limit as a number; absent where there is none, or none that is a number."""
+    try:
+        return absent if declared is None else float(declared)
+    except (TypeError, ValueError):
+        return absent
+
+
+def _less(a: float, b: float) -> bool:
+    return a < b and not isclose(a, b, rel_tol=SAME)
+
+
+def _same(was: Any, now: Any, change: Conversion | None) -> bool:
+    """Whether two start values are one, in the unit of each."""
+    if isinstance(was, list) and isinstance(now, list):
+        return len(was) == len(now) and all(map(_same, was, now, [change] * len(was)))
+    numbers = [isinstance(v, float | int) and not isinstance(v, bool) for v in (was, now)]
+    if not all(numbers) or change is None:
+        return bool(was == now)
+    return isclose(change(float(was)), float(now), rel_tol=SAME)
+
+
+def _shown(value: Any) -> str:
+    return "none" if value is None else f"{value:.9g}" if isinstance(value, float) else str(value)
+
+
+def _a(noun: str) -> str:
+    return f"an {noun}" if noun[0] in "aeio" else f"a {noun}"

@@ -1,0 +1,313 @@
+"""Swap qualification: whether an FMU may take the place of another in the closed loop.
+
+First what the candidate declares otherwise. Where nothing of that blocks, the closed loop runs with
+the original and with the candidate, and each signal and metric of the two is compared in its band.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError, SimulationError
+from ..grasp.metrics import OF_OBJECT, UNITS, grasp_metrics
+from ..interface.conversion import IDENTITY
+from ..interface.interface import Value
+from ..master.simulation import simulate
+from ..recording.result import Result
+from ..system.description import SCHEMES, System
+from ..system.parts import NANOSECONDS, Isolation
+from .bands import SHARE, Band, Bands, check_patterns, entry_for, metric_band, signal_band
+from .interface_difference import Difference
+from .swap import Swap, prepare_swap
+from .tube import Curve, curve, deviation
+
+FEWEST_STEPS = 2
+"""The least shift in time a derived band allows, in steps: one for the step, one for the scheme."""
+
+Curves = Mapping[str, Curve]
+
+
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """A signal or metric of both runs, in the unit of the original.
+
+    deviation is the largest (inf where only one run has a value of a metric), time in s when that
+    is, original and candidate are the values then, of one the nearest within the shift that its
+    band allows. span is the range of the original's signal.
+    Metrics have no time and span.
+    """
+
+    name: str
+    unit: str | None
+    band: Band
+    deviation: float
+    original: float | None
+    candidate: float | None
+    time: float | None = None
+    span: float | None = None
+
+    @property
+    def ratio(self) -> float:
+        """The deviation in widths of its band."""
+        if self.deviation == 0.0 or self.band.width == inf:
+            return 0.0
+        return self.deviation / self.band.width if self.band.width else inf
+
+    @property
+    def inside(self) -> bool:
+        """Whether the deviation is in its band."""
+        return self.ratio <= 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Qualification:
+    """The verdict and all that led to it; signals and metrics the worst first.
+
+    failure is why the candidate did not run to the end, None where it did or was not run. numerics
+    are the other runs of the original that derived bands are from. runs are the signals of the
+    original and of the candidate, by name and in the original's units. log is what the candidate's
+    run tells and the original's does not.
+    """
+
+    swap: Swap
+    signals: tuple[Compared, ...] = ()
+    metrics: tuple[Compared, ...] = ()
+    failure: str | None = None
+    numerics: tuple[str, ...] = ()
+    runs: tuple[Curves, Curves] = ({}, {})
+    log: tuple[str, ...] = ()
+
+    @property
+    def blocks(self) -> tuple[Difference, ...]:
+        """The differences that kept the candidate from being run."""
+        return tuple(d for d in self.swap.differences if d.severity == "blocks")
+
+    @property
+    def outside(self) -> tuple[Compared, ...]:
+        """The signals and metrics that are out of their bands."""
+        return tuple(c for c in (*self.signals, *self.metrics) if not c.inside)
+
+    @property
+    def uncompared(self) -> tuple[str, ...]:
+        """The signals of the original that the candidate's run lacks, or has in no such unit."""
+        return tuple(name for name in self.runs[0] if name not in self.runs[1])
+
+    @property
+    def qualified(self) -> bool:
+        """Whether the candidate may take the original's place."""
+        return not (self.blocks or self.failure or self.outside)
+
+
+def qualify(
+    system: System,
+    component: str,
+    candidate: str | Path,
+    *,
+    rename: Mapping[str, str] | None = None,
+    values: Mapping[str, Value] | None = None,
+    bands: Bands | None = None,
+    isolation: Isolation = "process",
+    progress: bool = False,
+) -> Qualification:
+    """Compare a candidate FMU with that of a component, as declared and in the closed loop.
+
+    rename maps the system's names to the candidate's. values like {'plant.object_width': 0.06} are
+    set in both systems, in the unit of the original, or in the one that has such a variable. bands
+    are derived where they are not given. The candidate runs in a process of its own, which a crash
+    does not leave, unless isolation says otherwise. InputError where the input is wrong or the
+    original refuses, SimulationError where the original fails, KeyboardInterrupt at Ctrl-C.
+    """
+    bands = bands or Bands()
+    swap = prepare_swap(system, component, Path(candidate), rename or {}, values or {}, isolation)
+    if swap.swapped is None:
+        return Qualification(swap)
+    reference = _run(swap.system, progress)
+    original = _curves(reference)
+    _check(bands, original)
+    result, failure = _attempt(swap.swapped, progress)
+    again: tuple[Curves, ...] = ()
+    numerics: tuple[str, ...] = ()
+    if _derives(bands, original):
+        again, numerics = _other_numerics(swap.system, original, progress)
+    candidate_curves = _converted(_curves(result), swap) if result else {}
+    judge = _Judge(swap, bands, reference.units, original, again)
+    return Qualification(
+        swap,
+        judge.signals(candidate_curves),
+        () if failure else judge.metrics(candidate_curves),
+        failure,
+        numerics,
+        (original, candidate_curves),
+        tuple(line for line in result.log if line not in reference.log) if result else (),
+    )
+
+
+def _run(system: System, progress: bool) -> Result:
+    result = simulate(system, progress=progress)
+    if not result.complete:
+        raise KeyboardInterrupt
+    return result
+
+
+def _attempt(system: System, progress: bool) -> tuple[Result | None, str | None]:
+    """The candidate's run, as far as it came, and why not further."""
+    try:
+        return _run(system, progress), None
+    except SimulationError as error:
+        return error.result, str(error)
+    except InputError as error:  # does not load, or refuses its initialisation
+        return None, str(error)
+
+
+def _derives(bands: Bands, original: Curves) -> bool:
+    """Whether a width is left to be derived."""
+    given = [
+        *(entry_for(bands.signals, name) for name in original),
+        *(entry_for(bands.metrics, name, _plain(name)) for name in _values(original)),
+    ]
+    return not all(entry and entry.wide for entry in given)
+
+
+def _other_numerics(
+    system: System, original: Curves, progress: bool
+) -> tuple[tuple[Curves, ...], tuple[str, ...]]:
+    """The original with twice the step and in the other scheme, as far as it runs so, and thinned.
+
+    And what they are, in words.
+    """
+    runs: list[Curves] = [{n: c.thinned(first) for n, c in original.items()} for first in (0, 1)]
+    said = ["every second sample"]
+    for name, other in _variants(system):
+        try:
+            runs.append(_curves(_run(other, progress)))
+            said.append(name)
+        except (InputError, SimulationError) as error:
+            said.append(f"not {name}: {error}")
+    return tuple(runs), tuple(said)
+
+
+def _variants(system: System) -> Iterator[tuple[str, System]]:
+    twice = 2 * system.step_ns
+    steps = [system.stop_ns, *(c.step_ns for c in system.components if c.step_ns is not None)]
+    if not any(step % twice for step in steps):
+        step = twice / NANOSECONDS
+        yield f"step {step:g} s", system.with_experiment(step=step)
+    for scheme in SCHEMES:
+        if scheme != system.scheme:
+            yield f"scheme {scheme}", system.with_experiment(scheme=scheme)
+
+
+def _curves(result: Result) -> dict[str, Curve]:
+    return {name: curve(result.time, values) for name, values in result.items()}
+
+
+def _converted(curves: Curves, swap: Swap) -> dict[str, Curve]:
+    """The signals in the original's units, but for those that cannot be."""
+    changes = {name: swap.back.get(name, IDENTITY) for name in curves}
+    return {
+        name: Curve(c.time, change(c.values), c.held)
+        for name, c in curves.items()
+        if (change := changes[name]) is not None
+    }
+
+
+def _check(bands: Bands, original: Curves) -> None:
+    """InputError where an entry of the bands is for nothing."""
+    check_patterns(f"{bands.place}: [signals]", bands.signals, tuple(original))
+    metrics = [n for name in _values(original) for n in dict.fromkeys((_plain(name), name))]
+    check_patterns(f"{bands.place}: [metrics]", bands.metrics, metrics)
+
+
+@dataclass(frozen=True, slots=True)
+class _Judge:
+    """Compares a candidate's run with the original's; again are its runs with other numerics."""
+
+    swap: Swap
+    bands: Bands
+    units: Mapping[str, str | None]
+    original: Curves
+    again: tuple[Curves, ...]
+
+    @property
+    def shift(self) -> float:
+        """The shift in time in s that a derived band allows."""
+        system = self.swap.system
+        return max(SHARE * system.stop_ns, FEWEST_STEPS * system.step_ns) / NANOSECONDS
+
+    def signals(self, candidate: Curves) -> tuple[Compared, ...]:
+        """All signals that both have, up to the end of the candidate's run."""
+        found = [self._signal(n, candidate[n]) for n in self.original if n in candidate]
+        return tuple(sorted(found, key=lambda c: -c.ratio))
+
+    def metrics(self, candidate: Curves) -> tuple[Compared, ...]:
+        """All metrics of the original; one that the candidate's run lacks is None there.
+
+        But for those of the object for which the candidate has no such output as the original.
+        """
+        values, theirs = _values(self.original), _values(candidate)
+        others = [_values(run) for run in self.again]
+        found = []
+        for name, value in values.items():
+            if name in OF_OBJECT and name not in theirs:
+                continue
+            given = entry_for(self.bands.metrics, name, _plain(name))
+            least = self._least(UNITS[_plain(name)])
+            band = metric_band(value, [run.get(name) for run in others], least, given)
+            found.append(_metric(name, band, value, theirs.get(name)))
+        return tuple(sorted(found, key=lambda c: -c.ratio))
+
+    def _least(self, unit: str | None) -> float:
+        """The smallest derived width of a metric in that unit, see metric_band."""
+        return self.shift if unit == "s" else SHARE if unit == "1" else 0.0
+
+    def _signal(self, name: str, candidate: Curve) -> Compared:
+        reference = self.original[name]
+        given = entry_for(self.bands.signals, name)
+        others = [run[name] for run in self.again]
+        band = signal_band(reference, others, self.swap.nominals.get(name), self.shift, given)
+        apart = deviation(reference.until(float(candidate.time[-1])), candidate, band.time)
+        worst = int(apart.values.argmax())
+        return Compared(
+            name,
+            self.units[name],
+            band,
+            float(apart.values[worst]),
+            float(apart.reference[worst]),
+            float(apart.candidate[worst]),
+            float(apart.time[worst]),
+            float(np.ptp(reference.values)),
+        )
+
+
+def _metric(name: str, band: Band, original: float | None, candidate: float | None) -> Compared:
+    if original is None or candidate is None:
+        apart = 0.0 if original is candidate else inf
+    else:
+        apart = abs(candidate - original)
+    return Compared(name, UNITS[_plain(name)], band, apart, original, candidate)
+
+
+def _values(curves: Curves) -> dict[str, float | None]:
+    """The grasp's metrics by name, like time_to_contact[1] where there is one per finger.
+
+    One that is true or false is 1 or 0, as such a signal is.
+    """
+    if not curves:
+        return {}
+    time = next(iter(curves.values())).time
+    found: dict[str, float | bool | None] = {}
+    for name, value in grasp_metrics(time, {n: c.values for n, c in curves.items()}).items():
+        if isinstance(value, list):
+            found.update({f"{name}[{i}]": v for i, v in enumerate(value, start=1)})
+        else:
+            found[name] = value
+    return {name: None if value is None else float(value) for name, value in found.items()}
+
+
+def _plain(metric: str) -> str:
+    return metric.partition("[")[0]

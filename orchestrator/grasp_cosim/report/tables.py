@@ -1,0 +1,165 @@
+"""What a run was and what came of it, as HTML: the metrics and the settings of its run.json."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from typing import Any
+
+from ..grasp.metrics import FINGERS, LABELS
+
+EXPERIMENT = (
+    "system",
+    "step",
+    "stop",
+    "scheme",
+    "initialisation",
+    "steps",
+    "wall_time",
+    "real_time_factor",
+    "complete",
+)
+"""Entries of run.json that say how the run was made, in the order in which they are shown."""
+
+SETTINGS = ("components", "wires", "events", "faults", "log", "rejections")
+"""Those that are shown as lists of their own."""
+
+TIMING, PROXIES = "realtime", "proxies"
+"""The entries that a paced run has more, its timing, and one with proxies: the log has them."""
+
+_ABOUT_SIGNALS = ("units", "types", "descriptions")
+_UNITS = {"step": "s", "stop": "s", "wall_time": "s"}
+
+
+def summary(run: Mapping[str, Any]) -> str:
+    """One line on the run."""
+    text = escape(
+        f"{number(run['stop'])} s in {count(run['steps'])} steps of "
+        f"{number(1e3 * run['step'])} ms, {run['scheme']}, "
+        f"{number(run['real_time_factor'], 3)} times as fast as real time"
+    )
+    if not run["complete"]:
+        text += ' <span class="warn">not complete: interrupted, or failed on the way</span>'
+    return text
+
+
+def metrics_table(run: Mapping[str, Any]) -> str:
+    """The metrics of the grasp with a column per finger, then any others as they are."""
+    known = [entry for entry in LABELS if entry[1] in run]
+    shown = {
+        *(key for _, key, _, _ in LABELS),
+        *EXPERIMENT,
+        *SETTINGS,
+        *_ABOUT_SIGNALS,
+        TIMING,
+        PROXIES,
+    }
+    others = [key for key in run if key not in shown]
+    if not known and not others:
+        return "<p>There are no metrics of this system.</p>"
+    rows = [_metric(label, run[key], factor, unit) for label, key, factor, unit in known]
+    rows += [_metric(key.replace("_", " "), run[key], 1.0, "") for key in others]
+    fingers = "".join(f'<th class="n"><span class="key{j}">finger {j}</span></th>' for j in FINGERS)
+    return table(f"<th></th>{fingers}<th></th>" if known else "", rows)
+
+
+def settings_html(run: Mapping[str, Any]) -> str:
+    """Components, experiment, events, faults, log and discarded steps."""
+    components = [
+        (
+            f"<td>{escape(name)}</td><td>{escape(c['fmu'])}</td>"
+            f'<td class="w">{escape(entries(c["values"])) or "as the FMU starts"}</td>'
+            f"<td>{escape(_how(c))}</td>"
+        )
+        for name, c in run["components"].items()
+    ]
+    heads = "<th>component</th><th>FMU</th><th>start values given</th><th></th>"
+    experiment = [
+        f"<td>{escape(key.replace('_', ' '))}</td>"
+        f"<td>{escape(_plain(run[key]))} {_UNITS.get(key, '')}</td>"
+        for key in EXPERIMENT
+    ]
+    lists = [
+        bullets("Events", map(entries, run["events"]), "No events."),
+        bullets("Faults on wires", map(entries, run["faults"]), "No faults."),
+        bullets("Log", run["log"], "Nothing to report."),
+        bullets(
+            "Steps discarded or cut short",
+            (f"{name}: {entries(about)}" for name, about in run["rejections"].items()),
+            "None.",
+        ),
+    ]
+    return (
+        f"<h3>Components, in the order of execution</h3>{table(heads, components)}"
+        f'<div class="two"><section><h3>Experiment</h3>{table("", experiment)}</section>'
+        f"{''.join(lists)}</div>"
+    )
+
+
+def table(heads: str, rows: Iterable[str]) -> str:
+    """A table of rows of cells that are HTML already."""
+    head = f"<thead><tr>{heads}</tr></thead>" if heads else ""
+    body = "".join(f"<tr>{row}</tr>" for row in rows)
+    return f'<div class="scroll"><table>{head}<tbody>{body}</tbody></table></div>'
+
+
+def bullets(title: str, lines: Iterable[str], none: str) -> str:
+    """A list below a title, each line as a text; none is said where there are no lines."""
+    items = "".join(f"<li>{escape(line)}</li>" for line in lines)
+    body = f'<ul class="plain">{items}</ul>' if items else f'<p class="hint">{none}</p>'
+    return f"<section><h3>{title}</h3>{body}</section>"
+
+
+def entries(values: Mapping[str, Any]) -> str:
+    """Like a = 1, b = 2; a mapping within in brackets."""
+    return ", ".join(
+        f"{key} = " + (f"({_plain(v)})" if isinstance(v, Mapping) else number(v))
+        for key, v in values.items()
+    )
+
+
+def number(value: Any, digits: int = 6) -> str:
+    """A value for the eye: floats with so many figures, True and False in words."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.{digits}g}"
+    if value is None:
+        return "none"
+    return str(value)
+
+
+def count(value: int) -> str:
+    """A whole number in groups of three digits."""
+    return f"{value:,}".replace(",", "\N{NARROW NO-BREAK SPACE}")
+
+
+def _metric(label: str, value: Any, factor: float, unit: str) -> str:
+    """A row: a pair has a cell per finger, anything else one across both."""
+    pair = isinstance(value, Sequence) and not isinstance(value, str) and len(value) == 2
+    values = value if pair else [value]
+    how = ' class="n"' if pair else ' class="both" colspan="2"'
+    cells = "".join(f"<td{how}>{escape(_scaled(v, factor))}</td>" for v in values)
+    return f"<td>{escape(label)}</td>{cells}<td>{escape(unit)}</td>"
+
+
+def _scaled(value: Any, factor: float) -> str:
+    if isinstance(value, float):
+        return f"{factor * value:.4f}" if factor * abs(value) < 1e4 else number(factor * value)
+    return _plain(value)
+
+
+def _plain(value: Any) -> str:
+    return entries(value) if isinstance(value, Mapping) else number(value)
+
+
+def _how(component: Mapping[str, Any]) -> str:
+    """What is special about a component: its own step, its own process, other names."""
+    parts = []
+    if component["step"] is not None:
+        parts.append(f"step {number(1e3 * component['step'])} ms")
+    if component["isolation"] != "none":
+        parts.append(f"isolation: {component['isolation']}")
+    if component["rename"]:
+        parts.append("renamed: " + ", ".join(f"{k} is {v}" for k, v in component["rename"].items()))
+    return "; ".join(parts)

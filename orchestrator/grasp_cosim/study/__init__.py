@@ -1,1 +1,0 @@
-"""Figures of merit, and comparisons of runs."""
