@@ -2,7 +2,7 @@
 
     python -m benchmarks.masters [--cofmupy-python PYTHON]
 
-Runs the loop of four instances and ten wires at 10 kHz with the Jacobi scheme, everything
+Runs the loop of four instances and ten connections at 10 kHz with the Jacobi scheme, everything
 recorded, on our Python FMUs and on native ones of the same shape, in short chunks, one master after
 the other. Prints the table of README.md. A master that is not installed is skipped by
 name; cofmupy pins an FMPy and a matplotlib of its own, so it may be in an environment of its own.

@@ -91,7 +91,7 @@ def kills(system: System, folder: Path) -> None:
         v.name: 0.1 * (-1) ** i for i, v in enumerate(part.interface.of("input"))
     }
     part = replace(part, values={**part.values, **values, "proxy.timeout": TIMEOUT})
-    alone = replace(whole, components=(part,), wires=())
+    alone = replace(whole, components=(part,), connections=())
     took = []
     for seed in range(KILLS):
         child, port = peers.start()

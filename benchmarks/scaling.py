@@ -15,7 +15,7 @@ from pathlib import Path
 
 from grasp_cosim import System, simulate
 from grasp_cosim.grasp.system import SYSTEM
-from grasp_cosim.system.parts import Port, Wire
+from grasp_cosim.system.parts import Connection, Port
 from grasp_fmus.build import build
 
 from benchmarks.native_fmus import build_native
@@ -42,7 +42,7 @@ def star(folder: Path, instances: int) -> System:
     return replace(
         grasp,
         components=(plant, *sensors),
-        wires=tuple(Wire(gap, Port(s.name, "gap")) for s in sensors),
+        connections=tuple(Connection(gap, Port(s.name, "gap")) for s in sensors),
     )
 
 

@@ -14,7 +14,7 @@ from grasp_cosim.master.engine import Engine
 from grasp_cosim.master.master import Master
 from grasp_cosim.recording.dispatch import Dispatcher
 from grasp_cosim.recording.memory import MemoryListener
-from grasp_cosim.system.parts import Component, Wire
+from grasp_cosim.system.parts import Component, Connection
 
 Function = Callable[[float, float], float]
 
@@ -136,23 +136,25 @@ class Mock:
 
 def make_system(
     mocks: Sequence[Mock],
-    wires: Sequence[Wire],
+    connections: Sequence[Connection],
     steps: int = 4,
     step_ns: int = 100_000_000,
     **more: Any,
 ) -> System:
     """A system of mocks; more are other fields of System, and `own`: steps by name.
 
-    An input without a wire is given what the mock has there.
+    An input without a connection is given what the mock has there.
     """
     own = more.pop("own", {})
-    wired = {wire.target.component for wire in wires}
+    connected = {connection.target.component for connection in connections}
     components = tuple(
-        Component(m.name, m.path, {} if m.name in wired else {"u": m.u}, step_ns=own.get(m.name))
+        Component(
+            m.name, m.path, {} if m.name in connected else {"u": m.u}, step_ns=own.get(m.name)
+        )
         for m in mocks
     )
     more.setdefault("scheme", "sequential")
-    return System("mock.toml", components, tuple(wires), step_ns, step_ns * steps, **more)
+    return System("mock.toml", components, tuple(connections), step_ns, step_ns * steps, **more)
 
 
 class Run:

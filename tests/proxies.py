@@ -1,4 +1,4 @@
-"""Both ends of the wire: an FMU that is served, its proxy, and a proxy's side by hand."""
+"""Both ends of the connection: an FMU that is served, its proxy, and a proxy's side by hand."""
 
 import socket
 import threading

@@ -30,7 +30,7 @@ from grasp_fmus.link.message import (
     Message,
     Sealer,
 )
-from grasp_fmus.link.signature import Signature, WireVariable
+from grasp_fmus.link.signature import LinkVariable, Signature
 from grasp_fmus.proxy import Fmi2Proxy
 from grasp_fmus.variable import TYPES, Variable
 
@@ -51,7 +51,7 @@ VARIABLES = (
 """One of each kind and causality; what the peer answers is in answers()."""
 
 SIGNATURE = Signature(
-    tuple(WireVariable(v.name, TYPES[v.kind], v.causality, v.unit or None) for v in VARIABLES)
+    tuple(LinkVariable(v.name, TYPES[v.kind], v.causality, v.unit or None) for v in VARIABLES)
 )
 
 

@@ -172,7 +172,7 @@ def assert_formulas(carried: Any, converter: Any, friction: Any) -> None:
 
 
 def assert_loop(loop: Any) -> None:
-    """Steps of 30 ms go well; with 40 ms layer 2 swings; 8 ms do with a delay at each wire."""
+    """Steps of 30 ms go well; with 40 ms layer 2 swings; 8 ms do, delayed at each connection."""
 
     def swings(run: Any) -> int:
         force = run.signals["controller.impact_reduction_force[1]"]

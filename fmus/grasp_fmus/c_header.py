@@ -13,7 +13,7 @@ from string import Template
 from typing import NamedTuple
 
 from .link.message import HEAD, STRING_SIZE, TAG_SIZE, Codec, Value, check_size
-from .link.signature import HASH_SIZE, Causality, Signature, WireVariable
+from .link.signature import HASH_SIZE, Causality, LinkVariable, Signature
 
 TEMPLATE = Path(__file__).with_name("link.h.in")
 
@@ -55,7 +55,7 @@ _TAKEN = frozenset(
 class Member(NamedTuple):
     """A variable in C: what it is called, and where it begins in a body, in bytes."""
 
-    variable: WireVariable
+    variable: LinkVariable
     identifier: str
     offset: int
 
@@ -175,7 +175,7 @@ def _declaration(m: Member) -> str:
     return f"{_TYPES[m.variable.kind]} {m.identifier}{size};"
 
 
-def _described(v: WireVariable, descriptions: Mapping[str, str]) -> str:
+def _described(v: LinkVariable, descriptions: Mapping[str, str]) -> str:
     named = f"{v.name}, {v.unit}" if v.unit else v.name
     description = descriptions.get(v.name)
     return f"{named}: {description.replace('·', '.')}" if description else named
@@ -197,7 +197,7 @@ def _defaults(group: Group, starts: Mapping[str, Value]) -> str:
     )
 
 
-def _literal(v: WireVariable, value: Value) -> str:
+def _literal(v: LinkVariable, value: Value) -> str:
     """A start value in C."""
     try:
         packed = Codec([v]).unpack(Codec([v]).pack([value]))

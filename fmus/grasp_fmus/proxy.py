@@ -16,7 +16,7 @@ from .connection import Connection
 from .host_log import WARNING
 from .link.client import Client
 from .link.message import FAILED, PORT, STRING_SIZE, read_key
-from .link.signature import Kind, Signature, WireVariable
+from .link.signature import Kind, LinkVariable, Signature
 from .variable import TYPES, Scalar, Variable
 
 TIMEOUT = 0.01
@@ -142,12 +142,12 @@ class Fmi2Proxy(Slave):
     clock: Callable[[], int] = staticmethod(monotonic_ns)
 
     def _prepare(self) -> None:
-        wire = Signature(tuple(_wire(v) for v in self.variables))
-        outputs = self.variables[len(wire.request) :]
-        self._signature = wire
+        exchanged = Signature(tuple(_as_sent(v) for v in self.variables))
+        outputs = self.variables[len(exchanged.request) :]
+        self._signature = exchanged
         self._variables = [*map(_limited, self.variables), *own_variables(outputs, self.settings)]
         self._values = [ZEROS[v.kind] if v.start is None else v.start for v in self._variables]
-        sizes = (len(wire.request), n := len(outputs), len(Settings._fields), n, n)
+        sizes = (len(exchanged.request), n := len(outputs), len(Settings._fields), n, n)
         self._request, self._outputs, self._settings, self._holds, self._failsafes = _slices(sizes)
         self._diagnostics = slice(self._failsafes.stop, len(self._values))
         self._connection: Connection | None = None
@@ -354,13 +354,13 @@ def _slices(sizes: Sequence[int]) -> list[slice]:
     return [slice(end - size, end) for size, end in zip(sizes, ends, strict=True)]
 
 
-def _wire(v: Variable) -> WireVariable:
+def _as_sent(v: Variable) -> LinkVariable:
     kind: Kind = TYPES[v.kind]
-    return WireVariable(v.name, kind, v.causality, v.unit or None)
+    return LinkVariable(v.name, kind, v.causality, v.unit or None)
 
 
 def _limited(v: Variable) -> Variable:
-    """As a host may set it: the peer checks values, but for what the wire cannot carry."""
+    """As a host may set it: the peer checks values, but for what cannot be sent."""
     return replace(v, limits=(0, STRING_SIZE - 1)) if v.kind is str else v
 
 

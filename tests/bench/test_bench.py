@@ -13,7 +13,7 @@ import pytest
 from grasp_cosim.errors import InputError
 from grasp_cosim.fmi.load import load_here
 from grasp_cosim.hil.bench import BACKLOG, Bench, Serving
-from grasp_cosim.hil.wire import wire_signature
+from grasp_cosim.hil.protocol import link_signature
 from grasp_cosim.interface.interface import Value, read_interface
 from proxies import HandProxy
 
@@ -28,7 +28,7 @@ class Clocked:
         self.now = 10_000 * MS
         self.said: list[str] = []
         self.bench = Bench(read_interface(fmu), serving, self.said.append)
-        signature, _ = wire_signature(read_interface(fmu))
+        signature, _ = link_signature(read_interface(fmu))
         self.proxy = HandProxy(signature, lambda d: self.bench.answer(d, "test", self.now))
 
     def wait(self, milliseconds: float) -> None:
@@ -59,7 +59,7 @@ def clocked() -> Iterator[MakeClocked]:
 def starts(fmu: Path, **values: Value) -> list[Value]:
     """A request's values: the start values, but for those given by name."""
     interface = read_interface(fmu)
-    signature, _ = wire_signature(interface)
+    signature, _ = link_signature(interface)
     declared = {v.name: interface.by_name[v.name].start or "" for v in signature.request}
     return [
         values.get(name, interface.parse("", name, start, text=True))
@@ -298,7 +298,7 @@ def test_every_type_there_and_back(tmp_path: Path, clocked: MakeClocked) -> None
 def test_what_a_proxy_cannot_exchange_is_refused_by_name(tmp_path: Path) -> None:
     fmu = native_fmus.build(tmp_path, "Native", "3.0")
     with pytest.raises(InputError, match=r"input u_UInt32 is of type UInt32, which a proxy cannot"):
-        wire_signature(read_interface(fmu))
+        link_signature(read_interface(fmu))
 
 
 def test_an_output_that_is_not_finite_is_a_failure(tmp_path: Path, clocked: MakeClocked) -> None:

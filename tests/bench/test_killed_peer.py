@@ -93,7 +93,7 @@ def proxied(grasp: System, tmp_path_factory: pytest.TempPathFactory) -> System:
     }
     part = replace(controller, fmu=proxy, values=values)
     return replace(
-        grasp.with_experiment(step=1e-3, stop=STEPS * 1e-3), components=(part,), wires=()
+        grasp.with_experiment(step=1e-3, stop=STEPS * 1e-3), components=(part,), connections=()
     )
 
 

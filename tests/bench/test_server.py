@@ -17,8 +17,8 @@ import pytest
 from grasp_cosim import cli
 from grasp_cosim.errors import InputError
 from grasp_cosim.hil.bench import Bench, Serving
+from grasp_cosim.hil.protocol import link_signature
 from grasp_cosim.hil.server import Server
-from grasp_cosim.hil.wire import wire_signature
 from grasp_cosim.interface.interface import read_interface
 from grasp_fmus.link.message import LARGEST
 from proxies import HandProxy, UdpAsk, serving, wait_until
@@ -28,14 +28,14 @@ KEY = b"a key of 16 byte"
 
 @contextmanager
 def proxied(fmu: Path, server: Server, key: bytes | None = None) -> Iterator[HandProxy]:
-    signature, _ = wire_signature(read_interface(fmu))
+    signature, _ = link_signature(read_interface(fmu))
     with UdpAsk(server.address) as ask:
         yield HandProxy(signature, ask, key)
 
 
 def requests(fmu: Path) -> list[float | int | bool | str]:
     interface = read_interface(fmu)
-    signature, _ = wire_signature(interface)
+    signature, _ = link_signature(interface)
     return [
         interface.parse("", v.name, interface.by_name[v.name].start or "", text=True)
         for v in signature.request
@@ -137,7 +137,7 @@ def test_the_command_serves_until_it_is_interrupted(fmus: Path) -> None:
         assert line.startswith("serving ProximitySensor.fmu at 127.0.0.1:")
         port = int(line.rpartition(":")[2].partition(",")[0])
         fmu = fmus / "ProximitySensor.fmu"
-        signature, _ = wire_signature(read_interface(fmu))
+        signature, _ = link_signature(read_interface(fmu))
         with UdpAsk(("127.0.0.1", port)) as ask:
             HandProxy(signature, ask).begin(1, requests(fmu))
         process.send_signal(signal.SIGINT)

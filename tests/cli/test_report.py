@@ -112,7 +112,7 @@ def test_a_run_as_it_is_recorded_makes_a_page(grasp: System, tmp_path: Path) -> 
     assert cli.main(["report", str(tmp_path)]) == 0
     html = (tmp_path / "report.html").read_text("utf-8")
     assert all(f"{c.name}</text>" in html for c in grasp.components)
-    assert all(f"{w.source} → {w.target}" in html for w in grasp.wires)
+    assert all(f"{w.source} → {w.target}" in html for w in grasp.connections)
 
 
 def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:

@@ -31,8 +31,8 @@ def component(fmu: str, **values: Any) -> dict[str, Any]:
     return {"fmu": fmu, "values": values, "step": None, "isolation": "none", "rename": {}}
 
 
-def wire(source: str, target: str, factor: float | None = None) -> dict[str, Any]:
-    """The entry of a wire in run.json."""
+def connection(source: str, target: str, factor: float | None = None) -> dict[str, Any]:
+    """The entry of a connection in run.json."""
     return {"from": source, "to": target, "factor": factor, "offset": None}
 
 
@@ -77,15 +77,15 @@ def grasp_run(rows: int = 2001) -> Run:
             "sensor_2": component("ProximitySensor.fmu"),
             "controller": component("GraspController.fmu"),
         },
-        "wires": [
-            *(wire(f"plant.gap[{j}]", f"sensor_{j}.gap") for j in (1, 2)),
-            *(wire(f"plant.position[{j}]", f"controller.position[{j}]") for j in (1, 2)),
-            *(wire(f"plant.velocity[{j}]", f"controller.velocity[{j}]") for j in (1, 2)),
-            *(wire(f"sensor_{j}.intensity", f"controller.intensity[{j}]") for j in (1, 2)),
-            *(wire(f"controller.force[{j}]", f"plant.force[{j}]") for j in (1, 2)),
+        "connections": [
+            *(connection(f"plant.gap[{j}]", f"sensor_{j}.gap") for j in (1, 2)),
+            *(connection(f"plant.position[{j}]", f"controller.position[{j}]") for j in (1, 2)),
+            *(connection(f"plant.velocity[{j}]", f"controller.velocity[{j}]") for j in (1, 2)),
+            *(connection(f"sensor_{j}.intensity", f"controller.intensity[{j}]") for j in (1, 2)),
+            *(connection(f"controller.force[{j}]", f"plant.force[{j}]") for j in (1, 2)),
         ],
         "events": [{"at": 0.5, "set": {"sensor_1.reflectance": 0.6}}],
-        "faults": [{"wire": "controller.intensity[1]", "kind": "bias", "value": 0.1}],
+        "faults": [{"connection": "controller.intensity[1]", "kind": "bias", "value": 0.1}],
         "log": ["t = 0.5 s: sensor_1.reflectance = 0.6"],
         "rejections": {"sensor_2": {"count": 3, "first": 0.25}},
     }
@@ -93,14 +93,15 @@ def grasp_run(rows: int = 2001) -> Run:
 
 
 def ring_run(names: list[str], rows: int = 50) -> Run:
-    """Components wired in a ring, each with an output y."""
+    """Components connected in a ring, each with an output y."""
     time = np.linspace(0.0, 1.0, rows)
     signals = {f"{name}.y": np.sin(time + k) for k, name in enumerate(names)}
     settings = {
         **EXPERIMENT,
         "components": {name: component(f"{name}.fmu") for name in names},
-        "wires": [
-            wire(f"{a}.y", f"{b}.u") for a, b in zip(names, [*names[1:], names[0]], strict=True)
+        "connections": [
+            connection(f"{a}.y", f"{b}.u")
+            for a, b in zip(names, [*names[1:], names[0]], strict=True)
         ],
         "events": [],
         "faults": [],

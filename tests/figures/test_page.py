@@ -187,15 +187,15 @@ def test_contacts_and_lines_of_the_log_with_a_time_are_marked() -> None:
     np.testing.assert_allclose([t for _, t in marks], [1.0, 1.2, 0.25, 0.001], atol=1e-9)
 
 
-def test_the_actuator_force_comes_from_the_wires() -> None:
+def test_the_actuator_force_comes_from_the_connections() -> None:
     def actuators(factor: float | None, unit: str | None) -> object:
         run = grasp_run()
-        wires = [
+        connections = [
             {**w, "factor": factor} if w["to"] == "plant.force[1]" else w
-            for w in run.settings["wires"]
+            for w in run.settings["connections"]
         ]
         units = {**run.units, "controller.force[1]": unit}
-        changed = replace(run, units=units, settings={**run.settings, "wires": wires})
+        changed = replace(run, units=units, settings={**run.settings, "connections": connections})
         return json.loads(Elements(page_html(changed, "r")).texts["page"])["grasp"]["actuator"]
 
     both = {"1": "controller.force[1]", "2": "controller.force[2]"}
@@ -208,8 +208,10 @@ def test_the_actuator_force_comes_from_the_wires() -> None:
 
 def test_an_older_run_folder_is_refused_in_one_line() -> None:
     run = ring_run(["a"])
-    settings = {k: v for k, v in run.settings.items() if k != "wires"}
-    with pytest.raises(InputError, match=r"^run.json of r: no entry 'wires'; must be") as raised:
+    settings = {k: v for k, v in run.settings.items() if k != "connections"}
+    with pytest.raises(
+        InputError, match=r"^run.json of r: no entry 'connections'; must be"
+    ) as raised:
         page_html(replace(run, settings=settings), "r")
     assert "\n" not in str(raised.value)
 

@@ -1,4 +1,4 @@
-"""The wiring diagram: every wire from its port to its port, boxes apart, feedback below."""
+"""The wiring diagram: every connection from its port to its port, boxes apart, feedback below."""
 
 import itertools
 import random
@@ -14,21 +14,21 @@ Point = tuple[float, float]
 
 
 class Diagram:
-    """What is drawn, read back: boxes by name as left, top, right, bottom; wires by name."""
+    """What is drawn, read back: boxes by name as left, top, right, bottom; connections by name."""
 
     def __init__(self, svg: str) -> None:
         root = ET.fromstring(svg)
         self.width, self.height = float(root.attrib["width"]), float(root.attrib["height"])
         self.boxes: dict[str, Box] = {}
         self.ports: dict[tuple[str, str, str], float] = {}
-        self.wires: dict[str, list[Point]] = {}
+        self.connections: dict[str, list[Point]] = {}
         self.labels: dict[str, str] = {}
         self.kinds: dict[str, str] = {}
         for group in root.findall(f"{SVG}g"):
             if group.attrib["class"] == "box":
                 self._box(group)
             else:
-                self._wire(group)
+                self._connection(group)
 
     def _box(self, group: ET.Element) -> None:
         rect = group.find(f"{SVG}rect")
@@ -40,12 +40,12 @@ class Diagram:
             side = "output" if port.get("text-anchor") == "end" else "input"
             self.ports[str(name.text), side, str(port.text)] = float(port.attrib["y"]) - 4.0
 
-    def _wire(self, group: ET.Element) -> None:
+    def _connection(self, group: ET.Element) -> None:
         title, *paths = (e for e in group if e.tag != f"{SVG}text")
         label = group.find(f"{SVG}text")
         assert len(paths) == 2
         name = str(title.text).partition(", ")[0]
-        self.wires[name] = corners(paths[1].attrib["d"])
+        self.connections[name] = corners(paths[1].attrib["d"])
         self.labels[name] = "" if label is None else str(label.text)
         self.kinds[name] = group.attrib["class"]
 
@@ -79,7 +79,7 @@ def draw(names: list[str], links: list[Link]) -> Diagram:
 
 
 GRASP = ["plant", "sensor_1", "sensor_2", "controller"]
-GRASP_WIRES = [
+GRASP_CONNECTIONS = [
     link(text)
     for text in (
         "plant.gap[1] → sensor_1.gap",
@@ -96,35 +96,35 @@ GRASP_WIRES = [
 ]
 
 
-def many(seed: int, components: int, wires: int) -> tuple[list[str], list[Link]]:
+def many(seed: int, components: int, connections: int) -> tuple[list[str], list[Link]]:
     numbers = random.Random(seed)
     names = [f"c{k}" for k in range(components)]
-    pairs = [(numbers.choice(names), numbers.choice(names)) for _ in range(wires)]
+    pairs = [(numbers.choice(names), numbers.choice(names)) for _ in range(connections)]
     return names, [Link((a, f"y{k % 3}"), (b, f"u{k}")) for k, (a, b) in enumerate(pairs)]
 
 
 CASES = {
-    "grasp": (GRASP, GRASP_WIRES),
+    "grasp": (GRASP, GRASP_CONNECTIONS),
     "ring of 64": (
         [f"c{k}" for k in range(64)],
         [Link((f"c{k}", "y"), (f"c{(k + 1) % 64}", "u")) for k in range(64)],
     ),
     "64 at random": many(1, 64, 100),
     "12 at random": many(2, 12, 40),
-    "without wires": (["a", "b", "c"], []),
+    "without connections": (["a", "b", "c"], []),
     "nothing": ([], []),
     "on itself": (["a"], [link("a.y → a.u")]),
 }
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_every_wire_leads_from_its_port_to_its_port(case: str) -> None:
+def test_every_connection_leads_from_its_port_to_its_port(case: str) -> None:
     names, links = CASES[case]
     diagram = draw(names, links)
     assert list(diagram.boxes) == names
-    assert sorted(diagram.wires) == sorted(w.name for w in links)
+    assert sorted(diagram.connections) == sorted(w.name for w in links)
     for w in links:
-        points = diagram.wires[w.name]
+        points = diagram.connections[w.name]
         left, right = diagram.boxes[w.target[0]][0], diagram.boxes[w.source[0]][2]
         start = right, diagram.ports[w.source[0], "output", w.source[1]]
         end = left, diagram.ports[w.target[0], "input", w.target[1]]
@@ -144,9 +144,9 @@ def test_boxes_stand_apart_and_inside(case: str) -> None:
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_no_wire_runs_through_a_box(case: str) -> None:
+def test_no_connection_runs_through_a_box(case: str) -> None:
     diagram = draw(*CASES[case])
-    for name, points in diagram.wires.items():
+    for name, points in diagram.connections.items():
         for (x, y), (to_x, to_y) in itertools.pairwise(points):
             assert 0 <= to_x <= diagram.width
             assert 0 <= to_y <= diagram.height
@@ -165,7 +165,7 @@ def test_data_flow_to_the_right_and_feedback_below(case: str) -> None:
     lowest = max((box[3] for box in diagram.boxes.values()), default=0.0)
     lanes = set()
     for w in links:
-        points = diagram.wires[w.name]
+        points = diagram.connections[w.name]
         if names.index(w.source[0]) < names.index(w.target[0]):
             assert [x for x, _ in points] == sorted(x for x, _ in points)
             assert "back" not in diagram.kinds[w.name]
@@ -179,7 +179,7 @@ def test_data_flow_to_the_right_and_feedback_below(case: str) -> None:
 
 
 def test_the_grasp_reads_from_the_plant_over_the_sensors_to_the_controller() -> None:
-    diagram = draw(GRASP, GRASP_WIRES)
+    diagram = draw(GRASP, GRASP_CONNECTIONS)
     left = {name: box[0] for name, box in diagram.boxes.items()}
     top = {name: box[1] for name, box in diagram.boxes.items()}
     assert left["plant"] < left["sensor_1"] == left["sensor_2"] < left["controller"]
@@ -187,11 +187,11 @@ def test_the_grasp_reads_from_the_plant_over_the_sensors_to_the_controller() -> 
     assert diagram.width < 1184  # that of the page
 
 
-def test_labels_and_faults_stand_on_their_wires() -> None:
+def test_labels_and_faults_stand_on_their_connections() -> None:
     links = [link("a.y → b.u", "× 1000"), link("b.y → a.u", "noise", fault=True)]
     diagram = draw(["a", "b"], links)
     assert diagram.labels == {"a.y → b.u": "× 1000", "b.y → a.u": "b.y → a.u, noise"}
-    assert diagram.kinds == {"a.y → b.u": "wire", "b.y → a.u": "wire back fault"}
+    assert diagram.kinds == {"a.y → b.u": "connection", "b.y → a.u": "connection back fault"}
 
 
 def test_names_are_escaped_and_units_shown() -> None:
@@ -204,7 +204,7 @@ def test_names_are_escaped_and_units_shown() -> None:
     assert "µ&lt;" in svg
 
 
-def test_ports_stand_in_the_order_of_their_wires_and_those_of_feedback_lowest() -> None:
+def test_ports_stand_in_the_order_of_their_connections_and_those_of_feedback_lowest() -> None:
     links = [
         link("d.y → b.fed"),
         link("c.y → d.second"),

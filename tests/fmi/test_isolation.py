@@ -52,7 +52,7 @@ def system_file(folder: Path, version: str, values: str, isolation: str = "proce
     others = "".join(f", u_{t} = {starts.get(t, '0')}" for t in list(TYPES[version])[1:])
     path = folder / "two.toml"
     path.write_text(
-        f"""wires = ["first.{y} -> second.{u}"]
+        f"""connections = ["first.{y} -> second.{u}"]
 [experiment]
 step = 0.1
 stop = 2.0

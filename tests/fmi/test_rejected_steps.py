@@ -6,7 +6,7 @@ import pytest
 from fmi.instances import KINDS, real
 from grasp_cosim import SimulationError, System, simulate
 from grasp_cosim.master.engine import Engine
-from grasp_cosim.system.parts import Component, Isolation, Wire
+from grasp_cosim.system.parts import Component, Connection, Isolation
 from native_fmus import CAPABLE, EARLY, TYPES, build, needs_gcc
 
 pytestmark = needs_gcc
@@ -21,8 +21,8 @@ def alone(folder: Path, version: str, isolation: Isolation, **values: float) -> 
     starts = {f"u_{t}": STARTS.get(t, 0) for t in TYPES[version]}
     given = {**starts, f"u_{real(version)}": 2.0, **values}
     component = Component("part", fmu, given, isolation=isolation)
-    wires: tuple[Wire, ...] = ()
-    return System("alone", (component,), wires, 100_000_000, 1_000_000_000, "sequential")
+    connections: tuple[Connection, ...] = ()
+    return System("alone", (component,), connections, 100_000_000, 1_000_000_000, "sequential")
 
 
 @both

@@ -40,7 +40,7 @@ from grasp_fmus.link.message import (
     Value,
 )
 from grasp_fmus.link.peer import ALIVE, Peer, PeerCounters, Request
-from grasp_fmus.link.signature import Causality, Kind, Signature, WireVariable
+from grasp_fmus.link.signature import Causality, Kind, LinkVariable, Signature
 from gripper_plant import rigid
 
 NATIVE = Path(__file__).parent / "native"
@@ -65,8 +65,8 @@ RECORD = struct.Struct("=dddIIII")
 pytestmark = pytest.mark.skipif(not shutil.which("gcc"), reason="NO gcc: nothing to compile with")
 
 
-def variables(causality: Causality, prefix: str, *kinds: Kind) -> list[WireVariable]:
-    return [WireVariable(f"{prefix}.{kind.lower()}", kind, causality) for kind in kinds]
+def variables(causality: Causality, prefix: str, *kinds: Kind) -> list[LinkVariable]:
+    return [LinkVariable(f"{prefix}.{kind.lower()}", kind, causality) for kind in kinds]
 
 
 IN_ORDER: tuple[Kind, ...] = ("Real", "Integer", "Boolean", "String")
@@ -89,7 +89,7 @@ def plant() -> tuple[Signature, dict[str, Value]]:
     ]
     return Signature(
         tuple(
-            WireVariable(name, "Boolean" if f.kind is bool else "Real", f.causality, f.unit or None)
+            LinkVariable(name, "Boolean" if f.kind is bool else "Real", f.causality, f.unit or None)
             for f, name, _ in listed
         )
     ), {name: start for _, name, start in listed if start is not None}
@@ -169,7 +169,7 @@ AWKWARD = (
 def test_any_name(tmp_path: Path) -> None:
     signature = Signature(
         tuple(
-            WireVariable(f"{name}{c[0] * (c == 'output')}", kind, c, "*/ ?")
+            LinkVariable(f"{name}{c[0] * (c == 'output')}", kind, c, "*/ ?")
             for c in ("input", "output")
             for name, kind in zip(AWKWARD, IN_ORDER * 5, strict=False)
         )
@@ -190,7 +190,7 @@ def test_any_name(tmp_path: Path) -> None:
 
 
 def test_members_by_the_variables_names() -> None:
-    inputs = [WireVariable(name, "Real", "input") for name in AWKWARD]
+    inputs = [LinkVariable(name, "Real", "input") for name in AWKWARD]
     header = c_header("M", Signature(tuple(inputs)))
     struct_text = header.partition("typedef struct {")[2].partition("}")[0]
     members = [line.split()[1].rstrip(";") for line in struct_text.strip().splitlines()]
@@ -258,7 +258,7 @@ def test_a_start_value_that_is_none(name: str, value: Value, kind: str) -> None:
 
 
 def test_more_than_a_datagram() -> None:
-    many = [WireVariable(f"u[{i}]", "String", "input") for i in range(512)]
+    many = [LinkVariable(f"u[{i}]", "String", "input") for i in range(512)]
     with pytest.raises(ValueError, match="must be 65507 at most"):
         c_header("M", Signature(tuple(many)))
 
@@ -371,7 +371,7 @@ def drawn_values(rng: random.Random) -> list[Value]:
     return [real(), integer(), boolean(), text(), text(), boolean(), integer(), real()]
 
 
-def packed(values: list[Value], variables: tuple[WireVariable, ...]) -> bytes:
+def packed(values: list[Value], variables: tuple[LinkVariable, ...]) -> bytes:
     """A body by Python's struct alone."""
     raw = [value.encode() if isinstance(value, str) else value for value in values]
     return struct.pack("<" + "".join(KINDS[v.kind] for v in variables), *raw)
@@ -524,7 +524,7 @@ def test_of_two_that_were_greeted_the_later_one_waits(driver: Path) -> None:
 
 
 def test_outputs_that_are_none_fail_and_are_named(tmp_path: Path) -> None:
-    outputs = [WireVariable(n, "Real", "output", "N") for n in ("y[1]", "µ")]
+    outputs = [LinkVariable(n, "Real", "output", "N") for n in ("y[1]", "µ")]
     source = """#include "m.h"
         #include <stdio.h>
         int main(void) {
@@ -862,6 +862,6 @@ def test_the_constants_are_those_of_the_protocol() -> None:
 
 
 def test_descriptions_are_in_the_comments() -> None:
-    signature = Signature((WireVariable("gap", "Real", "input", "m"),))
+    signature = Signature((LinkVariable("gap", "Real", "input", "m"),))
     header = c_header("M", signature, descriptions={"gap": "l, to the */ surface"})
     assert "double gap;                              /* gap, m: l, to the * / surface */" in header

@@ -17,7 +17,7 @@ import pytest
 from conftest import Load
 from fmpy.validation import validate_fmu
 from grasp_cosim import cli
-from grasp_cosim.hil.wire import wire_signature
+from grasp_cosim.hil.protocol import link_signature
 from grasp_cosim.interface.interface import read_interface
 from grasp_fmus.c_header import c_header
 from grasp_fmus.documentation import icon
@@ -469,7 +469,7 @@ def test_an_unchanged_proxy_is_left_alone(fmus: Path, run: Run) -> None:
 def test_the_peers_side_as_a_c_header(fmus: Path, run: Run) -> None:
     """What it does: test_c_header.py."""
     original = fmus / "GripperPlant.fmu"
-    signature, _ = wire_signature(read_interface(original))
+    signature, _ = link_signature(read_interface(original))
     both = ("-o", "P.fmu", "--c-header", "sub/bench.h")
     assert run(original, *both) == (0, "P.fmu: new\nsub/bench.h: written\n", "")
     text = Path("sub/bench.h").read_text("ascii")

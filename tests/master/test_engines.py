@@ -15,7 +15,7 @@ from grasp_cosim.grasp.system import CASES
 from grasp_cosim.master import compiled
 from grasp_cosim.master.engine import Engine
 from grasp_cosim.recording.result import Rejection, Result
-from grasp_cosim.system.parts import Port, Wire
+from grasp_cosim.system.parts import Connection, Port
 from mocks import Mock, Run, make_system
 
 pytest.importorskip("numba")
@@ -41,14 +41,18 @@ def test_the_grasp(grasp: System, case: int, step: float, scheme: str) -> None:
 
 
 @pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
-def test_slow_sensors_and_scaled_wires(grasp: System, scheme: str) -> None:
+def test_slow_sensors_and_scaled_connections(grasp: System, scheme: str) -> None:
     components = tuple(
         replace(c, step_ns=3_000_000) if c.name == "sensor_1" else c for c in grasp.components
     )
-    first, *others = grasp.wires
-    wires = (replace(first, factor=1.1, offset=-0.003), *others)
+    first, *others = grasp.connections
+    connections = (replace(first, factor=1.1, offset=-0.003), *others)
     system = replace(
-        grasp, components=components, wires=wires, step_ns=1_000_000, stop_ns=2_400_000_000
+        grasp,
+        components=components,
+        connections=connections,
+        step_ns=1_000_000,
+        stop_ns=2_400_000_000,
     )
     one, two = both(system, scheme=scheme)
     assert_same_bits(one, two)
@@ -82,8 +86,8 @@ def test_an_fmu_that_fails_is_the_same_error(
 
 
 def chain(tmp_path: Path, engine: Engine, *mocks: Mock) -> Run:
-    wires = [Wire(Port(a.name, "y"), Port(b.name, "u")) for a, b in pairwise(mocks)]
-    return Run(make_system(mocks, wires), mocks, engine)
+    connections = [Connection(Port(a.name, "y"), Port(b.name, "u")) for a, b in pairwise(mocks)]
+    return Run(make_system(mocks, connections), mocks, engine)
 
 
 @pytest.mark.parametrize("engine", ENGINES)

@@ -12,14 +12,14 @@ from grasp_cosim.fmi.instance import Instance
 from grasp_cosim.interface.interface import Interface, Value, Variable
 from grasp_cosim.master.scenario import Scenario
 from grasp_cosim.system import parts
-from grasp_cosim.system.parts import Component, Condition, Event, Fault, Port, Relation, Wire
+from grasp_cosim.system.parts import Component, Condition, Connection, Event, Fault, Port, Relation
 
 STEP = 100_000_000
 """ns"""
 
 
 def interface(path: Path) -> Interface:
-    """Outputs y and on, a wired input u, a free one v, tunable parameters p, n and label."""
+    """Outputs y and on, a connected input u, a free one v, tunable parameters p, n and label."""
     variables = [
         ("y", "Real", "output"),
         ("on", "Boolean", "output"),
@@ -82,7 +82,7 @@ class Rig:
                 Component(n, Path("m.fmu"), {"v": 0.0}, step_ns=3 * STEP if n == "slow" else None)
                 for n in names
             ),
-            tuple(Wire(Port("a", "y"), Port(n, "u")) for n in names),
+            tuple(Connection(Port("a", "y"), Port(n, "u")) for n in names),
             STEP,
             30 * STEP,
             "sequential",
@@ -313,7 +313,7 @@ def test_what_is_set_by_hand_is_noted_with_the_events() -> None:
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
-        ("a.u", 1.0, r"^set: a\.u: has a wire, from a\.y; put a fault of kind 'stuck' on it"),
+        ("a.u", 1.0, r"^set: a\.u: has a connection, from a\.y; put a fault of kind 'stuck' on it"),
         ("a.w", 1.0, r"^set: a\.w: not there; must be a tunable parameter or an input without"),
         ("c.p", 1.0, r"^set: c\.p: no component 'c'; valid: a, b, slow$"),
         ("p", 1.0, r"^set: p: no component 'p'"),

@@ -1,4 +1,4 @@
-"""Faults on a wire, each against NumPy; seeds, windows, and being asked more than once."""
+"""Faults on a connection, each against NumPy; seeds, windows, and being asked more than once."""
 
 import math
 from collections.abc import Sequence
@@ -34,8 +34,8 @@ def fault(
     return Fault(target, kind, parameters, round(start * STEP), until, seed=seed)
 
 
-def on_wire(*faults: Fault) -> FaultFunction:
-    """What a wire with these faults makes of a value."""
+def on_connection(*faults: Fault) -> FaultFunction:
+    """What a connection with these faults makes of a value."""
     windows = [Window(f"faults[{i}]", f, STEP) for i, f in enumerate(faults)]
     return fault_functions(windows, STEP)[faults[0].target]
 
@@ -52,35 +52,35 @@ def passed(
 def test_stuck_holds_the_value_where_it_begins() -> None:
     expected = SIGNAL.copy()
     expected[20:50] = SIGNAL[20]
-    assert (passed(on_wire(fault("stuck", 20, 50)), SIGNAL) == expected).all()
+    assert (passed(on_connection(fault("stuck", 20, 50)), SIGNAL) == expected).all()
 
 
 def test_stuck_at_a_value() -> None:
     expected = SIGNAL.copy()
     expected[20:50] = -3.0
-    assert (passed(on_wire(fault("stuck", 20, 50, value=-3.0)), SIGNAL) == expected).all()
+    assert (passed(on_connection(fault("stuck", 20, 50, value=-3.0)), SIGNAL) == expected).all()
 
 
 def test_a_boolean_is_stuck_as_a_number() -> None:
-    assert repr(on_wire(fault("stuck", value=True))(0.0, 3)) == "1.0"
+    assert repr(on_connection(fault("stuck", value=True))(0.0, 3)) == "1.0"
 
 
 def test_bias() -> None:
     expected = np.where(np.arange(100) < 30, SIGNAL, SIGNAL + 0.25)
-    assert (passed(on_wire(fault("bias", 30, value=0.25)), SIGNAL) == expected).all()
+    assert (passed(on_connection(fault("bias", 30, value=0.25)), SIGNAL) == expected).all()
 
 
 @pytest.mark.parametrize("limits", [{"low": -0.5}, {"high": 0.5}, {"low": -0.2, "high": 0.3}])
 def test_saturation(limits: dict[str, float]) -> None:
     expected = np.clip(SIGNAL, limits.get("low"), limits.get("high"))
-    assert (passed(on_wire(Fault(WIRE, "saturation", limits)), SIGNAL) == expected).all()
+    assert (passed(on_connection(Fault(WIRE, "saturation", limits)), SIGNAL) == expected).all()
 
 
 @QUICK
 @given(st.floats(-1e6, 1e6), st.floats(1e-6, 1e3))
 def test_quantisation(value: float, width: float) -> None:
     """The nearest level; NumPy rounds to even as well."""
-    result = on_wire(fault("quantisation", step=width))(value, 0)
+    result = on_connection(fault("quantisation", step=width))(value, 0)
     assert result == np.rint(value / width) * width
     assert abs(result - value) <= 0.5 * width * (1 + 1e-9) + 1e-9 * abs(value)
 
@@ -88,34 +88,36 @@ def test_quantisation(value: float, width: float) -> None:
 def test_quantisation_between_two_levels_takes_the_even_one() -> None:
     values = np.array([-1.5, -0.5, 0.5, 1.5, 2.5]) * 0.25
     expected = [-0.5, 0.0, 0.0, 0.5, 0.5]
-    assert passed(on_wire(fault("quantisation", step=0.25)), values).tolist() == expected
+    assert passed(on_connection(fault("quantisation", step=0.25)), values).tolist() == expected
 
 
 @pytest.mark.parametrize("steps", [0, 1, 7, 40])
 def test_delay_is_exact(steps: int) -> None:
     expected = SIGNAL[np.maximum(np.arange(100) - steps, 0)]
-    assert (passed(on_wire(fault("delay", time=steps / 1000)), SIGNAL) == expected).all()
+    assert (passed(on_connection(fault("delay", time=steps / 1000)), SIGNAL) == expected).all()
 
 
 def test_a_delay_knows_what_was_passed_before_it_began() -> None:
     expected = SIGNAL.copy()
     expected[20:50] = SIGNAL[13:43]
-    assert (passed(on_wire(fault("delay", 20, 50, time=0.007)), SIGNAL) == expected).all()
+    assert (passed(on_connection(fault("delay", 20, 50, time=0.007)), SIGNAL) == expected).all()
 
 
 @pytest.mark.parametrize("delay", [1, 2, 5, 7])
 @pytest.mark.parametrize(("period", "phase"), [(1, 0), (3, 0), (3, 2)])
-def test_a_delay_counts_base_steps_on_a_slow_wire_too(delay: int, period: int, phase: int) -> None:
+def test_a_delay_counts_base_steps_on_a_slow_connection_too(
+    delay: int, period: int, phase: int
+) -> None:
     """The value is the one that was the newest so many base steps ago."""
     steps = np.arange(phase, 100, period)
     newest = np.searchsorted(steps, steps - delay, side="right") - 1
     values = SIGNAL[steps]
-    function = on_wire(fault("delay", time=delay / 1000))
+    function = on_connection(fault("delay", time=delay / 1000))
     assert (passed(function, values, steps.tolist()) == values[np.maximum(newest, 0)]).all()
 
 
 def test_a_delay_starts_with_the_value_of_the_initialisation() -> None:
-    function = on_wire(fault("delay", time=0.002))
+    function = on_connection(fault("delay", time=0.002))
     assert passed(function, [5.0, 1.0, 2.0, 3.0], [INITIAL, 0, 1, 2]).tolist() == [5, 5, 5, 1]
 
 
@@ -125,7 +127,7 @@ def lost(result: npt.NDArray[Any], values: npt.NDArray[Any]) -> npt.NDArray[np.b
 
 
 def test_a_dropout_holds_the_last_value_that_got_through() -> None:
-    result = passed(on_wire(fault("dropout", probability=0.6, seed=4)), SIGNAL)
+    result = passed(on_connection(fault("dropout", probability=0.6, seed=4)), SIGNAL)
     through = ~lost(result, SIGNAL)
     assert 10 < through.sum() < 90
     assert through[0]
@@ -137,7 +139,9 @@ def test_a_dropout_holds_the_last_value_that_got_through() -> None:
 def test_how_many_a_dropout_loses(probability: float, share: float) -> None:
     n = 20_000
     values = np.arange(n, dtype=float)
-    hits = lost(passed(on_wire(fault("dropout", probability=probability)), values), values)[1:]
+    hits = lost(passed(on_connection(fault("dropout", probability=probability)), values), values)[
+        1:
+    ]
     assert abs(hits.mean() - share) <= 5 * math.sqrt(share * (1 - share) / n)
     pairs = (hits[1:] & hits[:-1]).mean()  # of neighbours; those that overlap are correlated
     variance = share**2 * (1 - share**2) + 2 * (share**3 - share**4)
@@ -145,14 +149,14 @@ def test_how_many_a_dropout_loses(probability: float, share: float) -> None:
 
 
 def test_a_dropout_holds_what_was_passed_before_its_window() -> None:
-    result = passed(on_wire(fault("dropout", 20, 50, probability=1.0)), SIGNAL)
+    result = passed(on_connection(fault("dropout", 20, 50, probability=1.0)), SIGNAL)
     expected = SIGNAL.copy()
     expected[20:50] = SIGNAL[19]
     assert (result == expected).all()
 
 
 def noise(seed: int = 1, target: Port = WIRE, n: int = 20_000) -> npt.NDArray[Any]:
-    function = on_wire(fault("noise", target=target, seed=seed, standard_deviation=2.0))
+    function = on_connection(fault("noise", target=target, seed=seed, standard_deviation=2.0))
     return passed(function, np.zeros(n))
 
 
@@ -167,15 +171,15 @@ def test_noise_is_gaussian_and_white() -> None:
         assert abs((x[lag:] * x[:-lag]).mean()) < 5 / math.sqrt(n)
 
 
-def test_noise_of_another_seed_or_wire_is_independent() -> None:
+def test_noise_of_another_seed_or_connection_is_independent() -> None:
     x = noise()
     for y in (noise(seed=2), noise(target=OTHER)):
         assert abs(np.corrcoef(x, y)[0, 1]) < 5 / math.sqrt(len(x))
 
 
-def test_two_noises_on_a_wire_are_independent() -> None:
+def test_two_noises_on_a_connection_are_independent() -> None:
     """Their variances add up; the same numbers twice would add up to four times one of them."""
-    twice = on_wire(*2 * [fault("noise", standard_deviation=1.0)])
+    twice = on_connection(*2 * [fault("noise", standard_deviation=1.0)])
     variance = passed(twice, np.zeros(20_000)).var()
     assert abs(variance - 2.0) < 5 * 2.0 * math.sqrt(2 / 20_000)
 
@@ -189,11 +193,11 @@ def test_two_noises_on_a_wire_are_independent() -> None:
 )
 def test_a_random_number_depends_on_the_step_alone(one: Fault) -> None:
     """Not on the window, on other faults, on the steps asked before, nor on their order."""
-    whole = on_wire(one)
-    part = on_wire(
+    whole = on_connection(one)
+    part = on_connection(
         Fault(WIRE, one.kind, one.parameters, 40 * STEP, 60 * STEP, seed=one.seed),
     )
-    beside = on_wire(fault("bias", value=0.0), one)
+    beside = on_connection(fault("bias", value=0.0), one)
     expected = passed(whole, SIGNAL)[41:60]
     hit = expected != SIGNAL[41:60]
     assert ((passed(part, SIGNAL)[41:60] != SIGNAL[41:60]) == hit).all()
@@ -201,11 +205,11 @@ def test_a_random_number_depends_on_the_step_alone(one: Fault) -> None:
     if one.kind == "noise":
         assert (passed(part, SIGNAL)[41:60] == expected).all()
         steps = list(range(99, -1, -1))
-        assert (passed(on_wire(one), SIGNAL[::-1], steps)[::-1][41:60] == expected).all()
+        assert (passed(on_connection(one), SIGNAL[::-1], steps)[::-1][41:60] == expected).all()
 
 
 def test_random_numbers_stay_the_same_from_release_to_release() -> None:
-    function = on_wire(fault("noise", seed=7, standard_deviation=1.0))
+    function = on_connection(fault("noise", seed=7, standard_deviation=1.0))
     kept = [-0.7353820911792353, 0.8132515606280434, 0.7269561280503712, 0.6529768198539552]
     result = passed(function, np.zeros(4), [INITIAL, 0, 1, 1000])
     assert result == pytest.approx(kept, rel=1e-12)
@@ -226,23 +230,23 @@ def test_random_numbers_stay_the_same_from_release_to_release() -> None:
 def test_a_window_is_exact_to_the_step(
     start: float, end: float | None, acts: Sequence[int]
 ) -> None:
-    result = passed(on_wire(fault("bias", start, end, value=1.0)), np.zeros(100))
+    result = passed(on_connection(fault("bias", start, end, value=1.0)), np.zeros(100))
     assert np.flatnonzero(result).tolist() == list(acts)
 
 
 @pytest.mark.parametrize(("start", "acts"), [(0, True), (1, False), (1e-6, False)])
 def test_only_a_fault_from_0_acts_in_initialisation(start: float, acts: bool) -> None:
-    assert on_wire(fault("bias", start, value=1.0))(0.0, INITIAL) == float(acts)
+    assert on_connection(fault("bias", start, value=1.0))(0.0, INITIAL) == float(acts)
 
 
-def test_faults_of_a_wire_act_in_the_order_of_the_file() -> None:
+def test_faults_of_a_connection_act_in_the_order_of_the_file() -> None:
     bias, limit = fault("bias", value=1.0), fault("saturation", high=0.5)
-    assert on_wire(bias, limit)(0.0, 0) == 0.5
-    assert on_wire(limit, bias)(0.0, 0) == 1.0
-    assert on_wire(limit, bias)(2.0, 1) == 1.5
+    assert on_connection(bias, limit)(0.0, 0) == 0.5
+    assert on_connection(limit, bias)(0.0, 0) == 1.0
+    assert on_connection(limit, bias)(2.0, 1) == 1.5
 
 
-def test_each_wire_has_its_own_faults() -> None:
+def test_each_connection_has_its_own_faults() -> None:
     faults = (fault("bias", value=1.0), fault("bias", value=2.0, target=OTHER))
     functions = fault_functions([Window("", f, STEP) for f in faults], STEP)
     assert {port: f(0.0, 0) for port, f in functions.items()} == {WIRE: 1.0, OTHER: 2.0}
@@ -272,7 +276,7 @@ def test_asked_again_at_a_step_it_answers_the_same(
     faults: list[Fault], values: list[float], before: list[list[float]]
 ) -> None:
     """And what it was asked before at the same step leaves no trace."""
-    once, often = on_wire(*faults), on_wire(*faults)
+    once, often = on_connection(*faults), on_connection(*faults)
     for step, (value, others) in enumerate(zip(values, before, strict=True), INITIAL):
         for other in others:
             often(other, step)
@@ -283,7 +287,7 @@ def test_asked_again_at_a_step_it_answers_the_same(
 @pytest.mark.parametrize("value", [math.inf, -math.inf, math.nan])
 @pytest.mark.parametrize("one", ALL, ids=lambda f: f.kind)
 def test_what_is_not_finite_is_not_hidden_by_an_exception(one: Fault, value: float) -> None:
-    function = on_wire(one)
+    function = on_connection(one)
     results = [function(value, step) for step in range(12)]
     if one.kind not in ("saturation", "stuck"):
         assert not any(map(math.isfinite, results))

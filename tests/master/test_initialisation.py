@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 from grasp_cosim import InputError, SimulationError
-from grasp_cosim.system.parts import Initialisation, Port, Wire
+from grasp_cosim.system.parts import Connection, Initialisation, Port
 from mocks import Mock, Run, make_system
 
 Make = Callable[..., Mock]
@@ -22,9 +22,9 @@ def through(u: float, t: float) -> float:
 
 
 def run(mocks: Sequence[Mock], pairs: Sequence[str], **more: Any) -> Run:
-    """Each pair 'ab' is a wire from a's y to b's u."""
-    wires = [Wire(Port(a, "y"), Port(b, "u")) for a, b in map(tuple, pairs)]
-    return Run(make_system(mocks, wires, **more), mocks)
+    """Each pair 'ab' is a connection from a's y to b's u."""
+    connections = [Connection(Port(a, "y"), Port(b, "u")) for a, b in map(tuple, pairs)]
+    return Run(make_system(mocks, connections, **more), mocks)
 
 
 def test_values_propagate_against_the_order_of_execution(mock: Make) -> None:

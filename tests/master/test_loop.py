@@ -34,9 +34,9 @@ def numba(engine: Engine) -> None:
 
 
 def plan(values: Any, operations: Any, **parts: Any) -> Plan:
-    parts = {"wires": (), "casts": (), "buffers": (), "calls": (), **parts}
+    parts = {"connections": (), "casts": (), "buffers": (), "calls": (), **parts}
     return Plan(
-        np.array(values, float), np.zeros(2), {}, tuple(operations), parts["wires"],
+        np.array(values, float), np.zeros(2), {}, tuple(operations), parts["connections"],
         parts["casts"], parts["buffers"], parts["calls"], (0,) * len(parts["calls"]), [],
     )  # fmt: skip
 
@@ -49,8 +49,10 @@ def run(made: Plan, engine: Engine, steps: int, operation: int = 0) -> tuple[Any
 
 
 def test_a_copy_keeps_the_sign_of_zero_and_a_scale_computes(engine: Engine) -> None:
-    wires = ((0, 1, 1.0, 0.0), (0, 2, 3.0, 0.1))
-    made = plan([-0.0, 5.0, 5.0], [(COPY, 0, 1, 1, 0), (SCALE, 1, 2, 1, 0)], wires=wires)
+    connections = ((0, 1, 1.0, 0.0), (0, 2, 3.0, 0.1))
+    made = plan(
+        [-0.0, 5.0, 5.0], [(COPY, 0, 1, 1, 0), (SCALE, 1, 2, 1, 0)], connections=connections
+    )
     result, rows = run(made, engine, 1)
     assert result == (1, 0, 0)
     assert rows[0].tobytes() == np.array([-0.0, -0.0, 3.0 * -0.0 + 0.1]).tobytes()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim import InputError, SimulationError
-from grasp_cosim.system.parts import Port, Wire
+from grasp_cosim.system.parts import Connection, Port
 from mocks import Mock, Run, make_system
 
 Make = Callable[..., Mock]
@@ -27,9 +27,9 @@ def through(u: float, t: float) -> float:
     return u
 
 
-def in_a_row(*mocks: Mock) -> list[Wire]:
+def in_a_row(*mocks: Mock) -> list[Connection]:
     """Each one's y goes to the next one's u."""
-    return [Wire(Port(a.name, "y"), Port(b.name, "u")) for a, b in pairwise(mocks)]
+    return [Connection(Port(a.name, "y"), Port(b.name, "u")) for a, b in pairwise(mocks)]
 
 
 def chain(scheme: str, *mocks: Mock, step_ns: int = 100_000_000, steps: int = 4) -> Run:
@@ -43,12 +43,12 @@ def test_sequential_passes_values_on_within_the_step(mock: Make, clock: Mock) ->
 
 def test_sequential_against_the_order_delays_by_a_step(mock: Make, clock: Mock) -> None:
     a = mock("a", through)
-    system = make_system([a, clock], [Wire(Port("clock", "y"), Port("a", "u"))])
+    system = make_system([a, clock], [Connection(Port("clock", "y"), Port("a", "u"))])
     signals = Run(system, [a, clock]).to_the_end()
     assert signals["a.y"][1:] == signals["clock.y"][:-1]
 
 
-def test_jacobi_delays_every_wire_by_a_step(mock: Make, clock: Mock) -> None:
+def test_jacobi_delays_every_connection_by_a_step(mock: Make, clock: Mock) -> None:
     signals = chain("jacobi", clock, mock("a", through), mock("b", through)).to_the_end()
     assert signals["a.y"][1:] == signals["clock.y"][:-1]
     assert signals["b.y"][2:] == signals["clock.y"][:-2]
@@ -67,7 +67,7 @@ def test_time_is_never_accumulated(clock: Mock) -> None:
     assert times == [k * 100_000 / 1e9 for k in range(3000)]
 
 
-def test_an_unwired_input_is_never_sent(mock: Make) -> None:
+def test_an_unconnected_input_is_never_sent(mock: Make) -> None:
     a = mock("a", through)
     a.u = 5.0
     assert Run(make_system([a], []), [a]).to_the_end()["a.y"] == [5.0] * 5
@@ -157,8 +157,8 @@ def test_a_rate_that_does_not_divide_names_both_numbers(mock: Make, clock: Mock)
         rates([clock], "sequential", {"clock": 300_000_000})
 
 
-def test_a_wire_scales(mock: Make, clock: Mock) -> None:
+def test_a_connection_scales(mock: Make, clock: Mock) -> None:
     a = mock("a", through)
-    wire = Wire(Port("clock", "y"), Port("a", "u"), 1000.0, -5.0)
-    signals = Run(make_system([clock, a], [wire]), [clock, a]).to_the_end()
+    connection = Connection(Port("clock", "y"), Port("a", "u"), 1000.0, -5.0)
+    signals = Run(make_system([clock, a], [connection]), [clock, a]).to_the_end()
     assert signals["a.y"] == [1000.0 * y - 5.0 for y in signals["clock.y"]]

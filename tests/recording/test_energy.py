@@ -12,7 +12,7 @@ from grasp_cosim.interface.interface import Interface, read_interface
 from grasp_cosim.interface.units import Unit
 from grasp_cosim.recording.energy import Bond, ExchangeEnergy, bonds
 from grasp_cosim.system import parts
-from grasp_cosim.system.parts import Component, Port, Wire
+from grasp_cosim.system.parts import Component, Connection, Port
 from gripper_plant import rigid
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -171,8 +171,8 @@ def test_values_that_are_not_finite_are_passed_on_without_a_warning() -> None:
     assert np.isfinite(_energy(rows)).tolist() == [True, True, False, False]
 
 
-def test_units_of_the_source_are_those_of_the_wires() -> None:
-    """A spring in mm from another origin and kN, with wires that convert, and a mass in cm."""
+def test_units_of_the_source_are_those_of_the_connections() -> None:
+    """A spring in mm from another origin and kN, connections that convert, and a mass in cm."""
     run = _sequential()
     rows = run.rows * [1e-3, 100.0, 1.0, 1e3] + [0.0, 0.0, 0.0, 40.0]
     energies = ExchangeEnergy(
@@ -181,7 +181,7 @@ def test_units_of_the_source_are_those_of_the_wires() -> None:
     assert energies[:, 0] == pytest.approx(run.drift, rel=1e-9, abs=1e-14)
 
 
-def test_a_wire_with_a_factor_of_zero_shows_the_source_no_motion() -> None:
+def test_a_connection_with_a_factor_of_zero_shows_the_source_no_motion() -> None:
     rows = _sequential().rows
     (energy,) = ExchangeEnergy([BOND], COLUMN, {SEEN: (0.0, 0.0)})(rows).T
     assert energy[-1] == pytest.approx(float(np.sum(rows[1:, 2] * np.diff(rows[:, 1]))))
@@ -261,25 +261,27 @@ def test_the_source_keeps_its_own_step(grasp: System) -> None:
 def test_a_position_of_another_name_makes_no_bond(grasp: System) -> None:
     plant = replace(grasp.component("plant", "test"), rename={"place[1]": "position[1]"})
     place = Port("plant", "place[1]")
-    wires = tuple(
-        Wire(place, w.target) if w.source == Port("plant", "position[1]") else w
-        for w in grasp.wires
+    connections = tuple(
+        Connection(place, w.target) if w.source == Port("plant", "position[1]") else w
+        for w in grasp.connections
     )
-    system = replace(grasp, components=_with_component(grasp, plant), wires=wires)
+    system = replace(grasp, components=_with_component(grasp, plant), connections=connections)
     assert [b.index for b in bonds(system)] == [2]
 
 
-def test_a_force_without_a_wire_makes_no_bond(grasp: System) -> None:
+def test_a_force_without_a_connection_makes_no_bond(grasp: System) -> None:
     plant = replace(grasp.component("plant", "test"), values={"force[1]": -1.0})
-    wires = tuple(w for w in grasp.wires if w.target != Port("plant", "force[1]"))
-    system = replace(grasp, components=_with_component(grasp, plant), wires=wires)
+    connections = tuple(w for w in grasp.connections if w.target != Port("plant", "force[1]"))
+    system = replace(grasp, components=_with_component(grasp, plant), connections=connections)
     assert [b.index for b in bonds(system)] == [2]
 
 
-def test_a_source_that_has_no_wire_from_the_position(grasp: System) -> None:
+def test_a_source_that_has_no_connection_from_the_position(grasp: System) -> None:
     controller = replace(grasp.component("controller", "test"), values={"position[1]": 0.1})
-    wires = tuple(w for w in grasp.wires if w.target != Port("controller", "position[1]"))
-    system = replace(grasp, components=_with_component(grasp, controller), wires=wires)
+    connections = tuple(
+        w for w in grasp.connections if w.target != Port("controller", "position[1]")
+    )
+    system = replace(grasp, components=_with_component(grasp, controller), connections=connections)
     assert [b.seen for b in bonds(system)] == [None, Port("controller", "position[2]")]
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 from grasp_cosim import System
-from grasp_cosim.system.parts import Condition, Event, Fault, Port, Wire
+from grasp_cosim.system.parts import Condition, Connection, Event, Fault, Port
 from grasp_cosim.system.settings import settings
 
 
@@ -20,23 +20,23 @@ def test_the_settings_of_the_grasp(grasp: System) -> None:
         "isolation": "none",
         "rename": {},
     }
-    assert found["wires"][0] == {
+    assert found["connections"][0] == {
         "from": "plant.gap[1]",
         "to": "sensor_1.gap",
         "factor": None,
         "offset": None,
     }
-    assert len(found["wires"]) == 10
+    assert len(found["connections"]) == 10
     assert found["events"] == found["faults"] == []
 
 
 def test_what_is_special_in_a_system(grasp: System) -> None:
     plant, *others = grasp.components
-    gap = grasp.wires[0]
+    gap = grasp.connections[0]
     system = replace(
         grasp,
         components=(replace(plant, step_ns=200_000, isolation="process"), *others),
-        wires=(Wire(gap.source, gap.target, 2.0, -0.5), *grasp.wires[1:]),
+        connections=(Connection(gap.source, gap.target, 2.0, -0.5), *grasp.connections[1:]),
         events=(
             Event({Port("sensor_1", "reflectance"): 0.5}, at_ns=500_000_000),
             Event(
@@ -52,18 +52,18 @@ def test_what_is_special_in_a_system(grasp: System) -> None:
     found: dict[str, Any] = json.loads(json.dumps(settings(system)))
     assert found["components"]["plant"]["step"] == 2e-4
     assert found["components"]["plant"]["isolation"] == "process"
-    assert (found["wires"][0]["factor"], found["wires"][0]["offset"]) == (2.0, -0.5)
+    assert (found["connections"][0]["factor"], found["connections"][0]["offset"]) == (2.0, -0.5)
     assert found["events"] == [
         {"at": 0.5, "set": {"sensor_1.reflectance": 0.5}},
         {"when": "plant.gap[1] < 0.01", "set": {"sensor_2.reflectance": 0.25}},
     ]
     assert found["faults"] == [
         {
-            "wire": "controller.intensity[1]",
+            "connection": "controller.intensity[1]",
             "kind": "bias",
             "value": 0.1,
             "from": 1e-4,
             "until": 3e-4,
         },
-        {"wire": "controller.intensity[2]", "kind": "stuck", "from": 0.0},
+        {"connection": "controller.intensity[2]", "kind": "stuck", "from": 0.0},
     ]

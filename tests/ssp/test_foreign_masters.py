@@ -56,16 +56,22 @@ json.dump(rows, open(sys.argv[4], "w"))
 
 @pytest.fixture(scope="module")
 def jacobi(grasp: System) -> System:
-    """A grasp that needs its values of all types and a transformation on a wire.
+    """A grasp that needs its values of all types and a transformation on a connection.
 
     Case 1, the object elsewhere, one side darker, the other sensor 1 mm behind its place.
     """
-    wires = tuple(
-        replace(wire, factor=1.0, offset=0.001) if wire.target.component == "sensor_2" else wire
-        for wire in grasp.wires
+    connections = tuple(
+        replace(connection, factor=1.0, offset=0.001)
+        if connection.target.component == "sensor_2"
+        else connection
+        for connection in grasp.connections
     )
     values = {**CASES[1], "plant.initial_object_position": 0.02, "sensor_1.reflectance": 0.86}
-    return replace(grasp, wires=wires).with_values(values).with_experiment(STEP, scheme="jacobi")
+    return (
+        replace(grasp, connections=connections)
+        .with_values(values)
+        .with_experiment(STEP, scheme="jacobi")
+    )
 
 
 def gaps(program: str, path: Path, system: System) -> npt.NDArray[np.float64]:

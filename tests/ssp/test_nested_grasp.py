@@ -82,12 +82,17 @@ def test_it_runs_as_the_flat_system_does(grasp: System, fmus: Path, tmp_path: Pa
     # The same by hand: in the same order, with the sum of conversion and transformation.
     by_name = {c.name: c for c in grasp.components}
     order = ("controller", "plant", "sensor_1", "sensor_2")
-    wires = tuple(
+    connections = tuple(
         type(w)(w.source, w.target, 2.0 if w.target.component == "sensor_2" else None)
-        for w in grasp.wires
+        for w in grasp.connections
     )
     flat = System(
-        "flat", tuple(by_name[n] for n in order), wires, 1_000_000, 2_500_000_000, "sequential"
+        "flat",
+        tuple(by_name[n] for n in order),
+        connections,
+        1_000_000,
+        2_500_000_000,
+        "sequential",
     ).with_values({"plant.initial_object_position": 0.02, "sensor_1.reflectance": 0.86})
 
     ours, theirs = simulate(flat), simulate(loaded)

@@ -10,7 +10,15 @@ from grasp_cosim import InputError, System, simulate
 from grasp_cosim.interface.interface import Value
 from grasp_cosim.ssp.document import parse
 from grasp_cosim.ssp.write import SET, write_ssp
-from grasp_cosim.system.parts import Component, Condition, Event, Fault, Initialisation, Port, Wire
+from grasp_cosim.system.parts import (
+    Component,
+    Condition,
+    Connection,
+    Event,
+    Fault,
+    Initialisation,
+    Port,
+)
 from ssp.hand_made import archive, component, connect, fmu, structure, system
 
 
@@ -64,7 +72,7 @@ def test_what_ssp_has_no_form_for_comes_back(grasp: System, tmp_path: Path) -> N
     assert round_trip(full, tmp_path) == full
 
 
-def hand(folder: Path, *wires: Wire, rename: bool = False) -> System:
+def hand(folder: Path, *connections: Connection, rename: bool = False) -> System:
     """Two FMUs with an output y in m and an input u in mm, beside other variables."""
     variables = (
         "output Real y - m",
@@ -89,12 +97,12 @@ def hand(folder: Path, *wires: Wire, rename: bool = False) -> System:
         "plain": 0.1 + 0.2,
     }
     target = "in put" if rename else "u"
-    free = [name for name in ("a", "b") if name not in {w.target.component for w in wires}]
+    free = [name for name in ("a", "b") if name not in {w.target.component for w in connections}]
     components = tuple(
         Component(name, path, {**values, **({target: 1.5} if name in free else {})}, names)
         for name in ("b", "a")
     )
-    return System("hand.toml", components, wires, 1_000_000, 1_000_000_000, "sequential")
+    return System("hand.toml", components, connections, 1_000_000, 1_000_000_000, "sequential")
 
 
 @pytest.mark.parametrize(
@@ -105,14 +113,14 @@ def hand(folder: Path, *wires: Wire, rename: bool = False) -> System:
         ((None, None), (1000.0, 0.0)),  # m to mm, said for masters that know no units
     ],
 )
-def test_wires_with_a_factor(
+def test_connections_with_a_factor(
     tmp_path: Path,
     given: tuple[float | None, float | None],
     expected: tuple[float, float],
 ) -> None:
-    wire = Wire(Port("a", "y"), Port("b", "u"), *given)
-    (again,) = round_trip(hand(tmp_path, wire), tmp_path).wires
-    assert again == Wire(wire.source, wire.target, *expected)
+    connection = Connection(Port("a", "y"), Port("b", "u"), *given)
+    (again,) = round_trip(hand(tmp_path, connection), tmp_path).connections
+    assert again == Connection(connection.source, connection.target, *expected)
 
 
 def test_values_of_every_type(tmp_path: Path) -> None:
@@ -132,8 +140,8 @@ def test_an_enumeration_is_written_by_name(tmp_path: Path) -> None:
 
 
 def test_renamed_variables_have_the_names_of_the_fmu_in_the_archive(tmp_path: Path) -> None:
-    wire = Wire(Port("a", "out"), Port("b", "in put"), 2.0, 0.0)
-    original = hand(tmp_path, wire, rename=True)
+    connection = Connection(Port("a", "out"), Port("b", "in put"), 2.0, 0.0)
+    original = hand(tmp_path, connection, rename=True)
     assert round_trip(original, tmp_path) == original
     text = (zipfile.ZipFile(tmp_path / "again.ssp").read("SystemStructure.ssd")).decode()
     assert 'startConnector="y" endElement="b" endConnector="u"' in text

@@ -79,7 +79,7 @@ def write_system(folder: Path) -> System:
     }
     write_fmu(folder / "spring.fmu", spring, {"force": ["position"]})
     (folder / "loop.toml").write_text(
-        'wires = ["plant.gap -> spring.position", "spring.force -> plant.force"]\n'
+        'connections = ["plant.gap -> spring.position", "spring.force -> plant.force"]\n'
         "[experiment]\nstep = 1e-3\nstop = 0.01\n"
         '[components.plant]\nfmu = "plant.fmu"\nvalues = { width = 0.07 }\n'
         '[components.spring]\nfmu = "spring.fmu"\n'

@@ -26,7 +26,7 @@ def loop(tmp_path: Path) -> System:
         )
     )  # fmt: skip
     (tmp_path / "loop.toml").write_text(
-        "wires = [\n"
+        "connections = [\n"
         '  "plant.x -> spring.u_Real",\n'
         '  { from = "spring.y_Real", to = "plant.u_Real", factor = -1.0, offset = 1.0 },\n]\n'
         "[experiment]\nstep = 0.01\nstop = 1.0\n"
@@ -46,7 +46,7 @@ def test_the_loop_is_what_it_says(loop: System, tmp_path: Path) -> None:
     assert x.tolist() == pytest.approx([1.0 - 0.97**k for k in range(101)], rel=1e-9)
 
 
-def test_millimetres_are_converted_on_the_wire_in_values_and_in_signals(
+def test_millimetres_are_converted_on_the_connection_in_values_and_in_signals(
     loop: System, tmp_path: Path
 ) -> None:
     """With its gain in mm, the candidate integrates to x in mm."""

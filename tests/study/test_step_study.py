@@ -69,7 +69,7 @@ def test_the_limit_of_the_contact_times_is_the_continuous_solution(finger: int) 
 @pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
 def test_the_grasp_of_fmus_against_the_continuous_solution(grasp: System, scheme: str) -> None:
-    """Jacobi adds a step of delay at each wire: larger errors, of the same order and limit."""
+    """Jacobi adds a step of delay at each connection: larger errors, same order and limit."""
     system = grasp.with_experiment(step=1.6e-3, stop=2.0, scheme=scheme)
     study = step_study(system, tolerance=3e-3, steps=[4e-4, 8e-4, 3.2e-3], workers=1)
     for finger in FINGERS:
@@ -267,6 +267,6 @@ def test_a_given_step_that_does_not_fit_is_refused(grasp: System) -> None:
 
 def test_a_system_without_a_grasp_is_refused_by_name(grasp: System) -> None:
     sensor = replace(grasp.components[1], values={"gap": 0.1})
-    system = replace(grasp, name="bench.toml", components=(sensor,), wires=())
+    system = replace(grasp, name="bench.toml", components=(sensor,), connections=())
     with pytest.raises(InputError, match=r"bench.toml: no contact times .* several --step"):
         step_study(system)

@@ -14,11 +14,11 @@ from grasp_cosim.interface.units import Unit
 from grasp_cosim.qualification.interface_difference import capability_differences, family
 from grasp_cosim.qualification.swap import Swap, prepare_swap
 from grasp_cosim.system.description import System
-from grasp_cosim.system.parts import Condition, Event, Fault, Initialisation, Port, Wire
+from grasp_cosim.system.parts import Condition, Connection, Event, Fault, Initialisation, Port
 from study.made import DEPENDENCIES, PLANT, changed, without, write_fmu, write_system
 
 GAP = Port("plant", "gap")
-FORCE_WIRE = Wire(Port("spring", "force"), Port("plant", "force"))
+FORCE_CONNECTION = Connection(Port("spring", "force"), Port("plant", "force"))
 
 
 @pytest.fixture
@@ -51,8 +51,12 @@ def test_a_copy_has_no_difference(system: System, tmp_path: Path) -> None:
 
 
 ONE: list[tuple[dict[str, str], tuple[str, str, str], str]] = [
-    (without("gap"), ("blocks", "missing", "gap"), r"output is wired .*; its outputs: touching, s"),
-    (without("force"), ("blocks", "missing", "force"), r"input is wired .*missing.*: none"),
+    (
+        without("gap"),
+        ("blocks", "missing", "gap"),
+        r"output is connected .*; its outputs: touching, s",
+    ),
+    (without("force"), ("blocks", "missing", "force"), r"input is connected .*missing.*: none"),
     (without("width"), ("blocks", "missing", "width"), r"parameter is set in the system, but miss"),
     (without("spare"), ("warns", "missing", "spare"), r"^output is missing$"),
     (without("mass"), ("notes", "missing", "mass"), r"^parameter is missing$"),
@@ -220,7 +224,7 @@ def test_outputs_are_converted_back(system: System, tmp_path: Path) -> None:
     [
         {"events": (Event({Port("plant", "mass"): 0.6}, when=Condition(GAP, "<", 0.01)),)},
         {"faults": (Fault(Port("spring", "position"), "bias", {"value": 0.1}),)},
-        {"wires": (Wire(GAP, Port("spring", "position"), 2.0, 0.0), FORCE_WIRE)},
+        {"connections": (Connection(GAP, Port("spring", "position"), 2.0, 0.0), FORCE_CONNECTION)},
     ],
 )
 def test_numbers_that_the_system_states_in_the_originals_unit(

@@ -120,7 +120,7 @@ WRONG = [
     (["missing.toml"], "missing.toml: no such system file"),
     (["--fast"], "No such option"),
     (["--step", "1e300"], "must be a number greater than 0, at most 1e\\+09"),
-    (["--set", "sensor_1.gap=0.01"], "sensor_1.gap has two sources, the wire and a value"),
+    (["--set", "sensor_1.gap=0.01"], "sensor_1.gap has two sources, the connection and a value"),
     (["--debug"], "No such option"),
 ]
 

@@ -22,13 +22,13 @@ def load(text: str, fmus: Path, folder: Path) -> System:
 
 def test_the_built_in_grasp(grasp: System) -> None:
     assert [c.name for c in grasp.components] == ["plant", "sensor_1", "sensor_2", "controller"]
-    assert len(grasp.wires) == 10
+    assert len(grasp.connections) == 10
     assert (grasp.step_ns, grasp.stop_ns, grasp.scheme) == (100_000, 3_000_000_000, "sequential")
 
 
-def test_every_input_is_wired(grasp: System) -> None:
+def test_every_input_is_connected(grasp: System) -> None:
     inputs = {Port(c.name, v.name) for c in grasp.components for v in c.interface.of("input")}
-    assert {wire.target for wire in grasp.wires} == inputs
+    assert {connection.target for connection in grasp.connections} == inputs
 
 
 WRONG = [
@@ -51,7 +51,11 @@ WRONG = [
     ("-> sensor_1.gap", "-> sensor_1.gain", "sensor_1 has no input 'gain'; valid: gap"),
     ("-> sensor_1.gap", "-> sensor_2.gap", "sensor_2.gap has two sources, plant.gap"),
     ("plant.gap[1] ->", "plant.contact[1] ->", "is Boolean and sensor_1.gap is Real; must be both"),
-    ('  "plant.gap[1] -> sensor_1.gap",\n', "", "input sensor_1.gap has no source; wire one of"),
+    (
+        '  "plant.gap[1] -> sensor_1.gap",\n',
+        "",
+        "input sensor_1.gap has no source; connect one of",
+    ),
     (" -> sensor_1.gap", " sensor_1.gap", "must be 'component.output -> component.input'"),
     ("GripperPlant.fmu", "Gripper.fmu", "Gripper.fmu: no such FMU file"),
     ('fmu = "GripperPlant.fmu"', "fmu = 7", r"\[components.plant\]: fmu = 7: must be the path"),
@@ -81,7 +85,7 @@ def test_a_mistake_is_one_line(
     assert "\n" not in str(caught.value)
 
 
-def test_an_unwired_input_may_have_a_value(fmus: Path, tmp_path: Path) -> None:
+def test_an_unconnected_input_may_have_a_value(fmus: Path, tmp_path: Path) -> None:
     text = TEXT.replace('  "plant.gap[1] -> sensor_1.gap",\n', "")
     text = text.replace("[components.sensor_2]", "values = { gap = 0.02 }\n\n[components.sensor_2]")
     assert load(text, fmus, tmp_path).component("sensor_1", "test").values == {"gap": 0.02}

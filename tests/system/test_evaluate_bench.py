@@ -61,7 +61,7 @@ def test_the_preset_has_friction(bench: System) -> None:
 
 def test_a_system_that_the_preset_does_not_fit_is_refused(grasp: System) -> None:
     plant = replace(grasp.components[0], values={"force[1]": 0.0, "force[2]": 0.0})
-    other = replace(grasp, name="other.toml", components=(plant,), wires=())
+    other = replace(grasp, name="other.toml", components=(plant,), connections=())
     with pytest.raises(InputError, match=rf"^{BENCH.name} sensor_1.*: no component 'sensor_1'"):
         with_bench(other)
 

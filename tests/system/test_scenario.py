@@ -10,7 +10,15 @@ from grasp_cosim import InputError, System
 from grasp_cosim.grasp.system import SYSTEM
 from grasp_cosim.interface.interface import Interface, Kind, Variable
 from grasp_cosim.system import parts
-from grasp_cosim.system.parts import Component, Condition, Event, Fault, Initialisation, Port, Wire
+from grasp_cosim.system.parts import (
+    Component,
+    Condition,
+    Connection,
+    Event,
+    Fault,
+    Initialisation,
+    Port,
+)
 from grasp_cosim.system.scenario import event_entry, fault_entry, read_events, read_faults
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -30,7 +38,7 @@ set = { "sensor_1.reflectance" = 0.4, "sensor_2.reflectance" = 1 }
 """
 FAULTS = """
 [[faults]]
-wire = "sensor_1.intensity -> controller.intensity[1]"
+connection = "sensor_1.intensity -> controller.intensity[1]"
 kind = "noise"
 standard_deviation = 0.002
 from = 0.5
@@ -39,7 +47,7 @@ when = "plant.contact[2] == true"
 seed = 1
 
 [[faults]]
-wire = "controller.intensity[1]"
+connection = "controller.intensity[1]"
 kind = "saturation"
 high = 0.4
 """
@@ -111,14 +119,14 @@ WRONG_EVENTS = [
         "sensor_1.reflectance",
         "sensor_1.reflection",
         r"set\.sensor_1\.reflection: not there; must be a tunable parameter or an input "
-        r"without a wire; valid: sensor_1\.reflectance, sensor_1\.surface, ",
+        r"without a connection; valid: sensor_1\.reflectance, sensor_1\.surface, ",
     ),
     ("sensor_1.reflectance", "sensor_1.gain", "is a fixed parameter; must be a tunable parameter"),
     ("sensor_1.reflectance", "sensor_1.intensity", "is a continuous output; must be a tunable"),
     (
         "sensor_1.reflectance",
         "sensor_1.gap",
-        r"set\.sensor_1\.gap: has a wire, from plant\.gap\[1\]; put a fault of kind 'stuck' on it",
+        r"set\.sensor_1\.gap: has a connection, from plant\.gap\[1\]; put a fault of kind 'stuck'",
     ),
     ("= 0.6", "= 11", "reflectance = 11: must be a finite number from 0 to 10 1"),
     ("= 0.6", "= true", "reflectance = True: must be a finite number"),
@@ -146,8 +154,8 @@ WRONG_FAULTS = [
     (
         "standard_deviation",
         "sigma",
-        r"faults\[0\]: unknown entry 'sigma'; valid for noise: standard_deviation, wire, kind, "
-        "from, until, when, seed",
+        r"faults\[0\]: unknown entry 'sigma'; valid for noise: standard_deviation, connection, "
+        "kind, from, until, when, seed",
     ),
     ("standard_deviation = 0.002", "", "standard_deviation = None: must be a finite number of at"),
     ("= 0.002", "= -1", "standard_deviation = -1: must be a finite number of at least 0"),
@@ -161,14 +169,18 @@ WRONG_FAULTS = [
     ("seed = 1", "seed = 1.5", "seed = 1.5: must be a whole number, at least 0"),
     ("seed = 1", "seed = -1", "seed = -1: must be a whole number, at least 0"),
     ("seed = 1", "seed = true", "seed = True: must be a whole number, at least 0"),
-    ("sensor_1.intensity ->", "sensor_2.intensity ->", r"no such wire; valid: plant.gap\[1\] -> "),
+    (
+        "sensor_1.intensity ->",
+        "sensor_2.intensity ->",
+        r"no such connection; valid: plant.gap\[1\] -> ",
+    ),
     ("sensor_1.intensity ->", "a.b -> c.d ->", "must be 'component.output -> component.input', or"),
-    ('"controller.intensity[1]"', "7", r"faults\[1\]: wire = 7: must be"),
-    ('"controller.intensity[1]"', '"intensity"', "wire = 'intensity': must be"),
+    ('"controller.intensity[1]"', "7", r"faults\[1\]: connection = 7: must be"),
+    ('"controller.intensity[1]"', '"intensity"', "connection = 'intensity': must be"),
     (
         '"controller.intensity[1]"',
         '"sensor_1.intensity"',
-        r"wire = 'sensor_1.intensity': no wire ends there; valid: sensor_1.gap, sensor_2.gap",
+        r"connection = 'sensor_1.intensity': no connection ends there; valid: sensor_1.gap, ",
     ),
     ("contact[2] ==", "contact[3] ==", r"no numeric output 'contact\[3\]'; valid: position"),
     ("high = 0.4", "", "a saturation must have low, high or both"),
@@ -186,7 +198,11 @@ WRONG_FAULTS = [
     ),
     ('"saturation"\nhigh = 0.4', '"stuck"\nvalue = nan', r"value: intensity\[1\] = nan: must be a"),
     ('"saturation"\nhigh = 0.4', '"stuck"\nvalue = true', r"intensity\[1\] = True: must be a"),
-    ('"saturation"\nhigh = 0.4', '"stuck"\nhold = 1.0', "'hold'; valid for stuck: value, wire"),
+    (
+        '"saturation"\nhigh = 0.4',
+        '"stuck"\nhold = 1.0',
+        "'hold'; valid for stuck: value, connection",
+    ),
 ]
 
 WRONG_INITIALISATION = [
@@ -244,20 +260,25 @@ def test_another_step_must_suit_the_delays(grasp: System) -> None:
         delayed.with_experiment(step=2e-4)
 
 
-def test_an_input_without_a_wire_can_be_set(grasp: System) -> None:
+def test_an_input_without_a_connection_can_be_set(grasp: System) -> None:
     event = Event({Port("sensor_1", "gap"): 0.02}, at_ns=0)
     components = tuple(
         replace(c, values={"gap": 0.1}) if c.name == "sensor_1" else c for c in grasp.components
     )
-    wires = tuple(w for w in grasp.wires if w.target != Port("sensor_1", "gap"))
-    assert replace(grasp, components=components, wires=wires, events=(event,)).events == (event,)
+    connections = tuple(w for w in grasp.connections if w.target != Port("sensor_1", "gap"))
+    assert replace(
+        grasp, components=components, connections=connections, events=(event,)
+    ).events == (event,)
 
 
 def mock_system(kind: Kind, faults: tuple[Fault, ...]) -> System:
     """a.y -> b.u of one kind; read_interface is replaced."""
     components = tuple(Component(name, Path(f"{kind}.fmu"), {}) for name in "ab")
-    wires = (Wire(Port("a", "y"), Port("b", "u")), Wire(Port("b", "y"), Port("a", "u")))
-    return System("mock.toml", components, wires, 10**6, 10**9, "jacobi", faults=faults)
+    connections = (
+        Connection(Port("a", "y"), Port("b", "u")),
+        Connection(Port("b", "y"), Port("a", "u")),
+    )
+    return System("mock.toml", components, connections, 10**6, 10**9, "jacobi", faults=faults)
 
 
 def mock_interface(path: Path) -> Interface:
@@ -372,7 +393,7 @@ def test_entries_are_those_of_the_system_file(fmus: Path, tmp_path: Path) -> Non
         "set": {"sensor_1.reflectance": 0.4, "sensor_2.reflectance": 1},
     }
     assert fault_entry(system.faults[0]) == {
-        "wire": "controller.intensity[1]",
+        "connection": "controller.intensity[1]",
         "kind": "noise",
         "standard_deviation": 0.002,
         "from": 0.5,

@@ -34,7 +34,7 @@ def run(system: System, stop: float = 0.3, **changes: Any) -> Result:
 
 
 def on_gap(kind: FaultKind, start: int = 0, end: int | None = None, **given: float) -> Fault:
-    """A fault of the wire to sensor 1, with a window in steps."""
+    """A fault of the connection to sensor 1, with a window in steps."""
     unit = round(STEP * 1e9)
     return Fault(GAP, kind, given, start * unit, None if end is None else end * unit)
 
@@ -102,7 +102,9 @@ DETERMINISTIC: list[tuple[Fault, Callable[[Array], Array]]] = [
 @pytest.mark.parametrize(
     ("fault", "expected"), DETERMINISTIC, ids=[fault.kind for fault, _ in DETERMINISTIC]
 )
-def test_a_fault_of_a_wire(grasp: System, fault: Fault, expected: Callable[[Array], Array]) -> None:
+def test_a_fault_of_a_connection(
+    grasp: System, fault: Fault, expected: Callable[[Array], Array]
+) -> None:
     result = run(grasp, stop=0.15, faults=(fault,))
     gap = result["plant.gap[1]"]
     got = np.where(window(151, 50, 90), expected(gap), gap)
@@ -129,7 +131,7 @@ def test_a_delay_from_0_repeats_the_value_of_t_0(grasp: System) -> None:
     assert result["sensor_1.intensity"] == pytest.approx(expected, rel=1e-12)
 
 
-def test_noise_of_a_wire(grasp: System) -> None:
+def test_noise_of_a_connection(grasp: System) -> None:
     result = run(grasp, faults=(on_gap("noise", standard_deviation=1e-4),))
     x = (seen(result) - result["plant.gap[1]"]) / 1e-4
     n = len(x)
@@ -138,7 +140,7 @@ def test_noise_of_a_wire(grasp: System) -> None:
     assert abs((x[1:] * x[:-1]).mean()) < 5 / math.sqrt(n)
 
 
-def test_dropouts_of_a_wire(grasp: System) -> None:
+def test_dropouts_of_a_connection(grasp: System) -> None:
     result = run(grasp, stop=0.2, faults=(on_gap("dropout", probability=0.5),))
     gap = result["plant.gap[1]"]
     through = np.isclose(seen(result), gap, rtol=0, atol=1e-12)
@@ -216,7 +218,9 @@ def test_what_a_session_sets_is_what_an_event_sets(grasp: System) -> None:
         session.set("sensor_1.reflectance", 0.6)
         session.step(30)
         result = session.result()
-        with pytest.raises(InputError, match=r"sensor_1\.gap: has a wire, from plant\.gap\[1\]"):
+        with pytest.raises(
+            InputError, match=r"sensor_1\.gap: has a connection, from plant\.gap\[1\]"
+        ):
             session.set("sensor_1.gap", 0.1)
     assert bits(result) == bits(whole)
     assert result.log == whole.log == ("t = 0.02 s: sensor_1.reflectance = 0.6",)

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from grasp_cosim import InputError, System
 from grasp_cosim.interface.units import BASE, Unit, conversion
-from grasp_cosim.system.checks import wire_transform
-from grasp_cosim.system.parts import Component, Port, Wire
+from grasp_cosim.system.checks import connection_transform
+from grasp_cosim.system.parts import Component, Connection, Port
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -88,12 +88,14 @@ RISE = 'declaredType="Rise" start="0"'
 
 
 def from_y_to_u(folder: Path, y: str, u: str) -> tuple[float, float]:
-    """Factor and offset of a wire between variables with these attributes."""
+    """Factor and offset of a connection between variables with these attributes."""
     with zipfile.ZipFile(folder / "t.fmu", "w") as archive:
         archive.writestr("modelDescription.xml", DESCRIPTION.format(y=y, u=u))
     components = Component("a", folder / "t.fmu", {"u": 0.0}), Component("b", folder / "t.fmu", {})
-    wire = Wire(Port("a", "y"), Port("b", "u"))
-    return wire_transform(System("t", components, (wire,), 1, 1, "sequential"), wire)
+    connection = Connection(Port("a", "y"), Port("b", "u"))
+    return connection_transform(
+        System("t", components, (connection,), 1, 1, "sequential"), connection
+    )
 
 
 def test_the_offset_of_a_unit_does_not_apply_to_a_difference(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from grasp_cosim import InputError, System, simulate
 from grasp_cosim.interface.interface import limits, read_interface
-from grasp_cosim.system.checks import remarks, wire_transform
+from grasp_cosim.system.checks import connection_transform, remarks
 from native_fmus import TYPES, build, needs_gcc
 
 pytestmark = needs_gcc
@@ -17,32 +17,34 @@ STARTS = {"Boolean": "false", "String": "''", "Enumeration": "1"}
 
 def pair(
     folder: Path,
-    wire: str,
+    connection: str,
     units: tuple[Mapping[str, str], Mapping[str, str]] = ({}, {}),
     versions: tuple[str, str] = ("3.0", "3.0"),
     first: str = "",
     given: str = "",
     without: str = "",
 ) -> System:
-    """Two native FMUs, a and b, with one wire.
+    """Two native FMUs, a and b, with one connection.
 
     first is more of a's table, given of its values; the inputs named in without get no value.
     """
     tables = ""
     for name, version, declared in zip("ab", versions, units, strict=True):
         build(folder, name, version, declared)
-        inputs = [f"u_{t}" for t in TYPES[version] if name == "a" or f"b.u_{t}" not in wire]
+        inputs = [f"u_{t}" for t in TYPES[version] if name == "a" or f"b.u_{t}" not in connection]
         own = given if name == "a" else ""
         starts = [f"{n} = {STARTS.get(n[2:], '0')}" for n in inputs if n not in (own + without)]
         values = ", ".join([*starts, own] if own else starts)
         tables += f'[components.{name}]\nfmu = "{name}.fmu"\nvalues = {{ {values} }}\n'
         tables += first if name == "a" else ""
     path = folder / "pair.toml"
-    path.write_text(f"wires = [{wire}]\n[experiment]\nstep = 0.1\nstop = 1.0\n{tables}", "utf-8")
+    path.write_text(
+        f"connections = [{connection}]\n[experiment]\nstep = 0.1\nstop = 1.0\n{tables}", "utf-8"
+    )
     return System.load(path)
 
 
-def wired(source: str, target: str) -> str:
+def connected(source: str, target: str) -> str:
     return f'"a.y_{source} -> b.u_{target}"'
 
 
@@ -111,7 +113,7 @@ def test_large_integers_are_exact(tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("versions", [("2.0", "3.0"), ("3.0", "2.0")])
-def test_units_are_converted_on_the_wire(
+def test_units_are_converted_on_the_connection(
     tmp_path: Path,
     versions: tuple[str, str],
     source: str | None,
@@ -123,8 +125,8 @@ def test_units_are_converted_on_the_wire(
         {f"y_{ends[0]}": source} if source else {},
         {f"u_{ends[1]}": target} if target else {},
     )
-    system = pair(tmp_path, wired(*ends), units, versions, given=f"u_{ends[0]} = 2.0")
-    assert wire_transform(system, system.wires[0]) == pytest.approx(expected, rel=1e-15)
+    system = pair(tmp_path, connected(*ends), units, versions, given=f"u_{ends[0]} = 2.0")
+    assert connection_transform(system, system.connections[0]) == pytest.approx(expected, rel=1e-15)
     result = simulate(system)
     factor, offset = expected
     assert result[f"b.y_{ends[1]}"][-1] == pytest.approx(factor * 2.0 + offset, rel=1e-15)
@@ -133,9 +135,9 @@ def test_units_are_converted_on_the_wire(
 
 
 def test_a_declared_factor_overrides_the_units(tmp_path: Path) -> None:
-    wire = '{ from = "a.y_Float64", to = "b.u_Float64", factor = -2, offset = 0.5 }'
+    connection = '{ from = "a.y_Float64", to = "b.u_Float64", factor = -2, offset = 0.5 }'
     units = ({"y_Float64": "m"}, {"u_Float64": "N"})
-    result = simulate(pair(tmp_path, wire, units, given="u_Float64 = 3.0"))
+    result = simulate(pair(tmp_path, connection, units, given="u_Float64 = 3.0"))
     assert result["b.y_Float64"][-1] == -5.5
 
 
@@ -148,12 +150,12 @@ ALLOWED = [
 
 @pytest.mark.parametrize(("source", "target"), ALLOWED)
 @pytest.mark.parametrize("engine", ["python", "auto"])
-def test_types_that_may_be_wired_pass_their_values(
+def test_types_that_may_be_connected_pass_their_values(
     tmp_path: Path, source: str, target: str, engine: str
 ) -> None:
     value = STARTS.get(source, "5")
     value = {"false": "true", "''": "'text'"}.get(value, value)
-    system = pair(tmp_path, wired(source, target), given=f"u_{source} = {value}")
+    system = pair(tmp_path, connected(source, target), given=f"u_{source} = {value}")
     result = simulate(system, engine=engine)  # type: ignore[arg-type]
     if source != "String":
         assert result[f"b.y_{target}"].tolist() == [1.0 if source in STARTS else 5.0] * 11
@@ -162,13 +164,16 @@ def test_types_that_may_be_wired_pass_their_values(
 
 
 REFUSED = [
-    (wired("Int16", "Int8"), "is Int16 and b.u_Int8 is Int8, which does not hold all its values"),
-    (wired("UInt8", "Int8"), "must be a type that holds 0 to 255"),
-    (wired("Int32", "UInt64"), "which does not hold all its values"),
-    (wired("Int32", "Float32"), "which does not hold all its values; must be Float64"),
-    (wired("Float64", "Int32"), "must be both Real, both Integer, both Boolean or both String"),
-    (wired("Boolean", "Int32"), "a.y_Boolean is Boolean and b.u_Int32 is Int32; must be both"),
-    (wired("String", "Float64"), "must be both Real"),
+    (
+        connected("Int16", "Int8"),
+        "is Int16 and b.u_Int8 is Int8, which does not hold all its values",
+    ),
+    (connected("UInt8", "Int8"), "must be a type that holds 0 to 255"),
+    (connected("Int32", "UInt64"), "which does not hold all its values"),
+    (connected("Int32", "Float32"), "which does not hold all its values; must be Float64"),
+    (connected("Float64", "Int32"), "must be both Real, both Integer, both Boolean or both String"),
+    (connected("Boolean", "Int32"), "a.y_Boolean is Boolean and b.u_Int32 is Int32; must be both"),
+    (connected("String", "Float64"), "must be both Real"),
     ('"a.y_array -> b.u_Float64"', "a.y_array is of type array of Float64, which is not supp"),
     ('"a.y_clock -> b.u_Boolean"', "a.y_clock is of type Clock, which is not supported; must be"),
     ('"a.y_Float64 -> b.u_Binary"', "b.u_Binary is of type Binary, which is not supported"),
@@ -182,10 +187,10 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(("wire", "message"), REFUSED)
-def test_wires_that_are_refused(tmp_path: Path, wire: str, message: str) -> None:
-    with pytest.raises(InputError, match=rf"^pair.toml: wires\[0\].*{message}") as caught:
-        pair(tmp_path, wire)
+@pytest.mark.parametrize(("connection", "message"), REFUSED)
+def test_connections_that_are_refused(tmp_path: Path, connection: str, message: str) -> None:
+    with pytest.raises(InputError, match=rf"^pair.toml: connections\[0\].*{message}") as caught:
+        pair(tmp_path, connection)
     assert "\n" not in str(caught.value)
 
 
@@ -200,7 +205,7 @@ def test_wires_that_are_refused(tmp_path: Path, wire: str, message: str) -> None
 def test_units_that_are_refused(tmp_path: Path, source: str, target: str, message: str) -> None:
     units = ({"y_Float64": source}, {"u_Float64": target})
     with pytest.raises(InputError, match=message) as caught:
-        pair(tmp_path, wired("Float64", "Float64"), units)
+        pair(tmp_path, connected("Float64", "Float64"), units)
     assert f"gives the factor from {source} to {target}" in str(caught.value)
 
 
@@ -233,17 +238,17 @@ def test_a_rename_table_gives_the_systems_names(tmp_path: Path) -> None:
 )
 def test_component_entries_that_are_refused(tmp_path: Path, table: str, message: str) -> None:
     with pytest.raises(InputError, match=message) as caught:
-        pair(tmp_path, wired("Float64", "Float64"), first=f"{table}\n")
+        pair(tmp_path, connected("Float64", "Float64"), first=f"{table}\n")
     assert "\n" not in str(caught.value)
 
 
 def test_what_cannot_be_set_is_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="u_Binary is of type Binary, which cannot be set; must"):
-        pair(tmp_path, wired("Float64", "Float64"), given="u_Binary = '00'")
+        pair(tmp_path, connected("Float64", "Float64"), given="u_Binary = '00'")
 
 
 def test_what_is_left_alone_is_named(tmp_path: Path) -> None:
-    lines = remarks(pair(tmp_path, wired("Float64", "Float64")))
+    lines = remarks(pair(tmp_path, connected("Float64", "Float64")))
     assert "a.u_Binary is of type Binary: keeps its start value" in lines
     assert "b.y_array is of type array of Float64: not recorded" in lines
     assert "b.y_clock is of type Clock: not recorded" in lines

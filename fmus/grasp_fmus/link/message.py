@@ -7,7 +7,7 @@ from math import isfinite
 from pathlib import Path
 from typing import NamedTuple
 
-from .signature import HASH_SIZE, Signature, WireVariable
+from .signature import HASH_SIZE, LinkVariable, Signature
 
 Value = float | int | bool | str
 
@@ -94,7 +94,7 @@ class Sealer:
 class Codec:
     """Values of variables as a body: Real f64, Integer i64, Boolean u64, String 128 bytes."""
 
-    def __init__(self, variables: Sequence[WireVariable]) -> None:
+    def __init__(self, variables: Sequence[LinkVariable]) -> None:
         self._struct = struct.Struct("<" + "".join(_CODES[v.kind] for v in variables))
         self._reals = [i for i, v in enumerate(variables) if v.kind == "Real"]
         self._integers = [i for i, v in enumerate(variables) if v.kind == "Integer"]

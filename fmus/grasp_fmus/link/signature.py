@@ -17,7 +17,7 @@ NAMED = 4
 """The most differences that are named in one line."""
 
 
-class WireVariable(NamedTuple):
+class LinkVariable(NamedTuple):
     """A variable as both sides must have it; unit is None where it has none."""
 
     name: str
@@ -33,7 +33,7 @@ class Signature:
     ValueError where a name has a character that the text cannot hold, or comes twice.
     """
 
-    variables: tuple[WireVariable, ...]
+    variables: tuple[LinkVariable, ...]
 
     def __post_init__(self) -> None:
         ordered = [v for causality in ORDER for v in self.variables if v.causality == causality]
@@ -61,16 +61,16 @@ class Signature:
         return sha256(self.text.encode()).digest()[:HASH_SIZE]
 
     @cached_property
-    def request(self) -> tuple[WireVariable, ...]:
+    def request(self) -> tuple[LinkVariable, ...]:
         """What a request carries: inputs, then parameters."""
         return tuple(v for v in self.variables if v.causality != "output")
 
     @cached_property
-    def answer(self) -> tuple[WireVariable, ...]:
+    def answer(self) -> tuple[LinkVariable, ...]:
         """What an answer carries: outputs."""
         return self.of("output")
 
-    def of(self, causality: Causality) -> tuple[WireVariable, ...]:
+    def of(self, causality: Causality) -> tuple[LinkVariable, ...]:
         """The variables of a causality, in order."""
         return tuple(v for v in self.variables if v.causality == causality)
 

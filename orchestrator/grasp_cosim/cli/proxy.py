@@ -15,7 +15,7 @@ from grasp_fmus.variable import Variable as ProxyVariable
 
 from ..errors import InputError
 from ..files import check_folder
-from ..hil.wire import wire_signature
+from ..hil.protocol import link_signature
 from ..inspection.inspection import inspect_fmu
 from ..interface.interface import Interface, Value, Variable, read_interface
 from ..interface.units import BASE
@@ -78,7 +78,7 @@ def proxy(
     if bind_python == "":
         raise InputError("--bind-python '': must be a Python program, or left out")
     interface = read_interface(fmu)
-    signature, notes = wire_signature(interface)
+    signature, notes = link_signature(interface)
     report: dict[str, object] = {"notes": notes}
     lines = []
     try:

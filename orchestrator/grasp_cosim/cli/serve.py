@@ -8,8 +8,8 @@ import click
 from ..errors import InputError
 from ..hil.address import is_loopback, text
 from ..hil.bench import Bench, Serving
+from ..hil.protocol import shared_key
 from ..hil.server import DEFAULT_ADDRESS, Server
-from ..hil.wire import shared_key
 from ..interface.interface import read_interface
 from ..system.description import in_nanoseconds
 from .frame import INTERRUPTED, NEGATIVE, fail, json_option, pair

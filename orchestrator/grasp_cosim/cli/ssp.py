@@ -35,7 +35,7 @@ def ssp(
             "ssp": str(out),
             "entries": list(written.entries),
             "components": [c.name for c in chosen.components],
-            "connections": len(chosen.wires),
+            "connections": len(chosen.connections),
             "notes": [*chosen.notes, *written.notes],
         }
         click.echo(json.dumps(report))

@@ -11,7 +11,7 @@ from ..interface.interface import Interface, Value
 from ..system.description import LONGEST
 from ..system.parts import NANOSECONDS
 from .model import Model
-from .wire import wire_signature
+from .protocol import link_signature
 
 BACKLOG = 1_000_000_000
 """ns by which the model's own clock may be late; beyond that it goes on from now."""
@@ -69,7 +69,7 @@ class Bench:
 
         InputError where the FMU cannot be served so, SimulationError where it cannot be set up.
         """
-        signature, self.notes = wire_signature(interface)
+        signature, self.notes = link_signature(interface)
         self.served = Served()
         self._serving, self._say = serving, say
         try:

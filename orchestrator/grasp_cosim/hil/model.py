@@ -5,7 +5,7 @@ from math import isclose, isfinite
 
 import numpy as np
 import numpy.typing as npt
-from grasp_fmus.link.signature import Signature, WireVariable
+from grasp_fmus.link.signature import LinkVariable, Signature
 
 from ..errors import SimulationError
 from ..fmi.instance import DISCARD, EARLY, WARNING, Instance, dtype
@@ -157,7 +157,7 @@ def _same(old: Value, new: Value) -> bool:
 
 
 def _by_type(
-    instance: Instance, variables: Sequence[WireVariable]
+    instance: Instance, variables: Sequence[LinkVariable]
 ) -> Mapping[str, list[tuple[int, Variable]]]:
     """Place and variable by FMI type."""
     found: dict[str, list[tuple[int, Variable]]] = {}
@@ -177,7 +177,7 @@ def _checked(instance: Instance, status: int) -> None:
 
 
 def _putter(
-    instance: Instance, variables: Sequence[WireVariable]
+    instance: Instance, variables: Sequence[LinkVariable]
 ) -> Callable[[Sequence[Value]], None]:
     """A function that sets these variables from the beginning of a list of values."""
     parts, texts = [], []
@@ -199,7 +199,7 @@ def _putter(
     return put
 
 
-def _getter(instance: Instance, variables: Sequence[WireVariable]) -> Callable[[], list[Value]]:
+def _getter(instance: Instance, variables: Sequence[LinkVariable]) -> Callable[[], list[Value]]:
     """A function that gets the values of these variables, in their order."""
     parts, texts = [], []
     kinds = {"Real": float, "Integer": int, "Boolean": bool}

@@ -17,7 +17,7 @@ Value = float | int | bool | str
 Kind = Literal["Real", "Integer", "Boolean", "String", "Binary", "Clock"]
 KINDS: tuple[str, ...] = get_args(Kind)
 SUPPORTED = ("Real", "Integer", "Boolean", "String")
-"""The kinds a master can set, wire and record; it leaves the others alone."""
+"""The kinds a master can set, connection and record; it leaves the others alone."""
 
 SETTABLE = ("input", "parameter", "structuralParameter")
 _WHOLE = {
@@ -86,7 +86,7 @@ class Variable:
 
     @property
     def supported(self) -> bool:
-        """Whether a master can set, wire and record it."""
+        """Whether a master can set, connection and record it."""
         return self.kind in SUPPORTED and not self.shape
 
     @property

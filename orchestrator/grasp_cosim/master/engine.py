@@ -41,7 +41,7 @@ def _columns(table: Sequence[Sequence[Any]], width: int) -> list[list[Any]]:
 
 def _interpreted(plan: Plan) -> Loop:
     program = loop.Program(*_columns(plan.operations, 5))
-    wires = loop.Wires(*_columns(plan.wires, 4))
+    connections = loop.Connections(*_columns(plan.connections, 4))
     casts = loop.Casts(*_columns(plan.casts, 3))
     calls = [call.python for call in plan.calls]
     buffers = [memoryview(b) for b in plan.buffers]  # type: ignore[arg-type]
@@ -50,8 +50,8 @@ def _interpreted(plan: Plan) -> Loop:
     def run(rows: Any, operation: int, start: int, stop: int, step_ns: int) -> tuple[int, int, int]:
         flat = memoryview(rows.reshape(-1))
         return loop.run(
-            program, wires, casts, calls, buffers, values, clock, flat, operation, start, stop,
-            step_ns,
+            program, connections, casts, calls, buffers, values, clock, flat, operation, start,
+            stop, step_ns,
         )  # fmt: skip
 
     return run
@@ -60,8 +60,8 @@ def _interpreted(plan: Plan) -> Loop:
 def _compiled(plan: Plan) -> Loop:
     compiled = compiled_loop()
     program = loop.Program(*(np.array(c, np.int64) for c in _columns(plan.operations, 5)))
-    source, target, factor, offset = _columns(plan.wires, 4)
-    wires = loop.Wires(
+    source, target, factor, offset = _columns(plan.connections, 4)
+    connections = loop.Connections(
         np.array(source, np.int64), np.array(target, np.int64),
         np.array(factor, np.float64), np.array(offset, np.float64),
     )  # fmt: skip
@@ -71,8 +71,8 @@ def _compiled(plan: Plan) -> Loop:
 
     def run(rows: Any, operation: int, start: int, stop: int, step_ns: int) -> tuple[int, int, int]:
         return compiled(
-            program, wires, casts, calls.table, buffers, plan.values, plan.clock, rows.reshape(-1),
-            operation, start, stop, step_ns,
+            program, connections, casts, calls.table, buffers, plan.values, plan.clock,
+            rows.reshape(-1), operation, start, stop, step_ns,
         )  # fmt: skip
 
     return run

@@ -1,9 +1,9 @@
-"""Faults at run time: what a wire makes of the values it passes. Meaning: system/scenario.py.
+"""Faults at run time: what a connection makes of the values it passes. Meaning: system/scenario.py.
 
-A fault function gets each value that its wire passes, units converted, and the number of the base
-step in which it does so, INITIAL in initialisation mode. Step numbers never fall. Within a step it
-may be asked several times, as initialisation and iteration do: only what came last counts for later
-steps, so that the same value at the same step number always has the same result.
+A fault function gets each value that its connection passes, units converted, and the number of the
+base step in which it does so, INITIAL in initialisation mode. Step numbers never fall. Within a
+step it may be asked several times, as initialisation and iteration do: only what came last counts
+for later steps, so that the same value at the same step number always has the same result.
 
 It never raises, since a compiled loop could not pass that on: what is not finite goes through and
 is found where it is recorded.
@@ -75,7 +75,7 @@ class Window:
 
 
 def fault_functions(windows: Sequence[Window], step_ns: int) -> Mapping[Port, FaultFunction]:
-    """For each wire that has faults, by target, all of them one after the other."""
+    """For each connection that has faults, by target, all of them one after the other."""
     chains: dict[Port, list[FaultFunction]] = {}
     kinds: list[tuple[Port, str]] = []
     for window in windows:
@@ -193,7 +193,7 @@ class _Draws:
     """Random numbers that depend on what they are for and on the step number, on nothing else.
 
     Each is a hash (BLAKE2b) of both, as in a counter-based generator: there is no state to advance.
-    Faults of one kind on one wire differ by their count.
+    Faults of one kind on one connection differ by their count.
     """
 
     def __init__(self, kind: str, target: str, count: int, seed: int) -> None:

@@ -16,7 +16,7 @@ from ..fmi.instance import Instance
 from ..interface.interface import Value, Variable
 from ..system.checks import transforms
 from ..system.description import System
-from ..system.parts import Initialisation, Port, Wire
+from ..system.parts import Connection, Initialisation, Port
 from .scenario import INITIAL
 
 DIFFERENCE = 1e-7
@@ -42,7 +42,7 @@ def order_ports(system: System, instances: Sequence[Instance]) -> Order:
     general, or else on all.
     """
     graph = _graph(system, instances)
-    inputs = {wire.target for wire in system.wires}
+    inputs = {connection.target for connection in system.connections}
     cuts: list[Port] = []
     loops: list[tuple[Port, ...]] = []
     while True:
@@ -61,7 +61,7 @@ def order_ports(system: System, instances: Sequence[Instance]) -> Order:
 
 def _graph(system: System, instances: Sequence[Instance]) -> dict[Port, list[Port]]:
     """For each port those it depends on, in the order of the system: the same in every process."""
-    sources = {wire.target: wire.source for wire in system.wires}
+    sources = {connection.target: connection.source for connection in system.connections}
     graph: dict[Port, list[Port]] = {}
     for instance in instances:
         inputs = [v.name for v in instance.interface.of("input")]
@@ -91,7 +91,7 @@ class Propagation:
         self.order = order
         self.values: dict[Port, Value] = {}
         self._instances = {instance.name: instance for instance in instances}
-        self._wires = {wire.target: wire for wire in system.wires}
+        self._connections = {connection.target: connection for connection in system.connections}
         self._transforms = transforms(system)
         self._faults = faults
 
@@ -160,14 +160,14 @@ class Propagation:
         """What comes back at the cuts when x is put in there."""
         cuts = self.order.cuts
         self._pass_on(dict(zip(cuts, x.tolist(), strict=True)))
-        return np.array([self._arriving(self._wires[port]) for port in cuts], np.float64)
+        return np.array([self._arriving(self._connections[port]) for port in cuts], np.float64)
 
     def _pass_on(self, given: Mapping[Port, Value]) -> None:
         for port in self.order.ports:
             instance = self._instances[port.component]
             variable = instance.interface.by_name[port.variable]
-            if port in self._wires:
-                value = given[port] if port in given else self._arriving(self._wires[port])
+            if port in self._connections:
+                value = given[port] if port in given else self._arriving(self._connections[port])
                 instance.set([variable], [value])
             elif variable.kind in ("Real", "Integer", "Boolean", "String") and not variable.shape:
                 value = instance.get([variable])[0]
@@ -175,18 +175,18 @@ class Propagation:
                 continue
             self.values[port] = value
 
-    def _arriving(self, wire: Wire) -> Value:
-        """The value that a wire hands over."""
-        value = self.values[wire.source]
-        if self._kind(wire.target) == "String":
+    def _arriving(self, connection: Connection) -> Value:
+        """The value that a connection hands over."""
+        value = self.values[connection.source]
+        if self._kind(connection.target) == "String":
             return value
-        factor, offset = self._transforms[wire.target]
+        factor, offset = self._transforms[connection.target]
         number = float(value)
         if (factor, offset) != (1.0, 0.0):
             number = factor * number + offset
-        if wire.target in self._faults:
-            number = self._faults[wire.target](number, INITIAL)
-        kind = self._kind(wire.target)
+        if connection.target in self._faults:
+            number = self._faults[connection.target](number, INITIAL)
+        kind = self._kind(connection.target)
         return number if kind == "Real" else int(number) if kind == "Integer" else number != 0.0
 
     def _check_dependencies(self) -> list[str]:
@@ -199,7 +199,7 @@ class Propagation:
             moved = [
                 port
                 for port, value in self.values.items()
-                if port not in self._wires and value != before[port] and value == value
+                if port not in self._connections and value != before[port] and value == value
             ]
             if not moved:
                 return [

@@ -11,8 +11,8 @@ from ctypes import c_float
 from typing import Any, NamedTuple
 
 COPY, SCALE, STORE, LOAD, LOAD_LONG, CALL, STEP = range(7)  # calls last
-"""Operations: over wires COPY and SCALE; over casts STORE into a buffer of another type, LOAD from
-one, LOAD_LONG with a check; over calls CALL and STEP, which sets the clock before it.
+"""Operations: over connections COPY and SCALE; over casts STORE into a buffer of another type, LOAD
+from one, LOAD_LONG with a check; over calls CALL and STEP, which sets the clock before it.
 """
 
 TOO_LONG = 100
@@ -38,7 +38,7 @@ class Program(NamedTuple):
     phase: Any
 
 
-class Wires(NamedTuple):
+class Connections(NamedTuple):
     """values[target] = factor * values[source] + offset."""
 
     source: Any
@@ -57,7 +57,7 @@ class Casts(NamedTuple):
 
 def run(
     program: Program,
-    wires: Wires,
+    connections: Connections,
     casts: Casts,
     calls: Any,
     buffers: Any,
@@ -76,7 +76,7 @@ def run(
     reached, and where a call's status is a bad one, the operation and the status (else 0 and 0).
     """
     kind, first, last, period, phase = program
-    source, target, factor, offset = wires
+    source, target, factor, offset = connections
     buffer, index, slot = casts
     width, size = len(values), len(kind)
     for k in range(start, stop):

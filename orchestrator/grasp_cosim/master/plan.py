@@ -1,8 +1,8 @@
 """The flat plan: a system turned into one vector of values and a program for the loop.
 
-In the vector the outputs come first, then the inputs that have a wire. The Real values of a
+In the vector the outputs come first, then the inputs that have a connection. The Real values of a
 component stand together, so that one FMI call moves them all; values of another type have a
-buffer of their type beside the vector. Strings are no numbers: a wire between them is a call.
+buffer of their type beside the vector. Strings are no numbers: a connection between them is a call.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -17,7 +17,7 @@ from ..interface.interface import Variable
 from ..realtime.pacer import Pacer
 from ..system.checks import transforms
 from ..system.description import System
-from ..system.parts import NANOSECONDS, Port, Wire
+from ..system.parts import NANOSECONDS, Connection, Port
 from .faults import FaultFunction
 from .loop import CALL, COPY, LOAD, LOAD_LONG, RAISED, SCALE, STEP, STORE
 
@@ -32,15 +32,16 @@ Operation = tuple[int, int, int, int, int]
 class Plan:
     """Everything the loop works on.
 
-    slots gives the place of each output and wired input in values. operations refer to wires
-    (source, target, factor, offset), casts (buffer, index, slot) and calls. clock is the loop's.
+    slots gives the place of each output and connected input in values. operations refer to
+    connections (source, target, factor, offset), casts (buffer, index, slot) and calls. clock is
+    the loop's.
     """
 
     values: npt.NDArray[np.float64]
     clock: npt.NDArray[np.float64]
     slots: Mapping[Port, int]
     operations: tuple[Operation, ...]
-    wires: tuple[tuple[int, int, float, float], ...]
+    connections: tuple[tuple[int, int, float, float], ...]
     casts: tuple[tuple[int, int, int], ...]
     buffers: tuple[npt.NDArray[Any], ...]
     calls: tuple[Call, ...]
@@ -51,15 +52,15 @@ class Plan:
 
 
 def slots_of(system: System, instances: Sequence[Instance]) -> dict[Port, int]:
-    """The place of each output and each wired input that is a number."""
-    wired = {wire.target for wire in system.wires}
+    """The place of each output and each connected input that is a number."""
+    connected = {connection.target for connection in system.connections}
     ports = [
         Port(instance.name, v.name)
         for causality in ("output", "input")
         for instance in instances
         for _, variables in _by_type(instance, causality)
         for v in variables
-        if causality == "output" or Port(instance.name, v.name) in wired
+        if causality == "output" or Port(instance.name, v.name) in connected
     ]
     return {port: slot for slot, port in enumerate(ports)}
 
@@ -79,8 +80,8 @@ class Planner:
     ) -> None:
         """Over the given vector of values; slots are those of slots_of().
 
-        faults act on wires, by target. before_step is called at the start of each macro step with
-        its number, after the pacer of a run in real time.
+        faults act on connections, by target. before_step is called at the start of each macro step
+        with its number, after the pacer of a run in real time.
         """
         self.system = system
         self.instances = {instance.name: instance for instance in instances}
@@ -94,7 +95,7 @@ class Planner:
         self.transforms = transforms(system)
         self.clock = np.zeros(2)
         self.operations: list[Operation] = []
-        self.wires: list[tuple[int, int, float, float]] = []
+        self.connections: list[tuple[int, int, float, float]] = []
         self.casts: list[tuple[int, int, int]] = []
         self.buffers: list[npt.NDArray[Any]] = []
         self.calls: list[Call] = []
@@ -131,7 +132,7 @@ class Planner:
             self.clock,
             self.slots,
             tuple(self.operations),
-            tuple(self.wires),
+            tuple(self.connections),
             tuple(self.casts),
             tuple(self.buffers),
             tuple(self.calls),
@@ -140,23 +141,27 @@ class Planner:
         )
 
     def _move(self, name: str, phase: int) -> None:
-        """The wires that end at a component, then their faults."""
+        """The connections that end at a component, then their faults."""
         period = self.system.period(name)
-        wires = [wire for wire in self.system.wires if wire.target.component == name]
-        numbers = [wire for wire in wires if wire.target in self.slots]
+        connections = [
+            connection
+            for connection in self.system.connections
+            if connection.target.component == name
+        ]
+        numbers = [connection for connection in connections if connection.target in self.slots]
         for kind in (COPY, SCALE):
-            first = len(self.wires)
-            for wire in numbers:
-                transform = self.transforms[wire.target]
+            first = len(self.connections)
+            for connection in numbers:
+                transform = self.transforms[connection.target]
                 if (transform == (1.0, 0.0)) == (kind == COPY):
-                    ends = self.slots[wire.source], self.slots[wire.target]
-                    self.wires.append((*ends, *transform))
-            self._operation(kind, first, len(self.wires), period, phase)
-        for wire in wires:
-            if wire.target in self.faults:
-                self._fault(wire.target, period, phase)
-            if wire.target not in self.slots:
-                self._text(wire, period, phase)
+                    ends = self.slots[connection.source], self.slots[connection.target]
+                    self.connections.append((*ends, *transform))
+            self._operation(kind, first, len(self.connections), period, phase)
+        for connection in connections:
+            if connection.target in self.faults:
+                self._fault(connection.target, period, phase)
+            if connection.target not in self.slots:
+                self._text(connection, period, phase)
 
     def _stamp(self) -> None:
         """The end of a segment of the step: see realtime.meter.segments_of."""
@@ -172,10 +177,12 @@ class Planner:
 
         self._python(act, period, phase)
 
-    def _text(self, wire: Wire, period: int, phase: int) -> None:
-        source, target = (self.instances[port.component] for port in (wire.source, wire.target))
-        put_out = source.interface.by_name[wire.source.variable]
-        taken_in = target.interface.by_name[wire.target.variable]
+    def _text(self, connection: Connection, period: int, phase: int) -> None:
+        source, target = (
+            self.instances[port.component] for port in (connection.source, connection.target)
+        )
+        put_out = source.interface.by_name[connection.source.variable]
+        taken_in = target.interface.by_name[connection.target.variable]
         self._python(lambda _: target.set([taken_in], source.get([put_out])), period, phase)
 
     def _python(self, function: Callable[[int], None], period: int, phase: int) -> None:
@@ -196,7 +203,7 @@ class Planner:
         self._transfer(name, "output", period - 1)
 
     def _transfer(self, name: str, causality: str, phase: int) -> None:
-        """Pass all wired inputs, or fetch all outputs, a call per FMI type."""
+        """Pass all connected inputs, or fetch all outputs, a call per FMI type."""
         instance, period = self.instances[name], self.system.period(name)
         for fmi_type, variables in _by_type(instance, causality):
             taken = [v for v in variables if Port(name, v.name) in self.slots]

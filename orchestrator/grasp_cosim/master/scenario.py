@@ -34,8 +34,8 @@ class Values(Protocol):
 class Scenario:
     """The events and faults of one run.
 
-    log says what happened, a line each, in order. fault_functions are those of the wires that have
-    faults, by target: see faults.py.
+    log says what happened, a line each, in order. fault_functions are those of the connections that
+    have faults, by target: see faults.py.
     """
 
     log: list[str]

@@ -170,7 +170,7 @@ class Session:
             raise
 
     def __getitem__(self, name: str) -> float:
-        """The value now of an output or a wired input, by a name like 'plant.gap[1]'.
+        """The value now of an output or a connected input, by a name like 'plant.gap[1]'.
 
         Booleans are 0.0 or 1.0. InputError where there is no such signal.
         """
@@ -181,7 +181,7 @@ class Session:
         return float(self._master.values[slots[port]])
 
     def set(self, name: str, value: Value) -> None:
-        """Set a tunable parameter or an input without a wire, from now on.
+        """Set a tunable parameter or an input without a connection, from now on.
 
         InputError where there is none of that name, or where the value does not fit; errors of
         FMUs as of step().

@@ -4,9 +4,9 @@ Derived, a band answers one question: can this deviation be told from a mere cho
 original is run again with twice the communication step, and in the other scheme. Of a method of
 order p, the result with twice the step is (2^p - 1) times as far from that with the step as that is
 from the exact one, which is at least its own error; the scheme adds or removes a delay of one step
-at each wire. Of the original itself, every second sample stands against all of them: the peak of an
-impact is recorded as far as a sample falls on it, which a shift of less than a step changes. The
-candidate has such an error of its own, so the band is twice the largest of these deviations.
+at each connection. Of the original itself, every second sample stands against all of them: the peak
+of an impact is recorded as far as a sample falls on it, which a shift of less than a step changes.
+The candidate has such an error of its own, so the band is twice the largest of these deviations.
 
 Nothing smaller than SHARE of the range of a signal, or of a metric, matters, and of a signal that
 hardly moves SMALL of its size, or of its nominal value where it is about 0: the rounding of a

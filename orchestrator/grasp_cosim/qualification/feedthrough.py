@@ -83,7 +83,7 @@ def _loop(
 
 def _followers(system: System, port: Port, reports: Reports) -> Iterator[Port]:
     """The ports whose values follow at once from that of a port."""
-    yield from (wire.target for wire in system.wires if wire.source == port)
+    yield from (connection.target for connection in system.connections if connection.source == port)
     report = reports[port.component]
     inputs = _inputs(report)
     if port.variable not in inputs:

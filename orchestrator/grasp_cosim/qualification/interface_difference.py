@@ -1,8 +1,8 @@
 """What a candidate declares otherwise than the FMU it is to replace, and what that means here.
 
 A difference blocks where the closed loop could not run, or would not be the same experiment: a port
-that is wired is missing, of another type or direction, or in a unit that cannot be converted. It
-warns where results may differ, and is a note where nothing in this system depends on it.
+that is connected is missing, of another type or direction, or in a unit that cannot be converted.
+It warns where results may differ, and is a note where nothing in this system depends on it.
 """
 
 from __future__ import annotations
@@ -71,12 +71,12 @@ class Use:
     """What a system does with the variables of a component, by the system's names.
 
     values are what the original is given. stated are variables for which the system states other
-    numbers in the unit of the original: in events, conditions, faults and factors of wires. tuned
-    are those that events set. loops is what is done with an algebraic loop.
+    numbers in the unit of the original: in events, conditions, faults and factors of connections.
+    tuned are those that events set. loops is what is done with an algebraic loop.
     """
 
     component: str
-    wired: frozenset[str]
+    connected: frozenset[str]
     values: Mapping[str, Value]
     stated: frozenset[str]
     tuned: frozenset[str]
@@ -85,7 +85,7 @@ class Use:
 
     def uses(self, name: str) -> bool:
         """Whether the system depends on the variable."""
-        return name in self.wired or name in self.values or name in self.stated
+        return name in self.connected or name in self.values or name in self.stated
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,10 +104,14 @@ class Declared:
 def use_of(system: System, name: str) -> Use:
     """What the system does with the component of that name."""
     component = system.component(name, system.name)
-    ends = [(port, wire) for wire in system.wires for port in (wire.source, wire.target)]
-    scaled = [p for p, wire in ends if (wire.factor, wire.offset) != (None, None)]
+    ends = [
+        (port, connection)
+        for connection in system.connections
+        for port in (connection.source, connection.target)
+    ]
+    scaled = [p for p, connection in ends if (connection.factor, connection.offset) != (None, None)]
     faulty = {fault.target for fault in system.faults}
-    through = [p for p, wire in ends if wire.target in faulty]
+    through = [p for p, connection in ends if connection.target in faulty]
     tuned = [port for event in system.events for port in event.set]
     conditions = [*(e.when for e in system.events), *(f.when for f in system.faults)]
     asked = [condition.port for condition in conditions if condition]
@@ -171,7 +175,7 @@ def _missing(old: Described, use: Use, theirs: Iterable[Described]) -> Differenc
     name, causality = old["name"], old["causality"]
     if use.uses(name):
         alike = [v["name"] for v in theirs if v["causality"] == causality]
-        how = "wired" if name in use.wired else "set" if name in use.values else "used"
+        how = "connected" if name in use.connected else "set" if name in use.values else "used"
         text = (
             f"{causality} is {how} in the system, but missing; if it has another name: "
             f"--rename '{name}=NAME'; its {causality}s: {choices(alike, 8)}"
@@ -225,8 +229,8 @@ def _changed(
 
 def _causality(old: Described, new: Described, use: Use) -> Difference:
     name, was, now = old["name"], old["causality"], new["causality"]
-    lonely = now == "input" and name not in use.wired and name not in use.values
-    value_only = settable(old) and settable(new) and name not in use.wired
+    lonely = now == "input" and name not in use.connected and name not in use.values
+    value_only = settable(old) and settable(new) and name not in use.connected
     severity: Severity = "blocks" if lonely or (use.uses(name) and not value_only) else "warns"
     more = f", or have a value: --set '{use.component}.{name}=VALUE'" if lonely else ""
     text = f"is {_a(now)}, must be {_a(was)}{more}"
@@ -254,7 +258,7 @@ def _unit(old: Described, new: Described, use: Use, change: Conversion | None) -
         severity, text = "notes", f"unit {now} instead of {was}, which is the same"
     elif name in use.stated:
         severity = "blocks"
-        text = f"is in {now}, but an event, a fault or the factor of a wire is meant in {was}"
+        text = f"is in {now}, but an event, a fault or the factor of a connection is meant in {was}"
     elif name in use.values:
         severity, value = "warns", float(use.values[name])
         text = f"unit {now} instead of {was}: {value:.9g} {was} becomes {change(value):.9g} {now}"
@@ -296,7 +300,7 @@ def _start(
     name, was, now = old["name"], old["start"], new["start"]
     if name in use.values or _same(was, now, change):
         return
-    severity: Severity = "notes" if name in use.wired else "warns"
+    severity: Severity = "notes" if name in use.connected else "warns"
     units = [f" {v['unit']}" if v["unit"] else "" for v in (new, old)]
     text = f"starts with {_shown(now)}{units[0]} instead of {_shown(was)}{units[1]}"
     yield Difference(severity, "start", name, text, was, now)

@@ -28,8 +28,8 @@ Limits. The second sum is a trapezoid: exact for a force linear in the position,
 the second order of the step, as for damping, where the exchange itself is of the first order. What
 the source does with a force before it puts it out (filters, delays of its own) is its own affair.
 A source that receives the position by way of another component, or not at all, is taken to have
-seen it at the same moment: the delay on that way is then not counted. A fault on one of the wires
-is part of the exchange, and what it adds is counted.
+seen it at the same moment: the delay on that way is then not counted. A fault on one of the
+connections is part of the exchange, and what it adds is counted.
 """
 
 import re
@@ -41,7 +41,7 @@ import numpy.typing as npt
 
 from ..interface.interface import Interface, Variable
 from ..system.description import System
-from ..system.parts import Component, Port, Wire
+from ..system.parts import Component, Connection, Port
 from .listener import Signal
 
 Floats = npt.NDArray[np.float64]
@@ -55,12 +55,12 @@ IDENTITY = (1.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class Bond:
-    """A wired input force[j] of a component with an output position[j], and where each goes.
+    """A connected input force[j] of a component with an output position[j], and where each goes.
 
-    index is j, None for a plain force and position. force is the input, source the output wired to
-    it, position the output. seen is the input of the source's component that is wired to position,
-    None where it has none. period is the source's own step in base steps. scale is the energy in J
-    of one unit of force times one of position.
+    index is j, None for a plain force and position. force is the input, source the output connected
+    to it, position the output. seen is the input of the source's component that is connected to
+    position, None where it has none. period is the source's own step in base steps. scale is the
+    energy in J of one unit of force times one of position.
     """
 
     component: str
@@ -88,8 +88,8 @@ class Bond:
 def bonds(system: System) -> tuple[Bond, ...]:
     """The bonds of a system, in the order of its components and their inputs.
 
-    A component has one for each wired Real input force[j], or force, in a unit of force that has
-    beside it an output position[j], or position, in a unit of length.
+    A component has one for each connected Real input force[j], or force, in a unit of force that
+    has beside it an output position[j], or position, in a unit of length.
     """
     return tuple(
         bond
@@ -102,8 +102,8 @@ def bonds(system: System) -> tuple[Bond, ...]:
 def _bond(system: System, component: Component, force: Variable) -> Bond | None:
     """The bond of an input, None where it has none."""
     match = re.fullmatch(r"force(?:\[(\d+)\])?", force.name)
-    wire = _wire_to(system, Port(component.name, force.name))
-    if not match or not wire:
+    connection = _connection_to(system, Port(component.name, force.name))
+    if not match or not connection:
         return None
     interface = component.interface
     position = interface.by_name.get(force.name.replace("force", "position"))
@@ -114,12 +114,12 @@ def _bond(system: System, component: Component, force: Variable) -> Bond | None:
     if None in factors:
         return None
     place = Port(component.name, position.name)
-    source = system.component(wire.source.component, str(wire.source))
+    source = system.component(connection.source.component, str(connection.source))
     return Bond(
         component.name,
         int(match[1]) if match[1] else None,
-        wire.target,
-        wire.source,
+        connection.target,
+        connection.source,
         place,
         _seen(system, place, source),
         system.period(source.name),
@@ -127,15 +127,17 @@ def _bond(system: System, component: Component, force: Variable) -> Bond | None:
     )
 
 
-def _wire_to(system: System, target: Port) -> Wire | None:
-    return next((wire for wire in system.wires if wire.target == target), None)
+def _connection_to(system: System, target: Port) -> Connection | None:
+    return next(
+        (connection for connection in system.connections if connection.target == target), None
+    )
 
 
 def _seen(system: System, position: Port, source: Component) -> Port | None:
-    """The first input of the source's component that is wired to the position."""
+    """The first input of the source's component that is connected to the position."""
     inputs = (Port(source.name, v.name) for v in source.interface.of("input"))
-    wires = (_wire_to(system, port) for port in inputs)
-    return next((w.target for w in wires if w and w.source == position), None)
+    connections = (_connection_to(system, port) for port in inputs)
+    return next((w.target for w in connections if w and w.source == position), None)
 
 
 def _in_si(
@@ -164,10 +166,10 @@ class ExchangeEnergy:
         column: Mapping[Port, int],
         transforms: Mapping[Port, tuple[float, float]] | None = None,
     ) -> None:
-        """The column of a port is the place of that output or wired input in a row.
+        """The column of a port is the place of that output or connected input in a row.
 
-        transforms are factor and offset of the wire to an input, as target = factor * source +
-        offset, where they are not 1 and 0: the source's forces and the positions it has seen are
+        transforms are factor and offset of the connection to an input, as target = factor * source
+        + offset, where they are not 1 and 0: the source's forces and the positions it has seen are
         taken in the units of the component that moves.
         """
         self.signals = tuple(bond.signal for bond in bonds)

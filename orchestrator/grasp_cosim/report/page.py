@@ -172,7 +172,7 @@ def _actuators(run: Run) -> dict[int, str]:
     forces = {f"{PLANT}.force[{j}]": j for j in FINGERS}
     return {
         forces[w["to"]]: w["from"]
-        for w in run.settings["wires"]
+        for w in run.settings["connections"]
         if w["to"] in forces
         and run.units.get(w["from"]) == "N"
         and w["factor"] in (None, 1.0)
@@ -242,7 +242,7 @@ def _grasp_html(grasp: Mapping[str, Any], contacts: Sequence[Mapping[str, float]
     return _filled("grasp.html", jumps=jumps, heads=heads, rows="\n".join(rows))
 
 
-# Signals and wires -----------------------------------------------------------------------------
+# Signals and connections -----------------------------------------------------------------------
 
 
 def _at_first(run: Run, grasp: bool) -> list[str]:
@@ -285,9 +285,9 @@ def _moments(log: Sequence[str]) -> list[float]:
 def _wiring(run: Run) -> str:
     faults: dict[str, list[str]] = {}
     for f in run.settings["faults"]:
-        faults.setdefault(f["wire"], []).append(f["kind"])
+        faults.setdefault(f["connection"], []).append(f["kind"])
     links = []
-    for w in run.settings["wires"]:
+    for w in run.settings["connections"]:
         label = [] if w["factor"] is None else [f"× {number(w['factor'])}"]
         label += [f"+ {number(w['offset'])}"] if w["offset"] else []
         label += faults.get(w["to"], [])
@@ -299,6 +299,6 @@ def _wiring(run: Run) -> str:
     boxes = {name: c["fmu"] for name, c in run.settings["components"].items()}
     return (
         f'<div class="diagram">{wiring_svg(boxes, links, run.units)}</div>'
-        '<p class="hint">From left to right in the order of execution. Dashed, below: wires back '
-        "to a component that steps earlier. Hold the pointer over a wire for its name.</p>"
+        '<p class="hint">From left to right in the order of execution. Dashed, below: connections '
+        "back to a component that steps earlier. Hold the pointer over one for its name.</p>"
     )

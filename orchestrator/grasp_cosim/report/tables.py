@@ -21,7 +21,7 @@ EXPERIMENT = (
 )
 """Entries of run.json that say how the run was made, in the order in which they are shown."""
 
-SETTINGS = ("components", "wires", "events", "faults", "log", "rejections")
+SETTINGS = ("components", "connections", "events", "faults", "log", "rejections")
 """Those that are shown as lists of their own."""
 
 TIMING, PROXIES = "realtime", "proxies"
@@ -81,7 +81,7 @@ def settings_html(run: Mapping[str, Any]) -> str:
     ]
     lists = [
         bullets("Events", map(entries, run["events"]), "No events."),
-        bullets("Faults on wires", map(entries, run["faults"]), "No faults."),
+        bullets("Faults on connections", map(entries, run["faults"]), "No faults."),
         bullets("Log", run["log"], "Nothing to report."),
         bullets(
             "Steps discarded or cut short",

@@ -1,9 +1,10 @@
 """The wiring of a system as a diagram: SVG, components from left to right along the data.
 
-A wire goes forward where its source is listed before its target, in the order of execution; the
-others are feedback and pass below. Components are put into columns by the longest chain of forward
-wires that leads to them; wires that pass a column keep a lane in it; the order within a column
-follows the mean of the neighbours (Sugiyama, Tagawa and Toda, IEEE Trans. SMC-11, 1981).
+A connection goes forward where its source is listed before its target, in the order of execution;
+the others are feedback and pass below. Components are put into columns by the longest chain of
+forward connections that leads to them; connections that pass a column keep a lane in it; the order
+within a column follows the mean of the neighbours (Sugiyama, Tagawa and Toda, IEEE Trans. SMC-11,
+1981).
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from itertools import pairwise
 PITCH, HEAD, FOOT = 20.0, 46.0, 8.0
 """px: between ports, above the first and below the last."""
 GAP, GUTTER, LANE, NEST, MARGIN = 26.0, 90.0, 18.0, 6.0, 14.0
-"""px: between boxes, between columns, between feedback wires below and beside boxes, around all."""
+"""px: between boxes, between columns, between feedback below and beside boxes, around all."""
 LETTER = 7.2
 """px a letter takes, rather too much than too little."""
 SWEEPS = 6
@@ -28,24 +29,24 @@ STYLE = """
 .diagram .box rect{fill:var(--lens);stroke:var(--muted)}
 .diagram .box .name{font-weight:600;font-size:13px}
 .diagram .box .more,.diagram .box .unit{fill:var(--muted);font-size:11px}
-.diagram .wire path{fill:none;stroke:transparent;stroke-width:11}
-.diagram .wire .line{stroke:var(--muted);stroke-width:1.3;marker-end:url(#tip)}
-.diagram .wire text{font-size:11px;paint-order:stroke;stroke:var(--paper);stroke-width:4px;
+.diagram .connection path{fill:none;stroke:transparent;stroke-width:11}
+.diagram .connection .line{stroke:var(--muted);stroke-width:1.3;marker-end:url(#tip)}
+.diagram .connection text{font-size:11px;paint-order:stroke;stroke:var(--paper);stroke-width:4px;
 stroke-linejoin:round}
 .diagram .back .line{stroke:var(--back);stroke-dasharray:6 3;marker-end:url(#tip-back)}
 .diagram .back text{fill:var(--back)}
 .diagram .fault .line{stroke:var(--fault);marker-end:url(#tip-fault)}
 .diagram .fault text{fill:var(--fault)}
-.diagram .wire:hover .line{stroke-width:3}
+.diagram .connection:hover .line{stroke-width:3}
 #tip path{fill:var(--muted)}#tip-back path{fill:var(--back)}#tip-fault path{fill:var(--fault)}
 """
 
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A wire between ports (component, variable); label stands on it, if there is one.
+    """A connection between ports (component, variable); label stands on it, if there is one.
 
-    fault marks a wire that is disturbed.
+    fault marks a connection that is disturbed.
     """
 
     source: tuple[str, str]
@@ -61,7 +62,7 @@ class Link:
 
 @dataclass(eq=False, slots=True)
 class _Node:
-    """A box, or the lanes of the wires that pass a column; x, y is the upper left corner."""
+    """A box, or the lanes of the connections that pass a column; x, y is the upper left corner."""
 
     column: int
     width: float
@@ -81,7 +82,7 @@ class _Node:
 
 
 Chain = list[_Node]
-"""From the box of a wire's source through the lanes to the box of its target."""
+"""From the box of a connection's source through the lanes to the box of its target."""
 
 
 def wiring_svg(
@@ -107,8 +108,8 @@ def wiring_svg(
     right = _spread(layers, nodes, back, chains)
     bottom = max((n.y + n.height for layer in layers for n in layer), default=MARGIN) + GAP
     drawn = [
-        *_forward_wires(forward, nodes, chains),
-        *_back_wires(back, nodes, bottom),
+        *_forward_connections(forward, nodes, chains),
+        *_back_connections(back, nodes, bottom),
         *(_drawn(name, line, nodes[name], units) for name, line in boxes.items()),
     ]
     height = bottom + LANE * len(back) + (MARGIN if back else 0.0)
@@ -142,7 +143,7 @@ def _box(name: str, line: str, column: int, links: Sequence[Link]) -> _Node:
 
 
 def _chains(nodes: Mapping[str, _Node], forward: Sequence[Link]) -> dict[tuple[str, str], Chain]:
-    """The way of the wires between each two boxes."""
+    """The way of the connections between each two boxes."""
     counts: dict[tuple[str, str], int] = defaultdict(int)
     for w in forward:
         counts[w.source[0], w.target[0]] += 1
@@ -235,7 +236,7 @@ def _settle(layer: list[_Node], wanted: list[float]) -> None:
 
 
 def _sort_ports(nodes: Mapping[str, _Node], forward: Sequence[Link], back: Sequence[Link]) -> None:
-    """Ports in the order in which their wires come in and leave; those of feedback lowest."""
+    """Ports in the order in which their connections come in and leave; those of feedback lowest."""
     sources = {w.target: nodes[w.source[0]].middle for w in forward}
     targets: dict[tuple[str, str], float] = {}
     for w in forward:
@@ -253,7 +254,7 @@ def _spread(
     back: Sequence[Link],
     chains: Mapping[tuple[str, str], Chain],
 ) -> float:
-    """Put the columns side by side, room for the wires between them; return the whole width."""
+    """Put the columns side by side, room for connections between them; return the whole width."""
     leaving = Counter(nodes[w.source[0]].column for w in back)
     coming = Counter(nodes[w.target[0]].column for w in back)
     crossing = Counter(node.column for chain in chains.values() for node in chain[:-1])
@@ -270,10 +271,10 @@ def _spread(
     return right + MARGIN
 
 
-def _forward_wires(
+def _forward_connections(
     forward: Sequence[Link], nodes: Mapping[str, _Node], chains: Mapping[tuple[str, str], Chain]
 ) -> Iterable[str]:
-    """Wires from port to port, through the lanes between them."""
+    """Connections from port to port, through the lanes between them."""
     bundles: dict[tuple[str, str], list[Link]] = defaultdict(list)
     for w in forward:
         bundles[w.source[0], w.target[0]].append(w)
@@ -289,7 +290,7 @@ def _forward_wires(
                 x, y = lane.x + lane.width, height
             end = last.port(last.inputs, w.target[1])
             path += _bend(x, y, last.x, end)
-            yield _wire(w, path, "", (x + last.x) / 2, (y + end) / 2 - 4)
+            yield _connection(w, path, "", (x + last.x) / 2, (y + end) / 2 - 4)
 
 
 def _bend(x: float, y: float, to_x: float, to_y: float) -> str:
@@ -297,8 +298,10 @@ def _bend(x: float, y: float, to_x: float, to_y: float) -> str:
     return f"C{half:.1f} {y:.1f} {half:.1f} {to_y:.1f} {to_x:.1f} {to_y:.1f}"
 
 
-def _back_wires(back: Sequence[Link], nodes: Mapping[str, _Node], bottom: float) -> Iterable[str]:
-    """Wires around below all boxes, nested so that those of the lowest ports are innermost."""
+def _back_connections(
+    back: Sequence[Link], nodes: Mapping[str, _Node], bottom: float
+) -> Iterable[str]:
+    """Connections around below all boxes, nested, those of the lowest ports innermost."""
     nested = sorted(
         back, key=lambda w: -nodes[w.source[0]].port(nodes[w.source[0]].outputs, w.source[1])
     )
@@ -316,16 +319,16 @@ def _back_wires(back: Sequence[Link], nodes: Mapping[str, _Node], bottom: float)
             f"M{source.x + source.width:.1f} {y:.1f}H{out - 5:.1f}q5 0 5 5V{lane - 5:.1f}q0 5 -5 5"
             f"H{back_in + 5:.1f}q-5 0 -5 -5V{end + 5:.1f}q0 -5 5 -5H{target.x:.1f}"
         )
-        yield _wire(w, path, " back", (out + back_in) / 2, lane + 4)
+        yield _connection(w, path, " back", (out + back_in) / 2, lane + 4)
 
 
-def _wire(w: Link, path: str, kind: str, x: float, y: float) -> str:
-    """A wire with its label in the middle and its whole name on hover."""
+def _connection(w: Link, path: str, kind: str, x: float, y: float) -> str:
+    """A connection with its label in the middle and its whole name on hover."""
     text = ", ".join(filter(None, (w.name if kind else "", w.label)))
     label = f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="middle">{escape(text)}</text>'
     note = escape(", ".join(filter(None, (w.name, w.label))))
     return (
-        f'<g class="wire{kind}{" fault" if w.fault else ""}"><title>{note}</title>'
+        f'<g class="connection{kind}{" fault" if w.fault else ""}"><title>{note}</title>'
         f'<path d="{path}"/><path class="line" d="{path}"/>{label if text else ""}</g>'
     )
 

@@ -33,7 +33,7 @@ class Beside:
 
 @dataclass(frozen=True, slots=True)
 class Extras:
-    """What a system has beside components, wires and stop."""
+    """What a system has beside components, connections and stop."""
 
     step_ns: int
     scheme: Scheme

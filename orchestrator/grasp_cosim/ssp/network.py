@@ -154,7 +154,7 @@ class Network:
         units = [self.parts[node.path].unit(node.name) for node in nodes]
         direct = (1.0, 0.0)
         if None not in names and names[0] != names[1]:
-            if units[0] is None or units[1] is None:  # a wire is refused, unless the archive
+            if units[0] is None or units[1] is None:  # a connection is refused, unless the archive
                 return None in (self.unit(node) for node in nodes)  # says what they are
             direct = change(hops[-1].connection.place, units[0], units[1])
         return direct == (carried.factor, carried.offset)

@@ -3,15 +3,15 @@
 from collections.abc import Iterable, Mapping, Sequence
 
 
-def flow_order(names: Sequence[str], wires: Iterable[tuple[str, str]]) -> tuple[str, ...]:
+def flow_order(names: Sequence[str], connections: Iterable[tuple[str, str]]) -> tuple[str, ...]:
     """The names such that who gives goes before who takes; within a loop, and else, as given.
 
-    wires lead from name to name. The elements of an SSD are in no order of execution, often sorted
-    by name, and a sequential scheme against the flow delays a value by a step. Inside a loop no
-    order is better than that of the file.
+    connections lead from name to name. The elements of an SSD are in no order of execution, often
+    sorted by name, and a sequential scheme against the flow delays a value by a step. Inside a loop
+    no order is better than that of the file.
     """
     after: dict[str, set[str]] = {name: set() for name in names}
-    for source, target in wires:
+    for source, target in connections:
         after[source].add(target)
     behind = {name: _reachable(after, name) for name in names}
     order: list[str] = []

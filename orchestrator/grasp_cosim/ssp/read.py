@@ -21,7 +21,7 @@ from typing import Any
 from ..errors import InputError, choices
 from ..interface.interface import Value, read_interface
 from ..system.description import System, in_nanoseconds
-from ..system.parts import NANOSECONDS, Component, Initialisation, Port, Wire
+from ..system.parts import NANOSECONDS, Component, Connection, Initialisation, Port
 from .annotation import TYPE, Beside, Extras, read_extras
 from .archive import STRUCTURE, Archive
 from .document import at, child, children, parse, qualified
@@ -45,18 +45,18 @@ def read_ssp(path: FilePath, step: float | None = None, stop: float | None = Non
     network = read_network(top, parts)
     extras = _extras(file, root)
     names = _names(file, parts, extras)
-    wires = tuple(_wires(network, names, extras))
+    connections = tuple(_connections(network, names, extras))
     values, notes = read_settings(archive, file, network, units)
     given = [_component(names[p], part, values.get(p, {}), extras) for p, part in parts.items()]
-    components = tuple(_keep_starts(file, given, wires, notes))
+    components = tuple(_keep_starts(file, given, connections, notes))
     if extras is None:
-        components = _in_order(components, wires, notes)
+        components = _in_order(components, connections, notes)
     stop_ns = _stop(file, root, stop)
     step_ns = _step(file, parts.values(), stop_ns, step, extras, notes)
     return System(
         archive.place,
         components,
-        wires,
+        connections,
         step_ns,
         stop_ns,
         extras.scheme if extras else "sequential",
@@ -100,8 +100,10 @@ def _names(file: str, parts: Iterable[Path], extras: Extras | None) -> dict[Path
     return names
 
 
-def _wires(network: Network, names: Mapping[Path, str], extras: Extras | None) -> Iterator[Wire]:
-    """The wires, in the order of the connections that reach the inputs."""
+def _connections(
+    network: Network, names: Mapping[Path, str], extras: Extras | None
+) -> Iterator[Connection]:
+    """The connections, in the order of the connections that reach the inputs."""
     for target in network.into:
         if target.path not in network.parts or network.output(target) is None:
             continue
@@ -112,9 +114,9 @@ def _wires(network: Network, names: Mapping[Path, str], extras: Extras | None) -
             for node in (hops[0].source, target)
         )
         if network.decided_by_units(hops, carried):
-            yield Wire(source, sink)
+            yield Connection(source, sink)
         else:
-            yield Wire(source, sink, carried.factor, carried.offset)
+            yield Connection(source, sink, carried.factor, carried.offset)
 
 
 def _carried(network: Network, hops: list[Hop]) -> Carried:
@@ -177,15 +179,15 @@ def _component(
 
 
 def _keep_starts(
-    file: str, components: Iterable[Component], wires: Iterable[Wire], notes: list[str]
+    file: str, components: Iterable[Component], connections: Iterable[Connection], notes: list[str]
 ) -> Iterator[Component]:
     """The components, with the start values of inputs that are not connected as values."""
-    wired = {wire.target for wire in wires}
+    connected = {connection.target for connection in connections}
     for component in components:
         starts: dict[str, Value] = {}
         for variable in component.interface.of("input"):
             port, start = Port(component.name, variable.name), variable.start
-            given = port in wired or variable.name in component.values
+            given = port in connected or variable.name in component.values
             if variable.supported and not given and start is not None:
                 place = f"{file}: start value of {port}"
                 starts[variable.name] = component.interface.parse(
@@ -196,11 +198,13 @@ def _keep_starts(
 
 
 def _in_order(
-    components: tuple[Component, ...], wires: Iterable[Wire], notes: list[str]
+    components: tuple[Component, ...], connections: Iterable[Connection], notes: list[str]
 ) -> tuple[Component, ...]:
     """The components along the flow of the data."""
     known = {component.name: component for component in components}
-    order = flow_order(tuple(known), [(w.source.component, w.target.component) for w in wires])
+    order = flow_order(
+        tuple(known), [(w.source.component, w.target.component) for w in connections]
+    )
     notes.append(f"order of execution: {', '.join(order)}")
     return tuple(known[name] for name in order)
 

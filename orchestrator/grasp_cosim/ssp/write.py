@@ -5,9 +5,9 @@
     resources/plant.ssv      the values of a component
 
 The connectors have the FMU's own names, so that any tool can run the archive. What SSP has no form
-for is in an annotation, see annotation.py. A wire whose factor and offset are given, or follow from
-units that differ, has a linear transformation and suppresses the conversion of units: masters that
-know no units then compute the same. The same system gives the same bytes.
+for is in an annotation, see annotation.py. A connection whose factor and offset are given, or
+follow from units that differ, has a linear transformation and suppresses the conversion of units:
+masters that know no units then compute the same. The same system gives the same bytes.
 """
 
 import re
@@ -21,7 +21,7 @@ from ..errors import InputError
 from ..interface.interface import Value, Variable, read_interface
 from ..interface.units import Unit
 from ..system.description import System
-from ..system.parts import NANOSECONDS, Component, Port, Wire
+from ..system.parts import NANOSECONDS, Component, Connection, Port
 from .annotation import extras_of, write_extras
 from .archive import RESOURCES, STRUCTURE, write_archive
 from .document import VERSION, add, new, to_bytes
@@ -124,10 +124,10 @@ def _structure(system: System, sources: Mapping[str, str], bindings: Mapping[str
     elements = add(top, "ssd:Elements")
     for component in system.components:
         _write_component(elements, component, sources, bindings, units)
-    if system.wires:
+    if system.connections:
         connections = add(top, "ssd:Connections")
-        for wire in system.wires:
-            _write_connection(connections, system, wire)
+        for connection in system.connections:
+            _write_connection(connections, system, connection)
     write_units(root, "ssd", units.values())
     stop = system.stop_ns / NANOSECONDS
     add(root, "ssd:DefaultExperiment", startTime="0.0", stopTime=repr(stop))
@@ -172,9 +172,9 @@ def _connected(component: Component) -> list[Variable]:
     return [v for v in variables if v.supported and not (v.items and v.causality == "parameter")]
 
 
-def _write_connection(connections: Any, system: System, wire: Wire) -> None:
+def _write_connection(connections: Any, system: System, connection: Connection) -> None:
     (start, start_unit), (end, end_unit) = (
-        _own(system, port) for port in (wire.source, wire.target)
+        _own(system, port) for port in (connection.source, connection.target)
     )
     element = add(
         connections,
@@ -184,11 +184,11 @@ def _write_connection(connections: Any, system: System, wire: Wire) -> None:
         endElement=end.component,
         endConnector=end.variable,
     )
-    given = wire.factor is not None or wire.offset is not None
-    factor = 1.0 if wire.factor is None else wire.factor
-    offset = 0.0 if wire.offset is None else wire.offset
+    given = connection.factor is not None or connection.offset is not None
+    factor = 1.0 if connection.factor is None else connection.factor
+    offset = 0.0 if connection.offset is None else connection.offset
     if not given and start_unit and end_unit and not same(start_unit, end_unit):
-        factor, offset = change(str(wire.target), start_unit, end_unit)
+        factor, offset = change(str(connection.target), start_unit, end_unit)
     if given or (factor, offset) != (1.0, 0.0):
         element.set("suppressUnitConversion", "true")
         add(element, "ssc:LinearTransformation", factor=repr(factor), offset=repr(offset))

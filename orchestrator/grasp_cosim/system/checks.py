@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from ..errors import InputError, choices
 from ..interface.interface import SUPPORTED, Value, Variable, limits
 from ..interface.units import conversion
-from .parts import LOOPS, NANOSECONDS, Component, Port, Wire
+from .parts import LOOPS, NANOSECONDS, Component, Connection, Port
 
 if TYPE_CHECKING:
     from .description import System
@@ -49,22 +49,26 @@ def _label(items: Mapping[str, int], value: Value) -> str | None:
     return next((name for name, number in items.items() if number == value), None)
 
 
-def check_wires(system: System) -> None:
-    """InputError at the first wire or input that is not as it must be."""
-    sources: dict[Port, Wire] = {}
-    for wire in system.wires:
-        place = _place(system, wire)
-        wire_transform(system, wire)
-        if wire.target.variable in system.component(wire.target.component, place).values:
+def check_connections(system: System) -> None:
+    """InputError at the first connection or input that is not as it must be."""
+    sources: dict[Port, Connection] = {}
+    for connection in system.connections:
+        place = _place(system, connection)
+        connection_transform(system, connection)
+        if (
+            connection.target.variable
+            in system.component(connection.target.component, place).values
+        ):
             raise InputError(
-                f"{place}: {wire.target} has two sources, the wire and a value; must have one"
+                f"{place}: {connection.target} has two sources, the connection and a value; "
+                "must have one"
             )
-        if wire.target in sources:
+        if connection.target in sources:
             raise InputError(
-                f"{place}: {wire.target} has two sources, {sources[wire.target].source} and "
-                f"{wire.source}; must have one"
+                f"{place}: {connection.target} has two sources, "
+                f"{sources[connection.target].source} and {connection.source}; must have one"
             )
-        sources[wire.target] = wire
+        sources[connection.target] = connection
     outputs = [
         str(Port(c.name, v.name)) for c in system.components for v in c.interface.of("output")
     ]
@@ -78,31 +82,33 @@ def check_wires(system: System) -> None:
         plural = len(missing) > 1
         raise InputError(
             f"{system.name}: input{'s' * plural} {choices(missing)} {'have' if plural else 'has'} "
-            f"no source; wire one of {choices(outputs)} to {'each' if plural else 'it'}, or give "
-            f"it a value: --set {missing[0]}=VALUE, or in the system file"
+            f"no source; connect one of {choices(outputs)} to {'each' if plural else 'it'}, or "
+            f"give it a value: --set {missing[0]}=VALUE, or in the system file"
         )
 
 
-def wire_transform(system: System, wire: Wire) -> tuple[float, float]:
-    """Factor and offset of a wire, (1.0, 0.0) for the identity.
+def connection_transform(system: System, connection: Connection) -> tuple[float, float]:
+    """Factor and offset of a connection, (1.0, 0.0) for the identity.
 
-    What the wire declares, or else the conversion between the units of its ends. InputError where
-    an end does not exist, and where values cannot be passed from one end to the other.
+    What the connection declares, or else the conversion between the units of its ends. InputError
+    where an end does not exist, and where values cannot be passed from one end to the other.
     """
-    place = _place(system, wire)
-    source, target = (_end(system, wire, causality) for causality in ("output", "input"))
-    _check_types(system, wire, source, target)
-    if wire.factor is not None or wire.offset is not None:
-        return _declared(place, wire, target)
+    place = _place(system, connection)
+    source, target = (_end(system, connection, causality) for causality in ("output", "input"))
+    _check_types(system, connection, source, target)
+    if connection.factor is not None or connection.offset is not None:
+        return _declared(place, connection, target)
     if source.unit is None or target.unit is None or source.unit == target.unit:
         return 1.0, 0.0
     units = [
         system.component(port.component, place).interface.units.get(v.unit or "")
-        for port, v in ((wire.source, source), (wire.target, target))
+        for port, v in ((connection.source, source), (connection.target, target))
     ]
-    ends = f"{place}: {wire.source} is in {source.unit} and {wire.target} in {target.unit}"
+    ends = (
+        f"{place}: {connection.source} is in {source.unit} and {connection.target} in {target.unit}"
+    )
     advice = (
-        f'{{ from = "{wire.source}", to = "{wire.target}", factor = ... }} '
+        f'{{ from = "{connection.source}", to = "{connection.target}", factor = ... }} '
         f"gives the factor from {source.unit} to {target.unit}"
     )
     if units[0] is None or units[1] is None:
@@ -122,8 +128,11 @@ def wire_transform(system: System, wire: Wire) -> tuple[float, float]:
 
 
 def transforms(system: System) -> dict[Port, tuple[float, float]]:
-    """Factor and offset of every wire, by its target: see wire_transform()."""
-    return {wire.target: wire_transform(system, wire) for wire in system.wires}
+    """Factor and offset of every connection, by its target: see connection_transform()."""
+    return {
+        connection.target: connection_transform(system, connection)
+        for connection in system.connections
+    }
 
 
 def remarks(system: System) -> tuple[str, ...]:
@@ -132,15 +141,15 @@ def remarks(system: System) -> tuple[str, ...]:
     Values that lose digits, units that cannot be compared, variables that are left alone.
     """
     lines = []
-    for wire in system.wires:
-        source, target = (_end(system, wire, causality) for causality in ("output", "input"))
-        arrow = f"{wire.source} -> {wire.target}"
+    for connection in system.connections:
+        source, target = (_end(system, connection, causality) for causality in ("output", "input"))
+        arrow = str(connection)
         if target.type == "Float32" and source.type in ("Real", "Float64"):
             lines.append(f"{arrow}: from {source.type} to Float32, rounded to 7 digits")
-        if target.kind == "Real" and wire.factor is None and wire.offset is None:
+        if target.kind == "Real" and connection.factor is None and connection.offset is None:
             missing = [
                 str(port)
-                for port, v in ((wire.source, source), (wire.target, target))
+                for port, v in ((connection.source, source), (connection.target, target))
                 if v.unit is None
             ]
             if len(missing) == 1:
@@ -155,14 +164,14 @@ def remarks(system: System) -> tuple[str, ...]:
     return tuple(lines)
 
 
-def _place(system: System, wire: Wire) -> str:
-    return f"{system.name}: wires[{system.wires.index(wire)}] '{wire.source} -> {wire.target}'"
+def _place(system: System, connection: Connection) -> str:
+    return f"{system.name}: connections[{system.connections.index(connection)}] '{connection}'"
 
 
-def _end(system: System, wire: Wire, causality: str) -> Variable:
-    """The variable at the end of a wire that has the causality."""
-    place = _place(system, wire)
-    port = wire.source if causality == "output" else wire.target
+def _end(system: System, connection: Connection, causality: str) -> Variable:
+    """The variable at the end of a connection that has the causality."""
+    place = _place(system, connection)
+    port = connection.source if causality == "output" else connection.target
     interface = system.component(port.component, place).interface
     valid = [v.name for v in interface.of(causality)]
     if port.variable not in valid:
@@ -173,18 +182,22 @@ def _end(system: System, wire: Wire, causality: str) -> Variable:
     return interface.by_name[port.variable]
 
 
-def _check_types(system: System, wire: Wire, source: Variable, target: Variable) -> None:
+def _check_types(
+    system: System, connection: Connection, source: Variable, target: Variable
+) -> None:
     """InputError where the target's type does not hold what the source puts out."""
-    place = _place(system, wire)
-    for port, variable in ((wire.source, source), (wire.target, target)):
+    place = _place(system, connection)
+    for port, variable in ((connection.source, source), (connection.target, target)):
         if not variable.supported:
             raise InputError(
                 f"{place}: {port} is of type {variable.nature}, which is not supported; "
                 f"must be {choices(SUPPORTED)}, no array"
             )
-    types = f"{place}: {wire.source} is {source.type} and {wire.target} is {target.type}"
+    types = (
+        f"{place}: {connection.source} is {source.type} and {connection.target} is {target.type}"
+    )
     if (source.kind, target.kind) == ("Integer", "Real"):
-        if target.type == "Float32" and not _holds_singles(system, wire, source):
+        if target.type == "Float32" and not _holds_singles(system, connection, source):
             raise InputError(f"{types}, which does not hold all its values; must be Float64")
     elif source.kind != target.kind:
         raise InputError(
@@ -192,8 +205,8 @@ def _check_types(system: System, wire: Wire, source: Variable, target: Variable)
             "or from Integer to Real"
         )
     elif source.kind == "Integer":
-        low, high = _limits(system, wire.target, target)
-        least, most = _limits(system, wire.source, source)
+        low, high = _limits(system, connection.target, target)
+        least, most = _limits(system, connection.source, source)
         if not low <= least <= most <= high:
             raise InputError(
                 f"{types}, which does not hold all its values; must be a type that holds "
@@ -206,23 +219,23 @@ def _limits(system: System, port: Port, variable: Variable) -> tuple[float, floa
     return limits(variable.type, version)
 
 
-def _holds_singles(system: System, wire: Wire, source: Variable) -> bool:
+def _holds_singles(system: System, connection: Connection, source: Variable) -> bool:
     """Whether a Float32 holds every value of an integer exactly."""
-    low, high = _limits(system, wire.source, source)
+    low, high = _limits(system, connection.source, source)
     return -(2**24) <= low <= high <= 2**24
 
 
-def _declared(place: str, wire: Wire, target: Variable) -> tuple[float, float]:
-    factor = 1.0 if wire.factor is None else float(wire.factor)
-    offset = 0.0 if wire.offset is None else float(wire.offset)
+def _declared(place: str, connection: Connection, target: Variable) -> tuple[float, float]:
+    factor = 1.0 if connection.factor is None else float(connection.factor)
+    offset = 0.0 if connection.offset is None else float(connection.offset)
     if not factor or not math.isfinite(factor):
         raise InputError(f"{place}: factor = {factor!r}: must be a finite number other than 0")
     if not math.isfinite(offset):
         raise InputError(f"{place}: offset = {offset!r}: must be a finite number")
     if target.kind != "Real" and (factor, offset) != (1.0, 0.0):
         raise InputError(
-            f"{place}: factor = {factor!r}, offset = {offset!r}: {wire.target} is {target.type}; "
-            "must be Real to be scaled"
+            f"{place}: factor = {factor!r}, offset = {offset!r}: {connection.target} is "
+            f"{target.type}; must be Real to be scaled"
         )
     return factor, offset
 

@@ -1,4 +1,4 @@
-"""The system description: components, wires and the experiment, checked once."""
+"""The system description: components, connections and the experiment, checked once."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -7,8 +7,14 @@ from typing import Any, Literal, get_args
 
 from ..errors import InputError, choices
 from ..interface.interface import Value
-from .checks import check_components, check_initialisation, check_items, check_steps, check_wires
-from .parts import NANOSECONDS, Component, Event, Fault, Initialisation, Wire
+from .checks import (
+    check_components,
+    check_connections,
+    check_initialisation,
+    check_items,
+    check_steps,
+)
+from .parts import NANOSECONDS, Component, Connection, Event, Fault, Initialisation
 from .scenario_checks import check_scenario
 
 Scheme = Literal["sequential", "jacobi"]
@@ -27,7 +33,7 @@ class System:
 
     name: str
     components: tuple[Component, ...]
-    wires: tuple[Wire, ...]
+    connections: tuple[Connection, ...]
     step_ns: int
     stop_ns: int
     scheme: Scheme
@@ -42,7 +48,7 @@ class System:
             for name, value in component.values.items():
                 component.interface.parse(f"{self.name}: {component.name}.{name}", name, value)
         check_components(self)
-        check_wires(self)
+        check_connections(self)
         check_scenario(self)
         check_initialisation(self)
 

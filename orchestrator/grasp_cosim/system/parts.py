@@ -1,4 +1,4 @@
-"""The parts of a system description: components, ports, wires, events and faults."""
+"""The parts of a system description: components, ports, connections, events and faults."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Port:
 
 
 @dataclass(frozen=True, slots=True)
-class Wire:
+class Connection:
     """From an output to an input: target = factor * source + offset.
 
     factor and offset are None where the units decide: the identity, or the conversion between them.
@@ -73,6 +73,9 @@ class Wire:
     target: Port
     factor: float | None = None
     offset: float | None = None
+
+    def __str__(self) -> str:
+        return f"{self.source} -> {self.target}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,10 +95,11 @@ class Condition:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Sets tunable parameters or unwired inputs, once, before the step from a communication point.
+    """Sets tunable parameters or unconnected inputs, once, before the step from a moment.
 
-    That is the first one at or after at_ns, or the first one where the condition holds; exactly one
-    of the two is given. Of components with a step of their own only their own points count.
+    That is the first communication point at or after at_ns, or the first one where the condition
+    holds; exactly one of the two is given. Of components with a step of their own only their own
+    points count.
     """
 
     set: Mapping[Port, Value]
@@ -105,11 +109,11 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """What a wire does to the values it passes on, in the steps from t >= start_ns to t < end_ns.
+    """What a connection does to the values it passes, in steps from t >= start_ns to t < end_ns.
 
     end_ns is None where there is no end. With a condition it begins where that holds first in this
-    window, and stays. The wire is named by its target. What the kinds do and their parameters:
-    scenario.py. seed is that of a random kind.
+    window, and stays. The connection is named by its target. What the kinds do and their
+    parameters: scenario.py. seed is that of a random kind.
     """
 
     target: Port

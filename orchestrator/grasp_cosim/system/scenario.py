@@ -9,7 +9,7 @@
     set = { "sensor_1.reflectance" = 0.4, "sensor_2.reflectance" = 0.4 }
 
     [[faults]]
-    wire = "sensor_1.intensity -> controller.intensity[1]"    # or its target alone
+    connection = "sensor_1.intensity -> controller.intensity[1]"    # or its target alone
     kind = "noise"
     standard_deviation = 0.002
     from = 0.5                                        # s, 0 where it is left out
@@ -17,14 +17,15 @@
     when = "plant.contact[2] == true"                 # may be left out
     seed = 1                                          # 0 where it is left out
 
-An event sets tunable parameters, and inputs without a wire, at a communication point: the first one
-at or after its time, or the first one where its condition holds. Of components with a step of their
-own only their own points count. It acts on the step that begins there.
+An event sets tunable parameters, and inputs without a connection, at a communication point: the
+first one at or after its time, or the first one where its condition holds. Of components with a
+step of their own only their own points count. It acts on the step that begins there.
 
-A fault acts on the values that its wire passes in the steps that begin at from <= t < until; one
-from 0 acts in the initialisation too. With a condition it begins at the first communication point
-in that window where the condition holds, and stays. It gets values as the input would, with units
-converted; of several faults on a wire, each gets what the one before it in the file has made.
+A fault acts on the values that its connection passes in the steps that begin at from <= t < until;
+one from 0 acts in the initialisation too. With a condition it begins at the first communication
+point in that window where the condition holds, and stays. It gets values as the input would, with
+units converted; of several faults on a connection, each gets what the one before it in the file has
+made.
 
 | kind | makes of a value | parameters |
 |---|---|---|
@@ -36,9 +37,9 @@ converted; of several faults on a wire, each gets what the one before it in the 
 | saturation | low, or high, where it is below or above | low, high, or one of them |
 | quantisation | the nearest whole multiple of `step`, of two the even one | step |
 
-Integer and Boolean wires can be stuck, lose values and delay them. Dropout and noise are random:
-whether a value is lost, or the number added, follows from seed, wire, and step number alone. So it
-is the same in every engine, and neither a window nor another fault shifts it.
+Integer and Boolean connections can be stuck, lose values and delay them. Dropout and noise are
+random: whether a value is lost, or the number added, follows from seed, connection, and step number
+alone. So it is the same in every engine, and neither a window nor another fault shifts it.
 """
 
 import re
@@ -48,7 +49,7 @@ from typing import Any
 from ..checks import as_table, check_keys
 from ..errors import InputError, choices
 from .description import in_nanoseconds
-from .parts import NANOSECONDS, RANDOM, Condition, Event, Fault, Port, Wire
+from .parts import NANOSECONDS, RANDOM, Condition, Connection, Event, Fault, Port
 
 _CONDITION = re.compile(r"(.+?\S)\s*(<=|>=|==|!=|<|>)\s*([^<>=!\s]+)")
 
@@ -61,13 +62,13 @@ def read_events(place: str, entries: Any) -> tuple[Event, ...]:
     )
 
 
-def read_faults(place: str, entries: Any, wires: Sequence[Wire]) -> tuple[Fault, ...]:
-    """The faults of a list of entries on wires; a System checks them.
+def read_faults(place: str, entries: Any, connections: Sequence[Connection]) -> tuple[Fault, ...]:
+    """The faults of a list of entries on connections; a System checks them.
 
     InputError where one is malformed.
     """
     return tuple(
-        _fault(f"{place}: faults[{i}]", entry, wires)
+        _fault(f"{place}: faults[{i}]", entry, connections)
         for i, entry in enumerate(_entries(place, "faults", entries))
     )
 
@@ -84,7 +85,7 @@ def event_entry(event: Event) -> dict[str, Any]:
 
 def fault_entry(fault: Fault) -> dict[str, Any]:
     """The entry that reads as this fault; it fits into JSON."""
-    entry = {"wire": str(fault.target), "kind": fault.kind, **fault.parameters}
+    entry = {"connection": str(fault.target), "kind": fault.kind, **fault.parameters}
     entry["from"] = fault.start_ns / NANOSECONDS
     if fault.end_ns is not None:
         entry["until"] = fault.end_ns / NANOSECONDS
@@ -119,13 +120,13 @@ def _event(place: str, entry: Any) -> Event:
     )
 
 
-def _fault(place: str, entry: Any, wires: Sequence[Wire]) -> Fault:
+def _fault(place: str, entry: Any, connections: Sequence[Connection]) -> Fault:
     entry = as_table(place, entry)
     kind = entry.get("kind")
     until = entry.get("until")
-    common = {"wire", "kind", "from", "until", "when", *(["seed"] if kind in RANDOM else [])}
+    common = {"connection", "kind", "from", "until", "when", *(["seed"] if kind in RANDOM else [])}
     return Fault(
-        _target(place, entry.get("wire"), wires),
+        _target(place, entry.get("connection"), connections),
         kind,
         {key: value for key, value in entry.items() if key not in common},
         in_nanoseconds(f"{place}: from", entry.get("from", 0.0), zero=True),
@@ -135,18 +136,20 @@ def _fault(place: str, entry: Any, wires: Sequence[Wire]) -> Fault:
     )
 
 
-def _target(place: str, text: Any, wires: Sequence[Wire]) -> Port:
-    """The target of the wire that the text names, by both of its ends or the target alone."""
+def _target(place: str, text: Any, connections: Sequence[Connection]) -> Port:
+    """The target of the connection that the text names, by both of its ends or the target alone."""
     parts = [part.strip() for part in text.split("->")] if isinstance(text, str) else []
     if len(parts) not in (1, 2) or not all("." in part for part in parts):
         raise InputError(
-            f"{place}: wire = {text!r}: must be 'component.output -> component.input', or "
+            f"{place}: connection = {text!r}: must be 'component.output -> component.input', or "
             "'component.input' alone"
         )
     ends = [_port(place, part) for part in parts]
-    if len(ends) == 2 and not any([wire.source, wire.target] == ends for wire in wires):
-        valid = choices(f"{wire.source} -> {wire.target}" for wire in wires)
-        raise InputError(f"{place}: wire = {text!r}: no such wire; valid: {valid}")
+    if len(ends) == 2 and not any(
+        [connection.source, connection.target] == ends for connection in connections
+    ):
+        valid = choices(connections)
+        raise InputError(f"{place}: connection = {text!r}: no such connection; valid: {valid}")
     return ends[-1]
 
 

@@ -81,14 +81,14 @@ def _check_event(system: System, event: Event, place: str) -> None:
 
 
 def _settable(system: System) -> list[Port]:
-    """What an event may set: tunable parameters and inputs without a wire."""
-    wired = {wire.target for wire in system.wires}
+    """What an event may set: tunable parameters and inputs without a connection."""
+    connected = {connection.target for connection in system.connections}
     return [
         port
         for component in system.components
         for v in component.interface.of("input", "parameter")
         if v.supported
-        and (port := Port(component.name, v.name)) not in wired
+        and (port := Port(component.name, v.name)) not in connected
         and (v.causality == "input" or v.variability == "tunable")
     ]
 
@@ -96,18 +96,18 @@ def _settable(system: System) -> list[Port]:
 def check_setting(system: System, port: Port, value: Value, place: str) -> None:
     """InputError where the value cannot be set at the port during a run."""
     interface = system.component(port.component, place).interface
-    for wire in system.wires:
-        if wire.target == port:
+    for connection in system.connections:
+        if connection.target == port:
             raise InputError(
-                f"{place}: has a wire, from {wire.source}; put a fault of kind 'stuck' on it, "
-                "with a value"
+                f"{place}: has a connection, from {connection.source}; put a fault of kind 'stuck' "
+                "on it, with a value"
             )
     settable = _settable(system)
     if port not in settable:
         variable = interface.by_name.get(port.variable)
         found = f"is a {variable.variability} {variable.causality}" if variable else "not there"
         raise InputError(
-            f"{place}: {found}; must be a tunable parameter or an input without a wire; "
+            f"{place}: {found}; must be a tunable parameter or an input without a connection; "
             f"valid: {choices(settable)}"
         )
     interface.parse(place, port.variable, value)
@@ -134,10 +134,11 @@ def _check_condition(system: System, condition: Condition, place: str) -> None:
 
 
 def _check_fault(system: System, fault: Fault, place: str) -> None:
-    targets = [wire.target for wire in system.wires]
+    targets = [connection.target for connection in system.connections]
     if fault.target not in targets:
         raise InputError(
-            f"{place}: wire = '{fault.target}': no wire ends there; valid: {choices(targets)}"
+            f"{place}: connection = '{fault.target}': no connection ends there; "
+            f"valid: {choices(targets)}"
         )
     if fault.kind not in FAULTS:
         raise InputError(f"{place}: kind = {fault.kind!r}: must be one of {choices(FAULTS)}")
@@ -165,7 +166,7 @@ def _check_parameters(fault: Fault, place: str) -> None:
     known = ["value"] if fault.kind == "stuck" else list(ranges)
     for name in fault.parameters:
         if name not in known:
-            others = ["wire", "kind", "from", "until", "when"]
+            others = ["connection", "kind", "from", "until", "when"]
             others += ["seed"] if fault.kind in RANDOM else []
             raise InputError(
                 f"{place}: unknown entry {name!r}; valid for {fault.kind}: "

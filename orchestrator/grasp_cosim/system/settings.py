@@ -3,7 +3,7 @@
 from typing import Any
 
 from .description import System
-from .parts import NANOSECONDS, Component, Wire
+from .parts import NANOSECONDS, Component, Connection
 from .scenario import event_entry, fault_entry
 
 
@@ -24,7 +24,7 @@ def settings(system: System) -> dict[str, Any]:
             "iterations": loops.iterations,
         },
         "components": {c.name: _component(c) for c in system.components},
-        "wires": [_wire(w) for w in system.wires],
+        "connections": [_connection(w) for w in system.connections],
         "events": [event_entry(e) for e in system.events],
         "faults": [fault_entry(f) for f in system.faults],
     }
@@ -44,10 +44,10 @@ def _component(component: Component) -> dict[str, Any]:
     }
 
 
-def _wire(wire: Wire) -> dict[str, Any]:
+def _connection(connection: Connection) -> dict[str, Any]:
     return {
-        "from": str(wire.source),
-        "to": str(wire.target),
-        "factor": wire.factor,
-        "offset": wire.offset,
+        "from": str(connection.source),
+        "to": str(connection.target),
+        "factor": connection.factor,
+        "offset": connection.offset,
     }

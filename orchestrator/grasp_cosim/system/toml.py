@@ -1,6 +1,6 @@
-"""The system description: components, wires and the experiment, from one TOML file.
+"""The system description: components, connections and the experiment, from one TOML file.
 
-    wires = ["plant.gap[1] -> sensor_1.gap", ...]   # before the first table, as TOML wants it
+    connections = ["plant.gap[1] -> sensor_1.gap", ...]   # before the first table, as TOML wants it
 
     [experiment]
     step = 1e-4                     # s, communication step
@@ -14,15 +14,16 @@
     rename = { "gap[1]" = "Gap1" }  # the system's name = the FMU's, where they differ
     isolation = "process"           # in a process of its own; or "none"
 
-A wire that scales is a table: { from = "a.x", to = "b.y", factor = 1000.0, offset = 0.0 }. Without
-factor and offset, units that differ are converted.
+A connection that scales is a table: { from = "a.x", to = "b.y", factor = 1000.0, offset = 0.0 }.
+Without factor and offset, units that differ are converted.
 
     [initialisation]                # may be left out, as each of its entries
     loops = "iterate"               # what to do with an algebraic loop at t = 0; or "refuse"
     tolerance = 1e-10               # relative, of the iteration
     iterations = 50                 # at most
 
-Every input has exactly one source: a wire or a value. [[events]] and [[faults]]: see scenario.py.
+Every input has exactly one source: a connection or a value. [[events]] and [[faults]]: see
+scenario.py.
 """
 
 import tomllib
@@ -34,7 +35,7 @@ from ..checks import as_table, check_keys
 from ..errors import InputError, choices
 from ..interface.interface import read_interface
 from .description import System, as_scheme, in_nanoseconds
-from .parts import ISOLATIONS, Component, Initialisation, Isolation, Port, Wire
+from .parts import ISOLATIONS, Component, Connection, Initialisation, Isolation, Port
 from .scenario import read_events, read_faults
 
 
@@ -51,24 +52,28 @@ def read_toml(path: Path, fmus: Path | None = None) -> System:
 
 def _from_table(place: str, table: dict[str, Any], folder: Path) -> System:
     check_keys(
-        place, table, {"experiment", "components", "wires", "initialisation", "events", "faults"}
+        place,
+        table,
+        {"experiment", "components", "connections", "initialisation", "events", "faults"},
     )
     experiment = as_table(f"{place}: [experiment]", table.get("experiment"))
     check_keys(f"{place}: [experiment]", experiment, {"step", "stop", "scheme"})
     components = as_table(f"{place}: [components]", table.get("components"))
-    texts = table.get("wires", [])
+    texts = table.get("connections", [])
     if not isinstance(texts, list):
-        raise InputError(f"{place}: wires = {texts!r}: must be a list of 'output -> input'")
-    wires = tuple(_wire(f"{place}: wires[{i}]", text) for i, text in enumerate(texts))
+        raise InputError(f"{place}: connections = {texts!r}: must be a list of 'output -> input'")
+    connections = tuple(
+        _connection(f"{place}: connections[{i}]", text) for i, text in enumerate(texts)
+    )
     return System(
         place,
         tuple(_component(place, name, entry, folder) for name, entry in components.items()),
-        wires,
+        connections,
         in_nanoseconds(f"{place}: experiment.step", experiment.get("step")),
         in_nanoseconds(f"{place}: experiment.stop", experiment.get("stop")),
         as_scheme(f"{place}: experiment.scheme", experiment.get("scheme", "sequential")),
         read_events(place, table.get("events", [])),
-        read_faults(place, table.get("faults", []), wires),
+        read_faults(place, table.get("faults", []), connections),
         read_initialisation(f"{place}: [initialisation]", table.get("initialisation", {})),
     )
 
@@ -122,20 +127,20 @@ def _isolation(place: str, name: Any) -> Isolation:
     return name  # type: ignore[no-any-return]
 
 
-def _wire(place: str, entry: Any) -> Wire:
+def _connection(place: str, entry: Any) -> Connection:
     if not isinstance(entry, dict):
         parts = [part.strip() for part in entry.split("->")] if isinstance(entry, str) else []
         ports = [Port(*part.split(".", 1)) for part in parts if "." in part]
         if len(parts) != 2 or len(ports) != 2:
             raise InputError(f"{place}: {entry!r}: must be 'component.output -> component.input'")
-        return Wire(ports[0], ports[1])
+        return Connection(ports[0], ports[1])
     check_keys(place, entry, {"from", "to", "factor", "offset"})
     for key in ("factor", "offset"):
         number = entry.get(key, 0.0)
         if isinstance(number, bool) or not isinstance(number, float | int):
             raise InputError(f"{place}: {key} = {number!r}: must be a number")
     source, target = (_port(f"{place}: {key}", entry.get(key)) for key in ("from", "to"))
-    return Wire(source, target, entry.get("factor"), entry.get("offset"))
+    return Connection(source, target, entry.get("factor"), entry.get("offset"))
 
 
 def _port(place: str, text: Any) -> Port:

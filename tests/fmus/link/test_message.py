@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from grasp_fmus.link import message
 from grasp_fmus.link.message import Codec, Message, Sealer, read_key
-from grasp_fmus.link.signature import Signature, WireVariable
+from grasp_fmus.link.signature import LinkVariable, Signature
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -18,10 +18,10 @@ HASH = b"0123456789abcdef"
 EXAMPLE = Message(message.STEP, 0, HASH, 2**63 + 1, 7, 3, 0.25, 1e-3, -5, b"12345678")
 
 ALL = (
-    WireVariable("a", "Real", "input"),
-    WireVariable("b", "Integer", "input"),
-    WireVariable("c", "Boolean", "input"),
-    WireVariable("d", "String", "input"),
+    LinkVariable("a", "Real", "input"),
+    LinkVariable("b", "Integer", "input"),
+    LinkVariable("c", "Boolean", "input"),
+    LinkVariable("d", "String", "input"),
 )
 
 messages = st.builds(
@@ -159,10 +159,10 @@ def test_a_key_is_read_without_the_line_end(tmp_path: Path) -> None:
 
 
 def test_too_many_variables_for_a_datagram() -> None:
-    many = tuple(WireVariable(f"x{i}", "String", "output") for i in range(512))
+    many = tuple(LinkVariable(f"x{i}", "String", "output") for i in range(512))
     with pytest.raises(ValueError, match="an answer with 512 variables has 65648 bytes"):
         message.check_size(Signature(many))
-    names = tuple(WireVariable("x" * 1000 + str(i), "Real", "output") for i in range(70))
+    names = tuple(LinkVariable("x" * 1000 + str(i), "Real", "output") for i in range(70))
     with pytest.raises(ValueError, match="their names must fit"):
         message.check_size(Signature(names))
     message.check_size(Signature(ALL))

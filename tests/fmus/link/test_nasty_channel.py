@@ -5,11 +5,11 @@ from itertools import count
 from grasp_fmus.link.client import Client, Verdict
 from grasp_fmus.link.message import STEP
 from grasp_fmus.link.peer import Peer, Request
-from grasp_fmus.link.signature import Signature, WireVariable
+from grasp_fmus.link.signature import LinkVariable, Signature
 from hypothesis import given
 from hypothesis import strategies as st
 
-SIGNATURE = Signature((WireVariable("u", "Real", "input"), WireVariable("y", "Real", "output")))
+SIGNATURE = Signature((LinkVariable("u", "Real", "input"), LinkVariable("y", "Real", "output")))
 
 fates = st.lists(st.sampled_from(["pass", "lose", "repeat", "hold"]), min_size=2, max_size=2)
 

@@ -7,11 +7,11 @@ import pytest
 from grasp_fmus.link.client import Client, Verdict
 from grasp_fmus.link.message import END, INITIALISE, OUTPUTS, STEP, Message, Sealer, Value
 from grasp_fmus.link.peer import ALIVE, Peer, Request
-from grasp_fmus.link.signature import Signature, WireVariable
+from grasp_fmus.link.signature import LinkVariable, Signature
 
-U = WireVariable("u", "Real", "input", "m")
-P = WireVariable("p", "Boolean", "parameter")
-Y = WireVariable("y", "Real", "output", "N")
+U = LinkVariable("u", "Real", "input", "m")
+P = LinkVariable("p", "Boolean", "parameter")
+Y = LinkVariable("y", "Real", "output", "N")
 SIGNATURE = Signature((U, P, Y))
 KEY = b"sixteen bytes...", b"another 16 bytes"
 VALUES: list[Value] = [0.5, True]

@@ -3,12 +3,12 @@
 from hashlib import sha256
 
 import pytest
-from grasp_fmus.link.signature import Signature, WireVariable
+from grasp_fmus.link.signature import LinkVariable, Signature
 
-GAP = WireVariable("gap", "Real", "input", "m")
-REFLECTANCE = WireVariable("reflectance", "Real", "parameter", "1")
-INTENSITY = WireVariable("intensity", "Real", "output", "V")
-CONTACT = WireVariable("contact", "Boolean", "output")
+GAP = LinkVariable("gap", "Real", "input", "m")
+REFLECTANCE = LinkVariable("reflectance", "Real", "parameter", "1")
+INTENSITY = LinkVariable("intensity", "Real", "output", "V")
+CONTACT = LinkVariable("contact", "Boolean", "output")
 
 ONE = Signature((INTENSITY, GAP, CONTACT, REFLECTANCE))
 
@@ -31,7 +31,7 @@ def test_text_and_hash() -> None:
 @pytest.mark.parametrize("name", ["a\tb", "a\nb", "a\rb"])
 def test_a_name_that_the_text_cannot_hold_is_refused(name: str) -> None:
     with pytest.raises(ValueError, match="must be without tabs and line ends"):
-        Signature((WireVariable(name, "Real", "input"),))
+        Signature((LinkVariable(name, "Real", "input"),))
 
 
 def test_a_name_twice_is_refused() -> None:
@@ -45,7 +45,7 @@ def test_a_name_twice_is_refused() -> None:
         ((GAP, REFLECTANCE, INTENSITY, CONTACT), ""),
         ((GAP, REFLECTANCE, INTENSITY), "there is no output contact, Boolean"),
         (
-            (GAP, REFLECTANCE, INTENSITY, CONTACT, WireVariable("x", "Integer", "output", "m")),
+            (GAP, REFLECTANCE, INTENSITY, CONTACT, LinkVariable("x", "Integer", "output", "m")),
             "there is also output x, Integer in m",
         ),
         (
@@ -55,13 +55,13 @@ def test_a_name_twice_is_refused() -> None:
         ((GAP, REFLECTANCE, CONTACT, INTENSITY), "the variables are in another order"),
     ],
 )
-def test_difference(other: tuple[WireVariable, ...], words: str) -> None:
+def test_difference(other: tuple[LinkVariable, ...], words: str) -> None:
     assert ONE.difference(Signature(other).text) == words
 
 
 def test_of_many_differences_four_are_named() -> None:
     assert Signature(()).difference(ONE.text).endswith("; there is also output contact, Boolean")
-    many = tuple(WireVariable(f"x{i}", "Real", "input") for i in range(6))
+    many = tuple(LinkVariable(f"x{i}", "Real", "input") for i in range(6))
     assert Signature(many).difference("").endswith("input x3, Real; and 2 more")
 
 

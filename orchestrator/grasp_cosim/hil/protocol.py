@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Literal
 
 from grasp_fmus.link.message import check_size, read_key
-from grasp_fmus.link.signature import ORDER, Causality, Signature, WireVariable
+from grasp_fmus.link.signature import ORDER, Causality, LinkVariable, Signature
 
 from ..errors import InputError
 from ..interface.interface import Interface, Variable
@@ -14,17 +14,17 @@ WIDE = ("UInt32", "Int64", "UInt64")
 """Integer types that an Integer of FMI 2.0 does not hold."""
 
 
-def wire_signature(interface: Interface) -> tuple[Signature, list[str]]:
+def link_signature(interface: Interface) -> tuple[Signature, list[str]]:
     """The signature of an FMU, and a note for each parameter that is left out.
 
     InputError where an input or output cannot be exchanged.
     """
-    taken: list[WireVariable] = []
+    taken: list[LinkVariable] = []
     notes = []
     for v in interface.of(*ORDER, "structuralParameter"):
         reason = _obstacle(v)
         if reason is None:
-            taken.append(WireVariable(v.name, _kind(v), _causality(v), v.unit))
+            taken.append(LinkVariable(v.name, _kind(v), _causality(v), v.unit))
         elif v.causality in ("input", "output"):
             raise InputError(
                 f"{interface.path}: {v.causality} {v.name} is {reason}, which a proxy cannot "

@@ -1,10 +1,10 @@
-"""Connections become wires: through nested systems, with units and transformations."""
+"""Connections become connections: through nested systems, with units and transformations."""
 
 from pathlib import Path
 
 import pytest
 from grasp_cosim import InputError, System
-from grasp_cosim.system.parts import Port, Wire
+from grasp_cosim.system.parts import Connection, Port
 from ssp.hand_made import archive, component, connect, fmu, linear, structure, system
 
 GIVES = fmu("output Real y - m")
@@ -16,56 +16,60 @@ PLAIN_TAKES = fmu("input Real u 0.5")
 BOTH = component("a", "output y Real") + component("b", "input u Real")
 
 
-def wires(folder: Path, top: str, a: bytes = GIVES, b: bytes = TAKES) -> tuple[Wire, ...]:
-    return System.load(archive(folder, structure(top), {"a": a, "b": b})).wires
+def connections(
+    folder: Path, top: str, a: bytes = GIVES, b: bytes = TAKES
+) -> tuple[Connection, ...]:
+    return System.load(archive(folder, structure(top), {"a": a, "b": b})).connections
 
 
-def one(folder: Path, content: str = "", suppress: str = "false", **ends: bytes) -> Wire:
-    connection = connect("a/y", "b/u", content, suppressUnitConversion=suppress)
-    (wire,) = wires(folder, system("top", BOTH, connection), **ends)
-    return wire
+def one(folder: Path, content: str = "", suppress: str = "false", **ends: bytes) -> Connection:
+    drawn = connect("a/y", "b/u", content, suppressUnitConversion=suppress)
+    (connection,) = connections(folder, system("top", BOTH, drawn), **ends)
+    return connection
 
 
 A_TO_B = Port("a", "y"), Port("b", "u")
 
 
 def test_the_units_decide_where_nothing_is_said(tmp_path: Path) -> None:
-    assert one(tmp_path) == Wire(*A_TO_B)
+    assert one(tmp_path) == Connection(*A_TO_B)
 
 
 def test_the_two_ends_of_a_connection_are_in_no_order(tmp_path: Path) -> None:
-    assert wires(tmp_path, system("top", BOTH, connect("b/u", "a/y"))) == (Wire(*A_TO_B),)
+    assert connections(tmp_path, system("top", BOTH, connect("b/u", "a/y"))) == (
+        Connection(*A_TO_B),
+    )
 
 
 def test_suppressed_units_leave_the_number_as_it_is(tmp_path: Path) -> None:
-    assert one(tmp_path, suppress="true") == Wire(*A_TO_B, 1.0, 0.0)
+    assert one(tmp_path, suppress="true") == Connection(*A_TO_B, 1.0, 0.0)
 
 
 def test_a_transformation_takes_the_place_of_suppressed_units(tmp_path: Path) -> None:
-    assert one(tmp_path, linear(3.0, 0.25), "true") == Wire(*A_TO_B, 3.0, 0.25)
+    assert one(tmp_path, linear(3.0, 0.25), "true") == Connection(*A_TO_B, 3.0, 0.25)
 
 
 def test_a_transformation_comes_after_the_conversion_of_units(tmp_path: Path) -> None:
     # 2 m are 2000 mm, transformed 3 * 2000 + 0.25
-    wire = one(tmp_path, linear(3.0, 0.25))
-    assert wire.factor is not None
-    assert wire.offset is not None
-    assert wire.factor * 2.0 + wire.offset == pytest.approx(6000.25, rel=1e-15)
+    connection = one(tmp_path, linear(3.0, 0.25))
+    assert connection.factor is not None
+    assert connection.offset is not None
+    assert connection.factor * 2.0 + connection.offset == pytest.approx(6000.25, rel=1e-15)
 
 
 def test_units_with_an_offset(tmp_path: Path) -> None:
     # 300 K are 26.85 degC, doubled 53.7
-    wire = one(tmp_path, linear(2.0), a=KELVIN, b=CELSIUS)
-    assert wire.factor is not None
-    assert wire.offset is not None
-    assert wire.factor * 300.0 + wire.offset == pytest.approx(53.7, rel=1e-13)
+    connection = one(tmp_path, linear(2.0), a=KELVIN, b=CELSIUS)
+    assert connection.factor is not None
+    assert connection.offset is not None
+    assert connection.factor * 300.0 + connection.offset == pytest.approx(53.7, rel=1e-13)
 
 
 def test_units_that_only_the_archive_names_are_converted(tmp_path: Path) -> None:
     elements = component("a", "output y Real m") + component("b", "input u Real mm")
     top = system("top", elements, connect("a/y", "b/u"))
-    (wire,) = wires(tmp_path, top, PLAIN_GIVES, PLAIN_TAKES)
-    assert wire == Wire(*A_TO_B, 1000.0, 0.0)
+    (connection,) = connections(tmp_path, top, PLAIN_GIVES, PLAIN_TAKES)
+    assert connection == Connection(*A_TO_B, 1000.0, 0.0)
 
 
 def test_units_of_different_quantities_are_refused(tmp_path: Path) -> None:
@@ -81,7 +85,7 @@ def test_through_a_nested_system(tmp_path: Path) -> None:
     sub = inner("input in Real", connect("in", "b/u"))
     top = system("top", component("a", "output y Real") + sub, connect("a/y", "sub/in"))
     loaded = System.load(archive(tmp_path, structure(top), {"a": GIVES, "b": TAKES}))
-    assert loaded.wires == (Wire(Port("a", "y"), Port("sub_b", "u")),)
+    assert loaded.connections == (Connection(Port("a", "y"), Port("sub_b", "u")),)
     assert "component sub.b is called sub_b here" in loaded.notes
 
 
@@ -89,7 +93,7 @@ def test_two_nested_systems_side_by_side(tmp_path: Path) -> None:
     first = system("x", component("a", "output y"), connect("out", "a/y"), "output out")
     second = system("x2", component("b", "input u"), connect("in", "b/u"), "input in")
     top = system("top", first + second, connect("x/out", "x2/in"))
-    assert wires(tmp_path, top) == (Wire(Port("x_a", "y"), Port("x2_b", "u")),)
+    assert connections(tmp_path, top) == (Connection(Port("x_a", "y"), Port("x2_b", "u")),)
 
 
 def test_transformations_on_the_way_add_up(tmp_path: Path) -> None:
@@ -97,21 +101,21 @@ def test_transformations_on_the_way_add_up(tmp_path: Path) -> None:
     sub = inner("input in Real m", connect("in", "b/u", linear(1.0, 1.0)))
     elements = component("a", "output y Real") + sub
     top = system("top", elements, connect("a/y", "sub/in", linear(2.0)))
-    (wire,) = wires(tmp_path, top)
-    assert (wire.factor, wire.offset) == (2000.0, 1.0)
+    (connection,) = connections(tmp_path, top)
+    assert (connection.factor, connection.offset) == (2000.0, 1.0)
 
 
 def test_a_connector_between_in_another_unit_changes_nothing(tmp_path: Path) -> None:
     sub = inner("input in Real mm", connect("in", "b/u"))
     top = system("top", component("a", "output y Real") + sub, connect("a/y", "sub/in"))
-    assert wires(tmp_path, top) == (Wire(Port("a", "y"), Port("sub_b", "u")),)
+    assert connections(tmp_path, top) == (Connection(Port("a", "y"), Port("sub_b", "u")),)
 
 
 def test_a_connector_between_names_the_unit_of_an_fmu_without(tmp_path: Path) -> None:
     sub = inner("input in Real m", connect("in", "b/u"))
     top = system("top", component("a", "output y Real") + sub, connect("a/y", "sub/in"))
-    (wire,) = wires(tmp_path, top, a=PLAIN_GIVES)
-    assert (wire.factor, wire.offset) == (1000.0, 0.0)
+    (connection,) = connections(tmp_path, top, a=PLAIN_GIVES)
+    assert (connection.factor, connection.offset) == (1000.0, 0.0)
 
 
 def test_an_unclear_unit_is_refused(tmp_path: Path) -> None:
@@ -119,11 +123,11 @@ def test_an_unclear_unit_is_refused(tmp_path: Path) -> None:
     elements = component("a", "output y Real") + sub
     top = system("top", elements, connect("a/y", "sub/in", linear(1000.0)))
     with pytest.raises(InputError, match=r"unit at sub\.in is not clear, m or mm; give that conn"):
-        wires(tmp_path, top)
+        connections(tmp_path, top)
 
 
 @pytest.mark.parametrize(
-    ("connections", "message"),
+    ("drawn", "message"),
     [
         (connect("a/y", "c/u"), "no element 'c'; valid: a, b"),
         (connect("a/z", "b/u"), "a has no connector 'z'; valid: y"),
@@ -145,10 +149,10 @@ def test_an_unclear_unit_is_refused(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_connections_that_are_refused(tmp_path: Path, connections: str, message: str) -> None:
-    top = system("top", BOTH, connections, "input in Real; output out Real")
+def test_connections_that_are_refused(tmp_path: Path, drawn: str, message: str) -> None:
+    top = system("top", BOTH, drawn, "input in Real; output out Real")
     with pytest.raises(InputError, match=message) as error:
-        wires(tmp_path, top)
+        connections(tmp_path, top)
     assert str(error.value).startswith("hand.ssp: SystemStructure.ssd:2: connection '")
 
 
@@ -157,7 +161,7 @@ def test_connections_in_a_circle_are_refused(tmp_path: Path) -> None:
     top = system("top", component("a", "output y") + loop, connect("sub/out", "sub/in"))
     inside = top.replace(connect("in", "out"), connect("in", "out") + connect("in", "b/u"))
     with pytest.raises(InputError, match="leads back to itself"):
-        wires(tmp_path, inside)
+        connections(tmp_path, inside)
 
 
 @pytest.mark.parametrize(
@@ -183,20 +187,20 @@ def test_connections_in_a_circle_are_refused(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_values_that_wires_do_not_carry(
+def test_values_that_connections_do_not_carry(
     tmp_path: Path, a: bytes, b: bytes, content: str, message: str
 ) -> None:
     kinds = ("calculatedParameter", "parameter") if b"calculated" in a else ("output", "input")
     elements = component("a", f"{kinds[0]} y") + component("b", f"{kinds[1]} u")
     with pytest.raises(InputError, match=message):
-        wires(tmp_path, system("top", elements, connect("a/y", "b/u", content)), a, b)
+        connections(tmp_path, system("top", elements, connect("a/y", "b/u", content)), a, b)
 
 
 def test_an_enumeration_goes_to_an_enumeration(tmp_path: Path) -> None:
     elements = component("a", "output y") + component("b", "input u")
     ends = fmu("output Enumeration y -"), fmu("input Enumeration u 1")
-    assert wires(tmp_path, system("top", elements, connect("a/y", "b/u")), *ends) == (
-        Wire(*A_TO_B),
+    assert connections(tmp_path, system("top", elements, connect("a/y", "b/u")), *ends) == (
+        Connection(*A_TO_B),
     )
 
 
@@ -204,7 +208,7 @@ def test_an_integer_goes_to_a_real_and_may_be_transformed_there(tmp_path: Path) 
     ends = {"a": fmu("output Integer y -"), "b": fmu("input Real u 0.0")}
     elements = component("a", "output y Integer") + component("b", "input u Real")
     top = system("top", elements, connect("a/y", "b/u", linear(0.5)))
-    assert wires(tmp_path, top, **ends) == (Wire(*A_TO_B, 0.5, 0.0),)
+    assert connections(tmp_path, top, **ends) == (Connection(*A_TO_B, 0.5, 0.0),)
 
 
 def test_units_that_no_one_defines_are_refused(tmp_path: Path) -> None:
@@ -216,5 +220,5 @@ def test_units_that_no_one_defines_are_refused(tmp_path: Path) -> None:
 def test_units_that_the_archive_defines_in_place_of_the_fmu(tmp_path: Path) -> None:
     a = fmu("output Real y - m").replace(b'<BaseUnit m="1"/>', b"")
     elements = component("a", "output y Real m") + component("b", "input u Real")
-    (wire,) = wires(tmp_path, system("top", elements, connect("a/y", "b/u")), a)
-    assert wire == Wire(*A_TO_B, 1000.0, 0.0)
+    (connection,) = connections(tmp_path, system("top", elements, connect("a/y", "b/u")), a)
+    assert connection == Connection(*A_TO_B, 1000.0, 0.0)
