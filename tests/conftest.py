@@ -12,11 +12,11 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
-from fmi2 import Fmu
 from grasp_cosim import System, cli
 from grasp_cosim.grasp.system import SYSTEM
 from grasp_fmus import build as builder
-from packages import skip_where_it_cannot_run
+from support.fmi2 import Fmu
+from support.packages import skip_where_it_cannot_run
 
 Run = Callable[..., tuple[int, str, str]]
 """A command line without its program; exit code, standard output, standard error."""

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from grasp_cosim.grasp.system import SYSTEM
 from grasp_cosim.interface.interface import read_interface
-from native_fmus import build, needs_gcc
+from support.native_fmus import build, needs_gcc
 
 FULL = Path("/dev/full")
 

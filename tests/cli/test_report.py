@@ -6,11 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from figures.runs import grasp_run, ring_run, write_run
-from figures.timings import paced
 from grasp_cosim import System, cli, simulate
 from grasp_cosim.recording.load import load_run
 from grasp_cosim.report.page import page_html
+from report.runs import grasp_run, ring_run, write_run
+from report.timings import paced
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from grasp_cosim.fmi.instance import Instance, dtype
 from grasp_cosim.fmi.load import load
 from grasp_cosim.interface.interface import Value, Variable
 from grasp_cosim.system.parts import Component, Isolation
-from native_fmus import TYPES, build
+from support.native_fmus import TYPES, build
 
 KINDS: Sequence[tuple[str, Isolation]] = [
     (version, isolation) for version in ("2.0", "3.0") for isolation in ("none", "process")

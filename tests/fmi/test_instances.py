@@ -16,8 +16,8 @@ from grasp_cosim.fmi.instance import DISCARD, EARLY, OK, STEP_2, STEP_3, TRANSFE
 from grasp_cosim.fmi.load import load
 from grasp_cosim.fmi.loaded import KEPT
 from grasp_cosim.system.parts import Component, Isolation
-from native_fmus import EARLY as MIGHT_RETURN_EARLY
-from native_fmus import TYPES, build, needs_gcc
+from support.native_fmus import EARLY as MIGHT_RETURN_EARLY
+from support.native_fmus import TYPES, build, needs_gcc
 
 pytestmark = needs_gcc
 both = pytest.mark.parametrize(("version", "isolation"), KINDS)

@@ -17,7 +17,7 @@ from fmi.instances import Bound, interrupted_after, real, running
 from grasp_cosim import InputError, SimulationError, System, simulate
 from grasp_cosim.fmi import child, process
 from grasp_cosim.fmi.instance import OK
-from native_fmus import TYPES, build, needs_gcc
+from support.native_fmus import TYPES, build, needs_gcc
 
 pytestmark = needs_gcc
 versions = pytest.mark.parametrize("version", ["2.0", "3.0"])

@@ -10,7 +10,7 @@ import pytest
 from grasp_controller import series
 from gripper_plant import compliant, movable, rigid
 from proximity_sensor import channel
-from pythons import VERSIONS, python
+from support.pythons import VERSIONS, python
 
 HOST = Path(__file__).with_name("bare_host.py")
 STEPS, H = 50, 1e-3

@@ -15,9 +15,9 @@ from typing import Any
 
 import pytest
 from conftest import Altered
-from fmi2 import DISCARD, ERROR, FATAL, OK, Fmu, Instance
 from grasp_fmus.binary import bound, mended, preamble
 from grasp_fmus.build import BINARIES
+from support.fmi2 import DISCARD, ERROR, FATAL, OK, Fmu, Instance
 
 STOCK = (BINARIES / "linux64" / "libpythonfmu-export.so").read_bytes()
 HOST = Path(__file__).with_name("bare_host.py")

@@ -8,15 +8,15 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
-from fmi2 import ERROR, OK, Fmu, Instance
 from grasp_fmus.build import SCRIPTS, build_fmu
 from grasp_fmus.link.message import END, HELLO, INITIALISE, STEP
 from grasp_fmus.link.signature import Signature
 from grasp_fmus.model_description import Experiment
 from grasp_fmus.proxy import Settings
 from grasp_fmus.proxy_build import Original, build_proxy
-from pythons import VERSIONS, python
-from scripted_peer import SIGNATURE, VARIABLES, ScriptedPeer
+from support.fmi2 import ERROR, OK, Fmu, Instance
+from support.pythons import VERSIONS, python
+from support.scripted_peer import SIGNATURE, VARIABLES, ScriptedPeer
 
 SOURCE = Path(__file__).with_name("host.c")
 STEPS, H = 20, 1e-3

@@ -12,8 +12,8 @@ from zipfile import ZipFile
 
 import pytest
 from conftest import Altered, Load
-from fmi2 import OK, Fmu, Instance
-from packages import runnable
+from support.fmi2 import OK, Fmu, Instance
+from support.packages import runnable
 
 TESTS = Path(__file__).parents[1]
 ROOT = TESTS.parent
@@ -216,7 +216,7 @@ HOST = """
 import sys
 from pathlib import Path
 {before}
-from fmi2 import Fmu, Instance
+from support.fmi2 import Fmu, Instance
 from math import sin
 folder, *fmus = map(Path, sys.argv[1:])
 for path in fmus:
@@ -331,7 +331,7 @@ FmuBuilder.build_FMU(sys.argv[1], dest=sys.argv[2])
 NEIGHBOURS = """
 import sys
 from pathlib import Path
-from fmi2 import Fmu, Instance
+from support.fmi2 import Fmu, Instance
 folder, *paths = map(Path, sys.argv[1:])
 fmus = {path.stem: Fmu(path, folder / path.stem) for path in paths}
 instances = {name: Instance(fmu, name).initialise() for name, fmu in fmus.items()}

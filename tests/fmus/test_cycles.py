@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from fmi2 import ERROR, OK, Fmu, Instance
-from packages import skip_where_it_cannot_run
+from support.fmi2 import ERROR, OK, Fmu, Instance
+from support.packages import skip_where_it_cannot_run
 
 NAMES = ("GraspController", "GripperPlant", "GripperPlantMuJoCo", "ProximitySensor")
 """The other plants are GripperPlant's adapter with arithmetic that keeps nothing."""

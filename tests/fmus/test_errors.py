@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 from conftest import Altered, Load
-from fmi2 import DISCARD, ERROR, OK, Fmu, Instance
+from support.fmi2 import DISCARD, ERROR, OK, Fmu, Instance
 
 Act = Callable[[Instance], int]
 

@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 from conftest import Load
-from fmi2 import DISCARD, ERROR, OK, Fmu, Instance, State
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from support.fmi2 import DISCARD, ERROR, OK, Fmu, Instance, State
 
 NAMES = (
     "GripperPlant",

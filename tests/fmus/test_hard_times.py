@@ -12,8 +12,8 @@ from threading import Thread
 from typing import Any
 
 import pytest
-from fmi2 import ERROR, OK, Fmu, Instance
-from packages import runnable
+from support.fmi2 import ERROR, OK, Fmu, Instance
+from support.packages import runnable
 
 ROUNDS = 10
 MANY = 200

@@ -21,14 +21,14 @@ from zipfile import ZipFile
 import fmpy
 import pytest
 from conftest import Load
-from fmi2 import OK, Instance
 from fmpy.validation import validate_fmu
 from grasp_controller import series
 from gripper_plant import compliant, movable, mujoco_box, rigid
 from lxml import etree  # type: ignore[import-untyped]
-from packages import skip_where_it_cannot_run
 from proximity_sensor import channel
 from proximity_sensor.surfaces import Surface
+from support.fmi2 import OK, Instance
+from support.packages import skip_where_it_cannot_run
 
 BLOCKS: dict[str, ModuleType] = {
     "GraspController": series,

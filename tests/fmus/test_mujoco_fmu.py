@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from conftest import Load
-from fmi2 import DISCARD, OK, Instance
+from support.fmi2 import DISCARD, OK, Instance
 
 NAME = "GripperPlantMuJoCo"
 MISSING = (

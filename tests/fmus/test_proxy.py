@@ -26,7 +26,7 @@ from grasp_fmus.link.message import (
     Message,
 )
 from grasp_fmus.link.signature import Signature
-from scripted_peer import (
+from support.scripted_peer import (
     SIGNATURE,
     VARIABLES,
     Clock,

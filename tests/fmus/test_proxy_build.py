@@ -12,7 +12,6 @@ from typing import Any
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-import native_fmus
 import pytest
 from conftest import Load
 from fmpy.validation import validate_fmu
@@ -21,6 +20,7 @@ from grasp_cosim.hil.protocol import link_signature
 from grasp_cosim.interface.interface import read_interface
 from grasp_fmus.c_header import c_header
 from grasp_fmus.documentation import icon
+from support import native_fmus
 
 Proxy = Callable[..., Path]
 Run = Callable[..., tuple[int, str, str]]

@@ -13,13 +13,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fmi2 import ERROR, OK, WARNING, Fmu, Instance
 from fmpy import simulate_fmu
 from grasp_fmus.link.message import END, HELLO, INITIALISE, STEP
 from grasp_fmus.model_description import Experiment
 from grasp_fmus.proxy import Settings
 from grasp_fmus.proxy_build import Original, build_proxy
-from scripted_peer import VARIABLES, ScriptedPeer, fail
+from support.fmi2 import ERROR, OK, WARNING, Fmu, Instance
+from support.scripted_peer import VARIABLES, ScriptedPeer, fail
 
 _C: dict[str, Any] = {
     "Real": ctypes.c_double,

@@ -5,9 +5,9 @@ from math import sin
 
 import pytest
 from conftest import Load
-from fmi2 import ERROR, OK, Instance
 from grasp_fmus.contract import declared
 from proximity_sensor import channel
+from support.fmi2 import ERROR, OK, Instance
 
 STAGES = ("pattern", "ambient", "noise", "adc", "filter", "median")
 H = 1e-4

@@ -10,8 +10,8 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
 from grasp_controller import series
 from gripper_plant import compliant, movable, mujoco_box, rigid
-from packages import skip_where_it_cannot_run
 from proximity_sensor import channel
+from support.packages import skip_where_it_cannot_run
 
 BLOCKS: dict[str, Any] = {
     "GripperPlant": rigid,

@@ -5,9 +5,9 @@ from math import sin
 
 import pytest
 from conftest import Load
-from fmi2 import ERROR, OK, Fmu, Instance
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.fmi2 import ERROR, OK, Fmu, Instance
 
 H = 1e-3
 NAMES = (

@@ -16,7 +16,7 @@ from grasp_cosim.master import compiled
 from grasp_cosim.master.engine import Engine
 from grasp_cosim.recording.result import Rejection, Result
 from grasp_cosim.system.parts import Connection, Port
-from mocks import Mock, Run, make_system
+from support.mocks import Mock, Run, make_system
 
 pytest.importorskip("numba")
 ENGINES: tuple[Engine, ...] = ("python", "compiled")

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from grasp_cosim import InputError, SimulationError
 from grasp_cosim.system.parts import Connection, Initialisation, Port
-from mocks import Mock, Run, make_system
+from support.mocks import Mock, Run, make_system
 
 Make = Callable[..., Mock]
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from grasp_cosim import InputError, SimulationError
 from grasp_cosim.system.parts import Connection, Port
-from mocks import Mock, Run, make_system
+from support.mocks import Mock, Run, make_system
 
 Make = Callable[..., Mock]
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from grasp_cosim import SimulationError
 from grasp_cosim.recording.result import Rejection
-from mocks import Mock, Run, make_system
+from support.mocks import Mock, Run, make_system
 
 Make = Callable[..., Run]
 

@@ -12,7 +12,7 @@ from grasp_cosim.realtime.timing import Timing
 from grasp_cosim.recording.dispatch import Dispatcher
 from grasp_cosim.recording.memory import MemoryListener
 from grasp_cosim.system.description import System
-from mocks import Mock, make_system
+from support.mocks import Mock, make_system
 
 US, MS = 1_000, 1_000_000
 """ns."""

@@ -13,8 +13,8 @@ from grasp_cosim.realtime.meter import LISTED
 from grasp_cosim.realtime.options import Overrun
 from grasp_cosim.realtime.pacer import BREATH_NS, SLICE_NS, SOME, SPIN_NS, Pacer
 from grasp_cosim.realtime.timing import Timing
-from mocks import Mock, make_system
 from realtime.fake import MS, NEAR, US, Fake, Paced
+from support.mocks import Mock, make_system
 
 ENGINES: tuple[Engine, ...] = ("python", "compiled")
 

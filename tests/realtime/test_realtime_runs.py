@@ -19,7 +19,7 @@ from grasp_cosim.realtime.pacer import HAS_CLOCK
 from grasp_cosim.realtime.timing import Timing
 from grasp_cosim.recording.load import load_run
 from grasp_cosim.report.tables import metrics_table
-from mocks import Mock, make_system
+from support.mocks import Mock, make_system
 
 FAST = Realtime(factor=1e4)
 """Not to wait at all in a test."""

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from figures.timings import paced
 from grasp_cosim.errors import InputError
 from grasp_cosim.realtime.timing import Timing
+from report.timings import paced
 
 
 @pytest.mark.parametrize(("hiccups", "listed"), [(0, 1000), (12, 1000), (12, 5)])

@@ -18,7 +18,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from proximity_sensor import optics
-from reference.direct import closed_loop
+from support.direct import closed_loop
 
 Array = npt.NDArray[np.float64]
 

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim.sweep.sweep import sweep
-from made_studies import GAIN, HEAD, native_study, write_native
-from native_fmus import needs_gcc
+from support.made_studies import GAIN, HEAD, native_study, write_native
+from support.native_fmus import needs_gcc
 
 pytestmark = [needs_gcc, pytest.mark.slow]
 

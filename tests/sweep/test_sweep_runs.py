@@ -9,8 +9,8 @@ from grasp_cosim import InputError, SimulationError
 from grasp_cosim.sweep.run import Job, Task, run_job
 from grasp_cosim.sweep.sweep import sweep
 from grasp_cosim.sweep.workers import run_here
-from made_studies import GRID, native_study, write_native
-from native_fmus import needs_gcc
+from support.made_studies import GRID, native_study, write_native
+from support.native_fmus import needs_gcc
 
 pytestmark = needs_gcc
 

@@ -1,0 +1,148 @@
+"""A virtual object's exact transition, against other ways of solving its equation."""
+
+from math import inf, isfinite, nextafter, sqrt
+
+import numpy as np
+import pytest
+from grasp_controller.impedance import Matrix, Motion, advance, transition
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm
+from support.exact import oscillator
+
+QUICK = settings(deadline=None, derandomize=True, max_examples=100)
+
+EPS = float(np.finfo(float).eps)
+
+
+def powers(low: float, high: float) -> st.SearchStrategy[float]:
+    """Numbers of all magnitudes from 10^low to 10^high."""
+    return st.floats(low, high).map(lambda exponent: float(10.0**exponent))
+
+
+MASSES = powers(-3.0, 3.0)
+DAMPINGS = st.just(0.0) | powers(-6.0, 5.0)
+STIFFNESSES = powers(-3.0, 6.0)
+TIMES = powers(-6.0, -1.0)
+
+CRITICAL = [(1.0, 12.0, 36.0), (1.0, 10.0, 25.0), (2.0, 8.0, 8.0), (0.25, 16.0, 256.0)]
+"""Mass, damping, stiffness whose sigma^2 and omega^2 are the same floating point number."""
+
+PUBLISHED = [
+    pytest.param(1.0, 3.0, 36.0, id="weak"),
+    pytest.param(1.0, 12.0, 36.0, id="critical"),
+    pytest.param(1.0, 60.0, 36.0, id="strong"),
+]
+
+
+Virtual = tuple[float, float, float, float]
+"""Mass, damping, stiffness and a time."""
+
+
+def scales(virtual: Virtual) -> Matrix:
+    """The size the entries can have."""
+    m, d, k, h = virtual
+    s = min(h, sqrt(m / k), m / d if d else h)
+    return 1.0, s, k / m * s, 1.0
+
+
+def agree(a: Matrix, b: Matrix, virtual: Virtual, roundings: float) -> bool:
+    """Equal but for roundings, each of which turns the phase omega·h by its share."""
+    m, _, k, h = virtual
+    tolerance = roundings * EPS * (1.0 + sqrt(k / m) * h)
+    return all(
+        abs(x - y) <= tolerance * size for x, y, size in zip(a, b, scales(virtual), strict=True)
+    )
+
+
+@QUICK
+@given(MASSES, DAMPINGS, STIFFNESSES, TIMES)
+def test_the_transition_is_exact_for_any_damping(m: float, d: float, k: float, h: float) -> None:
+    a = transition(m, d, k, h)
+    assert all(isfinite(entry) for entry in a)
+    assert agree(a, oscillator(m, d, k, h), (m, d, k, h), roundings=8.0)
+
+
+@pytest.mark.parametrize("m", [1e-3, 1e3])
+@pytest.mark.parametrize("d", [0.0, 1e5])
+@pytest.mark.parametrize("k", [1e-3, 1e6])
+@pytest.mark.parametrize("h", [1e-6, 0.1])
+def test_nothing_overflows_in_the_corners(m: float, d: float, k: float, h: float) -> None:
+    a = transition(m, d, k, h)
+    assert all(isfinite(entry) for entry in a)
+    assert agree(a, oscillator(m, d, k, h), (m, d, k, h), roundings=8.0)
+
+
+@pytest.mark.parametrize("h", [1e-4, 1e-2, 0.5])
+@pytest.mark.parametrize(("m", "d", "k"), PUBLISHED)
+def test_the_transition_is_the_matrix_exponential(m: float, d: float, k: float, h: float) -> None:
+    expected = expm(np.array([[0.0, 1.0], [-k / m, -d / m]]) * h).ravel()
+    np.testing.assert_allclose(transition(m, d, k, h), expected, rtol=0.0, atol=1e-13)
+
+
+@pytest.mark.parametrize("h", [1e-4, 1e-2, 0.1])
+@pytest.mark.parametrize(("m", "d", "k"), CRITICAL)
+def test_critical_damping(m: float, d: float, k: float, h: float) -> None:
+    sigma = 0.5 * d / m
+    assert sigma * sigma == k / m
+    expected = expm(np.array([[0.0, 1.0], [-k / m, -d / m]]) * h).ravel()
+    np.testing.assert_allclose(transition(m, d, k, h), expected, rtol=1e-13, atol=1e-14 * k / m)
+
+
+@pytest.mark.parametrize("h", [1e-4, 1e-2, 0.1])
+@pytest.mark.parametrize(("m", "d", "k"), CRITICAL)
+def test_nothing_jumps_at_critical_damping(m: float, d: float, k: float, h: float) -> None:
+    """A relative change delta of the damping turns the transition by less than 2·sigma·h·delta."""
+    here = transition(m, d, k, h)
+    for beside in (nextafter(d, 0.0), nextafter(d, inf)):
+        assert agree(transition(m, beside, k, h), here, (m, d, k, h), roundings=8.0)
+    for delta in (-1e-3, -1e-6, -1e-9, -1e-12, 1e-12, 1e-9, 1e-6, 1e-3):
+        beside = d * (1.0 + delta)
+        a = transition(m, beside, k, h)
+        turn = d / m * h * abs(delta)
+        assert agree(a, here, (m, d, k, h), roundings=8.0 + turn / EPS)
+        assert agree(a, oscillator(m, beside, k, h), (m, beside, k, h), roundings=8.0)
+
+
+@QUICK
+@given(MASSES, DAMPINGS, STIFFNESSES, TIMES)
+def test_two_half_steps_are_one_step(m: float, d: float, k: float, h: float) -> None:
+    half = np.array(transition(m, d, k, 0.5 * h)).reshape(2, 2)
+    twice = (half @ half).ravel().tolist()
+    assert agree(tuple(twice), transition(m, d, k, h), (m, d, k, h), roundings=16.0)
+
+
+@QUICK
+@given(MASSES, DAMPINGS, STIFFNESSES, st.floats(-10.0, 10.0), st.floats(-10.0, 10.0))
+def test_no_energy_appears(m: float, d: float, k: float, e: float, e_dot: float) -> None:
+    omega = sqrt(k / m)
+    h = 0.1
+    after, rate = advance(transition(m, d, k, h), e, e_dot, 0.0)
+    before = (omega * e) ** 2 + e_dot**2
+    assert (omega * after) ** 2 + rate**2 <= before * (1.0 + 32.0 * EPS * (1.0 + omega * h))
+
+
+@pytest.mark.parametrize("start", [(0.3, 0.0), (0.0, -2.0), (-0.1, 0.7)])
+@pytest.mark.parametrize(("m", "d", "k"), PUBLISHED)
+def test_a_held_force_moves_the_object_around_its_rest(
+    m: float, d: float, k: float, start: Motion
+) -> None:
+    force, h = 5.0, 0.25
+    motion = solve_ivp(
+        lambda _, z: [z[1], (force - d * z[1] - k * z[0]) / m],
+        (0.0, h),
+        start,
+        method="DOP853",
+        rtol=1e-12,
+        atol=1e-14,
+    )
+    after = advance(transition(m, d, k, h), *start, force / k)
+    np.testing.assert_allclose(after, motion.y[:, -1], rtol=0.0, atol=1e-10)
+
+
+@pytest.mark.parametrize(("m", "d", "k"), PUBLISHED)
+def test_the_rest_is_left_by_nothing(m: float, d: float, k: float) -> None:
+    a = transition(m, d, k, 0.01)
+    assert advance(a, 0.125, 0.0, 0.125) == (0.125, 0.0)
+    assert advance(transition(m, d, k, 100.0), 0.3, -1.0, 0.125) == pytest.approx((0.125, 0.0))

@@ -1,0 +1,334 @@
+"""The three layers in series: the cases, the start, the symmetry and the parameters."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+from math import tanh
+from typing import Any
+
+import numpy as np
+import pytest
+from grasp_controller import contact_force as layer_1
+from grasp_controller import impact_reduction as layer_2
+from grasp_controller import series
+from grasp_controller import simultaneous_contact as layer_3
+from grasp_controller.series import Inputs, Outputs, Pair, Params, State
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+from support.declared import Parameter, parameters
+
+QUICK = settings(deadline=None, derandomize=True, max_examples=60)
+
+
+def switched(layer_3_on: bool, layer_2_on: bool) -> Params:
+    return Params(
+        simultaneous_contact=layer_3.Params(enabled=layer_3_on),
+        impact_reduction=layer_2.Params(enabled=layer_2_on),
+    )
+
+
+CASE_0, CASE_1, CASE_2 = switched(False, False), switched(False, True), switched(True, True)
+
+NO_IMPACT_REDUCTION = switched(True, False)
+
+SAMPLES = [
+    Inputs((0.11, -0.11), (0.0, 0.0), (0.030, 0.010)),
+    Inputs((0.10, -0.09), (-0.2, 0.3), (0.035, 0.013)),
+    Inputs((0.08, -0.085), (-0.1, 0.1), (0.061, 0.012)),
+    Inputs((0.07, -0.07), (-0.05, 0.2), (0.079, 0.020)),
+]
+"""Two fingers that close, the right one nearer the object."""
+
+H = 0.02
+"""A step in s, long enough to see what is held over it."""
+
+
+def run(p: Params, samples: list[Inputs], h: float = H) -> list[tuple[State, Outputs]]:
+    """From the first sample on, the state and outputs at each."""
+    x = series.initial_state(p, samples[0])
+    trace = [(x, series.outputs(p, x, samples[0]))]
+    for u in samples[1:]:
+        x = series.step(p, x, u, h)
+        trace.append((x, series.outputs(p, x, u)))
+    return trace
+
+
+# ------------------------------------------------------------- the equations, integrated
+
+
+def virtual_forces(u: Inputs, before: Inputs) -> tuple[float, Pair]:
+    """Eqs. (2) and (5) with the published gains."""
+    xi_1, xi_2 = u.intensity
+    f_s = 3.0 * tanh((xi_1 - xi_2) / (xi_1 + xi_2))
+    rates = [(xi - was) / (H * xi) for xi, was in zip(u.intensity, before.intensity, strict=True)]
+    return f_s, (0.6 * rates[0], -0.6 * rates[1])
+
+
+def derivative(
+    z: Sequence[float], x_d: float, f_s: float, f_p: Pair, layer_3_on: bool
+) -> list[float]:
+    """Eqs. (3) and (6) for x_v2, x_v11, x_v21 and their rates; without (3) x_v2 stands still."""
+    x, y_1, y_2, v, w_1, w_2 = z
+    a = f_s - 12.0 * v - 36.0 * (x - x_d) if layer_3_on else 0.0
+    a_1 = a + f_p[0] - 10.0 * (w_1 - v) - 25.0 * (y_1 - x)
+    a_2 = a + f_p[1] - 10.0 * (w_2 - v) - 25.0 * (y_2 - x)
+    return [v, w_1, w_2, a, a_1, a_2]
+
+
+def integrated(layer_3_on: bool) -> list[list[float]]:
+    """x_v2, x_v11, x_v21 and their rates at each of the samples but the first."""
+    z = [0.0, 0.11, -0.11, 0.0, 0.0, 0.0]
+    trace = []
+    for before, u in pairwise(SAMPLES):
+        x_d = 0.5 * sum(u.position)
+        motion = solve_ivp(
+            lambda _, z, *held: derivative(z, *held),
+            (0.0, H),
+            z if layer_3_on else [x_d, *z[1:]],
+            args=(x_d, *virtual_forces(u, before), layer_3_on),
+            method="DOP853",
+            rtol=1e-12,
+            atol=1e-14,
+        )
+        z = motion.y[:, -1].tolist()
+        trace.append(z)
+    return trace
+
+
+@pytest.mark.parametrize(("p", "layer_3_on"), [(CASE_1, False), (CASE_2, True)])
+def test_the_controller_is_its_equations_integrated(p: Params, layer_3_on: bool) -> None:
+    for u, (_, y), z in zip(SAMPLES[1:], run(p, SAMPLES)[1:], integrated(layer_3_on), strict=True):
+        x, v = z[:3], z[3:]
+        expected = [
+            -14.0 * (u.velocity[j] - v[j + 1]) - 98.0 * (u.position[j] - x[j + 1]) for j in (0, 1)
+        ]
+        assert y.target_position == pytest.approx(x[0], abs=1e-11)
+        assert y.virtual_position == pytest.approx(x[1:], abs=1e-11)
+        np.testing.assert_allclose(y.force, expected, rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("p", [CASE_0, CASE_1, CASE_2, NO_IMPACT_REDUCTION])
+def test_the_virtual_forces_are_shown_in_every_case(p: Params) -> None:
+    for n, (_, y) in enumerate(run(p, SAMPLES)):
+        f_s, f_p = virtual_forces(SAMPLES[n], SAMPLES[max(n - 1, 0)])
+        assert y.simultaneous_contact_force == pytest.approx(f_s, rel=1e-12)
+        assert y.impact_reduction_force == pytest.approx(f_p, rel=1e-12)
+
+
+# ----------------------------------------------------------------------------- the cases
+
+
+def test_case_0_heads_for_the_middle_directly() -> None:
+    for u, (_, y) in zip(SAMPLES, run(CASE_0, SAMPLES), strict=True):
+        x_d = 0.5 * sum(u.position)
+        assert y.target_position == x_d
+        assert y.virtual_position == (x_d, x_d)
+        expected = [-14.0 * u.velocity[j] - 98.0 * (u.position[j] - x_d) for j in (0, 1)]
+        assert y.force == pytest.approx(expected, rel=1e-13)
+
+
+def test_case_0_has_no_memory() -> None:
+    """The force follows the sample of its own instant, whatever has been before."""
+    (_, fresh), *_ = run(CASE_0, SAMPLES[2:])
+    assert run(CASE_0, SAMPLES)[2][1].force == fresh.force
+
+
+def test_case_1_has_the_middle_for_its_target() -> None:
+    for u, (_, y) in zip(SAMPLES, run(CASE_1, SAMPLES), strict=True):
+        assert y.target_position == 0.5 * sum(u.position)
+
+
+def test_case_2_has_a_target_of_its_own() -> None:
+    """Drawn towards finger 1, which sees more, while the middle does not move."""
+    still = [Inputs((0.11, -0.11), (0.0, 0.0), (0.030, 0.010))] * 200
+    targets = [y.target_position for _, y in run(CASE_2, still)]
+    assert targets[0] == 0.0
+    assert all(after > before for before, after in pairwise(targets))
+    assert targets[-1] == pytest.approx(3.0 * tanh(0.5) / 36.0, rel=1e-6)
+
+
+def test_without_impact_reduction_the_fingers_follow_the_target() -> None:
+    """Its position and its velocity, which is that of Case 2."""
+    trace = zip(SAMPLES[1:], run(NO_IMPACT_REDUCTION, SAMPLES)[1:], integrated(True), strict=True)
+    for u, (_, y), (x, _, _, v, _, _) in trace:
+        assert y.target_position == pytest.approx(x, abs=1e-11)
+        assert y.virtual_position == (y.target_position, y.target_position)
+        expected = [-14.0 * (u.velocity[j] - v) - 98.0 * (u.position[j] - x) for j in (0, 1)]
+        np.testing.assert_allclose(y.force, expected, rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("p", [CASE_0, CASE_1, CASE_2, NO_IMPACT_REDUCTION])
+def test_the_force_follows_the_sample_it_is_asked_for(p: Params) -> None:
+    """Also where it is not the one of the last step; the virtual objects do not move by it."""
+    x, y = run(p, SAMPLES)[-1]
+    u = Inputs((0.05, 0.01), (0.4, -0.3), (1.0, 2.0))
+    now = series.outputs(p, x, u)
+    if not p.simultaneous_contact.enabled:
+        assert now.target_position == pytest.approx(0.03, rel=1e-15)
+    else:
+        assert now.target_position == y.target_position
+    if p.impact_reduction.enabled:
+        assert now.virtual_position == y.virtual_position
+    else:
+        assert now.virtual_position == (now.target_position,) * 2
+    for j in (0, 1):
+        push = -14.0 * (u.velocity[j] - SAMPLES[-1].velocity[j])
+        push -= 98.0 * (u.position[j] - SAMPLES[-1].position[j])
+        push += 98.0 * (now.virtual_position[j] - y.virtual_position[j])
+        assert now.force[j] - y.force[j] == pytest.approx(push, rel=1e-12)
+
+
+# ----------------------------------------------------------------------------- the start
+
+POSITIONS = st.floats(-1.0, 1.0)
+INTENSITIES = st.floats(0.0, 5.0)
+
+
+@QUICK
+@given(POSITIONS, POSITIONS, INTENSITIES, INTENSITIES, st.booleans())
+def test_fingers_at_rest_start_without_a_force(
+    x_1: float, x_2: float, xi_1: float, xi_2: float, layer_3_on: bool
+) -> None:
+    u = Inputs((x_1, x_2), (0.0, 0.0), (xi_1, xi_2))
+    p = switched(layer_3_on, True)
+    y = series.outputs(p, series.initial_state(p, u), u)
+    assert y.force == (0.0, 0.0)
+    assert y.virtual_position == (x_1, x_2)
+    assert y.target_position == pytest.approx(0.5 * (x_1 + x_2), abs=1e-16)
+    assert y.impact_reduction_force == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("p", [CASE_1, CASE_2])
+def test_the_force_grows_from_nothing(p: Params) -> None:
+    """After h seconds of the same sample it is of the order of h: no jump at the start."""
+    u = Inputs((0.11, -0.11), (0.0, 0.0), (0.030, 0.010))
+    for h in (1e-3, 1e-4, 1e-5):
+        _, (_, y) = run(p, [u, u], h)
+        assert 0.0 < max(abs(force) for force in y.force) < 100.0 * h
+
+
+def test_the_first_sample_is_no_approach() -> None:
+    """The rate of the intensity starts at zero, however bright the start."""
+    u = Inputs((0.11, -0.11), (0.0, 0.0), (2.0, 1.0))
+    assert run(CASE_2, [u, u])[1][1].impact_reduction_force == (0.0, 0.0)
+
+
+# -------------------------------------------------------------------------- the symmetry
+
+
+def swapped(pair: Pair) -> Pair:
+    first, second = pair
+    return -second, -first
+
+
+def mirrored(u: Inputs) -> Inputs:
+    """What is measured from behind the gripper."""
+    return Inputs(swapped(u.position), swapped(u.velocity), u.intensity[::-1])
+
+
+def pairs(low: float, high: float) -> st.SearchStrategy[Pair]:
+    return st.tuples(st.floats(low, high), st.floats(low, high))
+
+
+INPUTS = st.builds(Inputs, pairs(-0.2, 0.2), pairs(-1.0, 1.0), pairs(0.0, 2.0))
+
+
+@st.composite
+def controllers(draw: st.DrawFn) -> Params:
+    """Any of the cases; the viscosities +D_p and -D_p map onto each other."""
+    mass, damping, stiffness = st.floats(0.1, 5.0), st.floats(0.0, 50.0), st.floats(1.0, 200.0)
+    viscosity = draw(st.floats(0.0, 2.0))
+    return Params(
+        layer_3.Params(
+            draw(st.booleans()), draw(mass), draw(damping), draw(stiffness), draw(st.floats(-5, 5))
+        ),
+        layer_2.Params(
+            draw(st.booleans()),
+            draw(mass),
+            draw(damping),
+            draw(stiffness),
+            (viscosity, -viscosity),
+        ),
+        layer_1.Params(draw(damping), draw(stiffness)),
+    )
+
+
+@QUICK
+@given(
+    st.sampled_from([CASE_0, CASE_1, CASE_2]) | controllers(),
+    st.lists(INPUTS, min_size=2, max_size=20),
+    st.floats(1e-5, 1e-2),
+)
+def test_the_mirrored_controller_does_exactly_the_mirrored_thing(
+    p: Params, samples: list[Inputs], h: float
+) -> None:
+    images = run(p, [mirrored(u) for u in samples], h)
+    for (_, y), (_, z) in zip(run(p, samples, h), images, strict=True):
+        assert z.force == swapped(y.force)
+        assert z.target_position == -y.target_position
+        assert z.virtual_position == swapped(y.virtual_position)
+        assert z.simultaneous_contact_force == -y.simultaneous_contact_force
+        assert z.impact_reduction_force == swapped(y.impact_reduction_force)
+
+
+# ------------------------------------------------------------------------ the parameters
+
+LAYERS: dict[str, Any] = {
+    "simultaneous_contact": layer_3.Params,
+    "impact_reduction": layer_2.Params,
+    "contact_force": layer_1.Params,
+}
+
+PARAMETERS = [(layer, p) for layer, block in LAYERS.items() for p in parameters(block)]
+
+
+@pytest.mark.parametrize(("layer", "parameter"), PARAMETERS)
+def test_a_value_outside_its_range_is_refused(layer: str, parameter: Parameter) -> None:
+    for number, value in parameter.invalid():
+        with pytest.raises(ValueError, match=r"^\w+\.\w+ = ") as caught:
+            LAYERS[layer](**{parameter.name: value})
+        assert str(caught.value) == (
+            f"{layer}.{parameter.name} = {number!r} {parameter.unit}: "
+            f"must be from {parameter.low:g} to {parameter.high:g}"
+        )
+
+
+@pytest.mark.parametrize(("layer", "parameter"), PARAMETERS)
+def test_both_ends_of_a_range_are_accepted(layer: str, parameter: Parameter) -> None:
+    for bound in (parameter.low, parameter.high):
+        for value in parameter.variants(bound):
+            p = LAYERS[layer](**{parameter.name: value})
+            assert getattr(p, parameter.name) == value
+
+
+def test_every_number_has_a_range() -> None:
+    assert {f"{layer}.{p.name}" for layer, p in PARAMETERS} == {
+        "simultaneous_contact.mass",
+        "simultaneous_contact.damping",
+        "simultaneous_contact.stiffness",
+        "simultaneous_contact.gain",
+        "impact_reduction.mass",
+        "impact_reduction.damping",
+        "impact_reduction.stiffness",
+        "impact_reduction.viscosity",
+        "impact_reduction.intensity_floor",
+        "contact_force.damping",
+        "contact_force.stiffness",
+    }
+
+
+def test_a_negative_mass_is_refused_by_name() -> None:
+    text = r"impact_reduction\.mass = -1\.0 kg: must be from 0\.001 to 1000"
+    with pytest.raises(ValueError, match=f"^{text}$"):
+        replace(CASE_2.impact_reduction, mass=-1.0)
+
+
+def test_the_published_parameters() -> None:
+    p = Params()
+    three, two, one = p.simultaneous_contact, p.impact_reduction, p.contact_force
+    assert (three.mass, three.damping, three.stiffness, three.gain) == (1.0, 12.0, 36.0, 3.0)
+    assert (two.mass, two.damping, two.stiffness) == (1.0, 10.0, 25.0)
+    assert two.viscosity == (0.6, -0.6)
+    assert (one.damping, one.stiffness) == (14.0, 98.0)
+    assert (three.enabled, two.enabled) == (True, True)

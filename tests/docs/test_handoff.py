@@ -1,0 +1,156 @@
+"""The four steps of docs/handoff.md, rehearsed on one machine with the commands of the page."""
+
+import csv
+import os
+import re
+import shlex
+import socket
+import subprocess
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+from select import select
+from time import monotonic
+from typing import Self
+
+import pytest
+from grasp_cosim import cli
+from support import native_fmus
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs/handoff.md").read_text("utf-8")
+BLOCKS = re.findall(r"```(console|toml)\n(.*?)```", PAGE, re.DOTALL)
+READY = re.compile(r"serving |relaying |listening on ")
+STOP = "0.3"
+"""s that each run simulates here."""
+
+
+class Bench:
+    """The terminal bench$: what it starts goes on in the background."""
+
+    def __init__(self) -> None:
+        self._processes: list[subprocess.Popen[str]] = []
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.end()
+
+    def start(self, words: list[str]) -> None:
+        """Start a program, and wait until it says that it listens."""
+        process = subprocess.Popen(
+            words,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        self._processes.append(process)
+        assert process.stdout is not None
+        end = monotonic() + 60.0
+        while select([process.stdout], [], [], end - monotonic())[0]:
+            line = process.stdout.readline()
+            assert line, words
+            if READY.match(line):
+                return
+        raise AssertionError(words)
+
+    def end(self) -> None:
+        for process in self._processes:
+            process.kill()
+            process.communicate()
+        self._processes.clear()
+
+
+def free_ports(ports: list[str]) -> dict[str, str]:
+    """For each port of the page one that is free here."""
+    with ExitStack() as stack:
+        sockets = [stack.enter_context(socket.socket(type=socket.SOCK_DGRAM)) for _ in ports]
+        for s in sockets:
+            s.bind(("127.0.0.1", 0))
+        return {p: str(s.getsockname()[1]) for p, s in zip(ports, sockets, strict=True)}
+
+
+def rehearse(system: Path) -> None:
+    """All blocks of the page, in order."""
+    ports = free_ports(sorted(set(re.findall(r"\b5[56]0\d\b", PAGE))))
+    with Bench() as bench:
+        for kind, block in BLOCKS:
+            if kind == "toml":
+                change(system, block)
+                continue
+            for line in block.splitlines():
+                command = re.sub(r"\b5[56]0\d\b", lambda m: ports[m.group()], line)
+                prompt, _, text = command.partition("$ ")
+                if prompt == "bench" and not text.startswith("cc "):
+                    bench.start(words(text))
+                else:
+                    run(text)
+            bench.end()
+
+
+def words(text: str) -> list[str]:
+    """A command line as a program takes it; ours is that of this interpreter."""
+    found = shlex.split(text)
+    if found[0] == "grasp-cosim":
+        found[:1] = [sys.executable, "-m", "grasp_cosim"]
+        found += ["--stop", STOP] if found[3] == "run" else []
+    return found
+
+
+def run(text: str) -> None:
+    """A command of host$, in this process where it is ours: that saves it the start."""
+    if text.startswith("grasp-cosim "):
+        assert cli.main(words(text)[3:]) == 0, text
+    else:
+        subprocess.run(text, shell=True, check=True)
+
+
+def change(system: Path, block: str) -> None:
+    """Put each table of the block into the system file, in place of that of its name."""
+    tables = system.read_text("utf-8").split("\n\n")
+    for new in block.strip().split("\n\n"):
+        name = new.partition("]")[0]
+        (place,) = (i for i, old in enumerate(tables) if old.startswith(name))
+        tables[place] = new
+    system.write_text("\n\n".join(tables) + "\n", encoding="utf-8")
+
+
+def columns(path: Path) -> dict[str, tuple[str, ...]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        names, *rows = csv.reader(file)
+    return dict(zip(names, zip(*rows, strict=True), strict=True))
+
+
+@pytest.mark.slow
+@native_fmus.needs_gcc
+def test_the_four_steps(checkout: Path) -> None:
+    rehearse(checkout / "my_system.toml")
+    simulated = columns(checkout / "simulated/signals.csv")
+    assert len(simulated["time"]) == 301
+    assert columns(checkout / "paced/signals.csv") == simulated
+    for folder in ("lockstep", "sensors"):
+        found = columns(checkout / folder / "signals.csv")
+        assert {name: found[name] for name in simulated} == simulated
+    bench = columns(checkout / "bench/signals.csv")
+    assert set(bench["plant.proxy.state"]) <= {"1", "2"}
+    assert float(bench["plant.position[1]"][-1]) < 0.11
+    assert set(columns(checkout / "nasty/signals.csv")["sensor_1.proxy.state"]) <= {"1", "2"}
+    assert_is_case_0(checkout)
+
+
+def assert_is_case_0(checkout: Path) -> None:
+    """The controller in C moves the fingers as the FMU does without layers 2 and 3, to the bit."""
+    run("grasp-cosim run --case 0 --step 1e-3 --out case_0")
+    ours = columns(checkout / "case_0/signals.csv")
+    target = columns(checkout / "target/signals.csv")
+    for name in ("plant.position[1]", "plant.position[2]", "controller.force[1]"):
+        assert target[name] == ours[name], name
+    assert "true" in ours["plant.contact[1]"] or "1" in ours["plant.contact[1]"]
+
+
+def test_every_command_of_the_page_is_rehearsed() -> None:
+    assert len(BLOCKS) == 10
+    lines = [line for kind, block in BLOCKS if kind == "console" for line in block.splitlines()]
+    assert {line.partition("$")[0] for line in lines} == {"host", "bench"}

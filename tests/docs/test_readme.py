@@ -1,0 +1,112 @@
+"""What the README tells a user to type works."""
+
+import re
+import shlex
+import shutil
+from pathlib import Path
+
+import pytest
+from grasp_cosim import System, cli, simulate
+from grasp_cosim.grasp.system import SYSTEM
+from grasp_cosim.ssp.write import write_ssp
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text("utf-8")
+COMMANDS = re.findall(r"^    \.venv/bin/(grasp-cosim .*?)(?:\s+#.*)?$", README, re.MULTILINE)
+EXAMPLES = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+OUTPUTS = re.findall(r"```\n(\d+ steps of .*?)```", README, re.DOTALL)
+TABLES = re.findall(r"```toml\n(.*?)```", README, re.DOTALL)
+
+
+@pytest.fixture(scope="session")
+def recorded(grasp: System, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a short run."""
+    folder = tmp_path_factory.mktemp("recorded")
+    result = simulate(grasp, step=1e-3, stop=0.1)
+    result.to_csv(folder / "signals.csv")
+    result.to_json(folder / "run.json")
+    return folder
+
+
+def _folder(path: Path) -> Path:
+    path.mkdir(exist_ok=True)
+    return path
+
+
+@pytest.fixture
+def user(checkout: Path, grasp: System, recorded: Path) -> Path:
+    """A checkout with a vendor's FMU, systems and a run of one's own."""
+    shutil.copy(checkout / "fmus/build/GripperPlant.fmu", checkout / "vendor.fmu")
+    text = SYSTEM.read_text("utf-8").replace('fmu = "', 'fmu = "fmus/build/')
+    (checkout / "my_system.toml").write_text(text, encoding="utf-8")
+    write_ssp(grasp, checkout / "my_system.ssp")
+    for written in ("signals.csv", "run.json"):
+        shutil.copy(recorded / written, _folder(checkout / "results"))
+    return checkout
+
+
+def test_there_is_something_to_try() -> None:
+    assert len(COMMANDS) == 20
+    assert len(EXAMPLES) == 1
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_command(user: Path, command: str) -> None:
+    arguments = shlex.split(command)
+    if arguments[1] in ("run", "qualify"):
+        arguments += ["--stop", "0.01"]
+    if arguments[1] in ("serve", "relay"):
+        arguments += ["--port", "0", "--duration", "0.01"]
+    touches = "--step-study" not in arguments  # in so short a time: nothing to judge
+    assert cli.main(arguments[1:]) == (0 if touches else 1)
+
+
+@pytest.mark.parametrize("example", EXAMPLES)
+def test_example(user: Path, capsys: pytest.CaptureFixture[str], example: str) -> None:
+    assert "stop=3.0" in example
+    exec(example.replace("stop=3.0", "stop=2.0"), {})
+    out = capsys.readouterr().out
+    assert out.startswith("[1.")
+    assert "] m\n0.2 (" in out
+    assert "sensor_2.reflectance = 0.5" in out
+    assert (user / "results/signals.csv").is_file()
+
+
+def test_what_a_run_ends_with(user: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """All but how fast it was."""
+    (shown,) = OUTPUTS
+    assert cli.main(["run"]) == 0
+    found = capsys.readouterr().out
+    first, *rest = shown.splitlines()
+    assert found.splitlines()[1:] == rest
+    assert found.startswith(first.rpartition(", ")[0])
+
+
+def test_the_scenario_runs(user: Path) -> None:
+    """The events and faults of the README, appended to a system of one's own."""
+    (scenario,) = (table for table in TABLES if "[[events]]" in table)
+    path = user / "my_system.toml"
+    path.write_text(path.read_text("utf-8") + scenario, encoding="utf-8")
+    log = simulate(System.load(path), step=1e-3, stop=1.2).log
+    assert [line.partition(": ")[0] for line in log] == ["t = 0.5 s", "t = 0.5 s", "t = 1 s"]
+
+
+def test_the_keys_of_a_component_are_read(user: Path) -> None:
+    (keys,) = (table for table in TABLES if "[components.plant]" in table)
+    keys = keys.replace("GapRight", "gap[1]").replace("GapLeft", "gap[2]")
+    text = (user / "my_system.toml").read_text("utf-8")
+    own = re.sub(r"\[components\.plant\]\n.*?\n(?=\n)", lambda _: keys, text, flags=re.DOTALL)
+    (user / "my_system.toml").write_text(own, encoding="utf-8")
+    plant = System.load(user / "my_system.toml").component("plant", "test")
+    assert (plant.step_ns, plant.isolation, len(plant.rename)) == (1_000_000, "process", 2)
+
+
+def test_pictures_exist() -> None:
+    pictures = re.findall(r"!\[.*?\]\((.*?)\)", README)
+    assert pictures
+    assert all((ROOT / picture).is_file() for picture in pictures)
+
+
+@pytest.mark.parametrize("card", sorted(ROOT.glob("*/README.md")), ids=lambda p: p.parent.name)
+def test_links_in_the_readme_lead_to_every_card(card: Path) -> None:
+    assert f"]({card.relative_to(ROOT).as_posix()})" in README

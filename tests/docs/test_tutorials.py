@@ -1,0 +1,328 @@
+"""What docs/layers.md, limits.md and your_plant.md say is what their commands give."""
+
+import importlib.util
+import math
+import re
+import runpy
+import shlex
+import subprocess
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from grasp_cosim import System, cli
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+BLOCKS = re.compile(r"```(console|toml|python)\n(.*?)```", re.DOTALL)
+
+
+INDENTED = [
+    command
+    for name in ("layers", "limits", "your_plant")
+    for command in re.findall(
+        r"^    (grasp-cosim .*?)(?:\s+#.*)?$",
+        (DOCS / f"{name}.md").read_text("utf-8"),
+        re.MULTILINE,
+    )
+]
+
+
+def load_tutorials() -> Any:
+    spec = importlib.util.spec_from_file_location("tutorials", DOCS / "tutorials.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def page(name: str) -> str:
+    return (DOCS / f"{name}.md").read_text("utf-8")
+
+
+def said(name: str, pattern: str) -> list[float]:
+    """The numbers in the one place of a page that a pattern describes, line ends as spaces."""
+    (found,) = re.findall(pattern, " ".join(page(name).split()))
+    return [float(x) for x in ([found] if isinstance(found, str) else found)]
+
+
+def checked(name: str, checkout: Path) -> tuple[list[Any], Any]:
+    """The runs of the tables of a page, whose cells and pictures must be those of the runs.
+
+    The cells must be the same to the printed digit: the runs are deterministic. Of the pictures a
+    few pixels may be others, as another processor rounds.
+    """
+    image = pytest.importorskip("matplotlib.image")
+    tutorials = load_tutorials()
+    do = tutorials.Recorder(checkout / "recorded")
+    assert tutorials.filled(page(name), do) == page(name), "run: docs/tutorials.py"
+    tables = tutorials.tables_of(page(name), do)
+    drawn = checkout / "drawn"
+    drawn.mkdir()
+    tutorials.PAGES[name](tables, drawn)
+    pictures = re.findall(r"!\[.*?\]\((.*?)\)", page(name))
+    assert sorted(p.name for p in drawn.iterdir()) == sorted(pictures)
+    for picture in pictures:
+        new, kept = (image.imread(folder / picture) for folder in (drawn, DOCS))
+        assert new.shape == kept.shape
+        assert (abs(new - kept).max(axis=-1) > 0.1).mean() < 1e-3, f"{picture}: docs/tutorials.py"
+    return tables, do
+
+
+def test_the_commands_at_the_beginnings_work(checkout: Path) -> None:
+    assert [command.split()[1] for command in INDENTED] == ["run", "run", "build", "run"]
+    for command in INDENTED:
+        short = ["--stop", "0.01"] if command.split()[1] == "run" else []
+        assert cli.main([*shlex.split(command)[1:], *short]) == 0, command
+    assert (checkout / "case_0/grasp.png").is_file()
+
+
+@pytest.mark.slow
+def test_layers(checkout: Path) -> None:
+    (cases, _, _, cup), _ = checked("layers", checkout)
+    case_0, case_1, case_2 = (cases[f"--case {case}"].settings for case in "012")
+    assert said("layers", r"K_i·W/2 = ([\d.]+) N") == [98.0 * 0.07 / 2.0]
+    assert case_0["steady_contact_force"] == pytest.approx([3.43, 3.43], abs=1e-6)
+    assert said("layers", r"(\d+) and (\d+) times slower") == [
+        round(fast / slow)
+        for fast, slow in zip(case_0["impact_velocity"], case_1["impact_velocity"], strict=True)
+    ]
+    assert said("layers", r"is there ([\d.]+) s before") == [round(case_1["time_difference"], 1)]
+    assert said("layers", r"before, and ([\d.]+) s apart") == [round(case_2["time_difference"], 2)]
+    assert said("layers", r"balance, at (\d+)°") == [round(math.degrees(math.atan(0.07 / 0.1)))]
+    in_the_end = 2.0 * 98.0 * 0.035 / (98.0 + 1000.0)  # each side's spring against layer 1's
+    assert said("layers", r"by ([\d.]+) mm in the end") == [round(1e3 * in_the_end, 1)]
+    assert cup["0"].signals["plant.squeeze"][-1] == pytest.approx(in_the_end, rel=1e-3)
+
+
+def test_the_switch_in_a_system_file_makes_case_1(checkout: Path, grasp: System) -> None:
+    (switch,) = (block for kind, block in BLOCKS.findall(page("layers")) if kind == "toml")
+    text = (ROOT / "orchestrator/grasp_cosim/grasp/grasp.toml").read_text("utf-8")
+    text = text.replace('fmu = "', 'fmu = "fmus/build/')
+    head, _, _ = text.partition("[components.controller]")
+    (checkout / "my_system.toml").write_text(head + switch, encoding="utf-8")
+    system = System.load(checkout / "my_system.toml")
+    assert system.component("controller", "test").values == {"simultaneous_contact.enabled": False}
+
+
+@pytest.mark.slow
+def test_limits(checkout: Path) -> None:
+    tables, do = checked("limits", checkout)
+    reflectances, carried, converter, _, friction, loop, near, _ = tables
+    assert_reflectances(reflectances, do)
+    assert_formulas(carried, converter, friction)
+    assert_loop(loop)
+    headings = re.findall(r"^## (.*)$", page("limits"), re.MULTILINE)
+    assert "You see seven ways" in page("limits")
+    assert len(headings) == 8
+    assert headings[-1] == "What is no limit"
+    place = r"at (\d+) mm the nearer one has (\d+) mm to go, at (\d+) mm (\d+) mm"
+    assert said("limits", place) == [
+        round(1e3 * x)
+        for place in ("0.068", "0.074")
+        for x in (float(place), near[place].signals["plant.gap[1]"][0])
+    ]
+
+
+def assert_reflectances(reflectances: Any, do: Any) -> None:
+    """The ratios up to which the fingers are within 0.1 s, and not beyond."""
+    apart = {ratio: run.settings["time_difference"] for ratio, run in reflectances.items()}
+    assert said("limits", r"From ([\d.]+) to ([\d.]+) the fingers are within 0.1 s") == [0.9, 1.14]
+    assert max(apart["0.9"], apart["1.14"]) <= 0.1 < min(apart["0.89"], apart["1.15"])
+    assert said("limits", r"in the middle, from ([\d.]+) to ([\d.]+)\.") == [0.885, 1.13]
+    line = "grasp-cosim run --step 2e-3 --stop 2.2 --set plant.initial_object_position=0"
+    inside, outside = (
+        [do(f"{line} --set sensor_1.reflectance={r}").settings["time_difference"] for r in ratios]
+        for ratios in ((0.885, 1.13), (0.88, 1.14))
+    )
+    assert max(inside) <= 0.1 < min(outside)
+    for ratio, run in reflectances.items():
+        r = float(ratio.partition(" ")[0]) if "gain" not in ratio else 1.0
+        behind = 5e-3 * (max(r, 1.0 / r) ** (1.0 / 1.1506) - 1.0)
+        later = 2 if run.settings["time_to_contact"][0] < run.settings["time_to_contact"][1] else 1
+        found = np.interp(
+            min(run.settings["time_to_contact"]), run.time, run.signals[f"plant.gap[{later}]"]
+        )
+        assert found == pytest.approx(behind, abs=0.3e-3)  # what the target is behind
+
+
+def assert_formulas(carried: Any, converter: Any, friction: Any) -> None:
+    """What the page derives from the equations, worked out here once more."""
+    f_s = 3.0 * math.tanh(0.14 / 1.86)
+    (mass,) = said("limits", r"here from ([\d.]+) kg on")
+    assert mass == round(2.0 * 98.0 * f_s / 36.0 / (0.3 * 9.80665), 3)
+    for m, run in carried.items():
+        speed = max(0.0, f_s - 36.0 * 0.3 * float(m) * 9.80665 / (2.0 * 98.0)) / 12.0
+        position = run.signals["plant.object_position"]
+        assert (position[-251] - position[-1]) / 0.5 == pytest.approx(speed, abs=0.2e-3)
+    assert said("limits", r"K/l_0\^n = ([\d.]+) V") == [round(0.0024 / 0.005**1.1506, 2)]
+    for volts in ("0.9", "0.5"):
+        blind = (0.0024 / float(volts)) ** (1.0 / 1.1506) - 0.005
+        signals = converter[volts].signals
+        free = ~signals["plant.contact[1]"].astype(bool) & (signals["plant.gap[1]"] < 0.02)
+        slowest = np.argmax(np.where(free, signals["plant.velocity[1]"], -np.inf))
+        assert signals["plant.gap[1]"][slowest] == pytest.approx(blind, abs=0.1e-3)
+    (holds,) = said("limits", r"Friction above K_i·W/2 = ([\d.]+) N")
+    assert holds == pytest.approx(98.0 * 0.035, abs=1e-12)
+    assert friction["5"].signals["plant.gap[1]"][-1] == pytest.approx(5.0 / 98.0 - 0.035, abs=2e-4)
+    assert not friction["5"].signals["plant.contact[1]"].any()
+
+
+def assert_loop(loop: Any) -> None:
+    """Steps of 30 ms go well; with 40 ms layer 2 swings; 8 ms do, delayed at each connection."""
+
+    def swings(run: Any) -> int:
+        force = run.signals["controller.impact_reduction_force[1]"]
+        free = ~np.maximum.accumulate(run.signals["plant.contact[1]"].astype(bool))
+        return int((force[free][1:] * force[free][:-1] < 0.0).sum())
+
+    assert said("limits", r"bears steps of (\d+) ms; at (\d+) ms") == [30.0, 40.0]
+    assert swings(loop["--step 0.03"]) == 0
+    assert swings(loop["--step 0.04"]) >= 3
+    assert said("limits", r"and then (\d+) ms are too many") == [8.0]
+    slow, fast = (loop[f"--scheme jacobi --step {h}"].settings for h in ("8e-3", "5e-3"))
+    assert max(fast["impact_velocity"]) < 0.0065 < 0.02 < min(slow["impact_velocity"])
+
+
+@pytest.mark.slow
+def test_your_plant(checkout: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    vendor(checkout / "fmus/build/GripperPlant.fmu", checkout / "vendor.fmu")
+    source = (DOCS / "spring_plant.py").read_text("utf-8")
+    excerpts = 0
+    for kind, block in BLOCKS.findall(page("your_plant")):
+        if kind == "python":
+            assert block in source
+            excerpts += 1
+        elif kind == "console":
+            try_commands(block, capsys)
+        elif block.startswith("[signals]"):
+            (checkout / "bands.toml").write_text(block, encoding="utf-8")
+        else:
+            change_component(checkout / "my_system.toml", block)
+    assert excerpts == 2
+    assert (checkout / "vendor/report.html").is_file()
+    (lines,) = said("your_plant", r"about (\d+) lines")
+    assert len(source.splitlines()) == pytest.approx(lines, abs=10)
+    (cases,), _ = checked("your_plant", checkout)
+    case_1 = cases["1"]
+    k = int(np.flatnonzero(case_1.signals["plant.contact[2]"])[0])
+    before = slice(k - 2, k)  # both free: how fast the gap closes is the impact, whoever moves
+    rate = -np.diff(case_1.signals["plant.gap[2]"][before]) / np.diff(case_1.time[before])
+    assert case_1.settings["impact_velocity"][1] == pytest.approx(rate[0], rel=0.05)
+    place = case_1.signals["plant.object_position"]
+    assert place[k] < place[k - 1]  # finger 2 is the left one
+
+
+def try_commands(block: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """Do the commands of a block, which print first what the page shows below them."""
+    for part in re.findall(r"^\$ (.*?)(?=^\$ |\Z)", block, re.MULTILINE | re.DOTALL):
+        command, _, shown = part.partition("\n")
+        if "CASE" in command:
+            continue  # the rows of a table
+        if not command.startswith("grasp-cosim "):
+            subprocess.run(command, shell=True, check=True)
+            continue
+        capsys.readouterr()
+        code = cli.main(shlex.split(command)[1:])
+        assert capsys.readouterr().out.startswith(shown), command
+        assert code == (1 if shown.startswith("NOT") else 0), command
+
+
+def vendor(original: Path, path: Path) -> None:
+    """An FMU with other names for the gaps."""
+    names = {b'"gap[1]"': b'"GapRight"', b'"gap[2]"': b'"GapLeft"'}
+    with zipfile.ZipFile(original) as source, zipfile.ZipFile(path, "w") as target:
+        for name in source.namelist():
+            data = source.read(name)
+            if name == "modelDescription.xml":
+                for ours, theirs in names.items():
+                    assert data.count(ours) == 1
+                    data = data.replace(ours, theirs)
+            target.writestr(name, data)
+
+
+def change_component(system: Path, block: str) -> None:
+    """Put the table of a component in the place of that of its name."""
+    tables = system.read_text("utf-8").split("\n\n")
+    (place,) = (i for i, t in enumerate(tables) if t.startswith(block.partition("]")[0]))
+    tables[place] = block
+    system.write_text("\n\n".join(tables), encoding="utf-8")
+
+
+def test_the_spring_plant_obeys_its_equations() -> None:
+    """Against an adaptive integration, error control at the step at which a face is touched."""
+    integrate = pytest.importorskip("scipy.integrate")
+    plant = runpy.run_path(str(DOCS / "spring_plant.py"))
+    p = plant["Params"](initial_position=(0.07, -0.11))
+    u = plant["Inputs"](force=(-0.5, 0.1))
+
+    def rates(_: float, y: Any) -> list[float]:
+        x_1, x_2, x, v_1, v_2, v = y
+        into_1, into_2 = x + 0.035 - x_1, x_2 - (x - 0.035)
+        f_1 = max(0.0, 1e4 * into_1 + 20.0 * (v - v_1)) if into_1 > 0.0 else 0.0
+        f_2 = max(0.0, 1e4 * into_2 + 20.0 * (v_2 - v)) if into_2 > 0.0 else 0.0
+        spring = -100.0 * (x - 0.03) - 2.0 * v
+        return [v_1, v_2, v, (-0.5 + f_1) / 0.5, (0.1 - f_2) / 0.5, (spring - f_1 + f_2) / 0.1]
+
+    start = [0.07, -0.11, 0.03, 0.0, 0.0, 0.0]
+    exact = integrate.solve_ivp(rates, (0.0, 0.3), start, max_step=1e-3, rtol=1e-9, atol=1e-12)
+    errors = []
+    for h in (4e-5, 2e-5):  # below its own sub-steps, so that it takes just one
+        s = plant["initial_state"](p, u)
+        for _ in range(round(0.3 / h)):
+            s = plant["step"](p, s, u, h)
+        found = [*s.position, s.object_position]
+        errors.append(max(abs(a - b) for a, b in zip(found, exact.y[:3, -1], strict=True)))
+    assert errors[0] < 1e-4  # m, on a way of several mm
+    assert 1.5 < errors[0] / errors[1] < 2.5  # first order
+
+
+def test_the_spring_plant_resolves_its_spring() -> None:
+    """A damper as strong as may be, m/d = 0.1 ms: steps of 1 ms do as the exact motion does."""
+    integrate = pytest.importorskip("scipy.integrate")
+    plant = runpy.run_path(str(DOCS / "spring_plant.py"))
+    p = plant["Params"](initial_position=(0.066, -0.11), spring_damping=1000.0)
+    u = plant["Inputs"](force=(-2.0, 0.0))
+
+    def pushed(into: float, rate: float) -> float:
+        return max(0.0, 1e4 * into + 20.0 * rate) if into > 0.0 else 0.0
+
+    def rates(_: float, y: Any) -> list[float]:
+        x_1, x, v_1, v = y
+        f_1 = pushed(x + 0.035 - x_1, v - v_1)
+        return [v_1, v, (-2.0 + f_1) / 0.5, (-100.0 * (x - 0.03) - 1000.0 * v - f_1) / 0.1]
+
+    times = np.arange(1, 101) * 1e-3
+    exact = integrate.solve_ivp(
+        rates, (0.0, 0.1), [0.066, 0.03, 0.0, 0.0], "Radau", times,
+        max_step=1e-4, rtol=1e-9, atol=1e-12,
+    )  # fmt: skip
+    s = plant["initial_state"](p, u)
+    found = []
+    for _ in times:
+        s = plant["step"](p, s, u, 1e-3)
+        found.append((s.contact_force[0], s.position[0], s.object_position))
+    force, *places = np.transpose(found)
+    x_1, x, v_1, v = exact.y
+    expected = [pushed(*y) for y in zip(x + 0.035 - x_1, v - v_1, strict=True)]
+    assert max(expected) > 5.0  # N
+    assert np.abs(force - expected).max() < 0.1
+    assert np.abs(places - exact.y[:2]).max() < 1e-5
+
+
+def test_the_spring_plant_at_rest() -> None:
+    """A finger that pushes alone moves the object until the spring answers: x - x_0 = F/k."""
+    plant = runpy.run_path(str(DOCS / "spring_plant.py"))
+    p = plant["Params"](initial_position=(0.066, -0.11), spring_damping=20.0)
+    u = plant["Inputs"](force=(-0.5, 0.0))
+    s = plant["initial_state"](p, u)
+    for _ in range(3000):
+        s = plant["step"](p, s, u, 1e-3)
+    y = plant["outputs"](p, s, u)
+    assert y.object_position == pytest.approx(0.03 - 0.5 / 100.0, abs=1e-9)
+    assert y.contact_force == pytest.approx((0.5, 0.0), abs=1e-6)
+    assert y.spring_force == pytest.approx(0.5, abs=1e-6)
+    assert y.contact == (True, False)

@@ -1,0 +1,343 @@
+"""The bench without its socket: FMUs stepped by requests or by a clock that the test moves."""
+
+import math
+import re
+import zipfile
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import numpy as np
+import pytest
+from grasp_cosim.errors import InputError
+from grasp_cosim.fmi.load import load_here
+from grasp_cosim.hil.bench import BACKLOG, Bench, Serving
+from grasp_cosim.hil.protocol import link_signature
+from grasp_cosim.interface.interface import Value, read_interface
+from support import native_fmus
+from support.proxies import HandProxy
+
+MS = 1_000_000
+STEP = 1e-3
+
+
+class Clocked:
+    """A bench, a proxy of it and their clock."""
+
+    def __init__(self, fmu: Path, serving: Serving) -> None:
+        self.now = 10_000 * MS
+        self.said: list[str] = []
+        self.bench = Bench(read_interface(fmu), serving, self.said.append)
+        signature, _ = link_signature(read_interface(fmu))
+        self.proxy = HandProxy(signature, lambda d: self.bench.answer(d, "test", self.now))
+
+    def wait(self, milliseconds: float) -> None:
+        """Let time pass; the bench looks whenever it wants to."""
+        end = self.now + round(milliseconds * MS)
+        while (due := self.bench.due()) is not None and due <= end:
+            self.now = max(self.now, due)
+            self.bench.look(self.now)
+        self.now = end
+
+
+MakeClocked = Callable[[Path, Serving], Clocked]
+
+
+@pytest.fixture
+def clocked() -> Iterator[MakeClocked]:
+    """Makes benches with a clock; closes them."""
+    with ExitStack() as stack:
+
+        def make(fmu: Path, serving: Serving) -> Clocked:
+            it = Clocked(fmu, serving)
+            stack.callback(it.bench.close)
+            return it
+
+        yield make
+
+
+def starts(fmu: Path, **values: Value) -> list[Value]:
+    """A request's values: the start values, but for those given by name."""
+    interface = read_interface(fmu)
+    signature, _ = link_signature(interface)
+    declared = {v.name: interface.by_name[v.name].start or "" for v in signature.request}
+    return [
+        values.get(name, interface.parse("", name, start, text=True))
+        for name, start in declared.items()
+    ]
+
+
+def directly(fmu: Path, gaps: list[float], reflectance: float) -> list[Value]:
+    """The intensities of a sensor stepped in this process."""
+    interface = read_interface(fmu)
+    gap, intensity = interface.by_name["gap"], interface.by_name["intensity"]
+    found = []
+    with load_here("sensor", interface) as sensor:
+        sensor.enter_initialization({"reflectance": reflectance, "gap": gaps[0]}, None)
+        found += sensor.get([intensity])
+        sensor.exit_initialization()
+        clock = np.zeros(1)
+        advance = sensor.stepper(clock, STEP)
+        for k, value in enumerate(gaps[1:]):
+            clock[0] = k * STEP
+            sensor.set([gap], [value])
+            assert advance.python() == 0
+            found += sensor.get([intensity])
+    return found
+
+
+def test_in_lockstep_the_values_are_those_of_the_fmu_to_the_bit(
+    fmus: Path, clocked: MakeClocked
+) -> None:
+    fmu = fmus / "ProximitySensor.fmu"
+    gaps = [0.1 / 3 ** (k / 7) for k in range(40)]
+    it = clocked(fmu, Serving(lockstep=True))
+    found = it.proxy.begin(1, starts(fmu, gap=gaps[0], reflectance=0.57))
+    for k, gap in enumerate(gaps[1:]):
+        found = found + it.proxy.step(k * STEP, STEP, starts(fmu, gap=gap, reflectance=0.57))
+    assert found == directly(fmu, gaps, 0.57)
+    it.proxy.end()
+    assert it.bench.counters()["steps"] == 39
+    assert it.said == [
+        "a session of test begins at t = 0 s",
+        "the session is over at t = 0.039 s: the proxy ended the session",
+    ]
+
+
+def test_in_initialisation_mode_outputs_follow_the_inputs(fmus: Path, clocked: MakeClocked) -> None:
+    fmu = fmus / "ProximitySensor.fmu"
+    it = clocked(fmu, Serving(lockstep=True))
+    it.proxy.begin(1, starts(fmu))
+    for gap in (0.01, 0.02):
+        (intensity,) = it.proxy.initialise(0.0, starts(fmu, gap=gap, gain=0.001))
+        expected = 0.001 / (gap + 0.005) ** 1.1506
+        assert intensity == pytest.approx(expected, rel=1e-12)
+
+
+def test_lost_requests_are_made_up_for_with_the_newest_values(
+    fmus: Path, clocked: MakeClocked
+) -> None:
+    fmu = fmus / "GripperPlant.fmu"
+    push, rest = {"force[1]": 1.0, "force[2]": 0.0}, {"force[1]": 0.0, "force[2]": 0.0}
+    two, one = (clocked(fmu, Serving(lockstep=True)) for _ in range(2))
+    for it in (two, one):
+        it.proxy.begin(1, starts(fmu, **rest))
+    for k in range(3):
+        whole = two.proxy.step(k * STEP, STEP, starts(fmu, **push))
+    assert one.proxy.step(2 * STEP, STEP, starts(fmu, **push)) == whole
+
+
+@pytest.mark.parametrize("time", [-1.0, 1e9, 1e300])
+def test_a_step_from_nowhere_fails_and_the_next_session_is_served(
+    fmus: Path, time: float, clocked: MakeClocked
+) -> None:
+    fmu = fmus / "ProximitySensor.fmu"
+    it = clocked(fmu, Serving(lockstep=True))
+    it.proxy.begin(1, starts(fmu))
+    with pytest.raises(RuntimeError, match=r"the peer failed: ProximitySensor\.fmu: step from"):
+        it.proxy.step(time, STEP, starts(fmu))
+    assert it.bench.counters()["failures"] == 1
+    it.proxy.begin(2, starts(fmu))
+    assert it.proxy.step(0.0, STEP, starts(fmu))
+
+
+@pytest.mark.parametrize("step", [5e-324, 4e-10, 1e10, 1e300])
+def test_a_step_that_no_clock_can_keep_fails_and_the_next_session_is_served(
+    fmus: Path, step: float, clocked: MakeClocked
+) -> None:
+    fmu = fmus / "ProximitySensor.fmu"
+    it = clocked(fmu, Serving())
+    it.proxy.begin(1, starts(fmu))
+    with pytest.raises(RuntimeError, match=r"step of .* s: must be from 1 ns to 1e\+09 s"):
+        it.proxy.step(0.0, step, starts(fmu))
+    assert it.bench.due() is None
+    it.proxy.begin(2, starts(fmu))
+    assert it.proxy.step(0.0, STEP, starts(fmu))
+
+
+def test_sessions_of_an_fmu_without_inputs_and_parameters_count(
+    fmus: Path, tmp_path: Path, clocked: MakeClocked
+) -> None:
+    sensor, fmu = fmus / "ProximitySensor.fmu", tmp_path / "Source.fmu"
+    with zipfile.ZipFile(sensor) as old, zipfile.ZipFile(fmu, "w") as new:
+        for name in old.namelist():
+            data = old.read(name)
+            if name == "modelDescription.xml":
+                data = re.sub(b'causality="(input|parameter)"', b'causality="local"', data)
+            new.writestr(name, data)
+    it = clocked(fmu, Serving(lockstep=True))
+    it.proxy.begin(1, [])
+    assert it.bench.counters()["sessions"] == 0
+    it.proxy.end()
+    assert it.bench.counters()["sessions"] == 1
+
+
+def test_a_parameter_that_the_fmu_refuses_is_said(fmus: Path, clocked: MakeClocked) -> None:
+    fmu = fmus / "ProximitySensor.fmu"
+    it = clocked(fmu, Serving())
+    with pytest.raises(RuntimeError, match=r"offset_distance = -1\.0 m: must be from"):
+        it.proxy.begin(1, starts(fmu, offset_distance=-1.0))
+
+
+def test_a_tunable_parameter_changes_on_the_way(fmus: Path, clocked: MakeClocked) -> None:
+    fmu = fmus / "ProximitySensor.fmu"
+    it = clocked(fmu, Serving(lockstep=True))
+    it.proxy.begin(1, starts(fmu))
+    (bright,) = it.proxy.step(0.0, STEP, starts(fmu))
+    (dark,) = it.proxy.step(STEP, STEP, starts(fmu, reflectance=0.5))
+    assert float(dark) == pytest.approx(0.5 * float(bright))
+
+
+def test_a_session_starts_at_its_own_time(fmus: Path, clocked: MakeClocked) -> None:
+    fmu = fmus / "GripperPlant.fmu"
+    it = clocked(fmu, Serving(lockstep=True))
+    it.proxy.begin(1, starts(fmu), time=2.5)
+    it.proxy.step(2.5, STEP, starts(fmu))
+    assert it.proxy.client.outputs_time == 2.5 + STEP
+
+
+def test_by_its_own_clock_the_model_moves_between_requests(
+    fmus: Path, clocked: MakeClocked
+) -> None:
+    fmu = fmus / "GripperPlant.fmu"
+    push = starts(fmu, **{"force[1]": -1.0})
+    it = clocked(fmu, Serving())
+    it.proxy.begin(1, starts(fmu))
+    it.wait(500.0)  # it does not start before the first step
+    first = it.proxy.step(0.0, STEP, push)
+    assert it.proxy.client.outputs_time == 0.0
+    it.wait(20.0)
+    later = it.proxy.step(0.02, STEP, push)
+    assert it.proxy.client.outputs_time == pytest.approx(0.02)
+    assert it.bench.counters()["own_steps"] == 20
+    moved = float(later[0]) - float(first[0])  # x = F t^2 / 2m
+    assert moved == pytest.approx(-0.5 * 1.0 / 0.5 * 0.02**2, rel=1e-9)
+
+
+def test_its_own_step_may_be_shorter(fmus: Path, clocked: MakeClocked) -> None:
+    fmu = fmus / "GripperPlant.fmu"
+    it = clocked(fmu, Serving(step_ns=MS // 4))
+    it.proxy.begin(1, starts(fmu))
+    it.proxy.step(0.0, STEP, starts(fmu))
+    it.wait(5.0)
+    assert it.bench.counters()["own_steps"] == 20
+
+
+def test_the_watchdog_puts_the_inputs_to_what_is_safe_until_a_request_comes(
+    fmus: Path, clocked: MakeClocked
+) -> None:
+    fmu = fmus / "GripperPlant.fmu"
+    push = starts(fmu, **{"force[1]": -1.0})
+    it = clocked(fmu, Serving(watchdog_ns=50 * MS, failsafe={"force[1]": 0.25}))
+    it.proxy.begin(1, starts(fmu))
+    it.proxy.step(0.0, STEP, push)
+    it.wait(49.0)
+    assert it.bench.counters()["watchdog"] == 0
+    it.wait(51.0)
+    assert it.bench.counters()["watchdog"] == 1
+    assert "no request for 0.05 s: inputs failsafe" in it.said
+    velocity = it.proxy.step(0.1, STEP, push)[2]
+    expected = (-1.0 * 0.049 + 0.25 * 0.051) / 0.5  # the watchdog is before the step due with it
+    assert float(velocity) == pytest.approx(expected, rel=1e-9)
+    it.wait(10.0)
+    assert float(it.proxy.step(0.11, STEP, push)[2]) < float(velocity)
+
+
+def test_a_clock_that_was_away_for_long_does_not_make_the_model_race(
+    fmus: Path, clocked: MakeClocked
+) -> None:
+    fmu = fmus / "ProximitySensor.fmu"
+    it = clocked(fmu, Serving(watchdog_ns=10**15))
+    it.proxy.begin(1, starts(fmu))
+    it.proxy.step(0.0, STEP, starts(fmu))
+    it.now += 3 * BACKLOG  # the machine slept
+    while (due := it.bench.due()) is not None and due <= it.now:
+        it.bench.look(it.now)
+    counters = it.bench.counters()
+    assert counters["own_steps"] + counters["skipped"] == 3000
+    assert counters["own_steps"] == 2
+
+
+@pytest.mark.parametrize("lockstep", [True, False])
+def test_a_failure_of_the_fmu_is_said_to_the_proxy(
+    tmp_path: Path, lockstep: bool, clocked: MakeClocked
+) -> None:
+    fmu = native_fmus.build(tmp_path, "Native", "2.0")
+    it = clocked(fmu, Serving(lockstep=lockstep))
+    values = starts(fmu, error_at=0.0025)
+    it.proxy.begin(1, values)
+    for k in range(2):
+        it.proxy.step(k * STEP, STEP, values)
+        it.wait(1.0)
+    it.wait(2.0)
+    with pytest.raises(RuntimeError, match=r"the peer failed: native: Native\.fmu returned error"):
+        it.proxy.step(2 * STEP, STEP, values)
+    assert it.bench.due() is None
+
+
+def test_every_type_there_and_back(tmp_path: Path, clocked: MakeClocked) -> None:
+    fmu = native_fmus.build(tmp_path, "Native", "2.0")
+    values: dict[str, Value] = {
+        "u_Real": 0.1,
+        "u_Integer": -7,
+        "u_Boolean": True,
+        "u_Enumeration": 2,
+        "u_String": "é",
+    }
+    it = clocked(fmu, Serving(lockstep=True))
+    it.proxy.begin(1, starts(fmu))
+    for found in (
+        it.proxy.initialise(0.0, starts(fmu, **values)),
+        it.proxy.step(0.0, STEP, starts(fmu, **values)),
+    ):
+        outputs = dict(zip([v.name for v in it.bench.peer.signature.answer], found, strict=True))
+        for name, value in values.items():
+            assert (outputs[f"y{name[1:]}"], type(outputs[f"y{name[1:]}"])) == (value, type(value))
+
+
+def test_what_a_proxy_cannot_exchange_is_refused_by_name(tmp_path: Path) -> None:
+    fmu = native_fmus.build(tmp_path, "Native", "3.0")
+    with pytest.raises(InputError, match=r"input u_UInt32 is of type UInt32, which a proxy cannot"):
+        link_signature(read_interface(fmu))
+
+
+def test_an_output_that_is_not_finite_is_a_failure(tmp_path: Path, clocked: MakeClocked) -> None:
+    fmu = native_fmus.build(tmp_path, "Native", "2.0")
+    it = clocked(fmu, Serving(lockstep=True))
+    it.proxy.begin(1, starts(fmu))
+    bench = it.bench
+    bench._model._get = lambda: [math.nan] * len(bench.peer.signature.answer)
+    with pytest.raises(RuntimeError, match=r"= nan at t = 0\.001 s: must be finite"):
+        it.proxy.step(0.0, STEP, starts(fmu))
+
+
+def test_what_is_dropped_is_said_once(fmus: Path, clocked: MakeClocked) -> None:
+    fmu = fmus / "ProximitySensor.fmu"
+    it = clocked(fmu, Serving(key=b"a key of 16 byte"))
+    for _ in range(3):
+        assert it.bench.answer(it.proxy.client.greet(1, 0), "somebody", it.now) is None
+    assert it.said == ["a datagram from somebody without the right key is dropped"]
+
+
+def test_a_bench_that_is_closed_says_where_its_session_ended(
+    fmus: Path, clocked: MakeClocked
+) -> None:
+    fmu = fmus / "ProximitySensor.fmu"
+    it = clocked(fmu, Serving(lockstep=True))
+    it.proxy.begin(1, starts(fmu))
+    it.proxy.step(0.0, STEP, starts(fmu))
+    it.bench.close()
+    assert it.said[-1] == "the session is over at t = 0.001 s: the bench is closed"
+
+
+def test_wrong_failsafe_values_are_refused(fmus: Path) -> None:
+    plant = read_interface(fmus / "GripperPlant.fmu")
+    with pytest.raises(InputError, match=r"failsafe force: no such input .* valid: force\[1\]"):
+        Bench(plant, Serving(failsafe={"force": 1.0}))
+    with pytest.raises(InputError, match=r"failsafe force\[1\]: force\[1\] = 'x': must be a"):
+        Bench(plant, Serving(failsafe={"force[1]": "x"}))
+
+
+def test_a_key_that_is_too_short_is_refused(fmus: Path) -> None:
+    with pytest.raises(InputError, match="key of 3 bytes: must have 16 or more"):
+        Bench(read_interface(fmus / "GripperPlant.fmu"), Serving(key=b"abc"))

@@ -1,0 +1,92 @@
+"""The grasp with a part of it behind a proxy: the same values, to the bit, in lockstep."""
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from grasp_cosim import System, simulate
+from grasp_cosim.hil.bench import Serving
+from support.proxies import build_proxy, serving
+
+STEP, STOP = 4e-3, 2.0
+"""s; past the contacts, in steps as long as the grasp takes them."""
+
+
+@pytest.fixture(scope="module")
+def stepped(grasp: System) -> System:
+    return grasp.with_experiment(step=STEP, stop=STOP)
+
+
+@contextmanager
+def on_the_bench(
+    system: System, folder: Path, names: tuple[str, ...], how: Serving
+) -> Iterator[System]:
+    """The system with these components as proxies, each with a peer in lockstep of its own."""
+    with ExitStack() as stack:
+        for name in names:
+            fmu = system.component(name, "test").fmu
+            server = stack.enter_context(serving(fmu, how))
+            proxy = build_proxy(fmu, folder / f"{name}_bench.fmu", server.address[1])
+            system = system.swap(name, proxy)
+        yield system
+
+
+@pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
+@pytest.mark.parametrize(
+    "names",
+    [("plant",), ("sensor_1", "sensor_2"), ("controller",)],
+    ids=["plant", "sensors", "controller"],
+)
+def test_a_part_on_the_bench_changes_no_bit(
+    stepped: System, tmp_path: Path, names: tuple[str, ...], scheme: str
+) -> None:
+    values = {"plant.initial_object_position": 0.02, "sensor_1.reflectance": 0.93}
+    system = stepped.with_experiment(scheme=scheme).with_values(values)
+    direct = simulate(system)
+    with on_the_bench(system, tmp_path, names, Serving(lockstep=True)) as benched:
+        proxied = simulate(benched)
+    for signal, column in direct.items():
+        np.testing.assert_array_equal(column, proxied[signal], signal)
+    for name in names:
+        assert not proxied[f"{name}.proxy.missed"].any()
+        assert set(proxied[f"{name}.proxy.state"]) == {1}
+        assert not proxied[f"{name}.proxy.age"].any()
+    assert direct.metrics["time_to_contact"] == proxied.metrics["time_to_contact"]
+    assert None not in direct.metrics["time_to_contact"]
+
+
+def test_all_of_it_on_the_bench(stepped: System, tmp_path: Path) -> None:
+    direct = simulate(stepped)
+    names = ("plant", "sensor_1", "sensor_2", "controller")
+    with on_the_bench(stepped, tmp_path, names, Serving(lockstep=True)) as system:
+        again = simulate(system, engine="python")
+    for signal, values in direct.items():
+        np.testing.assert_array_equal(values, again[signal], signal)
+
+
+def test_events_reach_the_bench(grasp: System, tmp_path: Path) -> None:
+    """A tunable parameter of a sensor on the bench, set on the way."""
+    system = grasp.with_experiment(step=1e-3, stop=0.02)
+    with on_the_bench(system, tmp_path, ("sensor_1",), Serving(lockstep=True)) as benched:
+        there, here = darkened(benched), darkened(system)
+    np.testing.assert_array_equal(there, here)
+    assert here[11] < 0.6 * here[10]
+
+
+def darkened(system: System) -> npt.NDArray[np.float64]:
+    """The intensity of a sensor before whose tenth step its side gets darker."""
+    with simulate.session(system) as session:
+        session.step(10)
+        session.set("sensor_1.reflectance", 0.57)
+        session.step(10)
+        return session.result()["sensor_1.intensity"]
+
+
+def test_two_runs_one_after_the_other_use_the_same_bench(grasp: System, tmp_path: Path) -> None:
+    system = grasp.with_experiment(step=1e-3, stop=0.05)
+    with on_the_bench(system, tmp_path, ("plant",), Serving(lockstep=True)) as benched:
+        first, second = (simulate(benched)["plant.position[1]"] for _ in range(2))
+    np.testing.assert_array_equal(first, second)

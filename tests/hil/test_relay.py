@@ -1,0 +1,432 @@
+"""The relay between real sockets on loopback: what comes out is what the fates say, and counts."""
+
+import json
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from csv import DictReader
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+
+import pytest
+from grasp_cosim import cli
+from grasp_cosim.errors import InputError
+from grasp_cosim.hil.address import Address
+from grasp_cosim.hil.network import DIRECTIONS, Conditions, Network, Outage
+from grasp_cosim.hil.relay import MOST_CLIENTS, Relay, relaying
+from grasp_cosim.hil.traffic import Counters, Entry
+from support.echo_peer import EchoPeer, client
+from support.proxies import wait_until
+
+NASTY = Conditions(jitter=0.002, loss=0.2, duplicate=0.2, reorder=0.2, reorder_by=0.005)
+
+
+def both(conditions: Conditions, seed: int = 0, *outages: Outage) -> Network:
+    """The same in both directions."""
+    return Network(dict.fromkeys(DIRECTIONS, conditions), outages, seed)
+
+
+def converse(relay: Relay, count: int, at_once: int = 20) -> list[bytes]:
+    """Send so many numbered requests, a few at a time; return the replies, in their order."""
+    replies: list[bytes] = []
+    with client() as mine:
+        for first in range(0, count, at_once):
+            upto = min(first + at_once, count)
+            for number in range(first, upto):
+                mine.sendto(b"%d" % (number + 1), relay.address)
+            wait_until(partial(settled, relay, upto))
+            while len(replies) < relay.counters["reply"].delivered:
+                replies.append(mine.recv(100))
+    return replies
+
+
+def settled(relay: Relay, requests: int) -> bool:
+    """Whether so many requests and all the replies to them have gone through, or been dropped."""
+    request, reply = relay.counters.values()
+    arrived = request.received == requests and reply.received == request.delivered
+    return arrived and request.held == reply.held == 0
+
+
+def delivered(relay: Relay, requests: int) -> bool:
+    """Whether so many requests have gone through."""
+    return relay.counters["request"].delivered == requests
+
+
+def test_an_undisturbed_network_passes_all_in_order() -> None:
+    with EchoPeer() as peer, relaying(peer.address) as relay:
+        assert converse(relay, 100) == [b"%d" % n for n in range(1, 101)]
+        fine = Counters(received=100, delivered=100)
+        assert relay.counters == {"request": fine, "reply": fine}
+
+
+def test_what_gets_through_and_the_counters_are_those_of_the_fates() -> None:
+    """Whatever the timing: requests by their content, replies by how many there were."""
+    net = both(NASTY, 11)
+    log: list[Entry] = []
+    with EchoPeer() as peer, relaying(peer.address, net, log=log.append) as relay:
+        replies = converse(relay, 300)
+    request, reply = relay.counters.values()
+    fates = {n: net.fate("request", n) for n in range(1, 301)}
+    arrived = sorted(int(data) for _, data in peer.received)
+    assert arrived == [n for n, fate in fates.items() for _ in fate]
+    expected = {
+        "request": list(fates.values()),
+        "reply": [net.fate("reply", n) for n in range(1, len(arrived) + 1)],
+    }
+    for direction, counters in relay.counters.items():
+        of = expected[direction]
+        assert counters == Counters(
+            received=len(of), delivered=sum(map(len, of)), lost=of.count(()),
+            duplicated=sum(len(f) == 2 for f in of), reordered=counters.reordered,
+        )  # fmt: skip
+        told = [e.delay for e in log if e.direction == direction and e.delay is not None]
+        assert told == [p.delay_ns / 1e9 for f in of for p in f]
+    assert len(replies) == reply.delivered
+    order = [int(data) for _, data in peer.received]
+    assert request.reordered == sum(n < max(order[:i], default=0) for i, n in enumerate(order))
+    assert request.reordered > 0
+
+
+def test_any_content_goes_through_unchanged() -> None:
+    contents = [b"", b"\0", bytes(range(256)) * 200, b"GRSP" + bytes(76)]
+    with EchoPeer() as peer, relaying(peer.address) as relay, client() as mine:
+        for data in contents:
+            mine.sendto(data, relay.address)
+            assert mine.recvfrom(65_535) == (data, relay.address)
+
+
+def test_a_peer_that_is_away_and_comes_back() -> None:
+    """What nobody takes is lost on the way; the first datagram after the return gets through."""
+    peer = EchoPeer()
+    with relaying(peer.address) as relay, client() as mine:
+        with peer:
+            mine.sendto(b"here", relay.address)
+            assert mine.recv(100) == b"here"
+        for number in range(2, 6):
+            mine.sendto(b"away", relay.address)
+            wait_until(partial(delivered, relay, number))
+        with EchoPeer(peer.address[1]):
+            mine.sendto(b"back", relay.address)
+            assert mine.recv(100) == b"back"
+    assert relay.counters["request"] == Counters(received=6, delivered=6)
+    assert relay.counters["reply"] == Counters(received=2, delivered=2)
+
+
+def test_an_outage_in_the_middle() -> None:
+    with EchoPeer() as peer, relaying(peer.address, both(Conditions(), 0, Outage(4, 8))) as relay:
+        assert converse(relay, 10, at_once=1) == [b"1", b"2", b"3", b"8", b"9", b"10"]
+    assert relay.counters["request"] == Counters(received=10, delivered=6, outage=4)
+
+
+def test_clients_get_their_own_replies_and_the_peer_can_tell_them_apart() -> None:
+    with EchoPeer() as peer, relaying(peer.address) as relay, client() as one, client() as other:
+        for _ in range(3):
+            one.sendto(b"one", relay.address)
+            other.sendto(b"other", relay.address)
+            assert one.recv(100) == b"one"
+            assert other.recv(100) == b"other"
+    assert len(peer.received) == 6
+    assert len(set(peer.received)) == 2
+    assert len({port for port, _ in peer.received}) == 2
+
+
+def test_a_further_client_takes_the_place_of_the_one_silent_for_longest() -> None:
+    with EchoPeer() as peer, relaying(peer.address) as relay, ExitStack() as stack:
+        mine = [stack.enter_context(client()) for _ in range(MOST_CLIENTS + 1)]
+        for number in [*range(MOST_CLIENTS), 0, MOST_CLIENTS, 0, 1]:
+            mine[number].sendto(b"%d" % number, relay.address)
+            assert mine[number].recv(100) == b"%d" % number
+    ports: dict[bytes, list[int]] = {}
+    for port, data in peer.received:
+        ports.setdefault(data, []).append(port)
+    assert len(set(ports[b"0"])) == 1  # heard again before the further one came
+    assert len(set(ports[b"1"])) == 2  # that took its place; it is a new client now
+
+
+def test_a_request_of_a_forgotten_client_is_counted_as_unsent() -> None:
+    """All are held for 1 s of a clock that stands still; the first client has to go."""
+    now = 0
+    net = both(Conditions(delay=1.0))
+    with EchoPeer() as peer, ExitStack() as stack:
+        relay = stack.enter_context(Relay(peer.address, net, clock=lambda: now))
+        for number in range(MOST_CLIENTS + 1):
+            stack.enter_context(client()).sendto(b"%d" % number, relay.address)
+            relay.turn(None)
+        now = 10**9
+        relay.turn(0)
+        expected = Counters(received=17, delivered=16, unsent=1)
+        assert relay.counters["request"] == expected
+        wait_until(lambda: len(peer.received) == MOST_CLIENTS)
+    assert {data for _, data in peer.received} == {b"%d" % n for n in range(1, MOST_CLIENTS + 1)}
+
+
+@pytest.mark.parametrize("more", [0, 1])
+def test_a_client_that_gives_way_in_the_turn_in_which_it_gets_a_reply(more: int) -> None:
+    """For many sockets: their numbers decide which is looked at first."""
+    with client() as peer, ExitStack() as stack:
+        for _ in range(more):
+            stack.enter_context(client())
+        relay = stack.enter_context(Relay(peer.getsockname()))
+        mine = [stack.enter_context(client()) for _ in range(2 * MOST_CLIENTS)]
+        senders: list[Address] = []
+        for number, one in enumerate(mine):
+            if number >= MOST_CLIENTS:
+                peer.sendto(b"reply", senders[number - MOST_CLIENTS])
+            one.sendto(b"request", relay.address)
+            relay.turn(None)
+            senders.append(peer.recvfrom(100)[1])
+        for one in mine[:MOST_CLIENTS]:
+            assert one.recv(100) == b"reply"
+
+
+def test_requests_that_are_sent_one_after_the_other_to_nobody_are_all_sent() -> None:
+    """What the network says of the first must not keep the second from being sent."""
+    now = 0
+    with client() as peer, client() as mine:
+        nobody = peer.getsockname()
+        peer.close()
+        with Relay(nobody, both(Conditions(delay=1.0)), clock=lambda: now) as relay:
+            for _ in range(3):
+                mine.sendto(b"x", relay.address)
+                relay.turn(None)
+            now = 10**9
+            relay.turn(0)
+        assert relay.counters["request"] == Counters(received=3, delivered=3)
+
+
+def test_room_is_bounded() -> None:
+    net = Network(dict.fromkeys(DIRECTIONS, Conditions(delay=60.0)), capacity=3)
+    with EchoPeer() as peer, relaying(peer.address, net) as relay, client() as mine:
+        for _ in range(8):
+            mine.sendto(b"x", relay.address)
+        wait_until(lambda: relay.counters["request"].received == 8)
+        assert relay.counters["request"] == Counters(received=8, overflow=5, held=3)
+
+
+def test_what_is_under_way_at_the_end_stays_so() -> None:
+    """A duration of 3 s, on a clock that goes on by 1 s whenever it is asked."""
+    ticks = iter(range(0, 100 * 10**9, 10**9))
+    with EchoPeer() as peer, client() as mine:
+        net = both(Conditions(delay=1000.0))
+        with Relay(peer.address, net, clock=lambda: next(ticks)) as relay:
+            mine.sendto(b"x", relay.address)
+            relay.run(3.0)
+        assert relay.counters["request"] == Counters(received=1, held=1)
+    assert not peer.received
+
+
+def test_stopped_before_it_runs_and_more_than_once() -> None:
+    with EchoPeer() as peer, Relay(peer.address) as relay:
+        for _ in range(1000):  # more than the waking socket holds
+            relay.stop()
+        relay.run()
+        assert relay.counters["request"] == Counters()
+
+
+def test_an_idle_relay_is_woken_to_end() -> None:
+    with EchoPeer() as peer, relaying(peer.address) as relay:
+        pass
+    with Relay(peer.address, port=relay.port) as again:  # which is free again
+        assert again.port == relay.port
+
+
+def test_what_the_log_raises_ends_it_and_is_raised() -> None:
+    def full(entry: Entry) -> None:
+        raise OSError(28, "No space left on device")
+
+    with EchoPeer() as peer, client() as mine, Relay(peer.address, log=full) as relay:
+        mine.sendto(b"x", relay.address)
+        with pytest.raises(OSError, match="No space left"):
+            relay.run()
+
+
+def test_what_ends_a_relay_in_a_thread_is_raised_at_the_end() -> None:
+    def full(entry: Entry) -> None:
+        raise OSError(28, "No space left on device")
+
+    with EchoPeer() as peer, client() as mine, ExitStack() as stack:
+        relay = stack.enter_context(relaying(peer.address, log=full))
+        mine.sendto(b"x", relay.address)
+        wait_until(lambda: relay.counters["request"].received == 1)
+        with pytest.raises(OSError, match="No space left"):
+            stack.close()
+
+
+def test_it_does_not_relay_to_itself() -> None:
+    with client() as mine:
+        port = mine.getsockname()[1]
+    for host in ("127.0.0.1", "0.0.0.0"):
+        with pytest.raises(InputError, match=f"127.0.0.1:{port}: is the relay itself; must be"):
+            Relay(("127.0.0.1", port), host=host, port=port)
+
+
+def test_a_port_that_is_taken() -> None:
+    with EchoPeer() as peer, pytest.raises(InputError) as error:
+        Relay(peer.address, port=peer.address[1])
+    assert str(error.value) == (
+        f"127.0.0.1:{peer.address[1]}: cannot listen there: Address already in use;"
+        " must be an address of this machine and a free port, or 0"
+    )
+
+
+def command(*arguments: str) -> int:
+    """Run grasp-cosim relay in this process."""
+    return cli.main(["relay", *arguments])
+
+
+def test_the_command_relays_until_its_duration_is_over(capsys: pytest.CaptureFixture[str]) -> None:
+    assert command("--to", "127.0.0.1:5501", "--duration", "0") == 0
+    out, err = capsys.readouterr()
+    assert re.fullmatch(r"relaying 127\.0\.0\.1:[1-9][0-9]* -> 127\.0\.0\.1:5501\n", err)
+    names, request, reply = out.splitlines()
+    assert names.split() == list(asdict(Counters()))
+    assert request.split() == ["request"] + ["0"] * 9
+    assert reply.split() == ["reply"] + ["0"] * 9
+
+
+def test_listening_beyond_this_machine_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+    assert command("--to", "127.0.0.1:5501", "--host", "0.0.0.0", "--duration", "0") == 0
+    note, listening = capsys.readouterr().err.splitlines()
+    where = listening.split()[1]
+    assert where.startswith("0.0.0.0:")
+    assert note == (
+        f"listening beyond this machine: whoever reaches {where} reaches 127.0.0.1:5501"
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--loss", "1.5"], "loss = 1.5: must be a probability, from 0 to 1"),
+        (["--delay", "nan"], "delay = nan s: must be from 0 to 1e+06 s"),
+        (["--reorder-by", "-1"], "reorder_by = -1.0 s: must be from 0 to 1e+06 s"),
+        (["--duration", "inf"], "duration = inf s: must be from 0 to 1e+06 s"),
+        (["--duration", "-1"], "duration = -1.0 s: must be from 0 to 1e+06 s"),
+        (["--to", "5501"], "--to '5501': must be HOST:PORT, as in 127.0.0.1:5501"),
+        (["--to", "127.0.0.1:"], "--to '127.0.0.1:': must be HOST:PORT, as in 127.0.0.1:5501"),
+        (["--to", "127.0.0.1:0"], "127.0.0.1:0: port must be from 1 to 65535"),
+        (["--to", "127.0.0.1:65536"], "127.0.0.1:65536: port must be from 1 to 65535"),
+        (
+            ["--to", "256.0.0.1:5501"],
+            "256.0.0.1:5501: no such host; must be an IPv4 address or a name that has one",
+        ),
+        (
+            ["--outage", "5"],
+            "--outage '5': must be FROM:UNTIL, in numbers of requests, as in 100:200,"
+            " or in s, as in 0.5s:2s",
+        ),
+        (["--outage", "1.5:2"], "outage from 1.5 until 2.0 requests: must be whole numbers"),
+        (
+            ["--outage", "2s:1s"],
+            "outage from 2.0 until 1.0 s: must begin at 0 or later, and end after that",
+        ),
+    ],
+)
+def test_wrong_input_is_one_line(
+    arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    given = ["--to", "127.0.0.1:5501", "--duration", "0", *arguments]
+    assert command(*given) == 2
+    assert capsys.readouterr() == ("", f"grasp-cosim: {said}\n")
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [[], ["--to", "127.0.0.1:1", "--port", "65536"], ["--to", "127.0.0.1:1", "--seed", "-1"]],
+)
+def test_what_click_refuses_is_one_line(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert command(*arguments) == 2
+    out, err = capsys.readouterr()
+    assert not out
+    assert len(err.splitlines()) == 1
+
+
+def test_a_log_that_cannot_be_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "missing" / "log.csv"
+    assert command("--to", "127.0.0.1:5501", "--log", str(path)) == 2
+    assert capsys.readouterr().err == f"grasp-cosim: {path}: No such file or directory\n"
+
+
+@pytest.fixture
+def started(tmp_path: Path) -> Iterator[Callable[..., tuple[subprocess.Popen[str], Address]]]:
+    """Starts the command as a process; returns it and where it listens. Ends what is left."""
+    with ExitStack() as stack:
+
+        def start(*arguments: str) -> tuple[subprocess.Popen[str], Address]:
+            process = stack.enter_context(
+                subprocess.Popen(
+                    [sys.executable, "-m", "grasp_cosim", "relay", *arguments],
+                    stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                )
+            )  # fmt: skip
+            stack.callback(process.kill)
+            assert process.stderr
+            said = process.stderr.readline().split()
+            assert said[0] == "relaying"
+            host, port = said[1].split(":")
+            return process, (host, int(port))
+
+        yield start
+
+
+def test_ctrl_c_ends_it_with_counters_and_log(
+    started: Callable[..., tuple[subprocess.Popen[str], Address]], tmp_path: Path
+) -> None:
+    """As a process of its own: the log is that of the fates, the counters are those of the log."""
+    path = tmp_path / "log.csv"
+    options = ["--loss", "0.3", "--jitter", "0.002", "--duplicate", "0.3", "--reorder", "0.2"]
+    options += ["--seed", "7", "--log", str(path), "--json"]
+    conditions = Conditions(jitter=0.002, loss=0.3, duplicate=0.3, reorder=0.2)
+    net = both(conditions, 7)
+    with EchoPeer() as peer, client() as mine:
+        to = f"127.0.0.1:{peer.address[1]}"
+        process, address = started("--to", to, *options)
+        expected = 0
+        for number in range(1, 41):
+            mine.sendto(b"%d" % number, address)
+            expected += len(net.fate("request", number))
+        wait_until(lambda: len(peer.received) == expected)
+        for number in range(1, expected + 1):
+            for _ in net.fate("reply", number):
+                mine.recv(100)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+    assert (process.returncode, err) == (0, "")
+    report = json.loads(out)
+    assert {k: report.pop(k) for k in ("listening", "to", "seed")} == {
+        "listening": f"127.0.0.1:{address[1]}", "to": to, "seed": 7,
+    }  # fmt: skip
+    assert list(report) == list(DIRECTIONS)
+    with path.open(newline="") as file:
+        rows = list(DictReader(file))
+    for direction in DIRECTIONS:
+        of = [row for row in rows if row["direction"] == direction]
+        received = 40 if direction == "request" else expected
+        assert [row["delay"] for row in of] == [
+            delay
+            for n in range(1, received + 1)
+            for delay in ([str(p.delay_ns / 1e9) for p in net.fate(direction, n)] or [""])
+        ]
+        counts = report[direction]
+        assert counts["received"] == len({row["number"] for row in of}) == received
+        assert counts["lost"] == counts["dropped"] == sum(row["fate"] == "lost" for row in of)
+        assert counts["duplicated"] == sum(row["copy"] == "1" for row in of)
+        assert counts["delivered"] == sum(row["delay"] != "" for row in of)
+        assert counts["held"] == 0
+
+
+def test_sigterm_before_the_duration_is_over(
+    started: Callable[..., tuple[subprocess.Popen[str], Address]],
+) -> None:
+    process, _ = started("--to", "127.0.0.1:5501", "--duration", "1000", "--json")
+    process.send_signal(signal.SIGTERM)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert err == "grasp-cosim: interrupted before --duration 1000.0 was over\n"
+    assert json.loads(out)["request"]["received"] == 0

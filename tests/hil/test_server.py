@@ -1,0 +1,221 @@
+"""The bench at its port: real sockets on the loopback."""
+
+import itertools
+import json
+import os
+import random
+import signal
+import socket
+import subprocess
+import sys
+import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from grasp_cosim import cli
+from grasp_cosim.errors import InputError
+from grasp_cosim.hil.bench import Bench, Serving
+from grasp_cosim.hil.protocol import link_signature
+from grasp_cosim.hil.server import Server
+from grasp_cosim.interface.interface import read_interface
+from grasp_fmus.link.message import LARGEST
+from support.proxies import HandProxy, UdpAsk, serving, wait_until
+
+KEY = b"a key of 16 byte"
+
+
+@contextmanager
+def proxied(fmu: Path, server: Server, key: bytes | None = None) -> Iterator[HandProxy]:
+    signature, _ = link_signature(read_interface(fmu))
+    with UdpAsk(server.address) as ask:
+        yield HandProxy(signature, ask, key)
+
+
+def requests(fmu: Path) -> list[float | int | bool | str]:
+    interface = read_interface(fmu)
+    signature, _ = link_signature(interface)
+    return [
+        interface.parse("", v.name, interface.by_name[v.name].start or "", text=True)
+        for v in signature.request
+    ]
+
+
+def test_a_session_over_udp(fmus: Path) -> None:
+    fmu = fmus / "GripperPlant.fmu"
+    values = requests(fmu)
+    with (
+        serving(fmu, Serving(lockstep=True, key=KEY)) as server,
+        proxied(fmu, server, KEY) as proxy,
+    ):
+        assert server.address[0] == "127.0.0.1"
+        proxy.begin(1, values)
+        for k in range(50):
+            proxy.step(k * 1e-3, 1e-3, values)
+        proxy.end()
+        wait_until(lambda: server.bench.counters()["sessions"] == 1)
+    assert server.bench.counters()["steps"] == 50
+
+
+def test_by_its_own_clock_it_goes_on_without_requests(fmus: Path) -> None:
+    fmu = fmus / "GripperPlant.fmu"
+    values = requests(fmu)
+    with serving(fmu, Serving()) as server, proxied(fmu, server) as proxy:
+        proxy.begin(1, values)
+        proxy.step(0.0, 1e-3, values)
+        wait_until(lambda: server.bench.counters()["own_steps"] >= 20)
+        proxy.step(0.02, 1e-3, values)
+        assert proxy.client.outputs_time >= 0.02
+
+
+def test_the_port_is_one_that_is_free(fmus: Path) -> None:
+    interface = read_interface(fmus / "ProximitySensor.fmu")
+    refused = pytest.raises(InputError, match="cannot listen there: Address already in use")
+    with Server(Bench(interface)) as server, refused:
+        Server(Bench(interface), server.address)
+
+
+def garbage(seed: int, legal: bytes) -> Iterator[bytes]:
+    """Datagrams that are none: noise of every size, and legal ones with bytes changed."""
+    chance = random.Random(seed)
+    while True:
+        if chance.random() < 0.5:
+            yield chance.randbytes(chance.choice((0, 1, 79, 80, 100, 1000)))
+        else:
+            spoilt = bytearray(legal)
+            for _ in range(chance.randrange(1, 6)):
+                spoilt[chance.randrange(len(spoilt))] = chance.randrange(256)
+            yield bytes(spoilt[: chance.randrange(len(spoilt) + 1)])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("key", [None, KEY])
+def test_half_a_million_malformed_datagrams(fmus: Path, key: bytes | None) -> None:
+    """With a key and without: no crash, no growth, every legal request served."""
+    fmu = fmus / "GripperPlant.fmu"
+    values = requests(fmu)
+    with (
+        serving(fmu, Serving(lockstep=True, key=key)) as server,
+        proxied(fmu, server, key) as proxy,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vandal,
+    ):
+        proxy.begin(1, values)
+        legal = bytearray(proxy.client.step(0.0, 1e-3, values, 0))
+        if key is None:
+            legal[24:40] = bytes(16)  # an outsider knows neither session nor cookie
+        noise = list(itertools.islice(garbage(1, bytes(legal)), 10_000))
+        vandal.connect(server.address)
+        blocks = 0
+        for k in range(5000):
+            for i in range(100):
+                vandal.send(noise[(100 * k + i) % len(noise)])
+            proxy.step(k * 1e-3, 1e-3, values)
+            blocks = blocks or sys.getallocatedblocks() * (k == 1000)
+        grown = sys.getallocatedblocks() - blocks
+        vandal.send(bytes(LARGEST))
+        proxy.step(5.0, 1e-3, values)
+        counters = server.bench.counters()
+    dropped = ("malformed", "forged", "foreign", "stale", "duplicated")
+    assert sum(counters[name] for name in dropped) == 500_001
+    assert (counters["steps"], counters["failures"]) == (5001, 0)
+    assert grown < 500
+
+
+def test_the_command_serves_until_it_is_interrupted(fmus: Path) -> None:
+    command = [sys.executable, "-m", "grasp_cosim", "serve", str(fmus / "ProximitySensor.fmu")]
+    process = subprocess.Popen(
+        [*command, "--port", "0", "--lockstep", "--json"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+    )
+    try:
+        assert process.stderr is not None
+        line = process.stderr.readline()
+        assert line.startswith("serving ProximitySensor.fmu at 127.0.0.1:")
+        port = int(line.rpartition(":")[2].partition(",")[0])
+        fmu = fmus / "ProximitySensor.fmu"
+        signature, _ = link_signature(read_interface(fmu))
+        with UdpAsk(("127.0.0.1", port)) as ask:
+            HandProxy(signature, ask).begin(1, requests(fmu))
+        process.send_signal(signal.SIGINT)
+        out, _ = process.communicate(timeout=60)
+    finally:
+        process.kill()
+        process.wait()
+    assert process.returncode == 0
+    assert json.loads(out)["initialisations"] == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--lockstep", "--step", "0.001"], "--step 0.001: must be left out with --lockstep"),
+        (["--watchdog", "-1"], "--watchdog = -1.0 s: must be a number greater than 0"),
+        (["--failsafe", "gap"], "--failsafe 'gap': must be INPUT=VALUE"),
+        (["--failsafe", "gap=wide"], "failsafe gap: gap = 'wide': must be a finite number"),
+        (["--key-file", "{short}"], "key of 5 bytes: must have 16 or more"),
+        (["--host", "192.0.2.1"], "192.0.2.1:5501: cannot listen there"),
+        (["--host", ""], ":5501: no such host; must be an IPv4 address or a name that has one"),
+    ],
+)
+def test_wrong_input_is_one_line(
+    fmus: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    arguments: list[str],
+    message: str,
+) -> None:
+    (tmp_path / "short").write_text("short", encoding="utf-8")
+    given = [a.format(short=tmp_path / "short") for a in arguments]
+    assert cli.main(["serve", str(fmus / "ProximitySensor.fmu"), *given]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1
+    assert message in captured.err
+
+
+def test_an_fmu_that_does_not_load_is_not_offered(
+    fmus: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    empty = tmp_path / "empty.fmu"
+    with zipfile.ZipFile(fmus / "GripperPlant.fmu") as good, zipfile.ZipFile(empty, "w") as file:
+        file.writestr("modelDescription.xml", good.read("modelDescription.xml"))
+    assert cli.main(["serve", str(empty), "--port", "0", "--duration", "0.01"]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1
+    assert f"GripperPlant: {empty} does not load: " in captured.err
+
+
+def test_a_bounded_service_ends_by_itself(fmus: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    fmu = str(fmus / "ProximitySensor.fmu")
+    assert cli.main(["serve", fmu, "--port", "0", "--duration", "0.01"]) == 0
+    assert capsys.readouterr().out == "nothing came\n"
+    bounded = ["serve", fmu, "--port", "0", "--duration", "0.01", "--sessions", "1", "--json"]
+    assert cli.main(bounded) == 1
+    captured = capsys.readouterr()
+    assert json.loads(captured.out)["listening"].startswith("127.0.0.1:")
+    assert captured.err.endswith("grasp-cosim: 0 of 1 sessions in 0.01 s\n")
+
+
+@pytest.mark.parametrize(
+    ("host", "key", "open_to_others"),
+    [("localhost", False, False), ("0.0.0.0", False, True), ("0.0.0.0", True, False)],
+)
+def test_it_says_who_may_take_part(
+    fmus: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    host: str,
+    key: bool,
+    open_to_others: bool,
+) -> None:
+    (tmp_path / "key").write_bytes(KEY)
+    given = ["--host", host, *(["--key-file", str(tmp_path / "key")] if key else [])]
+    command = ["serve", str(fmus / "ProximitySensor.fmu"), "--port", "0", "--duration", "0.01"]
+    assert cli.main([*command, *given]) == 0
+    err = capsys.readouterr().err
+    assert ("can be reached by others, who may take part" in err) == open_to_others

@@ -1,0 +1,197 @@
+"""Sessions: what can be done with one, and when that is over."""
+
+import math
+import signal
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from fmi.instances import KINDS, interrupted_after
+from fmi.test_rejected_steps import alone
+from grasp_cosim import InputError, SimulationError, System, simulate
+from grasp_cosim.master import master, simulation
+from grasp_cosim.master.engine import Engine
+from grasp_cosim.recording.memory import MemoryListener
+from grasp_cosim.system.parts import Isolation
+from support.mocks import Mock, make_system
+from support.native_fmus import needs_gcc
+
+pytestmark = needs_gcc
+engines = pytest.mark.parametrize("engine", ["python", "auto"])
+
+
+@engines
+def test_a_closed_session_calls_no_fmu(tmp_path: Path, engine: Engine) -> None:
+    with simulate.session(alone(tmp_path, "3.0", "none"), engine=engine) as session:
+        session.step(3)
+    closed = "^alone: the session is closed; must be a new one$"
+    with pytest.raises(InputError, match=closed):
+        session.step()
+    with pytest.raises(InputError, match=closed):
+        session.set("part.gain", 2.0)
+    assert session["part.x"] == pytest.approx(0.6)
+    assert len(session.result().time) == 4
+
+
+@engines
+def test_after_a_failure_no_fmu_is_called(tmp_path: Path, engine: Engine) -> None:
+    system = alone(tmp_path, "3.0", "none", error_at=0.35)
+    with simulate.session(system, engine=engine) as session:
+        with pytest.raises(SimulationError):
+            session.step(5)
+        for call in (session.step, lambda: session.set("part.gain", 2.0)):
+            with pytest.raises(InputError, match="the session is broken off by a failure or an"):
+                call()
+        assert len(session.result().time) == 4
+
+
+def test_a_value_that_does_not_fit_breaks_nothing(tmp_path: Path) -> None:
+    with simulate.session(alone(tmp_path, "3.0", "none")) as session:
+        with pytest.raises(InputError, match="must be a finite number"):
+            session.set("part.gain", float("nan"))
+        assert session.step(10)
+        assert session.complete
+
+
+@pytest.mark.parametrize(("version", "isolation"), KINDS)
+def test_an_interrupted_session_does_not_go_on(
+    tmp_path: Path, version: str, isolation: Isolation
+) -> None:
+    """Its FMU is further than its rows."""
+    system = replace(alone(tmp_path, version, isolation), step_ns=1000, stop_ns=100_000_000_000)
+    with simulate.session(system, engine="python") as session:
+        with interrupted_after(0.05):
+            session.step(100_000_000)
+        with pytest.raises(InputError, match="the session is broken off by a failure or an"):
+            session.step()
+        result = session.result()
+        assert not result.complete
+        assert result["part.x"] == pytest.approx(2.0 * result.time, rel=1e-9)
+
+
+def test_an_interruption_of_which_an_fmu_makes_an_error_is_one_all_the_same(
+    grasp: System, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def load(_: object) -> None:
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt:  # as pythonfmu does
+            raise InputError("plant: refused its initialisation: KeyboardInterrupt") from None
+
+    monkeypatch.setattr(simulation, "load", load)
+    with pytest.raises(KeyboardInterrupt):
+        simulate(grasp, stop=0.01)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_a_session_that_has_not_stepped_has_metrics(tmp_path: Path) -> None:
+    with simulate.session(alone(tmp_path, "3.0", "none")) as session:
+        metrics = session.result().metrics
+    assert (metrics["steps"], metrics["real_time_factor"]) == (0, 0.0)
+
+
+@pytest.mark.parametrize("steps", [0, -1, 1.5, True, 2**63])
+def test_steps_are_counted_in_whole_numbers(grasp: System, steps: int) -> None:
+    with simulate.session(grasp, stop=0.01) as session:
+        with pytest.raises(InputError, match=r"steps = .*: must be a whole number from 1 to"):
+            session.step(steps)
+        assert session.step(np.int64(3))  # type: ignore[arg-type]
+        assert session.time == 3e-4
+
+
+def test_an_engine_that_does_not_exist_is_refused(grasp: System) -> None:
+    with pytest.raises(InputError, match="engine = 'complied': must be one of auto, python, comp"):
+        simulate(grasp, stop=1e-3, engine="complied")  # type: ignore[arg-type]
+
+
+class Blocks(MemoryListener):
+    """Remembers how many rows came at once."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.sizes: list[int] = []
+
+    def block(self, steps: Any, rows: Any) -> None:
+        self.sizes.append(len(steps))
+        super().block(steps, rows)
+
+
+def test_rows_of_single_steps_are_handed_on_together(
+    grasp: System, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(master, "LONG", math.inf)
+    blocks = Blocks()
+    with simulate.session(grasp, stop=0.1, listeners=[blocks]) as session:
+        for _ in range(80):
+            session.step()
+        assert blocks.sizes == [1, 32, 32]
+        assert len(session.result().time) == 81
+        session.step(2000)
+        assert session.complete
+    assert blocks.sizes == [1, 32, 32, 16, 920]
+    assert np.array_equal(blocks.signals["plant.gap[1]"], simulate(grasp, stop=0.1)["plant.gap[1]"])
+
+
+def test_rows_that_wait_are_handed_on_after_a_while(
+    grasp: System, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(master, "LONG", 0.0)
+    blocks = Blocks()
+    with simulate.session(grasp, stop=0.1, listeners=[blocks]) as session:
+        for _ in range(3):
+            session.step()
+    assert blocks.sizes == [1, 1, 1, 1]
+
+
+@engines
+def test_a_value_that_is_not_finite_is_found_in_its_step(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, engine: Engine
+) -> None:
+    """Also where it has gone again at the end of the call."""
+    monkeypatch.setattr(master, "LONG", math.inf)
+    mock = Mock(tmp_path, "a", lambda u, t: math.inf if 0.45 < t < 0.65 else t)
+    monkeypatch.setattr("grasp_cosim.master.simulation.load", lambda component: mock)
+    with simulate.session(make_system([mock], [], 10), engine=engine) as session:
+        for _ in range(3):
+            session.step()
+        with pytest.raises(
+            SimulationError, match=r"^a\.y = inf at step 5: must be finite"
+        ) as error:
+            session.step(5)
+        assert error.value.result is not None
+        assert len(error.value.result.time) == 6
+
+
+def test_a_listener_that_fails_at_a_look_breaks_the_session(
+    grasp: System, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(master, "LONG", math.inf)
+
+    class Full(Blocks):
+        def block(self, steps: Any, rows: Any) -> None:
+            if len(self.sizes):
+                raise SimulationError("full")
+            super().block(steps, rows)
+
+    with simulate.session(grasp, stop=0.1, listeners=[Full()]) as session:
+        session.step()
+        with pytest.raises(SimulationError, match=r"^full$") as error:
+            session.result()
+        assert error.value.result is not None
+        assert len(error.value.result.time) == 2
+        with pytest.raises(InputError, match="broken off by a failure"):
+            session.step()
+
+
+def test_a_setting_is_checked_each_time(grasp: System) -> None:
+    with simulate.session(grasp, stop=0.1) as session:
+        session.set("sensor_1.reflectance", 0.5)
+        session.set("sensor_1.reflectance", 0.25)
+        with pytest.raises(InputError, match=r"^set: sensor_1\.reflectance: reflectance = 'dark'"):
+            session.set("sensor_1.reflectance", "dark")
+        for _ in range(2):
+            with pytest.raises(InputError, match=r"^set: sensor_1\.gain: is a fixed parameter"):
+                session.set("sensor_1.gain", 1.0)
+        assert len(session.result().log) == 2

@@ -1,0 +1,275 @@
+"""Vendor FMUs in a system file: names, units, types, and what is refused, and how."""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+from grasp_cosim import InputError, System, simulate
+from grasp_cosim.interface.interface import limits, read_interface
+from grasp_cosim.system.checks import connection_transform, remarks
+from support.native_fmus import TYPES, build, needs_gcc
+
+pytestmark = needs_gcc
+STARTS = {"Boolean": "false", "String": "''", "Enumeration": "1"}
+
+
+def pair(
+    folder: Path,
+    connection: str,
+    units: tuple[Mapping[str, str], Mapping[str, str]] = ({}, {}),
+    versions: tuple[str, str] = ("3.0", "3.0"),
+    first: str = "",
+    given: str = "",
+    without: str = "",
+) -> System:
+    """Two native FMUs, a and b, with one connection.
+
+    first is more of a's table, given of its values; the inputs named in without get no value.
+    """
+    tables = ""
+    for name, version, declared in zip("ab", versions, units, strict=True):
+        build(folder, name, version, declared)
+        inputs = [f"u_{t}" for t in TYPES[version] if name == "a" or f"b.u_{t}" not in connection]
+        own = given if name == "a" else ""
+        starts = [f"{n} = {STARTS.get(n[2:], '0')}" for n in inputs if n not in (own + without)]
+        values = ", ".join([*starts, own] if own else starts)
+        tables += f'[components.{name}]\nfmu = "{name}.fmu"\nvalues = {{ {values} }}\n'
+        tables += first if name == "a" else ""
+    path = folder / "pair.toml"
+    path.write_text(
+        f"connections = [{connection}]\n[experiment]\nstep = 0.1\nstop = 1.0\n{tables}", "utf-8"
+    )
+    return System.load(path)
+
+
+def connected(source: str, target: str) -> str:
+    return f'"a.y_{source} -> b.u_{target}"'
+
+
+def test_the_interface_of_fmi_3(tmp_path: Path) -> None:
+    found = read_interface(build(tmp_path, units={"x": "m"}))
+    assert (found.version, found.guid, found.identifier) == ("3.0", "{native}", "native")
+    assert (found.can_vary_step, found.can_save_state, found.early_return) == (True, False, False)
+    by_type = {fmi_type: found.by_name[f"y_{fmi_type}"] for fmi_type in TYPES["3.0"]}
+    assert {v.type for v in by_type.values()} == set(TYPES["3.0"])
+    kinds = {"Float64": "Real", "Float32": "Real", "Boolean": "Boolean", "String": "String"}
+    assert {t: v.kind for t, v in by_type.items()} == {
+        t: kinds.get(t, "Integer") for t in TYPES["3.0"]
+    }
+    assert by_type["Int8"].dependencies == by_type["Int8"].initial_dependencies == ("u_Int8",)
+    assert found.by_name["x"].dependencies == ()
+    assert found.by_name["x"].unit == "m"
+    assert found.by_name["y_array"].shape == (3,)
+    assert found.by_name["y_array"].dependencies is None
+    assert found.by_name["gain"].variability == "tunable"
+    assert found.units["mm"].factor == 0.001
+    assert "bare" not in found.units
+
+
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_limits_are_those_of_numpy(version: str) -> None:
+    types = {"Enumeration": "Int32" if version == "2.0" else "Int64", "Integer": "Int32"}
+    for fmi_type in TYPES[version]:
+        if "Int" in fmi_type or fmi_type == "Enumeration":
+            info = np.iinfo(types.get(fmi_type, fmi_type).lower())
+            assert limits(fmi_type, version) == (info.min, info.max)
+    assert limits("Float32", "3.0")[1] == float(np.finfo(np.float32).max)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "fits"),
+    [
+        ("u_Int8", 127, True), ("u_Int8", 128, False), ("u_UInt8", -1, False),
+        ("u_UInt64", 2**64 - 1, True), ("u_UInt64", 2**64, False), ("u_UInt64", "7.0", True),
+        ("u_Int64", 2**53 + 1, True), ("u_Int64", -(2**63) - 1, False), ("u_Int32", 1.5, False),
+        ("u_Int16", "x", False), ("u_Float32", 3.4e38, True), ("u_Float32", 3.5e38, False),
+        ("u_Boolean", 1, False), ("u_String", 1, False), ("u_Enumeration", True, False),
+    ],
+)  # fmt: skip
+def test_values_must_fit_their_type(
+    tmp_path: Path, name: str, value: float | str, fits: bool
+) -> None:
+    interface = read_interface(build(tmp_path))
+    if fits:
+        assert interface.parse("here", name, value, text=True) == (7 if value == "7.0" else value)
+    else:
+        with pytest.raises(InputError, match=f"^here: {name} = .*: must be "):
+            interface.parse("here", name, value, text=True)
+
+
+def test_large_integers_are_exact(tmp_path: Path) -> None:
+    interface = read_interface(build(tmp_path))
+    assert interface.parse("here", "u_Int64", str(2**53 + 1), text=True) == 2**53 + 1
+
+
+@pytest.mark.parametrize(
+    ("source", "target", "expected"),
+    [
+        ("mm", "m", (0.001, 0.0)), ("m", "mm", (1000.0, 0.0)), ("degC", "K", (1.0, 273.15)),
+        ("m", "m", (1.0, 0.0)), ("odd", "odd", (1.0, 0.0)), (None, None, (1.0, 0.0)),
+        (None, "m", (1.0, 0.0)),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("versions", [("2.0", "3.0"), ("3.0", "2.0")])
+def test_units_are_converted_on_the_connection(
+    tmp_path: Path,
+    versions: tuple[str, str],
+    source: str | None,
+    target: str | None,
+    expected: tuple[float, float],
+) -> None:
+    ends = [next(iter(TYPES[version])) for version in versions]
+    units = (
+        {f"y_{ends[0]}": source} if source else {},
+        {f"u_{ends[1]}": target} if target else {},
+    )
+    system = pair(tmp_path, connected(*ends), units, versions, given=f"u_{ends[0]} = 2.0")
+    assert connection_transform(system, system.connections[0]) == pytest.approx(expected, rel=1e-15)
+    result = simulate(system)
+    factor, offset = expected
+    assert result[f"b.y_{ends[1]}"][-1] == pytest.approx(factor * 2.0 + offset, rel=1e-15)
+    unknown = f"a.y_{ends[0]} has no unit, taken to be in m"
+    assert (unknown in "; ".join(remarks(system))) is (source is None and target is not None)
+
+
+def test_a_declared_factor_overrides_the_units(tmp_path: Path) -> None:
+    connection = '{ from = "a.y_Float64", to = "b.u_Float64", factor = -2, offset = 0.5 }'
+    units = ({"y_Float64": "m"}, {"u_Float64": "N"})
+    result = simulate(pair(tmp_path, connection, units, given="u_Float64 = 3.0"))
+    assert result["b.y_Float64"][-1] == -5.5
+
+
+ALLOWED = [
+    *((t, t) for t in TYPES["3.0"]),
+    ("Int8", "Int64"), ("UInt8", "Int16"), ("UInt32", "Int64"), ("Int64", "Enumeration"),
+    ("Int64", "Float64"), ("UInt16", "Float32"), ("Float32", "Float64"), ("Float64", "Float32"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("source", "target"), ALLOWED)
+@pytest.mark.parametrize("engine", ["python", "auto"])
+def test_types_that_may_be_connected_pass_their_values(
+    tmp_path: Path, source: str, target: str, engine: str
+) -> None:
+    value = STARTS.get(source, "5")
+    value = {"false": "true", "''": "'text'"}.get(value, value)
+    system = pair(tmp_path, connected(source, target), given=f"u_{source} = {value}")
+    result = simulate(system, engine=engine)  # type: ignore[arg-type]
+    if source != "String":
+        assert result[f"b.y_{target}"].tolist() == [1.0 if source in STARTS else 5.0] * 11
+    rounded = (source, target) == ("Float64", "Float32")
+    assert ("rounded to 7 digits" in "; ".join(remarks(system))) is rounded
+
+
+REFUSED = [
+    (
+        connected("Int16", "Int8"),
+        "is Int16 and b.u_Int8 is Int8, which does not hold all its values",
+    ),
+    (connected("UInt8", "Int8"), "must be a type that holds 0 to 255"),
+    (connected("Int32", "UInt64"), "which does not hold all its values"),
+    (connected("Int32", "Float32"), "which does not hold all its values; must be Float64"),
+    (connected("Float64", "Int32"), "must be both Real, both Integer, both Boolean or both String"),
+    (connected("Boolean", "Int32"), "a.y_Boolean is Boolean and b.u_Int32 is Int32; must be both"),
+    (connected("String", "Float64"), "must be both Real"),
+    ('"a.y_array -> b.u_Float64"', "a.y_array is of type array of Float64, which is not supp"),
+    ('"a.y_clock -> b.u_Boolean"', "a.y_clock is of type Clock, which is not supported; must be"),
+    ('"a.y_Float64 -> b.u_Binary"', "b.u_Binary is of type Binary, which is not supported"),
+    ('{ from = "a.y_Int8", to = "b.u_Int8", factor = 2 }', "must be Real to be scaled"),
+    ('{ from = "a.x", to = "b.u_Float64", factor = 0 }', "factor = 0.0: must be a finite number"),
+    ('{ from = "a.x", to = "b.u_Float64", offset = nan }', "offset = nan: must be a finite"),
+    ('{ from = "a.x", to = "b.u_Float64", factor = true }', "factor = True: must be a number"),
+    ('{ from = "a.x", to = "b.u_Float64", gain = 2 }', "unknown entry 'gain'; valid: factor"),
+    ('{ from = "a.x" }', "to = None: must be 'component.variable'"),
+    ('{ from = "x", to = "b.u_Float64" }', "from = 'x': must be 'component.variable'"),
+]
+
+
+@pytest.mark.parametrize(("connection", "message"), REFUSED)
+def test_connections_that_are_refused(tmp_path: Path, connection: str, message: str) -> None:
+    with pytest.raises(InputError, match=rf"^pair.toml: connections\[0\].*{message}") as caught:
+        pair(tmp_path, connection)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("source", "target", "message"),
+    [
+        ("m", "N", "a.y_Float64 is in m and b.u_Float64 in N, which cannot be converted; must be"),
+        ("m", "yard", "which their FMUs do not define in SI units; { from = "),
+        ("bare", "m", "which their FMUs do not define in SI units; { from = "),
+    ],
+)
+def test_units_that_are_refused(tmp_path: Path, source: str, target: str, message: str) -> None:
+    units = ({"y_Float64": source}, {"u_Float64": target})
+    with pytest.raises(InputError, match=message) as caught:
+        pair(tmp_path, connected("Float64", "Float64"), units)
+    assert f"gives the factor from {source} to {target}" in str(caught.value)
+
+
+def test_a_rename_table_gives_the_systems_names(tmp_path: Path) -> None:
+    table = 'rename = { u_force = "u_Float64", "gap[1]" = "x", k = "gain" }\n'
+    values = "u_force = 2.0, k = 3.0"
+    text = '"a.gap[1] -> b.u_Float64"'
+    with pytest.raises(InputError, match="has no input or parameter 'u_Float64'; valid: u_force"):
+        pair(tmp_path, text, first=table, given=values)
+    system = pair(tmp_path, text, first=table, given=values, without="u_Float64")
+    result = simulate(system)
+    assert result["a.gap[1]"][-1] == pytest.approx(6.0, rel=1e-13)
+    assert "a.x" not in result
+    declared = system.component("a", "test").interface.by_name["y_Float64"]
+    assert declared.dependencies == ("u_force",)
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ('rename = { gap = "Gap" }', "'gap' = 'Gap': a.fmu has no variable 'Gap'; valid: u_Float"),
+        ('rename = { gap = "x", hole = "x" }', "'hole' = 'x': 'x' is renamed to 'gap' already"),
+        ('rename = { now = "x" }', "'now' = 'x': a.fmu has a variable 'now' itself; must be a"),
+        ("rename = { gap = 1 }", "'gap' = 1: must be a variable of the FMU, a string"),
+        ("rename = 'x'", "rename"),
+        ('isolation = "thread"', "isolation = 'thread': must be one of none, process"),
+        ("step = 0.15", r"a: step = 0.15 s is no whole multiple of the base step 0.1 s"),
+        ("step = true", "step = True s: must be a number"),
+    ],
+)
+def test_component_entries_that_are_refused(tmp_path: Path, table: str, message: str) -> None:
+    with pytest.raises(InputError, match=message) as caught:
+        pair(tmp_path, connected("Float64", "Float64"), first=f"{table}\n")
+    assert "\n" not in str(caught.value)
+
+
+def test_what_cannot_be_set_is_named(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="u_Binary is of type Binary, which cannot be set; must"):
+        pair(tmp_path, connected("Float64", "Float64"), given="u_Binary = '00'")
+
+
+def test_what_is_left_alone_is_named(tmp_path: Path) -> None:
+    lines = remarks(pair(tmp_path, connected("Float64", "Float64")))
+    assert "a.u_Binary is of type Binary: keeps its start value" in lines
+    assert "b.y_array is of type array of Float64: not recorded" in lines
+    assert "b.y_clock is of type Clock: not recorded" in lines
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "message"),
+    [
+        ("<CoSimulation ", "<ModelExchange ", "for model exchange only; must be a co-simulation"),
+        ('fmiVersion="3.0"', 'fmiVersion="4.0"', "not a readable FMU: Unsupported FMI version"),
+        ('factor="0.001"', 'factor="0"', "not a readable FMU: unit 'mm': factor = 0"),
+        ('m="1"', 'm="one"', "not a readable FMU: invalid literal"),
+    ],
+)
+def test_fmus_that_are_refused(tmp_path: Path, before: str, after: str, message: str) -> None:
+    import zipfile
+
+    with zipfile.ZipFile(build(tmp_path)) as archive:
+        xml = archive.read("modelDescription.xml").decode()
+    assert before in xml
+    with zipfile.ZipFile(tmp_path / "other.fmu", "w") as archive:
+        archive.writestr("modelDescription.xml", xml.replace(before, after))
+    with pytest.raises(InputError, match=re.escape(message)):
+        read_interface(tmp_path / "other.fmu")

@@ -1,0 +1,273 @@
+"""Sliding and sticking: analytic, exact at the stop, and without chatter."""
+
+from itertools import pairwise
+from math import exp, log, sqrt
+from typing import Any
+
+import numpy as np
+import pytest
+from gripper_plant import contact, fingers, friction, rigid
+from gripper_plant.fingers import Actuator, Inputs
+from gripper_plant.friction import Law, Params, move, resistance
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+from support.declared import Parameter, parameters
+
+QUICK = settings(deadline=None, derandomize=True, max_examples=100)
+
+STRIBECK: Law = (0.4, 0.7, 2.0, 0.02)
+MASSES = st.floats(0.01, 100.0)
+SPEEDS = st.floats(-1.0, 1.0)
+STEPS = st.floats(1e-5, 5e-3)
+
+
+def run(x: float, v: float, m: float, f: float, law: Law, d: float, n: int) -> tuple[float, float]:
+    for _ in range(n):
+        x, v = move(x, v, m, f, law, d)
+    return x, v
+
+
+@pytest.mark.parametrize("n", [1, 3, 100])
+def test_a_sliding_block_stops_after_its_stopping_distance(n: int) -> None:
+    """v^2 / (2·mu·g), in whatever steps, and then it is at rest."""
+    mu, g, v, m = 0.3, 9.80665, 0.8, 0.05
+    law = (mu * m * g, mu * m * g, 0.0, 1.0)
+    x, rate = run(0.1, v, m, 0.0, law, 0.5 / n, n)
+    assert x == pytest.approx(0.1 + v**2 / (2.0 * mu * g), rel=1e-12)
+    assert rate == 0.0
+
+
+def test_a_block_that_is_pushed_back_stops_turns_and_goes() -> None:
+    """Both ways on the analytic parabolas, though the stop is within the step."""
+    m, v, f, mu = 2.0, 0.5, -9.0, 4.0
+    law = (mu, mu, 0.0, 1.0)
+    x, rate = move(0.0, v, m, f, law, 0.3)
+    stop = v / ((mu - f) / m)
+    back = (f + mu) / m
+    assert x == pytest.approx(0.5 * v * stop + 0.5 * back * (0.3 - stop) ** 2, rel=1e-12)
+    assert rate == pytest.approx(back * (0.3 - stop), rel=1e-12)
+
+
+@QUICK
+@given(MASSES, st.floats(-0.7, 0.7), STEPS)
+def test_at_rest_below_breakaway_nothing_moves_at_all(m: float, f: float, d: float) -> None:
+    assert run(0.123, 0.0, m, f, STRIBECK, d, 10) == (0.123, 0.0)
+
+
+@QUICK
+@given(MASSES, st.floats(0.7001, 50.0), st.sampled_from([-1.0, 1.0]), STEPS)
+def test_above_breakaway_it_goes_the_way_of_the_force(
+    m: float, f: float, way: float, d: float
+) -> None:
+    x, v = move(0.0, 0.0, m, way * f, STRIBECK, d)
+    assert way * x > 0.0
+    assert way * v > 0.0
+
+
+def test_breakaway_is_at_the_static_force_under_a_slow_ramp() -> None:
+    """And then the Stribeck curve lets it run away from where it stuck."""
+    x, v, moved = 0.0, 0.0, 0.0
+    for k in range(20_000):
+        f = 1e-4 * k
+        x, v = move(x, v, 0.5, f, STRIBECK, 1e-3)
+        if v != 0.0 and moved == 0.0:
+            moved = f
+    assert moved == pytest.approx(0.7, abs=1.1e-4)
+    assert x > 0.0
+
+
+@QUICK
+@given(MASSES, SPEEDS, st.floats(-5.0, 5.0), STEPS)
+def test_friction_never_gives_energy(m: float, v: float, f: float, d: float) -> None:
+    x, rate = move(0.0, v, m, f, STRIBECK, d)
+    gained = 0.5 * m * (rate**2 - v**2) - f * x
+    assert gained <= 1e-12 * (0.5 * m * (rate**2 + v**2) + abs(f * x))
+
+
+@QUICK
+@given(MASSES, SPEEDS, st.floats(-5.0, 5.0), STEPS)
+def test_left_is_as_right(m: float, v: float, f: float, d: float) -> None:
+    x, rate = move(0.1, v, m, f, STRIBECK, d)
+    y, mirrored = move(-0.1, -v, m, -f, STRIBECK, d)
+    assert (y, mirrored) == (-x, -rate)
+
+
+def test_there_is_no_chatter_about_a_stop() -> None:
+    """Slowed down under a force that cannot move it, the velocity falls to zero and stays."""
+    x, v = 0.0, 0.05
+    speeds = []
+    for _ in range(300):
+        x, v = move(x, v, 0.5, -0.3, STRIBECK, 1e-3)
+        speeds.append(v)
+    stopped = speeds.index(0.0)
+    assert 10 < stopped < 200
+    assert all(later < before for before, later in pairwise(speeds[:stopped]))
+    assert set(speeds[stopped:]) == {0.0}
+
+
+def test_viscous_friction_alone_is_an_exponential() -> None:
+    m, b, v, t = 0.5, 2.0, 0.3, 0.4
+    x, rate = run(0.0, v, m, 0.0, (0.0, 0.0, b, 1.0), t / 4000, 4000)
+    assert rate == pytest.approx(v * exp(-b * t / m), rel=1e-6)
+    assert x == pytest.approx(v * m / b * (1.0 - exp(-b * t / m)), rel=1e-6)
+
+
+def test_coulomb_and_viscous_friction_stop_at_a_finite_time() -> None:
+    """t = m/b·ln(1 + b·v/F_C)."""
+    m, b, v, coulomb = 0.5, 2.0, 0.3, 0.1
+    stop = m / b * log(1.0 + b * v / coulomb)
+    law, d = (coulomb, coulomb, b, 1.0), stop / 2000.5
+    _, before = run(0.0, v, m, 0.0, law, d, 1998)
+    _, after = run(0.0, v, m, 0.0, law, d, 2003)
+    assert before > 0.0
+    assert after == 0.0
+
+
+def test_the_stribeck_curve() -> None:
+    assert resistance(STRIBECK, 0.0) == 0.7
+    assert resistance(STRIBECK, 0.02) == pytest.approx(0.4 + 0.3 / exp(1.0) + 0.04)
+    assert resistance(STRIBECK, 1.0) == pytest.approx(2.4)
+
+
+def test_the_order_of_convergence() -> None:
+    """Second, on the whole Stribeck curve: half the step, a quarter of the error."""
+    m, f, v, t = 0.5, -0.2, 0.08, 0.035
+    motion = solve_ivp(
+        lambda _, z: [z[1], (f - resistance(STRIBECK, z[1])) / m],
+        (0.0, t), (0.0, v), method="DOP853", rtol=1e-12, atol=1e-14,
+    )  # fmt: skip
+    assert motion.y[1, -1] > 0.0  # it still slides
+    steps = [40, 80, 160, 320]
+    errors = [
+        np.hypot(*(np.array(run(0.0, v, m, f, STRIBECK, t / n, n)) - motion.y[:, -1]))
+        for n in steps
+    ]
+    order, _ = np.polyfit(np.log(steps), -np.log(errors), 1)
+    assert order == pytest.approx(2.0, abs=0.1)
+
+
+# ---------------------------------------------------------------------------- the fingers
+
+
+def gripper(**values: Any) -> rigid.Params:
+    return rigid.Params(friction=Params(**values))
+
+
+def after(p: rigid.Params, x: rigid.State, force: fingers.Pair, h: float, n: int) -> rigid.State:
+    for _ in range(n):
+        x = rigid.step(p, x, Inputs(force), h)
+    return x
+
+
+def test_a_finger_sticks_until_its_own_breakaway_force() -> None:
+    p = gripper(static=(0.5, 0.2))
+    start = rigid.initial_state(p, Inputs())
+    assert after(p, start, (-0.5, 0.2), 1e-3, 50) == start
+    x = after(p, start, (-0.4, 0.21), 1e-3, 50)
+    assert x.velocity[0] == 0.0
+    assert x.velocity[1] > 0.0
+
+
+def test_a_static_force_below_coulombs_counts_as_that() -> None:
+    p = gripper(coulomb=(0.5, 0.5), static=(0.1, 0.9))
+    assert friction.laws(p.friction) == ((0.5, 0.5, 0.0, 0.01), (0.5, 0.9, 0.0, 0.01))
+
+
+@pytest.mark.parametrize("h", [1e-4, 1e-3, 5e-3])
+def test_a_pressed_finger_with_friction_comes_to_rest_exactly(h: float) -> None:
+    """In contact, and what the object bears is within the breakaway force of what is pressed."""
+    p = gripper(coulomb=(0.1, 0.1), static=(0.15, 0.15), viscous=(1.0, 1.0))
+    x = after(p, rigid.initial_state(p, Inputs()), (-3.0, 3.0), h, round(0.8 / h))
+    y = rigid.outputs(p, x, Inputs((-3.0, 3.0)))
+    assert y.velocity == (0.0, 0.0)
+    assert y.contact == (True, True)
+    assert np.abs(y.contact_force) == pytest.approx([3.0, 3.0], abs=0.15)
+    assert np.abs(y.gap) == pytest.approx([0.0, 0.0], abs=0.15 / (0.5 * 200.0**2))
+    assert after(p, x, (-3.0, 3.0), h, 10) == x
+
+
+def test_the_moment_of_contact_with_friction() -> None:
+    """It gathers speed under what friction leaves of the force, and meets the object on time."""
+    p = gripper(coulomb=(0.4, 0.4))
+    a, way = (1.0 - 0.4) / 0.5, 0.11 - 0.065
+    arrival = sqrt(2.0 * way / a)
+    h = 1e-4
+    x = after(p, rigid.initial_state(p, Inputs()), (-1.0, 0.0), h, int(arrival / h))
+    assert x.contact_force[0] == 0.0
+    x = after(p, x, (-1.0, 0.0), h, 1)
+    assert x.contact_force[0] > 0.0
+    rest = (int(arrival / h) + 1) * h - arrival
+    assert x.position[0] - 0.065 == pytest.approx(-a * arrival * rest, rel=0.1)
+
+
+@QUICK
+@given(
+    st.tuples(st.floats(-8.0, 8.0), st.floats(-8.0, 8.0)),
+    st.tuples(SPEEDS, SPEEDS),
+    st.floats(-1e-4, 1e-3),
+    STEPS,
+)
+def test_contact_beside_friction_pushes_only_and_gives_no_energy(
+    force: fingers.Pair, velocity: fingers.Pair, gap: float, h: float
+) -> None:
+    """With m·beta^2·depth^2/2 counted as stored."""
+    p = gripper(coulomb=(0.4, 0.2), static=(0.7, 0.2), viscous=(0.0, 3.0))
+    x = rigid.State((0.065 + gap, -0.005 - gap), velocity, (0.0, 0.0))
+    for _ in range(8):
+        before, x = x, rigid.step(p, x, Inputs(force), h)
+        y = rigid.outputs(p, x, Inputs(force))
+        assert y.contact_force[0] >= 0.0 >= y.contact_force[1]
+        assert y.contact[0] or y.contact_force[0] == 0.0
+        for j in (0, 1):
+            work = max(0.0, force[j] * (x.position[j] - before.position[j]))
+            gained = stored(p, x, j) - stored(p, before, j)
+            assert gained <= work + 1e-12
+
+
+def stored(p: rigid.Params, x: rigid.State, j: int) -> float:
+    gap = rigid.outputs(p, x, Inputs()).gap[j]
+    m = p.finger_mass[j]
+    return 0.5 * m * (x.velocity[j] ** 2 + (p.baumgarte_beta * min(gap, 0.0)) ** 2)
+
+
+def test_without_friction_the_fingers_are_those_of_the_contact_alone() -> None:
+    """Bit for bit, from flight into rest."""
+    p, h = rigid.Params(), 1e-3
+    assert not any(map(friction.acts, (*friction.laws(p.friction), friction.NONE)))
+    x = rigid.initial_state(p, Inputs())
+    finger = (0.11, 0.0, 0.0)
+    for _ in range(400):
+        s, v, _ = finger
+        finger = contact.advance(s, v, 0.065, 0.5, -2.0, 200.0, 200.0, h)
+        x = rigid.step(p, x, Inputs((-2.0, 0.0)), h)
+        assert (x.position[0], x.velocity[0], x.contact_force[0]) == finger
+    assert finger[2] > 0.0
+
+
+# ------------------------------------------------------------------------------ the actuator
+
+
+def test_the_actuator_gives_no_more_than_its_limit() -> None:
+    p = rigid.Params(actuator=Actuator((2.0, 0.5)))
+    assert fingers.forces(p.actuator, Inputs((-3.0, 0.4))) == (-2.0, 0.4)
+    assert fingers.forces(p.actuator, Inputs((1.9, 0.6))) == (1.9, 0.5)
+    assert fingers.forces(Actuator((0.0, 1.0)), Inputs((-1e9, 1e9))) == (-1e9, 1.0)
+    start = rigid.initial_state(p, Inputs())
+    limited = after(p, start, (-3.0, 3.0), 1e-3, 400)
+    assert limited == after(p, start, (-2.0, 0.5), 1e-3, 400)
+
+
+@pytest.mark.parametrize("parameter", parameters(Params), ids=lambda p: p.name)
+def test_a_value_outside_its_range_is_refused(parameter: Parameter) -> None:
+    for number, value in parameter.invalid():
+        with pytest.raises(ValueError, match=r".+") as caught:
+            Params(**{parameter.name: value})
+        text = str(caught.value)
+        assert text.startswith(f"friction.{parameter.name} = {number!r} {parameter.unit}: ")
+        assert text.endswith(f"must be from {parameter.low:g} to {parameter.high:g}")
+
+
+def test_a_force_limit_below_zero_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"^actuator.force_limit = -1.0 N: must be from 0 to 1e"):
+        Actuator((-1.0, 1.0))

@@ -1,0 +1,107 @@
+"""The figure of a paced run's timing, however the run went: one must always come out."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from grasp_cosim.realtime.timing import Overrun, Timing
+from grasp_cosim.report import timing as drawn
+from grasp_cosim.report.plot import RED
+from grasp_cosim.report.timing import COLORS, draw_timing
+from grasp_cosim.report.timing_curves import looks
+from matplotlib.colors import same_color
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from report.timings import PERIOD, paced
+
+
+def figure_of(timing: Timing, monkeypatch: pytest.MonkeyPatch) -> Figure:
+    """What would be saved of a run of 3 s."""
+    figures: list[Figure] = []
+    monkeypatch.setattr(drawn, "save", lambda figure, path: figures.append(figure))
+    draw_timing(timing, 3.0, Path())
+    return figures[0]
+
+
+def points(line: Line2D) -> list[list[float]]:
+    """The points of a line."""
+    x, y = (np.asarray(data, float).tolist() for data in line.get_data())
+    return [list(point) for point in zip(x, y, strict=True)]
+
+
+def broken_off() -> Timing:
+    """Of a run that was interrupted in its first step."""
+    return replace(paced(steps=10, hiccups=0), steps=0, parts={}, histograms={})
+
+
+@pytest.mark.parametrize(
+    "timing",
+    [
+        paced(steps=3000, hiccups=0),
+        paced(steps=3000, hiccups=300, listed=100),
+        paced(steps=3000, components={rf"_$\no_formula_{k}$": 1e-6 for k in range(20)}),
+        broken_off(),
+    ],
+    ids=["none", "unlisted", "many", "nothing"],
+)
+def test_any_timing_can_be_drawn(timing: Timing, tmp_path: Path) -> None:
+    draw_timing(timing, 3.0, tmp_path / "timing.png")
+    assert [p.name for p in tmp_path.iterdir()] == ["timing.png"]
+    head = (tmp_path / "timing.png").read_bytes()[:24]
+    assert head.startswith(b"\x89PNG")
+    assert int.from_bytes(head[16:20]) == 1560
+
+
+def test_every_part_has_a_curve_and_the_period_is_a_red_line(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    timing = paced(steps=3000)
+    above = figure_of(timing, monkeypatch).axes[0]
+    lines = {str(line.get_label()): line for line in above.lines}
+    for part, spread in timing.parts.items():
+        assert same_color(lines[part].get_color(), COLORS[looks(timing)[part].color])
+        assert points(lines[part])[-1] == [spread.worst, 1.0 / timing.steps]
+    limits = [line for line in above.lines if same_color(line.get_color(), RED)]
+    assert [points(line) for line in limits] == [[[PERIOD, 0.0], [PERIOD, 1.0]]]
+    assert above.get_xlim()[1] > PERIOD
+
+
+def test_the_legend_is_a_table_of_the_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    timing = paced(steps=3000)
+    legend = figure_of(timing, monkeypatch).axes[0].get_legend()
+    assert legend is not None
+    assert legend.get_title().get_text().split() == ["median", "p99", "p99.9", "worst"]
+    rows = [text.get_text() for text in legend.get_texts()]
+    assert len(rows) == len(timing.parts)
+    assert rows[0].startswith("whole step")
+    assert len({len(row) for row in rows}) == 1
+
+
+def test_overruns_are_in_the_colours_of_their_culprits(monkeypatch: pytest.MonkeyPatch) -> None:
+    moments = {"plant": (0.5, 3e-4), "start": (1.5, 2e-3), "backlog": (2.5, 1e-3)}
+    timing = replace(
+        paced(steps=3000, hiccups=0),
+        overruns=5,
+        culprits={"plant": 3, "start": 1, "backlog": 1},
+        listed=tuple(Overrun(0, t, late, name, late) for name, (t, late) in moments.items()),
+    )
+    below = figure_of(timing, monkeypatch).axes[1]
+    lines = {str(line.get_label()): line for line in below.lines}
+    assert list(lines) == ["3 × plant", "1 × late start", "1 × backlog"]
+    for line, name in zip(lines.values(), moments, strict=True):
+        assert points(line) == [list(moments[name])]
+        assert same_color(line.get_color(), COLORS[looks(timing)[name].color])
+    assert below.get_xlim() == (0.0, 3.0)
+    assert below.get_title(loc="right") == "grey: 2 more, counted only"
+
+
+def test_without_overruns_it_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    below = figure_of(paced(steps=3000, hiccups=0), monkeypatch).axes[1]
+    assert [text.get_text() for text in below.texts] == ["no overruns"]
+
+
+def test_the_same_timing_gives_the_same_bytes(tmp_path: Path) -> None:
+    for name in ("one.png", "two.png"):
+        draw_timing(paced(steps=3000), 3.0, tmp_path / name)
+    assert (tmp_path / "one.png").read_bytes() == (tmp_path / "two.png").read_bytes()

@@ -1,0 +1,143 @@
+"""The section on the timing of a paced run: what it says, and that names stay text."""
+
+import re
+from dataclasses import replace
+
+import pytest
+from grasp_cosim.realtime.timing import Overrun, Spread
+from grasp_cosim.report.page import page_html
+from grasp_cosim.report.timing_html import timing_html
+from report.runs import grasp_run, ring_run
+from report.test_page import Elements
+from report.timings import paced
+
+
+def rows(html: str) -> list[list[str]]:
+    """The texts of the cells of all rows of tables."""
+    return [
+        [re.sub(r"<[^>]*>", "", cell) for cell in re.findall(r"<td[^>]*>(.*?)</td>", row)]
+        for row in re.findall(r"<tr>(.*?)</tr>", html)
+    ]
+
+
+def test_only_a_paced_run_has_the_section() -> None:
+    run = grasp_run()
+    plain, timed = (Elements(page_html(r, "r")) for r in (run, replace(run, timing=paced())))
+    assert "timing" not in plain.ids()
+    assert "Real time" not in plain.visible
+    assert timed.ids().count("timing") == 1
+    assert ("a", {"href": "#timing"}) in timed.found
+
+
+def test_the_entry_of_the_timing_is_no_metric() -> None:
+    run = ring_run(["a"])
+    timing = paced(steps=50)
+    timed = replace(run, timing=timing, settings={**run.settings, "realtime": timing.as_dict()})
+    assert "There are no metrics" in Elements(page_html(timed, "r")).visible
+
+
+def test_a_row_for_each_part_with_the_worst_beyond_the_period_marked() -> None:
+    timing = paced(steps=3000, hiccups=0)
+    plant = Spread(24.04e-6, 31e-6, 90e-6, 1.2345678e-3, 0.125)
+    late = Overrun(125, 0.125, 3e-4, "plant", 1.2345678e-3)
+    timing = replace(
+        timing,
+        parts={**timing.parts, "plant": plant},
+        overruns=1,
+        listed=(late,),
+        culprits={"plant": 1},
+    )
+    html = timing_html(timing, 3.0)
+    thin = "\N{NARROW NO-BREAK SPACE}"
+    assert ["plant", "24.0", "31.0", "90.0", f"1{thin}234.6", "0.125", "1"] in rows(html)
+    assert [row[0] for row in rows(html) if len(row) == 7] == [
+        "whole step", "late start", "plant", "sensor_1", "sensor_2", "controller", "exchange",
+        "recording", "between steps",
+    ]  # fmt: skip
+    assert re.findall(r'<td class="n warn">([^<]*)</td>', html) == [f"1{thin}234.6"]
+    assert ["0.125", "125", "300.0", "plant", f"1{thin}234.6"] in rows(html)
+    assert "The overrun</summary>" in html
+
+
+def test_a_culprit_that_is_no_part_has_a_row_too() -> None:
+    late = Overrun(125, 0.125, 3e-4, "backlog", 2e-3)
+    timing = replace(
+        paced(steps=3000, hiccups=0), overruns=1, listed=(late,), culprits={"backlog": 1}
+    )
+    assert ["backlog", "", "", "", "", "", "1"] in rows(timing_html(timing, 3.0))
+
+
+@pytest.mark.parametrize(
+    ("hiccups", "listed", "title", "shown"),
+    [
+        (12, 1000, "All 12 overruns", 12),
+        (50, 1000, "All 50 overruns", 50),
+        (60, 1000, "The first 50 of 60 overruns", 50),
+        (70, 10, "The first 10 of 70 overruns", 10),
+    ],
+)
+def test_the_first_overruns_are_listed(hiccups: int, listed: int, title: str, shown: int) -> None:
+    timing = paced(steps=3000, hiccups=hiccups, listed=listed)
+    html = timing_html(timing, 3.0)
+    assert f"<summary>{title}</summary>" in html
+    assert len([row for row in rows(html) if len(row) == 5]) == shown
+    assert ("counted only" in html) == (listed < hiccups)
+
+
+def test_what_each_mark_of_a_late_step_stands_for_is_said() -> None:
+    """By its shape and colour, the most frequent first; of all its steps, listed or not."""
+    culprits = {"backlog": 4, "plant": 3, "start": 2, "between": 1, "recording": 1, "sensor_2": 1}
+    late = [Overrun(k, 0.1, 3e-4, name, 2e-3) for k, name in enumerate(culprits)][:5]
+    timing = replace(
+        paced(steps=3000, hiccups=0), overruns=12, listed=tuple(late), culprits=culprits
+    )
+    html = timing_html(timing, 3.0)
+    (key,) = re.findall(r'<ul class="marks">(.*?)</ul>', html)
+    assert re.findall(r'<li class="([^"]*)">([^<]*)</li>', key) == [
+        ("square lmuted dash2", "4 × backlog"), ("dot lc0 dash0", "3 × plant"),
+        ("ring link dash1", "2 × late start"), ("square link dash2", "1 × between steps"),
+        ("ring lmuted dash1", "1 × recording"),
+    ]  # fmt: skip
+    marks = re.findall(r'class="late ([^"]*)"><title>[^,]*, (.*?) took', html)
+    assert sorted(marks) == [
+        ("dot lc0 dash0", "plant"), ("ring link dash1", "late start"),
+        ("ring lmuted dash1", "recording"), ("square link dash2", "between steps"),
+        ("square lmuted dash2", "backlog"),
+    ]  # fmt: skip
+
+
+def test_without_overruns_there_is_no_list_and_no_chart_of_them() -> None:
+    html = timing_html(paced(steps=3000, hiccups=0), 3.0)
+    assert "<summary>" not in html
+    assert html.count("<figure>") == 1
+    assert 'class="warn"' not in html
+
+
+def test_pace_and_what_the_machine_granted_and_refused() -> None:
+    text = Elements(timing_html(paced(steps=3000), 3.0)).visible
+    for expected in (
+        "period1 ms",
+        "after an overruncatch-up",
+        "Granted by the machineSCHED_FIFO, priority 50",
+        "Refused by the machinememory not locked: RLIMIT_MEMLOCK is 65536 bytes",
+    ):
+        assert expected in text
+
+
+def test_a_run_that_was_broken_off_in_its_first_step() -> None:
+    timing = replace(paced(steps=10, hiccups=0), steps=0, parts={}, histograms={})
+    assert "All 0 steps" in Elements(timing_html(timing, 0.0)).visible
+
+
+def test_names_stay_text() -> None:
+    wicked = ["<b>", "</script><i>", "\"&'", "<!--"]
+    timing = replace(
+        paced(steps=3000, hiccups=60, components=dict.fromkeys(wicked, 1e-6)),
+        granted=("<u>",),
+        refused=("<s>",),
+    )
+    html = timing_html(timing, 3.0)
+    page = Elements(html)
+    assert not {tag for tag, _ in page.found} & {"b", "i", "u", "s", "script"}
+    for name in (*wicked, "<u>", "<s>"):
+        assert name in page.visible

@@ -1,0 +1,104 @@
+"""The proximity sensor, Eq. (9)."""
+
+from math import exp, isnan, log, nan
+
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from proximity_sensor import optics
+from proximity_sensor.optics import Inputs, Params, State
+from support.declared import Parameter, parameters
+
+PARAMETERS = parameters(Params)
+
+QUICK = settings(deadline=None, derandomize=True, max_examples=100)
+
+GAPS = st.floats(0.0, 10.0)
+
+SENSORS = st.builds(
+    Params,
+    reflectance=st.floats(1e-3, 10.0),
+    gain=st.floats(1e-6, 1e6),
+    diffusion_exponent=st.floats(0.1, 10.0),
+    offset_distance=st.floats(1e-6, 1.0),
+)
+
+
+def intensity(p: Params, gap: float) -> float:
+    return optics.outputs(p, State(), Inputs(gap)).intensity
+
+
+@QUICK
+@given(SENSORS, GAPS)
+def test_the_intensity_is_eq_9(p: Params, gap: float) -> None:
+    """The logarithm is at most 14 and n at most 10: the exponential costs 140 roundings."""
+    distance = gap + p.offset_distance
+    expected = exp(-p.diffusion_exponent * log(distance)) * p.gain * p.reflectance
+    assert intensity(p, gap) == pytest.approx(expected, rel=140 * 2.3e-16, abs=0.0)
+
+
+@pytest.mark.parametrize(
+    ("gap", "volts"), [(0.0, 1.066047005857), (0.005, 0.4801879325166), (0.045, 0.07536615422703)]
+)
+def test_the_published_sensor(gap: float, volts: float) -> None:
+    """0.0024 / (l + 0.005)^1.1506, worked out in decimal."""
+    assert intensity(Params(), gap) == pytest.approx(volts, rel=1e-11)
+
+
+@QUICK
+@given(SENSORS, GAPS, GAPS)
+def test_nearer_is_brighter(p: Params, a: float, b: float) -> None:
+    near, far = sorted((a, b))
+    assume(far + p.offset_distance > (near + p.offset_distance) * (1.0 + 1e-12))
+    assert intensity(p, near) > intensity(p, far) > 0.0
+
+
+@QUICK
+@given(GAPS, st.floats(0.01, 1.0), st.floats(1.0, 1e6))
+def test_the_intensity_is_proportional_to_reflectance_and_gain(
+    gap: float, reflectance: float, gain: float
+) -> None:
+    one = intensity(Params(reflectance=1.0, gain=1.0), gap)
+    dark = intensity(Params(reflectance=reflectance, gain=1.0), gap)
+    loud = intensity(Params(reflectance=1.0, gain=gain), gap)
+    assert dark == pytest.approx(reflectance * one, rel=1e-15, abs=0.0)
+    assert loud == pytest.approx(gain * one, rel=1e-15, abs=0.0)
+
+
+@pytest.mark.parametrize("change", [{"reflectance": 0.0}, {"gain": 0.0}])
+def test_a_surface_that_reflects_nothing_is_not_seen(change: dict[str, float]) -> None:
+    assert intensity(Params(**change), 0.0) == 0.0
+
+
+@QUICK
+@given(SENSORS, st.floats(-10.0, 0.0))
+def test_a_gap_below_zero_reads_as_zero(p: Params, gap: float) -> None:
+    assert intensity(p, gap) == intensity(p, 0.0)
+
+
+def test_a_gap_that_is_no_number_is_not_taken_for_contact() -> None:
+    assert isnan(intensity(Params(), nan))
+
+
+def test_the_optics_have_no_memory() -> None:
+    x = optics.initial_state(Params(), Inputs(0.1))
+    x = optics.step(Params(), x, Inputs(0.001), 1e-3)
+    assert optics.outputs(Params(), x, Inputs(0.1)).intensity == intensity(Params(), 0.1)
+
+
+@pytest.mark.parametrize("parameter", PARAMETERS, ids=lambda p: p.name)
+def test_every_range_is_enforced(parameter: Parameter) -> None:
+    for number, value in parameter.invalid():
+        with pytest.raises(ValueError, match=r"^\w+ = ") as caught:
+            Params(**{parameter.name: value})
+        assert str(caught.value) == (
+            f"{parameter.name} = {number!r} {parameter.unit}: "
+            f"must be from {parameter.low:g} to {parameter.high:g}"
+        )
+    for bound in (parameter.low, parameter.high):
+        assert getattr(Params(**{parameter.name: bound}), parameter.name) == bound
+
+
+def test_every_number_has_a_range() -> None:
+    names = {"reflectance", "gain", "diffusion_exponent", "offset_distance"}
+    assert {p.name for p in PARAMETERS} == names

@@ -1,0 +1,28 @@
+"""What the tests of all plants share: the gripper from behind, its parameters' ranges."""
+
+from math import inf
+from typing import Any
+
+import pytest
+from gripper_plant.fingers import Pair
+from support.declared import parameters
+
+
+def swapped(pair: Pair) -> Pair:
+    """What is on the right, seen from behind."""
+    first, second = pair
+    return -second, -first
+
+
+def assert_ranges_are_checked(part: type[Any], prefix: str = "", but: tuple[str, ...] = ()) -> None:
+    """Every number outside its range is refused by name; but names what depends on others."""
+    checked = [p for p in parameters(part) if p.name not in but]
+    assert checked
+    for parameter in checked:
+        assert -inf < parameter.low < parameter.high < inf
+        for number, value in parameter.invalid():
+            with pytest.raises(ValueError, match=r".+") as caught:
+                part(**{parameter.name: value})
+            text = str(caught.value)
+            assert text.startswith(f"{prefix}{parameter.name} = {number!r} {parameter.unit}: ")
+            assert text.endswith(f"must be from {parameter.low:g} to {parameter.high:g}")
