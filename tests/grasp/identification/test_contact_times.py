@@ -21,7 +21,7 @@ from grasp_cosim.grasp.identification.contact_times import (
 from grasp_cosim.grasp.identification.fit import Fit
 from grasp_cosim.grasp.identification.parameters import GROUPS, RATIO, chosen
 from grasp_cosim.grasp.published.tables import Setting
-from reference import continuous
+from support import continuous
 
 TRUE = {"plant.friction.viscous[1]": 25.0, "plant.friction.viscous[2]": 8.0}
 X_M = 0.02
