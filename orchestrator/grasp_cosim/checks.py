@@ -1,13 +1,75 @@
-"""What the readers of tables share: a table has known keys."""
+"""Checks of arguments and of entries of files, each with its one-line error.
 
+Every message is `PLACE = VALUE: must be ...`: where the value comes from, the value, what is valid.
+"""
+
+import math
+import tomllib
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 from .errors import InputError, choices
 
 
+def is_number(value: Any) -> bool:
+    """Return True if `value` is an int or a float; a bool is no number."""
+    return isinstance(value, float | int) and not isinstance(value, bool)
+
+
+def is_whole(value: Any) -> bool:
+    """Return True if `value` is an int; a bool is no number."""
+    return isinstance(value, int) and not isinstance(value, bool)
+
+
+def number(
+    place: str,
+    value: Any,
+    low: float = -math.inf,
+    high: float = math.inf,
+    *,
+    above: bool = False,
+    must: str = "a finite number",
+    unit: str = "",
+) -> float:
+    """Return `value`, a finite number from `low` to `high`, as a float.
+
+    With `above`, `low` itself is too low. `must` says what is valid, `unit` follows the value in
+    the message. InputError otherwise.
+    """
+    holds = is_number(value) and math.isfinite(value) and low <= value <= high
+    if not holds or (above and value == low):
+        raise InputError(f"{place} = {value!r}{unit and f' {unit}'}: must be {must}")
+    return float(value)
+
+
+def whole(
+    place: str,
+    value: Any,
+    low: float = -math.inf,
+    high: float = math.inf,
+    *,
+    must: str = "a whole number",
+) -> int:
+    """Return `value`, a whole number from `low` to `high`; `must` says what is valid.
+
+    InputError otherwise.
+    """
+    if not is_whole(value) or not low <= value <= high:
+        raise InputError(f"{place} = {value!r}: must be {must}")
+    return int(value)
+
+
+def choice(place: str, value: Any, valid: Iterable[Any]) -> Any:
+    """Return `value`, one of `valid`; InputError otherwise."""
+    listed = list(valid)
+    if isinstance(value, bool) or value not in listed:
+        raise InputError(f"{place} = {value!r}: must be one of {choices(listed)}")
+    return value
+
+
 def as_table(place: str, value: Any) -> dict[str, Any]:
-    """The value as a table; InputError where it is none."""
+    """Return `value`, a table of a TOML or JSON file; InputError where it is none."""
     if not isinstance(value, dict):
         found = "missing" if value is None else repr(value)
         raise InputError(f"{place}: {found}; must be a table")
@@ -15,7 +77,22 @@ def as_table(place: str, value: Any) -> dict[str, Any]:
 
 
 def check_keys(place: str, table: Mapping[str, Any], valid: Iterable[str]) -> None:
-    """InputError at the first key that is not a valid one."""
+    """InputError at the first key of `table` that is not one of `valid`."""
     for key in table:
         if key not in valid:
             raise InputError(f"{place}: unknown entry {key!r}; valid: {choices(sorted(valid))}")
+
+
+def toml_table(path: Path, what: str) -> dict[str, Any]:
+    """Return the content of a TOML file; `what` names it where there is none, "system file".
+
+    InputError where it is missing or not readable as TOML.
+    """
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+        repr(table)  # a hexadecimal number longer than Python writes is refused here
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such {what}") from None
+    except (OSError, ValueError, RecursionError) as error:
+        raise InputError(f"{path}: not readable as TOML: {error}") from error
+    return table
