@@ -15,7 +15,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from grasp_cosim import System, simulate
-from grasp_cosim.grasp.system import SYSTEM
+from grasp_cosim.grasp.presets import SYSTEM
 from grasp_fmus.build import build
 
 REPOSITORY = Path(__file__).parent.parent

@@ -14,7 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from grasp_cosim import System, simulate
-from grasp_cosim.grasp.system import SYSTEM
+from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.system.parts import Connection, Port
 from grasp_fmus.build import build
 

@@ -13,7 +13,7 @@ from multiprocessing import get_context
 from pathlib import Path
 
 from grasp_cosim import System
-from grasp_cosim.grasp.system import CASES, SYSTEM
+from grasp_cosim.grasp.presets import SYSTEM, with_case
 from grasp_cosim.sweep.design import Design
 from grasp_cosim.sweep.distributions import Uniform
 from grasp_cosim.sweep.study import Parameter, Study
@@ -62,7 +62,7 @@ def main() -> None:
     ratios, given_by_machine, walls = [], [], {1: 0.0, 2: 0.0}
     with tempfile.TemporaryDirectory(prefix="grasp_bench_") as name:
         build(Path(name, "fmus"))
-        system = System.load(SYSTEM, Path(name, "fmus")).with_values(CASES[2])
+        system = with_case(System.load(SYSTEM, Path(name, "fmus")), 2)
         system = system.with_experiment(step=given.step)
         print(f"{given.runs} grasps a round, step {given.step:g} s, {os.cpu_count()} processors\n")
         print("| round | 1 worker, s | 2 workers, s | times as fast | plain arithmetic | load |")

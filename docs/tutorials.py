@@ -21,25 +21,17 @@ import numpy as np
 from grasp_cosim import cli
 from grasp_cosim.files import write_text
 from grasp_cosim.grasp.metrics import CLOSING, FINGERS
-from grasp_cosim.recording.load import Run, load_run
-from grasp_cosim.report.plot import (
-    BLUE,
-    COLOR,
-    GREY,
-    RED,
-    draw_contact_forces,
-    draw_targets,
-    finish,
-    new_figure,
-    save,
-)
+from grasp_cosim.grasp.pictures import COLOR, draw_contact_forces, draw_targets
+from grasp_cosim.recording.load import load_run
+from grasp_cosim.recording.result import Result
+from grasp_cosim.report.plot import BLUE, GREY, RED, finish, new_figure, save
 
 HERE = Path(__file__).parent
 
-Runs = Mapping[str, Run]
+Runs = Mapping[str, Result]
 """The runs of a table by the values in its first column."""
 
-Do = Callable[[str], Run]
+Do = Callable[[str], Result]
 """What a command line recorded."""
 
 _TABLE = re.compile(r"```console\n\$ ((?:(?!```).)*)\n```\n\n((?:\|[^\n]*\n)+)", re.DOTALL)
@@ -90,9 +82,9 @@ class Recorder:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._runs: dict[str, Run] = {}
+        self._runs: dict[str, Result] = {}
 
-    def __call__(self, line: str) -> Run:
+    def __call__(self, line: str) -> Result:
         """The run of a line "grasp-cosim run ..."; SystemExit where it fails."""
         words = shlex.split(line)
         key = shlex.join(words)
@@ -109,11 +101,11 @@ class Recorder:
 # Columns
 
 
-def _pair(key: str, factor: float, digits: int) -> Callable[[Run], str]:
+def _pair(key: str, factor: float, digits: int) -> Callable[[Result], str]:
     return lambda run: " / ".join(_number(v, factor, digits) for v in run.settings[key])
 
 
-def _single(key: str, factor: float, digits: int) -> Callable[[Run], str]:
+def _single(key: str, factor: float, digits: int) -> Callable[[Result], str]:
     return lambda run: _number(run.settings[key], factor, digits)
 
 
@@ -122,40 +114,40 @@ def _number(value: float | None, factor: float, digits: int) -> str:
     return "none" if value is None else f"{round(factor * value, digits) + 0.0:.{digits}f}"
 
 
-def _largest(name: str, factor: float, digits: int) -> Callable[[Run], str]:
+def _largest(name: str, factor: float, digits: int) -> Callable[[Result], str]:
     return lambda run: _number(float(np.abs(run.signals[name]).max()), factor, digits)
 
 
-def _at_the_end(name: str) -> Callable[[Run], str]:
+def _at_the_end(name: str) -> Callable[[Result], str]:
     return lambda run: "yes" if run.signals[name][-1] else "no"
 
 
-def value(run: Run, name: str, otherwise: float) -> float:
+def value(run: Result, name: str, otherwise: float) -> float:
     """What a run set a variable to, or otherwise."""
     component, _, variable = name.partition(".")
     return float(run.settings["components"][component]["values"].get(variable, otherwise))
 
 
-def gap_behind(run: Run) -> float:
+def gap_behind(run: Result) -> float:
     """The gap of the second finger at the moment of the first contact, m."""
     times = run.settings["time_to_contact"]
     later = 1 + times.index(max(times))
     return float(np.interp(min(times), run.time, run.signals[f"plant.gap[{later}]"]))
 
 
-def drift(run: Run) -> float:
+def drift(run: Result) -> float:
     """The speed of the object over the last half second, m/s."""
     end = float(run.time[-1])
     x = np.interp([end - 0.5, end], run.time, run.signals["plant.object_position"])
     return float(x[1] - x[0]) / 0.5
 
 
-def gap_left(run: Run) -> float:
+def gap_left(run: Result) -> float:
     """The gap of finger 1 at the end, m."""
     return float(run.signals["plant.gap[1]"][-1])
 
 
-def gap_by_equation_9(run: Run) -> float:
+def gap_by_equation_9(run: Result) -> float:
     """The gap of the second finger at the first contact where both intensities are equal, m."""
     gain = value(run, "sensor_1.gain", 0.0024) / 0.0024
     return gap_at_equal_intensity(gain * value(run, "sensor_1.reflectance", 1.0))
@@ -166,7 +158,7 @@ def gap_at_equal_intensity(ratio: float) -> float:
     return 0.005 * math.pow(max(ratio, 1.0 / ratio), 1.0 / 1.1506) - 0.005
 
 
-def drift_by_equation_3(run: Run) -> float:
+def drift_by_equation_3(run: Result) -> float:
     """The speed at which the target stays ahead of the middle, as far as friction makes it, m/s."""
     ratio = value(run, "sensor_1.reflectance", 1.0)
     m_g = value(run, "plant.object_mass", 0.05) * 9.80665
@@ -175,19 +167,19 @@ def drift_by_equation_3(run: Run) -> float:
     return math.copysign(max(0.0, abs(f_s) - 36.0 * ahead) / 12.0, f_s)
 
 
-def blind_by_equation_9(run: Run) -> float:
+def blind_by_equation_9(run: Result) -> float:
     """The gap in m below which the sensor is at the upper end of its converter; 0 where none."""
     gain, highest = value(run, "sensor_1.gain", 0.0024), value(run, "sensor_1.adc.range[2]", 10.0)
     return max(0.0, math.pow(gain / highest, 1.0 / 1.1506) - 0.005)
 
 
-def gap_by_equation_7(run: Run) -> float:
+def gap_by_equation_7(run: Result) -> float:
     """The gap in m at which friction holds a finger against layer 1; 0 where it does not."""
     stiffness = value(run, "controller.contact_force.stiffness", 98.0)
     return max(0.0, value(run, "plant.friction.coulomb[1]", 0.0) / stiffness - 0.035)
 
 
-COLUMNS: Mapping[str, Callable[[Run], str]] = {
+COLUMNS: Mapping[str, Callable[[Result], str]] = {
     "contacts, s": _pair("time_to_contact", 1.0, 3),
     "apart, s": _single("time_difference", 1.0, 3),
     "impacts, mm/s": _pair("impact_velocity", 1e3, 1),

@@ -13,7 +13,7 @@ from types import ModuleType
 
 import pytest
 from grasp_cosim import System, cli
-from grasp_cosim.grasp.system import SYSTEM
+from grasp_cosim.grasp.presets import SYSTEM
 from grasp_fmus import build as builder
 from support.fmi2 import Fmu
 from support.packages import skip_where_it_cannot_run

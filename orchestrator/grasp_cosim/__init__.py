@@ -1,18 +1,96 @@
-"""Fixed-step co-simulation of FMUs, and the grasp of the paper. Card: orchestrator/README.md."""
+"""Fixed-step co-simulation of FMUs, and the grasp of the paper. Card: orchestrator/README.md.
 
+Importing it imports nothing yet, builds nothing and writes nothing: each name below is imported
+when it is asked for.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from . import extensions
 from .errors import InputError, SimulationError
-from .grasp.system import grasp_system
-from .master.simulation import simulate
-from .realtime.options import Realtime
-from .recording.result import Result
-from .system.description import System
+
+if TYPE_CHECKING:
+    from .grasp.system import grasp_system
+    from .master.simulation import simulate
+    from .metrics.metric import Metric, metric
+    from .realtime.options import Realtime
+    from .recording.load import load_run
+    from .recording.result import Result
+    from .system.description import System
 
 __all__ = [
     "InputError",
+    "Metric",
     "Realtime",
     "Result",
     "SimulationError",
     "System",
     "grasp_system",
+    "load_run",
+    "metric",
     "simulate",
 ]
+
+_HOMES = {
+    "Metric": "metrics.metric",
+    "Realtime": "realtime.options",
+    "Result": "recording.result",
+    "System": "system.description",
+    "grasp_system": "grasp.system",
+    "load_run": "recording.load",
+    "metric": "metrics.metric",
+    "simulate": "master.simulation",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f".{_HOMES[name]}", __name__), name)
+    globals()[name] = value
+    return value
+
+
+def _read_toml(path: Path, fmus: Path | None, step: float | None, stop: float | None) -> System:
+    from .system.toml import read_toml
+
+    return read_toml(path, fmus).with_experiment(step, stop)
+
+
+def _read_ssp(path: Path, fmus: Path | None, step: float | None, stop: float | None) -> System:
+    from .ssp.read import read_ssp
+
+    if fmus is not None:
+        raise InputError(f"{path}: has its own FMUs; those in {fmus} cannot take their place")
+    return read_ssp(path, step, stop)
+
+
+def _grasp_metrics() -> tuple[Metric, ...]:
+    from .grasp.metrics import METRICS
+
+    return METRICS
+
+
+def _draw_grasp(result: Result, path: Path) -> bool:
+    from .grasp.pictures import draw_grasp
+
+    return draw_grasp(result, path)
+
+
+def _draw_signals(result: Result, path: Path) -> bool:
+    from .report.plot import plot_signals
+
+    plot_signals(result, path)
+    return True
+
+
+extensions.readers |= {".toml": _read_toml, ".ssp": _read_ssp}
+if find_spec(f"{__name__}.grasp"):
+    extensions.metrics.append(_grasp_metrics)
+    extensions.drawings.append(_draw_grasp)
+extensions.drawings.append(_draw_signals)

@@ -83,6 +83,16 @@ def check_keys(place: str, table: Mapping[str, Any], valid: Iterable[str]) -> No
             raise InputError(f"{place}: unknown entry {key!r}; valid: {choices(sorted(valid))}")
 
 
+def check_values(place: str, values: Mapping[str, Any]) -> None:
+    """InputError at the first value that is no number, boolean or string."""
+    for name, value in values.items():
+        if not isinstance(value, float | int | bool | str):
+            raise InputError(
+                f"{place}: {name} = {value!r}: must be a number, boolean or string; a name with a "
+                'dot stands in quotes, like "sensor_1.reflectance" = 0.6'
+            )
+
+
 def toml_table(path: Path, what: str) -> dict[str, Any]:
     """Return the content of a TOML file; `what` names it where there is none, "system file".
 

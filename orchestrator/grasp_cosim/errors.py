@@ -1,12 +1,7 @@
 """The two ways a simulation is refused or broken off."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from .recording.result import Result
+from typing import Any
 
 
 class InputError(Exception):
@@ -16,8 +11,8 @@ class InputError(Exception):
 class SimulationError(Exception):
     """An FMU failed in a running simulation. The message is one line."""
 
-    result: Result | None = None
-    """What was recorded until then."""
+    result: Any = None
+    """What was recorded until then, a recording.result.Result; None where there is nothing."""
 
 
 def choices(names: Iterable[object], limit: int = 24) -> str:

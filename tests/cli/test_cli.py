@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 from conftest import Altered, Run
 from grasp_cosim import System, cli, simulate
-from grasp_cosim.grasp.system import CASES
 from grasp_fmus import documentation
+from support.cases import CASES
 
 METRICS = {
     "time_to_contact", "time_difference", "impact_velocity", "impact_impulse",

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from grasp_cosim.grasp.system import SYSTEM
+from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.interface.interface import read_interface
 from support.native_fmus import build, needs_gcc
 

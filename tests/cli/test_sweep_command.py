@@ -10,7 +10,7 @@ from pathlib import Path
 import pyarrow.parquet as pq  # type: ignore[import-untyped]
 import pytest
 from grasp_cosim import InputError, System, cli
-from grasp_cosim.grasp.system import with_bench
+from grasp_cosim.grasp.presets import with_bench
 from grasp_cosim.sweep.read import built_in, read_study, study_file
 
 Run = Callable[..., tuple[int, str, str]]

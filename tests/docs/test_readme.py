@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim import System, cli, simulate
-from grasp_cosim.grasp.system import SYSTEM
+from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.ssp.write import write_ssp
 
 ROOT = Path(__file__).parents[2]

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from grasp_controller import contact_force, impact_reduction, series, simultaneous_contact
 from grasp_cosim import System, simulate
-from grasp_cosim.grasp.system import CASES
 from grasp_cosim.interface.interface import Value
 from gripper_plant import rigid
 from proximity_sensor import optics
+from support.cases import CASES
 from support.direct import closed_loop
 
 

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from grasp_cosim import Result, System, simulate
-from grasp_cosim.grasp.system import CASES
 from grasp_cosim.interface.interface import Value
+from support.cases import CASES
 from support.packages import skip_where_it_cannot_run
 
 FREE: dict[str, Value] = {"plant.object_fixed": False}

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from grasp_cosim import Result, System, simulate
 from grasp_cosim.grasp.metrics import CLOSING, FINGERS, IMPACT_WINDOW
-from grasp_cosim.grasp.system import CASES
 from grasp_cosim.interface.interface import Value
+from support.cases import CASES
 
 Values = dict[str, Value]
 

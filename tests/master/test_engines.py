@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from grasp_cosim import InputError, SimulationError, System, simulate
 from grasp_cosim.fmi import instance
-from grasp_cosim.grasp.system import CASES
 from grasp_cosim.master import compiled
 from grasp_cosim.master.engine import Engine
 from grasp_cosim.recording.result import Rejection, Result
 from grasp_cosim.system.parts import Connection, Port
+from support.cases import CASES
 from support.mocks import Mock, Run, make_system
 
 pytest.importorskip("numba")

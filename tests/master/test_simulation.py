@@ -18,7 +18,8 @@ import numpy as np
 import pytest
 from conftest import Altered, UnpackIn
 from grasp_cosim import InputError, SimulationError, System, simulate
-from grasp_cosim.grasp.system import CASES, SYSTEM
+from grasp_cosim.grasp.presets import SYSTEM
+from support.cases import CASES
 
 SHORT = 0.05
 

@@ -17,8 +17,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from grasp_cosim import System, simulate
-from grasp_cosim.grasp.system import CASES
 from grasp_cosim.ssp.write import write_ssp
+from support.cases import CASES
 
 STEP = 1e-3  # s
 GAPS = ("plant.gap[1]", "plant.gap[2]")

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim.cli import main
-from grasp_cosim.grasp.system import SYSTEM
+from grasp_cosim.grasp.presets import SYSTEM
 from ssp.hand_made import archive, component, fmu, structure, system
 
 

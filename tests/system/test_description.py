@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from grasp_cosim import InputError, System
-from grasp_cosim.grasp.system import SYSTEM
+from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.qualification.swap import prepare_swap
 from grasp_cosim.system.parts import Port
 

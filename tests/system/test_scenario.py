@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim import InputError, System
-from grasp_cosim.grasp.system import SYSTEM
+from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.interface.interface import Interface, Kind, Variable
 from grasp_cosim.system import parts
 from grasp_cosim.system.parts import (

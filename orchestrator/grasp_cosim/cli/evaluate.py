@@ -9,9 +9,10 @@ from typing import Any
 import click
 
 from ..files import check_folder
+from ..grasp.presets import with_bench
 from ..grasp.published.bench import evaluate_bench
 from ..grasp.published.evaluate import evaluate as run_evaluation
-from ..grasp.system import grasp_system, with_bench
+from ..grasp.system import grasp_system
 from .frame import NEGATIVE, json_option
 
 

@@ -1,16 +1,33 @@
 """What the commands share: the group, exit codes, errors as one line."""
 
 import traceback
+from collections.abc import Callable, Sequence
+from functools import reduce
 from pathlib import Path
+from typing import Any
 
 import click
 
 from ..errors import InputError
+from ..grasp.presets import with_preset
 from ..grasp.system import grasp_system
+from ..metrics.metric import Metric, load_metrics
 from ..system.description import System
 
 NEGATIVE, WRONG, FAILED, INTERRUPTED = 1, 2, 3, 130
 """Exit codes beside 0: result negative, input wrong, failure on the way, Ctrl-C."""
+
+Command = Callable[..., Any]
+
+
+def _together(*options: Command) -> Command:
+    """Several options as one decorator."""
+
+    def decorate(command: Command) -> Command:
+        return reduce(lambda made, option: option(made), reversed(options), command)
+
+    return decorate
+
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 
@@ -37,6 +54,35 @@ def cli(debug: bool) -> None:
     grasp-cosim doctor FMU           whether this machine will load an FMU
     grasp-cosim COMMAND --help       options and an example
     """
+
+
+preset_options = _together(
+    click.option("--preset", "presets", multiple=True, help="Values that the system file names."),
+    click.option("--case", type=click.IntRange(0, 2), help="Short for --preset case_0, ..._2."),
+    click.option("--bench", is_flag=True, help="Short for --preset bench."),
+)
+"""The options that with_chosen_presets() takes."""
+
+metrics_option = click.option(
+    "--metrics",
+    "metric_files",
+    multiple=True,
+    type=click.Path(path_type=Path),
+    help="A Python file with metrics of your own.",
+)
+
+
+def with_chosen_presets(
+    system: System, presets: Sequence[str], case: int | None, bench: bool
+) -> System:
+    """The system with what the preset_options ask for, the case last."""
+    names = [*presets, *(["bench"] if bench else []), *([] if case is None else [f"case_{case}"])]
+    return reduce(with_preset, names, system)
+
+
+def chosen_metrics(files: Sequence[Path]) -> tuple[Metric, ...]:
+    """The metrics of the files that metrics_option names; InputError where one fails."""
+    return tuple(m for path in files for m in load_metrics(path))
 
 
 def load_system(path: Path | None, step: float | None, stop: float | None) -> System:

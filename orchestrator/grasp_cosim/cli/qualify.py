@@ -16,7 +16,16 @@ from ..report.plot import new_figure
 from ..report.qualification import draw_qualification
 from ..system.description import SCHEMES
 from ..system.parts import ISOLATIONS, Isolation
-from .frame import NEGATIVE, json_option, load_system, pair
+from .frame import (
+    NEGATIVE,
+    chosen_metrics,
+    json_option,
+    load_system,
+    metrics_option,
+    pair,
+    preset_options,
+    with_chosen_presets,
+)
 
 
 @click.command()
@@ -41,6 +50,8 @@ from .frame import NEGATIVE, json_option, load_system, pair
     type=click.Path(path_type=Path),
     help="Folder for qualification.json, qualification.png and bands_used.toml.",
 )
+@preset_options
+@metrics_option
 @json_option
 def qualify(
     candidate: Path,
@@ -54,6 +65,10 @@ def qualify(
     scheme: str | None,
     isolation: str,
     out: Path | None,
+    presets: tuple[str, ...],
+    case: int | None,
+    bench: bool,
+    metric_files: tuple[Path, ...],
     as_json: bool,
 ) -> int:
     """Find out whether CANDIDATE, an FMU, may take the place of COMPONENT.
@@ -67,7 +82,8 @@ def qualify(
     if out:
         check_folder(out)
         new_figure(1.0, 1.0)  # tells that matplotlib is missing before the runs, not after
-    chosen = load_system(system, step, stop)
+    metrics = chosen_metrics(metric_files)
+    chosen = with_chosen_presets(load_system(system, step, stop), presets, case, bench)
     values: dict[str, Value] = dict(
         pair("--set", text, "COMPONENT.VARIABLE=VALUE") for text in settings
     )
@@ -80,6 +96,7 @@ def qualify(
         bands=read_bands(bands) if bands else None,
         isolation=cast(Isolation, isolation),
         progress=True,
+        metrics=metrics,
     )
     if out:
         _write(found, out)

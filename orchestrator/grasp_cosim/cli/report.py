@@ -7,10 +7,9 @@ import click
 
 from ..errors import InputError
 from ..files import check_folder
-from ..grasp.metrics import is_grasp
+from ..grasp.pictures import picture_name
 from ..recording.load import load_run
 from ..report.page import write_page
-from ..report.plot import plot_run, plot_signals
 from ..report.timing import draw_timing
 from .frame import json_option
 
@@ -33,11 +32,10 @@ def report(run: Path, out: Path | None, as_json: bool) -> int:
     page = out or run / "report.html"
     check_folder(page.parent)
     write_page(recorded, run.resolve().name, page)
-    picture = page.parent / ("grasp.png" if is_grasp(recorded.signals) else "signals.png")
-    draw = plot_run if is_grasp(recorded.signals) else plot_signals
+    picture = page.parent / picture_name(recorded)
     pictures = []
     try:
-        draw(recorded, picture)
+        recorded.plot(picture)
         pictures.append(picture)
         if recorded.timing:
             draw_timing(recorded.timing, float(recorded.time[-1]), page.parent / "timing.png")

@@ -8,25 +8,32 @@ import click
 
 from ..errors import InputError, SimulationError
 from ..files import check_folder
-from ..grasp.metrics import LABELS, is_grasp
-from ..grasp.system import CASES, with_bench
-from ..interface.interface import Value
+from ..grasp.pictures import picture_name
 from ..master.engine import ENGINES, Engine
 from ..master.simulation import MOST, simulate
 from ..recording.mdf import check_mdf
 from ..recording.result import Result
-from ..report.plot import check_plot
+from ..report.plot import new_figure
 from ..report.timing import draw_timing
 from ..system.description import SCHEMES
-from .frame import INTERRUPTED, fail, json_option, load_system, pair
+from .frame import (
+    INTERRUPTED,
+    chosen_metrics,
+    fail,
+    json_option,
+    load_system,
+    metrics_option,
+    pair,
+    preset_options,
+    with_chosen_presets,
+)
 from .realtime import chosen_realtime, realtime_options, timing_lines
-from .step_study import run_step_study
+from .step_study import StepStudyRequest, run_step_study
 
 
 @click.command()
 @click.argument("system", required=False, type=click.Path(path_type=Path))
-@click.option("--case", type=click.IntRange(0, 2), help="0 and 1: without layers 3 and 2, 3.")
-@click.option("--bench", is_flag=True, help="With the bench's friction and sensor electronics.")
+@preset_options
 @click.option("--set", "settings", multiple=True, metavar="COMPONENT.VARIABLE=VALUE")
 @click.option("--swap", "swaps", multiple=True, metavar="COMPONENT=FMU")
 @click.option("--step", type=float, help="Communication step in s.")
@@ -46,11 +53,14 @@ from .step_study import run_step_study
 @click.option(
     "--step-study", is_flag=True, help="Repeat the run over steps: is --step small enough?"
 )
-@click.option("--tolerance", type=float, help="Of contact times in a step study, s.")
+@click.option("--of", "quantities", multiple=True, help="Metric or signal of a step study.")
+@click.option("--tolerance", type=float, help="Of a step study, in the unit of --of; 1e-3 s.")
+@metrics_option
 @realtime_options
 @json_option
 def run(
     system: Path | None,
+    presets: tuple[str, ...],
     case: int | None,
     bench: bool,
     settings: tuple[str, ...],
@@ -64,7 +74,9 @@ def run(
     every: int,
     engine: Engine,
     step_study: bool,
+    quantities: tuple[str, ...],
     tolerance: float | None,
+    metric_files: tuple[Path, ...],
     as_json: bool,
     realtime: bool,
     **pacing: Any,
@@ -84,24 +96,25 @@ def run(
         raise InputError("--mdf: must come with --out, the folder for signals.mf4")
     if mdf:
         check_mdf()
+    if quantities and not step_study:
+        raise InputError(f"--of {quantities[0]}: must come with --step-study")
+    metrics = chosen_metrics(metric_files)
     chosen = load_system(system, step, stop)
-    if bench:
-        chosen = with_bench(chosen)
     fmus = dict(pair("--swap", text, "COMPONENT=FMU") for text in swaps)
-    values: dict[str, Value] = {} if case is None else dict(CASES[case])
-    values.update(pair("--set", text, "COMPONENT.VARIABLE=VALUE") for text in settings)
+    values = dict(pair("--set", text, "COMPONENT.VARIABLE=VALUE") for text in settings)
+    chosen = with_chosen_presets(chosen, presets, case, bench)
     chosen = chosen.revised(fmus, values, ("--swap", "--set")).with_experiment(step, stop, scheme)
     if step_study:
-        return run_step_study(chosen, tolerance, out, plot, as_json)
+        asked = StepStudyRequest(chosen, quantities, tolerance, metrics)
+        return run_step_study(asked, out, plot, as_json)
     if plot:
-        outputs = (
-            f"{c.name}.{v.name}" for c in chosen.components for v in c.interface.of("output")
-        )
-        check_plot(outputs, paced is not None)
+        new_figure(1.0, 1.0)  # says at once if matplotlib is missing
     if out or plot:
         check_folder(out or Path())
     try:
-        result = simulate(chosen, progress=True, every=every, engine=engine, realtime=paced)
+        result = simulate(
+            chosen, progress=True, every=every, engine=engine, realtime=paced, metrics=metrics
+        )
     except SimulationError as error:
         if error.result:
             _write(error.result, out, plot, mdf)
@@ -129,10 +142,10 @@ def _write(result: Result, out: Path | None, plot: bool, mdf: bool) -> None:
 
 
 def _draw(result: Result, folder: Path) -> None:
-    """The grasp if it is one, and the timing if it was paced."""
-    if is_grasp(result.signals):
-        result.plot(folder / "grasp.png")
-        click.echo(f"drew {folder / 'grasp.png'}", err=True)
+    """The grasp, or all signals where it is none, and the timing if it was paced."""
+    picture = folder / picture_name(result)
+    result.plot(picture)
+    click.echo(f"drew {picture}", err=True)
     if result.timing:
         draw_timing(result.timing, float(result.time[-1]), folder / "timing.png")
         click.echo(f"drew {folder / 'timing.png'}", err=True)
@@ -140,7 +153,13 @@ def _draw(result: Result, folder: Path) -> None:
 
 def _as_json(result: Result) -> dict[str, Any]:
     timing = {"realtime": result.timing.as_dict()} if result.timing else {}
-    return {**result.metrics, **timing}
+    missing = list(result.measured.missing)
+    return {
+        **result.metrics,
+        "units": result.metric_units,
+        **({"missing_metrics": missing} if missing else {}),
+        **timing,
+    }
 
 
 def _summary(result: Result) -> str:
@@ -150,10 +169,11 @@ def _summary(result: Result) -> str:
         f"{m['real_time_factor']:.2f} times as fast as real time"
     ]
     lines += [
-        f"{label:22s}{_numbers(m[key], factor)} {unit}".rstrip()
-        for label, key, factor, unit in LABELS
-        if key in m
+        f"{metric.title:22s}{_numbers(m[metric.name], metric.factor)} "
+        f"{metric.display_unit}".rstrip()
+        for metric in result.measured.metrics
     ]
+    lines += result.measured.missing
     return "\n".join([*lines, *(timing_lines(result.timing) if result.timing else ())])
 
 

@@ -7,6 +7,7 @@ import click
 
 from ..errors import InputError
 from ..files import check_folder
+from ..grasp.presets import STUDIES, with_preset
 from ..report.plot import new_figure
 from ..report.sweep import draw_sweep
 from ..sweep.read import read_study, study_file
@@ -16,7 +17,15 @@ from ..sweep.study import Pictures
 from ..sweep.sweep import RUNS, Sweep
 from ..sweep.sweep import sweep as run_study
 from ..sweep.table import STATISTICS
-from .frame import INTERRUPTED, NEGATIVE, fail, json_option, load_system
+from .frame import (
+    INTERRUPTED,
+    NEGATIVE,
+    chosen_metrics,
+    fail,
+    json_option,
+    load_system,
+    metrics_option,
+)
 
 
 @click.command()
@@ -31,6 +40,7 @@ from .frame import INTERRUPTED, NEGATIVE, fail, json_option, load_system
 )
 @click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster, like tcp://host:8786.")
 @click.option("--plot", is_flag=True, help="Draw what the study asks for under [figures].")
+@metrics_option
 @json_option
 def sweep(
     study: str,
@@ -38,6 +48,7 @@ def sweep(
     workers: int | None,
     scheduler: str | None,
     plot: bool,
+    metric_files: tuple[Path, ...],
     as_json: bool,
 ) -> int:
     """Do all runs of STUDY: a .toml file, or reflectance_map, grasp_sensitivity, bench_monte_carlo.
@@ -49,10 +60,15 @@ def sweep(
     """
     if workers is not None and scheduler is not None:
         raise InputError("--workers: must not come with --scheduler, whose workers there are")
-    path = study_file(study)
+    path = study_file(study, STUDIES)
     folder = out or Path(path.stem)
     check_folder(folder)
-    chosen = read_study(path, lambda system: load_system(system, None, None))
+    chosen = read_study(
+        path,
+        lambda system: load_system(system, None, None),
+        with_preset,
+        chosen_metrics(metric_files),
+    )
     if plot and chosen.pictures == Pictures():
         raise InputError(f"--plot: {path.name} has no [figures]; must say what to draw")
     if plot:

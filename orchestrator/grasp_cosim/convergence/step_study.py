@@ -1,15 +1,15 @@
-"""Is the step small enough? A grasp repeated over steps, its contact times against their limit."""
+"""Is the step small enough? A run repeated over steps, metrics or signals against their limit."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
-from ..errors import InputError, SimulationError
-from ..grasp.metrics import FINGERS, is_grasp
+from ..checks import number
+from ..errors import InputError, SimulationError, choices
 from ..master.simulation import simulate
+from ..metrics.metric import Metric, available, measure, registered
 from ..parallel import run_all
 from ..system.description import System
 from ..system.parts import NANOSECONDS
@@ -19,7 +19,7 @@ FACTORS = tuple(Fraction(2) ** power for power in range(-2, 6))
 """The steps of a study as multiples of the system's own: 1/4 to 32."""
 
 TOLERANCE = 1e-3
-"""s; for contact times, by default. A tenth of the time between the contacts of the two fingers."""
+"""s; for times, by default. For a grasp a tenth of the time between the contacts of its fingers."""
 
 FEWEST = 3
 """Steps that an order needs."""
@@ -30,13 +30,14 @@ ENERGY = ".exchange_energy"
 
 @dataclass(frozen=True, slots=True)
 class StepRun:
-    """What a run with one step left: contact times in s, energies in J at the end, by signal.
+    """What a run with one step left: the quantities in question, energies in J at the end.
 
-    failure is what an FMU said where the run broke off, else None.
+    `values` has None for a moment that never came. failure is what an FMU said where the run broke
+    off, else None.
     """
 
     step_ns: int
-    contact_times: tuple[float | None, float | None]
+    values: Mapping[str, float | None]
     energies: Mapping[str, float]
     failure: str | None = None
 
@@ -48,27 +49,37 @@ class StepRun:
 
 @dataclass(frozen=True)
 class StepStudy:
-    """Runs of one system with rising steps, and what they say. tolerance in s."""
+    """Runs of one system with rising steps, and how a quantity tends to its limit.
+
+    `quantities` are the names of single values, like "time_to_contact[1]" or "plant.gap[1]", all in
+    `unit`, and so is the tolerance.
+    """
 
     system: str
     scheme: str
     stop: float
     step_ns: int
     tolerance: float
+    unit: str | None
+    quantities: tuple[str, ...]
     runs: tuple[StepRun, ...]
 
     @cached_property
-    def fingers(self) -> Mapping[int, Convergence]:
-        """How the contact time of each finger that touches in any run tends to its limit."""
+    def limits(self) -> Mapping[str, Convergence]:
+        """How each quantity that has a value in any run tends to its limit."""
         steps = [run.step for run in self.runs]
-        times = {j: [run.contact_times[j - 1] for run in self.runs] for j in FINGERS}
-        return {j: converge(steps, t) for j, t in times.items() if any(x is not None for x in t)}
+        found = {name: [run.values.get(name) for run in self.runs] for name in self.quantities}
+        return {
+            name: converge(steps, values)
+            for name, values in found.items()
+            if any(v is not None for v in values)
+        }
 
     @cached_property
     def kept(self) -> tuple[bool, ...]:
-        """Whether a run keeps every contact time within the tolerance of its limit."""
+        """True for each run that keeps every quantity within the tolerance of its limit."""
         return tuple(
-            bool(self.fingers) and all(c.within(i, self.tolerance) for c in self.fingers.values())
+            bool(self.limits) and all(c.within(i, self.tolerance) for c in self.limits.values())
             for i in range(len(self.runs))
         )
 
@@ -80,8 +91,13 @@ class StepStudy:
 
     @property
     def holds(self) -> bool:
-        """Whether the system's own step keeps the tolerance, and all finer ones do."""
+        """True if the system's own step keeps the tolerance, and all finer ones do."""
         return self.largest is not None and self.step_ns <= round(self.largest * NANOSECONDS)
+
+    @property
+    def shown(self) -> tuple[float, str]:
+        """Factor and unit in which errors and the tolerance are shown: times in ms."""
+        return (1e3, "ms") if self.unit == "s" else (1.0, self.unit or "")
 
     def as_json(self) -> dict[str, Any]:
         """The study as plain values for JSON; times in s, energies in J."""
@@ -93,54 +109,61 @@ class StepStudy:
             "tolerance": self.tolerance,
             "holds": self.holds,
             "largest_step": self.largest,
-            "fingers": [
+            "quantities": [
                 {
-                    "finger": j,
+                    "name": name,
                     "limit": c.limit,
                     "uncertainty": c.uncertainty,
                     "order": c.order,
                     "order_up_to": self.runs[c.settled - 1].step if c.settled else None,
                     "remark": c.remark or None,
                 }
-                for j, c in self.fingers.items()
+                for name, c in self.limits.items()
             ],
             "runs": [self._run_as_json(i) for i in range(len(self.runs))],
+            "units": {
+                **dict.fromkeys(("stop", "step", "largest_step", "order_up_to"), "s"),
+                **dict.fromkeys(("tolerance", "limit", "uncertainty", "value", "error"), self.unit),
+                "exchange_energy": "J",
+            },
         }
 
     def _run_as_json(self, i: int) -> dict[str, Any]:
         run = self.runs[i]
-        found = [self.fingers.get(j) for j in FINGERS]
+        found = {name: self.limits.get(name) for name in self.quantities}
         return {
             "step": run.step,
-            "time_to_contact": list(run.contact_times),
-            "error": [c.errors[i] if c else None for c in found],
-            "order": [c.orders[i] if c else None for c in found],
+            "value": {name: run.values.get(name) for name in self.quantities},
+            "error": {name: c.errors[i] if c else None for name, c in found.items()},
+            "order": {name: c.orders[i] if c else None for name, c in found.items()},
             "exchange_energy": dict(run.energies),
             "kept": self.kept[i],
             "failure": run.failure,
         }
 
     def as_text(self) -> str:
-        """The study as a table, what each finger shows, and a verdict."""
-        head = (
-            f"{self.system}, {self.scheme}, to {self.stop:g} s, "
-            f"tolerance {1e3 * self.tolerance:g} ms"
-        )
+        """The study as a table, what each quantity shows, and a verdict."""
+        head = f"{self.system}, {self.scheme}, to {self.stop:g} s, tolerance {self._tolerance()}"
         return "\n".join([head, *self._table(), *self._findings(), self._verdict()])
+
+    def _tolerance(self) -> str:
+        factor, unit = self.shown
+        return f"{factor * self.tolerance:g} {unit}".rstrip()
 
     def _table(self) -> list[str]:
         names = list(dict.fromkeys(name for run in self.runs for name in run.energies))
+        factor, unit = self.shown
         heads = ["step ms"]
-        for j in self.fingers:
-            heads += [f"contact {j} s", "error ms", "order"]
+        for name in self.limits:
+            heads += [f"{name} {self.unit or ''}".rstrip(), f"error {unit}".rstrip(), "order"]
         heads += [f"energy uJ: {name.replace(ENERGY, ' ')}" for name in names]
         rows = [heads]
         for i, run in enumerate(self.runs):
             own = "*" if run.step_ns == self.step_ns else ""
             row = [f"{own}{1e3 * run.step:g}"]
-            for j, c in self.fingers.items():
-                row.append(_number(run.contact_times[j - 1], ".6f"))
-                row.append(_number(c.errors[i], ".4f", 1e3))
+            for name, c in self.limits.items():
+                row.append(_number(run.values.get(name), ".6f"))
+                row.append(_number(c.errors[i], ".4f" if self.unit == "s" else ".3g", factor))
                 row.append(_number(c.orders[i], ".2f"))
             row += [_number(run.energies.get(name), ".2f", 1e6) for name in names]
             rows.append(row)
@@ -157,30 +180,35 @@ class StepStudy:
     def _note(self, i: int) -> str:
         if self.runs[i].failure:
             return f"failed: {self.runs[i].failure}"
-        return "out of tolerance" if self.fingers and not self.kept[i] else ""
+        return "out of tolerance" if self.limits and not self.kept[i] else ""
 
     def _findings(self) -> list[str]:
+        factor, unit = self.shown
         lines = ["*: the system's own step"]
-        for j in FINGERS:
-            c = self.fingers.get(j)
+        for name in self.quantities:
+            c = self.limits.get(name)
             if c is None:
-                lines.append(f"finger {j}: touches in no run")
+                lines.append(f"{name}: has no value in any run")
                 continue
             words = []
             if c.limit is not None and c.uncertainty is not None:
-                words.append(f"limit {c.limit:.7f} s, uncertain by {1e3 * c.uncertainty:.2g} ms")
+                words.append(
+                    f"limit {c.limit:.7f} {self.unit or ''}".rstrip()
+                    + f", uncertain by {factor * c.uncertainty:.2g} {unit}".rstrip()
+                )
             if c.order is not None:
                 coarsest = 1e3 * self.runs[c.settled - 1].step
                 words.append(f"observed order {c.order:.2f} up to {coarsest:g} ms")
             if c.remark:
                 words.append(c.remark)
-            lines.append(f"finger {j}: {'; '.join(words)}")
+            lines.append(f"{name}: {'; '.join(words)}")
         return lines
 
     def _verdict(self) -> str:
-        if not self.fingers:
-            return f"no finger touches until {self.stop:g} s: nothing to judge; try a later --stop"
-        within = f"the contact times within {1e3 * self.tolerance:g} ms"
+        asked = " and ".join(dict.fromkeys(name.partition("[")[0] for name in self.quantities))
+        if not self.limits:
+            return f"{asked}: no value until {self.stop:g} s, nothing to judge; try a later --stop"
+        within = f"{asked} within {self._tolerance()}"
         largest = self.largest
         if largest is None:
             return f"no step here keeps {within}; the finest is {1e3 * self.runs[0].step:g} ms"
@@ -191,24 +219,94 @@ class StepStudy:
         )
 
 
+@dataclass(frozen=True, slots=True)
+class Question:
+    """What a study of steps asks about: metrics or signals of one unit, to a tolerance in it.
+
+    A signal counts with its value at the end. `metrics` are a user's own.
+    """
+
+    metrics: tuple[Metric, ...]
+    signals: tuple[str, ...]
+    unit: str | None
+    tolerance: float
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """The names of the single values."""
+        return (*(c for m in self.metrics for c in m.columns), *self.signals)
+
+
+def ask(
+    system: System,
+    of: Sequence[str] = (),
+    tolerance: float | None = None,
+    metrics: Sequence[Metric] = (),
+) -> Question:
+    """The question about metrics or signals `of` these names, by default the primary metrics.
+
+    `tolerance` is in the unit of these, by default TOLERANCE for times. `metrics` are there beside
+    those that every result is asked for. InputError where there is no such quantity, they are of
+    several units, or the tolerance is missing or not positive.
+    """
+    units = {
+        f"{c.name}.{v.name}": v.unit
+        for c in system.components
+        for v in c.interface.of("output")
+        if v.supported and v.kind != "String"
+    }
+    known, reasons = available(registered(metrics), units, system.roles)
+    by_name = {m.name: m for m in known if m.unit is not None}
+    names = list(of) or [m.name for m in known if m.primary]
+    if not names:
+        because = f" ({choices(reasons)})" if reasons else ""
+        raise InputError(
+            f"{system.name}: nothing to study by default{because}; name metrics or signals: "
+            f"valid: {choices([*by_name, *units])}"
+        )
+    for name in names:
+        if name not in by_name and name not in units:
+            raise InputError(
+                f"{system.name}: no metric or signal {name!r}; valid: {choices([*by_name, *units])}"
+            )
+    asked = {by_name[n].unit if n in by_name else units[n] for n in names}
+    if len(asked) > 1:
+        listed = choices(unit or "no unit" for unit in sorted(asked, key=str))
+        raise InputError(f"{system.name}: {choices(names)} are in {listed}; must be of one unit")
+    (unit,) = asked
+    if tolerance is None and unit != "s":
+        raise InputError(f"tolerance: must be given for {choices(names)}, in {unit or 'its unit'}")
+    chosen = TOLERANCE if tolerance is None else tolerance
+    number("tolerance", chosen, 0.0, above=True, must="a number greater than 0", unit=unit or "")
+    return Question(
+        tuple(by_name[n] for n in names if n in by_name),
+        tuple(n for n in names if n not in by_name),
+        unit,
+        chosen,
+    )
+
+
 def step_study(
     system: System,
-    tolerance: float = TOLERANCE,
+    tolerance: float | None = None,
     steps: Sequence[float] | None = None,
     workers: int = 1,
     progress: bool = False,
+    *,
+    of: Sequence[str] = (),
+    metrics: Sequence[Metric] = (),
 ) -> StepStudy:
-    """Repeat a grasp over steps in s, its own always among them, and compare the contact times.
+    """Repeat a run over `steps` in s, its own always among them, and compare quantities.
 
     By default the steps are FACTORS of the system's own, as far as they divide the stop time and
-    the steps of the components, which stay as they are. tolerance in s. Each of the workers is a
-    process; the results are the same for any number of them. A run in which an FMU fails is one of
-    the findings.
+    the steps of the components, which stay as they are. For `of`, `tolerance` and `metrics` see
+    ask(). Each of the workers is a process; the results are the same for any number of them. A run
+    in which an FMU fails is one of the findings.
 
-    InputError where the system is no grasp, the tolerance is not positive, a given step does not
-    fit, or fewer than three steps do. KeyboardInterrupt at Ctrl-C.
+    InputError as from ask(), or where a given step does not fit, or fewer than three steps do.
+    KeyboardInterrupt at Ctrl-C.
     """
-    check_study(system, tolerance)
+    question = ask(system, of, tolerance, metrics)
     chosen = _ladder(system) if steps is None else _given(system, steps)
     if len(chosen) < FEWEST:
         listed = ", ".join(f"{ns / NANOSECONDS:g}" for ns in chosen)
@@ -216,28 +314,19 @@ def step_study(
             f"{system.name}: only {len(chosen)} steps fit the stop time, {listed} s; must be at "
             f"least {FEWEST}: a stop time that more of them divide, or other steps"
         )
-    jobs = [replace(system, step_ns=ns) for ns in chosen]  # the finest, which is the longest, first
+    # the finest, which is the longest, first
+    jobs = [(replace(system, step_ns=ns), question) for ns in chosen]
     runs = run_all(run_step, jobs, min(workers, len(jobs)), progress, "steps")
     return StepStudy(
         system.name,
         system.scheme,
         system.stop_ns / NANOSECONDS,
         system.step_ns,
-        tolerance,
+        question.tolerance,
+        question.unit,
+        question.quantities,
         tuple(runs),
     )
-
-
-def check_study(system: System, tolerance: float) -> None:
-    """InputError where there is no study of that system or with that tolerance in s."""
-    if not (math.isfinite(tolerance) and tolerance > 0.0):
-        raise InputError(f"tolerance = {tolerance!r} s: must be a number greater than 0")
-    outputs = (f"{c.name}.{v.name}" for c in system.components for v in c.interface.of("output"))
-    if not is_grasp(outputs):
-        raise InputError(
-            f"{system.name}: no contact times to study; must be a system with a gripper plant and "
-            "a controller. For another one compare runs with several --step by their signals"
-        )
 
 
 def _ladder(system: System) -> list[int]:
@@ -257,17 +346,20 @@ def _given(system: System, steps: Sequence[float]) -> list[int]:
     return sorted(chosen | {system.step_ns})
 
 
-def run_step(system: System) -> StepRun:
+def run_step(job: tuple[System, Question]) -> StepRun:
     """The run of a system with its own step; KeyboardInterrupt where it was interrupted."""
+    system, question = job
     try:
         result = simulate(system)
     except SimulationError as error:
-        return StepRun(system.step_ns, (None, None), {}, str(error))
+        return StepRun(system.step_ns, {}, {}, str(error))
     if not result.complete:
         raise KeyboardInterrupt
-    first, second = result.metrics["time_to_contact"]
+    found = measure(result.by_role, question.metrics).flat()
+    values = {name: None if v is None else float(v) for name, v in found.items()}
+    values |= {name: float(result[name][-1]) for name in question.signals}
     energies = {name: float(result[name][-1]) for name in result if ENERGY in name}
-    return StepRun(system.step_ns, (first, second), energies)
+    return StepRun(system.step_ns, values, energies)
 
 
 def _number(value: float | None, form: str, factor: float = 1.0) -> str:

@@ -1,10 +1,11 @@
 """A grasp that is run no longer than it takes."""
 
 from ..master.simulation import interrupts, simulate
+from ..metrics.metric import resolved
 from ..recording.result import Result
 from ..system.description import System
 from ..system.parts import NANOSECONDS
-from .metrics import FINGERS, PLANT
+from .metrics import FINGERS
 
 LOOK = 0.05
 """s; how often is asked whether both fingers touch."""
@@ -19,9 +20,10 @@ def close(system: System, after: float) -> Result:
     with simulate.session(system) as session, interrupts(session.halt):
         end = system.stop_ns / NANOSECONDS
         touching = False
+        contacts = [resolved(f"plant.contact[{j}]", system.roles) for j in FINGERS]
         while session.time < end and session.step(steps):
             if session.halt.is_set():
                 raise KeyboardInterrupt
-            if not touching and all(session[f"{PLANT}.contact[{j}]"] for j in FINGERS):
+            if not touching and all(session[name] for name in contacts):
                 touching, end = True, session.time + after
         return session.result()

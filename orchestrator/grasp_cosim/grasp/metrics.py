@@ -1,63 +1,41 @@
-"""Figures of merit of a grasp, from the recorded signals of a gripper plant and its controller."""
+"""Metrics of a grasp, from the recorded signals of a gripper plant and its controller.
 
-from collections.abc import Iterable, Mapping
+To add one, write a function under @of_grasp or @of_fingers. It gets signals by role: "plant" and
+"controller" are the components that play these roles. Units are SI.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
 from math import copysign, degrees
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-Signals = Mapping[str, npt.NDArray[Any]]
-Times = npt.NDArray[np.float64]
-Forces = npt.NDArray[np.float64]
+from ..metrics.metric import Metric, Signals, Value, metric
 
-PLANT = "plant"
-CONTROLLER = "controller"
+Floats = npt.NDArray[np.float64]
+
 FINGERS = (1, 2)
+ENTRIES = ("finger 1", "finger 2")
+"""The values of a metric that each finger has: the right one, the left one."""
+
 CLOSING = {1: -1.0, 2: 1.0}
 """Direction in which a finger closes."""
 
-_OUTPUTS = (
-    f"{PLANT}.object_position",
+PLANT_OUTPUTS = (
+    "plant.object_position",
     *(
-        f"{PLANT}.{name}[{j}]"
+        f"plant.{name}[{j}]"
         for name in ("position", "velocity", "gap", "contact_force", "contact")
         for j in FINGERS
     ),
 )
 """What every gripper plant puts out."""
 
-UNITS: Mapping[str, str | None] = {
-    "time_to_contact": "s",
-    "time_difference": "s",
-    "impact_velocity": "m/s",
-    "impact_impulse": "N.s",
-    "peak_contact_force": "N",
-    "steady_contact_force": "N",
-    "force_overshoot": "1",
-    "settling_time": "s",
-    "target_position": "m",
-    "object_shift": "m",
-    "object_tilt": "rad",
-    "toppled": None,
-    "squeeze": "m",
-    "damaged": None,
-}
-"""The units of the metrics of a grasp; None where one is true or false."""
-
-OF_FINGERS = (
-    "time_to_contact", "impact_velocity", "impact_impulse", "peak_contact_force",
-    "steady_contact_force", "force_overshoot", "settling_time",
-)  # fmt: skip
-"""The metrics of which each finger has one."""
-
-OF_OBJECT: Mapping[str, str] = {
-    "object_tilt": "tilt",
-    "toppled": "toppled",
-    "squeeze": "squeeze",
-    "damaged": "damaged",
-}
-"""The metrics that are there only if the plant has an output for them: its name."""
+NEEDS = ("controller.target_position", *PLANT_OUTPUTS)
+"""The signals of a grasp."""
 
 IMPACT_WINDOW = 0.02
 """s from first contact; an impact is over by then, the grasp presses within a second."""
@@ -68,23 +46,37 @@ STEADY_WINDOW = 0.1
 SETTLED = 0.02
 """A force has settled once it stays so near to the steady one, as a share of that."""
 
-LABELS = (
-    ("time to contact", "time_to_contact", 1.0, "s"),
-    ("time difference", "time_difference", 1.0, "s"),
-    ("impact velocity", "impact_velocity", 1e3, "mm/s"),
-    ("impact impulse", "impact_impulse", 1e3, "mN.s"),
-    ("peak contact force", "peak_contact_force", 1.0, "N"),
-    ("steady contact force", "steady_contact_force", 1.0, "N"),
-    ("force overshoot", "force_overshoot", 1e2, "%"),
-    ("settling time", "settling_time", 1.0, "s"),
-    ("target position", "target_position", 1e3, "mm"),
-    ("object shift", "object_shift", 1e3, "mm"),
-    ("object tilt", "object_tilt", degrees(1.0), "deg"),
-    ("object toppled", "toppled", 1.0, ""),
-    ("object squeezed by", "squeeze", 1e3, "mm"),
-    ("object damaged", "damaged", 1.0, ""),
-)
-"""The metrics as they are shown: label, name, factor and unit."""
+MILLI = {"m": (1e3, "mm"), "m/s": (1e3, "mm/s"), "N.s": (1e3, "mN.s"), "rad": (degrees(1), "deg")}
+"""How values are shown in tables, by unit."""
+
+_found: list[Metric] = []
+
+
+def of_grasp(name: str, unit: str | None, **more: Any) -> Callable[[Any], Metric]:
+    """Make the function below a metric of the grasp; `more` as for metrics.metric.metric."""
+    factor, shown = MILLI.get(unit or "", (1.0, None))
+    how = {"factor": factor, "shown_unit": shown, "needs": NEEDS, "group": "grasp", **more}
+
+    def enter(function: Callable[[Signals], Any]) -> Metric:
+        made: Metric = metric(name, unit=unit, **how)(function)
+        _found.append(made)
+        return made
+
+    return enter
+
+
+def of_fingers(
+    name: str, unit: str, **more: Any
+) -> Callable[[Callable[[Signals, int], Value]], Callable[[Signals, int], Value]]:
+    """Make a function of signals and finger a metric with a value per finger, [right, left]."""
+
+    def enter(function: Callable[[Signals, int], Value]) -> Callable[[Signals, int], Value]:
+        of_grasp(name, unit, entries=ENTRIES, **more)(
+            lambda signals: [function(signals, j) for j in FINGERS]
+        )
+        return function
+
+    return enter
 
 
 class FirstContact(NamedTuple):
@@ -97,60 +89,128 @@ class FirstContact(NamedTuple):
     row: int
 
 
-def is_grasp(signals: Iterable[str]) -> bool:
-    """Whether signals of these names are those of a gripper plant and its controller."""
-    return set(signals) >= {f"{CONTROLLER}.target_position", *_OUTPUTS}
+@of_fingers("time_to_contact", "s", primary=True)
+def time_to_contact(signals: Signals, finger: int) -> float | None:
+    """Moment where the gap of the last free sample runs out at its rate; None: never touches."""
+    contact = first_contact(signals, finger)
+    return contact.time if contact else None
 
 
-def grasp_metrics(time: Times, signals: Signals) -> dict[str, Any]:
-    """The metrics of `run --json`, or none where the system is not a grasp."""
-    if not is_grasp(signals):
-        return {}
-    fingers = [_of_finger(time, signals, j) for j in FINGERS]
-    first, second = (finger["time_to_contact"] for finger in fingers)
-    shift = signals[f"{PLANT}.object_position"] - signals[f"{PLANT}.object_position"][0]
-    return {
-        **{name: [finger[name] for finger in fingers] for name in fingers[0]},
-        "time_difference": None if first is None or second is None else abs(second - first),
-        "target_position": float(signals[f"{CONTROLLER}.target_position"][-1]),
-        "object_shift": float(np.abs(shift).max()),
-        **_of_object(signals),
-    }
+@of_grasp("time_difference", "s")
+def time_difference(signals: Signals) -> float | None:
+    """Time between the first contacts of the two fingers; None where one never touches."""
+    first, second = (time_to_contact(signals, j) for j in FINGERS)
+    return None if first is None or second is None else abs(second - first)
 
 
-def _of_finger(time: Times, signals: Signals, finger: int) -> dict[str, float | None]:
-    """The metrics of one finger; what begins with its first contact is None where it has none.
+@of_fingers("impact_velocity", "m/s")
+def impact_velocity(signals: Signals, finger: int) -> float | None:
+    """Rate at which the gap closes at first contact; None where it does not close."""
+    contact = first_contact(signals, finger)
+    return contact.speed if contact and contact.speed > 0.0 else None
 
-    A steady force that is 0 at any time is none to compare with: the finger does not hold on.
+
+@of_fingers("impact_impulse", "N.s")
+def impact_impulse(signals: Signals, finger: int) -> float | None:
+    """Impulse of the contact force over IMPACT_WINDOW from first contact."""
+    after, force = since_contact(signals, finger)
+    return impulse(after, force, IMPACT_WINDOW)
+
+
+@of_fingers("peak_contact_force", "N")
+def peak_contact_force(signals: Signals, finger: int) -> float:
+    """Highest sample of the contact force."""
+    return float(_force(signals, finger).max())
+
+
+@of_fingers("steady_contact_force", "N")
+def steady_contact_force(signals: Signals, finger: int) -> float:
+    """Mean contact force over the last STEADY_WINDOW."""
+    return float(_last(signals, finger).mean())
+
+
+@of_fingers("force_overshoot", "1", factor=1e2, shown_unit="%")
+def force_overshoot(signals: Signals, finger: int) -> float | None:
+    """Share of the steady force by which the peak exceeds it; None without a steady force."""
+    _, force = since_contact(signals, finger)
+    return overshoot(force, held_force(signals, finger))
+
+
+@of_fingers("settling_time", "s")
+def time_to_settle(signals: Signals, finger: int) -> float | None:
+    """Time from first contact until the force stays within SETTLED of the steady one."""
+    after, force = since_contact(signals, finger)
+    return settling_time(after, force, held_force(signals, finger))
+
+
+@of_grasp("target_position", "m")
+def target_position(signals: Signals) -> float:
+    """Target of the controller at the end."""
+    return float(signals["controller.target_position"][-1])
+
+
+@of_grasp("object_shift", "m")
+def object_shift(signals: Signals) -> float:
+    """Largest displacement of the object, either way."""
+    position = signals["plant.object_position"]
+    return float(np.abs(position - position[0]).max())
+
+
+def _of_object(name: str, unit: str | None, output: str, label: str) -> None:
+    """A metric of plants with an output of that name: its largest value, or if it was ever true."""
+    key = f"plant.{output}"
+
+    @of_grasp(name, unit, label=label, needs=(*NEEDS, key), optional=True)
+    def largest(signals: Signals) -> float | bool:
+        found = np.abs(signals[key]).max()
+        return bool(found) if unit is None else float(found)
+
+
+_of_object("object_tilt", "rad", "tilt", "object tilt")
+_of_object("toppled", None, "toppled", "object toppled")
+_of_object("squeeze", "m", "squeeze", "object squeezed by")
+_of_object("damaged", None, "damaged", "object damaged")
+
+METRICS = tuple(_found)
+"""The metrics of a grasp, in the order in which they are shown."""
+
+
+def is_grasp(signals: Signals) -> bool:
+    """True if there are the signals of a gripper plant and its controller."""
+    return all(name in signals for name in NEEDS)
+
+
+def _force(signals: Signals, finger: int) -> Floats:
+    """Magnitude of the contact force on a finger, N."""
+    force: Floats = np.abs(signals[f"plant.contact_force[{finger}]"])
+    return force
+
+
+def _last(signals: Signals, finger: int) -> Floats:
+    """The contact force over the last STEADY_WINDOW, N."""
+    late = signals.time >= signals.time[-1] - STEADY_WINDOW
+    return np.asarray(_force(signals, finger)[late])
+
+
+def held_force(signals: Signals, finger: int) -> float | None:
+    """The steady contact force, N; None where it is 0 at any time: the finger does not hold on."""
+    last = _last(signals, finger)
+    return float(last.mean()) if last.min() > 0.0 else None
+
+
+def since_contact(signals: Signals, finger: int) -> tuple[Floats, Floats]:
+    """Seconds since first contact and the contact force in N from its first row on; both empty
+    where the finger never touches.
     """
-    force = np.abs(signals[f"{PLANT}.contact_force[{finger}]"])
-    last = force[time >= time[-1] - STEADY_WINDOW]
-    held = float(last.mean()) if last.min() > 0.0 else None
-    contact = first_contact(time, signals, finger)
-    moment, speed, row = contact or (None, 0.0, len(time))
-    after = time[row:] - (moment or 0.0)  # empty where it never touches
-    return {
-        "time_to_contact": moment,
-        "impact_velocity": speed if speed > 0.0 else None,
-        "impact_impulse": impulse(after, force[row:], IMPACT_WINDOW),
-        "peak_contact_force": float(force.max()),
-        "steady_contact_force": float(last.mean()),
-        "force_overshoot": overshoot(force[row:], held),
-        "settling_time": settling_time(after, force[row:], held),
-    }
+    contact = first_contact(signals, finger)
+    moment, row = (contact.time, contact.row) if contact else (0.0, len(signals.time))
+    return signals.time[row:] - moment, _force(signals, finger)[row:]
 
 
-def _of_object(signals: Signals) -> dict[str, float | bool]:
-    """The largest tilt and squeeze, either way, and whether it ever toppled or was damaged."""
-    there = {name: f"{PLANT}.{output}" for name, output in OF_OBJECT.items()}
-    largest = {name: np.abs(signals[s]).max() for name, s in there.items() if s in signals}
-    return {n: bool(v) if UNITS[n] is None else float(v) for n, v in largest.items()}
+def impulse(after: Floats, force: Floats, window: float) -> float | None:
+    """Impulse in N.s of a `force` in N over a `window` in s from first contact, by trapezoids.
 
-
-def impulse(after: Times, force: Forces, window: float) -> float | None:
-    """Impulse in N.s of a force in N over a window in s from first contact.
-
-    after are the seconds since then. Until the first sample the force is taken as it is there, as
+    `after` are the seconds since then. Until the first sample the force is taken as it is there, as
     one that begins with a jump has it. None if it ends sooner, or with fewer than two samples.
     """
     if np.count_nonzero(after <= window) < 2 or after[-1] < window:
@@ -160,18 +220,18 @@ def impulse(after: Times, force: Forces, window: float) -> float | None:
     return float(np.trapezoid(np.interp(times, after, force), times))
 
 
-def overshoot(force: Forces, steady: float | None) -> float | None:
-    """By what share of the steady force in N a force since contact exceeds it at most; 0 if never.
+def overshoot(force: Floats, steady: float | None) -> float | None:
+    """Share of the `steady` force in N by which a `force` since contact exceeds it; 0 if never.
 
     None without a contact, or without a steady force.
     """
     return None if steady is None or not len(force) else max(0.0, float(force.max()) / steady - 1.0)
 
 
-def settling_time(after: Times, force: Forces, steady: float | None) -> float | None:
-    """Seconds since contact from which on a force is within SETTLED of the steady one, both in N.
+def settling_time(after: Floats, force: Floats, steady: float | None) -> float | None:
+    """Seconds since contact from which on a `force` is within SETTLED of the `steady` one, in N.
 
-    after are the seconds since then, at which the force is given. None where it is not within
+    `after` are the seconds since then, at which the force is given. None where it is not within
     throughout the last STEADY_WINDOW, without a contact, or without a steady force.
     """
     if steady is None or not len(after) or after[-1] < STEADY_WINDOW:
@@ -188,27 +248,28 @@ def settling_time(after: Times, force: Forces, steady: float | None) -> float | 
     return float(after[k] + fraction * (after[k + 1] - after[k]))
 
 
-def first_contact(time: Times, signals: Signals, finger: int) -> FirstContact | None:
-    """How a finger first touches; None if it never does.
+def first_contact(signals: Signals, finger: int) -> FirstContact | None:
+    """First contact of a finger; None if it never touches.
 
     Between the last free communication point and the first one in contact, the moment is where
     the gap runs out at the rate of the last free point.
     """
-    touching = np.flatnonzero(signals[f"{PLANT}.contact[{finger}]"])
+    time = signals.time
+    touching = np.flatnonzero(signals[f"plant.contact[{finger}]"])
     if not len(touching):
         return None
     row = int(touching[0])
     k = max(row - 1, 0)
-    own = float(CLOSING[finger] * signals[f"{PLANT}.velocity[{finger}]"][k])
-    speed = own - _surface_speed(time, signals, finger, k)
-    gap = max(float(signals[f"{PLANT}.gap[{finger}]"][k]), 0.0)
+    own = float(CLOSING[finger] * signals[f"plant.velocity[{finger}]"][k])
+    speed = own - _surface_speed(signals, finger, k)
+    gap = max(float(signals[f"plant.gap[{finger}]"][k]), 0.0)
     span = float(time[row] - time[k])
     wait = min(gap / speed, span) if speed > 0.0 else span
     return FirstContact(float(time[k]) + wait, speed, row)
 
 
-def _surface_speed(time: Times, signals: Signals, finger: int, k: int) -> float:
-    """How fast the object's surface goes ahead of a finger that is free up to row k, in m/s.
+def _surface_speed(signals: Signals, finger: int, k: int) -> float:
+    """Speed in m/s at which the object's surface goes ahead of a finger that is free up to row k.
 
     What the finger moved less what the gap shrank, over the last whole step of the plant, which
     may be longer than that of the system and holds its outputs in between. 0 where there was none.
@@ -219,23 +280,23 @@ def _surface_speed(time: Times, signals: Signals, finger: int, k: int) -> float:
     own = int(np.diff(given).min())
     last = k - (k - int(given[-1])) % own  # it may have stepped since, and nothing moved
     rows = [last - own, last]
-    gap = signals[f"{PLANT}.gap[{finger}]"][rows]
-    surface = CLOSING[finger] * signals[f"{PLANT}.position[{finger}]"][rows] + gap
-    return float((surface[1] - surface[0]) / (time[last] - time[last - own]))
+    gap = signals[f"plant.gap[{finger}]"][rows]
+    surface = CLOSING[finger] * signals[f"plant.position[{finger}]"][rows] + gap
+    return float((surface[1] - surface[0]) / (signals.time[last] - signals.time[last - own]))
 
 
 def _given(signals: Signals, k: int) -> npt.NDArray[np.intp]:
     """The rows up to row k that have other outputs of the plant than the one before; the first."""
     changed = np.zeros(k + 1, bool)
     changed[0] = True
-    for name in _OUTPUTS:
+    for name in PLANT_OUTPUTS:
         changed[1:] |= np.diff(signals[name][: k + 1]) != 0
     return np.flatnonzero(changed)
 
 
-def time_at_gap(time: Times, signals: Signals, finger: int, gap: float) -> float | None:
-    """Time in s at which a finger's gap first falls to gap in m, interpolated; None if never."""
-    gaps = signals[f"{PLANT}.gap[{finger}]"]
+def time_at_gap(signals: Signals, finger: int, gap: float) -> float | None:
+    """Time in s at which a finger's gap first falls to `gap` in m, interpolated; None if never."""
+    time, gaps = signals.time, signals[f"plant.gap[{finger}]"]
     below = np.flatnonzero(gaps <= gap)
     if not len(below):
         return None

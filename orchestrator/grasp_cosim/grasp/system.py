@@ -1,42 +1,16 @@
-"""The built-in system: the published grasp, its FMUs and its cases; the bench as a preset."""
+"""The built-in system: the published grasp and its FMUs."""
 
-import tomllib
-from collections.abc import Mapping
 from pathlib import Path
-from types import MappingProxyType
 
 from ..errors import InputError
-from ..interface.interface import Value
 from ..system.description import System
-
-SYSTEM = Path(__file__).parent / "grasp.toml"
-
-BENCH = Path(__file__).parent / "bench_preset.toml"
-"""The values that make the bench of the ideal grasp."""
+from .presets import SYSTEM
 
 FMU_FOLDER = Path("fmus/build")
 """Where the FMUs are built, below the current folder."""
 
 BOUND_FOLDER = Path("fmus/bound")
 """Where those for hosts that are not Python are built."""
-
-CASES: Mapping[int, Mapping[str, Value]] = MappingProxyType(
-    {
-        0: {
-            "controller.simultaneous_contact.enabled": False,
-            "controller.impact_reduction.enabled": False,
-        },
-        1: {
-            "controller.simultaneous_contact.enabled": False,
-            "controller.impact_reduction.enabled": True,
-        },
-        2: {
-            "controller.simultaneous_contact.enabled": True,
-            "controller.impact_reduction.enabled": True,
-        },
-    }
-)
-"""Case 0 is contact force control alone, 1 with impact reduction, 2 with simultaneous contact."""
 
 
 def grasp_system() -> System:
@@ -51,9 +25,3 @@ def grasp_system() -> System:
             "current folder, which must be one that can be written to"
         ) from error
     return System.load(SYSTEM, FMU_FOLDER)
-
-
-def with_bench(system: System) -> System:
-    """The grasp as on the bench: the sensors with their electronics, friction identified."""
-    values = tomllib.loads(BENCH.read_text("utf-8"))["values"]
-    return system.revised({}, values, ("swap", BENCH.name))

@@ -15,6 +15,7 @@ from ..errors import InputError, SimulationError, choices
 from ..fmi.instance import Instance
 from ..fmi.load import load
 from ..interface.interface import Value
+from ..metrics.metric import Metric, registered
 from ..realtime.options import Realtime
 from ..realtime.pacer import Pacer
 from ..realtime.privileges import Privileges, privileges
@@ -26,6 +27,7 @@ from ..recording.result import Result
 from ..system.checks import remarks
 from ..system.description import System
 from ..system.parts import NANOSECONDS, Component, Port
+from ..system.settings import settings
 from .engine import Engine
 from .master import Master
 
@@ -49,9 +51,12 @@ class Session:
         listeners: Sequence[Listener] = (),
         engine: Engine = "auto",
         realtime: Realtime | None = None,
+        metrics: Sequence[Metric] = (),
     ) -> None:
         """Load and initialise; see simulate() for the arguments and errors."""
         _check_count("every", every)
+        registered(metrics)  # tells of two with one name before the run, not after
+        self._metrics = tuple(metrics)
         self.system = system
         self._memory = MemoryListener(every)
         self._wall_time = 0.0
@@ -206,7 +211,7 @@ class Session:
     def _result(self) -> Result:
         master, signals, asked = self._master, self._dispatch.signals, self._privileges
         return Result(
-            self.system,
+            settings(self.system),
             self._memory.time,
             self._memory.signals,
             {s.name: s.unit for s in signals},
@@ -216,6 +221,7 @@ class Session:
             rejections=dict(master.rejections),
             log=self._log(),
             timing=self.pacer.timing(asked.granted, asked.refused) if self.pacer else None,
+            more_metrics=self._metrics,
         )
 
     def _log(self) -> tuple[str, ...]:
@@ -252,6 +258,7 @@ class Simulate:
         listeners: Sequence[Listener] = (),
         engine: Engine = "auto",
         realtime: Realtime | None = None,
+        metrics: Sequence[Metric] = (),
     ) -> Result:
         """Run a system to its stop time and return every output at every communication point.
 
@@ -259,13 +266,14 @@ class Simulate:
         standard error if that is a terminal. every keeps only each n-th communication point, and
         the last. listeners get what is kept while it is recorded. engine is "python", "compiled"
         (needs numba) or "auto", compiled where numba is installed; the results have the same bits.
-        realtime paces the run by the clock: the result has a timing, and the same bits.
+        realtime paces the run by the clock: the result has a timing, and the same bits. metrics are
+        worked out beside those that every result is asked for.
         Ctrl-C ends the run early: the result is what was recorded, with complete = False.
         InputError where an FMU does not load or refuses its parameters; SimulationError, with what
         was recorded as its result, where one fails on the way.
         """
         system = system.with_experiment(step, stop, scheme)
-        with Session(system, every, listeners, engine, realtime) as session:
+        with Session(system, every, listeners, engine, realtime, metrics) as session:
             _drive(session, progress)
             return session.result()
 
@@ -280,13 +288,14 @@ class Simulate:
         listeners: Sequence[Listener] = (),
         engine: Engine = "auto",
         realtime: Realtime | None = None,
+        metrics: Sequence[Metric] = (),
     ) -> Session:
         """A run that its user advances, for `with`; the arguments are those of simulate().
 
         In real time its schedule begins with the first step.
         """
         system = system.with_experiment(step, stop, scheme)
-        return Session(system, every, listeners, engine, realtime)
+        return Session(system, every, listeners, engine, realtime, metrics)
 
 
 simulate = Simulate()

@@ -6,7 +6,7 @@ the original and with the candidate, and each signal and metric of the two is co
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError, SimulationError
-from ..grasp.metrics import OF_OBJECT, UNITS, grasp_metrics
 from ..interface.conversion import IDENTITY
 from ..interface.interface import Value
 from ..master.simulation import simulate
+from ..metrics.metric import Metric, Signals, measure, registered
 from ..recording.result import Result
 from ..system.description import SCHEMES, System
 from ..system.parts import NANOSECONDS, Isolation
@@ -113,29 +113,32 @@ def qualify(
     bands: Bands | None = None,
     isolation: Isolation = "process",
     progress: bool = False,
+    metrics: Sequence[Metric] = (),
 ) -> Qualification:
     """Compare a candidate FMU with that of a component, as declared and in the closed loop.
 
     rename maps the system's names to the candidate's. values like {'plant.object_width': 0.06} are
     set in both systems, in the unit of the original, or in the one that has such a variable. bands
     are derived where they are not given. The candidate runs in a process of its own, which a crash
-    does not leave, unless isolation says otherwise. InputError where the input is wrong or the
+    does not leave, unless isolation says otherwise. metrics are compared beside those that every
+    result is asked for. InputError where the input is wrong or the
     original refuses, SimulationError where the original fails, KeyboardInterrupt at Ctrl-C.
     """
     bands = bands or Bands()
     swap = prepare_swap(system, component, Path(candidate), rename or {}, values or {}, isolation)
     if swap.swapped is None:
         return Qualification(swap)
+    measures = _Measures(registered(metrics), system.roles)
     reference = _run(swap.system, progress)
     original = _curves(reference)
-    _check(bands, original)
+    _check(bands, original, measures)
     result, failure = _attempt(swap.swapped, progress)
     again: tuple[Curves, ...] = ()
     numerics: tuple[str, ...] = ()
-    if _derives(bands, original):
+    if _derives(bands, original, measures):
         again, numerics = _other_numerics(swap.system, original, progress)
     candidate_curves = _converted(_curves(result), swap) if result else {}
-    judge = _Judge(swap, bands, reference.units, original, again)
+    judge = _Judge(swap, bands, reference.units, original, again, measures)
     return Qualification(
         swap,
         judge.signals(candidate_curves),
@@ -164,11 +167,11 @@ def _attempt(system: System, progress: bool) -> tuple[Result | None, str | None]
         return None, str(error)
 
 
-def _derives(bands: Bands, original: Curves) -> bool:
+def _derives(bands: Bands, original: Curves, measures: _Measures) -> bool:
     """Whether a width is left to be derived."""
     given = [
         *(entry_for(bands.signals, name) for name in original),
-        *(entry_for(bands.metrics, name, _plain(name)) for name in _values(original)),
+        *(entry_for(bands.metrics, name, _plain(name)) for name in measures.values(original)),
     ]
     return not all(entry and entry.wide for entry in given)
 
@@ -216,10 +219,10 @@ def _converted(curves: Curves, swap: Swap) -> dict[str, Curve]:
     }
 
 
-def _check(bands: Bands, original: Curves) -> None:
+def _check(bands: Bands, original: Curves, measures: _Measures) -> None:
     """InputError where an entry of the bands is for nothing."""
     check_patterns(f"{bands.place}: [signals]", bands.signals, tuple(original))
-    metrics = [n for name in _values(original) for n in dict.fromkeys((_plain(name), name))]
+    metrics = [n for name in measures.values(original) for n in dict.fromkeys((_plain(name), name))]
     check_patterns(f"{bands.place}: [metrics]", bands.metrics, metrics)
 
 
@@ -232,6 +235,7 @@ class _Judge:
     units: Mapping[str, str | None]
     original: Curves
     again: tuple[Curves, ...]
+    measures: _Measures
 
     @property
     def shift(self) -> float:
@@ -247,18 +251,19 @@ class _Judge:
     def metrics(self, candidate: Curves) -> tuple[Compared, ...]:
         """All metrics of the original; one that the candidate's run lacks is None there.
 
-        But for those of the object for which the candidate has no such output as the original.
+        But for optional ones that the candidate's signals do not permit.
         """
-        values, theirs = _values(self.original), _values(candidate)
-        others = [_values(run) for run in self.again]
+        values, theirs = self.measures.values(self.original), self.measures.values(candidate)
+        others = [self.measures.values(run) for run in self.again]
         found = []
         for name, value in values.items():
-            if name in OF_OBJECT and name not in theirs:
+            metric = self.measures.metric(name)
+            if metric.optional and name not in theirs:
                 continue
-            given = entry_for(self.bands.metrics, name, _plain(name))
-            least = self._least(UNITS[_plain(name)])
+            given = entry_for(self.bands.metrics, name, metric.name)
+            least = self._least(metric.unit)
             band = metric_band(value, [run.get(name) for run in others], least, given)
-            found.append(_metric(name, band, value, theirs.get(name)))
+            found.append(_compared(name, metric.unit, band, value, theirs.get(name)))
         return tuple(sorted(found, key=lambda c: -c.ratio))
 
     def _least(self, unit: str | None) -> float:
@@ -284,30 +289,36 @@ class _Judge:
         )
 
 
-def _metric(name: str, band: Band, original: float | None, candidate: float | None) -> Compared:
+def _compared(
+    name: str, unit: str | None, band: Band, original: float | None, candidate: float | None
+) -> Compared:
     if original is None or candidate is None:
         apart = 0.0 if original is candidate else inf
     else:
         apart = abs(candidate - original)
-    return Compared(name, UNITS[_plain(name)], band, apart, original, candidate)
+    return Compared(name, unit, band, apart, original, candidate)
 
 
-def _values(curves: Curves) -> dict[str, float | None]:
-    """The grasp's metrics by name, like time_to_contact[1] where there is one per finger.
+@dataclass(frozen=True, slots=True)
+class _Measures:
+    """The metrics that runs are compared by, and the roles of the system."""
 
-    One that is true or false is 1 or 0, as such a signal is.
-    """
-    if not curves:
-        return {}
-    time = next(iter(curves.values())).time
-    found: dict[str, float | bool | None] = {}
-    for name, value in grasp_metrics(time, {n: c.values for n, c in curves.items()}).items():
-        if isinstance(value, list):
-            found.update({f"{name}[{i}]": v for i, v in enumerate(value, start=1)})
-        else:
-            found[name] = value
-    return {name: None if value is None else float(value) for name, value in found.items()}
+    metrics: tuple[Metric, ...]
+    roles: Mapping[str, str]
+
+    def values(self, curves: Curves) -> dict[str, float | None]:
+        """The single values by name, like time_to_contact[1]; true is 1 and false 0."""
+        if not curves:
+            return {}
+        time = next(iter(curves.values())).time
+        signals = Signals(time, {n: c.values for n, c in curves.items()}, self.roles)
+        found = measure(signals, self.metrics).flat()
+        return {name: None if v is None else float(v) for name, v in found.items()}
+
+    def metric(self, name: str) -> Metric:
+        """The metric that a single value belongs to."""
+        return next(m for m in self.metrics if m.name == _plain(name))
 
 
-def _plain(metric: str) -> str:
-    return metric.partition("[")[0]
+def _plain(value: str) -> str:
+    return value.partition("[")[0]

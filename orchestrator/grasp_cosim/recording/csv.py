@@ -10,8 +10,7 @@ import numpy.typing as npt
 
 from ..errors import InputError, SimulationError
 from ..files import in_one_piece, unwritable
-from ..system.description import System
-from .listener import Signal, times
+from .listener import Experiment, Signal, times
 
 PIECE = 1024
 """Rows turned into text at once; a block may be long."""
@@ -28,9 +27,9 @@ class CsvListener:
     def __init__(self, path: str | Path) -> None:
         self._path = Path(path)
 
-    def begin(self, system: System, signals: Sequence[Signal]) -> None:
+    def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
         """Write the line of names; InputError where the file cannot be written."""
-        self._step_ns = system.step_ns
+        self._step_ns = experiment.step_ns
         self._whole = [i for i, s in enumerate(signals, 1) if s.kind != "Real"]
         names = ("time", *(s.name.replace('"', '""') for s in signals))
         try:

@@ -10,8 +10,9 @@ from ..errors import SimulationError
 from ..system.checks import transforms
 from ..system.description import System
 from ..system.parts import Port
+from ..system.settings import settings
 from .energy import ExchangeEnergy, bonds
-from .listener import Listener, Signal
+from .listener import Experiment, Listener, Signal
 
 
 class Dispatcher:
@@ -35,9 +36,10 @@ class Dispatcher:
         self._energy = ExchangeEnergy(bonds(system), slots, transforms(system))
         self.signals = (*self._outputs.values(), *self._energy.signals)
         self._pending: tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]] | None = None
+        experiment = Experiment.of(settings(system))
         with ExitStack() as begun:
             for listener in self._listeners:
-                listener.begin(system, self.signals)
+                listener.begin(experiment, self.signals)
                 begun.callback(listener.end, False)
             begun.pop_all()  # whoever has begun is ended here only where the next one fails
 

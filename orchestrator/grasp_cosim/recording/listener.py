@@ -1,5 +1,7 @@
 """What listens to a run: blocks of rows, one row per recorded communication point."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -7,7 +9,6 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from ..system.description import System
 from ..system.parts import NANOSECONDS
 
 
@@ -24,14 +25,38 @@ class Signal:
     description: str = ""
 
 
+@dataclass(frozen=True, slots=True)
+class Experiment:
+    """The run that is recorded: its name, communication step and stop time in ns, its settings.
+
+    `settings` are those of system.settings, as in run.json.
+    """
+
+    name: str
+    step_ns: int
+    stop_ns: int
+    settings: Mapping[str, Any]
+
+    @classmethod
+    def of(cls, settings: Mapping[str, Any]) -> Experiment:
+        """The experiment that settings describe."""
+        step, stop = (round(settings[key] * NANOSECONDS) for key in ("step", "stop"))
+        return cls(settings["system"], step, stop, settings)
+
+    @property
+    def total_steps(self) -> int:
+        """The number of communication steps from 0 to the stop time."""
+        return self.stop_ns // self.step_ns
+
+
 class Listener(Protocol):
     """Gets every recorded row once, in order, in blocks between chunks of steps."""
 
-    def begin(self, system: System, signals: Sequence[Signal]) -> None:
+    def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
         """Called before the first row."""
 
     def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
-        """Rows as (len(steps), len(signals)); step k is at t = k * system.step_ns.
+        """Rows as (len(steps), len(signals)); step k is at t = k * experiment.step_ns.
 
         Booleans are 0.0 or 1.0. The arrays are reused: copy what is kept.
         """

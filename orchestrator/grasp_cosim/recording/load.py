@@ -6,6 +6,7 @@ import logging
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,60 +14,73 @@ import numpy as np
 import numpy.typing as npt
 
 from ..errors import InputError, choices
+from ..metrics.metric import Metric, Signals, registered
 from ..realtime.timing import Timing
 from .mdf import check_mdf
+from .result import UNITS, Rejection, Result
 
 SIGNALS, SETTINGS = "signals.csv", "run.json"
 """The files of a run's folder."""
 
 
-@dataclass(frozen=True, eq=False)
-class Run:
-    """A recorded run: its signals by name, like plant.gap[1], on time in s.
+SETTING_KEYS = (
+    "system", "scheme", "step", "stop", "initialisation", "components", "connections", "events",
+    "faults",
+)  # fmt: skip
+"""Entries of run.json that say how the run was made."""
 
-    settings is the whole of run.json, see Result.to_json. A column that its types do not name is
-    float64.
-    """
-
-    time: npt.NDArray[np.float64]
-    signals: Mapping[str, npt.NDArray[Any]]
-    units: Mapping[str, str | None]
-    descriptions: Mapping[str, str]
-    settings: Mapping[str, Any]
-    timing: Timing | None = None
-    """How it kept to the clock; None where it was not paced."""
+OUTCOME_KEYS = ("wall_time", "complete", "log", "rejections")
+"""Entries that say what came of it, besides metrics."""
 
 
-def load_run(folder: str | Path) -> Run:
-    """The run in a folder that `run --out` wrote.
+def load_run(folder: str | Path) -> Result:
+    """The result in a folder that `run --out` wrote.
 
+    Metrics are worked out anew from the signals; those of a user's file are as they were recorded.
     InputError where a file is missing or damaged, or the two files are not of the same run.
     """
     folder = Path(folder)
-    settings = _settings(folder / SETTINGS)
-    names, table = _table(folder / SIGNALS)
-    units, types = settings["units"], settings.get("types", {})
     path = folder / SETTINGS
+    written = _settings(path)
+    names, table = _table(folder / SIGNALS)
+    units, types = written["units"], written.get("types", {})
     if list(units) != names:
         raise InputError(
             f"{path}: units are those of {choices(units)}; "
             f"must be those of the columns of {SIGNALS}: {choices(names)}"
         )
-    return Run(
+    realtime = written.get("realtime")
+    return Result(
+        settings={key: written[key] for key in (*SETTING_KEYS, "roles") if key in written},
         time=table[:, 0],
         signals={
             name: _typed(f"{path}: type of {name}", column, types.get(name, "float64"))
             for name, column in zip(names, table[:, 1:].T, strict=True)
         },
         units=units,
-        descriptions=settings.get("descriptions", {}),
-        settings=settings,
-        timing=(
-            Timing.from_dict(f"{path}: realtime", settings["realtime"])
-            if "realtime" in settings
-            else None
-        ),
+        wall_time=written["wall_time"],
+        complete=written["complete"],
+        descriptions=written.get("descriptions", {}),
+        rejections={name: Rejection(**r) for name, r in written["rejections"].items()},
+        log=tuple(written["log"]),
+        timing=None if realtime is None else Timing.from_dict(f"{path}: realtime", realtime),
+        more_metrics=_as_recorded(written),
     )
+
+
+def _as_recorded(written: Mapping[str, Any]) -> tuple[Metric, ...]:
+    """The metrics in run.json that nothing here would work out again, as they are there."""
+    known = {*UNITS, *(m.name for m in registered())}
+    units = written.get("metric_units", {})
+    return tuple(
+        Metric(name, partial(_constant, written[name]), units[name])
+        for name in units
+        if name not in known and name in written
+    )
+
+
+def _constant(value: Any, _: Signals) -> Any:
+    return value
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,8 +139,11 @@ def _settings(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: is damaged, no JSON: {error}") from error
     if not isinstance(settings, dict):
         raise InputError(f"{path}: is {type(settings).__name__}; must be a JSON object")
-    if "units" not in settings:
-        raise InputError(f"{path}: no units; must be what `grasp-cosim run --out` wrote")
+    for key in ("units", *SETTING_KEYS, *OUTCOME_KEYS):
+        if key not in settings:
+            raise InputError(
+                f"{path}: no entry {key!r}; must be as `grasp-cosim run --out` writes it"
+            )
     for key in {"units", "types", "descriptions"} & settings.keys():
         if not isinstance(settings[key], dict):
             raise InputError(f"{path}: {key} = {settings[key]!r}; must be a JSON object")

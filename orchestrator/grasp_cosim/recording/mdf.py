@@ -13,9 +13,7 @@ import numpy.typing as npt
 
 from ..errors import InputError, SimulationError
 from ..files import in_one_piece, unwritable
-from ..system.description import System
-from ..system.settings import settings
-from .listener import Signal, times
+from .listener import Experiment, Signal, times
 
 if TYPE_CHECKING:
     import asammdf
@@ -36,7 +34,7 @@ PIECE = 8192
 class MdfListener:
     """Writes time and signals as one channel group, with units and descriptions.
 
-    The header has the settings() of the system: all of them as JSON in its comment, and the main
+    The header has the settings of the run: all of them as JSON in its comment, and the main
     ones as properties, with "complete" besides. asammdf keeps the rows in a compressed temporary
     file beside path; the file at path is made from it when the run ends, in whatever way. There is
     no file where nothing was recorded.
@@ -47,13 +45,13 @@ class MdfListener:
         check_mdf()
         self._path = Path(path)
 
-    def begin(self, system: System, signals: Sequence[Signal]) -> None:
+    def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
         """Describe the channels; InputError where there are none or the folder is not writable."""
         from asammdf import MDF
 
         if not signals:
             raise InputError(f"{self._path}: nothing to record; must be a system with outputs")
-        self._system = system
+        self._experiment = experiment
         self._types = [TYPES[s.kind] for s in signals]
         self._steps, self._rows = np.empty(PIECE, np.int64), np.empty((PIECE, len(signals)))
         self._filled = 0
@@ -81,7 +79,7 @@ class MdfListener:
         try:
             self._flush()
             if self._mdf.groups[0].channel_group.cycles_nr:
-                self._mdf.header.comment = _comment(self._system, complete)
+                self._mdf.header.comment = _comment(self._experiment, complete)
                 with in_one_piece(self._path) as part, part.open("wb+") as file:
                     self._mdf.save(file, compression=TRANSPOSED_DEFLATE)
         except OSError as error:
@@ -92,7 +90,7 @@ class MdfListener:
     def _flush(self) -> None:
         """Hand what has come together to asammdf."""
         rows = self._rows[: self._filled].T
-        time = times(self._steps[: self._filled], self._system.step_ns)
+        time = times(self._steps[: self._filled], self._experiment.step_ns)
         channels = [c.astype(element) for c, element in zip(rows, self._types, strict=True)]
         try:
             self._mdf.extend(0, [(samples, None) for samples in (time, *channels)])
@@ -125,9 +123,9 @@ def _channel(signal: Signal) -> asammdf.Signal:
     )
 
 
-def _comment(system: System, complete: bool) -> str:
+def _comment(experiment: Experiment, complete: bool) -> str:
     """The header's comment, in the XML that MDF 4 asks for."""
-    described = settings(system)
+    described = experiment.settings
     root = ElementTree.Element("HDcomment")
     ElementTree.SubElement(root, "TX").text = json.dumps(described)
     properties = ElementTree.SubElement(root, "common_properties")

@@ -7,8 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..errors import InputError, SimulationError
-from ..system.description import System
-from .listener import Signal, columns, times
+from .listener import Experiment, Signal, columns, times
 
 
 class MemoryListener:
@@ -22,17 +21,17 @@ class MemoryListener:
         self._every = every
         self._rows = 0
 
-    def begin(self, system: System, signals: Sequence[Signal]) -> None:
+    def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
         """Make room; InputError where the run does not fit into memory."""
-        self._system, self._signals = system, tuple(signals)
+        self._experiment, self._signals = experiment, tuple(signals)
         self._steps = np.empty(0, np.int64)
         self._table = np.empty((0, len(signals)))
-        total = system.total_steps
+        total = experiment.total_steps
         try:
             self._grow(total // self._every + 2)  # t = 0, and the last one besides every n-th
         except MemoryError:
             raise InputError(
-                f"{system.name}: {total} steps do not fit into memory; "
+                f"{experiment.name}: {total} steps do not fit into memory; "
                 "must have a longer step or an earlier stop, or record fewer of them"
             ) from None
 
@@ -44,7 +43,7 @@ class MemoryListener:
                 self._grow(max(end, 2 * len(self._steps)))
             except MemoryError:
                 raise SimulationError(
-                    f"{self._system.name}: {end} recorded rows do not fit into memory"
+                    f"{self._experiment.name}: {end} recorded rows do not fit into memory"
                 ) from None
         self._steps[self._rows : end] = steps
         self._table[self._rows : end] = rows
@@ -56,7 +55,7 @@ class MemoryListener:
     @property
     def time(self) -> npt.NDArray[np.float64]:
         """The recorded communication points in s, so far."""
-        return times(self._steps[: self._rows], self._system.step_ns)
+        return times(self._steps[: self._rows], self._experiment.step_ns)
 
     @property
     def signals(self) -> dict[str, npt.NDArray[Any]]:

@@ -1,4 +1,4 @@
-"""What a simulation leaves behind: every output at every communication point."""
+"""What a run leaves behind: every output at every communication point, as plain data."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -10,13 +10,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from .. import extensions
+from ..errors import InputError
 from ..files import in_one_piece, write_text
-from ..grasp.metrics import grasp_metrics
+from ..metrics.metric import Measured, Metric, Signals, measure, registered
 from ..realtime.timing import Timing
-from ..system.description import System
 from ..system.parts import NANOSECONDS
-from ..system.settings import settings
-from .listener import Listener, Signal
+from .csv import CsvListener
+from .listener import Experiment, Listener, Signal
+from .mdf import MdfListener
 from .proxies import proxy_figures
 
 KINDS = {"f": "Real", "i": "Integer", "b": "Boolean"}
@@ -24,6 +26,12 @@ KINDS = {"f": "Real", "i": "Integer", "b": "Boolean"}
 
 PIECE = 8192
 """Rows written at once."""
+
+UNITS: Mapping[str, str | None] = {
+    "wall_time": "s", "real_time_factor": "1", "steps": "1", "scheme": None, "step": "s",
+    "stop": "s", "complete": None,
+}  # fmt: skip
+"""What is told of every run beside its metrics, and the units."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,9 +44,13 @@ class Rejection:
 
 @dataclass(frozen=True, eq=False)
 class Result(Mapping[str, npt.NDArray[Any]]):
-    """Recorded signals by name, like result["plant.gap[1]"], on result.time in s."""
+    """Recorded signals by name, like result["plant.gap[1]"], on result.time in s.
 
-    system: System
+    It is the same whether it was just run or read back from a folder. Every signal has the shape
+    of `time`, (rows,). `settings` are those of system.settings, as in run.json.
+    """
+
+    settings: Mapping[str, Any]
     time: npt.NDArray[np.float64]
     signals: Mapping[str, npt.NDArray[Any]]
     units: Mapping[str, str | None]
@@ -52,6 +64,8 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     """What is worth knowing about the run, a line each."""
     timing: Timing | None = None
     """How it kept to the clock; None where it was not paced."""
+    more_metrics: tuple[Metric, ...] = ()
+    """Metrics that were asked for beside those that every result is asked for."""
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
         return self.signals[name]
@@ -62,60 +76,87 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     def __len__(self) -> int:
         return len(self.signals)
 
+    @property
+    def roles(self) -> Mapping[str, str]:
+        """The component that plays a role, where its name does not say it."""
+        roles: Mapping[str, str] = self.settings.get("roles", {})
+        return roles
+
+    @cached_property
+    def by_role(self) -> Signals:
+        """The signals by names that may begin with a role, as metrics take them."""
+        return Signals(self.time, self.signals, self.roles)
+
+    @cached_property
+    def measured(self) -> Measured:
+        """The metrics, their units, and why others cannot be had."""
+        return measure(self.by_role, registered(self.more_metrics))
+
     @cached_property
     def metrics(self) -> Mapping[str, Any]:
-        """The figures of `run --json`.
-
-        Those of the grasp only if there is a gripper plant, those of proxies if there are any.
-        """
+        """The metrics by name, then the figures of UNITS, then those of any proxies."""
         simulated = float(self.time[-1])
+        proxies = proxy_figures(self.time, self.signals)
         return {
-            **grasp_metrics(self.time, self.signals),
+            **self.measured.values,
             "wall_time": self.wall_time,
             "real_time_factor": simulated / self.wall_time if self.wall_time else 0.0,
             "steps": int(self._steps[-1]),
-            "scheme": self.system.scheme,
-            "step": self.system.step_ns / NANOSECONDS,
-            "stop": self.system.stop_ns / NANOSECONDS,
+            "scheme": self.settings["scheme"],
+            "step": self.settings["step"],
+            "stop": self.settings["stop"],
             "complete": self.complete,
-            **({"proxies": proxies} if (proxies := proxy_figures(self.time, self.signals)) else {}),
+            **({"proxies": proxies} if proxies else {}),
         }
+
+    @property
+    def metric_units(self) -> dict[str, str | None]:
+        """The units of the metrics by name; None where a value has none."""
+        return {**self.measured.units, **UNITS}
 
     def to_csv(self, path: str | Path) -> None:
         """Write time and signals with full precision, a line per communication point."""
-        from .csv import CsvListener  # which needs this module
-
         with in_one_piece(Path(path)) as part:
             self._play(CsvListener(part))
 
     def to_mdf(self, path: str | Path) -> None:
         """Write an ASAM MDF 4 file with the units and the settings; InputError without asammdf."""
-        from .mdf import MdfListener  # which needs this module
-
         with in_one_piece(Path(path)) as part:
             self._play(MdfListener(part))
 
     def to_json(self, path: str | Path) -> None:
-        """Write the metrics and the settings() that led to them, then what is known by signal
-        (units, types, descriptions), the log, the rejections by component, and, as "realtime",
-        the timing of a paced run.
+        """Write the metrics and the settings that led to them, then what is known by signal
+        (units, types, descriptions), the units of the metrics, the log, the rejections by
+        component, and, as "realtime", the timing of a paced run.
         """
         report = {
             **self.metrics,
-            **settings(self.system),
+            **self.settings,
             "units": dict(self.units),
             "types": {name: str(column.dtype) for name, column in self.signals.items()},
             "descriptions": dict(self.descriptions),
+            "metric_units": self.metric_units,
+            "missing_metrics": list(self.measured.missing),
             "log": list(self.log),
             "rejections": {name: asdict(r) for name, r in self.rejections.items()},
             **({"realtime": self.timing.as_dict()} if self.timing else {}),
         }
         write_text(Path(path), json.dumps(report, indent=2) + "\n")
 
+    def plot(self, path: str | Path) -> None:
+        """Draw the result as a PNG: a grasp as one, of any other system all signals.
+
+        InputError without matplotlib.
+        """
+        if not any(draw(self, Path(path)) for draw in extensions.drawings):
+            raise InputError(f"{path}: nothing to draw; must be a result with signals")
+
     @cached_property
     def _steps(self) -> npt.NDArray[np.int64]:
-        """The numbers of the recorded communication points."""
-        return np.rint(self.time * (NANOSECONDS / self.system.step_ns)).astype(np.int64)
+        """The numbers of the recorded communication points, shape (rows,)."""
+        step_ns = round(self.settings["step"] * NANOSECONDS)
+        steps: npt.NDArray[np.int64] = np.rint(self.time * (NANOSECONDS / step_ns)).astype(np.int64)
+        return steps
 
     def _play(self, listener: Listener) -> None:
         """Have a listener hear the recorded run again."""
@@ -125,7 +166,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
             )
             for name, column in self.signals.items()
         ]
-        listener.begin(self.system, signals)
+        listener.begin(Experiment.of(self.settings), signals)
         try:
             for first in range(0, len(self.time), PIECE):
                 piece = slice(first, first + PIECE)
@@ -136,9 +177,3 @@ class Result(Mapping[str, npt.NDArray[Any]]):
                 listener.block(steps, rows)
         finally:
             listener.end(self.complete)
-
-    def plot(self, path: str | Path) -> None:
-        """Draw the grasp as a PNG; InputError without matplotlib or without a gripper plant."""
-        from ..report.plot import plot_run  # which needs this module
-
-        plot_run(self, Path(path))

@@ -19,14 +19,13 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
 from ..files import write_text
-from ..grasp.metrics import CONTROLLER, FINGERS, PLANT, first_contact
+from ..grasp.metrics import FINGERS, first_contact, is_grasp
+from ..metrics.metric import resolved
 from ..realtime.timing import Timing
-from ..recording.load import SETTINGS as RUN_JSON
-from ..recording.load import Run
+from ..recording.result import Result
 from .embed import LIMIT, Shown, fit, packed
-from .tables import EXPERIMENT, SETTINGS, count, metrics_table, number, settings_html, summary
+from .tables import count, metrics_table, number, settings_html, summary
 from .timing_html import timing_html
 from .wiring import Link, wiring_svg
 
@@ -37,7 +36,7 @@ BEFORE, AFTER = 0.005, 0.03
 """s around a contact that a button zooms to."""
 
 
-def write_page(run: Run, title: str, path: Path, limit: int = LIMIT) -> None:
+def write_page(run: Result, title: str, path: Path, limit: int = LIMIT) -> None:
     """Write the page of a run; of more than limit values the signals are thinned, and it says so.
 
     InputError where run.json lacks an entry that the page shows.
@@ -45,13 +44,8 @@ def write_page(run: Run, title: str, path: Path, limit: int = LIMIT) -> None:
     write_text(path, page_html(run, title, limit))
 
 
-def page_html(run: Run, title: str, limit: int = LIMIT) -> str:
+def page_html(run: Result, title: str, limit: int = LIMIT) -> str:
     """The page as text, see write_page."""
-    for key in (*EXPERIMENT, *SETTINGS):
-        if key not in run.settings:
-            raise InputError(
-                f"{RUN_JSON} of {title}: no entry {key!r}; must be as `run --out` writes it now"
-            )
     shown = fit(run.time, run.signals, limit)
     grasp = _grasp(run)
     contacts = _contacts(run) if grasp else []
@@ -68,16 +62,16 @@ def page_html(run: Run, title: str, limit: int = LIMIT) -> str:
         "page.html",
         title=escape(title),
         style=_text("page.css"),
-        summary=summary(run.settings),
+        summary=summary(run.metrics),
         contents="".join(f'<a href="#{s}">{name}</a>' for s, name in sections.items()),
         grasp=_grasp_html(grasp, contacts) if grasp else "",
         zooms=_zooms(contacts),
         signals=_choice(run),
         exactness=_exactness(shown, len(run.time)),
-        metrics=metrics_table(run.settings),
+        metrics=metrics_table(run),
         timing=_timing_html(timing, float(run.time[-1])) if timing else "",
         wiring=_wiring(run),
-        settings=settings_html(run.settings),
+        settings=settings_html(run),
         version=escape(version("grasp-cosim")),
         page=_json(_state(run, shown, grasp, contacts)),
         data=_data(shown),
@@ -86,7 +80,10 @@ def page_html(run: Run, title: str, limit: int = LIMIT) -> str:
 
 
 def _state(
-    run: Run, shown: Shown, grasp: Mapping[str, Any] | None, contacts: Sequence[Mapping[str, float]]
+    run: Result,
+    shown: Shown,
+    grasp: Mapping[str, Any] | None,
+    contacts: Sequence[Mapping[str, float]],
 ) -> dict[str, Any]:
     """What the scripts are told, beside the values themselves."""
     return {
@@ -104,7 +101,7 @@ def _state(
         "shown": _at_first(run, grasp is not None),
         "marks": [
             *({"t": c["t"], "color": f"--finger{c['finger']}"} for c in contacts),
-            *({"t": t, "color": "--fault"} for t in _moments(run.settings["log"])),
+            *({"t": t, "color": "--fault"} for t in _moments(run.log)),
         ],
         "grasp": {**grasp, "contacts": contacts} if grasp else None,
     }
@@ -151,25 +148,24 @@ def _timing_html(timing: Timing, end: float) -> str:
 # The grasp -------------------------------------------------------------------------------------
 
 
-def _grasp(run: Run) -> dict[str, Any] | None:
+def _grasp(run: Result) -> dict[str, Any] | None:
     """The signals that the animation is drawn from, by finger; None without a gripper plant."""
+    if not is_grasp(run.by_role):
+        return None
     names: dict[str, Any] = {
-        quantity: {j: f"{PLANT}.{quantity}[{j}]" for j in FINGERS}
+        quantity: {j: resolved(f"plant.{quantity}[{j}]", run.roles) for j in FINGERS}
         for quantity in ("position", "gap", "velocity", "contact_force", "contact")
     }
-    wanted = {f"{PLANT}.object_position", *(n for named in names.values() for n in named.values())}
-    if not wanted <= set(run.signals):
-        return None
     names["actuator"] = _actuators(run)
-    target = f"{CONTROLLER}.target_position"
+    target = resolved("controller.target_position", run.roles)
     names["target"] = target if target in run.signals else None
     used = [n for named in names.values() if isinstance(named, dict) for n in named.values()]
     return {**names, "signals": used + ([target] if names["target"] else [])}
 
 
-def _actuators(run: Run) -> dict[int, str]:
+def _actuators(run: Result) -> dict[int, str]:
     """The recorded signal that is the force on each finger as it is, where there is one."""
-    forces = {f"{PLANT}.force[{j}]": j for j in FINGERS}
+    forces = {resolved(f"plant.force[{j}]", run.roles): j for j in FINGERS}
     return {
         forces[w["to"]]: w["from"]
         for w in run.settings["connections"]
@@ -180,18 +176,18 @@ def _actuators(run: Run) -> dict[int, str]:
     }
 
 
-def _contacts(run: Run) -> list[dict[str, float]]:
+def _contacts(run: Result) -> list[dict[str, float]]:
     """Each moment in s at which a finger begins to touch, in order of time.
 
     The first one of each finger is that of the metrics, later ones are the samples themselves.
     """
     found = []
     for j in FINGERS:
-        touching = np.asarray(run.signals[f"{PLANT}.contact[{j}]"]).astype(bool)
+        touching = np.asarray(run.by_role[f"plant.contact[{j}]"]).astype(bool)
         begins = np.flatnonzero(touching[1:] & ~touching[:-1]) + 1
-        first = first_contact(run.time, run.signals, j)
+        first = first_contact(run.by_role, j)
         later = begins if touching[0] else begins[1:]
-        moments = ([first[0]] if first else []) + run.time[later].tolist()
+        moments = ([first.time] if first else []) + run.time[later].tolist()
         found += [{"t": t, "finger": j} for t in moments]
     return sorted(found, key=lambda c: c["t"])
 
@@ -245,15 +241,15 @@ def _grasp_html(grasp: Mapping[str, Any], contacts: Sequence[Mapping[str, float]
 # Signals and connections -----------------------------------------------------------------------
 
 
-def _at_first(run: Run, grasp: bool) -> list[str]:
+def _at_first(run: Result, grasp: bool) -> list[str]:
     """The signals shown first."""
-    wanted = [f"{PLANT}.{v}[{j}]" for v in ("gap", "contact_force", "velocity") for j in FINGERS]
-    wanted += [f"{CONTROLLER}.target_position"]
+    wanted = [f"plant.{v}[{j}]" for v in ("gap", "contact_force", "velocity") for j in FINGERS]
+    wanted = [resolved(name, run.roles) for name in (*wanted, "controller.target_position")]
     chosen = [name for name in wanted if name in run.signals] if grasp else []
     return chosen or list(run.signals)[:AT_FIRST]
 
 
-def _choice(run: Run) -> str:
+def _choice(run: Result) -> str:
     """A box to tick per signal, in groups by component."""
     groups: dict[str, list[str]] = {}
     for name in run.signals:
@@ -282,7 +278,7 @@ def _moments(log: Sequence[str]) -> list[float]:
     return [float(match[1]) for match in found if match]
 
 
-def _wiring(run: Run) -> str:
+def _wiring(run: Result) -> str:
     faults: dict[str, list[str]] = {}
     for f in run.settings["faults"]:
         faults.setdefault(f["connection"], []).append(f["kind"])

@@ -1,24 +1,24 @@
-"""Figure of a step study: how the contact times err, and the energy that sampling creates."""
+"""Figure of a step study: how quantities err, and the energy that sampling creates."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..grasp.metrics import FINGERS
-from .plot import COLOR, GREY, finish, new_figure, save
+from .plot import BLUE, GREY, RED, finish, new_figure, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from ..convergence.step_study import StepStudy
 
+COLORS = (BLUE, RED, GREY)
 MARKERS = ("o", "s", "^", "D", "v", "P")
-"""One per finger or energy, so that lines on top of each other can be told apart."""
+"""One per quantity or energy, so that lines on top of each other can be told apart."""
 
 
 def draw_step_study(study: StepStudy, path: Path) -> None:
-    """Errors of the contact times over the step, below them energies if there are any; a PNG."""
+    """Errors of the quantities over the step, below them energies if there are any; a PNG."""
     # A logarithmic axis has no place for 0.
     names = list(dict.fromkeys(n for run in study.runs for n, e in run.energies.items() if e))
     figure = new_figure(7.2, 7.6 if names else 4.4)
@@ -34,30 +34,31 @@ def draw_step_study(study: StepStudy, path: Path) -> None:
 
 
 def _draw_errors(axes: Axes, study: StepStudy) -> None:
-    """Distance of the contact times from their limits, in ms, with the tolerance."""
+    """Distance of the quantities from their limits, with the tolerance."""
+    factor, unit = study.shown
     drawn: list[tuple[float, float]] = []
-    for j, convergence in study.fingers.items():
+    for i, (name, convergence) in enumerate(study.limits.items()):
         points = [
-            (1e3 * run.step, 1e3 * abs(error))
+            (1e3 * run.step, factor * abs(error))
             for run, error in zip(study.runs, convergence.errors, strict=True)
             if error
         ]
         order = "" if convergence.order is None else f", order {convergence.order:.2f}"
         axes.plot(
             *zip(*points, strict=True) if points else ([], []),
-            marker=MARKERS[FINGERS.index(j)],
-            markersize=9 - 3 * FINGERS.index(j),
-            color=COLOR[j],
-            mfc="none" if j == FINGERS[0] else COLOR[j],
-            label=f"finger {j}{order}",
+            marker=MARKERS[i % len(MARKERS)],
+            markersize=max(9 - 3 * i, 4),
+            color=COLORS[i % len(COLORS)],
+            mfc="none" if i == 0 else COLORS[i % len(COLORS)],
+            label=f"{name}{order}",
         )
         drawn += points
-    tolerance = 1e3 * study.tolerance
-    axes.axhline(tolerance, color=GREY, linestyle="--", label=f"tolerance, {tolerance:g} ms")
+    tolerance = factor * study.tolerance
+    axes.axhline(tolerance, color=GREY, linestyle="--", label=f"tolerance, {tolerance:g} {unit}")
     if len(drawn) > 1:
         _draw_slope(axes, drawn)
     _set_scales(axes, study)
-    finish(axes, "error of the contact time in ms")
+    finish(axes, f"error in {unit}" if unit else "error")
     axes.set_title(f"{study.system}, {study.scheme}", fontsize=10)
 
 
@@ -81,9 +82,8 @@ def _draw_slope(axes: Axes, points: list[tuple[float, float]]) -> None:
 
 def _draw_energies(axes: Axes, study: StepStudy, names: list[str]) -> None:
     """Magnitude of each energy at the end in uJ; an open marker is energy lost."""
-    colors = [*COLOR.values(), GREY]
     for i, name in enumerate(names):
-        color = colors[i % len(colors)]
+        color = COLORS[i % len(COLORS)]
         ends = [(1e3 * run.step, 1e6 * run.energies.get(name, 0.0)) for run in study.runs]
         found = [(h, e) for h, e in ends if e]
         axes.plot([h for h, _ in found], [abs(e) for _, e in found], color=color, label=name)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from ..grasp.metrics import UNITS
-from ..sweep.study import METRICS, Map, Study
+from ..sweep.study import Map, Study
 from ..sweep.sweep import Sweep
 from .plot import BLUE, GREY, RED, finish, new_figure, save
 
@@ -79,7 +77,7 @@ def _draw_map(sweep: Sweep, wanted: Map, path: Path) -> None:
         axes.scatter(x[~there], y[~there], s=14, color=MISSING)
         shown = axes.scatter(x[there], y[there], c=z[there], s=14, **options)
     if not np.isfinite(z).all():
-        axes.fill([], [], color=MISSING, label=f"no {_plain(wanted.of)}")
+        axes.fill([], [], color=MISSING, label=f"no {_title(sweep.study, wanted.of)}")
     if np.isfinite(z).any():
         mean = "mean of " if cells and len(z) > cells[2].size else ""
         bar = figure.colorbar(shown, ax=axes, label=mean + _label(sweep.study, wanted.of))
@@ -206,11 +204,19 @@ def _runs(count: int) -> str:
 def _label(study: Study, name: str) -> str:
     """A parameter or metric with its unit."""
     unit = _unit(study, name)
-    return f"{_plain(name)} in {unit}" if unit and unit != "1" else _plain(name)
+    title = _title(study, name)
+    return f"{title} in {unit}" if unit and unit != "1" else title
 
 
 def _named(study: Study, name: str, value: float) -> str:
-    return f"{_plain(name)} = {value:g} {_unit(study, name) or ''}".rstrip()
+    return f"{_title(study, name)} = {value:g} {_unit(study, name) or ''}".rstrip()
+
+
+def _title(study: Study, name: str) -> str:
+    """A column as it is read."""
+    metric = study.metric_of(name)
+    known = metric is not None and name in metric.columns
+    return _plain(metric.column_title(name) if metric and known else name)
 
 
 def _unit(study: Study, name: str) -> str | None:
@@ -219,11 +225,10 @@ def _unit(study: Study, name: str) -> str | None:
             return None if p.ratio_to is not None else study.variable(p.variables[0]).unit
     if name in study.outputs:
         return study.variable(name).unit
-    return UNITS.get(name.partition("[")[0])
+    metric = study.metric_of(name)
+    return metric.unit if metric else None
 
 
 def _plain(name: str) -> str:
-    """A name as it is read, of which matplotlib makes no formula."""
-    if name in METRICS:
-        name = re.sub(r"\[(\d)\]$", r", finger \1", name).replace("_", " ")
+    """A name of which matplotlib makes no formula."""
     return name.replace("$", r"\$")

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
 from html import escape
 from typing import Any
 
-from ..grasp.metrics import FINGERS, LABELS
+from ..recording.result import Result
 
 EXPERIMENT = (
     "system",
@@ -21,13 +22,6 @@ EXPERIMENT = (
 )
 """Entries of run.json that say how the run was made, in the order in which they are shown."""
 
-SETTINGS = ("components", "connections", "events", "faults", "log", "rejections")
-"""Those that are shown as lists of their own."""
-
-TIMING, PROXIES = "realtime", "proxies"
-"""The entries that a paced run has more, its timing, and one with proxies: the log has them."""
-
-_ABOUT_SIGNALS = ("units", "types", "descriptions")
 _UNITS = {"step": "s", "stop": "s", "wall_time": "s"}
 
 
@@ -43,28 +37,27 @@ def summary(run: Mapping[str, Any]) -> str:
     return text
 
 
-def metrics_table(run: Mapping[str, Any]) -> str:
-    """The metrics of the grasp with a column per finger, then any others as they are."""
-    known = [entry for entry in LABELS if entry[1] in run]
-    shown = {
-        *(key for _, key, _, _ in LABELS),
-        *EXPERIMENT,
-        *SETTINGS,
-        *_ABOUT_SIGNALS,
-        TIMING,
-        PROXIES,
-    }
-    others = [key for key in run if key not in shown]
-    if not known and not others:
-        return "<p>There are no metrics of this system.</p>"
-    rows = [_metric(label, run[key], factor, unit) for label, key, factor, unit in known]
-    rows += [_metric(key.replace("_", " "), run[key], 1.0, "") for key in others]
-    fingers = "".join(f'<th class="n"><span class="key{j}">finger {j}</span></th>' for j in FINGERS)
-    return table(f"<th></th>{fingers}<th></th>" if known else "", rows)
+def metrics_table(result: Result) -> str:
+    """The metrics of a result, a column for each of several values, and why others are missing."""
+    measured = result.measured
+    rows = [
+        _metric(m.title, measured.values[m.name], m.factor, m.display_unit)
+        for m in measured.metrics
+    ]
+    why = "".join(f"<p>{escape(line)}</p>" for line in measured.missing)
+    if not rows:
+        return why or "<p>There are no metrics of this system.</p>"
+    entries = next((m.entries for m in measured.metrics if m.entries), ("", ""))
+    heads = "".join(
+        f'<th class="n"><span class="key{j}">{escape(entry)}</span></th>'
+        for j, entry in enumerate(entries, start=1)
+    )
+    return table(f"<th></th>{heads}<th></th>", rows) + why
 
 
-def settings_html(run: Mapping[str, Any]) -> str:
+def settings_html(result: Result) -> str:
     """Components, experiment, events, faults, log and discarded steps."""
+    run = {**result.metrics, **result.settings}
     components = [
         (
             f"<td>{escape(name)}</td><td>{escape(c['fmu'])}</td>"
@@ -82,10 +75,10 @@ def settings_html(run: Mapping[str, Any]) -> str:
     lists = [
         bullets("Events", map(entries, run["events"]), "No events."),
         bullets("Faults on connections", map(entries, run["faults"]), "No faults."),
-        bullets("Log", run["log"], "Nothing to report."),
+        bullets("Log", result.log, "Nothing to report."),
         bullets(
             "Steps discarded or cut short",
-            (f"{name}: {entries(about)}" for name, about in run["rejections"].items()),
+            (f"{name}: {entries(asdict(r))}" for name, r in result.rejections.items()),
             "None.",
         ),
     ]

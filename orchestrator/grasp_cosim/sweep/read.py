@@ -1,8 +1,9 @@
 """A study from a TOML file.
 
     system = "grasp.toml"           # or an .ssp, relative to this file; else the built-in one
-    bench = true                    # the grasp as on the bench, as in `run --bench`; else false
-    case = 2                        # 0, 1 or 2, of a grasp; may be left out, as step and stop
+    presets = ["bench"]             # of the system; bench = true and case = 2 are short for
+                                    # "bench" and "case_2"; may be left out, as step and stop
+    metrics = "my_metrics.py"       # metrics beside those of every result, relative to this file
     step = 1e-3                     # s
     stop = 3.0                      # s
     seeds = ["sensor_1.noise.seed"] # get another whole number in each run (in each two of a row of
@@ -35,31 +36,31 @@ uniform = { low, high }, normal = { mean, standard_deviation, low, high }.
 
 import math
 import sys
-import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ..checks import as_table, check_keys
+from ..checks import as_table, check_keys, toml_table, whole
 from ..errors import InputError, choices
-from ..grasp.system import CASES, with_bench
 from ..interface.interface import Value
+from ..metrics.metric import Metric, load_metrics
 from ..system.description import System
 from .design import Design
 from .distributions import Distribution, Listed, Normal, Uniform, spaced
 from .study import Map, Parameter, Pictures, Study
 
-STUDIES = Path(__file__).parent.parent / "grasp" / "studies"
-"""The folder of the built-in studies."""
-
 KEYS = {
-    "system", "bench", "case", "step", "stop", "seeds", "outputs", "swap", "values", "design",
-    "parameters", "figures",
+    "system", "presets", "bench", "case", "metrics", "step", "stop", "seeds", "outputs", "swap",
+    "values", "design", "parameters", "figures",
 }  # fmt: skip
 
 Made = TypeVar("Made")
 Load = Callable[[Path | None], System]
 """Reads a system; None stands for the built-in one."""
+
+Preset = Callable[[System, str], System]
+"""Applies a preset of that name to a system."""
 
 MOST_LEVELS = 100_000
 """Values of one parameter at most."""
@@ -68,28 +69,27 @@ WIDEST = 1e6
 """A normal distribution of which so little is left keeps 9 digits of its quantiles."""
 
 
-def built_in() -> list[str]:
-    """The names of the built-in studies."""
-    return sorted(path.stem for path in STUDIES.glob("*.toml"))
-
-
-def study_file(name: str) -> Path:
-    """The file of a study, given by its path or by the name of a built-in one."""
-    path = Path(name)
-    if path.suffix != ".toml" and name in built_in():
-        return STUDIES / f"{name}.toml"
+def study_file(name: str, folder: Path) -> Path:
+    """The file of a study, given by its path or by the name of one in the folder of studies."""
+    path, known = Path(name), sorted(p.stem for p in folder.glob("*.toml"))
+    if path.suffix != ".toml" and name in known:
+        return folder / f"{name}.toml"
     if not path.is_file():
-        raise InputError(f"{path}: no such study; must be a .toml file or {choices(built_in())}")
+        raise InputError(f"{path}: no such study; must be a .toml file or {choices(known)}")
     return path
 
 
-def read_study(path: Path, load: Load) -> Study:
-    """The study of a TOML file; load reads its system. InputError where anything is wrong."""
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-        repr(table)  # where a hexadecimal number is longer than Python writes, it says so here
-    except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"{path}: not readable as TOML: {error}") from error
+def read_study(
+    path: Path,
+    load: Load,
+    preset: Preset = System.with_presets,
+    metrics: Sequence[Metric] = (),
+) -> Study:
+    """The study of a TOML file; `load` reads its system, `preset` applies a preset to it.
+
+    `metrics` are kept beside those that the file names. InputError where anything is wrong.
+    """
+    table = toml_table(path, "study")
     place = path.name
     check_keys(place, table, KEYS)
     design = as_table(f"{place}: [design]", table.get("design"))
@@ -109,29 +109,41 @@ def read_study(path: Path, load: Load) -> Study:
     return Study(
         place,
         _system(
-            place, table, path.parent, load, {*seeds, *(v for p in parameters for v in p.variables)}
+            place,
+            table,
+            path.parent,
+            (load, preset),
+            {*seeds, *(v for p in parameters for v in p.variables)},
         ),
         parameters,
         _in(place, lambda: Design(**design)),
         seeds,
         _names(f"{place}: outputs", table.get("outputs", [])),
         _pictures(f"{place}: [figures]", table.get("figures", {})),
+        (*_metrics(place, table.get("metrics"), path.parent), *metrics),
     )
 
 
+def _metrics(place: str, name: Any, folder: Path) -> tuple[Metric, ...]:
+    if name is None:
+        return ()
+    if not isinstance(name, str):
+        raise InputError(f"{place}: metrics = {name!r}: must be the path of a Python file")
+    return load_metrics(folder / name)
+
+
 def _system(
-    place: str, table: Mapping[str, Any], folder: Path, load: Load, varied: set[str]
+    place: str,
+    table: Mapping[str, Any],
+    folder: Path,
+    made: tuple[Load, Preset],
+    varied: set[str],
 ) -> System:
     """The system with what is the same in all runs."""
     name = table.get("system")
     if name is not None and not isinstance(name, str):
         raise InputError(f"{place}: system = {name!r}: must be the path of a .toml or .ssp file")
-    bench = table.get("bench", False)
-    if not isinstance(bench, bool):
-        raise InputError(f"{place}: bench = {bench!r}: must be true or false")
-    case = table.get("case")
-    if isinstance(case, bool) or case not in (None, *CASES):
-        raise InputError(f"{place}: case = {case!r}: must be one of {choices(CASES)}")
+    presets = _presets(place, table)
     swaps = as_table(f"{place}: [swap]", table.get("swap", {}))
     for key, fmu in swaps.items():
         if not isinstance(fmu, str):
@@ -144,17 +156,29 @@ def _system(
                 f"{place}: [values]: {key}: is varied by [[parameters]] or seeds, too; must be in "
                 "one of them"
             )
+    load, with_preset = made
     system = load(None if name is None else folder / name)
-    if bench:
-        system = _in(f"{place}: bench = true", lambda: with_bench(system))
-    if case is not None:
-        system = system.revised({}, CASES[case], ("", f"{place}: case = {case}"))
+    for said, preset in presets.items():
+        system = _in(f"{place}: {said}", partial(with_preset, system, preset))
     revised = system.revised(
         {key: folder / fmu for key, fmu in swaps.items()},
         fixed,
         (f"{place}: [swap]", f"{place}: [values]"),
     )
     return _in(place, lambda: revised.with_experiment(table.get("step"), table.get("stop")))
+
+
+def _presets(place: str, table: Mapping[str, Any]) -> dict[str, str]:
+    """The presets that are asked for, by what asks for them."""
+    found = {f"presets: {n}": n for n in _names(f"{place}: presets", table.get("presets", []))}
+    bench, case = table.get("bench", False), table.get("case")
+    if not isinstance(bench, bool):
+        raise InputError(f"{place}: bench = {bench!r}: must be true or false")
+    if bench:
+        found["bench = true"] = "bench"
+    if case is not None:
+        found[f"case = {case}"] = f"case_{whole(f'{place}: case', case, 0)}"
+    return found
 
 
 def _parameter(place: str, entry: Any) -> Parameter:

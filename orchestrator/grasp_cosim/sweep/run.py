@@ -7,21 +7,18 @@ from typing import Any
 from ..errors import InputError, SimulationError
 from ..interface.interface import Value
 from ..master.simulation import simulate
-from ..recording.result import Result
+from ..metrics.metric import Metric
+from ..recording.result import UNITS, Result
 from ..system.description import System
-
-BOOKKEEPING = {
-    "wall_time", "real_time_factor", "steps", "scheme", "step", "stop", "complete",
-}  # fmt: skip
-"""Metrics that are the same in all runs, or that another run of the same values does not have."""
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """What all runs share: the system, and the signals whose last value is kept."""
+    """What all runs share: the system, the signals whose last value is kept, a user's metrics."""
 
     system: System
     outputs: tuple[str, ...]
+    metrics: tuple[Metric, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +41,7 @@ class Outcome:
 def run_job(task: Task, job: Job) -> Outcome:
     """Run a job; one that fails is an outcome, too. KeyboardInterrupt where it was interrupted."""
     try:
-        result = simulate(task.system.with_values(job.values))
+        result = simulate(task.system.with_values(job.values), metrics=task.metrics)
     except (InputError, SimulationError) as error:
         return Outcome(job.index, {}, str(error))
     if not result.complete:
@@ -53,7 +50,7 @@ def run_job(task: Task, job: Job) -> Outcome:
 
 
 def _kept(result: Result, outputs: tuple[str, ...]) -> dict[str, Value | None]:
-    metrics = {k: v for k, v in result.metrics.items() if k not in BOOKKEEPING}
+    metrics = {k: v for k, v in result.metrics.items() if k not in UNITS}
     last = {name: result[name][-1].item() for name in outputs}
     return dict(_flat("", {**metrics, **last}))
 

@@ -11,32 +11,15 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, choices
-from ..grasp.metrics import FINGERS, OF_FINGERS, OF_OBJECT, PLANT, UNITS, is_grasp
 from ..interface.interface import Value, Variable
+from ..metrics.metric import Metric, available, registered
 from ..system.description import System
 from ..system.settings import settings
 from .design import MOST, Design, Points
 from .distributions import Distribution
 
-METRICS = (
-    *(f"{name}[{j}]" for name in OF_FINGERS for j in FINGERS),
-    *(name for name in UNITS if name not in OF_FINGERS),
-)
-"""Columns of the results of a grasp; those of the object only where the plant has the outputs."""
-
-RESERVED = ("index", "error", *UNITS, *METRICS)
-"""Columns of the results that no parameter may be called."""
-
 PROXIES = "proxies."
 """How columns begin that a system with proxies has besides."""
-
-
-def grasp_columns(outputs: Sequence[str]) -> list[str]:
-    """The metrics' columns of a system with these outputs, none where it is not a grasp."""
-    if not is_grasp(outputs):
-        return []
-    there = {name for name, output in OF_OBJECT.items() if f"{PLANT}.{output}" in outputs}
-    return [name for name in METRICS if name not in OF_OBJECT or name in there]
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,8 +58,8 @@ class Study:
     """A checked study. The system has the fixed values already.
 
     seeds are variables that get another whole number in each run, each its own, but see _noise();
-    outputs are signals whose last value is kept beside the metrics. InputError where anything does
-    not fit.
+    outputs are signals whose last value is kept beside the metrics; metrics are those beside the
+    ones that every result is asked for. InputError where anything does not fit.
     """
 
     name: str
@@ -86,6 +69,7 @@ class Study:
     seeds: tuple[str, ...] = ()
     outputs: tuple[str, ...] = ()
     pictures: Pictures = field(default=Pictures(), compare=False)
+    metrics: tuple[Metric, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.parameters:
@@ -156,6 +140,7 @@ class Study:
             "design": asdict(self.design),
             "seeds": self.seeds,
             "outputs": self.outputs,
+            **({"metrics": [m.origin or m.name for m in self.metrics]} if self.metrics else {}),
         }
 
     @property
@@ -209,7 +194,8 @@ class Study:
             twice = next((n for n in listed if listed.count(n) > 1), None)
             if twice is not None:
                 raise InputError(f"{self.name}: {what} {twice!r} twice; must be there once")
-        taken = {*RESERVED, *self.outputs, *self.seeds}
+        known = [name for m in registered(self.metrics) for name in (m.name, *m.columns)]
+        taken = {"index", "error", *known, *self.outputs, *self.seeds}
         wrong = next((n for n in names if n in taken or n.startswith(PROXIES)), None)
         if wrong is not None:
             raise InputError(
@@ -231,7 +217,7 @@ class Study:
             for p in self.parameters
             if not any(isinstance(x, str) for x in p.distribution.extremes)
         ]
-        results = [*grasp_columns(self._declared), *self.outputs]
+        results = [*(c for m in self.expected for c in m.columns), *self.outputs]
         columns = [*numeric, *self.seeds, *results]
         picture = self.pictures.map
         if picture:
@@ -246,11 +232,24 @@ class Study:
                     f"{self.name}: figures.map: x = y = {picture.x!r}; must be two parameters"
                 )
         for name in (*([picture.of] if picture else ()), *self.pictures.distributions):
-            if name not in columns and not name.startswith(PROXIES):
+            if not (name in columns or name.startswith(PROXIES) or self.metric_of(name)):
                 raise InputError(
                     f"{self.name}: figures: no column {name!r} in the results; valid: "
                     f"{choices(columns)}"
                 )
+
+    @cached_property
+    def expected(self) -> list[Metric]:
+        """The metrics that the outputs of the system permit."""
+        return available(registered(self.metrics), self._declared, self.system.roles)[0]
+
+    def metric_of(self, column: str) -> Metric | None:
+        """The metric whose column this is; of a user's metric any column with its name."""
+        name, bracket, _ = column.partition("[")
+        found = next((m for m in self.expected if m.name == name), None)
+        if found is None or column in found.columns or (bracket and not found.entries):
+            return found
+        return None
 
     @property
     def _declared(self) -> list[str]:
@@ -266,10 +265,11 @@ class Study:
                 raise InputError(
                     f"{self.name}: outputs: no output {name!r}; valid: {choices(declared)}"
                 )
-        if not self.outputs and not is_grasp(declared):
+        if not self.outputs and not self.expected:
+            reasons = available(registered(self.metrics), declared, self.system.roles)[1]
             raise InputError(
                 f"{self.name}: nothing to keep of a run; must have outputs = [...], or a system "
-                "with a gripper plant and a controller"
+                f"whose signals metrics need{f' ({choices(reasons)})' if reasons else ''}"
             )
 
     def _check_seed(self, name: str) -> None:

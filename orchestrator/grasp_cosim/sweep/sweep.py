@@ -104,7 +104,7 @@ def _finish(
     done = store.open(study)
     resumed = len(done)
     left = (Job(i, study.values(i)) for i in range(study.runs) if i not in done)
-    task = Task(study.system, study.outputs)
+    task = Task(study.system, study.outputs, study.metrics)
     bar = tqdm(
         total=study.runs,
         initial=resumed,

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, get_args
 
+from .. import extensions
 from ..errors import InputError, choices
 from ..interface.interface import Value
 from .checks import (
@@ -28,7 +29,9 @@ class System:
     """A checked system: every name exists, every input has one source or keeps a value.
 
     step_ns and stop_ns are in nanoseconds; stop_ns is a whole multiple of step_ns, and so is the
-    step of each component. notes are what its reader decided or did not use, one line each.
+    step of each component. notes are what its reader decided or did not use, one line each. roles
+    name the component that plays a role, such as plant; where they do not, the component of that
+    name plays it. presets are values under a name, like {"bench": {"sensor_1.noise.seed": 1}}.
     """
 
     name: str
@@ -41,6 +44,8 @@ class System:
     faults: tuple[Fault, ...] = ()
     initialisation: Initialisation = Initialisation()
     notes: tuple[str, ...] = field(default=(), compare=False)
+    roles: Mapping[str, str] = field(default_factory=dict)
+    presets: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         check_steps(self)
@@ -51,6 +56,8 @@ class System:
         check_connections(self)
         check_scenario(self)
         check_initialisation(self)
+        for role, name in self.roles.items():
+            self.component(name, f"{self.name}: [roles]: {role} = {name!r}")
 
     @classmethod
     def load(
@@ -66,17 +73,9 @@ class System:
         fmus is where the FMUs of a TOML file are, by default beside it; an archive has its own.
         """
         path = Path(path)
-        if path.suffix.lower() == ".ssp":
-            from ..ssp.read import read_ssp  # which needs this module
-
-            if fmus is not None:
-                raise InputError(
-                    f"{path}: has its own FMUs; those in {fmus} cannot take their place"
-                )
-            return read_ssp(path, step, stop)
-        from .toml import read_toml  # which needs this module
-
-        return read_toml(path, Path(fmus) if fmus else None).with_experiment(step, stop)
+        reader = extensions.readers.get(path.suffix.lower(), extensions.readers[".toml"])
+        system: System = reader(path, Path(fmus) if fmus else None, step, stop)
+        return system
 
     @property
     def total_steps(self) -> int:
@@ -135,6 +134,19 @@ class System:
             kept = [v for v in components[name].values if f"{name}.{v}" not in values]
             check_items(self.component(name, name), components[name], kept, f"{places[0]} {name}")
         return replace(self, components=tuple(components.values()))
+
+    def with_presets(self, *names: str) -> "System":
+        """A copy with the values of presets, a later one before an earlier one."""
+        system = self
+        for name in names:
+            if name not in self.presets:
+                raise InputError(
+                    f"{self.name}: no preset {name!r}; valid: {choices(self.presets)}; a system "
+                    "file has them as [presets.NAME]"
+                )
+            place = f"{self.name}: [presets.{name}]"
+            system = system.revised({}, self.presets[name], (place, place))
+        return system
 
     def with_experiment(
         self,

@@ -24,6 +24,7 @@ def settings(system: System) -> dict[str, Any]:
             "iterations": loops.iterations,
         },
         "components": {c.name: _component(c) for c in system.components},
+        "roles": dict(system.roles),
         "connections": [_connection(w) for w in system.connections],
         "events": [event_entry(e) for e in system.events],
         "faults": [fault_entry(f) for f in system.faults],

@@ -22,40 +22,41 @@ Without factor and offset, units that differ are converted.
     tolerance = 1e-10               # relative, of the iteration
     iterations = 50                 # at most
 
+    [roles]                         # who plays which part, where the names do not say it
+    plant = "gripper"
+
+    [presets.bench]                 # values under a name, for run --preset bench
+    "sensor_1.noise.enabled" = true
+
 Every input has exactly one source: a connection or a value. [[events]] and [[faults]]: see
 scenario.py.
 """
 
-import tomllib
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..checks import as_table, check_keys
+from ..checks import as_table, check_keys, check_values, toml_table
 from ..errors import InputError, choices
-from ..interface.interface import read_interface
+from ..interface.interface import Value, read_interface
 from .description import System, as_scheme, in_nanoseconds
 from .parts import ISOLATIONS, Component, Connection, Initialisation, Isolation, Port
 from .scenario import read_events, read_faults
 
+KEYS = (
+    "experiment", "components", "connections", "initialisation", "events", "faults", "roles",
+    "presets",
+)  # fmt: skip
+"""The entries of a system file."""
+
 
 def read_toml(path: Path, fmus: Path | None = None) -> System:
     """The system of a TOML file; fmus is where its FMUs are, by default beside the file."""
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such system file") from None
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"{path}: not readable as TOML: {error}") from error
-    return _from_table(path.name, table, fmus or path.parent)
+    return _from_table(path.name, toml_table(path, "system file"), fmus or path.parent)
 
 
 def _from_table(place: str, table: dict[str, Any], folder: Path) -> System:
-    check_keys(
-        place,
-        table,
-        {"experiment", "components", "connections", "initialisation", "events", "faults"},
-    )
+    check_keys(place, table, KEYS)
     experiment = as_table(f"{place}: [experiment]", table.get("experiment"))
     check_keys(f"{place}: [experiment]", experiment, {"step", "stop", "scheme"})
     components = as_table(f"{place}: [components]", table.get("components"))
@@ -75,7 +76,25 @@ def _from_table(place: str, table: dict[str, Any], folder: Path) -> System:
         read_events(place, table.get("events", [])),
         read_faults(place, table.get("faults", []), connections),
         read_initialisation(f"{place}: [initialisation]", table.get("initialisation", {})),
+        roles=_roles(f"{place}: [roles]", table.get("roles", {})),
+        presets=read_presets(f"{place}: [presets]", table.get("presets", {})),
     )
+
+
+def _roles(place: str, table: Any) -> dict[str, str]:
+    roles = as_table(place, table)
+    for role, name in roles.items():
+        if not isinstance(name, str):
+            raise InputError(f"{place}: {role} = {name!r}: must be the name of a component")
+    return roles
+
+
+def read_presets(place: str, table: Any) -> dict[str, dict[str, Value]]:
+    """The presets of a table of tables; what the values may be is checked where one is used."""
+    presets = as_table(place, table)
+    for name, values in presets.items():
+        check_values(f"{place[:-1]}.{name}]", as_table(f"{place[:-1]}.{name}]", values))
+    return presets
 
 
 def read_initialisation(place: str, table: Any) -> Initialisation:
@@ -93,11 +112,7 @@ def _component(place: str, name: str, entry: Any, folder: Path) -> Component:
     if not isinstance(fmu, str):
         raise InputError(f"{place}: fmu = {fmu!r}: must be the path of an FMU, as a string")
     values = as_table(f"{place}: values", entry.get("values", {}))
-    for key, value in values.items():
-        if not isinstance(value, float | int | bool | str):
-            raise InputError(
-                f"{place}: values.{key} = {value!r}: must be a number, boolean or string"
-            )
+    check_values(f"{place}: values", values)
     own = entry.get("step")
     component = Component(
         name,

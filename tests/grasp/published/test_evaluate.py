@@ -9,7 +9,7 @@ import pytest
 from conftest import MadeOnce
 from grasp_cosim import System, simulate
 from grasp_cosim.grasp.published.evaluate import evaluate
-from grasp_cosim.grasp.system import CASES
+from support.cases import CASES
 
 pytestmark = pytest.mark.slow
 

@@ -10,9 +10,11 @@ import pytest
 from conftest import MadeOnce, Run
 from grasp_cosim import InputError, System
 from grasp_cosim.grasp.closing import close
+from grasp_cosim.grasp.presets import with_bench
 from grasp_cosim.grasp.published.bench import evaluate_bench, run_settings
 from grasp_cosim.grasp.published.tables import Setting
-from grasp_cosim.grasp.system import BENCH, CASES, with_bench
+from grasp_cosim.grasp.system import BENCH
+from support.cases import CASES
 
 QUIET = {f"sensor_{j}.noise.enabled": False for j in (1, 2)}
 """Noise acts by the sampled xi'/xi, so with it 1 ms steps are not the bench's."""

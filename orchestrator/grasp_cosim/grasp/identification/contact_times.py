@@ -19,8 +19,8 @@ from ...parallel import processes
 from ...system.description import System
 from ..closing import close
 from ..metrics import FINGERS
+from ..presets import CASES, with_case
 from ..published.tables import Row, Setting, experimental_rows
-from ..system import CASES
 from .fit import Fit, Parameter, Vector, check_scipy, fit
 from .parameters import RATIO
 
@@ -163,7 +163,7 @@ def contact_times(job: tuple[System, Grasp]) -> Times:
     own = values.get(RATIO, system.start(RATIO))
     values |= {"plant.initial_object_position": grasp.x_m, RATIO: own * grasp.ratio}
     try:
-        result = close(system.with_values({**CASES[grasp.case], **values}), after=0.0)
+        result = close(with_case(system, grasp.case).with_values(values), after=0.0)
     except (InputError, SimulationError) as error:
         error.args = (f"x_m = {grasp.x_m:g} m, Case {grasp.case}: {error}",)
         raise
@@ -195,7 +195,7 @@ def _read(place: str, names: Sequence[str], line: Sequence[str]) -> Contact:
         if not np.isfinite(numbers[name]):
             raise InputError(f"{place}: {name} = {text}: must be a finite number")
     case, finger = numbers["case"], numbers["finger"]
-    for name, valid in (("case", tuple(CASES)), ("finger", FINGERS)):
+    for name, valid in (("case", CASES), ("finger", FINGERS)):
         if numbers[name] not in valid:
             raise InputError(
                 f"{place}: {name} = {numbers[name]:g}: must be one of {choices(valid)}"

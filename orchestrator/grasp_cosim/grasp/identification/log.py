@@ -18,7 +18,7 @@ import numpy as np
 from ...errors import InputError, choices
 from ...recording.load import Log
 from ...system.description import System
-from ..metrics import CONTROLLER, FINGERS, PLANT
+from ..metrics import FINGERS
 from .fit import Fit, Parameter, Vector, fit
 from .parameters import FRICTION
 
@@ -70,7 +70,7 @@ def identify_from_log(
 
 
 def _windows(system: System, log: Log, finger: int, place: str) -> Windows:
-    mass = system.start(f"{PLANT}.finger_mass[{finger}]")
+    mass = system.start(f"plant.finger_mass[{finger}]")
     step = _step(log.time, place)
     size = int(WINDOW / step + 1e-6) + 1
 
@@ -80,7 +80,7 @@ def _windows(system: System, log: Log, finger: int, place: str) -> Windows:
 
     v, force, touch = (
         cut(_signal(log, f"{name}[{finger}]", place))
-        for name in (f"{PLANT}.velocity", f"{CONTROLLER}.force", f"{PLANT}.contact_force")
+        for name in ("plant.velocity", "controller.force", "plant.contact_force")
     )
     time = cut(log.time)
     way = np.sign(v[:, 0])

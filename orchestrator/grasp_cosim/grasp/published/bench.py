@@ -7,10 +7,11 @@ from typing import Any
 
 from ...files import write_text
 from ...parallel import run_all
-from ...report.plot import draw_colour_times, draw_contact_times, new_figure, save
+from ...report.plot import new_figure, save
 from ...system.description import System
 from ..closing import close
-from ..system import CASES
+from ..pictures import draw_colour_times, draw_contact_times
+from ..presets import CASES, with_case
 from .bench_claims import check_bench_claims, equal_colours
 from .evaluate import compared, draw_signals, root_mean_square
 from .grasps import Run, Runs, as_run, steady
@@ -86,12 +87,11 @@ def bench_rms(published: Sequence[Row], rows: Sequence[dict[str, Any]]) -> dict[
 def _run(job: tuple[System, Setting, int]) -> Run:
     system, setting, case = job
     values = {
-        **CASES[case],
         "plant.initial_object_position": setting.x_m,
         "sensor_1.reflectance": setting.alpha_1 * system.start("sensor_1.reflectance"),
         "sensor_2.reflectance": setting.alpha_2 * system.start("sensor_2.reflectance"),
     }
-    result = close(system.with_values(values).with_experiment(stop=STOP), AFTER)
+    result = close(with_case(system, case).with_values(values).with_experiment(stop=STOP), AFTER)
     return as_run(result, setting, case)
 
 

@@ -9,9 +9,10 @@ from typing import Any
 from ...files import write_text
 from ...master.simulation import simulate
 from ...parallel import run_all
-from ...report.plot import draw_contact_forces, draw_contact_times, draw_targets, new_figure, save
+from ...report.plot import new_figure, save
 from ...system.description import System
-from ..system import CASES
+from ..pictures import draw_contact_forces, draw_contact_times, draw_targets
+from ..presets import CASES, with_case
 from .claims import check_claims
 from .grasps import Run, Runs, as_run, steady
 from .report import markdown, table_csv
@@ -53,8 +54,8 @@ def evaluate(system: System, out: Path, workers: int, progress: bool) -> dict[st
 
 def _run(job: tuple[System, Setting, int]) -> Run:
     system, setting, case = job
-    values = {**CASES[case], "plant.initial_object_position": setting.x_m}
-    result = simulate(system.with_values(values), stop=STOP)
+    values = {"plant.initial_object_position": setting.x_m}
+    result = simulate(with_case(system, case).with_values(values), stop=STOP)
     if not result.complete:
         raise KeyboardInterrupt
     return as_run(result, setting, case)

@@ -10,7 +10,7 @@ import numpy as np
 from ...errors import InputError
 from ...recording.result import Result
 from ...system.description import System
-from ..metrics import FINGERS, IMPACT_WINDOW, PLANT, time_at_gap
+from ..metrics import FINGERS, IMPACT_WINDOW, time_at_gap
 from .tables import REFLECTANCE_X_M, Setting
 
 SENSOR_CONTACT = 0.37e-3
@@ -54,13 +54,13 @@ Runs = dict[tuple[Setting, int], Run]
 
 def as_run(result: Result, setting: Setting, case: int) -> Run:
     """What an evaluation keeps of a grasp; InputError where a finger does not touch."""
-    moments = [time_at_gap(result.time, result.signals, j, SENSOR_CONTACT) for j in FINGERS]
+    moments = [time_at_gap(result.by_role, j, SENSOR_CONTACT) for j in FINGERS]
     first, second = moments
     if first is None or second is None or None in result.metrics["time_to_contact"]:
         raise InputError(
             f"evaluate: x_m = {setting.x_m} m, Case {case}: a finger does not reach the object"
         )
-    target = result["controller.target_position"]
+    target = result.by_role["controller.target_position"]
     beyond = float(np.max((target - setting.x_m) * math.copysign(1.0, setting.x_m)))
     shown = result if setting == Setting(REFLECTANCE_X_M) else None
     right, left = (_touch_force(result, j) for j in FINGERS)
@@ -70,7 +70,7 @@ def as_run(result: Result, setting: Setting, case: int) -> Run:
 def _touch_force(result: Result, finger: int) -> float:
     touch = result.metrics["time_to_contact"][finger - 1]
     near = (result.time >= touch) & (result.time <= touch + IMPACT_WINDOW)
-    return float(np.abs(result[f"{PLANT}.contact_force[{finger}]"][near]).max())
+    return float(np.abs(result.by_role[f"plant.contact_force[{finger}]"][near]).max())
 
 
 def off_centre(runs: Runs) -> list[Setting]:

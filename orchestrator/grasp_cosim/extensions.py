@@ -1,0 +1,19 @@
+"""What the top of the package lends to lower rooms, so that none of these needs to know it.
+
+`grasp_cosim/__init__.py` enters functions here; each imports what it needs when it is called.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+readers: dict[str, Callable[[Path, Path | None, float | None, float | None], Any]] = {}
+"""Readers of system files by suffix: `path`, folder of the FMUs, step and stop in s to a System."""
+
+metrics: list[Callable[[], Iterable[Any]]] = []
+"""Sources of metrics (`metrics.metric.Metric`) that every result is asked for."""
+
+drawings: list[Callable[[Any, Path], bool]] = []
+"""Functions that draw a result as a picture at a path, and return False where they cannot."""

@@ -1,0 +1,283 @@
+"""A metric: a function of recorded signals, with a name, a unit and a description.
+
+    from grasp_cosim import metric
+
+    @metric("rise_time", unit="s", description="from 10 % to 90 % of the settled contact force")
+    def rise_time(run):
+        force = abs(run["plant.contact_force[1]"])
+        ...
+        return t_90 - t_10
+
+`run` is a Signals: names begin with a role or a component. The function returns a number, True or
+False, None where the moment never comes, or a list of these, one per finger for instance.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .. import extensions
+from ..errors import InputError
+
+Value = float | bool | None
+Function = Callable[["Signals"], Value | list[Value]]
+
+
+class MissingSignalError(KeyError):
+    """A signal that a metric needs was not recorded; its text says which and why."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+@dataclass(frozen=True, eq=False)
+class Signals(Mapping[str, npt.NDArray[Any]]):
+    """Recorded signals by names like plant.gap[1], where plant is a role or a component.
+
+    `time` in s and every signal have the shape (rows,). `roles` maps a role to the component that
+    plays it; a component of a role's name plays it where `roles` does not say otherwise.
+    """
+
+    time: npt.NDArray[np.float64]
+    by_name: Mapping[str, npt.NDArray[Any]]
+    roles: Mapping[str, str] = field(default_factory=dict)
+
+    def __getitem__(self, name: str) -> npt.NDArray[Any]:
+        """The signal; MissingSignalError where it was not recorded."""
+        reason = lacking((name,), self.by_name, self.roles)
+        if reason:
+            raise MissingSignalError(reason)
+        return self.by_name[resolved(name, self.roles)]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.by_name)
+
+    def __len__(self) -> int:
+        return len(self.by_name)
+
+
+@dataclass(frozen=True, slots=True)
+class Metric:
+    """A function of recorded signals and how its value is named and shown.
+
+    `unit` is that of the value ("1" for a share, None for true or false); in tables the value is
+    shown times `factor` in `shown_unit`. `entries` name its values where it has several, like
+    ("finger 1", "finger 2").
+    `needs` are the signals without which there is no value. Metrics of one `group` are there
+    together or not at all, and why not is said once; an `optional` one is then left out in silence.
+    A `primary` one is what a study of the step size asks for where nothing else is named.
+    """
+
+    name: str
+    function: Function
+    unit: str | None = None
+    description: str = ""
+    label: str = ""
+    factor: float = 1.0
+    shown_unit: str | None = None
+    entries: tuple[str, ...] = ()
+    needs: tuple[str, ...] = ()
+    group: str = ""
+    optional: bool = False
+    primary: bool = False
+    origin: tuple[str, str] | None = None
+    """Of a metric from a file, the file's name and text: so it travels to other processes."""
+
+    @property
+    def title(self) -> str:
+        """The label, or the name in words."""
+        return self.label or self.name.replace("_", " ")
+
+    @property
+    def display_unit(self) -> str:
+        """The unit in which tables show it."""
+        unit = self.unit if self.shown_unit is None else self.shown_unit
+        return "" if unit in (None, "1") else str(unit)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The names of its single values: name, or name[1], name[2], ..."""
+        if not self.entries:
+            return (self.name,)
+        return tuple(f"{self.name}[{i}]" for i in range(1, len(self.entries) + 1))
+
+    def column_title(self, column: str) -> str:
+        """The title of one of its columns: "time to contact, finger 1"."""
+        place = self.columns.index(column)
+        return f"{self.title}, {self.entries[place]}" if self.entries else self.title
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        if self.origin is None:
+            return _made, tuple(getattr(self, name) for name in _FIELDS)
+        return _from_text, (*self.origin, self.name)
+
+
+_FIELDS = tuple(Metric.__dataclass_fields__)
+
+
+def _made(*values: Any) -> Metric:
+    return Metric(*values)
+
+
+def metric(name: str, **more: Any) -> Callable[[Function], Metric]:
+    """Make a Metric of the function below; `more` are the other fields of a Metric by keyword.
+
+    InputError where `name` is no identifier, so that it can be a column and a key.
+    """
+    if not name.isidentifier():
+        raise InputError(f"metric {name!r}: must be a name of letters, digits and _")
+    return lambda function: Metric(name, function, **more)
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """The values of metrics by name, the metrics they are of, and why others have none."""
+
+    values: Mapping[str, Any]
+    metrics: tuple[Metric, ...]
+    missing: tuple[str, ...]
+
+    @property
+    def units(self) -> dict[str, str | None]:
+        """The units of the values, by name."""
+        return {m.name: m.unit for m in self.metrics}
+
+    def flat(self) -> dict[str, Value]:
+        """Single values by name, or name[1], name[2], ... where a metric has several."""
+        found: dict[str, Value] = {}
+        for name, value in self.values.items():
+            if isinstance(value, list):
+                found.update({f"{name}[{i}]": v for i, v in enumerate(value, start=1)})
+            else:
+                found[name] = value
+        return found
+
+
+def registered(more: Iterable[Metric] = ()) -> tuple[Metric, ...]:
+    """All metrics that a result is asked for, then `more`; InputError where two have one name."""
+    found = [m for source in extensions.metrics for m in source()] + list(more)
+    names = [m.name for m in found]
+    twice = next((n for n in names if names.count(n) > 1), None)
+    if twice is not None:
+        raise InputError(f"metric {twice!r}: is there twice; must have another name")
+    return tuple(found)
+
+
+def measure(signals: Signals, metrics: Iterable[Metric]) -> Measured:
+    """The values of `metrics` in their order, and a line for each that cannot be had.
+
+    A line like "no metrics of the grasp: plant lacks contact[1]". A group none of whose roles is
+    played by a component is not of this system, which is no news. InputError where a function
+    fails.
+    """
+    there, missing = available(metrics, signals.by_name, signals.roles)
+    values: dict[str, Any] = {}
+    for m in there:
+        try:
+            values[m.name] = _plain(m.function(signals))
+        except MissingSignalError as error:
+            missing.append(f"no {m.name}: {error}")
+        except Exception as error:  # a user's function may raise anything
+            said = f"{type(error).__name__}: {error}"
+            raise InputError(f"metric {m.name!r}: {' '.join(said.split())}") from error
+    return Measured(values, tuple(m for m in there if m.name in values), tuple(missing))
+
+
+def available(
+    metrics: Iterable[Metric], names: Collection[str], roles: Mapping[str, str]
+) -> tuple[list[Metric], list[str]]:
+    """The metrics that signals of these `names` permit, and a line for each reason against one."""
+    there: list[Metric] = []
+    missing: dict[str, None] = {}
+    for m in metrics:
+        reason = lacking(m.needs, names, roles)
+        if not reason:
+            there.append(m)
+        elif not m.optional and not (m.group and _unknown(m.needs, names, roles)):
+            what = f"metrics of the {m.group}" if m.group else m.name
+            missing[f"no {what}: {reason}"] = None
+    return there, list(missing)
+
+
+def lacking(needs: Iterable[str], names: Collection[str], roles: Mapping[str, str]) -> str | None:
+    """Why signals of these `names` do not have all that is needed; None where they do."""
+    for need in needs:
+        if resolved(need, roles) in names:
+            continue
+        role, _, variable = need.partition(".")
+        component = roles.get(role, role)
+        if not _plays(component, names):
+            return f'no component is the {role}; name it under [roles]: {role} = "..."'
+        return f"{component} lacks {variable}"
+    return None
+
+
+def resolved(name: str, roles: Mapping[str, str]) -> str:
+    """The name of a signal whose first part may be a role."""
+    role, dot, variable = name.partition(".")
+    return f"{roles.get(role, role)}{dot}{variable}"
+
+
+def _plays(component: str, names: Iterable[str]) -> bool:
+    return any(name.startswith(f"{component}.") for name in names)
+
+
+def _unknown(needs: Iterable[str], names: Collection[str], roles: Mapping[str, str]) -> bool:
+    """True if no component plays any role of what is needed."""
+    played = {roles.get(role, role) for role in (need.partition(".")[0] for need in needs)}
+    return not any(_plays(component, names) for component in played)
+
+
+def _plain(value: Any) -> Any:
+    """The value with Python's own numbers, in lists."""
+    if isinstance(value, np.ndarray | list | tuple):
+        return [_plain(entry) for entry in value]
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def load_metrics(path: Path) -> tuple[Metric, ...]:
+    """The metrics of a Python file, in the order in which they stand there.
+
+    The file is run. InputError where it cannot be read or fails, or has no metric.
+    """
+    try:
+        text = path.read_text("utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"--metrics {path}: {error}; must be a Python file") from error
+    found = _run(path.name, text)
+    if not found:
+        raise InputError(f"--metrics {path}: no metric; must have functions under @metric(name)")
+    return found
+
+
+def _run(name: str, text: str) -> tuple[Metric, ...]:
+    """The metrics of a file's text; run once per process and content."""
+    module_name = f"grasp_cosim_metrics_{hashlib.sha256(text.encode()).hexdigest()[:16]}"
+    module = sys.modules.get(module_name)
+    if module is None:
+        module = ModuleType(module_name)
+        sys.modules[module_name] = module
+        try:
+            exec(compile(text, name, "exec"), module.__dict__)  # noqa: S102 - the user's own
+        except BaseException as error:
+            del sys.modules[module_name]
+            if not isinstance(error, Exception | SystemExit):
+                raise
+            said = f"{type(error).__name__}: {error}"
+            raise InputError(f"--metrics {name}: {' '.join(said.split())}") from error
+    found = [value for value in vars(module).values() if isinstance(value, Metric)]
+    return tuple(replace(m, origin=(name, text)) for m in dict.fromkeys(found))
+
+
+def _from_text(name: str, text: str, wanted: str) -> Metric:
+    """The metric of that name from a file's text, in another process."""
+    return next(m for m in _run(name, text) if m.name == wanted)
