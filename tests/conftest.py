@@ -79,8 +79,7 @@ def grasp(fmus: Path) -> System:
 @pytest.fixture
 def built_in(grasp: System, monkeypatch: pytest.MonkeyPatch) -> None:
     """Commands take the FMUs of the tests instead of building them into their folder."""
-    for module in ("frame", "evaluate", "identify"):
-        monkeypatch.setattr(f"grasp_cosim.cli.{module}.grasp_system", lambda: grasp)
+    monkeypatch.setattr("grasp_cosim.grasp.system.grasp_system", lambda: grasp)
 
 
 @pytest.fixture

@@ -101,7 +101,7 @@ def test_the_orchestrator_builds_fmus_at_three_places_only() -> None:
         for f, module in modules(ROOT / "orchestrator/grasp_cosim")
         if module.startswith("grasp_fmus") and not module.startswith(LINK)
     }
-    assert builders == {"fmus.py", "system.py", "proxy.py"}
+    assert builders == {"build.py", "system.py", "proxy.py"}
 
 
 def test_the_connection_protocol_is_known_to_the_bench_alone_and_knows_nobody() -> None:

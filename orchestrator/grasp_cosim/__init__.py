@@ -76,21 +76,26 @@ def _grasp_metrics() -> tuple[Metric, ...]:
     return METRICS
 
 
-def _draw_grasp(result: Result, path: Path) -> bool:
+def _is_grasp(result: Result) -> bool:
+    from .grasp.metrics import is_grasp
+
+    return is_grasp(result.by_role)
+
+
+def _draw_grasp(result: Result, path: Path) -> None:
     from .grasp.pictures import draw_grasp
 
-    return draw_grasp(result, path)
+    draw_grasp(result, path)
 
 
-def _draw_signals(result: Result, path: Path) -> bool:
+def _draw_signals(result: Result, path: Path) -> None:
     from .report.plot import plot_signals
 
     plot_signals(result, path)
-    return True
 
 
 extensions.readers |= {".toml": _read_toml, ".ssp": _read_ssp}
 if find_spec(f"{__name__}.grasp"):
     extensions.metrics.append(_grasp_metrics)
-    extensions.drawings.append(_draw_grasp)
-extensions.drawings.append(_draw_signals)
+    extensions.drawings.append(extensions.Drawing("grasp", _is_grasp, _draw_grasp))
+extensions.drawings.append(extensions.Drawing("signals", lambda _: True, _draw_signals))

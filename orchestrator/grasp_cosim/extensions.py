@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 readers: dict[str, Callable[[Path, Path | None, float | None, float | None], Any]] = {}
 """Readers of system files by suffix: `path`, folder of the FMUs, step and stop in s to a System."""
@@ -15,5 +15,14 @@ readers: dict[str, Callable[[Path, Path | None, float | None, float | None], Any
 metrics: list[Callable[[], Iterable[Any]]] = []
 """Sources of metrics (`metrics.metric.Metric`) that every result is asked for."""
 
-drawings: list[Callable[[Any, Path], bool]] = []
-"""Functions that draw a result as a picture at a path, and return False where they cannot."""
+
+class Drawing(NamedTuple):
+    """A picture of a result: its file's stem, if it fits a result, how to draw it at a path."""
+
+    stem: str
+    fits: Callable[[Any], bool]
+    draw: Callable[[Any, Path], None]
+
+
+drawings: list[Drawing] = []
+"""Pictures of a result, of which the first that fits is drawn."""

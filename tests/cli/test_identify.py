@@ -57,7 +57,7 @@ def test_contact_times_have_a_residual_for_every_row(
 
     estimate = Estimate("plant.friction.coulomb[1]", "N", 0.0, None, "at its lower bound")
     monkeypatch.setattr(
-        "grasp_cosim.cli.identify.identify_from_times",
+        "grasp_cosim.cli.commands.identify.identify_from_times",
         lambda *_, **__: Fit((estimate,), np.linspace(-0.1, 0.1, 40), 9),
     )
     code, out, _ = command("identify", "--fit", "coulomb")
@@ -95,6 +95,6 @@ def test_ctrl_c_is_130(command: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(*_: object, **__: object) -> Fit:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("grasp_cosim.cli.identify.identify_from_times", interrupted)
+    monkeypatch.setattr("grasp_cosim.cli.commands.identify.identify_from_times", interrupted)
     code, out, err = command("identify")
     assert (code, out, err.split()) == (130, "", ["grasp-cosim:", "interrupted"])

@@ -28,7 +28,7 @@ def qualify(
     folder = tmp_path / "here"
     folder.mkdir()
     monkeypatch.chdir(folder)
-    monkeypatch.setattr("grasp_cosim.cli.frame.grasp_system", lambda: grasp)
+    monkeypatch.setattr("grasp_cosim.grasp.system.grasp_system", lambda: grasp)
 
     def run(*arguments: str | Path) -> tuple[int, str, str]:
         code = cli.main(["qualify", *map(str, arguments)])

@@ -8,29 +8,11 @@ from typing import NoReturn
 import click
 
 from ..errors import InputError, SimulationError
-from . import evaluate, fmus, identify, proxy, qualify, relay, report, run, serve, ssp, sweep
-from .frame import FAILED, INTERRUPTED, WRONG, cli, fail
+from .frame import FAILED, INTERRUPTED, WRONG, fail
+from .group import cli
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EIO)
 """Errors of a disk, not of the input."""
-
-COMMANDS = (
-    run.run,
-    report.report,
-    evaluate.evaluate,
-    identify.identify,
-    qualify.qualify,
-    sweep.sweep,
-    ssp.ssp,
-    proxy.proxy,
-    serve.serve,
-    relay.relay,
-    fmus.build,
-    fmus.inspect,
-    fmus.doctor,
-)
-for command in COMMANDS:
-    cli.add_command(command)
 
 
 def entry() -> NoReturn:

@@ -1,18 +1,20 @@
-"""What the commands share: the group, exit codes, errors as one line."""
+"""What the commands share: exit codes, options, errors as one line."""
+
+from __future__ import annotations
 
 import traceback
 from collections.abc import Callable, Sequence
 from functools import reduce
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ..errors import InputError
-from ..grasp.presets import with_preset
-from ..grasp.system import grasp_system
-from ..metrics.metric import Metric, load_metrics
-from ..system.description import System
+
+if TYPE_CHECKING:
+    from ..metrics.metric import Metric
+    from ..system.description import System
 
 NEGATIVE, WRONG, FAILED, INTERRUPTED = 1, 2, 3, 130
 """Exit codes beside 0: result negative, input wrong, failure on the way, Ctrl-C."""
@@ -20,43 +22,14 @@ NEGATIVE, WRONG, FAILED, INTERRUPTED = 1, 2, 3, 130
 Command = Callable[..., Any]
 
 
-def _together(*options: Command) -> Command:
+def together(*options: Command) -> Command:
     """Several options as one decorator."""
-
-    def decorate(command: Command) -> Command:
-        return reduce(lambda made, option: option(made), reversed(options), command)
-
-    return decorate
+    return lambda command: reduce(lambda made, option: option(made), reversed(options), command)
 
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 
-
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(package_name="grasp-cosim")
-@click.option("--debug", is_flag=True, help="Show the traceback of an error.")
-def cli(debug: bool) -> None:
-    """FMI co-simulation of a delicate grasp.
-
-    \b
-    grasp-cosim run [SYSTEM]         a closed loop; by default the published grasp, from FMUs
-    grasp-cosim report RUN           a page and figures of a run that was recorded
-    grasp-cosim evaluate             the published table and figures, side by side with ours
-    grasp-cosim identify             friction from contact times or from a recorded log
-    grasp-cosim qualify FMU --as C   whether an FMU may take the place of component C
-    grasp-cosim sweep STUDY          many runs, in parallel; begun again, it goes on
-    grasp-cosim ssp SYSTEM -o FILE   a system as an SSP archive
-    grasp-cosim proxy FMU -o FILE    an FMU with the same variables that talks to a peer
-    grasp-cosim serve FMU            an FMU as a test bench, for a proxy
-    grasp-cosim relay --to HOST:PORT a bad network on the way there, reproducible
-    grasp-cosim build                the FMUs
-    grasp-cosim inspect FMU          an FMU's interface
-    grasp-cosim doctor FMU           whether this machine will load an FMU
-    grasp-cosim COMMAND --help       options and an example
-    """
-
-
-preset_options = _together(
+preset_options = together(
     click.option("--preset", "presets", multiple=True, help="Values that the system file names."),
     click.option("--case", type=click.IntRange(0, 2), help="Short for --preset case_0, ..._2."),
     click.option("--bench", is_flag=True, help="Short for --preset bench."),
@@ -72,6 +45,29 @@ metrics_option = click.option(
 )
 
 
+def load_system(path: Path | None, step: float | None, stop: float | None) -> System:
+    """The system of a file, by default the built-in grasp; what its reader notes is printed."""
+    from ..system.description import System
+
+    if path is None:
+        from ..grasp.system import grasp_system
+
+        return grasp_system()
+    system = System.load(path, step=step, stop=stop)
+    for note in system.notes:
+        click.echo(note, err=True)
+    return system
+
+
+def with_preset(system: System, name: str) -> System:
+    """The system with a preset that its file names, or else with one of the built-in grasp."""
+    if name in system.presets:
+        return system.with_presets(name)
+    from ..grasp.presets import with_preset as with_built_in
+
+    return with_built_in(system, name)
+
+
 def with_chosen_presets(
     system: System, presets: Sequence[str], case: int | None, bench: bool
 ) -> System:
@@ -82,17 +78,9 @@ def with_chosen_presets(
 
 def chosen_metrics(files: Sequence[Path]) -> tuple[Metric, ...]:
     """The metrics of the files that metrics_option names; InputError where one fails."""
+    from ..metrics.metric import load_metrics
+
     return tuple(m for path in files for m in load_metrics(path))
-
-
-def load_system(path: Path | None, step: float | None, stop: float | None) -> System:
-    """The system of a file, by default the built-in grasp; what its reader notes is printed."""
-    if path is None:
-        return grasp_system()
-    system = System.load(path, step=step, stop=stop)
-    for note in system.notes:
-        click.echo(note, err=True)
-    return system
 
 
 def pair(option: str, text: str, form: str) -> tuple[str, str]:

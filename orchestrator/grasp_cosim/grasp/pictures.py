@@ -10,7 +10,7 @@ import numpy as np
 
 from ..recording.result import Result
 from ..report.plot import BLUE, GREY, RED, finish, new_figure, save
-from .metrics import CLOSING, FINGERS, first_contact, is_grasp
+from .metrics import CLOSING, FINGERS, first_contact
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,21 +25,7 @@ BEFORE, AFTER, NEAR = 0.015, 0.03, 0.05
 """s before and after a contact in a close-up; contacts that are nearer than NEAR share one."""
 
 
-def picture_name(result: Result) -> str:
-    """The name of the file that a result is drawn to."""
-    return "grasp.png" if is_grasp(result.by_role) else "signals.png"
-
-
-def draw_grasp(result: Result, path: Path) -> bool:
-    """Draw a grasp as a PNG; False where the result is none. InputError without matplotlib."""
-    new_figure(1.0, 1.0)
-    if is_grasp(result.by_role):
-        plot_run(result, path)
-        return True
-    return False
-
-
-def plot_run(run: Result, path: Path) -> None:
+def draw_grasp(run: Result, path: Path) -> None:
     """Gaps, contact forces, target and closing speed as a PNG; on the right around the contacts."""
     spans = _around_contacts(run)
     figure = new_figure(7.2 + 2.9 * len(spans), 8.0)

@@ -11,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import extensions
-from ..errors import InputError
 from ..files import in_one_piece, write_text
 from ..metrics.metric import Measured, Metric, Signals, measure, registered
 from ..realtime.timing import Timing
@@ -148,8 +147,12 @@ class Result(Mapping[str, npt.NDArray[Any]]):
 
         InputError without matplotlib.
         """
-        if not any(draw(self, Path(path)) for draw in extensions.drawings):
-            raise InputError(f"{path}: nothing to draw; must be a result with signals")
+        self.drawing.draw(self, Path(path))
+
+    @property
+    def drawing(self) -> extensions.Drawing:
+        """The picture that plot() draws."""
+        return next(d for d in extensions.drawings if d.fits(self))
 
     @cached_property
     def _steps(self) -> npt.NDArray[np.int64]:

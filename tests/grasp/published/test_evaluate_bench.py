@@ -139,7 +139,7 @@ def test_a_claim_that_fails_is_exit_1(
         assert system.start("sensor_1.noise.enabled") == 1.0
         return made
 
-    monkeypatch.setattr("grasp_cosim.cli.evaluate.evaluate_bench", evaluated)
+    monkeypatch.setattr("grasp_cosim.cli.commands.evaluate.evaluate_bench", evaluated)
     found, out, _ = command("evaluate", "--bench")
     assert found == code
     assert out.startswith("holds  It.\n" if holds else "FAILS  It.\n")

@@ -8,12 +8,11 @@ from typing import Any
 
 import click
 
-from ..files import check_folder
-from ..grasp.presets import with_bench
-from ..grasp.published.bench import evaluate_bench
-from ..grasp.published.evaluate import evaluate as run_evaluation
-from ..grasp.system import grasp_system
-from .frame import NEGATIVE, json_option
+from ...files import check_folder
+from ...grasp.presets import with_bench
+from ...grasp.published.bench import evaluate_bench
+from ...grasp.published.evaluate import evaluate as run_evaluation
+from ..frame import NEGATIVE, json_option, load_system
 
 
 @click.command()
@@ -29,9 +28,11 @@ def evaluate(bench: bool, out: Path, workers: int, as_json: bool) -> int:
     """
     check_folder(out)
     if bench:
-        report = evaluate_bench(with_bench(grasp_system()), out, workers, progress=True)
+        report = evaluate_bench(
+            with_bench(load_system(None, None, None)), out, workers, progress=True
+        )
     else:
-        report = run_evaluation(grasp_system(), out, workers, progress=True)
+        report = run_evaluation(load_system(None, None, None), out, workers, progress=True)
     holds = all(claim["holds"] for claim in report["claims"])
     click.echo(json.dumps(report) if as_json else _verdict(report, out))
     return 0 if holds else NEGATIVE

@@ -13,13 +13,13 @@ from grasp_fmus.proxy import DEFAULTS, Settings
 from grasp_fmus.variable import Enumeration
 from grasp_fmus.variable import Variable as ProxyVariable
 
-from ..errors import InputError
-from ..files import check_folder
-from ..hil.protocol import link_signature
-from ..inspection.inspection import inspect_fmu
-from ..interface.interface import Interface, Value, Variable, read_interface
-from ..interface.units import BASE
-from .frame import json_option
+from ...errors import InputError
+from ...files import check_folder
+from ...hil.protocol import link_signature
+from ...inspection.inspection import inspect_fmu
+from ...interface.interface import Interface, Value, Variable, read_interface
+from ...interface.units import BASE
+from ..frame import json_option
 
 if TYPE_CHECKING:
     from grasp_fmus.proxy_build import Original

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import click
 
-from ..errors import InputError
-from ..hil.address import Address, is_loopback, text
-from ..hil.network import DIRECTIONS, Conditions, Network, Outage, check_time
-from ..hil.relay import Relay
-from ..hil.traffic import Entry, Log
-from .frame import INTERRUPTED, fail, json_option
-from .signals import ended_by_signals
+from ...errors import InputError
+from ...hil.address import Address, is_loopback, text
+from ...hil.network import DIRECTIONS, Conditions, Network, Outage, check_time
+from ...hil.relay import Relay
+from ...hil.traffic import Entry, Log
+from ..frame import INTERRUPTED, fail, json_option
+from ..signals import ended_by_signals
 
 
 @click.command()

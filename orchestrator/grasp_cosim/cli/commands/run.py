@@ -6,17 +6,16 @@ from typing import Any
 
 import click
 
-from ..errors import InputError, SimulationError
-from ..files import check_folder
-from ..grasp.pictures import picture_name
-from ..master.engine import ENGINES, Engine
-from ..master.simulation import MOST, simulate
-from ..recording.mdf import check_mdf
-from ..recording.result import Result
-from ..report.plot import new_figure
-from ..report.timing import draw_timing
-from ..system.description import SCHEMES
-from .frame import (
+from ...errors import InputError, SimulationError
+from ...files import check_folder
+from ...master.engine import ENGINES, Engine
+from ...master.simulation import MOST, simulate
+from ...recording.mdf import check_mdf
+from ...recording.result import Result
+from ...report.plot import new_figure
+from ...report.timing import draw_timing
+from ...system.description import SCHEMES
+from ..frame import (
     INTERRUPTED,
     chosen_metrics,
     fail,
@@ -27,8 +26,8 @@ from .frame import (
     preset_options,
     with_chosen_presets,
 )
-from .realtime import chosen_realtime, realtime_options, timing_lines
-from .step_study import StepStudyRequest, run_step_study
+from ..realtime import chosen_realtime, realtime_options, timing_lines
+from ..step_study import StepStudyRequest, run_step_study
 
 
 @click.command()
@@ -143,7 +142,7 @@ def _write(result: Result, out: Path | None, plot: bool, mdf: bool) -> None:
 
 def _draw(result: Result, folder: Path) -> None:
     """The grasp, or all signals where it is none, and the timing if it was paced."""
-    picture = folder / picture_name(result)
+    picture = folder / f"{result.drawing.stem}.png"
     result.plot(picture)
     click.echo(f"drew {picture}", err=True)
     if result.timing:

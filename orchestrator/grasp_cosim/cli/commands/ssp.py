@@ -5,8 +5,8 @@ from pathlib import Path
 
 import click
 
-from ..files import check_folder
-from .frame import json_option, load_system
+from ...files import check_folder
+from ..frame import json_option, load_system
 
 
 @click.command()
@@ -25,7 +25,7 @@ def ssp(
     \b
     Example: grasp-cosim ssp my_system.toml -o my_system.ssp
     """
-    from ..ssp.write import write_ssp  # only here: its libraries take time to load
+    from ...ssp.write import write_ssp  # only here: its libraries take time to load
 
     chosen = load_system(system, step, stop).with_experiment(step, stop)
     check_folder(out.parent)

@@ -6,17 +6,17 @@ from typing import cast
 
 import click
 
-from ..files import check_folder, write_text
-from ..interface.interface import Value
-from ..qualification import verdict
-from ..qualification.bands import read_bands
-from ..qualification.qualify import Qualification
-from ..qualification.qualify import qualify as run_qualification
-from ..report.plot import new_figure
-from ..report.qualification import draw_qualification
-from ..system.description import SCHEMES
-from ..system.parts import ISOLATIONS, Isolation
-from .frame import (
+from ...files import check_folder, write_text
+from ...interface.interface import Value
+from ...qualification import verdict
+from ...qualification.bands import read_bands
+from ...qualification.qualify import Qualification
+from ...qualification.qualify import qualify as run_qualification
+from ...report.plot import new_figure
+from ...report.qualification import draw_qualification
+from ...system.description import SCHEMES
+from ...system.parts import ISOLATIONS, Isolation
+from ..frame import (
     NEGATIVE,
     chosen_metrics,
     json_option,

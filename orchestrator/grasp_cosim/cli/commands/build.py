@@ -1,21 +1,15 @@
-"""The commands about single FMUs: build, inspect, doctor."""
+"""The command build."""
 
 import json
-import shutil
 import sys
 from pathlib import Path
 
 import click
 
-from ..errors import InputError
-from ..files import check_folder
-from ..grasp.system import BOUND_FOLDER, FMU_FOLDER
-from ..inspection.doctor import as_json as findings_json
-from ..inspection.doctor import as_text as findings_text
-from ..inspection.doctor import examine
-from ..inspection.inspection import as_text as inspection_text
-from ..inspection.inspection import inspect_fmu
-from .frame import NEGATIVE, json_option
+from ...errors import InputError
+from ...files import check_folder
+from ...grasp.system import BOUND_FOLDER, FMU_FOLDER
+from ..frame import json_option
 
 
 @click.command()
@@ -62,40 +56,3 @@ def build(block: Path | None, out: Path | None, bind_python: str | None, as_json
         for b in built:
             click.echo("\n    ".join((f"{b.path}: {b.status}", *b.changes)))
     return 0
-
-
-@click.command()
-@click.argument("fmu", type=click.Path(path_type=Path))
-@json_option
-def inspect(fmu: Path, as_json: bool) -> int:
-    """Show the interface of any FMU: variables, units, ranges, dependencies, capabilities.
-
-    \b
-    Example: grasp-cosim inspect fmus/build/GripperPlant.fmu
-    """
-    report = inspect_fmu(fmu)
-    if as_json:
-        click.echo(json.dumps(report))
-    else:
-        width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
-        click.echo(inspection_text(report, width))
-    return 0
-
-
-@click.command()
-@click.argument("fmu", required=False, type=click.Path(path_type=Path))
-@json_option
-def doctor(fmu: Path | None, as_json: bool) -> int:
-    """Find out whether this machine will load FMU, and what to do if not.
-
-    Without FMU: whether it will load Python FMUs at all.
-
-    \b
-    Example: grasp-cosim doctor vendor.fmu
-    """
-    findings = examine(fmu)
-    if as_json:
-        click.echo(json.dumps({"findings": findings_json(findings)}))
-    else:
-        click.echo(findings_text(findings))
-    return NEGATIVE if any(f.status == "problem" for f in findings) else 0

@@ -6,23 +6,22 @@ from pathlib import Path
 
 import click
 
-from ..errors import InputError
-from ..files import check_folder, write_text
-from ..grasp.identification import report
-from ..grasp.identification.contact_times import (
+from ...errors import InputError
+from ...files import check_folder, write_text
+from ...grasp.identification import report
+from ...grasp.identification.contact_times import (
     identify_from_times,
     published_contacts,
     read_contacts,
     scatter,
 )
-from ..grasp.identification.fit import check_scipy
-from ..grasp.identification.log import GROUPS as IN_A_LOG
-from ..grasp.identification.log import identify_from_log
-from ..grasp.identification.parameters import DEFAULT, GROUPS, chosen
-from ..grasp.system import grasp_system
-from ..recording.load import load_log
-from ..system.description import System
-from .frame import json_option, pair
+from ...grasp.identification.fit import check_scipy
+from ...grasp.identification.log import GROUPS as IN_A_LOG
+from ...grasp.identification.log import identify_from_log
+from ...grasp.identification.parameters import DEFAULT, GROUPS, chosen
+from ...recording.load import load_log
+from ...system.description import System
+from ..frame import json_option, load_system, pair
 
 
 @click.command()
@@ -66,7 +65,7 @@ def identify(
     if out:
         check_folder(out)
     values = dict(pair("--set", text, "COMPONENT.VARIABLE=VALUE") for text in settings)
-    system = grasp_system().revised({}, values, ("--swap", "--set"))
+    system = load_system(None, None, None).revised({}, values, ("--swap", "--set"))
     found = _from_log(system, log, groups) if log else _from_times(system, times, groups, workers)
     if out:
         write_text(out / "values.toml", report.values_toml(found))

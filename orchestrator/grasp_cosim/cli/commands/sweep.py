@@ -5,19 +5,19 @@ from pathlib import Path
 
 import click
 
-from ..errors import InputError
-from ..files import check_folder
-from ..grasp.presets import STUDIES, with_preset
-from ..report.plot import new_figure
-from ..report.sweep import draw_sweep
-from ..sweep.read import read_study, study_file
-from ..sweep.sensitivity import Sensitivity
-from ..sweep.store import Store
-from ..sweep.study import Pictures
-from ..sweep.sweep import RUNS, Sweep
-from ..sweep.sweep import sweep as run_study
-from ..sweep.table import STATISTICS
-from .frame import (
+from ...errors import InputError
+from ...files import check_folder
+from ...grasp.presets import STUDIES
+from ...report.plot import new_figure
+from ...report.sweep import draw_sweep
+from ...sweep.read import read_study, study_file
+from ...sweep.sensitivity import Sensitivity
+from ...sweep.store import Store
+from ...sweep.study import Pictures
+from ...sweep.sweep import RUNS, Sweep
+from ...sweep.sweep import sweep as run_study
+from ...sweep.table import STATISTICS
+from ..frame import (
     INTERRUPTED,
     NEGATIVE,
     chosen_metrics,
@@ -25,6 +25,7 @@ from .frame import (
     json_option,
     load_system,
     metrics_option,
+    with_preset,
 )
 
 

@@ -5,13 +5,12 @@ from pathlib import Path
 
 import click
 
-from ..errors import InputError
-from ..files import check_folder
-from ..grasp.pictures import picture_name
-from ..recording.load import load_run
-from ..report.page import write_page
-from ..report.timing import draw_timing
-from .frame import json_option
+from ...errors import InputError
+from ...files import check_folder
+from ...recording.load import load_run
+from ...report.page import write_page
+from ...report.timing import draw_timing
+from ..frame import json_option
 
 
 @click.command()
@@ -32,7 +31,7 @@ def report(run: Path, out: Path | None, as_json: bool) -> int:
     page = out or run / "report.html"
     check_folder(page.parent)
     write_page(recorded, run.resolve().name, page)
-    picture = page.parent / picture_name(recorded)
+    picture = page.parent / f"{recorded.drawing.stem}.png"
     pictures = []
     try:
         recorded.plot(picture)

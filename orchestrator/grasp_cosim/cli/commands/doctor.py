@@ -1,0 +1,30 @@
+"""The command doctor."""
+
+import json
+from pathlib import Path
+
+import click
+
+from ...inspection.doctor import as_json as findings_json
+from ...inspection.doctor import as_text as findings_text
+from ...inspection.doctor import examine
+from ..frame import NEGATIVE, json_option
+
+
+@click.command()
+@click.argument("fmu", required=False, type=click.Path(path_type=Path))
+@json_option
+def doctor(fmu: Path | None, as_json: bool) -> int:
+    """Find out whether this machine will load FMU, and what to do if not.
+
+    Without FMU: whether it will load Python FMUs at all.
+
+    \b
+    Example: grasp-cosim doctor vendor.fmu
+    """
+    findings = examine(fmu)
+    if as_json:
+        click.echo(json.dumps({"findings": findings_json(findings)}))
+    else:
+        click.echo(findings_text(findings))
+    return NEGATIVE if any(f.status == "problem" for f in findings) else 0
