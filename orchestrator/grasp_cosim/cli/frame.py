@@ -29,13 +29,6 @@ def together(*options: Command) -> Command:
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 
-preset_options = together(
-    click.option("--preset", "presets", multiple=True, help="Values that the system file names."),
-    click.option("--case", type=click.IntRange(0, 2), help="Short for --preset case_0, ..._2."),
-    click.option("--bench", is_flag=True, help="Short for --preset bench."),
-)
-"""The options that with_chosen_presets() takes."""
-
 metrics_option = click.option(
     "--metrics",
     "metric_files",
@@ -66,14 +59,6 @@ def with_preset(system: System, name: str) -> System:
     from ..grasp.presets import with_preset as with_built_in
 
     return with_built_in(system, name)
-
-
-def with_chosen_presets(
-    system: System, presets: Sequence[str], case: int | None, bench: bool
-) -> System:
-    """The system with what the preset_options ask for, the case last."""
-    names = [*presets, *(["bench"] if bench else []), *([] if case is None else [f"case_{case}"])]
-    return reduce(with_preset, names, system)
 
 
 def chosen_metrics(files: Sequence[Path]) -> tuple[Metric, ...]:

@@ -1,6 +1,6 @@
 """The options of a run in real time, and what is said of its timing."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import click
@@ -8,8 +8,9 @@ import click
 from ..errors import InputError
 from ..realtime.options import OVERRUNS, Realtime
 from ..realtime.timing import Timing
+from .frame import together
 
-OPTIONS: tuple[Callable[[Any], Any], ...] = (
+realtime_options = together(
     click.option("--realtime", is_flag=True, help="Pace the run by the clock; print its timing."),
     click.option("--factor", type=float, help="Times as fast as real time; 1 by default."),
     click.option(
@@ -26,22 +27,15 @@ NAMES = ("factor", "overrun", "priority", "cpu", "lock_memory")
 """The options that need --realtime, as Realtime names them."""
 
 
-def realtime_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """The options of a run in real time, for a command that takes their values by name."""
-    for option in reversed(OPTIONS):
-        command = option(command)
-    return command
-
-
-def chosen_realtime(paced: bool, given: Mapping[str, Any]) -> Realtime | None:
-    """What the options ask for; given are their values by name, None or False where not given.
+def chosen_realtime(given: Mapping[str, Any]) -> Realtime | None:
+    """What the options ask for; `given` are the values of all options of a command by name.
 
     InputError where one of them comes without --realtime.
     """
     asked = {
         name: given[name] for name in NAMES if given[name] is not None and given[name] is not False
     }
-    if paced:
+    if given["realtime"]:
         return Realtime(**asked)
     for name, value in asked.items():
         option = f"--{name.replace('_', '-')}"

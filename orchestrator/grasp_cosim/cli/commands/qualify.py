@@ -2,42 +2,29 @@
 
 import json
 from pathlib import Path
-from typing import cast
+from typing import Any
 
 import click
 
 from ...files import check_folder, write_text
-from ...interface.interface import Value
 from ...qualification import verdict
 from ...qualification.bands import read_bands
 from ...qualification.qualify import Qualification
 from ...qualification.qualify import qualify as run_qualification
 from ...report.plot import new_figure
 from ...report.qualification import draw_qualification
-from ...system.description import SCHEMES
 from ...system.parts import ISOLATIONS, Isolation
-from ..frame import (
-    NEGATIVE,
-    chosen_metrics,
-    json_option,
-    load_system,
-    metrics_option,
-    pair,
-    preset_options,
-    with_chosen_presets,
-)
+from ..frame import NEGATIVE, chosen_metrics, json_option, metrics_option, pair
+from ..options import SystemOptions, system_options, taken
 
 
 @click.command()
 @click.argument("candidate", type=click.Path(path_type=Path))
 @click.option("--as", "component", required=True, metavar="COMPONENT", help="Whose place it takes.")
 @click.option("--system", type=click.Path(path_type=Path), help="Default: the built-in grasp.")
+@system_options
 @click.option("--bands", type=click.Path(path_type=Path), help="TOML; default: derived.")
 @click.option("--rename", "renames", multiple=True, metavar="VARIABLE=CANDIDATES_VARIABLE")
-@click.option("--set", "settings", multiple=True, metavar="COMPONENT.VARIABLE=VALUE")
-@click.option("--step", type=float, help="Communication step in s.")
-@click.option("--stop", type=float, help="Stop time in s.")
-@click.option("--scheme", type=click.Choice(SCHEMES))
 @click.option(
     "--isolation",
     type=click.Choice(ISOLATIONS),
@@ -45,31 +32,23 @@ from ..frame import (
     show_default=True,
     help="Where the candidate runs.",
 )
+@metrics_option
 @click.option(
     "--out",
     type=click.Path(path_type=Path),
     help="Folder for qualification.json, qualification.png and bands_used.toml.",
 )
-@preset_options
-@metrics_option
 @json_option
 def qualify(
     candidate: Path,
     component: str,
-    system: Path | None,
     bands: Path | None,
     renames: tuple[str, ...],
-    settings: tuple[str, ...],
-    step: float | None,
-    stop: float | None,
-    scheme: str | None,
-    isolation: str,
-    out: Path | None,
-    presets: tuple[str, ...],
-    case: int | None,
-    bench: bool,
+    isolation: Isolation,
     metric_files: tuple[Path, ...],
+    out: Path | None,
     as_json: bool,
+    **given: Any,
 ) -> int:
     """Find out whether CANDIDATE, an FMU, may take the place of COMPONENT.
 
@@ -82,21 +61,17 @@ def qualify(
     if out:
         check_folder(out)
         new_figure(1.0, 1.0)  # tells that matplotlib is missing before the runs, not after
-    metrics = chosen_metrics(metric_files)
-    chosen = with_chosen_presets(load_system(system, step, stop), presets, case, bench)
-    values: dict[str, Value] = dict(
-        pair("--set", text, "COMPONENT.VARIABLE=VALUE") for text in settings
-    )
+    options = taken(SystemOptions, given)
     found = run_qualification(
-        chosen.with_experiment(step, stop, scheme),
+        options.load(),
         component,
         candidate,
         rename=dict(pair("--rename", text, "VARIABLE=CANDIDATES_VARIABLE") for text in renames),
-        values=values,
+        values=options.values,
         bands=read_bands(bands) if bands else None,
-        isolation=cast(Isolation, isolation),
+        isolation=isolation,
         progress=True,
-        metrics=metrics,
+        metrics=chosen_metrics(metric_files),
     )
     if out:
         _write(found, out)
