@@ -11,10 +11,10 @@ LOOK = 0.05
 """s; how often is asked whether both fingers touch."""
 
 
-def close(system: System, after: float) -> Result:
-    """Run a grasp until `after` seconds after both fingers touch, at the latest to its stop time.
+def close(system: System, after: float | None = None) -> Result:
+    """Run a grasp until `after` s after both fingers touch, else or at the latest to its stop time.
 
-    The end is known to LOOK; the result is then not complete. KeyboardInterrupt on Ctrl-C.
+    The end is known to LOOK; a result that ends early is not complete. KeyboardInterrupt on Ctrl-C.
     """
     steps = max(1, round(LOOK * NANOSECONDS / system.step_ns))
     with simulate.session(system) as session, interrupts(session.halt):
@@ -24,6 +24,6 @@ def close(system: System, after: float) -> Result:
         while session.time < end and session.step(steps):
             if session.halt.is_set():
                 raise KeyboardInterrupt
-            if not touching and all(session[name] for name in contacts):
+            if after is not None and not touching and all(session[name] for name in contacts):
                 touching, end = True, session.time + after
         return session.result()

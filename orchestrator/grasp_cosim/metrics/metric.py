@@ -116,9 +116,11 @@ class Metric:
         return f"{self.title}, {self.entries[place]}" if self.entries else self.title
 
     def __reduce__(self) -> tuple[Any, ...]:
-        if self.origin is None:
-            return _made, tuple(getattr(self, name) for name in _FIELDS)
-        return _from_text, (*self.origin, self.name)
+        if self.origin is not None:
+            return _from_text, (*self.origin, self.name)
+        if any(self is m for m in registered()):
+            return _registered, (self.name,)
+        return _made, tuple(getattr(self, name) for name in _FIELDS)
 
 
 _FIELDS = tuple(Metric.__dataclass_fields__)
@@ -126,6 +128,11 @@ _FIELDS = tuple(Metric.__dataclass_fields__)
 
 def _made(*values: Any) -> Metric:
     return Metric(*values)
+
+
+def _registered(name: str) -> Metric:
+    """The metric of that name that every result is asked for, in another process."""
+    return next(m for m in registered() if m.name == name)
 
 
 def metric(name: str, **more: Any) -> Callable[[Function], Metric]:

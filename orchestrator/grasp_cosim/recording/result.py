@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -74,6 +74,10 @@ class Result(Mapping[str, npt.NDArray[Any]]):
 
     def __len__(self) -> int:
         return len(self.signals)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The data alone: what was worked out from it does not travel to other processes."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
 
     @property
     def roles(self) -> Mapping[str, str]:

@@ -10,7 +10,6 @@ import click
 
 from ...files import check_folder
 from ...grasp.presets import with_bench
-from ...grasp.published.bench import evaluate_bench
 from ...grasp.published.evaluate import evaluate as run_evaluation
 from ..frame import NEGATIVE, json_option, load_system
 
@@ -27,12 +26,11 @@ def evaluate(bench: bool, out: Path, workers: int, as_json: bool) -> int:
     Example: grasp-cosim evaluate --out results
     """
     check_folder(out)
+    system = load_system(None, None, None)
     if bench:
-        report = evaluate_bench(
-            with_bench(load_system(None, None, None)), out, workers, progress=True
-        )
+        report = run_evaluation(with_bench(system), out, workers, True, "experiment")
     else:
-        report = run_evaluation(load_system(None, None, None), out, workers, progress=True)
+        report = run_evaluation(system, out, workers, True)
     holds = all(claim["holds"] for claim in report["claims"])
     click.echo(json.dumps(report) if as_json else _verdict(report, out))
     return 0 if holds else NEGATIVE

@@ -20,7 +20,7 @@ from ...system.description import System
 from ..closing import close
 from ..metrics import FINGERS
 from ..presets import CASES, with_case
-from ..published.tables import Row, Setting, experimental_rows
+from ..published.tables import Row, Setting, published_rows
 from .fit import Fit, Parameter, Vector, check_scipy, fit
 from .parameters import RATIO
 
@@ -63,7 +63,7 @@ def published_contacts() -> list[Contact]:
 
     White on both sides is the row of x_m = 0.03 m once more, so it is left out.
     """
-    return [_contact(row) for row in experimental_rows() if row.finger and _counts(row)]
+    return [_contact(row) for row in published_rows("experiment") if row.finger and _counts(row)]
 
 
 def read_contacts(path: Path) -> list[Contact]:
@@ -173,8 +173,7 @@ def contact_times(job: tuple[System, Grasp]) -> Times:
 def _counts(row: Row) -> bool:
     if row.table == "position":
         return True
-    _, alpha_1, alpha_2 = row.setting
-    return alpha_1 == alpha_2 != 1.0
+    return row.setting.equal_colours and row.setting.alpha_1 != 1.0
 
 
 def _contact(row: Row) -> Contact:

@@ -1,71 +1,107 @@
-"""The published simulation, run again: table, figures, claims, report."""
+"""The published figures beside ours: the simulation, and the experiments on the bench preset.
+
+One pipeline for both: the settings of the published rows in every case, a row with both figures for
+each published one, their deviations, the claims, pictures and a report. What differs is in SOURCES.
+"""
+
+from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ...files import write_text
-from ...master.simulation import simulate
 from ...parallel import run_all
 from ...report.plot import new_figure, save
 from ...system.description import System
-from ..pictures import draw_contact_forces, draw_contact_times, draw_targets
+from ..closing import close
+from ..pictures import draw_colour_times, draw_contact_forces, draw_contact_times, draw_targets
 from ..presets import CASES, with_case
-from .claims import check_claims
-from .grasps import Run, Runs, as_run, steady
-from .report import markdown, table_csv
-from .tables import REFLECTANCE_X_M, Row, Setting, simulated_rows
+from .claims import Evidence, check_claims
+from .grasps import Run, Runs, as_run
+from .report import bench_markdown, markdown, table_csv
+from .tables import REFLECTANCE_X_M, Row, Setting, Source, published_rows
 
-STOP = 4.5
-"""s; the slowest contact is at 2.7 s and the layers settle with a time constant of 0.2 s."""
+Deviations = Callable[[Sequence[Row], Sequence[Mapping[str, Any]]], dict[str, float]]
 
-SHOWN_UNTIL = 3.0
-"""s; where the time axis of the figures ends."""
+BOOKKEEPING = ("wall_time", "real_time_factor")
+"""What differs from one repetition of a grasp to the next."""
 
 
-def evaluate(system: System, out: Path, workers: int, progress: bool) -> dict[str, Any]:
-    """Run Cases 0, 1 and 2 over the published object positions and write everything to out.
+@dataclass(frozen=True, slots=True)
+class Evaluation:
+    """How the figures of one source are run again.
+
+    A grasp lasts `stop` s, or ends `after` s once both fingers touch; figures end at `shown` s.
+    """
+
+    stop: float
+    after: float | None
+    shown: float
+    deviations: Deviations
+    at_sensor_contact: bool
+    draw_times: Callable[[Sequence[Mapping[str, Any]], Path], None]
+    page: Callable[[Mapping[str, Any], System], str]
+
+
+def evaluate(
+    system: System, out: Path, workers: int, progress: bool, source: Source = "simulation"
+) -> dict[str, Any]:
+    """Run Cases 0, 1 and 2 in all published settings of a source and write everything to `out`.
 
     Writes contact_forces.png, target_position.png, contact_times.png, evaluation.csv,
-    evaluation.json and report.md. Returns what evaluation.json holds.
+    evaluation.json and report.md. Returns what evaluation.json holds. InputError without
+    matplotlib, KeyboardInterrupt at Ctrl-C.
     """
     new_figure(1.0, 1.0)  # says at once if matplotlib is missing
-    published = simulated_rows()
+    how, published = SOURCES[source], published_rows(source)
     settings = sorted({row.setting for row in published})
-    jobs = [(system, setting, case) for setting in settings for case in CASES]
+    jobs = [(system, setting, case, source) for setting in settings for case in CASES]
     runs = {(r.setting, r.case): r for r in run_all(_run, jobs, workers, progress, "grasps")}
-    rows = [{**compared(row, runs), **_at_sensor_contact(row, runs)} for row in published]
+    rows = [_compared(row, runs, how.at_sensor_contact) for row in published]
+    rms = how.deviations(published, rows)
     report = {
         "rows": rows,
-        "rms": _rms(rows),
-        "claims": check_claims(runs, rows, system),
+        "rms": rms,
+        "claims": check_claims(source, Evidence(runs, published, rows, rms, system)),
         "runs": [
-            {"condition": r.setting.x_m, "case": r.case, **steady(r.metrics)} for r in runs.values()
+            {
+                "condition": r.setting.x_m if source == "simulation" else r.setting.label,
+                "case": r.case,
+                **{k: v for k, v in r.metrics.items() if k not in BOOKKEEPING},
+            }
+            for r in runs.values()
         ],
     }
-    _draw(runs, rows, out)
+    _draw_signals(runs, how.shown, out)
+    how.draw_times(rows, out / "contact_times.png")
     write_text(out / "evaluation.csv", table_csv(rows))
     write_text(out / "evaluation.json", json.dumps(report, indent=2) + "\n")
-    write_text(out / "report.md", markdown(report, system))
+    write_text(out / "report.md", how.page(report, system))
     return report
 
 
-def _run(job: tuple[System, Setting, int]) -> Run:
-    system, setting, case = job
-    values = {"plant.initial_object_position": setting.x_m}
-    result = simulate(with_case(system, case).with_values(values), stop=STOP)
-    if not result.complete:
-        raise KeyboardInterrupt
-    return as_run(result, setting, case)
+def _run(job: tuple[System, Setting, int, Source]) -> Run:
+    """One grasp; the reflectances of a setting are shares of those of the system."""
+    system, setting, case, source = job
+    values = {
+        "plant.initial_object_position": setting.x_m,
+        "sensor_1.reflectance": setting.alpha_1 * system.start("sensor_1.reflectance"),
+        "sensor_2.reflectance": setting.alpha_2 * system.start("sensor_2.reflectance"),
+    }
+    how = SOURCES[source]
+    chosen = with_case(system, case).with_values(values).with_experiment(stop=how.stop)
+    return as_run(close(chosen, how.after), setting, case)
 
 
-def compared(row: Row, runs: Runs) -> dict[str, Any]:
-    """The published figure with ours beside it and the difference."""
+def _compared(row: Row, runs: Runs, at_sensor_contact: bool) -> dict[str, Any]:
+    """The published figure with ours beside it and the difference, simulated less published."""
     run = runs[row.setting, row.case]
     simulated = run.apart if row.finger is None else run.times[row.finger - 1]
-    return {
+    found = {
         "table": row.table,
         "condition": row.condition,
         "case": row.case,
@@ -74,20 +110,20 @@ def compared(row: Row, runs: Runs) -> dict[str, Any]:
         "simulated": simulated,
         "difference": simulated - row.published,
     }
-
-
-def _at_sensor_contact(row: Row, runs: Runs) -> dict[str, float]:
-    first, second = runs[row.setting, row.case].times_at_sensor_contact
-    ours = abs(second - first) if row.finger is None else (first, second)[row.finger - 1]
-    return {"simulated_at_0.37_mm": ours, "difference_at_0.37_mm": ours - row.published}
+    if at_sensor_contact:
+        first, second = run.times_at_sensor_contact
+        ours = abs(second - first) if row.finger is None else (first, second)[row.finger - 1]
+        found["simulated_at_0.37_mm"] = ours
+        found["difference_at_0.37_mm"] = ours - row.published
+    return found
 
 
 def root_mean_square(values: Sequence[float]) -> float:
-    """Of at least one number."""
+    """Root mean square of at least one number."""
     return math.sqrt(sum(v * v for v in values) / len(values))
 
 
-def _rms(rows: list[dict[str, Any]]) -> dict[str, float]:
+def simulation_rms(published: Sequence[Row], rows: Sequence[Mapping[str, Any]]) -> dict[str, float]:
     """Root mean square of the differences in s, contact times and time differences apart."""
     return {
         f"{what}{suffix}": root_mean_square([r[key] for r in chosen])
@@ -99,16 +135,26 @@ def _rms(rows: list[dict[str, Any]]) -> dict[str, float]:
     }
 
 
-def _draw(runs: Runs, rows: list[dict[str, Any]], out: Path) -> None:
-    draw_signals(runs, SHOWN_UNTIL, out)
-    times = new_figure(9.0, 4.0)
-    left, right = times.subplots(1, 2, sharey=True)
-    draw_contact_times(left, rows, 1)
-    draw_contact_times(right, rows, 2)
-    save(times, out / "contact_times.png")
+def bench_rms(published: Sequence[Row], rows: Sequence[Mapping[str, Any]]) -> dict[str, float]:
+    """Root mean square of the differences in s: contact times by table, then time differences.
+
+    "contact_times" are those of the position rows and of equal colours; white on both sides,
+    which is the position row of 0.03 m again, counts once.
+    """
+    groups: dict[str, list[float]] = {}
+    for row, ours in zip(published, rows, strict=True):
+        names = ["time_differences"]
+        if row.finger is not None:
+            alike = "positions" if row.table == "position" else "equal_colours"
+            names = [alike if row.setting.equal_colours else "mixed_colours"]
+        if names[0] in ("positions", "equal_colours") and row.condition != "white/white":
+            names.append("contact_times")
+        for name in names:
+            groups.setdefault(name, []).append(ours["difference"])
+    return {name: root_mean_square(values) for name, values in sorted(groups.items())}
 
 
-def draw_signals(runs: Runs, until: float, out: Path) -> None:
+def _draw_signals(runs: Runs, until: float, out: Path) -> None:
     """The figures of contact forces and of the target, the object at REFLECTANCE_X_M."""
     shown = {r.case: r.result for r in runs.values() if r.result}
     pair = [(shown[1], "--", "Case 1"), (shown[2], "-", "Case 2")]
@@ -128,3 +174,27 @@ def draw_signals(runs: Runs, until: float, out: Path) -> None:
     axes.set_xlim(0.0, until)
     axes.set_title(f"Target position, {where}", fontsize=10)
     save(targets, out / "target_position.png")
+
+
+def _draw_position_times(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
+    figure = new_figure(9.0, 4.0)
+    for axes, case in zip(figure.subplots(1, 2, sharey=True), (1, 2), strict=True):
+        draw_contact_times(axes, rows, case)
+    save(figure, path)
+
+
+def _draw_all_times(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
+    figure = new_figure(11.0, 8.0)
+    axes = figure.subplots(2, 2, sharey="row")
+    for column, case in enumerate((1, 2)):
+        draw_contact_times(axes[0, column], [r for r in rows if r["table"] == "position"], case)
+        draw_colour_times(axes[1, column], [r for r in rows if r["table"] == "reflectance"], case)
+    save(figure, path)
+
+
+SOURCES: Mapping[Source, Evaluation] = {
+    # The slowest contact is at 2.7 s, and the layers settle with a time constant of 0.2 s.
+    "simulation": Evaluation(4.5, None, 3.0, simulation_rms, True, _draw_position_times, markdown),
+    # Twice the slowest published contact; a grasp goes on for 1.5 s once both fingers touch.
+    "experiment": Evaluation(10.0, 1.5, 5.0, bench_rms, False, _draw_all_times, bench_markdown),
+}

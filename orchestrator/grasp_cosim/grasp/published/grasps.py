@@ -1,7 +1,6 @@
-"""The grasps of an evaluation, and what both evaluations claim of them."""
+"""The grasps of an evaluation, and what claims ask of them."""
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,9 +14,6 @@ from .tables import REFLECTANCE_X_M, Setting
 
 SENSOR_CONTACT = 0.37e-3
 """m; the gap at which contact, were it declared there, would explain the published times best."""
-
-Claim = tuple[str, bool]
-"""A statement and whether it holds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +42,11 @@ class Run:
         """The time difference of contact in s."""
         first, second = self.times
         return abs(second - first)
+
+    @property
+    def off_target(self) -> float:
+        """Distance of the target from the centre of the object in the end, m."""
+        return abs(float(self.metrics["target_position"]) - self.setting.x_m)
 
 
 Runs = dict[tuple[Setting, int], Run]
@@ -88,13 +89,3 @@ def settled_force(system: System) -> float:
     """K_i·W/2 in N, with which a finger presses in the end where friction does not hold it."""
     stiffness = system.start("controller.contact_force.stiffness")
     return 0.5 * stiffness * system.start("plant.object_width")
-
-
-def as_json(claims: Iterable[Claim]) -> list[dict[str, Any]]:
-    """The claims of `evaluate --json`."""
-    return [{"text": text, "holds": bool(holds)} for text, holds in claims]
-
-
-def steady(metrics: dict[str, Any]) -> dict[str, Any]:
-    """The metrics that are the same in every repetition."""
-    return {k: v for k, v in metrics.items() if k not in ("wall_time", "real_time_factor")}

@@ -2,13 +2,14 @@
 
 import csv
 import io
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ...system.description import System
 from ...system.parts import NANOSECONDS
 
 
-def table_csv(rows: list[dict[str, Any]]) -> str:
+def table_csv(rows: Sequence[Mapping[str, Any]]) -> str:
     """The rows as CSV; `finger` is 1, 2 or `difference`."""
     text = io.StringIO()
     writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
@@ -17,7 +18,7 @@ def table_csv(rows: list[dict[str, Any]]) -> str:
     return text.getvalue()
 
 
-def markdown(report: dict[str, Any], system: System) -> str:
+def markdown(report: Mapping[str, Any], system: System) -> str:
     """The report, with the pictures beside it, as Markdown."""
     step = system.step_ns / NANOSECONDS
     rms = {key: f"{value:.3f}" for key, value in report["rms"].items()}
@@ -59,7 +60,7 @@ The object is named by its position in m.
 """
 
 
-def bench_markdown(report: dict[str, Any], system: System) -> str:
+def bench_markdown(report: Mapping[str, Any], system: System) -> str:
     """The report of the experiments, with the pictures beside it, as Markdown."""
     step = system.step_ns / NANOSECONDS
     position, colour = (
@@ -107,7 +108,7 @@ on both sides is the row of 0.03 m once more and counts once there.
 """
 
 
-def _table(rows: list[dict[str, Any]]) -> str:
+def _table(rows: Sequence[Mapping[str, Any]]) -> str:
     """Published and simulated times; more columns where the rows have those at 0.37 mm."""
     more = "simulated_at_0.37_mm" in rows[0]
     lines = [
@@ -127,17 +128,17 @@ def _table(rows: list[dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
-def _condition(row: dict[str, Any]) -> str:
+def _condition(row: Mapping[str, Any]) -> str:
     """The position in m, or what else the setting is called by."""
     condition = row["condition"]
     return f"{condition:.2f}" if isinstance(condition, float) else str(condition)
 
 
-def _claim_list(claims: list[dict[str, Any]]) -> str:
+def _claim_list(claims: Sequence[Mapping[str, Any]]) -> str:
     return "\n".join(f"- **{'holds' if c['holds'] else 'FAILS'}**: {c['text']}" for c in claims)
 
 
-def _run_table(runs: list[dict[str, Any]]) -> str:
+def _run_table(runs: Sequence[Mapping[str, Any]]) -> str:
     lines = [
         "| object | case | contact times, s | approach speed, mm/s | peak force, N "
         "| settled force, N | target at the end, m |",

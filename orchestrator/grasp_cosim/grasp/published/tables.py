@@ -8,6 +8,9 @@ from typing import Literal, NamedTuple
 
 from ..metrics import FINGERS
 
+Source = Literal["simulation", "experiment"]
+"""Where published figures are from."""
+
 REFLECTANCE_X_M = 0.03
 """m; where the object stands in the table of colours, and in the figures."""
 
@@ -18,6 +21,18 @@ class Setting(NamedTuple):
     x_m: float
     alpha_1: float = 1.0
     alpha_2: float = 1.0
+
+    @property
+    def equal_colours(self) -> bool:
+        """True if both surfaces of the object have the same reflectance."""
+        return self.alpha_1 == self.alpha_2
+
+    @property
+    def label(self) -> str:
+        """Like 0.03 m, with the reflectances where they are not 1."""
+        x_m, alpha_1, alpha_2 = self
+        colours = "" if alpha_1 == alpha_2 == 1.0 else f", {alpha_1:.2f}/{alpha_2:.2f}"
+        return f"{x_m:.2f} m{colours}"
 
 
 class Row(NamedTuple):
@@ -34,17 +49,15 @@ class Row(NamedTuple):
     published: float
 
 
-def simulated_rows() -> list[Row]:
-    """The simulated half of the position table: a row per finger, one per difference."""
-    return list(_positions("simulation"))
+def published_rows(source: Source) -> list[Row]:
+    """The figures of a source: its half of the position table, of the experiment the colours too.
+
+    A row per finger, and one for the difference.
+    """
+    return [*_positions(source), *(_colours() if source == "experiment" else ())]
 
 
-def experimental_rows() -> list[Row]:
-    """The experimental half of the position table, and the table of colours."""
-    return [*_positions("experiment"), *_colours()]
-
-
-def _positions(source: str) -> Iterator[Row]:
+def _positions(source: Source) -> Iterator[Row]:
     for line in _lines("table_position.csv"):
         if line["source"] == source:
             x_m = float(line["x_m"])
