@@ -112,6 +112,14 @@ WRONG = [
         f"{HEAD}{GRID}{WIDTH}normal = {{ mean = 3, standard_deviation = 1, low = 0, high = 1 }}\n",
         "mean = 3.0: must be from low, 0.0, to high, 1.0",
     ),
+    *(
+        (
+            f"{HEAD}{GRID}{WIDTH}normal = {{ mean = {mean}, standard_deviation = 1, low = 0, "
+            "high = 1 }\n",
+            f"normal: mean = {shown}: must be a finite number",
+        )
+        for mean, shown in (('"x"', "'x'"), ("true", "True"))
+    ),
     (
         f"{HEAD}{GRID}{WIDTH}normal = {{ mean = 0, standard_deviation = 0, low = 0, high = 1 }}\n",
         "standard_deviation = 0.0: must be greater than 0",
