@@ -104,9 +104,9 @@ def test_the_orchestrator_builds_fmus_at_three_places_only() -> None:
     assert builders == {"build.py", "system.py", "proxy.py"}
 
 
-def test_the_connection_protocol_is_known_to_the_bench_alone_and_knows_nobody() -> None:
+def test_the_protocol_of_the_link_is_known_to_both_its_ends_alone_and_knows_nobody() -> None:
     users = {f for f, m in modules(ROOT / "orchestrator/grasp_cosim") if m.startswith(LINK)}
-    assert users == {"bench.py", "model.py", "server.py", "connection.py"}
+    assert users == {"driven.py", "protocol.py", "served.py", "server.py"}
     foreign = {n for _, n in imports(ROOT / "fmus/grasp_fmus/link")} - sys.stdlib_module_names
     assert not foreign
 

@@ -1,11 +1,12 @@
 """Runs spread over processes."""
 
 import os
+import signal
 from pathlib import Path
 
 import pytest
-from grasp_cosim.errors import InputError
-from grasp_cosim.parallel import run_all
+from grasp_cosim.errors import InputError, SimulationError
+from grasp_cosim.parallel import Crew, progress_bar, run_all
 
 
 def _process(job: int) -> tuple[int, int]:
@@ -19,7 +20,7 @@ def _refuse(job: Path) -> None:
 
 
 def test_results_come_in_the_order_of_the_jobs_from_other_processes() -> None:
-    results = list(run_all(_process, range(6), 2, progress=False, what="runs"))
+    results = run_all(_process, range(6), 2, progress=False, what="runs")
     assert [job for job, _ in results] == list(range(6))
     assert os.getpid() not in {process for _, process in results}
 
@@ -27,5 +28,22 @@ def test_results_come_in_the_order_of_the_jobs_from_other_processes() -> None:
 def test_the_error_of_a_job_is_that_of_all(tmp_path: Path) -> None:
     jobs = [tmp_path / "right", tmp_path / "wrong"]
     with pytest.raises(InputError, match="wrong: must be something else"):
-        list(run_all(_refuse, jobs, 1, progress=False, what="runs"))
+        run_all(_refuse, jobs, 1, progress=False, what="runs")
     assert (tmp_path / "right").exists()
+
+
+def _end(job: int) -> int:
+    if job == 1:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return job
+
+
+def test_a_process_that_dies_is_an_error() -> None:
+    with pytest.raises(SimulationError, match="a process for the runs ended by signal 9, Killed"):
+        run_all(_end, range(3), 1, progress=False, what="runs")
+
+
+def test_batches_share_their_processes() -> None:
+    with Crew(1) as crew, progress_bar("runs", None, progress=False) as bar:
+        first, second = (crew.map(_process, range(2), bar) for _ in range(2))
+    assert first == second

@@ -4,8 +4,10 @@ Every message is `PLACE = VALUE: must be ...`: where the value comes from, the v
 """
 
 import math
+import sys
 import tomllib
 from collections.abc import Iterable, Mapping
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +39,7 @@ def number(
     With `above`, `low` itself is too low. `must` says what is valid, `unit` follows the value in
     the message. InputError otherwise.
     """
-    holds = is_number(value) and math.isfinite(value) and low <= value <= high
+    holds = is_number(value) and abs(value) <= sys.float_info.max and low <= value <= high
     if not holds or (above and value == low):
         raise InputError(f"{place} = {value!r}{unit and f' {unit}'}: must be {must}")
     return float(value)
@@ -91,6 +93,20 @@ def check_values(place: str, values: Mapping[str, Any]) -> None:
                 f"{place}: {name} = {value!r}: must be a number, boolean or string; a name with a "
                 'dot stands in quotes, like "sensor_1.reflectance" = 0.6'
             )
+
+
+def extra_module(name: str, purpose: str, extra: str) -> Any:
+    """Return the module `name` of an optional `extra` of ours; `purpose` says what it is for.
+
+    InputError with the command that installs it where it is missing.
+    """
+    try:
+        return import_module(name)
+    except ImportError as error:
+        raise InputError(
+            f"{name.partition('.')[0]} is not installed, {purpose}; "
+            f"install it with: pip install 'grasp-cosim[{extra}]'"
+        ) from error
 
 
 def toml_table(path: Path, what: str) -> dict[str, Any]:

@@ -1,40 +1,208 @@
-"""Runs spread over processes: the same results, to the bit, on any number of workers."""
+"""Jobs spread over processes of this machine: the same results, to the bit, on any number of them.
 
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
+The processes are new ones: a fork of one that has loaded FMUs would share their state. Each has one
+pipe to us. One that dies takes its own job with it and no other: a new one takes its place. Where
+we die, the pipes end, and the processes with them.
+"""
+
+import os
+import signal
+import threading
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from contextlib import closing, contextmanager, suppress
+from functools import partial
+from itertools import islice
 from multiprocessing import get_context
-from typing import TypeVar
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
+from typing import Any, NamedTuple, Self, TypeVar
 
 from tqdm import tqdm
+
+from .errors import SimulationError
 
 Job = TypeVar("Job")
 Run = TypeVar("Run")
 
+PATIENCE = 5.0
+"""s; a process that has not ended so long after it was to is killed."""
+
+
+class Lost(NamedTuple):
+    """A job whose process died: `end` says how, "ended with exit code 1"."""
+
+    end: str
+
+
+def progress_bar(what: str, total: int | None, progress: bool, initial: int = 0) -> "tqdm[Any]":
+    """A bar labelled `what` on standard error, with `progress` and if that is a terminal."""
+    disable = None if progress else True
+    return tqdm(total=total, initial=initial, desc=what, unit="run", disable=disable)
+
 
 def run_all(
     run: Callable[[Job], Run], jobs: Sequence[Job], workers: int, progress: bool, what: str
-) -> Iterator[Run]:
-    """The results of run(job), in the order of the jobs; run is a function of a module.
+) -> list[Run]:
+    """Return the results of Crew.map; `progress` shows a bar labelled `what`."""
+    with progress_bar(what, len(jobs), progress) as bar, Crew(workers) as crew:
+        return crew.map(run, jobs, bar)
 
-    progress shows a bar, labelled what, on standard error if that is a terminal.
-    """
-    bar = tqdm(total=len(jobs), desc=what, unit="run", disable=None if progress else True)
-    with bar, processes(workers) as pool:
-        for result in pool.map(run, jobs):
-            bar.update()
-            yield result
+
+class Crew:
+    """At most so many processes, for one batch of jobs after the other. Its context ends them."""
+
+    def __init__(self, workers: int) -> None:
+        self._most = workers
+        self._idle: list[_Worker] = []
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End the processes."""
+        for worker in self._idle:
+            worker.end()
+
+    def map(self, run: Callable[[Job], Run], jobs: Iterable[Job], bar: "tqdm[Any]") -> list[Run]:
+        """Return the results of run(job), in the order of the jobs; `bar` counts them.
+
+        `run` is a function of a module. What it raises is raised, and ends the other jobs;
+        SimulationError where a process dies or cannot start.
+        """
+        found: dict[int, Run] = {}
+        with closing(self.results(partial(_caught, run), enumerate(jobs))) as results:
+            for (index, _), result in results:
+                if isinstance(result, Lost):
+                    raise SimulationError(f"a process for the runs {result.end}")
+                if isinstance(result, _Raised):
+                    raise result.error
+                found[index] = result
+                bar.update()
+        return [found[index] for index in sorted(found)]
+
+    def results(
+        self, run: Callable[[Job], Run], jobs: Iterable[Job]
+    ) -> Generator[tuple[Job, Run | Lost], None, None]:
+        """Yield each job with its result, in the order in which they end.
+
+        `run` is a function of a module; where it raises, its process dies. Closing the iterator
+        ends the jobs. SimulationError where a process cannot start.
+        """
+        left = iter(jobs)
+        busy: dict[_Worker, Job] = {}
+
+        def give(job: Job) -> None:
+            worker = self._idle.pop() if self._idle else _Worker()
+            busy[worker] = job
+            worker.give(run, job)
+
+        try:
+            for job in islice(left, self._most):
+                give(job)
+            while busy:
+                heard = wait([worker.pipe for worker in busy])
+                for worker in [w for w in busy if w.pipe in heard]:
+                    if not worker.started():
+                        continue
+                    result = worker.received()
+                    job = busy.pop(worker)
+                    if isinstance(result, Lost):
+                        worker.end()
+                    else:
+                        self._idle.append(worker)
+                    for following in islice(left, 1):
+                        give(following)
+                    yield job, result
+        finally:
+            for worker in busy:
+                worker.end()
+
+
+class _Raised(NamedTuple):
+    error: BaseException
+
+
+def _caught(run: Callable[[Job], Run], numbered: tuple[int, Job]) -> Run | _Raised:
+    """Return the result of a numbered job, or its error, which map() raises."""
+    try:
+        return run(numbered[1])
+    except (Exception, KeyboardInterrupt) as error:
+        return _Raised(error)
+
+
+class _Worker:
+    """A process that does one job after the other."""
+
+    def __init__(self) -> None:
+        context = get_context("spawn")
+        self.pipe, theirs = context.Pipe()
+        self._started = False
+        self._process: BaseProcess = context.Process(target=_work, args=(theirs,))
+        with _deaf_to_ctrl_c(), theirs:
+            self._process.start()
+
+    def give(self, run: Callable[[Job], Any], job: Job) -> None:
+        """Have it do a job; where it has died meanwhile, received() says so."""
+        with suppress(OSError):
+            self.pipe.send((run, job))
+
+    def started(self) -> bool:
+        """Return False if what it has to say is only that it has started."""
+        if self._started:
+            return True
+        with suppress(EOFError, OSError):
+            self.pipe.recv()
+            self._started = True
+            return False
+        raise SimulationError(f"a process for the runs did not start: it {self._end()}")
+
+    def received(self) -> Any:
+        """Return the result of its job, or how it was lost."""
+        try:
+            return self.pipe.recv()
+        except (EOFError, OSError):
+            return Lost(self._end())
+
+    def end(self) -> None:
+        """End the process; a run it is at ends early, which frees its FMUs."""
+        self.pipe.close()
+        if self._process.is_alive() and self._process.pid:
+            os.kill(self._process.pid, signal.SIGINT)
+        self._process.join(PATIENCE)
+        if self._process.is_alive():
+            self._process.kill()
+            self._process.join()
+        self._process.close()
+
+    def _end(self) -> str:
+        """How the process, whose pipe has ended, came to its end."""
+        self._process.join(PATIENCE)
+        code = self._process.exitcode
+        if code is None:
+            return "closed its pipe"
+        if code < 0:
+            return f"ended by signal {-code}, {signal.strsignal(-code)}"
+        return f"ended with exit code {code}"
+
+
+def _work(pipe: Connection) -> None:
+    """The life of a process: say that it has started, then a job after the other."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a run collects it itself, and ends early
+    with suppress(EOFError, OSError, KeyboardInterrupt):
+        pipe.send(None)
+        while True:
+            run, job = pipe.recv()
+            pipe.send(run(job))
 
 
 @contextmanager
-def processes(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Processes for several batches of runs; after an error, what has not begun is dropped.
-
-    They are new ones: a fork of one that has loaded FMUs would share their state.
-    """
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        try:
-            yield pool
-        except BaseException:
-            pool.shutdown(cancel_futures=True)
-            raise
+def _deaf_to_ctrl_c() -> Iterator[None]:
+    """A process begun inside ignores Ctrl-C, which is for us; only the main thread can do so."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    previous = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, previous)

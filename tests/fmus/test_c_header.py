@@ -17,7 +17,7 @@ from time import monotonic, sleep
 from typing import IO, NamedTuple
 
 import pytest
-from grasp_cosim.hil.model import MOST_LOST
+from grasp_cosim.hil.driven import MOST_LOST
 from grasp_fmus.c_header import c_header, c_prefix
 from grasp_fmus.contract import Field, declared
 from grasp_fmus.link.client import Client, Verdict

@@ -11,14 +11,14 @@ import sys
 import tempfile
 from pathlib import Path
 
-from grasp_cosim.hil.bench import Bench, Serving
+from grasp_cosim.hil.served import ServedFmu, Service
 from grasp_cosim.hil.server import Server
 from grasp_cosim.interface.interface import read_interface
 
 
 def main(fmu: str) -> None:
     interface = read_interface(Path(fmu))
-    bench = Bench(interface, Serving(lockstep=True))
+    served = ServedFmu(interface, Service(lockstep=True))
     children: list[int] = []
     for line in sys.stdin:
         if line.startswith("end "):
@@ -31,7 +31,7 @@ def main(fmu: str) -> None:
         reading, writing = os.pipe()
         child = os.fork()
         if not child:
-            with Server(bench) as server:
+            with Server(served) as server:
                 os.write(writing, str(server.address[1]).encode())
                 server.serve()
             os._exit(0)

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from grasp_cosim import System, simulate
-from grasp_cosim.hil.bench import Serving
+from grasp_cosim.hil.served import Service
 from support.proxies import build_proxy, serving
 
 STEP, STOP = 4e-3, 2.0
@@ -22,7 +22,7 @@ def stepped(grasp: System) -> System:
 
 @contextmanager
 def on_the_bench(
-    system: System, folder: Path, names: tuple[str, ...], how: Serving
+    system: System, folder: Path, names: tuple[str, ...], how: Service
 ) -> Iterator[System]:
     """The system with these components as proxies, each with a peer in lockstep of its own."""
     with ExitStack() as stack:
@@ -46,7 +46,7 @@ def test_a_part_on_the_bench_changes_no_bit(
     values = {"plant.initial_object_position": 0.02, "sensor_1.reflectance": 0.93}
     system = stepped.with_experiment(scheme=scheme).with_values(values)
     direct = simulate(system)
-    with on_the_bench(system, tmp_path, names, Serving(lockstep=True)) as benched:
+    with on_the_bench(system, tmp_path, names, Service(lockstep=True)) as benched:
         proxied = simulate(benched)
     for signal, column in direct.items():
         np.testing.assert_array_equal(column, proxied[signal], signal)
@@ -61,7 +61,7 @@ def test_a_part_on_the_bench_changes_no_bit(
 def test_all_of_it_on_the_bench(stepped: System, tmp_path: Path) -> None:
     direct = simulate(stepped)
     names = ("plant", "sensor_1", "sensor_2", "controller")
-    with on_the_bench(stepped, tmp_path, names, Serving(lockstep=True)) as system:
+    with on_the_bench(stepped, tmp_path, names, Service(lockstep=True)) as system:
         again = simulate(system, engine="python")
     for signal, values in direct.items():
         np.testing.assert_array_equal(values, again[signal], signal)
@@ -70,7 +70,7 @@ def test_all_of_it_on_the_bench(stepped: System, tmp_path: Path) -> None:
 def test_events_reach_the_bench(grasp: System, tmp_path: Path) -> None:
     """A tunable parameter of a sensor on the bench, set on the way."""
     system = grasp.with_experiment(step=1e-3, stop=0.02)
-    with on_the_bench(system, tmp_path, ("sensor_1",), Serving(lockstep=True)) as benched:
+    with on_the_bench(system, tmp_path, ("sensor_1",), Service(lockstep=True)) as benched:
         there, here = darkened(benched), darkened(system)
     np.testing.assert_array_equal(there, here)
     assert here[11] < 0.6 * here[10]
@@ -87,6 +87,6 @@ def darkened(system: System) -> npt.NDArray[np.float64]:
 
 def test_two_runs_one_after_the_other_use_the_same_bench(grasp: System, tmp_path: Path) -> None:
     system = grasp.with_experiment(step=1e-3, stop=0.05)
-    with on_the_bench(system, tmp_path, ("plant",), Serving(lockstep=True)) as benched:
+    with on_the_bench(system, tmp_path, ("plant",), Service(lockstep=True)) as benched:
         first, second = (simulate(benched)["plant.position[1]"] for _ in range(2))
     np.testing.assert_array_equal(first, second)

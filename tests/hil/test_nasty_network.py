@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from grasp_cosim import System, simulate
-from grasp_cosim.hil.bench import Serving
 from grasp_cosim.hil.network import DIRECTIONS, Conditions, Direction, Network, Outage
-from grasp_cosim.hil.relay import Relay, relaying
+from grasp_cosim.hil.relay import Relay
+from grasp_cosim.hil.served import Service
 from grasp_cosim.hil.server import Server
 from grasp_cosim.hil.traffic import Entry
 from grasp_cosim.interface.interface import Value
 from grasp_cosim.recording.result import Result
-from support.proxies import build_proxy, serving, wait_until
+from support.proxies import build_proxy, relaying, serving, wait_until
 
 STEP = 0.01
 STEPS = 300
@@ -46,10 +46,10 @@ def behind_a_relay(
     """The system with a component on the bench, which steps on request, behind a relay."""
     fmu = system.component(name, "test").fmu
     with (
-        serving(fmu, Serving(lockstep=True)) as server,
+        serving(fmu, Service(lockstep=True)) as server,
         relaying(server.address, bad, log=log.append) as relay,
     ):
-        proxy = build_proxy(fmu, folder / f"{name}_bench.fmu", relay.port)
+        proxy = build_proxy(fmu, folder / f"{name}_bench.fmu", relay.address[1])
         yield system.swap(name, proxy), server, relay
 
 
@@ -83,8 +83,8 @@ def test_with_losses_and_jitter_the_grasp_completes_and_every_datagram_is_accoun
     }
     with behind_a_relay(slow_grasp, name, tmp_path, network(BAD), log) as (system, server, relay):
         result = simulated(system.with_values(values), name)
-        wait_until(lambda: server.bench.counters()["sessions"] == 1)
-        peer, counters = server.bench.counters(), relay.counters
+        wait_until(lambda: server.fmu.counters()["sessions"] == 1)
+        peer, counters = server.fmu.counters(), relay.counters
     steps = len(result.time) - 1
     assert counters["request"].received - 1 - steps < CLEAN  # HELLO and INITIALISE, and END
 
@@ -150,7 +150,7 @@ def test_the_peer_started_anew(slow_grasp: System, tmp_path: Path, resume: bool)
         "plant.proxy.failsafe.gap[2]": 0.25,
         "plant.proxy.resume": resume,
     }
-    with serving(fmu, Serving(lockstep=True)) as first:
+    with serving(fmu, Service(lockstep=True)) as first:
         address = first.address
         proxy = build_proxy(fmu, tmp_path / "plant_bench.fmu", address[1])
         session = simulate.session(slow_grasp.swap("plant", proxy).with_values(values))
@@ -160,7 +160,7 @@ def test_the_peer_started_anew(slow_grasp: System, tmp_path: Path, resume: bool)
         session.step(10)
         assert session["plant.proxy.state"] == 3
         assert (session["plant.gap[1]"], session["plant.gap[2]"]) == (gap, 0.25)
-        with serving(fmu, Serving(lockstep=True), address):
+        with serving(fmu, Service(lockstep=True), address):
             session.step(5)
             assert session["plant.proxy.state"] == (1 if resume else 3)
             session.step(5)

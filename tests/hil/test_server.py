@@ -1,4 +1,4 @@
-"""The bench at its port: real sockets on the loopback."""
+"""An FMU served at its port: real sockets on the loopback."""
 
 import itertools
 import json
@@ -16,8 +16,8 @@ from pathlib import Path
 import pytest
 from grasp_cosim import cli
 from grasp_cosim.errors import InputError
-from grasp_cosim.hil.bench import Bench, Serving
 from grasp_cosim.hil.protocol import link_signature
+from grasp_cosim.hil.served import ServedFmu, Service
 from grasp_cosim.hil.server import Server
 from grasp_cosim.interface.interface import read_interface
 from grasp_fmus.link.message import LARGEST
@@ -46,7 +46,7 @@ def test_a_session_over_udp(fmus: Path) -> None:
     fmu = fmus / "GripperPlant.fmu"
     values = requests(fmu)
     with (
-        serving(fmu, Serving(lockstep=True, key=KEY)) as server,
+        serving(fmu, Service(lockstep=True, key=KEY)) as server,
         proxied(fmu, server, KEY) as proxy,
     ):
         assert server.address[0] == "127.0.0.1"
@@ -54,17 +54,17 @@ def test_a_session_over_udp(fmus: Path) -> None:
         for k in range(50):
             proxy.step(k * 1e-3, 1e-3, values)
         proxy.end()
-        wait_until(lambda: server.bench.counters()["sessions"] == 1)
-    assert server.bench.counters()["steps"] == 50
+        wait_until(lambda: server.fmu.counters()["sessions"] == 1)
+    assert server.fmu.counters()["steps"] == 50
 
 
 def test_by_its_own_clock_it_goes_on_without_requests(fmus: Path) -> None:
     fmu = fmus / "GripperPlant.fmu"
     values = requests(fmu)
-    with serving(fmu, Serving()) as server, proxied(fmu, server) as proxy:
+    with serving(fmu, Service()) as server, proxied(fmu, server) as proxy:
         proxy.begin(1, values)
         proxy.step(0.0, 1e-3, values)
-        wait_until(lambda: server.bench.counters()["own_steps"] >= 20)
+        wait_until(lambda: server.fmu.counters()["own_steps"] >= 20)
         proxy.step(0.02, 1e-3, values)
         assert proxy.client.outputs_time >= 0.02
 
@@ -72,8 +72,8 @@ def test_by_its_own_clock_it_goes_on_without_requests(fmus: Path) -> None:
 def test_the_port_is_one_that_is_free(fmus: Path) -> None:
     interface = read_interface(fmus / "ProximitySensor.fmu")
     refused = pytest.raises(InputError, match="cannot listen there: Address already in use")
-    with Server(Bench(interface)) as server, refused:
-        Server(Bench(interface), server.address)
+    with Server(ServedFmu(interface)) as server, refused:
+        Server(ServedFmu(interface), server.address)
 
 
 def garbage(seed: int, legal: bytes) -> Iterator[bytes]:
@@ -96,7 +96,7 @@ def test_half_a_million_malformed_datagrams(fmus: Path, key: bytes | None) -> No
     fmu = fmus / "GripperPlant.fmu"
     values = requests(fmu)
     with (
-        serving(fmu, Serving(lockstep=True, key=key)) as server,
+        serving(fmu, Service(lockstep=True, key=key)) as server,
         proxied(fmu, server, key) as proxy,
         socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vandal,
     ):
@@ -115,7 +115,7 @@ def test_half_a_million_malformed_datagrams(fmus: Path, key: bytes | None) -> No
         grown = sys.getallocatedblocks() - blocks
         vandal.send(bytes(LARGEST))
         proxy.step(5.0, 1e-3, values)
-        counters = server.bench.counters()
+        counters = server.fmu.counters()
     dropped = ("malformed", "forged", "foreign", "stale", "duplicated")
     assert sum(counters[name] for name in dropped) == 500_001
     assert (counters["steps"], counters["failures"]) == (5001, 0)

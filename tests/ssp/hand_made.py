@@ -1,7 +1,7 @@
 """SSP archives as others make them, by hand, with FMUs that have an interface and no code."""
 
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 NAMESPACES = " ".join(
@@ -190,3 +190,13 @@ def archive(
         for entry, content in (files or {}).items():
             file.writestr(entry, content)
     return path
+
+
+def changed(path: Path, edit: Callable[[bytes], bytes]) -> None:
+    """Rewrite an archive with its SystemStructure.ssd edited."""
+    with zipfile.ZipFile(path) as file:
+        entries = {name: file.read(name) for name in file.namelist()}
+    entries["SystemStructure.ssd"] = edit(entries["SystemStructure.ssd"])
+    with zipfile.ZipFile(path, "w") as file:
+        for name, data in entries.items():
+            file.writestr(name, data)

@@ -1,5 +1,6 @@
 """Archives that are wrong or ask for more than this master does: one line says what, and where."""
 
+import re
 import subprocess
 import sys
 import zipfile
@@ -9,7 +10,17 @@ from pathlib import Path
 import pytest
 from grasp_cosim import InputError, System
 from grasp_cosim.ssp.write import write_ssp
-from ssp.hand_made import archive, bind, component, connect, fmu, parameter_set, structure, system
+from ssp.hand_made import (
+    archive,
+    bind,
+    changed,
+    component,
+    connect,
+    fmu,
+    parameter_set,
+    structure,
+    system,
+)
 
 A = fmu("output Real y - m", "input Real u 0.0 m")
 ELEMENT = component("a", "output y Real; input u Real")
@@ -178,6 +189,15 @@ def damaged(path: Path) -> None:
     path.write_bytes(data)
 
 
+def encrypted(path: Path) -> None:
+    """Say of each entry, in both of its headers, that it is."""
+    data = bytearray(path.read_bytes())
+    for header, flags in ((b"PK\3\4", 6), (b"PK\1\2", 8)):
+        for found in re.finditer(re.escape(header), data):
+            data[found.start() + flags] |= 1
+    path.write_bytes(data)
+
+
 def missing(path: Path) -> None:
     path.unlink()
 
@@ -194,6 +214,7 @@ def folder(path: Path) -> None:
         (not_a_zip, "not readable as an SSP archive"),
         (without_structure, "no SystemStructure.ssd in it; must be an SSP archive"),
         (damaged, "SystemStructure.ssd: not readable: Bad CRC-32"),
+        (encrypted, "SystemStructure.ssd: not readable: File 'SystemStructure.ssd' is encrypted"),
         (missing, "no such system file"),
         (folder, "is a folder; must be an .ssp file"),
     ],
@@ -231,7 +252,7 @@ def test_extracted_fmus_are_gone_when_the_process_ends(grasp: System, tmp_path: 
     program = (
         "import sys; from grasp_cosim import System; "
         "s = System.load(sys.argv[1]); t = System.load(sys.argv[1]); assert s == t; "
-        "print(s.components[0].fmu, s.components[0].fmu.exists())"
+        "print(s.components[0].fmu.exists(), s.components[0].fmu)"
     )
     done = subprocess.run(
         [sys.executable, "-c", program, str(tmp_path / "grasp.ssp")],
@@ -239,9 +260,36 @@ def test_extracted_fmus_are_gone_when_the_process_ends(grasp: System, tmp_path: 
         text=True,
         check=True,
     )
-    path, existed = done.stdout.split()
+    existed, _, path = done.stdout.rstrip("\n").partition(" ")
     assert existed == "True"
     assert not Path(path).parents[1].exists()
+
+
+def test_a_forked_process_leaves_the_fmus_of_its_parent(grasp: System, tmp_path: Path) -> None:
+    write_ssp(grasp, tmp_path / "grasp.ssp")
+    program = (
+        "import os, sys; from grasp_cosim import System; "
+        "s = System.load(sys.argv[1]); child = os.fork(); "
+        "child or sys.exit(); os.waitpid(child, 0); "
+        "print(s.components[0].fmu.exists())"
+    )
+    command = [sys.executable, "-c", program, str(tmp_path / "grasp.ssp")]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout == "True\n"
+
+
+def test_all_may_read_what_is_unpacked_from_an_archive(grasp: System, tmp_path: Path) -> None:
+    write_ssp(grasp, tmp_path / "grasp.ssp")
+    with zipfile.ZipFile(tmp_path / "grasp.ssp") as file:
+        modes = {(entry.create_system, entry.external_attr >> 16) for entry in file.infolist()}
+    assert modes == {(3, 0o644)}
+
+
+def test_comments_and_processing_instructions_are_passed_over(tmp_path: Path) -> None:
+    plain = System.load(archive(tmp_path, structure(TOP), {"a": A}))
+    for noise in ("<?tool of another maker?>", "<!-- by hand -->"):
+        noisy = structure(TOP.replace("<ssd:Component", f"{noise}<ssd:Component"))
+        assert System.load(archive(tmp_path, noisy, {"a": A})) == plain
 
 
 def step_of(folder: Path, *steps: str, stop: str = "1") -> int:
@@ -321,14 +369,12 @@ def test_a_spoilt_annotation(
     grasp: System, tmp_path: Path, before: str, after: str, message: str
 ) -> None:
     write_ssp(grasp, tmp_path / "grasp.ssp")
-    with zipfile.ZipFile(tmp_path / "grasp.ssp") as file:
-        entries = {name: file.read(name) for name in file.namelist()}
-    text = entries["SystemStructure.ssd"].decode()
-    assert before in text
-    entries["SystemStructure.ssd"] = text.replace(before, after, 1).encode()
-    with zipfile.ZipFile(tmp_path / "spoilt.ssp", "w") as file:
-        for name, data in entries.items():
-            file.writestr(name, data)
-    text = message_of(tmp_path / "spoilt.ssp")
+
+    def spoil(ssd: bytes) -> bytes:
+        assert before.encode() in ssd
+        return ssd.replace(before.encode(), after.encode(), 1)
+
+    changed(tmp_path / "grasp.ssp", spoil)
+    text = message_of(tmp_path / "grasp.ssp")
     assert message in text
     assert "\n" not in text

@@ -1,5 +1,6 @@
 """A system written and read again is the same system, and runs the same to the bit."""
 
+import json
 import zipfile
 from dataclasses import replace
 from pathlib import Path
@@ -7,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from grasp_cosim import InputError, System, simulate
+from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.interface.interface import Value
 from grasp_cosim.ssp.document import parse
 from grasp_cosim.ssp.write import SET, write_ssp
@@ -19,7 +21,8 @@ from grasp_cosim.system.parts import (
     Initialisation,
     Port,
 )
-from ssp.hand_made import archive, component, connect, fmu, structure, system
+from lxml import etree  # type: ignore[import-untyped]
+from ssp.hand_made import archive, changed, component, connect, fmu, structure, system
 
 
 def round_trip(original: System, folder: Path) -> System:
@@ -68,8 +71,38 @@ def test_what_ssp_has_no_form_for_comes_back(grasp: System, tmp_path: Path) -> N
             Fault(Port("sensor_2", "gap"), "stuck", {}, 0, 1_000_000_000),
             Fault(Port("sensor_2", "gap"), "delay", {"time": 1e-3}, when=Condition(gap, ">", 0.0)),
         ),
+        roles={"hand": "plant"},
+        presets={"wide": {"plant.object_width": 0.08}, "loud": {"sensor_1.noise.seed": 3}},
     )
     assert round_trip(full, tmp_path) == full
+
+
+def test_roles_and_presets_of_a_system_file_come_back(fmus: Path, tmp_path: Path) -> None:
+    text = SYSTEM.read_text(encoding="utf-8") + '[roles]\nplant = "plant"\n'
+    (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
+    original = System.load(tmp_path / "mine.toml", fmus)
+    again = round_trip(original, tmp_path)
+    assert again == original
+    assert again.roles == {"plant": "plant"}
+    assert again.presets["case_0"] == original.presets["case_0"]
+    assert again.with_presets("bench") == original.with_presets("bench")
+
+
+def test_an_archive_of_before_roles_and_presets(grasp: System, tmp_path: Path) -> None:
+    path = tmp_path / "grasp.ssp"
+    write_ssp(grasp, path)
+
+    def older(ssd: bytes) -> bytes:
+        root = etree.fromstring(ssd)
+        (ours,) = root.iter("{grasp-cosim:system}System")
+        kept = {k: v for k, v in json.loads(ours.text).items() if k not in ("roles", "presets")}
+        ours.text = json.dumps(kept)
+        return bytes(etree.tostring(root))
+
+    changed(path, older)
+    loaded = System.load(path)
+    assert (loaded.roles, loaded.presets) == ({}, {})
+    assert loaded.step_ns == grasp.step_ns
 
 
 def hand(folder: Path, *connections: Connection, rename: bool = False) -> System:

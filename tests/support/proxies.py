@@ -4,13 +4,18 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Self
 
 from grasp_cosim import cli
-from grasp_cosim.hil.bench import Bench, Serving
+from grasp_cosim.hil.address import Address
+from grasp_cosim.hil.network import Network
+from grasp_cosim.hil.relay import Relay
+from grasp_cosim.hil.served import ServedFmu, Service
 from grasp_cosim.hil.server import Server
+from grasp_cosim.hil.traffic import Log
 from grasp_cosim.interface.interface import read_interface
 from grasp_fmus.link.client import Client, Verdict
 from grasp_fmus.link.message import LARGEST, Value
@@ -81,10 +86,10 @@ def wait_until(condition: Callable[[], bool]) -> None:
 
 @contextmanager
 def serving(
-    fmu: Path, how: Serving, address: tuple[str, int] = ("127.0.0.1", 0)
+    fmu: Path, how: Service, address: tuple[str, int] = ("127.0.0.1", 0)
 ) -> Iterator[Server]:
     """A server in a thread, stopped in the end."""
-    with Server(Bench(read_interface(fmu), how), address) as server:
+    with Server(ServedFmu(read_interface(fmu), how), address) as server:
         thread = threading.Thread(target=server.serve)
         thread.start()
         try:
@@ -93,6 +98,28 @@ def serving(
             server.stop()
             thread.join(30.0)
             assert not thread.is_alive()
+
+
+@contextmanager
+def relaying(
+    peer: Address,
+    network: Network | None = None,
+    *,
+    host: str = "127.0.0.1",
+    port: int = 0,
+    log: Log | None = None,
+) -> Iterator[Relay]:
+    """A relay that runs in a thread of its own; whatever ends it is raised in the end."""
+    with (
+        Relay(peer, network, host=host, port=port, log=log) as relay,
+        ThreadPoolExecutor(1, "relay") as pool,
+    ):
+        running = pool.submit(relay.run)
+        try:
+            yield relay
+        finally:
+            relay.stop()
+            running.result()
 
 
 def build_proxy(fmu: Path, out: Path, port: int, *options: str) -> Path:

@@ -91,6 +91,12 @@ def test_a_folder_is_one_process_s_until_that_ends_however(tmp_path: Path) -> No
         assert store.kept() == 0
 
 
+def test_the_lock_names_its_process_alone(tmp_path: Path) -> None:
+    (tmp_path / "lock").write_text(f"{2**63}\n")
+    with Store(tmp_path).locked():
+        assert (tmp_path / "lock").read_text() == f"{os.getpid()}\n"
+
+
 def test_a_part_that_cannot_be_written_is_one_line(study: Study, tmp_path: Path) -> None:
     store = Store(tmp_path)
     store.open(study)

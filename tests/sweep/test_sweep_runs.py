@@ -7,8 +7,7 @@ import pyarrow.parquet as pq  # type: ignore[import-untyped]
 import pytest
 from grasp_cosim import InputError, SimulationError
 from grasp_cosim.sweep.run import Job, Task, run_job
-from grasp_cosim.sweep.sweep import sweep
-from grasp_cosim.sweep.workers import run_here
+from grasp_cosim.sweep.sweep import run_here, sweep
 from support.made_studies import GRID, native_study, write_native
 from support.native_fmus import needs_gcc
 
@@ -76,7 +75,7 @@ def test_a_process_that_does_not_start_ends_the_sweep(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     study = native_study(write_native(tmp_path), FAILING)
-    monkeypatch.setattr("grasp_cosim.sweep.workers._work", _does_not_start)
+    monkeypatch.setattr("grasp_cosim.parallel._work", _does_not_start)
     with pytest.raises(SimulationError, match="did not start: it ended with exit code 7"):
         list(run_here(Task(study.system, study.outputs), [Job(0, {})], 1))
 

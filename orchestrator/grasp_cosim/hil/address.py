@@ -2,6 +2,7 @@
 
 import ipaddress
 import socket
+from collections.abc import Callable
 
 from ..errors import InputError
 
@@ -10,7 +11,7 @@ Address = tuple[str, int]
 
 
 def resolved(host: str, port: int, lowest_port: int = 0) -> Address:
-    """IPv4 address and port; InputError where the host has none or the port is out of range."""
+    """Return IPv4 address and port; InputError where the host has none or the port is wrong."""
     if not lowest_port <= port <= 65_535:
         raise InputError(f"{text((host, port))}: port must be from {lowest_port} to 65535")
     try:
@@ -23,25 +24,35 @@ def resolved(host: str, port: int, lowest_port: int = 0) -> Address:
 
 
 def text(address: Address) -> str:
-    """As in a command line, 127.0.0.1:5501."""
+    """Return an address as in a command line, 127.0.0.1:5501."""
     return f"{address[0]}:{address[1]}"
 
 
 def is_loopback(address: Address) -> bool:
-    """Whether only this machine can send there."""
+    """Return True if only this machine can send there."""
     return ipaddress.ip_address(address[0]).is_loopback
 
 
 def listening(address: Address) -> socket.socket:
-    """A socket that receives there, and does not block; InputError where there can be none."""
-    receiving = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    """Return a socket that receives at `address`; InputError where there can be none."""
+    wrong = "cannot listen there: {}; must be an address of this machine and a free port, or 0"
+    return _socket(socket.socket.bind, address, wrong)
+
+
+def connected(peer: Address) -> socket.socket:
+    """Return a socket that receives from the peer alone; InputError where there is no way to it."""
+    return _socket(socket.socket.connect, peer, "no way to the peer: {}")
+
+
+def _socket(
+    attach: Callable[[socket.socket, Address], None], address: Address, wrong: str
+) -> socket.socket:
+    """Return a socket that does not block, attached to `address`; `wrong` is said if it cannot."""
+    made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:
-        receiving.bind(address)
+        attach(made, address)
     except OSError as error:
-        receiving.close()
-        raise InputError(
-            f"{text(address)}: cannot listen there: {error.strerror}; must be an address of this"
-            " machine and a free port, or 0"
-        ) from error
-    receiving.setblocking(False)
-    return receiving
+        made.close()
+        raise InputError(f"{text(address)}: {wrong.format(error.strerror)}") from error
+    made.setblocking(False)
+    return made

@@ -1,4 +1,4 @@
-"""What a nasty network does to a datagram: a pure function of seed, direction and number.
+"""The fate of a datagram in a nasty network: a pure function of seed, direction and number.
 
 Nothing here knows of sockets or clocks, so the same seed gives the same fates on every machine,
 however fast the datagrams come.
@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Literal, NamedTuple, get_args
 
+from ..checks import number, whole
 from ..errors import InputError
 from ..system.parts import NANOSECONDS
 
@@ -25,7 +26,7 @@ LONGEST = 1e6
 
 @dataclass(frozen=True, slots=True)
 class Conditions:
-    """What happens in one direction. Probabilities hold for each datagram by itself.
+    """The conditions in one direction. Probabilities hold for each datagram by itself.
 
     A datagram that is not lost takes between delay and delay + jitter, uniformly distributed; with
     the probability reorder it is held back by reorder_by longer, so that later ones overtake it.
@@ -42,9 +43,7 @@ class Conditions:
 
     def __post_init__(self) -> None:
         for name in ("loss", "duplicate", "reorder"):
-            value = getattr(self, name)
-            if not 0.0 <= value <= 1.0:
-                raise InputError(f"{name} = {value!r}: must be a probability, from 0 to 1")
+            number(name, getattr(self, name), 0.0, 1.0, must="a probability, from 0 to 1")
         for name in ("delay", "jitter", "reorder_by"):
             check_time(name, getattr(self, name))
 
@@ -71,7 +70,7 @@ class Outage:
             raise InputError(f"{text}: must be whole numbers")
 
     def covers(self, requests: int, elapsed_ns: int) -> bool:
-        """Whether it is on at the request of this number, and so long after the first datagram."""
+        """Return True if it is on at this request, and so long after the first datagram."""
         now = requests if self.by == "requests" else elapsed_ns / NANOSECONDS
         return self.start <= now < self.until
 
@@ -94,12 +93,10 @@ class Network:
 
     def __post_init__(self) -> None:
         for name, least in (("seed", 0), ("capacity", 1)):
-            value = getattr(self, name)
-            if not (isinstance(value, int) and value >= least):
-                raise InputError(f"{name} = {value!r}: must be a whole number, at least {least}")
+            whole(name, getattr(self, name), least, must=f"a whole number, at least {least}")
 
     def fate(self, direction: Direction, number: int) -> tuple["Passage", ...]:
-        """The ways through of the datagram of a number, 1, 2, 3, ...: none where it is lost.
+        """Return the ways through of the datagram of a number, 1, 2, ...: none where it is lost.
 
         Two are the datagram and its copy. Outages are not in it.
         """
@@ -122,8 +119,7 @@ class Passage(NamedTuple):
 
 def check_time(name: str, value: float) -> None:
     """InputError where a time in s is negative, longer than LONGEST, or no number."""
-    if not 0.0 <= value <= LONGEST:
-        raise InputError(f"{name} = {value!r} s: must be from 0 to {LONGEST:g} s")
+    number(name, value, 0.0, LONGEST, must=f"from 0 to {LONGEST:g} s", unit="s")
 
 
 def _passage(conditions: Conditions, position: float, chance: float) -> Passage:

@@ -2,10 +2,9 @@
 
 from math import isfinite
 from pathlib import Path
-from typing import Literal
 
 from grasp_fmus.link.message import check_size, read_key
-from grasp_fmus.link.signature import ORDER, Causality, LinkVariable, Signature
+from grasp_fmus.link.signature import ORDER, LinkVariable, Signature
 
 from ..errors import InputError
 from ..interface.interface import Interface, Variable
@@ -15,7 +14,7 @@ WIDE = ("UInt32", "Int64", "UInt64")
 
 
 def link_signature(interface: Interface) -> tuple[Signature, list[str]]:
-    """The signature of an FMU, and a note for each parameter that is left out.
+    """Return the signature of an FMU, and a note for each parameter that is left out.
 
     InputError where an input or output cannot be exchanged.
     """
@@ -24,7 +23,8 @@ def link_signature(interface: Interface) -> tuple[Signature, list[str]]:
     for v in interface.of(*ORDER, "structuralParameter"):
         reason = _obstacle(v)
         if reason is None:
-            taken.append(LinkVariable(v.name, _kind(v), _causality(v), v.unit))
+            # no other kind and causality is left
+            taken.append(LinkVariable(v.name, v.kind, v.causality, v.unit))  # type: ignore[arg-type]
         elif v.causality in ("input", "output"):
             raise InputError(
                 f"{interface.path}: {v.causality} {v.name} is {reason}, which a proxy cannot "
@@ -41,7 +41,7 @@ def link_signature(interface: Interface) -> tuple[Signature, list[str]]:
 
 
 def shared_key(path: Path) -> bytes:
-    """The key in a file; InputError where it is too short to be one."""
+    """Return the key in a file; InputError where it is too short to be one."""
     try:
         return read_key(path)
     except ValueError as error:
@@ -58,11 +58,3 @@ def _obstacle(v: Variable) -> str | None:
     if v.kind == "Real" and v.start is not None and not isfinite(float(v.start)):
         return f"{v.start} at the start"
     return None
-
-
-def _kind(v: Variable) -> Literal["Real", "Integer", "Boolean", "String"]:
-    return v.kind  # type: ignore[return-value]  # the others are not supported
-
-
-def _causality(v: Variable) -> Causality:
-    return v.causality  # type: ignore[return-value]  # these are all that were asked for

@@ -1,4 +1,4 @@
-"""The datagrams on their way through a nasty network: which, until when, and what became of them.
+"""The datagrams on their way through a nasty network: which, until when, and their fates.
 
 No socket and no clock: who calls says what arrived and what time it is.
 """
@@ -13,12 +13,12 @@ from ..system.parts import NANOSECONDS
 from .network import DIRECTIONS, Direction, Network, Passage
 
 Route = TypeVar("Route")
-"""Whatever tells the caller where a datagram has to go."""
+"""A value that tells the caller where a datagram has to go."""
 
 
 @dataclass(slots=True)
 class Counters:
-    """Of one direction, exact: received + duplicated = delivered + dropped + held, at any time."""
+    """One direction, exact at any time: received + duplicated = delivered + dropped + held."""
 
     received: int = 0
     delivered: int = 0
@@ -42,7 +42,7 @@ class Counters:
 
 
 class Entry(NamedTuple):
-    """What was decided of a datagram, or of its copy, when it arrived."""
+    """The decision on a datagram, or on its copy, when it arrived."""
 
     direction: Direction
     number: int
@@ -67,7 +67,7 @@ class Held(NamedTuple, Generic[Route]):
 
 
 class Traffic(Generic[Route]):
-    """What is under way in both directions. Times in ns, on any clock that does not go back."""
+    """The datagrams under way in both directions. Times in ns, of a clock that never goes back."""
 
     def __init__(self, network: Network, log: Log | None = None) -> None:
         self.counters = {direction: Counters() for direction in DIRECTIONS}
@@ -102,7 +102,7 @@ class Traffic(Generic[Route]):
 
     @property
     def next_due(self) -> int | None:
-        """When the next datagram has to go on; None where none is under way."""
+        """The time at which the next datagram has to go on; None where none is under way."""
         return self._held[0][0] if self._held else None
 
     def take(self, now: int) -> Held[Route] | None:

@@ -1,19 +1,20 @@
-"""What SSP 1.0 has no form for, as one annotation of the archive, so that our own run is the same.
+"""The annotation of an archive with all that SSP 1.0 has no form for, so that our run is the same.
 
 The communication step, the scheme, the components' own steps, processes and renamed variables, the
-initialisation, events and faults. Where it is, the elements are in the order of execution. Its
-content is JSON: the dataclasses of the system as objects, a port as a string.
+initialisation, events, faults, roles and presets. Where it is, the elements are in the order of
+execution. Its content is JSON: the dataclasses of the system as objects, a port as a string.
 """
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from lxml import etree  # type: ignore[import-untyped]
 
 from ..errors import InputError, choices
+from ..interface.interface import Value
 from ..system.description import Scheme, System
 from ..system.parts import Event, Fault, Initialisation, Isolation, Port
 from .document import add
@@ -24,7 +25,7 @@ _TAG = "{grasp-cosim:system}System"
 
 @dataclass(frozen=True, slots=True)
 class Beside:
-    """What a component has beside FMU and values."""
+    """The attributes of a component that SSP has no form for."""
 
     rename: Mapping[str, str]
     step_ns: int | None
@@ -33,7 +34,7 @@ class Beside:
 
 @dataclass(frozen=True, slots=True)
 class Extras:
-    """What a system has beside components, connections and stop."""
+    """The attributes of a system that SSP has no form for; earlier archives lack the last two."""
 
     step_ns: int
     scheme: Scheme
@@ -41,6 +42,8 @@ class Extras:
     initialisation: Initialisation
     events: tuple[Event, ...]
     faults: tuple[Fault, ...]
+    roles: Mapping[str, str] = field(default_factory=dict)
+    presets: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
 
 
 def extras_of(system: System) -> Extras:
@@ -52,6 +55,8 @@ def extras_of(system: System) -> Extras:
         system.initialisation,
         system.events,
         system.faults,
+        system.roles,
+        system.presets,
     )
 
 

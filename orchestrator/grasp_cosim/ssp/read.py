@@ -64,6 +64,8 @@ def read_ssp(path: FilePath, step: float | None = None, stop: float | None = Non
         extras.faults if extras else (),
         extras.initialisation if extras else Initialisation(),
         (*_unused(archive, root), *_renamed(names), *notes),
+        extras.roles if extras else {},
+        extras.presets if extras else {},
     )
 
 

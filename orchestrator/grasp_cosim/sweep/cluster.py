@@ -5,7 +5,6 @@ The FMUs travel with the task: the cluster needs no folder of ours.
 
 from __future__ import annotations
 
-import hashlib
 import tempfile
 import threading
 from collections.abc import Generator, Iterable
@@ -14,8 +13,10 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from ..checks import extra_module
 from ..errors import InputError, SimulationError
 from .run import Job, Outcome, Task, run_job
+from .study import hash_of
 
 CONNECT = 10.0
 """s, to find the scheduler and a worker."""
@@ -30,19 +31,14 @@ class Shipment:
 
     task: Task
     contents: tuple[bytes, ...]
-
-    @property
-    def key(self) -> str:
-        """A hash of what unpacked() makes of it."""
-        digest = hashlib.sha256()
-        for content in self.contents:
-            digest.update(hashlib.sha256(content).digest())
-        return digest.hexdigest()
+    key: str
+    """The hash of the contents."""
 
 
 def ship(task: Task) -> Shipment:
     """The task with its FMUs."""
-    return Shipment(task, tuple(c.fmu.read_bytes() for c in task.system.components))
+    fmus = [c.fmu for c in task.system.components]
+    return Shipment(task, tuple(fmu.read_bytes() for fmu in fmus), hash_of(fmus))
 
 
 def run_on_cluster(address: str, task: Task, jobs: Iterable[Job]) -> Generator[Outcome, None, None]:
@@ -51,7 +47,7 @@ def run_on_cluster(address: str, task: Task, jobs: Iterable[Job]) -> Generator[O
     A worker does a run at a time: start it with --nthreads 1. Closing the iterator cancels the
     rest. InputError without the extra, a scheduler or a worker; SimulationError where it is lost.
     """
-    dask = check_cluster()
+    dask = extra_module("distributed", "it talks to Dask clusters", "dask")
     try:
         client = dask.Client(address, timeout=CONNECT, set_as_default=False)
     except (OSError, ValueError) as error:
@@ -92,18 +88,6 @@ def run_on_cluster(address: str, task: Task, jobs: Iterable[Job]) -> Generator[O
 def _said(error: BaseException) -> str:
     """The first line of an error, or its name where it has none."""
     return (str(error).splitlines() or [type(error).__name__])[0]
-
-
-def check_cluster() -> Any:
-    """The module distributed; InputError without it."""
-    try:
-        import distributed
-    except ImportError as error:
-        raise InputError(
-            "distributed is not installed, it talks to Dask clusters; "
-            "install it with: pip install 'grasp-cosim[dask]'"
-        ) from error
-    return distributed
 
 
 _unpacked: dict[str, tuple[tempfile.TemporaryDirectory[str], tuple[Path, ...]]] = {}

@@ -20,8 +20,8 @@ from typing import Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from ..errors import InputError, choices
-from .distributions import scipy_stats
+from ..checks import choice, extra_module, whole
+from ..errors import InputError
 
 Kind = Literal["grid", "random", "latin-hypercube", "sobol", "saltelli"]
 KINDS: tuple[str, ...] = get_args(Kind)
@@ -43,10 +43,8 @@ class Design:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        if self.kind not in KINDS:
-            raise InputError(f"design: kind = {self.kind!r}: must be one of {choices(KINDS)}")
-        if isinstance(self.seed, bool) or not isinstance(self.seed, int) or self.seed < 0:
-            raise InputError(f"design: seed = {self.seed!r}: must be a whole number from 0")
+        choice("design: kind", self.kind, KINDS)
+        whole("design: seed", self.seed, 0, must="a whole number from 0")
         if self.kind == "grid":
             if self.runs is not None:
                 raise InputError(
@@ -54,10 +52,8 @@ class Design:
                     "combination of the values"
                 )
             return
-        whole = isinstance(self.runs, int) and not isinstance(self.runs, bool)
-        if self.runs is None or not whole or not 1 <= self.runs <= MOST:
-            raise InputError(f"design: runs = {self.runs!r}: must be a whole number 1 to {MOST}")
-        if self.kind in EVEN and self.runs & (self.runs - 1):
+        runs = whole("design: runs", self.runs, 1, MOST, must=f"a whole number 1 to {MOST}")
+        if self.kind in EVEN and runs & (runs - 1):
             raise InputError(
                 f"design: runs = {self.runs}: must be a power of two where kind = {self.kind!r}"
             )
@@ -87,7 +83,8 @@ class Design:
             return _grid([n or 0 for n in levels])
         if self.kind == "random":
             return np.random.default_rng(self.seed).random((total, width))
-        qmc, count = scipy_stats().qmc, self.runs or 0
+        stats = extra_module("scipy.stats", "it makes the designs of studies", "sweep")
+        qmc, count = stats.qmc, self.runs or 0
         generator = np.random.default_rng(self.seed)
         if self.kind == "latin-hypercube":
             return np.asarray(qmc.LatinHypercube(width, rng=generator).random(count))

@@ -1,13 +1,18 @@
-"""What a parameter may be: each maps a number u from 0 to 1 to a value."""
+"""Distributions of a parameter: each maps a number u from 0 to 1 to a value."""
 
+import math
 from dataclasses import dataclass
 from statistics import NormalDist
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
+from ..checks import number
 from ..errors import InputError
 from ..interface.interface import Value
+
+WIDEST = 1e6
+"""A normal distribution of which so little is left keeps 9 digits of its quantiles."""
 
 
 class Distribution(Protocol):
@@ -46,10 +51,10 @@ class Listed:
         return self.values[min(int(u * len(self.values)), len(self.values) - 1)]
 
 
-@dataclass(frozen=True, slots=True)
-class Uniform:
-    """Each value from low to high is as likely."""
+class _Bounded:
+    """A continuum of values from low to high; InputError where these are in no order."""
 
+    __slots__ = ()
     low: float
     high: float
     levels = None
@@ -58,6 +63,21 @@ class Uniform:
     def extremes(self) -> tuple[Value, ...]:
         """Low and high."""
         return self.low, self.high
+
+    def __post_init__(self) -> None:
+        bounds = f"low = {self.low!r}, high = {self.high!r}"
+        if not self.low < self.high:
+            raise InputError(f"{bounds}: must have low below high")
+        if not math.isfinite(self.high - self.low):
+            raise InputError(f"{bounds}: must be nearer to each other")
+
+
+@dataclass(frozen=True, slots=True)
+class Uniform(_Bounded):
+    """Each value from low to high is as likely."""
+
+    low: float
+    high: float
 
     def at(self, u: float) -> float:
         """The value at u of the way from low to high."""
@@ -65,19 +85,24 @@ class Uniform:
 
 
 @dataclass(frozen=True, slots=True)
-class Normal:
+class Normal(_Bounded):
     """Gaussian, cut off at low and high."""
 
     mean: float
     standard_deviation: float
     low: float
     high: float
-    levels = None
 
-    @property
-    def extremes(self) -> tuple[Value, ...]:
-        """Low and high."""
-        return self.low, self.high
+    def __post_init__(self) -> None:
+        _Bounded.__post_init__(self)
+        low, high, deviation = self.low, self.high, self.standard_deviation
+        number("standard_deviation", deviation, 0.0, above=True, must="greater than 0")
+        if deviation > WIDEST * (high - low):
+            raise InputError(
+                f"standard_deviation = {deviation!r}: must be at most {WIDEST:g} times high - low, "
+                "or the form uniform, which it comes to"
+            )
+        number("mean", self.mean, low, high, must=f"from low, {low!r}, to high, {high!r}")
 
     def at(self, u: float) -> float:
         """The quantile of u among what is not cut off."""
@@ -93,15 +118,3 @@ def spaced(first: float, last: float, count: int, logarithmic: bool) -> Listed:
     """So many values from first to last, with equal distances or, logarithmic, equal ratios."""
     values = (np.geomspace if logarithmic else np.linspace)(first, last, count)
     return Listed(tuple(values.tolist()))
-
-
-def scipy_stats() -> Any:
-    """The module scipy.stats; InputError without scipy."""
-    try:
-        from scipy import stats
-    except ImportError as error:
-        raise InputError(
-            "scipy is not installed, it makes the designs of studies; "
-            "install it with: pip install 'grasp-cosim[sweep]'"
-        ) from error
-    return stats

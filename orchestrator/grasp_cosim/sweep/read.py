@@ -35,13 +35,13 @@ uniform = { low, high }, normal = { mean, standard_deviation, low, high }.
 """
 
 import math
-import sys
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ..checks import as_table, check_keys, toml_table, whole
+from ..checks import as_table, check_keys, number, toml_table, whole
 from ..errors import InputError, choices
 from ..interface.interface import Value
 from ..metrics.metric import Metric, load_metrics
@@ -64,9 +64,6 @@ Preset = Callable[[System, str], System]
 
 MOST_LEVELS = 100_000
 """Values of one parameter at most."""
-
-WIDEST = 1e6
-"""A normal distribution of which so little is left keeps 9 digits of its quantiles."""
 
 
 def study_file(name: str, folder: Path) -> Path:
@@ -209,16 +206,8 @@ def _values(place: str, entry: Any) -> Listed:
     return Listed(tuple(_value(place, value) for value in entry))
 
 
-def _linspace(place: str, entry: Any) -> Listed:
-    return _spaced(place, entry, False)
-
-
-def _geomspace(place: str, entry: Any) -> Listed:
-    return _spaced(place, entry, True)
-
-
-def _spaced(place: str, entry: Any, logarithmic: bool) -> Listed:
-    first, last, count = _numbers(place, entry, ("from", "to", "count"))
+def _spaced(logarithmic: bool, place: str, entry: Any) -> Listed:
+    first, last, count = _numbers(place, entry, ["from", "to", "count"])
     if not count.is_integer() or not 2 <= count <= MOST_LEVELS:
         raise InputError(f"{place}: count = {count:g}: must be a whole number 2 to {MOST_LEVELS}")
     if logarithmic and not (first > 0.0 and last > 0.0):
@@ -228,35 +217,17 @@ def _spaced(place: str, entry: Any, logarithmic: bool) -> Listed:
     return spaced(first, last, int(count), logarithmic)
 
 
-def _uniform(place: str, entry: Any) -> Uniform:
-    low, high = _numbers(place, entry, ("low", "high"))
-    _check_rising(place, low, high)
-    return Uniform(low, high)
-
-
-def _normal(place: str, entry: Any) -> Normal:
-    mean, deviation, low, high = _numbers(
-        place, entry, ("mean", "standard_deviation", "low", "high")
-    )
-    _check_rising(place, low, high)
-    if deviation <= 0.0:
-        raise InputError(f"{place}: standard_deviation = {deviation!r}: must be greater than 0")
-    if deviation > WIDEST * (high - low):
-        raise InputError(
-            f"{place}: standard_deviation = {deviation!r}: must be at most {WIDEST:g} times high - "
-            "low, or the form uniform, which it comes to"
-        )
-    if not low <= mean <= high:
-        raise InputError(f"{place}: mean = {mean!r}: must be from low, {low!r}, to high, {high!r}")
-    return Normal(mean, deviation, low, high)
+def _bounded(kind: type[Normal | Uniform], place: str, entry: Any) -> Distribution:
+    numbers = _numbers(place, entry, [f.name for f in fields(kind)])
+    return _in(place, lambda: kind(*numbers))
 
 
 FORMS: Mapping[str, Callable[[str, Any], Distribution]] = {
     "values": _values,
-    "linspace": _linspace,
-    "geomspace": _geomspace,
-    "uniform": _uniform,
-    "normal": _normal,
+    "linspace": partial(_spaced, False),
+    "geomspace": partial(_spaced, True),
+    "uniform": partial(_bounded, Uniform),
+    "normal": partial(_bounded, Normal),
 }
 """The ways to say what a parameter may be."""
 
@@ -274,27 +245,15 @@ def _pictures(place: str, table: Any) -> Pictures:
             raise InputError(f"{place}: map: {key} = {entry.get(key)!r}: must be a name")
     limit = entry.get("limit")
     if limit is not None:
-        (limit,) = _numbers(f"{place}: map", {"limit": limit}, ("limit",))
+        limit = number(f"{place}: map: limit", limit)
     return Pictures(Map(entry["x"], entry["y"], entry["of"], limit), distributions)
 
 
-def _check_rising(place: str, low: float, high: float) -> None:
-    if not low < high:
-        raise InputError(f"{place}: low = {low!r}, high = {high!r}: must have low below high")
-    if not math.isfinite(high - low):
-        raise InputError(f"{place}: low = {low!r}, high = {high!r}: must be nearer to each other")
-
-
-def _numbers(place: str, entry: Any, names: tuple[str, ...]) -> list[float]:
+def _numbers(place: str, entry: Any, names: Sequence[str]) -> list[float]:
     """The finite numbers of a table with exactly these names."""
     table = as_table(place, entry)
     check_keys(place, table, names)
-    for name in names:
-        number = table.get(name)
-        real = isinstance(number, float | int) and not isinstance(number, bool)
-        if number is None or not real or not abs(number) <= sys.float_info.max:
-            raise InputError(f"{place}: {name} = {number!r}: must be a finite number")
-    return [float(table[name]) for name in names]
+    return [number(f"{place}: {name}", table.get(name)) for name in names]
 
 
 def _names(place: str, entry: Any) -> tuple[str, ...]:

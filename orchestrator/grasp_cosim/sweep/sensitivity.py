@@ -9,7 +9,7 @@ were independent; those of a Sobol sequence are spread more evenly, so the inter
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -53,16 +53,7 @@ class Sensitivity:
             "metric": self.metric,
             "rows": self.rows,
             "of": self.of,
-            "parameters": [
-                {
-                    "parameter": i.parameter,
-                    "first": i.first,
-                    "first_interval": list(i.first_interval),
-                    "total": i.total,
-                    "total_interval": list(i.total_interval),
-                }
-                for i in self.indices
-            ],
+            "parameters": [asdict(index) for index in self.indices],
         }
 
 
@@ -101,7 +92,7 @@ def sensitivity(
 
 
 def _varies(rows: Floats) -> bool:
-    """Whether f_A and f_B have a variance beyond rounding."""
+    """Return True if f_A and f_B have a variance beyond rounding."""
     values = rows[:, :2]
     return bool(np.ptp(values) > ROUNDING * np.abs(values).max())
 

@@ -3,9 +3,10 @@
 import hashlib
 import json
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -122,10 +123,8 @@ class Study:
     def identity(self) -> dict[str, str]:
         """A hash of all that decides the results: of the study, and of its FMUs' contents."""
         text = json.dumps(self._decisive(), sort_keys=True)
-        fmus = hashlib.sha256()
-        for component in self.system.components:
-            fmus.update(hashlib.sha256(component.fmu.read_bytes()).digest())
-        return {"study": hashlib.sha256(text.encode()).hexdigest(), "fmus": fmus.hexdigest()}
+        fmus = hash_of(c.fmu for c in self.system.components)
+        return {"study": hashlib.sha256(text.encode()).hexdigest(), "fmus": fmus}
 
     def _decisive(self) -> dict[str, Any]:
         system = settings(self.system)
@@ -317,6 +316,14 @@ class Study:
             return (self.system.start(name),)
         except InputError as error:
             raise InputError(f"{place}: ratio_to: {error}") from error
+
+
+def hash_of(files: Iterable[Path]) -> str:
+    """Return a hash of the contents of files, in their order."""
+    digest = hashlib.sha256()
+    for file in files:
+        digest.update(hashlib.sha256(file.read_bytes()).digest())
+    return digest.hexdigest()
 
 
 def _is_ratio(parameter: Parameter) -> bool:

@@ -2,24 +2,22 @@
 
 import json
 import os
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterable, Iterator
 from contextlib import closing
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
-from tqdm import tqdm
-
 from ..errors import InputError
 from ..files import write_text
+from ..parallel import Crew, Lost, progress_bar
 from .cluster import run_on_cluster
-from .run import Job, Outcome, Task
+from .run import Job, Outcome, Task, run_job
 from .sensitivity import Sensitivity, sensitivity
 from .store import Store
 from .study import Study
 from .table import Table, check_parquet, make_table, write_parquet
-from .workers import run_here
 
 RUNS = "runs.parquet"
 SENSITIVITY = "sensitivity.json"
@@ -105,13 +103,7 @@ def _finish(
     resumed = len(done)
     left = (Job(i, study.values(i)) for i in range(study.runs) if i not in done)
     task = Task(study.system, study.outputs, study.metrics)
-    bar = tqdm(
-        total=study.runs,
-        initial=resumed,
-        desc=study.name,
-        unit="run",
-        disable=None if progress else True,
-    )
+    bar = progress_bar(study.name, study.runs, progress, resumed)
     with bar, closing(_outcomes(task, left, study.runs - resumed, workers, scheduler)) as outcomes:
         for outcome in outcomes:
             store.keep(outcome)
@@ -135,3 +127,15 @@ def _outcomes(
         yield from run_on_cluster(scheduler, task, jobs)
     else:
         yield from run_here(task, jobs, min(workers or os.cpu_count() or 1, count))
+
+
+def run_here(task: Task, jobs: Iterable[Job], workers: int) -> Generator[Outcome, None, None]:
+    """Yield the outcomes of the jobs, in the order in which they end, of processes of this machine.
+
+    Closing the iterator ends the runs. SimulationError where a process cannot start.
+    """
+    with Crew(workers) as crew, closing(crew.results(partial(run_job, task), jobs)) as results:
+        for job, found in results:
+            if isinstance(found, Lost):
+                found = Outcome(job.index, {}, f"the process of the run {found.end}")
+            yield found

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..checks import extra_module
 from ..errors import InputError, choices
 from ..files import in_one_piece
 from .run import Outcome
@@ -74,15 +75,9 @@ def write_parquet(table: Table, study: Study, path: Path) -> None:
 
 def check_parquet() -> tuple[Any, Any]:
     """The modules pyarrow and pyarrow.parquet; InputError without them."""
-    try:
-        import pyarrow  # type: ignore[import-untyped]
-        import pyarrow.parquet  # type: ignore[import-untyped]
-    except ImportError as error:
-        raise InputError(
-            "pyarrow is not installed, it writes the results of studies; "
-            "install it with: pip install 'grasp-cosim[sweep]'"
-        ) from error
-    return pyarrow, pyarrow.parquet
+    names = ("pyarrow", "pyarrow.parquet")
+    arrow, parquet = (extra_module(n, "it writes the results of studies", "sweep") for n in names)
+    return arrow, parquet
 
 
 def _array(arrow: Any, name: str, column: Column) -> Any:

@@ -3,10 +3,11 @@
 import csv
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any, TypeVar
 
 import click
 
@@ -15,8 +16,23 @@ from ...hil.address import Address, is_loopback, text
 from ...hil.network import DIRECTIONS, Conditions, Network, Outage, check_time
 from ...hil.relay import Relay
 from ...hil.traffic import Entry, Log
+from ...system.parts import NANOSECONDS
 from ..frame import INTERRUPTED, fail, json_option
 from ..signals import ended_by_signals
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def _number(name: str, unit: str, text: str, default: float = 0.0) -> Callable[[F], F]:
+    """An option that is a number in a unit: s, or P for a probability."""
+    return click.option(
+        f"--{name}",
+        type=float,
+        default=default,
+        show_default=bool(default),
+        metavar=unit,
+        help=text,
+    )
 
 
 @click.command()
@@ -25,19 +41,12 @@ from ..signals import ended_by_signals
 @click.option(
     "--port", type=click.IntRange(0, 65_535), default=0, help="Default: one that is free."
 )
-@click.option("--delay", type=float, default=0.0, metavar="S", help="Of every datagram.")
-@click.option("--jitter", type=float, default=0.0, metavar="S", help="Up to so much more delay.")
-@click.option("--loss", type=float, default=0.0, metavar="P", help="Probability, 0 to 1.")
-@click.option("--duplicate", type=float, default=0.0, metavar="P", help="Probability, 0 to 1.")
-@click.option("--reorder", type=float, default=0.0, metavar="P", help="Probability, 0 to 1.")
-@click.option(
-    "--reorder-by",
-    type=float,
-    default=Conditions().reorder_by,
-    show_default=True,
-    metavar="S",
-    help="How long --reorder holds a datagram back.",
-)
+@_number("delay", "S", "Of every datagram.")
+@_number("jitter", "S", "Up to so much more delay.")
+@_number("loss", "P", "Probability, 0 to 1.")
+@_number("duplicate", "P", "Probability, 0 to 1.")
+@_number("reorder", "P", "Probability, 0 to 1.")
+@_number("reorder-by", "S", "How long --reorder holds a datagram back.", Conditions().reorder_by)
 @click.option(
     "--outage",
     "outages",
@@ -60,18 +69,13 @@ def relay(
     peer: str,
     host: str,
     port: int,
-    delay: float,
-    jitter: float,
-    loss: float,
-    duplicate: float,
-    reorder: float,
-    reorder_by: float,
     outages: tuple[str, ...],
     seed: int,
     capacity: int,
     duration: float | None,
     log: Path | None,
     as_json: bool,
+    **conditions: float,
 ) -> int:
     """Relay UDP datagrams to a peer and back through a nasty network, until Ctrl-C.
 
@@ -84,17 +88,16 @@ def relay(
     """
     if duration is not None:
         check_time("duration", duration)
-    conditions = Conditions(delay, jitter, loss, duplicate, reorder, reorder_by)
-    network = Network(
-        dict.fromkeys(DIRECTIONS, conditions), tuple(map(_outage, outages)), seed, capacity
-    )
+    end = None if duration is None else round(duration * NANOSECONDS)
+    both = dict.fromkeys(DIRECTIONS, Conditions(**conditions))
+    network = Network(both, tuple(map(_outage, outages)), seed, capacity)
     with (
         _written(log) as note,
         Relay(_address(peer), network, host=host, port=port, log=note) as relay,
     ):
         with ended_by_signals(relay.stop) as came:
             _say(relay)
-            relay.run(duration)
+            relay.run(end)
         click.echo(_json(relay, seed) if as_json else _table(relay))
     if came and duration is not None:
         return fail(f"interrupted before --duration {duration!r} was over", INTERRUPTED)

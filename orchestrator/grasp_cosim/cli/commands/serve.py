@@ -7,8 +7,8 @@ import click
 
 from ...errors import InputError
 from ...hil.address import is_loopback, text
-from ...hil.bench import Bench, Serving
 from ...hil.protocol import shared_key
+from ...hil.served import ServedFmu, Service
 from ...hil.server import DEFAULT_ADDRESS, Server
 from ...interface.interface import read_interface
 from ...system.description import in_nanoseconds
@@ -61,7 +61,7 @@ def serve(
     """
     if lockstep and step is not None:
         raise InputError(f"--step {step!r}: must be left out with --lockstep, the proxy decides")
-    serving = Serving(
+    service = Service(
         lockstep,
         None if step is None else in_nanoseconds("--step", step),
         in_nanoseconds("--watchdog", watchdog),
@@ -69,9 +69,9 @@ def serve(
         None if key_file is None else shared_key(key_file),
     )
     end = None if duration is None else in_nanoseconds("--duration", duration)
-    bench = Bench(read_interface(fmu), serving, _say)
-    with Server(bench, (host, port), _say) as server:
-        for note in bench.notes:
+    served = ServedFmu(read_interface(fmu), service, _say)
+    with Server(served, (host, port), _say) as server:
+        for note in served.notes:
             _say(note)
         at = text(server.address)
         _say(f"serving {fmu.name} at {at}, {'lockstep' if lockstep else 'real time'}")
@@ -79,7 +79,7 @@ def serve(
             _say(f"{at} can be reached by others, who may take part: --key-file keeps them out")
         with ended_by_signals(server.stop) as came:
             server.serve(sessions, end)
-        counters = bench.counters()
+        counters = served.counters()
     if as_json:
         click.echo(json.dumps({"listening": at, **counters}))
     else:

@@ -12,10 +12,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from tqdm import tqdm
 
 from ...errors import InputError, SimulationError, choices
-from ...parallel import processes
+from ...parallel import Crew, progress_bar
 from ...system.description import System
 from ..closing import close
 from ..metrics import FINGERS
@@ -103,13 +102,10 @@ def identify_from_times(
     """
     check_scipy()
     system = system.with_experiment(STEP, STOP)
-    bar = tqdm(desc="grasps", unit="run", disable=None if progress else True)
-    with bar, processes(workers) as pool:
+    with progress_bar("grasps", None, progress) as bar, Crew(workers) as crew:
 
         def simulate(grasps: Sequence[Grasp]) -> Iterable[Times]:
-            for times in pool.map(contact_times, [(system, grasp) for grasp in grasps]):
-                bar.update()
-                yield times
+            return crew.map(contact_times, [(system, grasp) for grasp in grasps], bar)
 
         return fit_contacts(contacts, parameters, simulate)
 

@@ -1,4 +1,4 @@
-"""A bench stand-in without its socket: an FMU that does what requests say, or its own clock."""
+"""A served FMU without its socket: it does what the requests of a proxy say, or its own clock."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
@@ -10,22 +10,23 @@ from ..errors import InputError, SimulationError
 from ..interface.interface import Interface, Value
 from ..system.description import LONGEST
 from ..system.parts import NANOSECONDS
-from .model import Model
+from .driven import DrivenFmu
 from .protocol import link_signature
 
 BACKLOG = 1_000_000_000
-"""ns by which the model's own clock may be late; beyond that it goes on from now."""
+"""ns by which the FMU's own clock may be late; beyond that it goes on from now."""
 
 Say = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True)
-class Serving:
-    """How to serve; InputError where that cannot be.
+class Service:
+    """How an FMU is served.
 
-    lockstep: step on request; else by an own clock, in steps of step_ns or of the length that the
-    proxy asks for. watchdog_ns: without a request for so long the inputs go to what failsafe says,
-    else to their start values; a model that steps on request then stands still.
+    `lockstep`: step on request; else by an own clock, in steps of `step_ns` or of the length that
+    the proxy asks for. `watchdog_ns`: without a request for so long the inputs go to what
+    `failsafe` says, else to their start values; an FMU that steps on request then stands still.
+    `key` is the one shared with the proxy, if any.
     """
 
     lockstep: bool = False
@@ -36,11 +37,11 @@ class Serving:
 
 
 @dataclass(slots=True)
-class Served:
-    """What was done beside what the peer counts.
+class Counts:
+    """The number of events that the peer of the protocol does not count.
 
-    own_steps: steps by the own clock; skipped: those that it left out, being too late;
-    watchdog: how often it put the inputs to their failsafe values.
+    `own_steps`: steps by the own clock; `skipped`: those that it left out, being too late;
+    `watchdog`: how often the inputs were put to their failsafe values.
     """
 
     sessions: int = 0
@@ -56,29 +57,29 @@ DROPPED = {
     "foreign": "of another interface, or of a session that is not known, is refused",
     "busy": "of another proxy is refused while a session is under way",
 }
-"""What is said of the first datagram of a kind, by its counter."""
+"""The line for the first datagram of a kind, by its counter."""
 
 
-class Bench:
-    """Serves one FMU. Times are ns of a monotonic clock. Close it."""
+class ServedFmu:
+    """One FMU that answers datagrams. Times are in ns of a monotonic clock. Close it."""
 
     def __init__(
-        self, interface: Interface, serving: Serving = Serving(), say: Say = lambda _: None
+        self, interface: Interface, service: Service = Service(), say: Say = lambda _: None
     ) -> None:
-        """Say gets a line for whatever happens.
+        """Try the FMU out; `say` gets a line for whatever happens.
 
         InputError where the FMU cannot be served so, SimulationError where it cannot be set up.
         """
         signature, self.notes = link_signature(interface)
-        self.served = Served()
-        self._serving, self._say = serving, say
+        self.counts = Counts()
+        self._service, self._say = service, say
         try:
-            self.peer = Peer(signature, serving.key)
+            self.peer = Peer(signature, service.key)
         except ValueError as error:
             raise InputError(str(error)) from error
-        self._failsafe = _failsafe(interface, self.peer, serving.failsafe)
-        self._model = Model(interface, signature)
-        self._model.try_out()  # rather now than in the first session, where the proxy waits
+        self._failsafe = _failsafe(interface, self.peer, service.failsafe)
+        self._fmu = DrivenFmu(interface, signature)
+        self._fmu.try_out()  # rather now than in the first session, where the proxy waits
         self._values: list[Value] = []
         self._in_session = False
         self._deadline: int | None = None  # of the next own step
@@ -89,19 +90,19 @@ class Bench:
 
     def close(self) -> None:
         """End the session under way, and free the FMU."""
-        self._end("the bench is closed")
+        self._end("the server is closed")
 
     def counters(self) -> dict[str, int]:
-        """What was done and what was received, by name."""
-        return {**asdict(self.served), **self.peer.counters.as_dict()}
+        """The numbers of what was done and of what was received, by name."""
+        return {**asdict(self.counts), **self.peer.counters.as_dict()}
 
     def due(self) -> int | None:
-        """When look() has something to do next; None: not before the next datagram."""
-        watchdog = None if self._heard is None else self._heard + self._serving.watchdog_ns
+        """Return when `look` has something to do next; None: not before the next datagram."""
+        watchdog = None if self._heard is None else self._heard + self._service.watchdog_ns
         return min((m for m in (self._deadline, watchdog) if m is not None), default=None)
 
     def answer(self, datagram: bytes, source: str, now: int) -> bytes | None:
-        """Do what a datagram says, whatever it holds; what to send back to its source."""
+        """Do what a datagram says, whatever it holds; return what to send back to its source."""
         action = self.peer.receive(datagram, now)
         if not isinstance(action, Request):
             self._say_what_is_dropped(source)
@@ -115,7 +116,7 @@ class Bench:
             self._say(f"a session of {source} begins at t = {action.time:.9g} s")
         try:
             self._do(action, now)
-            return self.peer.outputs(self._model.outputs(), self._model.time)
+            return self.peer.outputs(self._fmu.outputs(), self._fmu.time)
         except (InputError, SimulationError, ValueError) as error:
             return self._fail(str(error))
 
@@ -129,22 +130,22 @@ class Bench:
             raise SimulationError(self._own_failure)
         self._values = request.values
         if request.kind == INITIALISE:
-            self._model.initialise(request.time, request.values, request.fresh)
-        elif self._serving.lockstep:
-            self._model.step(request.time, request.step, request.values)
+            self._fmu.initialise(request.time, request.values, request.fresh)
+        elif self._service.lockstep:
+            self._fmu.step(request.time, request.step, request.values)
         else:
             step_ns = self._own_step(request.step)
             self._heard = now
-            self._model.begin()
-            self._model.set(request.values)
+            self._fmu.begin()
+            self._fmu.set(request.values)
             if self._deadline is None:
                 self._step_ns = step_ns
                 self._deadline = now + step_ns
 
     def _own_step(self, asked: float) -> int:
         """The step of the own clock in ns, where the proxy asks for one in s."""
-        if self._serving.step_ns is not None:
-            return self._serving.step_ns
+        if self._service.step_ns is not None:
+            return self._service.step_ns
         if not 1.0 <= asked * NANOSECONDS <= LONGEST * NANOSECONDS:
             raise SimulationError(
                 f"step of {asked!r} s: must be from 1 ns to {LONGEST:g} s, to be the own step"
@@ -154,20 +155,20 @@ class Bench:
     def look(self, now: int) -> None:
         """Do what is due by the own clock."""
         try:
-            if self._heard is not None and now - self._heard >= self._serving.watchdog_ns:
+            if self._heard is not None and now - self._heard >= self._service.watchdog_ns:
                 self._heard = None
-                self.served.watchdog += 1
-                self._say(f"no request for {self._serving.watchdog_ns / 1e9:g} s: inputs failsafe")
+                self.counts.watchdog += 1
+                self._say(f"no request for {self._service.watchdog_ns / 1e9:g} s: inputs failsafe")
                 for i, value in self._failsafe.items():
                     self._values[i] = value
-                self._model.set(self._values)
+                self._fmu.set(self._values)
             if self._deadline is not None and now >= self._deadline:
-                self._model.advance(self._model.time, self._step_ns / NANOSECONDS)
-                self.served.own_steps += 1
+                self._fmu.advance(self._fmu.time, self._step_ns / NANOSECONDS)
+                self.counts.own_steps += 1
                 self._deadline += self._step_ns
                 if now - self._deadline > BACKLOG:
                     skipped = (now - self._deadline) // self._step_ns
-                    self.served.skipped += skipped
+                    self.counts.skipped += skipped
                     self._deadline += skipped * self._step_ns
         except (InputError, SimulationError) as error:
             self._own_failure = str(error)
@@ -175,7 +176,7 @@ class Bench:
             self._deadline = self._heard = None
 
     def _fail(self, reason: str) -> bytes:
-        self.served.failures += 1
+        self.counts.failures += 1
         self._end(reason)
         return self.peer.failed(reason)
 
@@ -184,10 +185,10 @@ class Bench:
         was_one, self._in_session = self._in_session, False
         self._deadline = self._heard = None
         self._own_failure = ""
-        self._model.close()
+        self._fmu.close()
         if was_one:
-            self.served.sessions += 1
-            self._say(f"the session is over at t = {self._model.time:.9g} s: {reason}")
+            self.counts.sessions += 1
+            self._say(f"the session is over at t = {self._fmu.time:.9g} s: {reason}")
 
 
 def _failsafe(interface: Interface, peer: Peer, values: Mapping[str, Value]) -> dict[int, Value]:

@@ -1,4 +1,4 @@
-"""The bench without its socket: FMUs stepped by requests or by a clock that the test moves."""
+"""A served FMU without its socket: stepped by requests or by a clock that the test moves."""
 
 import math
 import re
@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from grasp_cosim.errors import InputError
 from grasp_cosim.fmi.load import load_here
-from grasp_cosim.hil.bench import BACKLOG, Bench, Serving
 from grasp_cosim.hil.protocol import link_signature
+from grasp_cosim.hil.served import BACKLOG, ServedFmu, Service
 from grasp_cosim.interface.interface import Value, read_interface
 from support import native_fmus
 from support.proxies import HandProxy
@@ -22,35 +22,35 @@ STEP = 1e-3
 
 
 class Clocked:
-    """A bench, a proxy of it and their clock."""
+    """A served FMU, a proxy of it and their clock."""
 
-    def __init__(self, fmu: Path, serving: Serving) -> None:
+    def __init__(self, fmu: Path, serving: Service) -> None:
         self.now = 10_000 * MS
         self.said: list[str] = []
-        self.bench = Bench(read_interface(fmu), serving, self.said.append)
+        self.served = ServedFmu(read_interface(fmu), serving, self.said.append)
         signature, _ = link_signature(read_interface(fmu))
-        self.proxy = HandProxy(signature, lambda d: self.bench.answer(d, "test", self.now))
+        self.proxy = HandProxy(signature, lambda d: self.served.answer(d, "test", self.now))
 
     def wait(self, milliseconds: float) -> None:
-        """Let time pass; the bench looks whenever it wants to."""
+        """Let time pass; it looks whenever it wants to."""
         end = self.now + round(milliseconds * MS)
-        while (due := self.bench.due()) is not None and due <= end:
+        while (due := self.served.due()) is not None and due <= end:
             self.now = max(self.now, due)
-            self.bench.look(self.now)
+            self.served.look(self.now)
         self.now = end
 
 
-MakeClocked = Callable[[Path, Serving], Clocked]
+MakeClocked = Callable[[Path, Service], Clocked]
 
 
 @pytest.fixture
 def clocked() -> Iterator[MakeClocked]:
-    """Makes benches with a clock; closes them."""
+    """Serves FMUs with a clock; closes them."""
     with ExitStack() as stack:
 
-        def make(fmu: Path, serving: Serving) -> Clocked:
+        def make(fmu: Path, serving: Service) -> Clocked:
             it = Clocked(fmu, serving)
-            stack.callback(it.bench.close)
+            stack.callback(it.served.close)
             return it
 
         yield make
@@ -91,13 +91,13 @@ def test_in_lockstep_the_values_are_those_of_the_fmu_to_the_bit(
 ) -> None:
     fmu = fmus / "ProximitySensor.fmu"
     gaps = [0.1 / 3 ** (k / 7) for k in range(40)]
-    it = clocked(fmu, Serving(lockstep=True))
+    it = clocked(fmu, Service(lockstep=True))
     found = it.proxy.begin(1, starts(fmu, gap=gaps[0], reflectance=0.57))
     for k, gap in enumerate(gaps[1:]):
         found = found + it.proxy.step(k * STEP, STEP, starts(fmu, gap=gap, reflectance=0.57))
     assert found == directly(fmu, gaps, 0.57)
     it.proxy.end()
-    assert it.bench.counters()["steps"] == 39
+    assert it.served.counters()["steps"] == 39
     assert it.said == [
         "a session of test begins at t = 0 s",
         "the session is over at t = 0.039 s: the proxy ended the session",
@@ -106,7 +106,7 @@ def test_in_lockstep_the_values_are_those_of_the_fmu_to_the_bit(
 
 def test_in_initialisation_mode_outputs_follow_the_inputs(fmus: Path, clocked: MakeClocked) -> None:
     fmu = fmus / "ProximitySensor.fmu"
-    it = clocked(fmu, Serving(lockstep=True))
+    it = clocked(fmu, Service(lockstep=True))
     it.proxy.begin(1, starts(fmu))
     for gap in (0.01, 0.02):
         (intensity,) = it.proxy.initialise(0.0, starts(fmu, gap=gap, gain=0.001))
@@ -119,7 +119,7 @@ def test_lost_requests_are_made_up_for_with_the_newest_values(
 ) -> None:
     fmu = fmus / "GripperPlant.fmu"
     push, rest = {"force[1]": 1.0, "force[2]": 0.0}, {"force[1]": 0.0, "force[2]": 0.0}
-    two, one = (clocked(fmu, Serving(lockstep=True)) for _ in range(2))
+    two, one = (clocked(fmu, Service(lockstep=True)) for _ in range(2))
     for it in (two, one):
         it.proxy.begin(1, starts(fmu, **rest))
     for k in range(3):
@@ -132,11 +132,11 @@ def test_a_step_from_nowhere_fails_and_the_next_session_is_served(
     fmus: Path, time: float, clocked: MakeClocked
 ) -> None:
     fmu = fmus / "ProximitySensor.fmu"
-    it = clocked(fmu, Serving(lockstep=True))
+    it = clocked(fmu, Service(lockstep=True))
     it.proxy.begin(1, starts(fmu))
     with pytest.raises(RuntimeError, match=r"the peer failed: ProximitySensor\.fmu: step from"):
         it.proxy.step(time, STEP, starts(fmu))
-    assert it.bench.counters()["failures"] == 1
+    assert it.served.counters()["failures"] == 1
     it.proxy.begin(2, starts(fmu))
     assert it.proxy.step(0.0, STEP, starts(fmu))
 
@@ -146,11 +146,11 @@ def test_a_step_that_no_clock_can_keep_fails_and_the_next_session_is_served(
     fmus: Path, step: float, clocked: MakeClocked
 ) -> None:
     fmu = fmus / "ProximitySensor.fmu"
-    it = clocked(fmu, Serving())
+    it = clocked(fmu, Service())
     it.proxy.begin(1, starts(fmu))
     with pytest.raises(RuntimeError, match=r"step of .* s: must be from 1 ns to 1e\+09 s"):
         it.proxy.step(0.0, step, starts(fmu))
-    assert it.bench.due() is None
+    assert it.served.due() is None
     it.proxy.begin(2, starts(fmu))
     assert it.proxy.step(0.0, STEP, starts(fmu))
 
@@ -165,23 +165,23 @@ def test_sessions_of_an_fmu_without_inputs_and_parameters_count(
             if name == "modelDescription.xml":
                 data = re.sub(b'causality="(input|parameter)"', b'causality="local"', data)
             new.writestr(name, data)
-    it = clocked(fmu, Serving(lockstep=True))
+    it = clocked(fmu, Service(lockstep=True))
     it.proxy.begin(1, [])
-    assert it.bench.counters()["sessions"] == 0
+    assert it.served.counters()["sessions"] == 0
     it.proxy.end()
-    assert it.bench.counters()["sessions"] == 1
+    assert it.served.counters()["sessions"] == 1
 
 
 def test_a_parameter_that_the_fmu_refuses_is_said(fmus: Path, clocked: MakeClocked) -> None:
     fmu = fmus / "ProximitySensor.fmu"
-    it = clocked(fmu, Serving())
+    it = clocked(fmu, Service())
     with pytest.raises(RuntimeError, match=r"offset_distance = -1\.0 m: must be from"):
         it.proxy.begin(1, starts(fmu, offset_distance=-1.0))
 
 
 def test_a_tunable_parameter_changes_on_the_way(fmus: Path, clocked: MakeClocked) -> None:
     fmu = fmus / "ProximitySensor.fmu"
-    it = clocked(fmu, Serving(lockstep=True))
+    it = clocked(fmu, Service(lockstep=True))
     it.proxy.begin(1, starts(fmu))
     (bright,) = it.proxy.step(0.0, STEP, starts(fmu))
     (dark,) = it.proxy.step(STEP, STEP, starts(fmu, reflectance=0.5))
@@ -190,7 +190,7 @@ def test_a_tunable_parameter_changes_on_the_way(fmus: Path, clocked: MakeClocked
 
 def test_a_session_starts_at_its_own_time(fmus: Path, clocked: MakeClocked) -> None:
     fmu = fmus / "GripperPlant.fmu"
-    it = clocked(fmu, Serving(lockstep=True))
+    it = clocked(fmu, Service(lockstep=True))
     it.proxy.begin(1, starts(fmu), time=2.5)
     it.proxy.step(2.5, STEP, starts(fmu))
     assert it.proxy.client.outputs_time == 2.5 + STEP
@@ -201,7 +201,7 @@ def test_by_its_own_clock_the_model_moves_between_requests(
 ) -> None:
     fmu = fmus / "GripperPlant.fmu"
     push = starts(fmu, **{"force[1]": -1.0})
-    it = clocked(fmu, Serving())
+    it = clocked(fmu, Service())
     it.proxy.begin(1, starts(fmu))
     it.wait(500.0)  # it does not start before the first step
     first = it.proxy.step(0.0, STEP, push)
@@ -209,18 +209,18 @@ def test_by_its_own_clock_the_model_moves_between_requests(
     it.wait(20.0)
     later = it.proxy.step(0.02, STEP, push)
     assert it.proxy.client.outputs_time == pytest.approx(0.02)
-    assert it.bench.counters()["own_steps"] == 20
+    assert it.served.counters()["own_steps"] == 20
     moved = float(later[0]) - float(first[0])  # x = F t^2 / 2m
     assert moved == pytest.approx(-0.5 * 1.0 / 0.5 * 0.02**2, rel=1e-9)
 
 
 def test_its_own_step_may_be_shorter(fmus: Path, clocked: MakeClocked) -> None:
     fmu = fmus / "GripperPlant.fmu"
-    it = clocked(fmu, Serving(step_ns=MS // 4))
+    it = clocked(fmu, Service(step_ns=MS // 4))
     it.proxy.begin(1, starts(fmu))
     it.proxy.step(0.0, STEP, starts(fmu))
     it.wait(5.0)
-    assert it.bench.counters()["own_steps"] == 20
+    assert it.served.counters()["own_steps"] == 20
 
 
 def test_the_watchdog_puts_the_inputs_to_what_is_safe_until_a_request_comes(
@@ -228,13 +228,13 @@ def test_the_watchdog_puts_the_inputs_to_what_is_safe_until_a_request_comes(
 ) -> None:
     fmu = fmus / "GripperPlant.fmu"
     push = starts(fmu, **{"force[1]": -1.0})
-    it = clocked(fmu, Serving(watchdog_ns=50 * MS, failsafe={"force[1]": 0.25}))
+    it = clocked(fmu, Service(watchdog_ns=50 * MS, failsafe={"force[1]": 0.25}))
     it.proxy.begin(1, starts(fmu))
     it.proxy.step(0.0, STEP, push)
     it.wait(49.0)
-    assert it.bench.counters()["watchdog"] == 0
+    assert it.served.counters()["watchdog"] == 0
     it.wait(51.0)
-    assert it.bench.counters()["watchdog"] == 1
+    assert it.served.counters()["watchdog"] == 1
     assert "no request for 0.05 s: inputs failsafe" in it.said
     velocity = it.proxy.step(0.1, STEP, push)[2]
     expected = (-1.0 * 0.049 + 0.25 * 0.051) / 0.5  # the watchdog is before the step due with it
@@ -247,13 +247,13 @@ def test_a_clock_that_was_away_for_long_does_not_make_the_model_race(
     fmus: Path, clocked: MakeClocked
 ) -> None:
     fmu = fmus / "ProximitySensor.fmu"
-    it = clocked(fmu, Serving(watchdog_ns=10**15))
+    it = clocked(fmu, Service(watchdog_ns=10**15))
     it.proxy.begin(1, starts(fmu))
     it.proxy.step(0.0, STEP, starts(fmu))
     it.now += 3 * BACKLOG  # the machine slept
-    while (due := it.bench.due()) is not None and due <= it.now:
-        it.bench.look(it.now)
-    counters = it.bench.counters()
+    while (due := it.served.due()) is not None and due <= it.now:
+        it.served.look(it.now)
+    counters = it.served.counters()
     assert counters["own_steps"] + counters["skipped"] == 3000
     assert counters["own_steps"] == 2
 
@@ -263,7 +263,7 @@ def test_a_failure_of_the_fmu_is_said_to_the_proxy(
     tmp_path: Path, lockstep: bool, clocked: MakeClocked
 ) -> None:
     fmu = native_fmus.build(tmp_path, "Native", "2.0")
-    it = clocked(fmu, Serving(lockstep=lockstep))
+    it = clocked(fmu, Service(lockstep=lockstep))
     values = starts(fmu, error_at=0.0025)
     it.proxy.begin(1, values)
     for k in range(2):
@@ -272,7 +272,7 @@ def test_a_failure_of_the_fmu_is_said_to_the_proxy(
     it.wait(2.0)
     with pytest.raises(RuntimeError, match=r"the peer failed: native: Native\.fmu returned error"):
         it.proxy.step(2 * STEP, STEP, values)
-    assert it.bench.due() is None
+    assert it.served.due() is None
 
 
 def test_every_type_there_and_back(tmp_path: Path, clocked: MakeClocked) -> None:
@@ -284,13 +284,13 @@ def test_every_type_there_and_back(tmp_path: Path, clocked: MakeClocked) -> None
         "u_Enumeration": 2,
         "u_String": "é",
     }
-    it = clocked(fmu, Serving(lockstep=True))
+    it = clocked(fmu, Service(lockstep=True))
     it.proxy.begin(1, starts(fmu))
     for found in (
         it.proxy.initialise(0.0, starts(fmu, **values)),
         it.proxy.step(0.0, STEP, starts(fmu, **values)),
     ):
-        outputs = dict(zip([v.name for v in it.bench.peer.signature.answer], found, strict=True))
+        outputs = dict(zip([v.name for v in it.served.peer.signature.answer], found, strict=True))
         for name, value in values.items():
             assert (outputs[f"y{name[1:]}"], type(outputs[f"y{name[1:]}"])) == (value, type(value))
 
@@ -303,41 +303,41 @@ def test_what_a_proxy_cannot_exchange_is_refused_by_name(tmp_path: Path) -> None
 
 def test_an_output_that_is_not_finite_is_a_failure(tmp_path: Path, clocked: MakeClocked) -> None:
     fmu = native_fmus.build(tmp_path, "Native", "2.0")
-    it = clocked(fmu, Serving(lockstep=True))
+    it = clocked(fmu, Service(lockstep=True))
     it.proxy.begin(1, starts(fmu))
-    bench = it.bench
-    bench._model._get = lambda: [math.nan] * len(bench.peer.signature.answer)
+    served = it.served
+    served._fmu._get = lambda: [math.nan] * len(served.peer.signature.answer)
     with pytest.raises(RuntimeError, match=r"= nan at t = 0\.001 s: must be finite"):
         it.proxy.step(0.0, STEP, starts(fmu))
 
 
 def test_what_is_dropped_is_said_once(fmus: Path, clocked: MakeClocked) -> None:
     fmu = fmus / "ProximitySensor.fmu"
-    it = clocked(fmu, Serving(key=b"a key of 16 byte"))
+    it = clocked(fmu, Service(key=b"a key of 16 byte"))
     for _ in range(3):
-        assert it.bench.answer(it.proxy.client.greet(1, 0), "somebody", it.now) is None
+        assert it.served.answer(it.proxy.client.greet(1, 0), "somebody", it.now) is None
     assert it.said == ["a datagram from somebody without the right key is dropped"]
 
 
-def test_a_bench_that_is_closed_says_where_its_session_ended(
+def test_a_server_that_is_closed_says_where_its_session_ended(
     fmus: Path, clocked: MakeClocked
 ) -> None:
     fmu = fmus / "ProximitySensor.fmu"
-    it = clocked(fmu, Serving(lockstep=True))
+    it = clocked(fmu, Service(lockstep=True))
     it.proxy.begin(1, starts(fmu))
     it.proxy.step(0.0, STEP, starts(fmu))
-    it.bench.close()
-    assert it.said[-1] == "the session is over at t = 0.001 s: the bench is closed"
+    it.served.close()
+    assert it.said[-1] == "the session is over at t = 0.001 s: the server is closed"
 
 
 def test_wrong_failsafe_values_are_refused(fmus: Path) -> None:
     plant = read_interface(fmus / "GripperPlant.fmu")
     with pytest.raises(InputError, match=r"failsafe force: no such input .* valid: force\[1\]"):
-        Bench(plant, Serving(failsafe={"force": 1.0}))
+        ServedFmu(plant, Service(failsafe={"force": 1.0}))
     with pytest.raises(InputError, match=r"failsafe force\[1\]: force\[1\] = 'x': must be a"):
-        Bench(plant, Serving(failsafe={"force[1]": "x"}))
+        ServedFmu(plant, Service(failsafe={"force[1]": "x"}))
 
 
 def test_a_key_that_is_too_short_is_refused(fmus: Path) -> None:
     with pytest.raises(InputError, match="key of 3 bytes: must have 16 or more"):
-        Bench(read_interface(fmus / "GripperPlant.fmu"), Serving(key=b"abc"))
+        ServedFmu(read_interface(fmus / "GripperPlant.fmu"), Service(key=b"abc"))

@@ -1,7 +1,8 @@
-"""An FMU as a peer runs it: set up anew by each session, stepped with the values of a request."""
+"""An FMU driven by requests: set up anew by each session, stepped with the values of a request."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from math import isclose, isfinite
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +21,7 @@ TOLERANCE = 1e-9
 """s by which a request's time may differ from the model's; relative to the time it is 1e-12."""
 
 
-class Model:
+class DrivenFmu:
     """One FMU with at most one instance. Close it.
 
     SimulationError or InputError where the FMU fails; it must then be set up anew.
@@ -38,26 +39,21 @@ class Model:
         self._step = 0.0
         self._bound: Callable[[], int] | None = None
 
-    @property
-    def running(self) -> bool:
-        """Whether there is an instance that has begun to step."""
-        return self._instance is not None and self._stepping
-
     def try_out(self) -> None:
         """Make an instance and free it, to see that this can be done."""
         load_here(self.interface.identifier, self.interface).close()
 
     def initialise(self, time: float, values: Sequence[Value], fresh: bool) -> None:
-        """Set values in initialisation mode; fresh makes a new instance that starts at time, s."""
+        """Set `values` in initialisation mode, with `fresh` of a new instance, from `time` in s."""
         if fresh or self._instance is None:
             self._set_up(time, values)
         else:
             self._set_changed(values)
 
     def step(self, time: float, step: float, values: Sequence[Value]) -> None:
-        """Step from time over step, both in s, with these values.
+        """Step from `time` over `step`, both in s, with these values.
 
-        What is missing before time is made up for first, in steps of the same length.
+        What is missing before `time` is made up for first, in steps of the same length.
         """
         self.begin()
         self.set(values)
@@ -76,7 +72,7 @@ class Model:
         self._set_changed(values, parameters_only=True)
 
     def advance(self, time: float, step: float) -> None:
-        """Advance by step from time, both in s, with the values as they are."""
+        """Advance by `step` from `time`, both in s, with the values as they are."""
         instance = self._required()
         self._clock[0] = time
         status = self._stepper(step)()
@@ -87,7 +83,7 @@ class Model:
         self.time = time + step
 
     def outputs(self) -> list[Value]:
-        """The outputs now, in the order of the signature."""
+        """Return the outputs now, in the order of the signature."""
         instance = self._required()
         values = self._get() if self._stepping else instance.get(self._outputs)
         for v, value in zip(self._outputs, values, strict=True):
@@ -156,19 +152,34 @@ def _same(old: Value, new: Value) -> bool:
     return type(old) is type(new) and old == new
 
 
-def _by_type(
-    instance: Instance, variables: Sequence[LinkVariable]
-) -> Mapping[str, list[tuple[int, Variable]]]:
-    """Place and variable by FMI type."""
-    found: dict[str, list[tuple[int, Variable]]] = {}
-    for i, v in enumerate(variables):
+class _Bound(NamedTuple):
+    """A call that passes the variables of one FMI type, which have these places in a list."""
+
+    places: list[int]
+    kind: Callable[[float], Value]
+    data: npt.NDArray[np.generic]
+    call: Callable[[], int]
+
+
+_KINDS: dict[str, Callable[[float], Value]] = {"Real": float, "Integer": int, "Boolean": bool}
+
+
+def _bound(
+    instance: Instance, action: str, variables: Sequence[LinkVariable]
+) -> tuple[list[_Bound], dict[int, Variable]]:
+    """The calls that pass these variables, and the strings, which have none, by their place."""
+    by_type: dict[str, dict[int, Variable]] = {}
+    for place, v in enumerate(variables):
         variable = instance.interface.by_name[v.name]
-        found.setdefault(variable.type, []).append((i, variable))
-    return found
-
-
-def _buffer(instance: Instance, fmi_type: str, size: int) -> npt.NDArray[np.generic]:
-    return np.zeros(size, dtype(instance.interface.version, fmi_type))
+        by_type.setdefault(variable.type, {})[place] = variable
+    texts = by_type.pop("String", {})
+    calls = []
+    for fmi_type, found in by_type.items():
+        data = np.zeros(len(found), dtype(instance.interface.version, fmi_type))
+        call = instance.transfer(action, list(found.values()), data).python
+        kind = _KINDS[next(iter(found.values())).kind]
+        calls.append(_Bound(list(found), kind, data, call))
+    return calls, texts
 
 
 def _checked(instance: Instance, status: int) -> None:
@@ -180,45 +191,30 @@ def _putter(
     instance: Instance, variables: Sequence[LinkVariable]
 ) -> Callable[[Sequence[Value]], None]:
     """A function that sets these variables from the beginning of a list of values."""
-    parts, texts = [], []
-    for fmi_type, found in _by_type(instance, variables).items():
-        if fmi_type == "String":
-            texts += found
-            continue
-        data = _buffer(instance, fmi_type, len(found))
-        call = instance.transfer("set", [v for _, v in found], data).python
-        parts.append((data, [i for i, _ in found], call))
+    calls, texts = _bound(instance, "set", variables)
 
     def put(values: Sequence[Value]) -> None:
-        for data, places, call in parts:
+        for places, _, data, call in calls:
             data[:] = [values[i] for i in places]
             _checked(instance, call())
         if texts:
-            instance.set([v for _, v in texts], [values[i] for i, _ in texts])
+            instance.set(list(texts.values()), [values[i] for i in texts])
 
     return put
 
 
 def _getter(instance: Instance, variables: Sequence[LinkVariable]) -> Callable[[], list[Value]]:
     """A function that gets the values of these variables, in their order."""
-    parts, texts = [], []
-    kinds = {"Real": float, "Integer": int, "Boolean": bool}
-    for fmi_type, found in _by_type(instance, variables).items():
-        if fmi_type == "String":
-            texts += found
-            continue
-        data = _buffer(instance, fmi_type, len(found))
-        call = instance.transfer("get", [v for _, v in found], data).python
-        parts.append((data, [i for i, _ in found], kinds[found[0][1].kind], call))
+    calls, texts = _bound(instance, "get", variables)
     values: list[Value] = [0.0] * len(variables)
 
     def get() -> list[Value]:
-        for data, places, kind, call in parts:
+        for places, kind, data, call in calls:
             _checked(instance, call())
             for i, value in zip(places, data.tolist(), strict=True):
                 values[i] = kind(value)
         if texts:
-            for (i, _), value in zip(texts, instance.get([v for _, v in texts]), strict=True):
+            for i, value in zip(texts, instance.get(list(texts.values())), strict=True):
                 values[i] = value
         return list(values)
 

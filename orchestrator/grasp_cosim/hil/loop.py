@@ -1,0 +1,94 @@
+"""A loop at a UDP port that waits for datagrams and for time, until it is stopped."""
+
+import selectors
+import socket
+import threading
+import time
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
+from typing import Any, Self
+
+from ..system.parts import NANOSECONDS
+from .address import Address, listening, resolved
+
+LARGEST = 65_536
+"""Bytes to take of a datagram; no UDP datagram has as many."""
+
+
+class Loop:
+    """Listens at a port once it is made; `run` calls the handlers. Leaving the context closes it.
+
+    A subclass registers a handler for each socket, and says in `due` and `look` what time asks for.
+    InputError where the address has no IPv4 address of this machine, or the port is taken.
+    """
+
+    def __init__(self, address: Address, clock: Callable[[], int] = time.monotonic_ns) -> None:
+        self._clock = clock  # ns
+        self._lock = threading.Lock()  # handlers work on what other threads may read
+        self._stopping = False
+        with ExitStack() as stack:
+            # select() waits to the microsecond, epoll() and poll() to the millisecond
+            self._selector = stack.enter_context(selectors.SelectSelector())
+            self._wake, woken = (stack.enter_context(end) for end in socket.socketpair())
+            self._wake.setblocking(False)
+            self.register(woken, lambda: woken.recv(LARGEST))
+            self.port_socket = stack.enter_context(listening(resolved(*address)))
+            self.address: Address = self.port_socket.getsockname()
+            self._stack = stack.pop_all()
+
+    def register(self, readable: socket.socket, handler: Callable[[], Any]) -> None:
+        """Have `handler` called whenever there is something to receive at a socket."""
+        self._selector.register(readable, selectors.EVENT_READ, handler)
+
+    def due(self) -> int | None:
+        """Return when `look` has something to do next, in ns of the clock; None: not by time."""
+        raise NotImplementedError
+
+    def look(self, now: int) -> None:
+        """Do what is due at `now`, in ns of the clock."""
+        raise NotImplementedError
+
+    def run(self, duration_ns: int | None = None, done: Callable[[], bool] = lambda: False) -> None:
+        """Go on until `stop`, until `done`, or for a duration in ns.
+
+        Whatever a handler raises ends it.
+        """
+        end = None if duration_ns is None else self._clock() + duration_ns
+        while not (self._stopping or done()):
+            now = self._clock()
+            if end is not None and now >= end:
+                break
+            self.turn(None if end is None else end - now)
+
+    def turn(self, wait_ns: int | None) -> None:
+        """Wait for a datagram, for what is due, for `stop` or `wait_ns`; then do what there is."""
+        waits = [] if wait_ns is None else [wait_ns]
+        if (due := self.due()) is not None:
+            waits.append(max(due - self._clock(), 0))
+        ready = self._selector.select(min(waits) / NANOSECONDS if waits else None)
+        with self._lock:
+            # the port last: its handler may close another socket that is ready, too
+            for key, _ in sorted(ready, key=lambda r: r[0].fileobj is self.port_socket):
+                key.data()
+            self.look(self._clock())
+
+    def stop(self) -> None:
+        """Make `run` return; may be called from any thread, a signal handler, and repeatedly."""
+        self._stopping = True
+        with suppress(BlockingIOError):  # full of earlier calls: that wakes it, too
+            self._wake.send(b"\0")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close all sockets. Must not be called while `run` goes on."""
+        self._stack.close()
+
+
+def received(readable: socket.socket) -> tuple[bytes, Address] | None:
+    """Return a datagram and its sender; None where what made the socket readable was none."""
+    try:
+        return readable.recvfrom(LARGEST)
+    except (BlockingIOError, ConnectionError):  # a broken datagram; nobody took an earlier one
+        return None
