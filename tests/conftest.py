@@ -4,6 +4,7 @@ import fcntl
 import importlib
 import os
 import shutil
+import signal
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
@@ -25,6 +26,11 @@ Load = Callable[[str], Fmu]
 MadeOnce = Callable[[str, Callable[[Path], object]], Path]
 UnpackIn = Callable[[str], Path]
 Altered = Callable[[str, str, str, str], Path]
+
+
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+    # As in `sh -c 'make test &'`, and inherited: tests send Ctrl-C to themselves and to children.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
