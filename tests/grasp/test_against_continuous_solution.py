@@ -9,11 +9,12 @@ import pytest
 from grasp_controller import contact_force, impact_reduction, series, simultaneous_contact
 from grasp_cosim.grasp.metrics import FINGERS, first_contact
 from gripper_plant import rigid
-from hypothesis import Phase, assume, given, settings
+from hypothesis import Phase, assume, given
 from hypothesis import strategies as st
 from proximity_sensor import optics
 from support.continuous import Grasp, Solution, solve
 from support.direct import Sensors, Signals, closed_loop
+from support.examples import examples
 
 Array = npt.NDArray[np.float64]
 
@@ -184,8 +185,8 @@ GRASPS = st.builds(
 
 
 @pytest.mark.parametrize("case", CASES)
-@settings(
-    max_examples=8, deadline=None, derandomize=True, database=None, phases=[Phase.generate]
+@examples(
+    8, phases=[Phase.generate]
 )  # to shrink a failure takes minutes and tells no more than the numbers of a grasp do
 @given(drawn=GRASPS)
 def test_contact_times_of_any_grasp(case: int, drawn: Grasp) -> None:

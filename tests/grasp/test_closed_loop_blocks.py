@@ -12,9 +12,10 @@ from grasp_controller import impact_reduction as layer_2
 from grasp_controller import series
 from grasp_controller import simultaneous_contact as layer_3
 from gripper_plant import rigid
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from proximity_sensor import optics
+from support.examples import examples
 
 H = 1e-3
 """Communication step in s, ten times the paper's: nothing below depends on it."""
@@ -93,7 +94,7 @@ def contact_times(samples: list[Sample]) -> list[float | None]:
 # ----------------------------------------------------------------------------- symmetry
 
 
-@settings(deadline=None, derandomize=True, max_examples=6)
+@examples(6)
 @given(st.floats(-0.07, 0.07), st.sampled_from([0, 1, 2]), st.floats(0.5, 1.0), st.floats(0.5, 1.0))
 def test_the_mirrored_grasp_is_exactly_the_mirrored_grasp(
     x_m: float, case: int, alpha_1: float, alpha_2: float
