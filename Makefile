@@ -1,5 +1,7 @@
 # make run    the published grasp from FMUs: .venv, build, evaluate, pictures in results/
-# make test   the tests        make check   lint, format, types, import rules
+# make test   the quick tests, in three minutes; make test-slow: the others; each runs in one of them
+# make explore  the properties, on new random examples and more of them; a failure prints its recipe
+# make check  lint, format, types, import rules
 # make bench  measurements     make cards    the variable tables of the equation cards
 
 PYTHON ?= $(firstword $(foreach p,python3 python3.13 python3.12 python3.11,$(shell \
@@ -7,15 +9,23 @@ PYTHON ?= $(firstword $(foreach p,python3 python3.13 python3.12 python3.11,$(she
 BIN := .venv/bin
 PIP := PIP_CONSTRAINT=constraints.txt PIP_DISABLE_PIP_VERSION_CHECK=1 $(BIN)/python -m pip install --quiet
 
-.PHONY: run test check bench cards clean
+# Tests start hundreds of Pythons: none should compile all modules anew, whatever the environment.
+PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 2 --maxschedchunk 1
+
+.PHONY: run test test-slow explore check bench cards clean
 
 run: .venv/run
 	$(BIN)/grasp-cosim build
 	$(BIN)/grasp-cosim evaluate --out results
 
-# Tests start hundreds of Pythons: none should compile all modules anew, whatever the environment.
 test: .venv/dev
-	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 2 --maxschedchunk 1
+	$(PYTEST) -m "not slow"
+
+test-slow: .venv/dev
+	$(PYTEST) -m slow
+
+explore: .venv/dev
+	$(PYTEST) -m hypothesis --hypothesis-profile explore
 
 check: .venv/dev
 	$(BIN)/ruff check .

@@ -4,6 +4,7 @@ import fcntl
 import importlib
 import os
 import shutil
+import signal
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
@@ -15,6 +16,7 @@ import pytest
 from grasp_cosim import System, cli
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_fmus import build as builder
+from hypothesis import settings
 from support.fmi2 import Fmu
 from support.packages import skip_where_it_cannot_run
 
@@ -25,6 +27,15 @@ Load = Callable[[str], Fmu]
 MadeOnce = Callable[[str, Callable[[Path], object]], Path]
 UnpackIn = Callable[[str], Path]
 Altered = Callable[[str, str, str, str], Path]
+
+
+settings.register_profile("usual", deadline=None, derandomize=True)
+settings.register_profile("explore", deadline=None, max_examples=1000, print_blob=True)
+settings.load_profile("usual")  # unless --hypothesis-profile names the other: make explore
+
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+    # As in `sh -c 'make test &'`, and inherited: tests send Ctrl-C to themselves and to children.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -58,6 +58,7 @@ def test_a_study_leaves_its_runs_and_pictures(command: Run, tmp_path: Path) -> N
     ]
 
 
+@pytest.mark.slow
 def test_what_is_true_or_false_counts_as_1_or_0(command: Run, fmus: Path) -> None:
     """A cup that takes damage from the impact, and one that takes a hundred times as much."""
     swap = f"[swap]\nplant = '{fmus / 'GripperPlantCompliant.fmu'}'\n"
@@ -75,6 +76,7 @@ def test_what_is_true_or_false_counts_as_1_or_0(command: Run, fmus: Path) -> Non
     assert pq.read_table("study/runs.parquet")["damaged"].to_pylist() == [True, False]
 
 
+@pytest.mark.slow
 def test_where_every_run_fails_the_result_is_negative(command: Run) -> None:
     narrow = STUDY.replace("values = [0.06, 0.07]", "values = [0.06]").replace(
         "[0.5, 0.6]", "[0.5]"

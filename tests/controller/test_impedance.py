@@ -5,13 +5,14 @@ from math import inf, isfinite, nextafter, sqrt
 import numpy as np
 import pytest
 from grasp_controller.impedance import Matrix, Motion, advance, transition
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from support.exact import oscillator
+from support.examples import examples
 
-QUICK = settings(deadline=None, derandomize=True, max_examples=100)
+QUICK = examples(100)
 
 EPS = float(np.finfo(float).eps)
 

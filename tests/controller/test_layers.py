@@ -9,11 +9,12 @@ from grasp_controller import contact_force as layer_1
 from grasp_controller import impact_reduction as layer_2
 from grasp_controller import simultaneous_contact as layer_3
 from grasp_controller.impedance import Motion
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
+from support.examples import examples
 
-QUICK = settings(deadline=None, derandomize=True, max_examples=100)
+QUICK = examples(100)
 
 Pair = tuple[float, float]
 

@@ -13,12 +13,13 @@ from grasp_controller import impact_reduction as layer_2
 from grasp_controller import series
 from grasp_controller import simultaneous_contact as layer_3
 from grasp_controller.series import Inputs, Outputs, Pair, Params, State
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from support.declared import Parameter, parameters
+from support.examples import examples
 
-QUICK = settings(deadline=None, derandomize=True, max_examples=60)
+QUICK = examples(60)
 
 
 def switched(layer_3_on: bool, layer_2_on: bool) -> Params:

@@ -5,13 +5,14 @@ from itertools import accumulate
 
 import pytest
 from grasp_cosim.convergence.extrapolation import converge
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from support.examples import examples
 
 STEPS = [0.1 * 2.0**i for i in range(6)]
 
 
-@settings(deadline=None, derandomize=True, database=None)
+@examples()
 @given(
     limit=st.floats(-10.0, 10.0),
     scale=st.floats(0.1, 10.0),

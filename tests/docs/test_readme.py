@@ -9,6 +9,7 @@ import pytest
 from grasp_cosim import System, cli, simulate
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.ssp.write import write_ssp
+from support.slow import slow
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text("utf-8")
@@ -50,7 +51,7 @@ def test_there_is_something_to_try() -> None:
     assert len(EXAMPLES) == 1
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", [slow(c) if "--step-study" in c else c for c in COMMANDS])
 def test_command(user: Path, command: str) -> None:
     arguments = shlex.split(command)
     if arguments[1] in ("run", "qualify"):

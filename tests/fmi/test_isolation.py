@@ -171,6 +171,7 @@ def test_without_posix_it_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyP
         pass
 
 
+@pytest.mark.slow
 def test_the_grasp_has_the_same_bits(grasp: System) -> None:
     """Also with FMUs that are written in Python, each in a Python of its own."""
     alone = tuple(replace(component, isolation="process") for component in grasp.components)
@@ -191,6 +192,7 @@ def test_an_fmu_that_a_process_can_have_once(tmp_path: Path) -> None:
                 System.load(path)
 
 
+@pytest.mark.slow
 def test_what_the_fmu_prints_does_not_get_into_json(tmp_path: Path) -> None:
     path = system_file(tmp_path, "3.0", "").read_text("utf-8")
     alone = path.replace("[components.first]", '[components.first]\nisolation = "process"')

@@ -11,6 +11,7 @@ from grasp_controller import series
 from gripper_plant import compliant, movable, rigid
 from proximity_sensor import channel
 from support.pythons import VERSIONS, python
+from support.slow import slow
 
 HOST = Path(__file__).with_name("bare_host.py")
 STEPS, H = 50, 1e-3
@@ -58,7 +59,7 @@ def without_fmu(case: Case) -> dict[str, list[str]]:
     return {name: [row[name].hex() for row in rows] for name in rows[0]}
 
 
-@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("version", [VERSIONS[0], *map(slow, VERSIONS[1:])])
 def test_runs_where_nothing_is_installed(fmus: Path, tmp_path: Path, version: str) -> None:
     """Bit for bit what the block gives, in every version the same."""
     venv = tmp_path / "venv"

@@ -46,6 +46,7 @@ def test_says_what_it_built(tmp_path: Path) -> None:
     assert builder.build(folder) == [Built(folder / name, "unchanged", ()) for name in FMUS]
 
 
+@pytest.mark.slow
 def test_another_process_gives_the_same_bytes(fmus: Path, tmp_path: Path) -> None:
     """From another folder, and with sets in another order."""
     script = "from pathlib import Path; from grasp_fmus import build; build.build(Path('out'))"

@@ -42,6 +42,7 @@ from grasp_fmus.link.message import (
 from grasp_fmus.link.peer import ALIVE, Peer, PeerCounters, Request
 from grasp_fmus.link.signature import Causality, Kind, LinkVariable, Signature
 from gripper_plant import rigid
+from support.slow import slow
 
 NATIVE = Path(__file__).parent / "native"
 STRICT = [
@@ -730,7 +731,7 @@ def test_the_plant_in_c_to_the_last_bit(target: Path) -> None:
     assert expected[8:10] == [False, False]
 
 
-@pytest.mark.parametrize(("lost", "made_up"), [(3.0, [1, 1, 1]), (2.25, [1, 1, 0.25])])
+@pytest.mark.parametrize(("lost", "made_up"), [(3.0, [1, 1, 1]), slow(2.25, [1, 1, 0.25])])
 def test_steps_lost_on_the_way_are_made_up_for(
     target: Path, lost: float, made_up: list[float]
 ) -> None:
@@ -821,6 +822,7 @@ def test_a_target_with_a_clock_of_its_own(target: Path) -> None:
         assert positions[-1] < 0.11
 
 
+@pytest.mark.slow
 def test_a_target_that_was_away_for_long_does_not_race_after_its_clock(target: Path) -> None:
     period = 2**-9
     with Target(target, "-", str(period)) as bench:

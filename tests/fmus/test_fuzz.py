@@ -11,8 +11,9 @@ from typing import Any
 
 import pytest
 from conftest import Load
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
+from support.examples import examples
 from support.fmi2 import DISCARD, ERROR, OK, Fmu, Instance, State
 
 NAMES = (
@@ -138,12 +139,13 @@ def in_order(fmu: Fmu) -> list[float]:
         return instance.outputs()
 
 
+@pytest.mark.hypothesis  # it finds those that are decorated, not what is inside of them
 @pytest.mark.parametrize("name", NAMES)
 def test_any_sequence_of_calls(load: Load, name: str) -> None:
     expected = in_order(load(name))
 
     @given(sequence=SEQUENCES)
-    @settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
+    @examples(150, suppress_health_check=list(HealthCheck))
     def run(sequence: list[tuple[int, tuple[Any, ...]]]) -> None:
         with Instance(load(name), "one") as one, Instance(load(name), "two", True) as two:
             drawn = (Drawn(one), Drawn(two))

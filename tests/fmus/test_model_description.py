@@ -554,8 +554,8 @@ DRAWS = {"GripperPlantMuJoCo": 1}
 """Parameters that are drawn, where not five: each change of one is a model to compile."""
 
 
-def moments(name: str) -> Iterator[tuple[Any, Any, Any]]:
-    """Parameters, state and inputs of a block, at the start and under way."""
+def moments(name: str, under_way: int = 3) -> Iterator[tuple[Any, Any, Any]]:
+    """Parameters, state and inputs of a block, at the start and so often under way."""
     skip_where_it_cannot_run(name)
     block: Any = BLOCKS[name]
     rng = random.Random(name)
@@ -564,7 +564,7 @@ def moments(name: str) -> Iterator[tuple[Any, Any, Any]]:
             u = inputs_at_random(block, rng)
             x = block.initial_state(p, u)
             yield p, x, u
-            for _ in range(3):
+            for _ in range(under_way):
                 for _ in range(rng.randrange(1, 40)):
                     x = block.step(p, x, inputs_at_random(block, rng), 1e-3)
                 yield p, x, inputs_at_random(block, rng)
@@ -592,7 +592,7 @@ def test_initial_outputs_depend_on_what_is_declared(root: Element, name: str) ->
     block: Any = BLOCKS[name]
     declared = dependencies(root, "InitialUnknowns")
     found: dict[str, set[str]] = {n: set() for n in declared}
-    for p, _, u in moments(name):
+    for p, _, u in moments(name, under_way=0):
         y = block.outputs(p, block.initial_state(p, u), u)
         for source in (*scalars(u), *scalars(p)):
             of_input = source in scalars(u)

@@ -59,6 +59,7 @@ def command(tmp_path: Path, environment: dict[str, str], *arguments: object) -> 
     return done.returncode, done.stdout
 
 
+@pytest.mark.slow
 def test_without_mujoco_the_same_is_built(
     fmus: Path, tmp_path: Path, environment: dict[str, str]
 ) -> None:
@@ -69,6 +70,7 @@ def test_without_mujoco_the_same_is_built(
     assert f"{NAME}.fmu" in built
 
 
+@pytest.mark.slow
 def test_without_mujoco_a_run_says_in_one_line_what_is_missing(
     fmus: Path, tmp_path: Path, environment: dict[str, str]
 ) -> None:
@@ -79,6 +81,7 @@ def test_without_mujoco_a_run_says_in_one_line_what_is_missing(
     assert "Traceback" not in said
 
 
+@pytest.mark.slow
 def test_without_mujoco_doctor_gives_the_reason_and_the_fix(
     fmus: Path, tmp_path: Path, environment: dict[str, str]
 ) -> None:
@@ -88,6 +91,7 @@ def test_without_mujoco_doctor_gives_the_reason_and_the_fix(
     assert trial == f"does not instantiate: [ERROR] {NAME}, t = 0 s: {MISSING}"
 
 
+@pytest.mark.slow
 def test_without_mujoco_the_interface_is_shown(
     fmus: Path, tmp_path: Path, environment: dict[str, str]
 ) -> None:

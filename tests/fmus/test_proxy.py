@@ -767,6 +767,7 @@ def test_the_end_is_said_once_and_values_stay() -> None:
     assert peer.kinds() == [HELLO, INITIALISE, STEP, END]
 
 
+@pytest.mark.slow
 def test_a_slave_that_goes_says_so() -> None:
     """pythonfmu drops it on fmi2Reset and fmi2FreeInstance, and does not tell it."""
     with ScriptedPeer() as peer:

@@ -21,6 +21,7 @@ from grasp_cosim.interface.interface import read_interface
 from grasp_fmus.c_header import c_header
 from grasp_fmus.documentation import icon
 from support import native_fmus
+from support.slow import slow
 
 Proxy = Callable[..., Path]
 Run = Callable[..., tuple[int, str, str]]
@@ -192,7 +193,7 @@ def initial(fmu: Path) -> dict[str, set[str]]:
     }
 
 
-@pytest.mark.parametrize("name", BLOCKS)
+@pytest.mark.parametrize("name", [slow("GraspController"), slow("GripperPlant"), "ProximitySensor"])
 def test_the_proxy_of_one_of_ours(fmus: Path, proxy: Proxy, name: str) -> None:
     original = fmus / f"{name}.fmu"
     made = proxy(original)
@@ -427,6 +428,7 @@ def test_what_is_packed_imports_the_standard_library_and_itself(fmus: Path, prox
     ElementTree.fromstring(page)
 
 
+@pytest.mark.slow
 def test_the_same_options_give_the_same_bytes_in_any_process(fmus: Path, proxy: Proxy) -> None:
     made = proxy(fmus / "GripperPlant.fmu")
     first = made.read_bytes()

@@ -222,6 +222,7 @@ def test_many_instances_side_by_side(fmu: Fmu) -> None:
             peer.__exit__()
 
 
+@pytest.mark.slow
 def test_strings_fill_no_memory(fmu: Fmu) -> None:
     with ScriptedPeer() as peer, Instance(fmu) as instance:
         initialised(instance, peer.port)

@@ -104,6 +104,7 @@ def test_values_in_any_order(fmus: Path, tmp_path: Path) -> None:
         assert host.get("virtual_position[1]") == 0.1
 
 
+@pytest.mark.slow
 def test_many_instances_come_and_go(fmus: Path, tmp_path: Path) -> None:
     """pythonfmu 0.7.0 alone crashes the process at the second or third instance."""
     for k in range(40):

@@ -5,8 +5,9 @@ from math import sin
 
 import pytest
 from conftest import Load
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from support.examples import examples
 from support.fmi2 import ERROR, OK, Fmu, Instance
 
 H = 1e-3
@@ -162,7 +163,7 @@ def test_a_state_of_another_fmu_is_refused(load: Load) -> None:
     steps=st.integers(0, 60),
     size=st.sampled_from([1e-4, 1e-3, 7e-3]),
 )
-@settings(max_examples=25, deadline=None)
+@examples(25)
 def test_any_moment_can_be_restored(
     load: Load, name: str, forces: list[float], steps: int, size: float
 ) -> None:

@@ -9,15 +9,18 @@ import pytest
 from grasp_controller import contact_force, impact_reduction, series, simultaneous_contact
 from grasp_cosim.grasp.metrics import FINGERS, first_contact
 from gripper_plant import rigid
-from hypothesis import Phase, assume, given, settings
+from hypothesis import Phase, assume, given
 from hypothesis import strategies as st
 from proximity_sensor import optics
 from support.continuous import Grasp, Solution, solve
 from support.direct import Sensors, Signals, closed_loop
+from support.examples import examples
+from support.slow import slow
 
 Array = npt.NDArray[np.float64]
 
 CASES = (0, 1, 2)
+SLOW_CASES = (0, slow(1), slow(2))
 STEP = 1e-4
 """s; the published controller runs at 10 kHz."""
 
@@ -108,13 +111,13 @@ def test_the_reference_settles_with_the_stiffness_over_half_the_width(case: int)
 
 
 @pytest.mark.parametrize("x_m", [0.0, OFF_CENTRE, 0.05])
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", SLOW_CASES)
 def test_contact_times(case: int, x_m: float) -> None:
     g = Grasp(case=case, x_m=x_m)
     assert _contact_times(g, STEP) == pytest.approx(_reference_times(g), abs=TOLERANCE)
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", SLOW_CASES)
 def test_contact_times_err_in_proportion_to_the_step(case: int) -> None:
     """Sample and hold is of first order, whatever the order of the steps within the blocks."""
     g = Grasp(case=case, x_m=OFF_CENTRE)
@@ -125,7 +128,7 @@ def test_contact_times_err_in_proportion_to_the_step(case: int) -> None:
         assert 0.8 <= slope <= 1.2
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", SLOW_CASES)
 def test_contact_times_tend_to_the_reference(case: int) -> None:
     """Without the part that falls with the step nothing is left: the equations are the same.
 
@@ -136,7 +139,7 @@ def test_contact_times_tend_to_the_reference(case: int) -> None:
     assert limit == pytest.approx(_reference_times(g), abs=1e-6)
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", SLOW_CASES)
 def test_the_force_builds_up_as_in_the_reference(case: int) -> None:
     g = Grasp(case=case, x_m=OFF_CENTRE)
     expected = solve(g, BUILD_UP[case], to_the_end=True)
@@ -145,7 +148,7 @@ def test_the_force_builds_up_as_in_the_reference(case: int) -> None:
     assert signals["controller.target_position"][-1] == pytest.approx(expected.target, abs=1e-6)
 
 
-@pytest.mark.parametrize("case", [1, 2])
+@pytest.mark.parametrize("case", [1, slow(2)])
 def test_the_contact_is_nearly_rigid(case: int) -> None:
     """Ten times the stabilisation rates, a hundred times the stiffness: no other grasp.
 
@@ -183,9 +186,9 @@ GRASPS = st.builds(
 """Around the published numbers; a wide object and a stiff layer 2 arrive fast enough."""
 
 
-@pytest.mark.parametrize("case", CASES)
-@settings(
-    max_examples=8, deadline=None, derandomize=True, database=None, phases=[Phase.generate]
+@pytest.mark.parametrize("case", SLOW_CASES)
+@examples(
+    8, phases=[Phase.generate]
 )  # to shrink a failure takes minutes and tells no more than the numbers of a grasp do
 @given(drawn=GRASPS)
 def test_contact_times_of_any_grasp(case: int, drawn: Grasp) -> None:

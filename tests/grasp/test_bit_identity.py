@@ -49,12 +49,14 @@ def test_the_grasp(grasp: System, case: int, step: float) -> None:
     assert_same_bits(system, rigid.Params(), (sensor, sensor), controller(case), step, steps)
 
 
+@pytest.mark.slow
 def test_the_published_step(grasp: System) -> None:
     """10 kHz, from free flight into contact."""
     sensor = optics.Params()
     assert_same_bits(grasp, rigid.Params(), (sensor, sensor), controller(2), 1e-4, 20_000)
 
 
+@pytest.mark.slow
 def test_other_parameters(grasp: System) -> None:
     values: dict[str, Value] = {
         "plant.finger_mass[1]": 0.41,

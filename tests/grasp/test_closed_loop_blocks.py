@@ -12,9 +12,11 @@ from grasp_controller import impact_reduction as layer_2
 from grasp_controller import series
 from grasp_controller import simultaneous_contact as layer_3
 from gripper_plant import rigid
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from proximity_sensor import optics
+from support.examples import examples
+from support.slow import slow
 
 H = 1e-3
 """Communication step in s, ten times the paper's: nothing below depends on it."""
@@ -93,7 +95,8 @@ def contact_times(samples: list[Sample]) -> list[float | None]:
 # ----------------------------------------------------------------------------- symmetry
 
 
-@settings(deadline=None, derandomize=True, max_examples=6)
+@pytest.mark.slow
+@examples(6)
 @given(st.floats(-0.07, 0.07), st.sampled_from([0, 1, 2]), st.floats(0.5, 1.0), st.floats(0.5, 1.0))
 def test_the_mirrored_grasp_is_exactly_the_mirrored_grasp(
     x_m: float, case: int, alpha_1: float, alpha_2: float
@@ -127,8 +130,8 @@ def test_both_fingers_of_a_centred_grasp_do_the_same(case: int) -> None:
     ("case", "x_m", "width", "stiffness"),
     [
         (0, 0.03, 0.07, 98.0),
-        (1, 0.03, 0.07, 98.0),
-        (2, 0.03, 0.07, 98.0),
+        slow(1, 0.03, 0.07, 98.0),
+        slow(2, 0.03, 0.07, 98.0),
         (2, -0.05, 0.07, 98.0),
         (2, 0.01, 0.04, 98.0),
         (1, 0.03, 0.07, 50.0),
@@ -178,7 +181,7 @@ def forces_of(samples: list[Sample]) -> npt.NDArray[np.float64]:
     return np.array([(*s.controller.force, *s.gripper.contact_force) for s in samples])
 
 
-@pytest.mark.parametrize("factor", [0.57, 0.93, 3.0])
+@pytest.mark.parametrize("factor", [slow(0.57), 0.93, 3.0])
 def test_any_reflectance_changes_no_force(factor: float) -> None:
     """But for roundings, relative to the largest force."""
     scaled = Grasp(reflectance=(factor, factor)).run(2.5)

@@ -29,6 +29,7 @@ def grasped(
     return simulate(system, step=step, stop=stop)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", [1, 2])
 @pytest.mark.parametrize("x_m", [0.03, -0.02])
 def test_the_forces_settle_where_those_of_our_plant_do(
@@ -62,6 +63,7 @@ def test_the_fingers_touch_when_those_of_our_plant_do(
     assert theirs["peak_contact_force"] == pytest.approx(ours["peak_contact_force"], rel=0.03)
 
 
+@pytest.mark.slow
 def test_a_free_box_is_shifted_as_ours_is(grasp: System, fmus: Path) -> None:
     """By centimetres in Case 1; in Case 2 by what passes between the contacts, 0.02 mm and 0.03."""
     shifts = {
@@ -79,6 +81,7 @@ def test_a_free_box_is_shifted_as_ours_is(grasp: System, fmus: Path) -> None:
     assert np.abs(x[1] - x[0]).max() < 2e-4
 
 
+@pytest.mark.slow
 def test_case_1_topples_what_case_2_grasps_here_too(grasp: System, fmus: Path) -> None:
     """On a rough floor, held near the top, as in test_plants.py."""
     rough: dict[str, Value] = {

@@ -42,6 +42,7 @@ def test_a_soft_object_is_pressed_no_harder_than_it_is_held(
     assert max(impact) > 2.0 * max(steady)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("values", [{}, RUBBING], ids=["smooth fingers", "fingers with friction"])
 def test_case_2_shifts_a_light_object_far_less_than_case_1(
     grasp: System, fmus: Path, values: Values
@@ -52,6 +53,7 @@ def test_case_2_shifts_a_light_object_far_less_than_case_1(
     assert two < 1e-4
 
 
+@pytest.mark.slow
 def test_case_1_topples_what_case_2_grasps(grasp: System, fmus: Path) -> None:
     """On a rough floor, held near the top."""
     rough: Values = {"plant.floor_friction": 0.8, "plant.contact_height": 0.08}
@@ -63,6 +65,7 @@ def test_case_1_topples_what_case_2_grasps(grasp: System, fmus: Path) -> None:
     assert two.metrics["object_tilt"] < 1e-3
 
 
+@pytest.mark.slow
 def test_unequal_reflectances_carry_a_free_object_away(grasp: System, fmus: Path) -> None:
     """Layer 3 keeps a force f_s that nothing answers but the floor.
 
@@ -77,6 +80,7 @@ def test_unequal_reflectances_carry_a_free_object_away(grasp: System, fmus: Path
     assert x[-201] - x[-1] == pytest.approx(0.2 * (f_s - 36.0 * distance) / 12.0, rel=1e-2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", [1, 2])
 def test_the_impact_on_an_object_that_moves_is_as_fast_as_the_gap_closes(
     grasp: System, fmus: Path, case: int

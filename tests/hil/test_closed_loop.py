@@ -10,6 +10,7 @@ import pytest
 from grasp_cosim import System, simulate
 from grasp_cosim.hil.served import Service
 from support.proxies import build_proxy, serving
+from support.slow import slow
 
 STEP, STOP = 4e-3, 2.0
 """s; past the contacts, in steps as long as the grasp takes them."""
@@ -37,7 +38,7 @@ def on_the_bench(
 @pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
 @pytest.mark.parametrize(
     "names",
-    [("plant",), ("sensor_1", "sensor_2"), ("controller",)],
+    [slow(("plant",)), slow(("sensor_1", "sensor_2")), ("controller",)],
     ids=["plant", "sensors", "controller"],
 )
 def test_a_part_on_the_bench_changes_no_bit(
@@ -58,6 +59,7 @@ def test_a_part_on_the_bench_changes_no_bit(
     assert None not in direct.metrics["time_to_contact"]
 
 
+@pytest.mark.slow
 def test_all_of_it_on_the_bench(stepped: System, tmp_path: Path) -> None:
     direct = simulate(stepped)
     names = ("plant", "sensor_1", "sensor_2", "controller")
@@ -85,6 +87,7 @@ def darkened(system: System) -> npt.NDArray[np.float64]:
         return session.result()["sensor_1.intensity"]
 
 
+@pytest.mark.slow
 def test_two_runs_one_after_the_other_use_the_same_bench(grasp: System, tmp_path: Path) -> None:
     system = grasp.with_experiment(step=1e-3, stop=0.05)
     with on_the_bench(system, tmp_path, ("plant",), Service(lockstep=True)) as benched:

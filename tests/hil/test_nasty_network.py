@@ -16,6 +16,7 @@ from grasp_cosim.hil.traffic import Entry
 from grasp_cosim.interface.interface import Value
 from grasp_cosim.recording.result import Result
 from support.proxies import build_proxy, relaying, serving, wait_until
+from support.slow import slow
 
 STEP = 0.01
 STEPS = 300
@@ -111,6 +112,7 @@ def last(result: Result, name: str) -> int:
     return int(result[name][-1])
 
 
+@pytest.mark.slow
 def test_the_peer_out_of_reach_for_a_while_and_back(slow_grasp: System, tmp_path: Path) -> None:
     """Twenty requests get nowhere; the peer makes up for them with what comes after."""
     log: list[Entry] = []
@@ -138,7 +140,7 @@ def test_the_peer_out_of_reach_for_a_while_and_back(slow_grasp: System, tmp_path
     assert missed - last(result, "plant.proxy.late") == 20 + dropped(log, "reply")
 
 
-@pytest.mark.parametrize("resume", [True, False])
+@pytest.mark.parametrize("resume", [slow(True), False])
 def test_the_peer_started_anew(slow_grasp: System, tmp_path: Path, resume: bool) -> None:
     """It knows no session; a proxy that may resume begins another one, from the start values."""
     fmu = slow_grasp.component("plant", "test").fmu

@@ -11,11 +11,12 @@ import pytest
 from grasp_cosim.errors import InputError
 from grasp_cosim.hil.network import DIRECTIONS, Conditions, Direction, Network, Outage
 from grasp_cosim.hil.traffic import Counters, Entry, Traffic
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
+from support.examples import examples
 
-QUICK = settings(deadline=None, derandomize=True, max_examples=100)
+QUICK = examples(100)
 MANY = 20_000
 MS = 1_000_000
 FATES = [[], [], [2921135], [2356986], [22230371], [1515930], [22747737, 1062552], [22415540]]

@@ -9,11 +9,12 @@ import numpy.typing as npt
 import pytest
 from grasp_cosim.master.faults import INITIAL, FaultFunction, Window, fault_functions
 from grasp_cosim.system.parts import Fault, FaultKind, Port
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
+from support.examples import examples
 
-QUICK = settings(deadline=None, derandomize=True, max_examples=100)
+QUICK = examples(100)
 STEP = 1_000_000
 WIRE, OTHER = Port("controller", "intensity[1]"), Port("controller", "intensity[2]")
 SIGNAL = np.sin(0.1 * np.arange(100)) + 1e-3 * np.arange(100)

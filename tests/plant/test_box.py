@@ -7,11 +7,12 @@ from math import atan2, cos, sin
 import numpy as np
 import pytest
 from gripper_plant.box import GRAVITY, Box, Pushes, Shape, advance, balance, centre, energy, faces
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
+from support.examples import examples
 
-QUICK = settings(deadline=None, derandomize=True, max_examples=60)
+QUICK = examples(60)
 
 UPRIGHT = Shape(b=0.035, a=0.05, m=0.05, mu=0.3, h=0.05)
 """70 mm wide, 100 mm high, 50 g, pushed at its middle: it slides long before it would tilt."""

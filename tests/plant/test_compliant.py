@@ -10,12 +10,13 @@ import pytest
 from gripper_plant import compliant, contact_laws, fingers, friction
 from gripper_plant.compliant import Inputs, Pair, Params, State
 from gripper_plant.contact_laws import HuntCrossley, KelvinVoigt, mean_force
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
+from support.examples import examples
 from support.gripper import assert_ranges_are_checked, swapped
 
-QUICK = settings(deadline=None, derandomize=True, max_examples=60)
+QUICK = examples(60)
 
 M, V = 0.5, 0.2
 """kg and m/s of finger 1, which arrives; finger 2 stays away."""

@@ -11,13 +11,14 @@ import pytest
 from gripper_plant import rigid
 from gripper_plant.contact import Finger, advance, substeps, time_to_contact
 from gripper_plant.rigid import Inputs, Pair, Params, State
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import brentq
+from support.examples import examples
 
-QUICK = settings(deadline=None, derandomize=True, max_examples=100)
+QUICK = examples(100)
 
 EPS = float(np.finfo(float).eps)
 

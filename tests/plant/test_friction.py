@@ -9,12 +9,13 @@ import pytest
 from gripper_plant import contact, fingers, friction, rigid
 from gripper_plant.fingers import Actuator, Inputs
 from gripper_plant.friction import Law, Params, move, resistance
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from support.declared import Parameter, parameters
+from support.examples import examples
 
-QUICK = settings(deadline=None, derandomize=True, max_examples=100)
+QUICK = examples(100)
 
 STRIBECK: Law = (0.4, 0.7, 2.0, 0.02)
 MASSES = st.floats(0.01, 100.0)

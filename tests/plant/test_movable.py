@@ -11,11 +11,12 @@ from gripper_plant import contact_laws, friction, movable
 from gripper_plant.box import GRAVITY, Box
 from gripper_plant.contact_laws import HuntCrossley, KelvinVoigt
 from gripper_plant.movable import Inputs, Pair, Params, State
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from support.examples import examples
 from support.gripper import assert_ranges_are_checked, swapped
 
-QUICK = settings(deadline=None, derandomize=True, max_examples=25)
+QUICK = examples(25)
 
 NEAR = Params(initial_position=(0.04, -0.04), initial_object_position=0.0)
 """5 mm of gap on either side."""

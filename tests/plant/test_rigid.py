@@ -7,9 +7,10 @@ from typing import Any
 import pytest
 from gripper_plant import rigid
 from gripper_plant.rigid import Inputs, Pair, Params, State
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from support.declared import Parameter, parameters
+from support.examples import examples
 
 PARAMETERS = parameters(Params)
 
@@ -141,7 +142,7 @@ FORCES = st.tuples(st.floats(-50.0, 50.0), st.floats(-50.0, 50.0))
 HISTORIES = st.lists(st.tuples(FORCES, st.floats(1e-5, 5e-3)), min_size=10, max_size=40)
 
 
-@settings(deadline=None, derandomize=True, max_examples=60)
+@examples(60)
 @given(grippers(), HISTORIES)
 def test_the_mirrored_gripper_does_exactly_the_mirrored_thing(
     p: Params, history: list[tuple[Pair, float]]

@@ -178,6 +178,7 @@ def test_a_blocked_candidate_is_not_run(short: System, fmus: Path) -> None:
     assert "blocks  missing" in as_text(found)
 
 
+@pytest.mark.slow
 def test_metrics_of_the_object_that_only_one_of_two_plants_has(short: System, fmus: Path) -> None:
     """The box that moves, then the rigid object, tell of no squeeze: nothing to compare."""
     soft = short.swap("plant", fmus / "GripperPlantCompliant.fmu")

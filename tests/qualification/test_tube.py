@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 from grasp_cosim.qualification.tube import Array, Curve, curve, deviation, tube
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
+from support.examples import examples
 
-QUICK = settings(deadline=None, derandomize=True, max_examples=100)
+QUICK = examples(100)
 STEP = 1e-3
 NUMBERS = st.floats(-1e3, 1e3, width=32)
 SAMPLES = arrays.arrays(np.float64, st.integers(1, 60), elements=NUMBERS)

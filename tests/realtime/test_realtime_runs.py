@@ -20,6 +20,7 @@ from grasp_cosim.realtime.timing import Timing
 from grasp_cosim.recording.load import load_run
 from grasp_cosim.report.tables import metrics_table
 from support.mocks import Mock, make_system
+from support.slow import slow
 
 FAST = Realtime(factor=1e4)
 """Not to wait at all in a test."""
@@ -35,7 +36,7 @@ def engine(request: pytest.FixtureRequest) -> Engine:
     return chosen
 
 
-@pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
+@pytest.mark.parametrize("scheme", ["sequential", slow("jacobi")])
 def test_a_paced_run_has_the_same_bits(grasp: System, engine: Engine, scheme: str) -> None:
     options: dict[str, Any] = {"step": 1e-3, "stop": 2.0, "scheme": scheme, "engine": engine}
     free, paced = simulate(grasp, **options), simulate(grasp, realtime=FAST, **options)

@@ -14,11 +14,12 @@ from grasp_cosim.recording.energy import Bond, ExchangeEnergy, bonds
 from grasp_cosim.system import parts
 from grasp_cosim.system.parts import Component, Connection, Port
 from gripper_plant import rigid
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from proximity_sensor import optics
 from support.direct import closed_loop
+from support.examples import examples
 
 Array = npt.NDArray[np.float64]
 
@@ -187,7 +188,7 @@ def test_a_connection_with_a_factor_of_zero_shows_the_source_no_motion() -> None
     assert energy[-1] == pytest.approx(float(np.sum(rows[1:, 2] * np.diff(rows[:, 1]))))
 
 
-@settings(deadline=None, derandomize=True, database=None)
+@examples()
 @given(
     rows=arrays.arrays(np.float64, (23, 4), elements=st.floats(-1e6, 1e6)),
     cuts=st.lists(st.integers(0, 23), max_size=6),

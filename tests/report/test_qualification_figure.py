@@ -11,6 +11,7 @@ from grasp_cosim.qualification.qualify import Compared, Qualification
 from grasp_cosim.qualification.swap import Swap
 from grasp_cosim.qualification.tube import Curve
 from grasp_cosim.report.qualification import ROWS, draw_qualification
+from support.slow import slow
 
 pytest.importorskip("matplotlib")
 
@@ -32,13 +33,14 @@ def qualification(grasp: System, names: int, end: int = 101) -> Qualification:
     return Qualification(swap, tuple(compared), runs=(original, candidate))
 
 
-@pytest.mark.parametrize(("names", "end"), [(1, 101), (2, 40), (ROWS + 3, 101), (3, 1)])
+@pytest.mark.parametrize(("names", "end"), [(1, 101), (2, 40), slow(ROWS + 3, 101), slow(3, 1)])
 def test_it_is_drawn(grasp: System, tmp_path: Path, names: int, end: int) -> None:
     path = tmp_path / "qualification.png"
     draw_qualification(qualification(grasp, names, end), path)
     assert path.read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_a_band_without_end_is_not_drawn(grasp: System, tmp_path: Path) -> None:
     found = qualification(grasp, 2)
     loose = [replace(c, band=Band(np.inf, 0.01, "given")) for c in found.signals]
@@ -46,6 +48,7 @@ def test_a_band_without_end_is_not_drawn(grasp: System, tmp_path: Path) -> None:
     assert (tmp_path / "loose.png").stat().st_size > 10_000
 
 
+@pytest.mark.slow
 def test_the_same_qualification_is_the_same_picture(grasp: System, tmp_path: Path) -> None:
     found = qualification(grasp, 2)
     for name in ("a.png", "b.png"):

@@ -53,6 +53,7 @@ def test_an_energy_of_zero_is_not_drawn(tmp_path: Path) -> None:
     assert (tmp_path / "zero.png").read_bytes() == (tmp_path / "without.png").read_bytes()
 
 
+@pytest.mark.slow
 def test_the_same_study_gives_the_same_bytes(tmp_path: Path) -> None:
     for name in ("one.png", "two.png"):
         draw_step_study(_study(LINEAR, [ENERGY] * 5), tmp_path / name)

@@ -14,6 +14,7 @@ from matplotlib.colors import same_color
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from report.timings import PERIOD, paced
+from support.slow import slow
 
 
 def figure_of(timing: Timing, monkeypatch: pytest.MonkeyPatch) -> Figure:
@@ -40,7 +41,7 @@ def broken_off() -> Timing:
     [
         paced(steps=3000, hiccups=0),
         paced(steps=3000, hiccups=300, listed=100),
-        paced(steps=3000, components={rf"_$\no_formula_{k}$": 1e-6 for k in range(20)}),
+        slow(paced(steps=3000, components={rf"_$\no_formula_{k}$": 1e-6 for k in range(20)})),
         broken_off(),
     ],
     ids=["none", "unlisted", "many", "nothing"],
@@ -101,6 +102,7 @@ def test_without_overruns_it_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     assert [text.get_text() for text in below.texts] == ["no overruns"]
 
 
+@pytest.mark.slow
 def test_the_same_timing_gives_the_same_bytes(tmp_path: Path) -> None:
     for name in ("one.png", "two.png"):
         draw_timing(paced(steps=3000), 3.0, tmp_path / name)

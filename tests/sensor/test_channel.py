@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from proximity_sensor import (
@@ -26,8 +26,9 @@ from proximity_sensor import (
 from proximity_sensor.channel import Inputs, Params, State
 from scipy import signal
 from support.declared import Parameter, parameters
+from support.examples import examples
 
-QUICK = settings(deadline=None, derandomize=True, max_examples=60)
+QUICK = examples(60)
 
 GAPS = st.floats(0.0, 0.2)
 

@@ -6,12 +6,13 @@ from math import ceil
 from random import Random
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from proximity_sensor import clock
 from proximity_sensor.clock import Params
+from support.examples import examples
 
-QUICK = settings(deadline=None, derandomize=True, max_examples=100)
+QUICK = examples(100)
 
 
 def counted(p: Params, steps: list[float]) -> tuple[int, float]:

@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from proximity_sensor import converter
 from proximity_sensor.converter import Params
+from support.examples import examples
 
-QUICK = settings(deadline=None, derandomize=True, max_examples=200)
+QUICK = examples(200)
 
 CONVERTERS = st.builds(
     lambda bits, low, span: Params(True, bits, (low, low + span)),

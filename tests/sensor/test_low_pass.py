@@ -4,13 +4,14 @@ from math import pi, tan
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from proximity_sensor import low_pass
 from proximity_sensor.low_pass import Coefficients
 from scipy import signal
+from support.examples import examples
 
-QUICK = settings(deadline=None, derandomize=True, max_examples=100)
+QUICK = examples(100)
 
 PUBLISHED = low_pass.coefficients(500.0, 10_000.0)
 

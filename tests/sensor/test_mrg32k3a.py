@@ -1,13 +1,14 @@
 """MRG32k3a against its published numbers, and against itself in whole numbers of any size."""
 
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from proximity_sensor import mrg32k3a
 from proximity_sensor.mrg32k3a import JUMP_1, JUMP_2, Matrix, State
+from support.examples import examples
 
 M_1, M_2 = 2**32 - 209, 2**32 - 22853
-QUICK = settings(deadline=None, derandomize=True, max_examples=100)
+QUICK = examples(100)
 
 Whole = tuple[int, int, int]
 Square = tuple[Whole, Whole, Whole]

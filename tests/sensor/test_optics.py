@@ -3,15 +3,16 @@
 from math import exp, isnan, log, nan
 
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from proximity_sensor import optics
 from proximity_sensor.optics import Inputs, Params, State
 from support.declared import Parameter, parameters
+from support.examples import examples
 
 PARAMETERS = parameters(Params)
 
-QUICK = settings(deadline=None, derandomize=True, max_examples=100)
+QUICK = examples(100)
 
 GAPS = st.floats(0.0, 10.0)
 

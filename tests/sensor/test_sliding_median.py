@@ -4,12 +4,13 @@ from itertools import product
 from statistics import median
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from proximity_sensor import sliding_median
 from scipy.ndimage import median_filter
+from support.examples import examples
 
-QUICK = settings(deadline=None, derandomize=True, max_examples=300)
+QUICK = examples(300)
 
 VOLTS = st.floats(-1e3, 1e3)
 

@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from proximity_sensor import stripes
 from proximity_sensor.stripes import Params
+from support.examples import examples
 
-QUICK = settings(deadline=None, derandomize=True, max_examples=100)
+QUICK = examples(100)
 
 PATTERN = Params(True, ratio=0.5, period=0.02, phase=0.003, edge=0.002)
 

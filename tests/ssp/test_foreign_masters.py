@@ -107,6 +107,7 @@ def test_ecos_finds_the_same_contacts(jacobi: System, tmp_path: Path) -> None:
     check(gaps(ECOS, path, jacobi), jacobi)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not importlib.util.find_spec("libcosimpy"), reason="libcosimpy is missing")
 def test_libcosim_finds_the_same_contacts(jacobi: System, tmp_path: Path) -> None:
     path = tmp_path / "grasp.ssp"

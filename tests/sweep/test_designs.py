@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from grasp_cosim import InputError
 from grasp_cosim.sweep.design import KINDS, Design, Kind
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from support.examples import examples
 
 SAMPLED: list[Kind] = ["random", "latin-hypercube", "sobol", "saltelli"]
 
@@ -14,7 +15,7 @@ seeds = st.integers(0, 2**40)
 
 
 @given(st.sampled_from(SAMPLED), powers, seeds, st.integers(1, 5))
-@settings(deadline=None, max_examples=25)
+@examples(25)
 def test_points_are_in_the_unit_cube_and_the_same_again(
     kind: Kind, runs: int, seed: int, width: int
 ) -> None:
@@ -27,7 +28,7 @@ def test_points_are_in_the_unit_cube_and_the_same_again(
 
 
 @given(st.integers(1, 40), st.integers(1, 40), seeds)
-@settings(deadline=None, max_examples=30)
+@examples(30)
 def test_a_random_point_depends_on_seed_and_index_alone(a: int, b: int, seed: int) -> None:
     few, many = sorted((a, b))
     points = [Design("random", n, seed).points([None, None]) for n in (few, many)]

@@ -20,10 +20,11 @@ from grasp_cosim.system.parts import (
     Port,
 )
 from grasp_cosim.system.scenario import event_entry, fault_entry, read_events, read_faults
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from support.examples import examples
 
-QUICK = settings(deadline=None, derandomize=True, max_examples=60)
+QUICK = examples(60)
 GRASP = SYSTEM.read_text("utf-8")
 INTENSITY = Port("controller", "intensity[1]")
 

@@ -96,6 +96,7 @@ def test_with_noise_the_intervals_hold_it(grasp: System, recorded: Log) -> None:
         assert e.value == pytest.approx(TRUE[e.name], rel=0.1), e.name
 
 
+@pytest.mark.slow
 def test_friction_of_a_model_that_scipy_integrates_comes_back(grasp: System) -> None:
     log = scipy_log(TRUE, 0.0, 0.01)
     for e in identified(grasp, log).estimates:

@@ -75,6 +75,7 @@ def test_run_takes_the_preset_too(command: Run) -> None:
     assert values["friction.coulomb[2]"] == pytest.approx(1.34, abs=0.01)
 
 
+@pytest.mark.slow
 def test_a_setting_runs_in_every_case_and_once(grasp: System) -> None:
     setting = Setting(0.05, 1.0, 0.86)
     coarse = grasp.with_experiment(step=2e-3)

@@ -1,0 +1,13 @@
+"""How many examples a property is tried on: more where new ones are looked for."""
+
+from typing import Any
+
+from hypothesis import settings
+
+USUAL = 100
+"""Examples in the profile of `make test`, and the unit in which others count."""
+
+
+def examples(count: int = USUAL, **more: Any) -> settings:
+    """The settings of a test with `count` examples, as many times more as the profile has."""
+    return settings(max_examples=max(1, count * settings().max_examples // USUAL), **more)
