@@ -15,7 +15,8 @@ from types import ModuleType
 import pytest
 from grasp_cosim import System, cli
 from grasp_cosim.grasp.presets import SYSTEM
-from grasp_fmus import build as builder
+from grasp_fmus.build import SCRIPTS, build
+from grasp_fmus.fmu import build_fmu
 from hypothesis import settings
 from support.fmi2 import Fmu
 from support.packages import skip_where_it_cannot_run
@@ -64,7 +65,7 @@ def made_once(tmp_path_factory: pytest.TempPathFactory) -> MadeOnce:
 @pytest.fixture(scope="session")
 def fmus(made_once: MadeOnce) -> Path:
     """The folder with the freshly built FMUs."""
-    return made_once("fmus", builder.build)
+    return made_once("fmus", build)
 
 
 @pytest.fixture(scope="session")
@@ -128,7 +129,7 @@ def unpack_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> UnpackIn:
 def altered(tmp_path: Path) -> Altered:
     """Builds the FMU of a script with one place in one source file changed."""
 
-    def build(script: str, source: str, before: str, after: str) -> Path:
+    def build_altered(script: str, source: str, before: str, after: str) -> Path:
         package = source.partition("/")[0]
         sources = tmp_path / "sources"
         shutil.rmtree(sources, ignore_errors=True)
@@ -139,10 +140,10 @@ def altered(tmp_path: Path) -> Altered:
         assert text.count(before) == 1
         (sources / source).write_text(text.replace(before, after), "utf-8")
         with _imported_from(sources, package):
-            built = builder.build_fmu(builder.SCRIPTS / f"{script}.py", tmp_path / "altered")
+            built = build_fmu(SCRIPTS / f"{script}.py", tmp_path / "altered")
         return built.path
 
-    return build
+    return build_altered
 
 
 @contextmanager

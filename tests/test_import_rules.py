@@ -7,7 +7,8 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from grasp_fmus import build, proxy_build
+from grasp_fmus.build import SCRIPTS
+from grasp_fmus.packing import packages, with_imports
 from support.imports import (
     Import,
     calls,
@@ -138,13 +139,19 @@ def test_the_fmu_adapter_knows_no_physics_but_for_the_scripts() -> None:
 
 
 def test_what_is_packed_into_fmus_imports_the_standard_library_only() -> None:
-    packed = {Path(name).name for name in (*build.ADAPTER, *proxy_build.ADAPTER)}
+    scripts = {script.name: script.read_bytes() for script in SCRIPTS.glob("*.py")}
+    packed = with_imports({**scripts, "Proxy.py": b"from grasp_fmus import proxy\n"})
+    assert {"grasp_fmus/slave.py", "grasp_fmus/link/client.py"} < packed.keys()
+    ours = packages("grasp_fmus").keys()
     foreign = {
         (file, name)
-        for file, name in imports(ROOT / "fmus/grasp_fmus")
-        if file in packed and name not in sys.stdlib_module_names
+        for file, source in packed.items()
+        for node in ast.walk(ast.parse(source))
+        for name in imported(node)
+        if name.partition(".")[0] not in sys.stdlib_module_names | ours
     }
-    assert not foreign
+    assert foreign == {("gripper_plant/mujoco_box.py", "mujoco")}
+
 
 
 # ------------------------------------------------------------------ rooms of the orchestrator

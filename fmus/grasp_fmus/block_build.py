@@ -12,17 +12,18 @@ import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
 from functools import partial
-from importlib import metadata
 from math import inf, isfinite, isnan
 from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any
 
-from .build import HASH, IMPORT, SCRIPTS, Built, bound_library, members, package_files, write_fmu
+from .build import SCRIPTS
 from .cards import BEGIN, variable_tables
 from .contract import declared, unpacker, variables
-from .documentation import page
+from .fmu import HASH, write_fmu
+from .folder import Built
 from .model_description import Description
+from .packing import IMPORT, packages
 from .variable import Variable
 
 PARTS = ("Params", "Inputs", "State", "Outputs", "initial_state", "step", "outputs")
@@ -47,22 +48,18 @@ def build_block(file: Path, out: Path, bind_python: str | None = None) -> Built:
         if ours.lower() == name.lower():  # the same file on Windows
             raise ValueError(f"{file}: {ours}.fmu is one of the FMUs that come with this package")
     text, tree = _parsed(file)
-    packages = _packages(file, text, tree)
+    _check_imports(file, text, tree)
     with _run(file, tree) as block:
         summary, _, rest = inspect.cleandoc(block.__doc__ or "").partition("\n")
         if not summary:
             raise ValueError(f"{file}: must begin with a docstring; its first line says what it is")
         description = Description(name, summary.rstrip("."), _variables(file, block))
         card = f"{rest.strip()}\n\n{BEGIN}{variable_tables({name: block})}"
-    version, library = metadata.version("grasp-cosim"), bound_library(bind_python)
-    html = page(name, description.summary, card, version, library)
     sources = {
         f"{name}.py": _script(name, file.stem).encode(),
         f"{file.stem}_block.py": text.encode(),
     }
-    for package in (__package__, *packages):
-        sources |= package_files(package)
-    return write_fmu(members(description, html, None, sources, bind_python), out / f"{name}.fmu")
+    return write_fmu(out / f"{name}.fmu", description, card, sources, bind_python)
 
 
 def _script(name: str, stem: str) -> str:
@@ -87,11 +84,9 @@ def _parsed(file: Path) -> tuple[str, ast.Module]:
         raise ValueError(f"{file}:{line} is no Python: {error.args[0]}") from error
 
 
-def _packages(file: Path, text: str, tree: ast.Module) -> list[str]:
-    """The packages that the FMU must bring along; ValueError where a module could not be packed."""
-    ours = {p for s in SCRIPTS.glob("*.py") for p in IMPORT.findall(s.read_text("utf-8"))}
-    ours.discard(__package__)
-    found = set()
+def _check_imports(file: Path, text: str, tree: ast.Module) -> None:
+    """ValueError where a module that the block imports could not be packed."""
+    ours = packages(__package__).keys() - {__package__}
     renamed = {text.count("\n", 0, match.start()) + 1 for match in IMPORT.finditer(text)}
     for line, module, packable in _imports(tree, renamed):
         package = module.partition(".")[0]
@@ -107,8 +102,6 @@ def _packages(file: Path, text: str, tree: ast.Module) -> list[str]:
                 f"{file}: line {line}: {package} must be imported at the top level, with single "
                 f"spaces, as: from {package} import ..."
             )
-        found.add(package)
-    return sorted(found)
 
 
 def _imports(tree: ast.Module, renamed: set[int]) -> Iterator[tuple[int, str, bool]]:

@@ -1,10 +1,10 @@
-"""What differs between an FMU that was built before and one built now."""
+"""Says what differs between an FMU that was built before and one built now."""
 
+import io
 import re
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from xml.etree import ElementTree
 
 DESCRIPTION = "modelDescription.xml"
@@ -15,19 +15,19 @@ UNREADABLE = (OSError, EOFError, ValueError, RuntimeError, zipfile.BadZipFile, z
 _CONTENT_HASH = re.compile(rb"_[0-9a-f]{16}(?![0-9a-f])|guid=.[0-9a-f]{16}")
 
 
-def read_members(fmu: Path) -> dict[str, bytes]:
-    """The files in an FMU; empty where it is damaged or none."""
+def read_members(fmu: bytes) -> dict[str, bytes]:
+    """Return the files in an FMU by name; none where it is damaged or no FMU."""
     try:
-        with zipfile.ZipFile(fmu) as archive:
+        with zipfile.ZipFile(io.BytesIO(fmu)) as archive:
             return {name: archive.read(name) for name in archive.namelist()}
     except UNREADABLE:
         return {}
 
 
 def changes(before: Mapping[str, bytes], after: Mapping[str, bytes]) -> tuple[str, ...]:
-    """Variables and files that are not what they were, from the files in an FMU.
+    """Return a line for each variable and file that differs, from the files in an FMU.
 
-    One line each: what was added, removed, or changed, and for a variable what it was.
+    It says what was added, removed, or changed, and for a variable the value before.
     """
     try:
         variables = tuple(_variable_changes(before[DESCRIPTION], after[DESCRIPTION]))
@@ -49,7 +49,7 @@ def _variable_changes(before: bytes, after: bytes) -> Iterator[str]:
 
 
 def _attributes(description: bytes) -> dict[str, dict[str, str]]:
-    """The attributes of every variable, its type's among them."""
+    """Return the attributes of every variable by its name, its type's among them."""
     root = ElementTree.fromstring(description)  # noqa: S314 - of an FMU that was built here
     return {
         variable.get("name", ""): {
@@ -69,7 +69,7 @@ def _file_changes(before: Mapping[str, bytes], after: Mapping[str, bytes]) -> It
 
 
 def _plain(members: Mapping[str, bytes]) -> dict[str, bytes]:
-    """The files without content hashes in their names and texts, which change with everything."""
+    """Return the files without content hashes in names and texts: they change with everything."""
     return {
         _CONTENT_HASH.sub(b"", name.encode()).decode(): data
         if name.startswith("binaries/")

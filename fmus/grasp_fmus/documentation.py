@@ -1,82 +1,19 @@
-"""What an FMU holds for its reader: documentation/index.html, the licences, the icon."""
+"""Makes what an FMU holds for its reader: documentation/index.html, the licences, the icon."""
 
 from collections.abc import Sequence
 from html import escape
-from importlib import metadata
 from pathlib import Path
 from re import MULTILINE, sub
 from string import Template
 from typing import NamedTuple
 
-from markdown_it import MarkdownIt
-from markdown_it.renderer import RendererHTML
-from markdown_it.token import Token
-from markdown_it.utils import EnvType, OptionsDict
-
 from .cards import BEGIN
 
 ICONS = Path(__file__).parent / "icons"
-
-_PAGE = Template("""\
-<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8" />
-<meta name="viewport" content="width=device-width" />
-<title>$name</title>
-<style>
-:root { color-scheme: light dark; }
-body { max-width: 64em; margin: 2em auto; padding: 0 1em; }
-body { font-family: sans-serif; line-height: 1.5; }
-h2 { margin-top: 2em; padding-bottom: 0.2em; border-bottom: 1px solid #888; }
-pre { padding: 0.6em 1em; border-left: 4px solid #888; overflow: auto; line-height: 1.4; }
-table { border-collapse: collapse; }
-th, td { padding: 0.3em 0.7em; border: 1px solid #888; text-align: left; vertical-align: top; }
-td:first-child { white-space: nowrap; }
-</style>
-</head>
-<body>
-<h1>$name</h1>
-<p>$summary.</p>
-<p>FMI 2.0 for co-simulation, made by grasp-cosim $version.</p>
-$card
-<h2>How the host must find Python</h2>
-<p>This FMU runs Python code inside the binary of pythonfmu, in the process of the host: 64 bit, on
-Linux or Windows, Python 3.11 or newer. $packages</p>
-<table>
-<thead>
-<tr><th>host</th><th>what it needs</th></tr>
-</thead>
-<tbody>
-<tr><td>a Python process</td><td>nothing</td></tr>
-<tr><td>any other process on Linux</td><td>$linux</td></tr>
-<tr><td>any other process on Windows</td><td><code>python3.dll</code> and
-<code>python3x.dll</code>, say <code>python311.dll</code>, on the <code>PATH</code></td></tr>
-</tbody>
-</table>
-<p>The path of the folder that the host extracts the FMU to must be made of ASCII letters, digits,
-<code>_ . - ~</code> and spaces: any other character crashes pythonfmu's loader, and the host with
-it. A host that is not Python must have made its first instance before other threads make theirs.
-The GUID is not checked.</p>
-<p><code>grasp-cosim doctor $name.fmu</code> checks all of this on the host's machine and names the
-fix.</p>
-<h2>Errors</h2>
-<p>A refused call returns <code>fmi2Error</code> and has no effect. The reason is in the log even
-when debug logging is off: instance, time, variable, value and the allowed range. On Windows it
-returns <code>fmi2Fatal</code>, and the log needs debug logging.</p>
-<p>$steps</p>
-<h2>State</h2>
-<p>$states</p>
-<h2>Licence</h2>
-<p>MIT, <a href="licenses/license.txt">licenses/license.txt</a>. The binary comes from pythonfmu,
-MIT as well, <a href="licenses/pythonfmu.txt">licenses/pythonfmu.txt</a>.</p>
-</body>
-</html>
-""")
+TEMPLATE = Path(__file__).with_name("page.html.in")
 
 _LICENCES = {"license.txt": "grasp-cosim", "pythonfmu.txt": "pythonfmu"}
-"""Whose licence is in which file of documentation/licenses."""
-
+"""The distribution whose licence is in each file of documentation/licenses."""
 
 _ANY = """A libpython in the process: start the host with
 <code>LD_PRELOAD=libpython3.x.so.1.0</code>, say <code>libpython3.11.so.1.0</code>, or use an FMU
@@ -88,7 +25,7 @@ along, and knows where its standard library is. On another machine build it ther
 
 
 class Making(NamedTuple):
-    """What is said of an FMU by what it was made from: the command, steps and states, as HTML."""
+    """How an FMU was made: the command, and what to say of its steps and states, as HTML."""
 
     command: str
     steps: str
@@ -120,15 +57,15 @@ def page(
     making: Making = BLOCK,
     requires: Sequence[str] = (),
 ) -> str:
-    """documentation/index.html of the FMU name, from its card in Markdown.
+    """Return documentation/index.html of the FMU `name`, from its card in Markdown.
 
-    library is the libpython to which the FMU is bound, if it is; requires are the extras of
+    `library` is the libpython to which the FMU is bound, if it is; `requires` are the extras of
     grasp-cosim, each called as its package, that it needs in the host's Python.
 
     The page stands alone: links and pictures of the card point to nothing in an FMU and come out as
     their text, HTML in it as it is written. The result is XML as well.
     """
-    return _PAGE.substitute(
+    return Template(TEMPLATE.read_text("utf-8")).substitute(
         name=escape(name),
         summary=escape(summary.rstrip(".")),
         card=_rendered(card),
@@ -157,7 +94,7 @@ def _packages(requires: Sequence[str]) -> str:
 
 
 def licences() -> dict[str, bytes]:
-    """The files of documentation/licenses, read from the installed distributions.
+    """Return the files of documentation/licenses, from the installed distributions.
 
     FileNotFoundError if one is not installed, or has no licence.
     """
@@ -165,7 +102,7 @@ def licences() -> dict[str, bytes]:
 
 
 def icon(name: str) -> bytes:
-    """model.png of the FMU name; FileNotFoundError if there is none."""
+    """Return model.png of the FMU `name`; FileNotFoundError if there is none."""
     try:
         return (ICONS / f"{name}.png").read_bytes()
     except FileNotFoundError as error:
@@ -173,6 +110,8 @@ def icon(name: str) -> bytes:
 
 
 def _licence(distribution: str) -> bytes:
+    from importlib import metadata  # takes time to load
+
     try:
         text = metadata.distribution(distribution).read_text("licenses/LICENSE")
     except metadata.PackageNotFoundError:
@@ -185,27 +124,17 @@ def _licence(distribution: str) -> bytes:
 
 
 def _rendered(card: str) -> str:
-    """The card as HTML, a heading level down: the page has its own title."""
+    """Return the card as HTML, a heading level down: the page has its own title."""
+    from markdown_it import MarkdownIt  # takes time to load
+
     card = sub(r"^<!--.*-->$", "", card.replace(BEGIN, "## Variables\n\n"), flags=MULTILINE)
     markdown = MarkdownIt("commonmark", {"html": False, "xhtmlOut": True}).enable("table")
     for rule in ("link_open", "link_close"):
-        markdown.add_render_rule(rule, _nothing)
-    markdown.add_render_rule("image", _text)
+        markdown.add_render_rule(rule, lambda *_: "")
+    markdown.add_render_rule("image", lambda _, tokens, index, *__: escape(tokens[index].content))
     tokens = markdown.parse(card)
     for token in tokens:
         if token.type in ("heading_open", "heading_close"):
             token.tag = f"h{min(int(token.tag[1]) + 1, 6)}"
     html: str = markdown.renderer.render(tokens, markdown.options, {})
     return html
-
-
-def _nothing(
-    renderer: RendererHTML, tokens: Sequence[Token], index: int, options: OptionsDict, env: EnvType
-) -> str:
-    return ""
-
-
-def _text(
-    renderer: RendererHTML, tokens: Sequence[Token], index: int, options: OptionsDict, env: EnvType
-) -> str:
-    return escape(tokens[index].content)

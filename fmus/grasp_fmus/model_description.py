@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib import metadata
 from math import isfinite
 from typing import NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
@@ -87,9 +86,9 @@ def model_description(d: Description, guid: str) -> bytes:
         modelName=d.name,
         guid=guid,
         description=d.summary,
-        version=metadata.version("grasp-cosim"),
+        version=version(),
         license="MIT",
-        generationTool=f"grasp-cosim with pythonfmu {metadata.version('pythonfmu')}",
+        generationTool=f"grasp-cosim with pythonfmu {version('pythonfmu')}",
         variableNamingConvention="structured" if d.structured else "flat",
         numberOfEventIndicators="0",
     )
@@ -111,6 +110,13 @@ def model_description(d: Description, guid: str) -> bytes:
     indent(root)
     document: bytes = tostring(root, "UTF-8", xml_declaration=True)
     return document + b"\n"
+
+
+def version(distribution: str = "grasp-cosim") -> str:
+    """Return the version of an installed distribution."""
+    from importlib import metadata  # takes longer to load than all the rest
+
+    return metadata.version(distribution)
 
 
 def _literal(value: Scalar) -> str:

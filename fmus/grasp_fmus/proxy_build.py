@@ -3,22 +3,16 @@
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib import metadata
 from math import inf
 from pathlib import Path
 
-from .build import Built, bound_library, members, own_files, write_fmu
-from .documentation import PROXY, icon, page
+from .documentation import PROXY, icon
+from .fmu import write_fmu
+from .folder import Built
 from .host_log import ERROR, WARNING
 from .model_description import UNITS, Description, Experiment, Unit
 from .proxy import DEFAULTS, Settings, own_variables
 from .variable import TYPES, Variable
-
-ADAPTER = (
-    "__init__.py", "base.py", "connection.py", "host_log.py", "link/__init__.py", "link/client.py",
-    "link/message.py", "link/signature.py", "loader.py", "proxy.py", "variable.py",
-)  # fmt: skip
-"""What of this package runs inside a proxy."""
 
 CARD = Path(__file__).parent / "link" / "README.md"
 
@@ -70,17 +64,15 @@ def build_proxy(
             raise ValueError(
                 f"{v.name} = {v.start}{v.in_unit}: must be from {low:g} to {high:g}{v.in_unit}"
             )
-    description = _description(name, original, own)
-    html = page(
-        name,
-        description.summary,
+    return write_fmu(
+        target,
+        _description(name, original, own),
         _card(own),
-        metadata.version("grasp-cosim"),
-        bound_library(bind_python),
-        PROXY,
+        {f"{name}.py": _script(name, original, settings).encode()},
+        bind_python,
+        picture=icon("Proxy"),
+        making=PROXY,
     )
-    sources = {f"{name}.py": _script(name, original, settings).encode(), **own_files(ADAPTER)}
-    return write_fmu(members(description, html, icon("Proxy"), sources, bind_python), target)
 
 
 def _description(name: str, original: Original, own: Sequence[Variable]) -> Description:

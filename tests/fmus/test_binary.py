@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 from conftest import Altered
 from grasp_fmus.binary import bound, mended, preamble
-from grasp_fmus.build import BINARIES
+from grasp_fmus.fmu import BINARIES
 from support.fmi2 import DISCARD, ERROR, FATAL, OK, Fmu, Instance
 
 STOCK = (BINARIES / "linux64" / "libpythonfmu-export.so").read_bytes()

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from conftest import Run
 from grasp_fmus.block_build import build_block
-from grasp_fmus.build import Built
+from grasp_fmus.folder import Built
 from support.fmi2 import OK, Fmu, Instance
 
 LAG = '''"""A first-order lag.

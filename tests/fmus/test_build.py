@@ -8,8 +8,11 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from grasp_fmus import build as builder
-from grasp_fmus.build import Built
+from grasp_fmus import fmu
+from grasp_fmus.build import SCRIPTS, build
+from grasp_fmus.fmu import HASH, build_fmu
+from grasp_fmus.folder import STAMP, Built, is_current, sources_hash
+from grasp_fmus.packing import package_folder, packages
 
 NAMES = [
     "GraspController",
@@ -24,7 +27,11 @@ CHECKED = [name for name in NAMES if name != "GripperPlantMuJoCo"]
 """Those with cross-check files; of the other they would check the package that it needs."""
 
 FILES = sorted(
-    [*FMUS, *(f"{name}{end}" for name in CHECKED for end in ("_in.csv", "_ref.csv", "_ref.opt"))]
+    [
+        STAMP,
+        *FMUS,
+        *(f"{name}{end}" for name in CHECKED for end in ("_in.csv", "_ref.csv", "_ref.opt")),
+    ]
 )
 
 
@@ -42,8 +49,8 @@ def test_builds_the_fmus_with_their_cross_check_files(fmus: Path) -> None:
 
 def test_says_what_it_built(tmp_path: Path) -> None:
     folder = tmp_path / "not" / "there yet"
-    assert builder.build(folder) == [Built(folder / name, "new", ()) for name in FMUS]
-    assert builder.build(folder) == [Built(folder / name, "unchanged", ()) for name in FMUS]
+    assert build(folder) == [Built(folder / name, "new", ()) for name in FMUS]
+    assert build(folder) == [Built(folder / name, "unchanged", ()) for name in FMUS]
 
 
 @pytest.mark.slow
@@ -88,15 +95,109 @@ def test_no_place_is_left_where_the_hash_belongs(fmus: Path) -> None:
     for name in FMUS:
         with zipfile.ZipFile(fmus / name) as archive:
             for member in archive.namelist():
-                assert builder.HASH not in member
-                assert builder.HASH.encode() not in archive.read(member)
+                assert HASH not in member
+                assert HASH.encode() not in archive.read(member)
+
+
+def test_an_up_to_date_folder_costs_no_import_of_what_builds(fmus: Path, tmp_path: Path) -> None:
+    script = """if True:
+        import sys
+        from pathlib import Path
+        from grasp_fmus.build import build
+        print({built.status for built in build(Path(sys.argv[1]))})
+        print([n for n in sys.modules if n.startswith((
+            "grasp_fmus.", "pythonfmu", "markdown_it", "numpy", "zipfile", "importlib.metadata",
+            "gripper_plant", "block_variables",
+        ))])
+    """
+    done = subprocess.run(
+        [sys.executable, "-c", script, str(fmus)],
+        cwd=tmp_path, check=True, capture_output=True, text=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+    )  # fmt: skip
+    needed = ["grasp_fmus.packing", "grasp_fmus.folder", "grasp_fmus.build"]
+    assert done.stdout == f"{{'unchanged'}}\n{needed}\n"
+
+
+@pytest.mark.parametrize("data", [None, b"", b"{", b"[]", b'{"sources": 1}', b"{}"])
+def test_without_a_stamp_that_can_be_read_all_is_looked_at(
+    fmus: Path, tmp_path: Path, data: bytes | None
+) -> None:
+    for path in fmus.iterdir():
+        shutil.copy(path, tmp_path)
+    (tmp_path / "GripperPlant_ref.opt").write_bytes(b"altered")
+    (tmp_path / STAMP).unlink()
+    if data is not None:
+        (tmp_path / STAMP).write_bytes(data)
+    assert {built.status for built in build(tmp_path)} == {"unchanged"}
+    assert contents(tmp_path) == contents(fmus)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_whatever_is_altered_is_found(fmus: Path, tmp_path: Path, name: str) -> None:
+    """A bit of a file, with its size and its time kept."""
+    for path in fmus.iterdir():
+        shutil.copy2(path, tmp_path)
+    sources = sources_hash()
+    assert is_current(tmp_path, sources)
+    file = tmp_path / name
+    time, data = file.stat().st_mtime_ns, bytearray(file.read_bytes())
+    data[len(data) // 2] ^= 1
+    file.write_bytes(data)
+    os.utime(file, ns=(time, time))
+    assert not is_current(tmp_path, sources)
+    file.unlink()
+    assert not is_current(tmp_path, sources)
+
+
+SOURCES = (
+    "grasp_fmus/cross_check.py", "grasp_fmus/scripts/GripperPlant.py",
+    "grasp_fmus/icons/GripperPlant.png", "grasp_fmus/page.html.in", "gripper_plant/rigid.py",
+    "proximity_sensor/optics.py", "grasp_controller/series.py", "README.md",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", [*SOURCES, "grasp_fmus/scripts/New.py", "metadata", "binary"])
+def test_every_source_is_in_the_hash(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    """Of copies of the packages, and of the metadata and binaries of what is installed."""
+    for package in packages("grasp_fmus"):
+        original = package_folder(package)
+        shutil.copytree(original, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(package_folder("gripper_plant").parent / "README.md", tmp_path)
+    for found in ("pythonfmu", "pythonfmu-0.7.0.dist-info"):
+        shutil.copytree(package_folder("pythonfmu").parent / found, tmp_path / found)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    with monkeypatch.context() as m:
+        for module in [n for n in sys.modules if n.partition(".")[0] in packages("grasp_fmus")]:
+            if not module.startswith("grasp_fmus."):
+                m.delitem(sys.modules, module)
+        changed = tmp_path / {
+            "metadata": "pythonfmu-0.7.0.dist-info/METADATA",
+            "binary": "pythonfmu/resources/binaries/linux64/libpythonfmu-export.so",
+        }.get(name, name)
+        before = sources_hash()
+        assert sources_hash() == before
+        with changed.open("ab") as file:
+            file.write(b"\n")
+        assert sources_hash() != before
+
+
+def test_several_processes_at_once_leave_one_whole_folder(fmus: Path, tmp_path: Path) -> None:
+    script = "import sys, pathlib; from grasp_fmus.build import build; build(pathlib.Path('out'))"
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    command = [sys.executable, "-c", script]
+    builders = [subprocess.Popen(command, cwd=tmp_path, env=env) for _ in range(3)]
+    assert [process.wait() for process in builders] == [0, 0, 0]
+    assert contents(tmp_path / "out") == contents(fmus)
 
 
 def test_an_fmu_with_the_same_content_is_left_alone(fmus: Path, tmp_path: Path) -> None:
     for path in fmus.iterdir():
         shutil.copy(path, tmp_path)
     before = times(tmp_path)
-    builder.build(tmp_path)
+    build(tmp_path)
     assert times(tmp_path) == before
 
 
@@ -106,7 +207,7 @@ def test_a_damaged_fmu_is_built_again(fmus: Path, tmp_path: Path) -> None:
         shutil.copy(path, tmp_path)
     (tmp_path / "ProximitySensor.fmu").write_bytes(b"half of an archi")
     before = times(tmp_path)
-    statuses = [built.status for built in builder.build(tmp_path)]
+    statuses = [built.status for built in build(tmp_path)]
     assert statuses == [*(["unchanged"] * (len(FMUS) - 1)), "changed"]
     assert contents(tmp_path) == contents(fmus)
     after = times(tmp_path)
@@ -119,7 +220,7 @@ def test_cross_check_files_are_written_again_where_they_differ(fmus: Path, tmp_p
     (tmp_path / "GripperPlant_in.csv").unlink()
     (tmp_path / "GraspController_ref.csv").write_text("0\n")
     before = times(tmp_path)
-    assert {built.status for built in builder.build(tmp_path)} == {"unchanged"}
+    assert {built.status for built in build(tmp_path)} == {"unchanged"}
     assert contents(tmp_path) == contents(fmus)
     after = times(tmp_path)
     assert {n for n in FILES if before.get(n) != after[n]} == {
@@ -129,7 +230,7 @@ def test_cross_check_files_are_written_again_where_they_differ(fmus: Path, tmp_p
 
 
 def test_one_fmu_alone_is_built_without_cross_check_files(fmus: Path, tmp_path: Path) -> None:
-    builder.build_fmu(builder.SCRIPTS / "GripperPlant.py", tmp_path)
+    build_fmu(SCRIPTS / "GripperPlant.py", tmp_path)
     assert contents(tmp_path) == {"GripperPlant.fmu": (fmus / "GripperPlant.fmu").read_bytes()}
 
 
@@ -137,9 +238,9 @@ def test_a_build_that_fails_leaves_what_was_there(
     fmus: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     shutil.copy(fmus / "GripperPlant.fmu", tmp_path)
-    monkeypatch.setattr(builder, "icon", lambda name: (_ for _ in ()).throw(OSError("no icon")))
+    monkeypatch.setattr(fmu, "icon", lambda name: (_ for _ in ()).throw(OSError("no icon")))
     with pytest.raises(OSError, match="no icon"):
-        builder.build(tmp_path)
+        build(tmp_path)
     assert contents(tmp_path) == {"GripperPlant.fmu": (fmus / "GripperPlant.fmu").read_bytes()}
 
 
@@ -152,6 +253,6 @@ def test_an_fmu_with_one_damaged_file_is_built_again(fmus: Path, tmp_path: Path,
         entry = archive.getinfo(name)
     data[entry.header_offset + 30 + len(name) + entry.compress_size // 2] ^= 0xFF
     (tmp_path / "GripperPlant.fmu").write_bytes(data)
-    built = builder.build_fmu(builder.SCRIPTS / "GripperPlant.py", tmp_path)
+    built = build_fmu(SCRIPTS / "GripperPlant.py", tmp_path)
     assert built.status == "changed"
     assert contents(tmp_path) == {"GripperPlant.fmu": (fmus / "GripperPlant.fmu").read_bytes()}

@@ -8,7 +8,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
-from grasp_fmus.build import SCRIPTS, build_fmu
+from grasp_fmus.build import SCRIPTS
+from grasp_fmus.fmu import build_fmu
 from grasp_fmus.link.message import END, HELLO, INITIALISE, STEP
 from grasp_fmus.link.signature import Signature
 from grasp_fmus.model_description import Experiment

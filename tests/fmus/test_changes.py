@@ -8,13 +8,14 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from grasp_fmus import build as builder
-from grasp_fmus.build import Built
+from grasp_fmus.build import SCRIPTS
 from grasp_fmus.contract import declared
+from grasp_fmus.fmu import build_fmu
+from grasp_fmus.folder import Built
 from proximity_sensor import channel
 
 SENSOR = Path(__file__).parents[2] / "sensor"
-SCRIPT = builder.SCRIPTS / "ProximitySensor.py"
+SCRIPT = SCRIPTS / "ProximitySensor.py"
 OPTICS, CARD = "proximity_sensor/optics.py", "README.md"
 CLOCK = "proximity_sensor/clock.py"
 """Of the parameters the last."""
@@ -53,7 +54,7 @@ def build(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Build:
             for name in [m for m in sys.modules if m.partition(".")[0] == "proximity_sensor"]:
                 patch.delitem(sys.modules, name)
             patch.syspath_prepend(copy)
-            built = builder.build_fmu(SCRIPT, tmp_path / "out")
+            built = build_fmu(SCRIPT, tmp_path / "out")
             for name in [m for m in sys.modules if m.partition(".")[0] == "proximity_sensor"]:
                 del sys.modules[name]
         return built

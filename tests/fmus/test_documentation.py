@@ -10,8 +10,8 @@ from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import pytest
-from grasp_fmus import build as builder
 from grasp_fmus import documentation
+from grasp_fmus.build import SCRIPTS
 from grasp_fmus.contract import Field, declared
 from grasp_fmus.documentation import PROXY, icon, licences, page
 
@@ -92,7 +92,7 @@ def rendered(markdown: str) -> str:
 
 
 def test_every_fmu_has_a_card_here() -> None:
-    assert {script.stem for script in builder.SCRIPTS.glob("*.py")} == set(BLOCKS)
+    assert {script.stem for script in SCRIPTS.glob("*.py")} == set(BLOCKS)
 
 
 def test_the_page_is_well_formed_and_says_what_it_is(html: str, name: str) -> None:

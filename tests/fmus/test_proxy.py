@@ -275,7 +275,9 @@ def test_a_peer_without_the_key_is_not_listened_to(tmp_path: Path) -> None:
     key.write_bytes(b"0123456789abcdef")
     with connected(key_file="") as (_, peer):
         host = Host(peer.port, Clock(tick=40_000_000), key_file=str(key), connect_timeout=0.1)
-        assert "no answer from" in refused(host, host.slave.enter_initialization_mode)
+        line = refused(host, host.slave.enter_initialization_mode)
+        assert "no answer from" in line
+        assert "is the peer running there, and has it the same key? e.g." in line
         assert peer.failures.pop(0)  # it could not read what came
         peer.failures.clear()
 
@@ -633,6 +635,66 @@ def test_a_network_that_is_down_is_a_peer_that_is_silent(monkeypatch: pytest.Mon
             host.step()
         assert (host.state(), host.counts()) == (3, {"missed": 1, "consecutive_missed": 1})
         assert "no answer within 0.001 s (Network is unreachable)" in host.log()[0]
+
+
+@pytest.mark.parametrize("at", ["greeting", "initialising"])
+def test_a_network_that_is_down_at_the_start_is_named(
+    monkeypatch: pytest.MonkeyPatch, at: str
+) -> None:
+    with ScriptedPeer() as peer:
+        host = Host(peer.port, peer.clock, connect_timeout=0.1)
+        call: Any = host.slave.enter_initialization_mode
+        real = socket.socket
+        with monkeypatch.context() as m:
+            if at == "initialising":
+                call()
+                call = host.outputs
+                ours: Any = host.slave._connection
+                m.setattr(ours, "_socket", Down(ours._socket))
+            else:
+                m.setattr(socket, "socket", lambda *which: Down(real(*which)))
+            peer.clock.tick = 40_000_000
+            line = refused(host, call)
+        assert f":{peer.port} within 0.1 s (Network is unreachable): is the peer running" in line
+
+
+class Reporting(Down):
+    """A socket whose first sends report that nobody took an earlier datagram, and send nothing."""
+
+    def __init__(self, real: socket.socket, reports: int) -> None:
+        super().__init__(real)
+        self.reports = reports
+        self.sent: list[int] = []
+
+    def send(self, datagram: bytes) -> int:
+        self.sent.append(datagram[6])
+        if len(self.sent) <= self.reports:
+            raise OSError(errno.ECONNREFUSED, "Connection refused")
+        return self._real.send(datagram)
+
+
+def test_a_step_that_only_reported_an_earlier_datagram_is_sent_again() -> None:
+    """Once, as a report is of one datagram; the peer gets it once."""
+    with connected(misses_tolerated=0, timeout=2.0) as (host, peer):
+        ours: Any = host.slave._connection
+        ours._socket = reporting = Reporting(ours._socket, 1)
+        peer.clock.tick = 50_000_000  # so that it does not wait for ever in vain
+        host.step()
+        assert (host.state(), host.counts()) == (1, {})
+        assert reporting.sent == [STEP, STEP]
+        assert peer.kinds() == [HELLO, INITIALISE, STEP]
+
+
+def test_that_nobody_listens_is_no_trouble_of_the_network() -> None:
+    with connected(misses_tolerated=0, timeout=1e-3) as (host, peer):
+        ours: Any = host.slave._connection
+        ours._socket = reporting = Reporting(ours._socket, 2)
+        peer.clock.tick = 400_000
+        host.step()
+        assert reporting.sent == [STEP, STEP]
+        assert host.state() == 3
+        assert "no answer within 0.001 s; proxy.on_loss" in host.log()[0]
+        peer.clock.tick = 0
 
 
 # All of that in any order

@@ -14,7 +14,7 @@ from grasp_fmus.variable import Enumeration
 from grasp_fmus.variable import Variable as ProxyVariable
 
 from ...errors import InputError
-from ...files import check_folder
+from ...files import check_folder, write_text
 from ...hil.protocol import link_signature
 from ...inspection.inspection import inspect_fmu
 from ...interface.interface import Interface, Value, Variable, read_interface
@@ -70,8 +70,7 @@ def proxy(
     \b
     Example: grasp-cosim proxy fmus/build/GripperPlant.fmu -o GripperPlantProxy.fmu --timeout 0.001
     """
-    from grasp_fmus.build import write_file  # only here: its libraries take time to load
-    from grasp_fmus.c_header import c_header as header
+    from grasp_fmus.c_header import c_header as header  # only here: they take time to load
     from grasp_fmus.proxy_build import build_proxy
 
     _check_paths(fmu, out, c_header)
@@ -92,7 +91,7 @@ def proxy(
             known = {name: start for name, start in starts.items() if start is not None}
             said = {v.name: v.description for v in interface.variables}
             text = header(interface.identifier, signature, known, said)
-            write_file(c_header, text.encode())
+            write_text(c_header, text)
             lines.append(f"{c_header}: written")
             report["c_header"] = str(c_header)
     except ValueError as error:

@@ -1,0 +1,154 @@
+"""Makes an FMU: a script and what it imports, pythonfmu's binaries, description, documentation.
+
+Everything in an FMU follows from the sources, and the same sources give the same bytes. All Python
+FMUs of a process share one sys.modules, so every module is packed under a name that ends in a hash
+of the whole content; the GUID is that hash.
+"""
+
+import hashlib
+import io
+import re
+import sys
+import zipfile
+from collections.abc import Mapping, Sequence
+from functools import cache
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from typing import Any
+
+from .binary import bound, libpython, mended, preamble
+from .changes import changes, read_members
+from .contract import declared, variables
+from .documentation import BLOCK, Making, icon, licences, page
+from .folder import Built, file_hash, write_file
+from .model_description import Description, model_description, version
+from .packing import package_folder, with_imports
+
+BINARIES = package_folder("pythonfmu") / "resources" / "binaries"
+HASH = "CONTENT_HASH"
+"""Stands for the content hash until it is known."""
+
+_DATE = (1980, 1, 1, 0, 0, 0)
+
+
+def build_fmu(script: Path, out: Path, bind_python: str | None = None) -> Built:
+    """Build the FMU of one script into the folder `out`; the script's name is that of the FMU.
+
+    `bind_python` is as in build(). An FMU that is there with the same content is left alone.
+    """
+    slave = slave_class(script)
+    name = script.stem
+    description = Description(
+        name, (slave.__doc__ or "").rstrip("."), variables(declared(slave.block))
+    )
+    return write_fmu(
+        out / f"{name}.fmu",
+        description,
+        _card(slave.block),
+        {script.name: script.read_bytes()},
+        bind_python,
+        picture=icon(name),
+        requires=slave.requires,
+    )
+
+
+def write_fmu(
+    target: Path,
+    description: Description,
+    card: str,
+    sources: Mapping[str, bytes],
+    bind_python: str | None,
+    *,
+    picture: bytes | None = None,
+    making: Making = BLOCK,
+    requires: Sequence[str] = (),
+) -> Built:
+    """Write an FMU, unless it is there already with the same content.
+
+    `sources` are its script NAME.py and modules beside it; what they import is packed with them.
+    `card`, in Markdown, `making` and `requires` are for the documentation. `picture` is the icon.
+    """
+    name = description.name
+    library = libpython(bind_python) if bind_python else None
+    html = page(name, description.summary, card, version(), library, making, requires)
+    packed = with_imports(sources)
+    if bind_python:
+        packed[f"{name}.py"] = preamble(bind_python).encode() + packed[f"{name}.py"]
+    template = {
+        "modelDescription.xml": model_description(description, HASH),
+        **({"model.png": picture} if picture else {}),
+        "documentation/index.html": html.encode(),
+        **{f"documentation/licenses/{file}": text for file, text in licences().items()},
+        f"binaries/linux64/{name}.so": _linux_binary(bind_python),
+        f"binaries/win64/{name}.dll": (BINARIES / "win64/pythonfmu-export.dll").read_bytes(),
+        "resources/slavemodule.txt": f"{name}_{HASH}".encode(),
+        **_renamed(packed),
+    }
+    content = _content_hash(template)
+    files = {
+        name.replace(HASH, content): data.replace(HASH.encode(), content.encode())
+        for name, data in template.items()
+    }
+    there = target.read_bytes() if target.is_file() else None
+    before = read_members(there or b"")
+    if there is not None and before == files:
+        return Built(target, "unchanged", hash=file_hash(there))
+    data = _archive(files)
+    write_file(target, data)
+    if there is None:
+        return Built(target, "new", hash=file_hash(data))
+    return Built(target, "changed", changes(before, files), file_hash(data))
+
+
+def slave_class(script: Path) -> Any:
+    """Return the class in a script, which has the script's name."""
+    spec = spec_from_file_location(script.stem, script)
+    if spec is None or spec.loader is None:
+        raise ImportError(f"{script}: must be a Python file")
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return getattr(module, script.stem)
+
+
+def _renamed(sources: Mapping[str, bytes]) -> dict[str, bytes]:
+    """Return the sources as they stand in the FMU, all modules under names with HASH."""
+    packages = sorted({name.partition("/")[0] for name in sources if "/" in name})
+    imports = re.compile(rf"^from ({'|'.join(packages)})\b".encode(), re.MULTILINE)
+    packed = {}
+    for name, data in sources.items():
+        package, _, rest = name.partition("/")
+        place = f"{package}_{HASH}/{rest}" if rest else f"{Path(name).stem}_{HASH}.py"
+        packed[f"resources/{place}"] = imports.sub(rf"from \1_{HASH}".encode(), data)
+    return packed
+
+
+def _card(block: Any) -> str:
+    """Return the equation card of a block: in its package once installed, in the sources beside."""
+    folder = Path(sys.modules[block.__package__].__file__ or "").parent
+    inside = folder / "README.md"
+    return (inside if inside.exists() else folder.parent / "README.md").read_text("utf-8")
+
+
+@cache
+def _linux_binary(bind_python: str | None) -> bytes:
+    binary = mended((BINARIES / "linux64/libpythonfmu-export.so").read_bytes())
+    return bound(binary, bind_python) if bind_python else binary
+
+
+def _content_hash(members: Mapping[str, bytes]) -> str:
+    digest = hashlib.sha256()
+    for name, data in sorted(members.items()):
+        digest.update(f"{name}\0{len(data)}\0".encode() + data)
+    return digest.hexdigest()[:16]
+
+
+def _archive(members: Mapping[str, bytes]) -> bytes:
+    """A ZIP file with sorted entries and one date."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        for name, data in sorted(members.items()):
+            entry = zipfile.ZipInfo(name, _DATE)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.external_attr = 0o644 << 16
+            archive.writestr(entry, data)
+    return buffer.getvalue()

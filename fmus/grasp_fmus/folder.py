@@ -1,0 +1,108 @@
+"""The folder of built FMUs: its files, and a stamp that says whether they are up to date.
+
+The stamp is a file with one hash of all that decides what the FMUs hold, and the hash of each file
+as it was built. A changed source or version differs in the one, a file that was altered, damaged or
+removed in the other. That takes a few milliseconds, without importing what builds.
+"""
+
+import json
+import os
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from hashlib import sha256
+from pathlib import Path
+from typing import Literal
+
+from .packing import package_folder, packages
+
+STAMP = ".stamp.json"
+
+DISTRIBUTIONS = ("grasp_cosim", "markdown_it_py", "pythonfmu")
+"""Those whose version or licence is in an FMU, or that write a part of it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Built:
+    """An FMU in its folder, and how building it changed what was there."""
+
+    path: Path
+    status: Literal["new", "changed", "unchanged"]
+    changes: tuple[str, ...] = ()
+    """Files in the FMU, and attributes of its variables, that are not as they were."""
+    hash: str = field(default="", compare=False, repr=False)
+    """That of the file, for the stamp."""
+
+
+def write_file(target: Path, data: bytes) -> None:
+    """Write a file in one piece, with its folder, unless it has that content already.
+
+    OSError names the target.
+    """
+    if target.is_file() and target.read_bytes() == data:
+        return
+    target.parent.mkdir(parents=True, exist_ok=True)
+    part = target.with_name(f"{target.name}.{os.getpid()}.part")
+    try:
+        part.write_bytes(data)
+        part.replace(target)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(target)) from error
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def file_hash(data: bytes) -> str:
+    """Return the hash of a file's content."""
+    return sha256(data).hexdigest()
+
+
+def sources_hash() -> str:
+    """Return the hash of all that decides what the FMUs and the files beside them hold.
+
+    That is this package with its scripts and icons, the packages to pack with their cards,
+    pythonfmu's binaries, the metadata of the distributions, and the version of Python.
+    """
+    digest = sha256(sys.version.encode())
+    for name, file in _deciding():
+        data = file.read_bytes()
+        digest.update(f"\0{name}\0{len(data)}\0".encode() + data)
+    return digest.hexdigest()
+
+
+def is_current(folder: Path, sources: str) -> bool:
+    """Return True if the folder holds what was built there from sources with this hash."""
+    try:
+        stamp = json.loads((folder / STAMP).read_bytes())
+        return stamp["sources"] == sources and all(
+            file_hash((folder / name).read_bytes()) == was for name, was in stamp["files"].items()
+        )
+    except (OSError, ValueError, LookupError, TypeError, AttributeError):
+        return False  # there is none, or it is damaged, or a file is missing
+
+
+def write_stamp(folder: Path, sources: str, files: Mapping[str, str]) -> None:
+    """Write the stamp of files, hashes by name, that were built from sources with this hash."""
+    stamp = {"sources": sources, "files": dict(sorted(files.items()))}
+    write_file(folder / STAMP, json.dumps(stamp, indent=1).encode())
+
+
+def _deciding() -> Iterator[tuple[str, Path]]:
+    """Yield the files, each with a name that does not depend on where it is installed."""
+    for package, folder in packages(__package__).items():
+        yield from _below(folder, package)
+        if (card := folder.parent / "README.md").is_file():
+            yield f"{package}: card", card
+    yield from _below(package_folder("pythonfmu") / "resources" / "binaries", "pythonfmu")
+    for name in DISTRIBUTIONS:
+        for folder in (f for entry in sys.path for f in Path(entry).glob(f"{name}-*.dist-info")):
+            for file in ("METADATA", "licenses/LICENSE"):
+                if (folder / file).is_file():
+                    yield f"{folder.name}/{file}", folder / file
+
+
+def _below(folder: Path, name: str) -> Iterator[tuple[str, Path]]:
+    """Yield the files below a folder, but for what Python makes there."""
+    for file in sorted(folder.rglob("*")):
+        if file.is_file() and "__pycache__" not in file.parts:
+            yield f"{name}/{file.relative_to(folder).as_posix()}", file

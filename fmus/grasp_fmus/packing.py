@@ -1,0 +1,88 @@
+"""Finds what an FMU must bring along: the modules that its script imports, and those they import.
+
+Packages are packed that a module imports at its top level with `from PACKAGE import ...`, other
+than those of the standard library: only such an import can be given the name that the package has
+in the FMU.
+"""
+
+import ast
+import re
+import sys
+from collections.abc import Iterator, Mapping
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+
+IMPORT = re.compile(r"^from (\w+)(?=[\w.]* import\b)", re.MULTILINE)
+"""An import whose package is packed, unless it is of the standard library."""
+
+
+def with_imports(sources: Mapping[str, bytes]) -> dict[str, bytes]:
+    """Return `sources` and all modules they import, by path in the FMU without the content hash."""
+    found = dict(sources)
+    waiting = list(sources)
+    while waiting:
+        path = waiting.pop()
+        for module in _imported(path, found[path]):
+            for file in _files(module):
+                if file not in found:
+                    package, _, rest = file.partition("/")
+                    found[file] = (package_folder(package) / rest).read_bytes()
+                    waiting.append(file)
+    return found
+
+
+def packages(*roots: str) -> dict[str, Path]:
+    """Return the folders of these packages, and of those to pack that their modules import."""
+    found: dict[str, Path] = {}
+    waiting = [*roots]
+    while waiting:
+        package = waiting.pop()
+        found[package] = package_folder(package)
+        for file in found[package].rglob("*.py"):
+            imported = {*IMPORT.findall(file.read_text("utf-8"))} - sys.stdlib_module_names
+            waiting += imported - {*found, *waiting}
+    return dict(sorted(found.items()))
+
+
+def package_folder(package: str) -> Path:
+    """Return the folder of a package, which is not imported for that; ImportError without one."""
+    spec = find_spec(package)
+    if spec is None or spec.origin is None:
+        raise ImportError(f"{package}: no such package; must be installed")
+    return Path(spec.origin).parent
+
+
+def _imported(path: str, source: bytes) -> Iterator[str]:
+    """Yield the modules to pack that a source imports, and names in them that may be modules."""
+    *package, _ = path.split("/")
+    for node in _run(ast.parse(source, path)):
+        if not isinstance(node, ast.ImportFrom):
+            continue
+        above = package[: len(package) + 1 - node.level] if node.level else []
+        module = ".".join([*above, *filter(None, [node.module])])
+        if node.level or not (
+            node.col_offset or module.partition(".")[0] in sys.stdlib_module_names
+        ):
+            yield from (module, *(f"{module}.{alias.name}" for alias in node.names))
+
+
+def _run(tree: ast.AST) -> Iterator[ast.AST]:
+    """Yield all nodes but those that only a type checker looks at."""
+    for node in ast.iter_child_nodes(tree):
+        if not (isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"):
+            yield node
+            yield from _run(node)
+
+
+@cache
+def _files(module: str) -> tuple[str, ...]:
+    """Return the files that importing a module runs, by path; nothing for what is no module."""
+    package, *rest = module.split(".")
+    place = package_folder(package).joinpath(*rest)
+    above = [f"{'/'.join([package, *rest[:i]])}/__init__.py" for i in range(len(rest))]
+    if (place / "__init__.py").is_file():
+        return (*above, f"{module.replace('.', '/')}/__init__.py")
+    if place.with_suffix(".py").is_file():
+        return (*above, f"{module.replace('.', '/')}.py")
+    return ()
