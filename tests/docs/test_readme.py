@@ -1,4 +1,4 @@
-"""What the README tells a user to type works."""
+"""The README and the guide: what they tell a user to type works."""
 
 import re
 import shlex
@@ -13,10 +13,14 @@ from support.slow import slow
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text("utf-8")
-COMMANDS = re.findall(r"^    \.venv/bin/(grasp-cosim .*?)(?:\s+#.*)?$", README, re.MULTILINE)
-EXAMPLES = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+GUIDE = (ROOT / "docs/guide.md").read_text("utf-8")
+PAGES = f"{README}\n{GUIDE}"
+COMMANDS = sorted(
+    set(re.findall(r"^    \.venv/bin/(grasp-cosim .*?)(?:\s+#.*)?$", PAGES, re.MULTILINE))
+)
+METRICS, *EXAMPLES = re.findall(r"```python\n(.*?)```", PAGES, re.DOTALL)
 OUTPUTS = re.findall(r"```\n(\d+ steps of .*?)```", README, re.DOTALL)
-TABLES = re.findall(r"```toml\n(.*?)```", README, re.DOTALL)
+TABLES = re.findall(r"```toml\n(.*?)```", PAGES, re.DOTALL)
 
 
 @pytest.fixture(scope="session")
@@ -41,13 +45,14 @@ def user(checkout: Path, grasp: System, recorded: Path) -> Path:
     text = SYSTEM.read_text("utf-8").replace('fmu = "', 'fmu = "fmus/build/')
     (checkout / "my_system.toml").write_text(text, encoding="utf-8")
     write_ssp(grasp, checkout / "my_system.ssp")
+    (checkout / "my_metrics.py").write_text(METRICS, encoding="utf-8")
     for written in ("signals.csv", "run.json"):
         shutil.copy(recorded / written, _folder(checkout / "results"))
     return checkout
 
 
 def test_there_is_something_to_try() -> None:
-    assert len(COMMANDS) == 20
+    assert len(COMMANDS) == 21
     assert len(EXAMPLES) == 1
 
 
@@ -92,6 +97,20 @@ def test_the_scenario_runs(user: Path) -> None:
     assert [line.partition(": ")[0] for line in log] == ["t = 0.5 s", "t = 0.5 s", "t = 1 s"]
 
 
+def test_the_metric_of_the_readme(user: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["run", "--metrics", "my_metrics.py", "--step", "1e-3", "--stop", "2"]) == 0
+    (shown,) = (s for s in capsys.readouterr().out.splitlines() if s.startswith("closing time"))
+    assert 1.0 < float(shown.split()[2]) < 1.9
+
+
+def test_the_preset_of_the_guide(user: Path) -> None:
+    (preset,) = (table for table in TABLES if "[presets.dark]" in table)
+    path = user / "my_system.toml"
+    path.write_text(path.read_text("utf-8") + preset, encoding="utf-8")
+    system = System.load(path).with_presets("dark")
+    assert system.start("sensor_2.reflectance") == 0.3
+
+
 def test_the_keys_of_a_component_are_read(user: Path) -> None:
     (keys,) = (table for table in TABLES if "[components.plant]" in table)
     keys = keys.replace("GapRight", "gap[1]").replace("GapLeft", "gap[2]")
@@ -102,10 +121,12 @@ def test_the_keys_of_a_component_are_read(user: Path) -> None:
     assert (plant.step_ns, plant.isolation, len(plant.rename)) == (1_000_000, "process", 2)
 
 
-def test_pictures_exist() -> None:
-    pictures = re.findall(r"!\[.*?\]\((.*?)\)", README)
-    assert pictures
-    assert all((ROOT / picture).is_file() for picture in pictures)
+def test_pictures_and_links_exist() -> None:
+    for page in ("README.md", "docs/guide.md"):
+        text = (ROOT / page).read_text("utf-8")
+        linked = re.findall(r"\]\(([^)#]+?)(?:#[^)]*)?\)", text)
+        assert "](docs/contact_times.png)" in README
+        assert [link for link in linked if not (ROOT / page).parent.joinpath(link).exists()] == []
 
 
 @pytest.mark.parametrize("card", sorted(ROOT.glob("*/README.md")), ids=lambda p: p.parent.name)
