@@ -23,7 +23,7 @@ STEPS = 2000
 ROUNDS = 5
 KILLS = 200
 TOLERATED, TIMEOUT = 3, 0.02
-PEERS = Path(__file__).parent.parent / "tests/bench/peers.py"
+PEERS = Path(__file__).parent.parent / "tests/hil/peers.py"
 
 
 class Peers:

@@ -15,6 +15,7 @@ import os
 import sys
 import tempfile
 import time
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -25,24 +26,15 @@ STEP = 1e-4
 LONG = 1000.0
 """s of simulated time that no measurement reaches."""
 
-COMPONENTS = {
-    "plant": "GripperPlant",
-    "sensor_1": "ProximitySensor",
-    "sensor_2": "ProximitySensor",
-    "controller": "GraspController",
-}
-WIRES = (
-    ("plant", "gap[1]", "sensor_1", "gap"),
-    ("plant", "gap[2]", "sensor_2", "gap"),
-    ("plant", "position[1]", "controller", "position[1]"),
-    ("plant", "position[2]", "controller", "position[2]"),
-    ("plant", "velocity[1]", "controller", "velocity[1]"),
-    ("plant", "velocity[2]", "controller", "velocity[2]"),
-    ("sensor_1", "intensity", "controller", "intensity[1]"),
-    ("sensor_2", "intensity", "controller", "intensity[2]"),
-    ("controller", "force[1]", "plant", "force[1]"),
-    ("controller", "force[2]", "plant", "force[2]"),
+GRASP = tomllib.loads(
+    (Path(__file__).parent.parent / "orchestrator/grasp_cosim/grasp/grasp.toml").read_text("utf-8")
 )
+COMPONENTS = {name: Path(c["fmu"]).stem for name, c in GRASP["components"].items()}
+CONNECTIONS = [
+    (*source.split(".", 1), *target.split(".", 1))
+    for source, target in (text.split(" -> ") for text in GRASP["connections"])
+]
+"""The components by their models; source, output, target, input."""
 
 
 class Master(NamedTuple):
@@ -70,9 +62,9 @@ def variables(folder: Path) -> dict[str, list[Any]]:
 def ours(folder: Path, engine: str) -> Master:
     """grasp-cosim; every output in memory."""
     grasp_cosim = importlib.import_module("grasp_cosim")
-    grasp = importlib.import_module("grasp_cosim.grasp.system")
+    presets = importlib.import_module("grasp_cosim.grasp.presets")
     session = grasp_cosim.simulate.session(
-        grasp_cosim.System.load(grasp.SYSTEM, folder),
+        grasp_cosim.System.load(presets.SYSTEM, folder),
         step=STEP,
         stop=LONG,
         scheme="jacobi",
@@ -87,7 +79,7 @@ def ecospy(folder: Path) -> Master:
     structure = ecos.EcosSimulationStructure()
     for name, fmu in COMPONENTS.items():
         structure.add_model(name, str(folder / f"{fmu}.fmu"))
-    for source, output, target, given in WIRES:
+    for source, output, target, given in CONNECTIONS:
         structure.make_real_connection(f"{source}::{output}", f"{target}::{given}")
     simulation = ecos.EcosSimulation(structure=structure, step_size=STEP)
     table = os.path.join(tempfile.mkdtemp(dir=os.environ["TMPDIR"]), "ecospy.csv")  # noqa: PTH118
@@ -116,7 +108,7 @@ def libcosimpy(folder: Path) -> Master:
         name: {v.name: v.valueReference for v in read(file).modelVariables}
         for name, file in files.items()
     }
-    for source, output, target, given in WIRES:
+    for source, output, target, given in CONNECTIONS:
         execution.connect_real_variables(
             *(index[source], references[source][output]),
             *(index[target], references[target][given]),
@@ -186,7 +178,7 @@ def cofmupy(folder: Path) -> Master:
                     "source": {"id": source, "variable": output},
                     "target": {"id": target, "variable": given},
                 }
-                for source, output, target, given in WIRES
+                for source, output, target, given in CONNECTIONS
             ],
         }
     )

@@ -153,7 +153,6 @@ def test_what_is_packed_into_fmus_imports_the_standard_library_only() -> None:
     assert foreign == {("gripper_plant/mujoco_box.py", "mujoco")}
 
 
-
 # ------------------------------------------------------------------ rooms of the orchestrator
 
 FLOORS = (
