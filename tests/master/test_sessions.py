@@ -71,6 +71,7 @@ def test_an_interrupted_session_does_not_go_on(
         assert result["part.x"] == pytest.approx(2.0 * result.time, rel=1e-9)
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_an_interruption_of_which_an_fmu_makes_an_error_is_one_all_the_same(
     grasp: System, monkeypatch: pytest.MonkeyPatch
 ) -> None:
