@@ -15,11 +15,11 @@ from grasp_cosim.master import master, simulation
 from grasp_cosim.master.engine import Engine
 from grasp_cosim.recording.memory import MemoryListener
 from grasp_cosim.system.parts import Isolation
+from support.both_engines import engines
 from support.mocks import Mock, make_system
 from support.native_fmus import needs_gcc
 
 pytestmark = needs_gcc
-engines = pytest.mark.parametrize("engine", ["python", "auto"])
 
 
 @engines
