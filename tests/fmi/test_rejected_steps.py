@@ -7,11 +7,11 @@ from fmi.instances import KINDS, real
 from grasp_cosim import SimulationError, System, simulate
 from grasp_cosim.master.engine import Engine
 from grasp_cosim.system.parts import Component, Connection, Isolation
+from support.both_engines import engines
 from support.native_fmus import CAPABLE, EARLY, TYPES, build, needs_gcc
 
 pytestmark = needs_gcc
 both = pytest.mark.parametrize(("version", "isolation"), KINDS)
-engines = pytest.mark.parametrize("engine", ["python", "auto"])
 STARTS = {"Boolean": False, "String": "", "Enumeration": 1}
 
 

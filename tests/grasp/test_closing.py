@@ -40,6 +40,7 @@ def test_it_ends_at_the_stop_time_at_the_latest(quick: System) -> None:
     assert close(quick.with_experiment(stop=0.1), after=0.0).time[-1] == 0.1
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_ends_it_between_two_steps(quick: System, monkeypatch: pytest.MonkeyPatch) -> None:
     step = Session.step
     taken: list[bool] = []

@@ -375,6 +375,7 @@ def started(tmp_path: Path) -> Iterator[Callable[..., tuple[subprocess.Popen[str
         yield start
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_ends_it_with_counters_and_log(
     started: Callable[..., tuple[subprocess.Popen[str], Address]], tmp_path: Path
 ) -> None:

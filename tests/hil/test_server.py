@@ -122,6 +122,7 @@ def test_half_a_million_malformed_datagrams(fmus: Path, key: bytes | None) -> No
     assert grown < 500
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_the_command_serves_until_it_is_interrupted(fmus: Path) -> None:
     command = [sys.executable, "-m", "grasp_cosim", "serve", str(fmus / "ProximitySensor.fmu")]
     process = subprocess.Popen(

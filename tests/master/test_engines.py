@@ -1,7 +1,9 @@
 """The interpreted and the compiled loop give the same bits, the same errors, the same rows."""
 
 import math
-from collections.abc import Callable
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -11,8 +13,12 @@ import numpy as np
 import pytest
 from grasp_cosim import InputError, SimulationError, System, simulate
 from grasp_cosim.fmi import instance
-from grasp_cosim.master import compiled
+from grasp_cosim.fmi.instance import STEP_2, Call, Native
+from grasp_cosim.grasp.system import SYSTEM
+from grasp_cosim.master import compiled, loop
+from grasp_cosim.master import engine as engines
 from grasp_cosim.master.engine import Engine
+from grasp_cosim.master.plan import Plan
 from grasp_cosim.recording.result import Rejection, Result
 from grasp_cosim.system.parts import Connection, Port
 from support.cases import CASES
@@ -178,3 +184,78 @@ def test_a_value_that_is_not_finite_at_t_0_is_kept_too(
     assert caught.value.result.time.tolist() == [0.0]
     assert not caught.value.result.complete
     assert mock.calls[-1] == "close"
+
+
+def native(count: int) -> tuple[Call, ...]:
+    return tuple(Call(lambda: 0, Native(STEP_2, 0, 0)) for _ in range(count))
+
+
+def plan(calls: tuple[Call, ...], period: int = 1) -> Plan:
+    operations = tuple((loop.CALL, i, i + 1, period, 0) for i in range(len(calls)))
+    return Plan(
+        np.zeros(1), np.zeros(2), {}, operations, (), (), (), calls, (0,) * len(calls), []
+    )  # fmt: skip
+
+
+@pytest.fixture
+def fresh(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """As in a process that has not compiled anything and could not have saved anything."""
+    compiled.compiled_loop.cache_clear()
+    monkeypatch.setattr(engines, "_forgone", 0.0)
+    yield
+    compiled.compiled_loop.cache_clear()
+
+
+ENOUGH = round(engines.START_UP / (10 * engines.SAVED))
+"""The steps with 10 native calls that save what the start-up costs."""
+
+
+@pytest.mark.usefixtures("fresh")
+@pytest.mark.parametrize(
+    ("made", "steps", "pays"),
+    [
+        (plan(native(10)), ENOUGH - 1, False),
+        (plan(native(10)), ENOUGH + 1, True),
+        (plan(native(20)), ENOUGH // 2 + 1, True),
+        (plan(native(10), period=4), 4 * ENOUGH - 1, False),
+        (plan(native(10), period=4), 4 * ENOUGH + 4, True),
+        (plan((Call(lambda: 0),) * 10), 100 * ENOUGH, False),
+        (plan(native(1)), None, True),
+    ],
+)
+def test_auto_compiles_where_the_steps_save_more_than_the_start_up(
+    made: Plan, steps: int | None, pays: bool
+) -> None:
+    assert engines._pays(made, steps) is pays
+
+
+@pytest.mark.usefixtures("fresh")
+def test_auto_compiles_once_many_short_runs_of_a_process_would_have_saved_as_much() -> None:
+    made = plan(native(10))
+    assert [engines._pays(made, ENOUGH // 4 + 1) for _ in range(5)] == [False] * 3 + [True] * 2
+
+
+@pytest.mark.usefixtures("fresh")
+def test_what_is_compiled_already_is_taken_at_once() -> None:
+    assert not engines._pays(plan(native(1)), 1)
+    compiled.compiled_loop()
+    assert engines._pays(plan(native(1)), 1)
+
+
+def test_a_short_run_does_not_import_numba(fmus: Path) -> None:
+    """Of the built-in grasp 3 s are short; it is asked for them, and does 10 ms."""
+    code = (
+        "import sys; from pathlib import Path; from grasp_cosim import System, simulate\n"
+        "system = System.load(Path(sys.argv[1]), Path(sys.argv[2]))\n"
+        "with simulate.session(system, engine=sys.argv[3]) as session:\n"
+        "    assert session.step(100)\n"
+        "print(system.total_steps, 'numba' in sys.modules, 'llvmlite' in sys.modules)"
+    )
+    found = [
+        subprocess.run(
+            [sys.executable, "-c", code, str(SYSTEM), str(fmus), engine],
+            capture_output=True, check=True, text=True,
+        ).stdout
+        for engine in ("auto", "compiled")
+    ]  # fmt: skip
+    assert found == ["30000 False False\n", "30000 True True\n"]

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from grasp_cosim.master.faults import INITIAL, FaultFunction, Window, fault_functions
-from grasp_cosim.system.parts import Fault, FaultKind, Port
+from grasp_cosim.master.faults import FaultFunction, Window, fault_functions
+from grasp_cosim.system.faults import INITIAL
+from grasp_cosim.system.parts import Fault, Port
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
@@ -22,7 +23,7 @@ SIGNAL = np.sin(0.1 * np.arange(100)) + 1e-3 * np.arange(100)
 
 
 def fault(
-    kind: FaultKind,
+    kind: str,
     start: float = 0,
     end: float | None = None,
     *,

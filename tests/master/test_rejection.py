@@ -37,6 +37,19 @@ def test_a_step_that_gets_somewhere_is_gone_on_with(run: Make) -> None:
     assert made.master.rejections == {"a": Rejection(1, 0.1)}
 
 
+@pytest.mark.parametrize("beyond", [0.0, 1e-9, 0.15])
+def test_a_step_that_reached_its_end_or_more_is_done(
+    run: Make, beyond: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The next step begins at the end of it all the same."""
+    made = run(lambda begin, end: end if begin else end - 0.01)
+    (mock,) = made.master.instances
+    monkeypatch.setattr(mock, "last_successful_time", lambda: 0.1 + beyond)
+    made.to_the_end()
+    assert [begin for begin, _ in steps(made)] == pytest.approx([0.0, 0.1, 0.2])
+    assert made.master.rejections == {"a": Rejection(1, 0.0)}
+
+
 def test_a_step_that_gets_nowhere_is_halved(run: Make) -> None:
     """It takes no step longer than 0.03 s."""
     made = run(lambda begin, end: begin if end - begin > 0.03 else end)

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from grasp_cosim import InputError, Result, System, simulate
-from grasp_cosim.system.parts import Condition, Event, Fault, FaultKind, Port
+from grasp_cosim.system.parts import Condition, Event, Fault, Port
 
 Array = npt.NDArray[Any]
 
@@ -33,7 +33,7 @@ def run(system: System, stop: float = 0.3, **changes: Any) -> Result:
     return simulate(replace(system, **changes), step=STEP, stop=stop)
 
 
-def on_gap(kind: FaultKind, start: int = 0, end: int | None = None, **given: float) -> Fault:
+def on_gap(kind: str, start: int = 0, end: int | None = None, **given: float) -> Fault:
     """A fault of the connection to sensor 1, with a window in steps."""
     unit = round(STEP * 1e9)
     return Fault(GAP, kind, given, start * unit, None if end is None else end * unit)

@@ -15,11 +15,11 @@ from grasp_cosim.master import master, simulation
 from grasp_cosim.master.engine import Engine
 from grasp_cosim.recording.memory import MemoryListener
 from grasp_cosim.system.parts import Isolation
+from support.both_engines import engines
 from support.mocks import Mock, make_system
 from support.native_fmus import needs_gcc
 
 pytestmark = needs_gcc
-engines = pytest.mark.parametrize("engine", ["python", "auto"])
 
 
 @engines
@@ -71,6 +71,7 @@ def test_an_interrupted_session_does_not_go_on(
         assert result["part.x"] == pytest.approx(2.0 * result.time, rel=1e-9)
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_an_interruption_of_which_an_fmu_makes_an_error_is_one_all_the_same(
     grasp: System, monkeypatch: pytest.MonkeyPatch
 ) -> None:

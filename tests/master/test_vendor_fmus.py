@@ -2,13 +2,17 @@
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from grasp_cosim import InputError, System, simulate
+from grasp_cosim import InputError, SimulationError, System, simulate
 from grasp_cosim.interface.interface import limits, read_interface
+from grasp_cosim.master.engine import Engine
 from grasp_cosim.system.checks import connection_transform, remarks
+from grasp_cosim.system.parts import Event, Port
+from support.both_engines import engines
 from support.native_fmus import TYPES, build, needs_gcc
 
 pytestmark = needs_gcc
@@ -144,23 +148,48 @@ def test_a_declared_factor_overrides_the_units(tmp_path: Path) -> None:
 ALLOWED = [
     *((t, t) for t in TYPES["3.0"]),
     ("Int8", "Int64"), ("UInt8", "Int16"), ("UInt32", "Int64"), ("Int64", "Enumeration"),
-    ("Int64", "Float64"), ("UInt16", "Float32"), ("Float32", "Float64"), ("Float64", "Float32"),
+    ("Int64", "Float64"), ("UInt16", "Float32"), ("Int8", "Float32"),
+    ("UInt8", "Float32"), ("Int16", "Float32"), ("Float32", "Float64"), ("Float64", "Float32"),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize(("source", "target"), ALLOWED)
-@pytest.mark.parametrize("engine", ["python", "auto"])
+@engines
 def test_types_that_may_be_connected_pass_their_values(
-    tmp_path: Path, source: str, target: str, engine: str
+    tmp_path: Path, source: str, target: str, engine: Engine
 ) -> None:
     value = STARTS.get(source, "5")
     value = {"false": "true", "''": "'text'"}.get(value, value)
     system = pair(tmp_path, connected(source, target), given=f"u_{source} = {value}")
-    result = simulate(system, engine=engine)  # type: ignore[arg-type]
+    result = simulate(system, engine=engine)
     if source != "String":
         assert result[f"b.y_{target}"].tolist() == [1.0 if source in STARTS else 5.0] * 11
     rounded = (source, target) == ("Float64", "Float32")
     assert ("rounded to 7 digits" in "; ".join(remarks(system))) is rounded
+
+
+@engines
+@pytest.mark.parametrize(("source", "least"), [("Int8", -(2**7)), ("Int16", -(2**15))])
+def test_a_float32_takes_every_small_integer(
+    tmp_path: Path, source: str, least: int, engine: Engine
+) -> None:
+    system = pair(tmp_path, connected(source, "Float32"), given=f"u_{source} = {least}")
+    assert simulate(system, engine=engine)["b.y_Float32"].tolist() == [least] * 11
+
+
+@engines
+@pytest.mark.parametrize(("source", "value"), [("Int64", -(2**53)), ("UInt64", 2**63)])
+def test_an_integer_that_gets_too_long_on_the_way_ends_the_run(
+    tmp_path: Path, source: str, value: int, engine: Engine
+) -> None:
+    """The event acts on the step from 0.5 s on, the sixth."""
+    system = pair(tmp_path, connected(source, source), given=f"u_{source} = 7")
+    event = Event({Port("a", f"u_{source}"): value}, at_ns=500_000_000)
+    message = rf"^a\.y_{source} = {value} at step 6: must be smaller than 2\*\*53 in magnitude, "
+    with pytest.raises(SimulationError, match=message) as caught:
+        simulate(replace(system, events=(event,)), engine=engine)
+    assert caught.value.result is not None
+    assert caught.value.result[f"a.y_{source}"].tolist() == [7] * 6
 
 
 REFUSED = [

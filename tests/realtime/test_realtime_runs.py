@@ -137,6 +137,7 @@ def test_what_is_refused_is_said_and_the_run_goes_on(
     assert caplog.messages == [refused]
 
 
+@pytest.mark.usefixtures("ctrl_c")
 @pytest.mark.parametrize("engine", ["python", "auto"])
 def test_ctrl_c_does_not_wait_for_the_next_step(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, engine: Engine

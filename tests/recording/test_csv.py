@@ -1,10 +1,14 @@
 """Writes CSV as the FMI cross-check has it, while the run goes on."""
 
 import csv
+import errno
 import math
+import os
 import struct
+from io import FileIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 import pytest
@@ -118,6 +122,31 @@ def test_a_full_disk_leaves_whole_lines(tmp_path: Path) -> None:
     assert last == ""
     assert {line.count(",") for line in lines} == {3}
     assert 500 < len(lines) < 3000
+
+
+class Broken(FileIO):
+    """A file on a disk that fails within the second text; it writes the half of it."""
+
+    writes = 0
+
+    def write(self, data: Any) -> int:
+        self.writes += 1
+        if self.writes < 3:
+            return super().write(data if self.writes < 2 else data[: len(data) // 2])
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+
+def test_a_broken_disk_leaves_whole_lines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("grasp_cosim.recording.csv.FileIO", Broken)
+    listener = CsvListener(tmp_path / "s.csv")
+    listener.begin(SYSTEM, SIGNALS)
+    with pytest.raises(SimulationError, match=r"^.*s.csv: cannot be written: Input/output error$"):
+        listener.block(np.arange(500), rows(500))
+    (part,) = tmp_path.iterdir()
+    (names,) = part.read_text().splitlines(keepends=True)
+    assert names.endswith('"\n')
+    listener.end(False)
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_place_that_cannot_be_written_is_a_wrong_input(tmp_path: Path) -> None:

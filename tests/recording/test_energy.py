@@ -303,3 +303,16 @@ def test_forces_are_taken_in_their_declared_unit(
 
     monkeypatch.setattr(parts, "read_interface", declared)
     assert [b.scale for b in bonds(grasp)] == scales
+
+
+@pytest.mark.parametrize("name", ["force[1]", "position[1]"])
+def test_an_array_makes_no_bond(name: str, grasp: System, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As FMI 3.0 has them, with a dimension: arrays are not recorded."""
+
+    def declared(path: Path) -> Interface:
+        found = read_interface(path)
+        variables = tuple(replace(v, shape=(3,)) if v.name == name else v for v in found.variables)
+        return replace(found, variables=variables)
+
+    monkeypatch.setattr(parts, "read_interface", declared)
+    assert [b.index for b in bonds(grasp)] == [2]

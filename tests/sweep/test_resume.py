@@ -97,6 +97,7 @@ def test_killed_at_any_moment_it_goes_on(tmp_path: Path) -> None:
     assert whole.read_bytes() == resumed.read_bytes()
 
 
+@pytest.mark.usefixtures("ctrl_c")
 @pytest.mark.parametrize("group", [True, False])
 def test_ctrl_c_keeps_what_is_done(tmp_path: Path, group: bool) -> None:
     native_study(write_native(tmp_path), study_of(ENDLESS))

@@ -10,6 +10,8 @@ from grasp_cosim import InputError, System
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.interface.interface import Interface, Kind, Variable
 from grasp_cosim.system import parts
+from grasp_cosim.system.faults import FAULTS as KINDS
+from grasp_cosim.system.faults import RANDOM
 from grasp_cosim.system.parts import (
     Component,
     Condition,
@@ -300,10 +302,19 @@ ANY: dict[str, dict[str, float]] = {
 }
 
 
+def test_the_readme_has_a_row_for_each_kind_of_fault() -> None:
+    """A new kind touches faults.py and that row."""
+    text = (Path(__file__).parents[2] / "orchestrator/README.md").read_text("utf-8")
+    table = text.split("| kind | makes of a value | parameters |\n|---|---|---|\n")[1]
+    rows = [f"| {name} | {kind.makes} | {kind.takes} |" for name, kind in KINDS.items()]
+    assert table.split("\n\n")[0].splitlines() == rows
+    assert ANY.keys() == KINDS.keys()
+
+
 @pytest.mark.parametrize("fault", ANY)
 @pytest.mark.parametrize("kind", ["Real", "Integer", "Boolean"])
 def test_numbers_that_are_not_real_can_be_stuck_lost_and_late(
-    monkeypatch: pytest.MonkeyPatch, kind: Kind, fault: parts.FaultKind
+    monkeypatch: pytest.MonkeyPatch, kind: Kind, fault: str
 ) -> None:
     monkeypatch.setattr(parts, "read_interface", mock_interface)
     faults = (Fault(Port("b", "u"), fault, ANY[fault]),)
@@ -362,7 +373,7 @@ FAULT_LISTS = st.lists(
             st.just(ANY[kind]),
             TIMES,
             st.none() | st.integers(1, 10**15),
-            st.integers(0, 2**64) if kind in parts.RANDOM else st.just(0),
+            st.integers(0, 2**64) if kind in RANDOM else st.just(0),
             st.none() | CONDITIONS,
         )
     )

@@ -9,6 +9,7 @@ import hashlib
 import os
 from collections.abc import Callable, Sequence
 from functools import lru_cache
+from inspect import Parameter, Signature
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -30,19 +31,21 @@ from ..fmi.instance import (
 )
 from . import loop
 
-CODES = (
-    "float32",
-    "int8",
-    "uint8",
-    "int16",
-    "uint16",
-    "int32",
-    "uint32",
-    "int64",
-    "uint64",
-    "bool",
-)
-"""Element types of buffers, in the order of their codes."""
+_WHOLE = [f"{sign}int{bits}" for bits in (8, 16, 32, 64) for sign in ("", "u")]
+ELEMENTS = {name: code for code, name in enumerate(["float32", "boolean", *_WHOLE])}
+"""The element types of buffers, as numba names them, and their codes."""
+
+ARGUMENTS = {
+    PYTHON: "",
+    CLOCK: "iw",
+    TRANSFER_2: "wwww",
+    TRANSFER_3: "wwwww",
+    STEP_2: "wddi",
+    STEP_3: "wddbwwww",
+}
+"""The arguments of C functions by the shape of their calls, a letter each: w is a word or an
+address, d a double, i an int, b a byte.
+"""
 
 
 class CallTable(NamedTuple):
@@ -54,17 +57,16 @@ class CallTable(NamedTuple):
     references: npt.NDArray[np.int64]
     size: npt.NDArray[np.int64]
     data: npt.NDArray[np.int64]
+    step: npt.NDArray[np.float64]
     flags: npt.NDArray[np.int64]
     last: npt.NDArray[np.int64]
-    step: npt.NDArray[np.float64]
 
 
 class BufferTable(NamedTuple):
-    """Buffers of other types than float64: code of the type, address, size of an element."""
+    """Buffers of other types than float64: codes of their types, and addresses."""
 
     code: npt.NDArray[np.int64]
     address: npt.NDArray[np.int64]
-    size: npt.NDArray[np.int64]
 
 
 class Calls:
@@ -82,23 +84,25 @@ class Calls:
         self.table = CallTable(*columns)
 
     def _python(self, function: Callable[[], int]) -> Native:
-        callback = ctypes.PYFUNCTYPE(ctypes.c_int)(function)
-        self._callbacks.append(callback)
-        return Native(PYTHON, ctypes.cast(callback, ctypes.c_void_p).value or 0, 0)
+        self._callbacks.append(ctypes.PYFUNCTYPE(ctypes.c_int)(function))
+        return Native(PYTHON, ctypes.cast(self._callbacks[-1], ctypes.c_void_p).value or 0, 0)
 
 
 def buffer_table(buffers: Sequence[npt.NDArray[Any]]) -> BufferTable:
-    """The table of the given buffers, which must outlive it."""
+    """Return the table of the given buffers, which must outlive it."""
+    names = [b.dtype.name.replace("bool", "boolean") for b in buffers]
     return BufferTable(
-        np.array([CODES.index(b.dtype.name) for b in buffers], np.int64),
+        np.array([ELEMENTS[name] for name in names], np.int64),
         np.array([b.ctypes.data for b in buffers], np.int64),
-        np.array([b.itemsize for b in buffers], np.int64),
     )
 
 
 @lru_cache(maxsize=1)
 def compiled_loop() -> Callable[..., tuple[int, int, int]]:
-    """loop.run() compiled; InputError without numba. What is compiled is kept in a cache folder."""
+    """Return loop.run() compiled. What is compiled is kept in a cache folder.
+
+    InputError without numba.
+    """
     try:
         import numba
     except ImportError as error:
@@ -106,7 +110,8 @@ def compiled_loop() -> Callable[..., tuple[int, int, int]]:
             "numba is not installed, it compiles the loop; "
             "install it with: pip install 'grasp-cosim[fast]'"
         ) from error
-    _register()
+    _register_invoke()
+    _register_buffers()
     before = numba.config.CACHE_DIR
     try:
         numba.config.CACHE_DIR = str(_cache())
@@ -118,76 +123,70 @@ def compiled_loop() -> Callable[..., tuple[int, int, int]]:
 
 
 def _cache() -> Path:
-    """A folder for this very source: numba looks for changes in loop.py only."""
+    """Return a folder for this very source: numba looks for changes in loop.py only."""
     files = (__file__, loop.__file__, instance.__file__)  # with all constants that are compiled in
     sources = b"".join(Path(f).read_bytes() for f in files)
     base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(base, "grasp-cosim", hashlib.sha256(sources).hexdigest()[:16])
 
 
-def _register() -> None:
-    """Teach numba invoke(), load() and store()."""
+def _intrinsic(names: str, result: str, generate: Callable[..., Any]) -> Any:
+    """Return a function of compiled code whose body is what `generate` builds.
+
+    `names` are those of its arguments, all of type int64 but for d... of float64; `result` is the
+    numba type that it returns. `generate` takes numba's context, the builder and the arguments.
+    """
+    from numba import types
+    from numba.extending import intrinsic
+
+    def typed(typing: Any, *given: Any) -> Any:
+        taken = [types.float64 if n[0] == "d" else types.int64 for n in names.split()]
+        made = getattr(types, result)(*taken)
+        return made, lambda context, builder, _, values: generate(context, builder, *values)
+
+    typed.__signature__ = Signature(  # type: ignore[attr-defined]
+        [Parameter(n, Parameter.POSITIONAL_ONLY) for n in ["typing", *names.split()]]
+    )
+    return intrinsic(typed)
+
+
+def _c_function(arguments: str) -> Any:
+    """Return an intrinsic that calls the C function at an address: see ARGUMENTS."""
     from llvmlite import ir
-    from numba import carray, types
-    from numba.core import cgutils
-    from numba.extending import intrinsic, overload
 
-    word, double, status, byte = ir.IntType(64), ir.DoubleType(), ir.IntType(32), ir.IntType(8)
+    word, status = ir.IntType(64), ir.IntType(32)
+    kinds = {"w": word, "d": ir.DoubleType(), "i": status, "b": ir.IntType(8)}
+    declared = [kinds[a] for a in arguments]
 
-    def function(result: Any, *arguments: Any) -> Any:
-        """An intrinsic that calls the C function at an address with arguments of these types."""
-        numba_types = [types.float64 if a is double else types.int64 for a in arguments]
+    def generate(context: Any, builder: Any, address: Any, *given: Any) -> Any:
+        pointer = ir.FunctionType(status, declared).as_pointer()
+        passed = [
+            builder.trunc(value, kinds[a]) if a in "ib" else value
+            for a, value in zip(arguments, given, strict=True)
+        ]
+        return builder.call(builder.inttoptr(address, pointer), passed)
 
-        def typed(context: Any, address: Any, *given: Any) -> Any:
-            def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-                pointer = ir.FunctionType(result, arguments).as_pointer()
-                passed = [
-                    builder.trunc(v, a) if isinstance(a, ir.IntType) and a.width < 64 else v
-                    for v, a in zip(values[1:], arguments, strict=True)
-                ]
-                return builder.call(builder.inttoptr(values[0], pointer), passed)
+    names = [f"{'d' if a == 'd' else 'w'}{i}" for i, a in enumerate(arguments)]
+    return _intrinsic(" ".join(["address", *names]), "int32", generate)
 
-            return types.int32(types.int64, *numba_types), generate
 
-        return typed
+def _register_invoke() -> None:
+    """Teach numba invoke(): a call by its shape."""
+    from numba import carray
+    from numba.core import types
+    from numba.extending import overload
 
-    none, clock_gettime = function(status), function(status, status, word)
-    transfer_2, transfer_3 = function(status, *[word] * 4), function(status, *[word] * 5)
-    step_2 = function(status, word, double, double, status)
-    step_3 = function(status, word, double, double, byte, word, word, word, word)
-
-    @intrinsic
-    def call_python(typing: Any, f: Any) -> Any:
-        return none(typing, f)
-
-    @intrinsic
-    def call_clock(typing: Any, f: Any, a: Any, b: Any) -> Any:
-        return clock_gettime(typing, f, a, b)
-
-    @intrinsic
-    def call_transfer_2(typing: Any, f: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
-        return transfer_2(typing, f, a, b, c, d)
-
-    @intrinsic
-    def call_transfer_3(typing: Any, f: Any, a: Any, b: Any, c: Any, d: Any, e: Any) -> Any:
-        return transfer_3(typing, f, a, b, c, d, e)
-
-    @intrinsic
-    def call_step_2(typing: Any, f: Any, a: Any, t: Any, h: Any, b: Any) -> Any:
-        return step_2(typing, f, a, t, h, b)
-
-    @intrinsic
-    def call_step_3(
-        typing: Any, f: Any, a: Any, t: Any, h: Any, b: Any, c: Any, d: Any, e: Any, g: Any
-    ) -> Any:
-        return step_3(typing, f, a, t, h, b, c, d, e, g)
-
-    @intrinsic
-    def pointer(typing: Any, address: Any, like: Any) -> Any:
-        def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-            return builder.inttoptr(values[0], cgutils.voidptr_t)
-
-        return types.voidptr(types.int64, like), generate
+    call_python, call_clock, transfer_2, transfer_3, step_2, step_3 = (
+        _c_function(ARGUMENTS[shape])
+        for shape in (PYTHON, CLOCK, TRANSFER_2, TRANSFER_3, STEP_2, STEP_3)
+    )
+    pointer = _intrinsic(
+        "address",
+        "voidptr",
+        lambda context, builder, address: builder.inttoptr(
+            address, context.get_value_type(types.voidptr)
+        ),
+    )
 
     @overload(loop.invoke)
     def invoke(calls: Any, i: Any, clock: Any) -> Any:
@@ -195,79 +194,69 @@ def _register() -> None:
             shape, f, instance = calls.shape[i], calls.function[i], calls.instance[i]
             refs, size, data = calls.references[i], calls.size[i], calls.data[i]
             if shape == TRANSFER_2:
-                return call_transfer_2(f, instance, refs, size, data)
+                return transfer_2(f, instance, refs, size, data)
             if shape == STEP_2:
-                return call_step_2(f, instance, clock[0], calls.step[i], 1)
+                return step_2(f, instance, clock[0], calls.step[i], 1)
             if shape == TRANSFER_3:
-                return call_transfer_3(f, instance, refs, size, data, size)
+                return transfer_3(f, instance, refs, size, data, size)
             if shape == STEP_3:
-                flags = calls.flags[i]
-                status = call_step_3(
-                    f, instance, clock[0], calls.step[i], 1, flags, flags + 1, flags + 2,
-                    calls.last[i],
-                )  # fmt: skip
-                said = carray(pointer(flags, 0), 3, np.uint8)
+                flags, last = calls.flags[i], calls.last[i]
+                time, step = clock[0], calls.step[i]
+                status = step_3(f, instance, time, step, 1, flags, flags + 1, flags + 2, last)
+                said = carray(pointer(flags), 3, np.uint8)
                 return EARLY if status <= loop.WORST and (said[1] or said[2]) else status
             if shape == CLOCK:
                 status = call_clock(f, instance, refs)
-                now = carray(pointer(refs, 0), 2, np.int64)
-                carray(pointer(data, 0), 1, np.float64)[0] = now[0] * 1_000_000_000 + now[1] - size
+                now = carray(pointer(refs), 2, np.int64)
+                carray(pointer(data), 1, np.float64)[0] = now[0] * 1_000_000_000 + now[1] - size
                 return status
             return call_python(f)
 
         return compiled
 
+
+def _register_buffers() -> None:
+    """Teach numba load() and store(): by the code of the element type, the same for each."""
+    from numba import types
+    from numba.core import cgutils
+    from numba.extending import overload
+
+    def elements(context: Any, builder: Any, code: Any, address: Any, index: Any) -> Any:
+        """Build, for the type of each code, what follows where it is that of the buffer."""
+        for name, number in ELEMENTS.items():
+            element = getattr(types, name)
+            with builder.if_then(builder.icmp_signed("==", code, code.type(number))):
+                start = builder.inttoptr(address, context.get_data_type(element).as_pointer())
+                yield element, builder.gep(start, [index])
+
+    def generate_load(context: Any, builder: Any, code: Any, address: Any, index: Any) -> Any:
+        result = cgutils.alloca_once(builder, context.get_value_type(types.float64))
+        for element, place in elements(context, builder, code, address, index):
+            found = context.unpack_value(builder, element, place)  # a byte but 0 is true, as in C
+            builder.store(context.cast(builder, found, element, types.float64), result)
+        return builder.load(result)
+
+    def generate_store(
+        context: Any, builder: Any, code: Any, address: Any, index: Any, value: Any
+    ) -> Any:
+        for element, place in elements(context, builder, code, address, index):
+            cast = context.cast(builder, value, types.float64, element)
+            context.pack_value(builder, element, cast, place)
+        return context.get_dummy_value()
+
+    load_element = _intrinsic("code address index", "float64", generate_load)
+    store_element = _intrinsic("code address index double", "void", generate_store)
+
     @overload(loop.load)
     def load(buffers: Any, i: Any, index: Any) -> Any:
         def compiled(buffers: Any, i: Any, index: Any) -> Any:
-            code = buffers.code[i]
-            at = pointer(buffers.address[i] + index * buffers.size[i], 0)
-            if code == 0:
-                return np.float64(carray(at, 1, np.float32)[0])
-            if code == 1:
-                return np.float64(carray(at, 1, np.int8)[0])
-            if code == 9:  # C takes any byte but 0 for true
-                return 1.0 if carray(at, 1, np.uint8)[0] else 0.0
-            if code == 2:
-                return np.float64(carray(at, 1, np.uint8)[0])
-            if code == 3:
-                return np.float64(carray(at, 1, np.int16)[0])
-            if code == 4:
-                return np.float64(carray(at, 1, np.uint16)[0])
-            if code == 5:
-                return np.float64(carray(at, 1, np.int32)[0])
-            if code == 6:
-                return np.float64(carray(at, 1, np.uint32)[0])
-            if code == 7:
-                return np.float64(carray(at, 1, np.int64)[0])
-            return np.float64(carray(at, 1, np.uint64)[0])
+            return load_element(buffers.code[i], buffers.address[i], index)
 
         return compiled
 
     @overload(loop.store)
     def store(buffers: Any, i: Any, index: Any, value: Any) -> Any:
         def compiled(buffers: Any, i: Any, index: Any, value: Any) -> Any:
-            code = buffers.code[i]
-            at = pointer(buffers.address[i] + index * buffers.size[i], 0)
-            if code == 0:
-                carray(at, 1, np.float32)[0] = np.float32(value)
-            elif code == 1:
-                carray(at, 1, np.int8)[0] = np.int8(value)
-            elif code == 2:
-                carray(at, 1, np.uint8)[0] = np.uint8(value)
-            elif code == 3:
-                carray(at, 1, np.int16)[0] = np.int16(value)
-            elif code == 4:
-                carray(at, 1, np.uint16)[0] = np.uint16(value)
-            elif code == 5:
-                carray(at, 1, np.int32)[0] = np.int32(value)
-            elif code == 6:
-                carray(at, 1, np.uint32)[0] = np.uint32(value)
-            elif code == 7:
-                carray(at, 1, np.int64)[0] = np.int64(value)
-            elif code == 8:
-                carray(at, 1, np.uint64)[0] = np.uint64(value)
-            else:
-                carray(at, 1, np.uint8)[0] = value != 0.0
+            store_element(buffers.code[i], buffers.address[i], index, value)
 
         return compiled

@@ -16,8 +16,8 @@ from ..fmi.instance import Instance
 from ..interface.interface import Value, Variable
 from ..system.checks import transforms
 from ..system.description import System
+from ..system.faults import INITIAL
 from ..system.parts import Connection, Initialisation, Port
-from .scenario import INITIAL
 
 DIFFERENCE = 1e-7
 """Relative change of an input for the derivatives of Newton's method."""

@@ -72,7 +72,7 @@ class Master:
             pacer,
         ).plan()
         self._pacer = pacer
-        self._loop = make_loop(self.plan, engine)
+        self._loop = make_loop(self.plan, engine, None if pacer else self.total_steps)
         self._rows = np.empty((CHUNK, len(self.values)))
         self._base = self._handed_on = 0
         self._handed_on_at = time.monotonic()

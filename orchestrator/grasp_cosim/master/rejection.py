@@ -24,7 +24,7 @@ def finish_step(instance: Instance, status: int, begin: float, end: float) -> No
         if reached is None:
             raise instance.failure(status, float(clock[0]))
         if reached > clock[0]:
-            clock[0] = min(reached, end)
+            clock[0] = reached
             length = end - float(clock[0])
         elif (length := length / 2) < smallest:
             raise instance.failure(status, float(clock[0]))

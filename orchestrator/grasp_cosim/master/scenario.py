@@ -10,9 +10,7 @@ from ..interface.interface import Value, Variable
 from ..system.description import System
 from ..system.parts import NANOSECONDS, Condition, Event, Port, literal
 from ..system.scenario_checks import check_setting
-from .faults import INITIAL, FaultFunction, Window, fault_functions, first_step
-
-__all__ = ["INITIAL", "FaultFunction", "Scenario"]
+from .faults import FaultFunction, Window, fault_functions, first_step
 
 _COMPARE: Mapping[str, Callable[[float, float], bool]] = {
     "<": operator.lt,

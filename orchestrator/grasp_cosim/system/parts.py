@@ -13,9 +13,6 @@ Isolation = Literal["none", "process"]
 ISOLATIONS: tuple[str, ...] = get_args(Isolation)
 Relation = Literal["<", "<=", ">", ">=", "==", "!="]
 RELATIONS: tuple[str, ...] = get_args(Relation)
-FaultKind = Literal["stuck", "dropout", "bias", "noise", "delay", "saturation", "quantisation"]
-FAULTS: tuple[str, ...] = get_args(FaultKind)
-RANDOM = ("dropout", "noise")
 Loops = Literal["iterate", "refuse"]
 LOOPS: tuple[str, ...] = get_args(Loops)
 NANOSECONDS = 1_000_000_000
@@ -113,11 +110,11 @@ class Fault:
 
     end_ns is None where there is no end. With a condition it begins where that holds first in this
     window, and stays. The connection is named by its target. What the kinds do and their
-    parameters: scenario.py. seed is that of a random kind.
+    parameters: faults.py. seed is that of a random kind.
     """
 
     target: Port
-    kind: FaultKind
+    kind: str
     parameters: Mapping[str, float | bool]
     start_ns: int = 0
     end_ns: int | None = None

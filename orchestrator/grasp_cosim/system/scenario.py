@@ -27,19 +27,10 @@ point in that window where the condition holds, and stays. It gets values as the
 units converted; of several faults on a connection, each gets what the one before it in the file has
 made.
 
-| kind | makes of a value | parameters |
-|---|---|---|
-| stuck | `value`, or the first value since the fault began | value |
-| dropout | the last value that got through, where this one is lost | probability, from 0 to 1 |
-| bias | value + `value` | value |
-| noise | value + a Gaussian random number of mean 0 | standard_deviation |
-| delay | the value of `time` ago, at first the first one | time in s, a whole number of steps |
-| saturation | low, or high, where it is below or above | low, high, or one of them |
-| quantisation | the nearest whole multiple of `step`, of two the even one | step |
-
-Integer and Boolean connections can be stuck, lose values and delay them. Dropout and noise are
-random: whether a value is lost, or the number added, follows from seed, connection, and step number
-alone. So it is the same in every engine, and neither a window nor another fault shifts it.
+The kinds with their parameters are in the table FAULTS of faults.py. Integer and Boolean
+connections can be stuck, lose values and delay them. Dropout and noise are random: whether a value
+is lost, or the number added, follows from seed, connection, and step number alone. So it is the
+same in every engine, and neither a window nor another fault shifts it.
 """
 
 import re
@@ -49,7 +40,8 @@ from typing import Any
 from ..checks import as_table, check_keys
 from ..errors import InputError, choices
 from .description import in_nanoseconds
-from .parts import NANOSECONDS, RANDOM, Condition, Connection, Event, Fault, Port
+from .faults import RANDOM
+from .parts import NANOSECONDS, Condition, Connection, Event, Fault, Port
 
 _CONDITION = re.compile(r"(.+?\S)\s*(<=|>=|==|!=|<|>)\s*([^<>=!\s]+)")
 

@@ -3,62 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from ..checks import choice, whole
 from ..errors import InputError, choices
-from .parts import FAULTS, NANOSECONDS, RANDOM, RELATIONS, Condition, Event, Fault, Port
+from ..interface.interface import Interface, Value
+from .faults import FAULTS
+from .parts import NANOSECONDS, RELATIONS, Condition, Event, Fault, Port
 
 if TYPE_CHECKING:
-    from ..interface.interface import Value
     from .description import System
-
-
-@dataclass(frozen=True, slots=True)
-class Range:
-    """Where a parameter of a fault may lie, and whether it must be given."""
-
-    low: float = -math.inf
-    high: float = math.inf
-    above: bool = False
-    """Whether low itself is too low."""
-    needed: bool = True
-
-    def holds(self, value: Any) -> bool:
-        """Whether the value is a finite number in this range."""
-        number = isinstance(value, float | int) and not isinstance(value, bool)
-        return (
-            number
-            and math.isfinite(value)
-            and self.low <= value <= self.high
-            and not (self.above and value == self.low)
-        )
-
-    def __str__(self) -> str:
-        if math.isfinite(self.high):
-            return f"a number from {self.low:g} to {self.high:g}"
-        if math.isfinite(self.low):
-            return f"a finite number {'above' if self.above else 'of at least'} {self.low:g}"
-        return "a finite number"
-
-
-PARAMETERS: Mapping[str, Mapping[str, Range]] = MappingProxyType(
-    {
-        "stuck": {},  # its value is one that the input takes
-        "dropout": {"probability": Range(0.0, 1.0)},
-        "bias": {"value": Range()},
-        "noise": {"standard_deviation": Range(0.0)},
-        "delay": {"time": Range(0.0)},
-        "saturation": {"low": Range(needed=False), "high": Range(needed=False)},
-        "quantisation": {"step": Range(0.0, above=True)},
-    }
-)
-"""By kind of fault, but for the value of a stuck one."""
-
-DISCRETE = ("stuck", "dropout", "delay")
-"""The kinds of faults that make sense for an Integer or a Boolean."""
 
 
 def check_scenario(system: System) -> None:
@@ -140,48 +94,38 @@ def _check_fault(system: System, fault: Fault, place: str) -> None:
             f"{place}: connection = '{fault.target}': no connection ends there; "
             f"valid: {choices(targets)}"
         )
-    if fault.kind not in FAULTS:
-        raise InputError(f"{place}: kind = {fault.kind!r}: must be one of {choices(FAULTS)}")
+    choice(f"{place}: kind", fault.kind, FAULTS)
     interface = system.component(fault.target.component, place).interface
     kind = interface.by_name[fault.target.variable].kind
-    possible = {"Real": FAULTS, "Integer": DISCRETE, "Boolean": DISCRETE}.get(kind, ())
+    discrete = kind in ("Integer", "Boolean")
+    possible = [name for name, f in FAULTS.items() if kind == "Real" or (discrete and f.discrete)]
     if fault.kind not in possible:
         raise InputError(
             f"{place}: kind = {fault.kind!r}: {fault.target} is {kind}; "
             f"must be one of {choices(possible)}"
         )
-    _check_parameters(fault, place)
-    if "value" in fault.parameters and fault.kind == "stuck":
-        interface.parse(f"{place}: value", fault.target.variable, fault.parameters["value"])
+    _check_parameters(fault, interface, place)
     _check_window(system, fault, place)
+    FAULTS[fault.kind].check(place, fault.parameters, system.step_ns)
     if fault.when is not None:
         _check_condition(system, fault.when, f"{place}: when = '{fault.when}'")
-    whole = isinstance(fault.seed, int) and not isinstance(fault.seed, bool)
-    if not whole or fault.seed < 0:
-        raise InputError(f"{place}: seed = {fault.seed!r}: must be a whole number, at least 0")
+    whole(f"{place}: seed", fault.seed, 0, must="a whole number, at least 0")
 
 
-def _check_parameters(fault: Fault, place: str) -> None:
-    ranges = PARAMETERS[fault.kind]
-    known = ["value"] if fault.kind == "stuck" else list(ranges)
+def _check_parameters(fault: Fault, interface: Interface, place: str) -> None:
+    kind = FAULTS[fault.kind]
     for name in fault.parameters:
-        if name not in known:
-            others = ["connection", "kind", "from", "until", "when"]
-            others += ["seed"] if fault.kind in RANDOM else []
+        if name not in kind.parameters:
+            others = ["connection", "kind", "from", "until", "when", *["seed"] * kind.random]
             raise InputError(
                 f"{place}: unknown entry {name!r}; valid for {fault.kind}: "
-                f"{choices(known + others)}"
+                f"{choices([*kind.parameters, *others])}"
             )
-    for name, valid in ranges.items():
-        given = fault.parameters.get(name)
-        if (valid.needed or name in fault.parameters) and not valid.holds(given):
-            raise InputError(f"{place}: {name} = {given!r}: must be {valid}")
-    if fault.kind == "saturation":
-        low, high = (fault.parameters.get(name) for name in ("low", "high"))
-        if low is None and high is None:
-            raise InputError(f"{place}: a saturation must have low, high or both")
-        if low is not None and high is not None and not low < high:
-            raise InputError(f"{place}: high = {high!r}: must be above low = {low!r}")
+    for name, valid in kind.parameters.items():
+        if valid is not None and (valid.needed or name in fault.parameters):
+            valid.check(f"{place}: {name}", fault.parameters.get(name))
+        elif valid is None and name in fault.parameters:
+            interface.parse(f"{place}: {name}", fault.target.variable, fault.parameters[name])
 
 
 def _check_window(system: System, fault: Fault, place: str) -> None:
@@ -192,11 +136,3 @@ def _check_window(system: System, fault: Fault, place: str) -> None:
             f"{fault.end_ns / NANOSECONDS:.9g} s: must hold a communication point, "
             f"a multiple of {step / NANOSECONDS:.9g} s"
         )
-    if fault.kind == "delay":
-        time = fault.parameters["time"]
-        count = round(time * NANOSECONDS / step)
-        if abs(count * step - time * NANOSECONDS) > 1e-12 * time * NANOSECONDS:
-            raise InputError(
-                f"{place}: time = {time:.9g} s: must be a whole number of steps of "
-                f"{step / NANOSECONDS:.9g} s; could be {max(1, count) * step / NANOSECONDS:.9g} s"
-            )

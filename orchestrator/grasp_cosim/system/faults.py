@@ -1,0 +1,245 @@
+"""The kinds of faults of a connection: what each makes of a value, and its parameters.
+
+FAULTS is the one table of them. The checks, the system file and the run take from it what they need
+of a kind; the table in the README of the orchestrator has the same words.
+
+At run time a fault gets each value that its connection passes, units converted, with the number of
+the base step in which it does so, INITIAL in initialisation mode, and whether the fault acts in it.
+Step numbers never fall. Within a step it may be asked several times, as initialisation and
+iteration do: only what came last counts for later steps, so that the same value at the same step
+number always has the same result.
+
+It never raises, since a compiled loop could not pass that on: what is not finite goes through and
+is found where it is recorded.
+"""
+
+import hashlib
+import math
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+from ..checks import number
+from ..errors import InputError
+from .parts import NANOSECONDS, Fault
+
+INITIAL = -1
+"""The step number of the exchanges in initialisation mode."""
+
+Act = Callable[[float, int, bool], float]
+"""What becomes of a value at a step number, where the fault acts or does not."""
+
+Parameters = Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """Where a parameter of a fault may lie, and whether it must be given."""
+
+    low: float = -math.inf
+    high: float = math.inf
+    above: bool = False
+    """True if `low` itself is too low."""
+    needed: bool = True
+
+    def check(self, place: str, value: Any) -> None:
+        """InputError where the value is no finite number in this range."""
+        number(place, value, self.low, self.high, above=self.above, must=str(self))
+
+    def __str__(self) -> str:
+        if math.isfinite(self.high):
+            return f"a number from {self.low:g} to {self.high:g}"
+        if math.isfinite(self.low):
+            return f"a finite number {'above' if self.above else 'of at least'} {self.low:g}"
+        return "a finite number"
+
+
+class Draws:
+    """Random numbers that depend on what they are for and on the step number, on nothing else.
+
+    Each is a hash (BLAKE2b) of both, as in a counter-based generator: there is no state to advance.
+    Faults of one kind on one connection differ by their `count`.
+    """
+
+    def __init__(self, fault: Fault, count: int) -> None:
+        purpose = repr((fault.kind, str(fault.target), count, fault.seed))
+        self._purpose = hashlib.blake2b(purpose.encode(), digest_size=16)
+
+    def uniforms(self, step: int) -> tuple[float, float]:
+        """Return two independent numbers, uniform in (0, 1] and in [0, 1)."""
+        whole = self._purpose.copy()
+        whole.update(step.to_bytes(8, "little", signed=True))
+        digest = whole.digest()
+        first, second = (int.from_bytes(half, "little") >> 11 for half in (digest[:8], digest[8:]))
+        return (first + 1) * 2.0**-53, second * 2.0**-53
+
+    def normal(self, step: int) -> float:
+        """Return a standard normal number, after Box and Muller."""
+        first, second = self.uniforms(step)
+        return math.sqrt(-2.0 * math.log(first)) * math.cos(2.0 * math.pi * second)
+
+
+def _stuck(given: Parameters, *_: object) -> Act:
+    """The given value, or the one of the first step in which it is asked."""
+    held = float(given.get("value", math.nan))
+    since = -math.inf if "value" in given else math.inf
+
+    def act(value: float, step: int, acts: bool) -> float:
+        nonlocal held, since
+        if not acts:
+            return value
+        if step <= since:
+            since, held = step, value
+        return held
+
+    return act
+
+
+def _dropout(given: Parameters, draws: Draws, _: int) -> Act:
+    """Hold what got through in an earlier step where a value is lost; at first there is none."""
+    probability: float = given["probability"]
+    last, held, passed = INITIAL - 1, None, None
+
+    def act(value: float, step: int, acts: bool) -> float:
+        nonlocal last, held, passed
+        if step != last:
+            last, held = step, passed
+        if held is not None and acts and draws.uniforms(step)[1] < probability:
+            return held
+        passed = value
+        return value
+
+    return act
+
+
+def _bias(given: Parameters, *_: object) -> Act:
+    bias: float = given["value"]
+    return lambda value, _, acts: value + bias if acts else value
+
+
+def _noise(given: Parameters, draws: Draws, _: int) -> Act:
+    deviation: float = given["standard_deviation"]
+    return lambda value, step, acts: value + deviation * draws.normal(step) if acts else value
+
+
+def _delay(given: Parameters, _: Draws, step_ns: int) -> Act:
+    """The last value passed at least so many base steps ago; the first one where there is none."""
+    steps = round(given["time"] * NANOSECONDS / step_ns)
+    history: deque[tuple[int, float]] = deque()
+
+    def act(value: float, step: int, acts: bool) -> float:
+        if history and history[-1][0] == step:
+            history.pop()
+        history.append((step, value))
+        while len(history) > 1 and history[1][0] <= step - steps:
+            history.popleft()
+        return history[0][1] if acts else value
+
+    return act
+
+
+def _check_delay(place: str, given: Parameters, step_ns: int) -> None:
+    time = given["time"]
+    count = round(time * NANOSECONDS / step_ns)
+    if abs(count * step_ns - time * NANOSECONDS) > 1e-12 * time * NANOSECONDS:
+        raise InputError(
+            f"{place}: time = {time:.9g} s: must be a whole number of steps of "
+            f"{step_ns / NANOSECONDS:.9g} s; could be {max(1, count) * step_ns / NANOSECONDS:.9g} s"
+        )
+
+
+def _saturation(given: Parameters, *_: object) -> Act:
+    low, high = given.get("low", -math.inf), given.get("high", math.inf)
+    return lambda value, _, acts: min(max(value, low), high) if acts else value
+
+
+def _check_saturation(place: str, given: Parameters, _: int) -> None:
+    low, high = given.get("low"), given.get("high")
+    if low is None and high is None:
+        raise InputError(f"{place}: a saturation must have low, high or both")
+    if low is not None and high is not None and not low < high:
+        raise InputError(f"{place}: high = {high!r}: must be above low = {low!r}")
+
+
+def _quantisation(given: Parameters, *_: object) -> Act:
+    width: float = given["step"]
+
+    def act(value: float, _: int, acts: bool) -> float:
+        count = value / width
+        return round(count) * width if acts and math.isfinite(count) else value
+
+    return act
+
+
+@dataclass(frozen=True, slots=True)
+class FaultKind:
+    """One kind of fault. `makes` and `takes` say in words what it does and its parameters."""
+
+    makes: str
+    takes: str
+    start: Callable[[Parameters, Draws, int], Act]
+    """Make a fault from its parameters, its random numbers and the base step in ns."""
+    parameters: Mapping[str, Range | None]
+    """The range of each; None where it is a value that the input takes, and may be left out."""
+    discrete: bool = False
+    """True if it makes sense for an Integer or a Boolean."""
+    random: bool = False
+    """True if it has a seed."""
+    check: Callable[[str, Parameters, int], None] = lambda *_: None
+    """InputError, at a place, where parameters in their ranges do not suit each other or the step.
+    """
+
+
+FAULTS: Mapping[str, FaultKind] = MappingProxyType(
+    {
+        "stuck": FaultKind(
+            "`value`, or the first value since the fault began",
+            "value",
+            _stuck,
+            {"value": None},
+            discrete=True,
+        ),
+        "dropout": FaultKind(
+            "the last value that got through, where this one is lost",
+            "probability, from 0 to 1",
+            _dropout,
+            {"probability": Range(0.0, 1.0)},
+            discrete=True,
+            random=True,
+        ),
+        "bias": FaultKind("value + `value`", "value", _bias, {"value": Range()}),
+        "noise": FaultKind(
+            "value + a Gaussian random number of mean 0",
+            "standard_deviation",
+            _noise,
+            {"standard_deviation": Range(0.0)},
+            random=True,
+        ),
+        "delay": FaultKind(
+            "the value of `time` ago, at first the first one",
+            "time in s, a whole number of steps",
+            _delay,
+            {"time": Range(0.0)},
+            discrete=True,
+            check=_check_delay,
+        ),
+        "saturation": FaultKind(
+            "low, or high, where it is below or above",
+            "low, high, or one of them",
+            _saturation,
+            {"low": Range(needed=False), "high": Range(needed=False)},
+            check=_check_saturation,
+        ),
+        "quantisation": FaultKind(
+            "the nearest whole multiple of `step`, of two the even one",
+            "step",
+            _quantisation,
+            {"step": Range(0.0, above=True)},
+        ),
+    }
+)
+"""The kinds of faults by name."""
+
+RANDOM = tuple(name for name, kind in FAULTS.items() if kind.random)
