@@ -4,13 +4,18 @@
 
 Extracts the FMU into the folder, runs it as REQUEST says, a JSON object with "set" (values by
 name), "steps" and "step_size" (s), and prints a JSON object: every output after each step in
-hexadecimal, which is every bit of it, the messages of the FMU, the files of all modules that the
-process has imported, and the call that failed. The exit code is the status of that call, or 0.
+hexadecimal, which is every bit of it, the messages of the FMU, the files of all modules imported
+since this program began, and the call that failed. The exit code is the status of that call, or 0.
 """
 
+import sys
+
+FIRST = set(sys.modules)
+"""What Python itself has imported, with the sitecustomize of a distribution."""
+
+# ruff: noqa: E402
 import ctypes
 import json
-import sys
 import sysconfig
 import zipfile
 from ctypes import byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
@@ -130,7 +135,8 @@ def main(fmu: str, folder: str, request: str) -> int:
         host.end()
     report["messages"] = host.messages
     report["standard_library"] = sysconfig.get_path("stdlib")
-    files = (getattr(module, "__file__", None) for module in sys.modules.values())
+    since = (module for name, module in sys.modules.items() if name not in FIRST)
+    files = (getattr(module, "__file__", None) for module in since)
     report["modules"] = sorted(str(Path(file).resolve()) for file in files if file)
     sys.stdout.write(json.dumps(report))
     sys.stdout.flush()

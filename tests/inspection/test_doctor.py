@@ -10,6 +10,7 @@ import tempfile
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
+from shlex import quote
 
 import pytest
 from conftest import UnpackIn
@@ -451,7 +452,7 @@ def test_what_a_script_imports_is_packed_or_installed(
         assert verdict[0] == "problem"
         assert verdict[1].endswith(f"neither packed nor installed: {missing}")
         names = missing.replace(",", "")
-        assert verdict[2] == f"{sys.executable} -m pip install {names}"
+        assert verdict[2] == f"{quote(sys.executable)} -m pip install {names}"
 
 
 def test_the_package_of_a_module_may_be_called_otherwise(

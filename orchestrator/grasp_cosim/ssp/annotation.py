@@ -6,7 +6,7 @@ execution. Its content is JSON: the dataclasses of the system as objects, a port
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
 from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
@@ -31,6 +31,10 @@ class Beside:
     step_ns: int | None
     isolation: Isolation
 
+    def new(self, own: str) -> str:
+        """Return the system's name of a variable of the FMU."""
+        return next((name for name, renamed in self.rename.items() if renamed == own), own)
+
 
 @dataclass(frozen=True, slots=True)
 class Extras:
@@ -44,6 +48,12 @@ class Extras:
     faults: tuple[Fault, ...]
     roles: Mapping[str, str] = field(default_factory=dict)
     presets: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
+
+
+def no_extras(components: Iterable[str]) -> Extras:
+    """The extras of an archive without our annotation, which names no step."""
+    beside = {name: Beside({}, None, "none") for name in components}
+    return Extras(0, "sequential", beside, Initialisation(), (), ())
 
 
 def extras_of(system: System) -> Extras:

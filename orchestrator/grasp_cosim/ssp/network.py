@@ -128,6 +128,14 @@ class Network:
         """The variable of a node of a component."""
         return self.parts[node.path].interface.by_name[node.name]
 
+    def nature(self, node: Node) -> tuple[str, str | None]:
+        """Causality and kind of value of a node; the kind is None where a connector names none."""
+        if node.path in self.parts:
+            variable = self.variable(node)
+            return variable.causality, variable.kind
+        connector = self.systems[node.path].connectors[node.name]
+        return connector.kind, kind_of(connector)
+
     def carry(self, hop: Hop, carried: Carried) -> Carried:
         """What the hop makes of what it is given; InputError where units do not fit."""
         place, target = hop.connection.place, self.unit(hop.target)

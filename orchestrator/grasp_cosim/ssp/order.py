@@ -15,19 +15,11 @@ def flow_order(names: Sequence[str], connections: Iterable[tuple[str, str]]) -> 
         after[source].add(target)
     behind = {name: _reachable(after, name) for name in names}
     order: list[str] = []
-    while len(order) < len(names):
-        order.append(
-            next(
-                name
-                for name in names
-                if name not in order
-                and not any(
-                    name in behind[other] and other not in behind[name]
-                    for other in names
-                    if other not in order
-                )
-            )
-        )
+    left = list(names)
+    while left:
+        waiting = {n for n in left for o in left if n in behind[o] and o not in behind[n]}
+        order.append(next(name for name in left if name not in waiting))
+        left.remove(order[-1])
     return tuple(order)
 
 

@@ -19,8 +19,8 @@ from ..interface.units import Unit
 from .archive import Archive
 from .document import at, checked, children, is_true, parse, short
 from .network import Carried, Network, Node, Path, kind_of
-from .tree import Binding, linear, transformation
-from .units import change, read_units
+from .tree import Binding, Content, linear, transformation
+from .units import change, named, read_units
 
 _READERS: Mapping[str, Callable[[str], Value]] = {
     "Real": float,
@@ -97,12 +97,12 @@ def _given(
         binding.prefix + name: parameter
         for name, parameter in _set(archive, file, binding, units).items()
     }
-    if not binding.mapped:
+    if binding.mapping is None:
         for name, parameter in parameters.items():
             yield Given(name, parameter, False, None)
         return
     mapped = set()
-    for place, source, given in _mapping(archive, file, binding, parameters):
+    for place, source, given in _mapping(archive, file, binding, binding.mapping, parameters):
         mapped.add(source)
         if given:
             yield given
@@ -122,14 +122,9 @@ def _ends(network: Network, path: Path, given: Given) -> Iterator[tuple[Node, Pa
 def _set(
     archive: Archive, file: str, binding: Binding, units: Mapping[str, Unit]
 ) -> dict[str, Parameter]:
-    if binding.source is None:
-        place, root = file, checked(file, binding.inline, "ssv")
-        known = {**units, **read_units(place, root, "ssv")}
-    else:
-        entry = archive.resolve(binding.place, binding.source)
-        place = f"{archive.place}: {entry}"
-        root = parse(place, archive.read(entry), "ssv")
-        known = dict(read_units(place, root, "ssv"))
+    place, root = _document(archive, file, binding.place, binding.values, "ssv")
+    inherited = units if binding.values.source is None else {}
+    known = {**inherited, **read_units(place, root, "ssv")}
     parameters: dict[str, Parameter] = {}
     for element in children(root, "ssv:Parameters", "ssv:Parameter"):
         name = element.get("name")
@@ -140,26 +135,33 @@ def _set(
     return parameters
 
 
+def _document(
+    archive: Archive, file: str, place: str, content: Content, form: str
+) -> tuple[str, Any]:
+    """The name and the root of a document, a file of the archive or inline in `file`."""
+    if content.source is None:
+        return file, checked(file, content.inline, form)
+    entry = archive.resolve(place, content.source)
+    name = f"{archive.place}: {entry}"
+    return name, parse(name, archive.read(entry), form)
+
+
 def _parameter(place: str, element: Any, units: Mapping[str, Unit]) -> Parameter:
     kind, text = short(element.tag).removeprefix("ssv:"), element.get("value")
     if kind not in _READERS:
         raise InputError(f"{place}: type {kind} is not supported; valid: {choices(_READERS)}")
-    name = element.get("unit")
-    if name is not None and name not in units:
-        raise InputError(f"{place}: unit {name!r} is not defined; valid: {choices(units)}")
-    return Parameter(place, kind, _READERS[kind](text), units[name] if name else None)
+    return Parameter(place, kind, _READERS[kind](text), named(place, element.get("unit"), units))
 
 
 def _mapping(
-    archive: Archive, file: str, binding: Binding, parameters: Mapping[str, Parameter]
+    archive: Archive,
+    file: str,
+    binding: Binding,
+    mapping: Content,
+    parameters: Mapping[str, Parameter],
 ) -> Iterator[tuple[str, str, Given | None]]:
     """The entries of a mapping: place, source, and what is given, None without such a source."""
-    if binding.mapping_source is None:
-        place, root = file, checked(file, binding.mapping_inline, "ssm")
-    else:
-        entry = archive.resolve(binding.place, binding.mapping_source)
-        place = f"{archive.place}: {entry}"
-        root = parse(place, archive.read(entry), "ssm")
+    place, root = _document(archive, file, binding.place, mapping, "ssm")
     targets: set[str] = set()
     for element in children(root, "ssm:MappingEntry"):
         source, target = element.get("source"), element.get("target")
@@ -230,16 +232,10 @@ def _transformed(given: Parameter, element: Any) -> Parameter:
                 f"{given.place}: {given.type} has a linear transformation; must be Real"
             )
         return replace(given, type="Real", value=_linear(given.value, *linear(element)))
-    readers: Mapping[str, tuple[tuple[str, ...], Callable[[str], Value]]] = {
-        "BooleanMapping": (("Boolean",), lambda text: text.strip() in ("true", "1")),
-        "IntegerMapping": (("Integer",), int),
-        "EnumerationMapping": (("Enumeration",), str),
-    }
-    types, read = readers[kind]
-    if given.type not in types:
-        raise InputError(
-            f"{given.place}: {given.type} has {short(element.tag)}; must be {types[0]}"
-        )
+    mapped = kind.removesuffix("Mapping")
+    if given.type != mapped:
+        raise InputError(f"{given.place}: {given.type} has {short(element.tag)}; must be {mapped}")
+    read = _READERS[mapped]
     table = {
         read(entry.get("source")): read(entry.get("target"))
         for entry in children(element, "ssc:MapEntry")

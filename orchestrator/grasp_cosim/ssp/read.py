@@ -13,7 +13,7 @@ here and said in the notes of the system.
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any
@@ -21,11 +21,11 @@ from typing import Any
 from ..errors import InputError, choices
 from ..interface.interface import Value, read_interface
 from ..system.description import System, in_nanoseconds
-from ..system.parts import NANOSECONDS, Component, Connection, Initialisation, Port
-from .annotation import TYPE, Beside, Extras, read_extras
+from ..system.parts import NANOSECONDS, Component, Connection, Port
+from .annotation import TYPE, Beside, Extras, no_extras, read_extras
 from .archive import STRUCTURE, Archive
 from .document import at, child, children, parse, qualified
-from .network import Carried, Hop, Network, Node, Part, Path, components_of, kind_of, read_network
+from .network import Carried, Hop, Network, Part, Path, components_of, read_network
 from .order import flow_order
 from .parameters import read_settings
 from .tree import ComponentElement, read_system
@@ -43,29 +43,33 @@ def read_ssp(path: FilePath, step: float | None = None, stop: float | None = Non
     if not parts:
         raise InputError(f"{top.place}: system {top.name!r} has no components; must have some")
     network = read_network(top, parts)
-    extras = _extras(file, root)
-    names = _names(file, parts, extras)
+    names = _names(file, parts)
+    annotated = _annotated(file, root, names.values())
+    extras = annotated or no_extras(names.values())
     connections = tuple(_connections(network, names, extras))
     values, notes = read_settings(archive, file, network, units)
-    given = [_component(names[p], part, values.get(p, {}), extras) for p, part in parts.items()]
+    given = [
+        _component(names[p], part, values.get(p, {}), extras.components[names[p]])
+        for p, part in parts.items()
+    ]
     components = tuple(_keep_starts(file, given, connections, notes))
-    if extras is None:
+    if annotated is None:
         components = _in_order(components, connections, notes)
     stop_ns = _stop(file, root, stop)
-    step_ns = _step(file, parts.values(), stop_ns, step, extras, notes)
+    step_ns = _step(file, parts.values(), stop_ns, step, annotated, notes)
     return System(
         archive.place,
         components,
         connections,
         step_ns,
         stop_ns,
-        extras.scheme if extras else "sequential",
-        extras.events if extras else (),
-        extras.faults if extras else (),
-        extras.initialisation if extras else Initialisation(),
+        extras.scheme,
+        extras.events,
+        extras.faults,
+        extras.initialisation,
         (*_unused(archive, root), *_renamed(names), *notes),
-        extras.roles if extras else {},
-        extras.presets if extras else {},
+        extras.roles,
+        extras.presets,
     )
 
 
@@ -80,30 +84,32 @@ def _part(archive: Archive, element: ComponentElement) -> Part:
     return Part(element, interface)
 
 
-def _extras(file: str, root: Any) -> Extras | None:
+def _annotated(file: str, root: Any, names: Collection[str]) -> Extras | None:
+    """The extras of our annotation, if there is one; `names` are those of the components."""
     for annotation in children(root, "ssd:Annotations", "ssc:Annotation"):
         if annotation.get("type") == TYPE:
-            return read_extras(at(file, annotation), annotation)
+            extras = read_extras(at(file, annotation), annotation)
+            if set(extras.components) != set(names):
+                raise InputError(
+                    f"{file}: annotation {TYPE!r} is about other components, "
+                    f"{choices(extras.components)}; valid: {choices(names)}; remove it"
+                )
+            return extras
     return None
 
 
-def _names(file: str, parts: Iterable[Path], extras: Extras | None) -> dict[Path, str]:
+def _names(file: str, parts: Iterable[Path]) -> dict[Path, str]:
     """The components' names in the system, where a dot parts component and variable."""
     names = {path: "_".join(path).replace(".", "_") for path in parts}
     for name, count in Counter(names.values()).items():
         if count > 1:
             same = choices(".".join(path) for path in names if names[path] == name)
             raise InputError(f"{file}: components {same} would all be {name!r} here; must differ")
-    if extras and set(extras.components) != set(names.values()):
-        raise InputError(
-            f"{file}: annotation {TYPE!r} is about other components, "
-            f"{choices(extras.components)}; valid: {choices(names.values())}; remove it"
-        )
     return names
 
 
 def _connections(
-    network: Network, names: Mapping[Path, str], extras: Extras | None
+    network: Network, names: Mapping[Path, str], extras: Extras
 ) -> Iterator[Connection]:
     """The connections, in the order of the connections that reach the inputs."""
     for target in network.into:
@@ -112,7 +118,7 @@ def _connections(
         hops = network.trace(target)
         carried = _carried(network, hops)
         source, sink = (
-            Port(names[node.path], _new_names(names[node.path], extras).get(node.name, node.name))
+            Port(names[node.path], extras.components[names[node.path]].new(node.name))
             for node in (hops[0].source, target)
         )
         if network.decided_by_units(hops, carried):
@@ -128,12 +134,13 @@ def _carried(network: Network, hops: list[Hop]) -> Carried:
     kind: str = variable.kind
     for hop in hops:
         place = hop.connection.place
-        if variable.causality != "output" or _causality(network, hop.target) == "parameter":
+        causality, reached = network.nature(hop.target)
+        if variable.causality != "output" or causality == "parameter":
             raise InputError(
                 f"{place}: leads from {hops[0].source} to a parameter, or from one; "
                 "only outputs are passed on to inputs, give the parameter a value"
             )
-        reached = _kind(network, hop.target) or kind
+        reached = reached or kind
         if reached != kind and (kind, reached) != ("Integer", "Real"):
             raise InputError(
                 f"{place}: from {kind} to {reached} at {hop.target}; must be the same, "
@@ -146,34 +153,12 @@ def _carried(network: Network, hops: list[Hop]) -> Carried:
     return carried
 
 
-def _causality(network: Network, node: Node) -> str:
-    if node.path in network.parts:
-        return network.variable(node).causality
-    return network.systems[node.path].connectors[node.name].kind
-
-
-def _kind(network: Network, node: Node) -> str | None:
-    if node.path in network.parts:
-        return network.variable(node).kind
-    return kind_of(network.systems[node.path].connectors[node.name])
-
-
-def _new_names(component: str, extras: Extras | None) -> dict[str, str]:
-    """The system's names of variables by those of the FMU, where they differ."""
-    rename = extras.components[component].rename if extras else {}
-    return {own: new for new, own in rename.items()}
-
-
-def _component(
-    name: str, part: Part, values: Mapping[str, Value], extras: Extras | None
-) -> Component:
+def _component(name: str, part: Part, values: Mapping[str, Value], beside: Beside) -> Component:
     """The component with the values it is given, under the system's names."""
-    new = _new_names(name, extras)
-    beside = extras.components[name] if extras else Beside({}, None, "none")
     return Component(
         name,
         part.interface.path,
-        {new.get(own, own): value for own, value in values.items()},
+        {beside.new(own): value for own, value in values.items()},
         beside.rename,
         beside.step_ns,
         beside.isolation,
@@ -232,14 +217,14 @@ def _step(
     parts: Iterable[Part],
     stop_ns: int,
     given: float | None,
-    extras: Extras | None,
+    annotated: Extras | None,
     notes: list[str],
 ) -> int:
     """The step in ns: given, or ours, or the smallest of the FMUs that divides the stop."""
     if given is not None:
         return in_nanoseconds("step", given)
-    if extras:
-        return extras.step_ns
+    if annotated:
+        return annotated.step_ns
     declared_steps = sorted({part.interface.step for part in parts if part.interface.step})
     for step in declared_steps:
         if not 0.0 < step * NANOSECONDS <= stop_ns:

@@ -4,13 +4,14 @@ What this master cannot run is refused here by its name and line. Geometry and n
 are passed over.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 from ..errors import InputError, choices
 from ..interface.units import Unit
 from .document import at, child, children, is_true, short
+from .units import named
 
 FMU = "application/x-fmu-sharedlibrary"
 _SOURCES = ("output", "calculatedParameter")
@@ -29,7 +30,7 @@ class Connector:
 
     @property
     def gives(self) -> bool:
-        """Whether its element gives the value, seen from outside."""
+        """True if its element gives the value, seen from outside."""
         return self.kind in _SOURCES
 
 
@@ -55,16 +56,21 @@ class Connection:
 
 
 @dataclass(frozen=True, slots=True)
+class Content:
+    """A parameter set or mapping: the source of its file, or its element where it is inline."""
+
+    source: str | None
+    inline: Any
+
+
+@dataclass(frozen=True, slots=True)
 class Binding:
-    """A parameter binding: source of the values and of the mapping, or the element inline."""
+    """A parameter binding; mapping is None where there is none."""
 
     place: str
     prefix: str
-    source: str | None
-    inline: Any
-    mapped: bool
-    mapping_source: str | None
-    mapping_inline: Any
+    values: Content
+    mapping: Content | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +96,9 @@ class SystemElement:
     bindings: tuple[Binding, ...]
 
 
+Part = TypeVar("Part", Connector, ComponentElement | SystemElement)
+
+
 def read_system(file: str, element: Any, units: Mapping[str, Unit]) -> SystemElement:
     """The system of an element; file names the document, for the error messages."""
     place = at(file, element)
@@ -99,19 +108,13 @@ def read_system(file: str, element: Any, units: Mapping[str, Unit]) -> SystemEle
             f"{at(file, unsupported)}: system {name!r}: signal dictionaries are not supported; "
             "connect the components directly"
         )
-    elements: dict[str, ComponentElement | SystemElement] = {}
-    for entry in child(element, "ssd:Elements") if _has(element, "ssd:Elements") else ():
-        read = _element(file, entry, units)
-        if read.name in elements:
-            raise InputError(
-                f"{read.place}: system {name!r}: two elements {read.name!r}; must differ"
-            )
-        elements[read.name] = read
+    found = child(element, "ssd:Elements")
+    elements = [_element(file, entry, units) for entry in (() if found is None else found)]
     connections = children(element, "ssd:Connections", "ssd:Connection")
     return SystemElement(
         place,
         name,
-        elements,
+        _by_name(elements, f"system {name!r}: two elements"),
         _connectors(file, element, units),
         tuple(_connection(file, entry) for entry in connections),
         tuple(_bindings(file, element)),
@@ -132,8 +135,14 @@ def linear(element: Any) -> tuple[float, float]:
     return float(element.get("factor", "1")), float(element.get("offset", "0"))
 
 
-def _has(element: Any, name: str) -> bool:
-    return child(element, name) is not None
+def _by_name(parts: Iterable[Part], twice: str) -> dict[str, Part]:
+    """The parts by their names, which must differ; else `twice` is said of them."""
+    found: dict[str, Part] = {}
+    for part in parts:
+        if part.name in found:
+            raise InputError(f"{part.place}: {twice} {part.name!r}; must differ")
+        found[part.name] = part
+    return found
 
 
 def _element(
@@ -164,16 +173,9 @@ def _element(
 
 
 def _connectors(file: str, element: Any, units: Mapping[str, Unit]) -> dict[str, Connector]:
-    connectors: dict[str, Connector] = {}
-    for entry in children(element, "ssd:Connectors", "ssd:Connector"):
-        connector = _connector(at(file, entry), entry, units)
-        if connector.name in connectors:
-            raise InputError(
-                f"{connector.place}: {element.get('name')}: two connectors {connector.name!r}; "
-                "must differ"
-            )
-        connectors[connector.name] = connector
-    return connectors
+    entries = children(element, "ssd:Connectors", "ssd:Connector")
+    connectors = [_connector(at(file, entry), entry, units) for entry in entries]
+    return _by_name(connectors, f"{element.get('name')}: two connectors")
 
 
 def _connector(place: str, entry: Any, units: Mapping[str, Unit]) -> Connector:
@@ -188,15 +190,7 @@ def _connector(place: str, entry: Any, units: Mapping[str, Unit]) -> Connector:
             f"valid: {choices(_TYPES)}"
         )
     unit = child(entry, "ssc:Real").get("unit") if declared == "Real" else None
-    return Connector(place, name, kind, declared, _unit(f"{place}: {name!r}", unit, units))
-
-
-def _unit(place: str, name: str | None, units: Mapping[str, Unit]) -> Unit | None:
-    if name is None:
-        return None
-    if name not in units:
-        raise InputError(f"{place}: unit {name!r} is not defined; valid: {choices(units)}")
-    return units[name]
+    return Connector(place, name, kind, declared, named(f"{place}: {name!r}", unit, units))
 
 
 def _connection(file: str, entry: Any) -> Connection:
@@ -222,20 +216,15 @@ def _connection(file: str, entry: Any) -> Connection:
 def _bindings(file: str, element: Any) -> Iterator[Binding]:
     for entry in children(element, "ssd:ParameterBindings", "ssd:ParameterBinding"):
         place = f"{at(file, entry)}: {element.get('name')!r}"
-        source, inline = _content(
-            place, entry, child(entry, "ssd:ParameterValues"), "parameter-set", "ssv:ParameterSet"
-        )
+        holder = child(entry, "ssd:ParameterValues")
+        values = _content(place, entry, holder, "parameter-set", "ssv:ParameterSet")
         mapping = child(entry, "ssd:ParameterMapping")
-        mapped = mapping is not None
-        content = (
-            _content(place, mapping, mapping, "parameter-mapping", "ssm:ParameterMapping")
-            if mapped
-            else (None, None)
-        )
-        yield Binding(place, entry.get("prefix", ""), source, inline, mapped, *content)
+        if mapping is not None:
+            mapping = _content(place, mapping, mapping, "parameter-mapping", "ssm:ParameterMapping")
+        yield Binding(place, entry.get("prefix", ""), values, mapping)
 
 
-def _content(place: str, entry: Any, holder: Any, form: str, root: str) -> tuple[str | None, Any]:
+def _content(place: str, entry: Any, holder: Any, form: str, root: str) -> Content:
     """The source of a set or mapping, or the element in holder; exactly one of the two."""
     kind = entry.get("type", f"application/x-ssp-{form}")
     if kind != f"application/x-ssp-{form}":
@@ -246,8 +235,7 @@ def _content(place: str, entry: Any, holder: Any, form: str, root: str) -> tuple
         raise InputError(
             f"{place}: sourceBase 'component' is not supported; put the file into resources/"
         )
-    source = entry.get("source")
-    inline = None if holder is None else child(holder, root)
-    if (source is None) == (inline is None):
+    content = Content(entry.get("source"), None if holder is None else child(holder, root))
+    if (content.source is None) == (content.inline is None):
         raise InputError(f"{place}: {form}: must have either a source or an inline {root}")
-    return source, inline
+    return content

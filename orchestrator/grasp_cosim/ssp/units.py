@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from ..errors import InputError
+from ..errors import InputError, choices
 from ..interface.units import BASE, Unit, conversion
 from .document import add, at, child, children
 
@@ -15,6 +15,15 @@ def read_units(file: str, parent: Any, prefix: str) -> Mapping[str, Unit]:
         unit.get("name"): _unit(file, unit)
         for unit in children(parent, f"{prefix}:Units", "ssc:Unit")
     }
+
+
+def named(place: str, name: str | None, units: Mapping[str, Unit]) -> Unit | None:
+    """Return the unit of that name, None for None; InputError where it is not defined."""
+    if name is None:
+        return None
+    if name not in units:
+        raise InputError(f"{place}: unit {name!r} is not defined; valid: {choices(units)}")
+    return units[name]
 
 
 def write_units(parent: Any, prefix: str, units: Iterable[Unit]) -> None:
@@ -34,7 +43,7 @@ def write_units(parent: Any, prefix: str, units: Iterable[Unit]) -> None:
 
 
 def same(a: Unit, b: Unit) -> bool:
-    """Whether they mean the same, whatever they are called."""
+    """Return True if they mean the same, whatever they are called."""
     return (a.exponents, a.factor, a.offset) == (b.exponents, b.factor, b.offset)
 
 
