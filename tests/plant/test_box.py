@@ -146,6 +146,67 @@ def test_it_falls_back_flat_and_loses_the_energy_of_the_fall() -> None:
     assert energy(q, states[-1]) == 0.0
 
 
+def fall(q: Shape, tilt: float) -> tuple[float, float]:
+    """When a box left alone on an edge that sticks lands, in s, and how fast it turns, rad/s.
+
+    Of 4/3·m·r^2·theta'' = -m·g·X, by an integrator that finds the moment.
+    """
+
+    def slope(_: float, z: list[float]) -> list[float]:
+        x = q.b * cos(z[0]) - q.a * sin(z[0])
+        return [z[1], -GRAVITY * x / (4.0 / 3.0 * (q.a**2 + q.b**2))]
+
+    def flat(_: float, z: list[float]) -> float:
+        return z[0]
+
+    flat.terminal = True  # type: ignore[attr-defined]
+    motion = solve_ivp(slope, (0.0, 1.0), (tilt, 0.0), events=flat, rtol=1e-11, atol=1e-13)
+    return float(motion.t_events[0][0]), float(motion.y_events[0][0][1])
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_it_lands_when_it_should_and_slides_on_as_far_as_the_impulse_of_the_floor_lets_it(
+    side: float,
+) -> None:
+    """The floor stops m·b·|w| upright; by friction it takes mu times as much off m·a·|w| forward.
+    With what is left the box slides, back from its edge, until friction has stopped it.
+    """
+    q, d = ROUGH._replace(mu=0.5), 1e-4
+    moment, w = fall(q, 0.3)
+    states = list(islice(run(q, Box(0.01, side * 0.3, 0.0, 0.0), NOTHING, d), 3000))
+    flat = next(k for k, box in enumerate(states, 1) if box.tilt == 0.0)
+    assert (flat - 1) * d - 1e-6 <= moment <= flat * d + 1e-6
+    assert all(box.x == 0.01 for box in states[: flat - 1])
+    speed = (q.a - q.mu * q.b) * abs(w)
+    assert speed == pytest.approx(0.184, abs=1e-3)
+    slid = speed**2 / (2.0 * q.mu * GRAVITY)
+    assert states[-1].x == pytest.approx(0.01 - side * slid, abs=1e-4 * slid)
+    after_landing = speed - q.mu * GRAVITY * (flat * d - moment)
+    assert states[flat - 1].v == pytest.approx(-side * after_landing, rel=1e-4)
+    assert (states[-1].v, states[-1].tilt, states[-1].w) == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_low_box_on_a_rough_floor_stays_where_it_lands(side: float) -> None:
+    """The floor could take more off than there is: mu·b > a."""
+    q = Shape(b=0.06, a=0.03, m=0.05, mu=0.9, h=0.03)
+    states = list(islice(run(q, Box(0.01, side * 0.2, 0.0, 0.0), NOTHING, 1e-4), 1000))
+    assert states[-1] == Box(0.01, 0.0, 0.0, 0.0)
+    assert {box.x for box in states} == {0.01}
+    assert {box.v for box in states} == {0.0}
+
+
+@pytest.mark.parametrize("v", [0.2, -0.3])
+def test_on_a_smooth_floor_a_landing_changes_no_momentum(v: float) -> None:
+    """No force acts along the floor: the centre keeps its speed, before and after."""
+    q, d, n = UPRIGHT._replace(mu=0.0), 1e-4, 2000
+    begin = Box(0.0, 0.2, v, 0.0)
+    box = after(q, begin, NOTHING, d, n)
+    assert (box.tilt, box.w) == (0.0, 0.0)
+    assert box.v == pytest.approx(v, abs=1e-5)
+    assert centre(q, box) == pytest.approx(centre(q, begin) + v * n * d, abs=1e-6)
+
+
 def test_the_balance_is_where_the_centre_is_above_the_edge() -> None:
     assert balance(UPRIGHT) == pytest.approx(atan2(0.035, 0.05))
     for share, rises in ((0.999, False), (1.001, True)):

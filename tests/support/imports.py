@@ -108,12 +108,12 @@ def graph(imports: Sequence[Import], of_rooms: bool = False) -> dict[str, list[s
 
 def circles(imports: Graph) -> list[str]:
     """The shortest circle through each name that is in one, each once, like "a -> b -> a"."""
-    found = {}
+    found = set()
     for name in imports:
         if way := _way_back(name, imports):
             first = way.index(min(way))
             turned = way[first:] + way[:first]
-            found[" -> ".join([*turned, turned[0]])] = None
+            found.add(" -> ".join([*turned, turned[0]]))
     return sorted(found)
 
 

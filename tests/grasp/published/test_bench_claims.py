@@ -7,15 +7,14 @@ from typing import Any
 
 import pytest
 from grasp_cosim import System
-from grasp_cosim.grasp.published.bench import bench_rms
-from grasp_cosim.grasp.published.bench_claims import check_bench_claims
-from grasp_cosim.grasp.published.evaluate import compared
+from grasp_cosim.grasp.published.claims import Evidence, check_claims
+from grasp_cosim.grasp.published.evaluate import bench_rms
 from grasp_cosim.grasp.published.grasps import Run, Runs
-from grasp_cosim.grasp.published.tables import Row, Setting, experimental_rows
+from grasp_cosim.grasp.published.tables import Row, Setting, published_rows
 
 Judge = Callable[..., list[int]]
 
-PUBLISHED = experimental_rows()
+PUBLISHED = published_rows("experiment")
 BROWN_WHITE = Setting(0.03, 0.86, 1.0)
 BLACK = Setting(0.03, 0.57, 0.57)
 
@@ -60,7 +59,8 @@ def judge(grasp: System) -> Judge:
     """The numbers of the claims that fail."""
 
     def failing(runs: Runs, contact_times: float = 0.2) -> list[int]:
-        claims = check_bench_claims(runs, PUBLISHED, {"contact_times": contact_times}, grasp)
+        evidence = Evidence(runs, PUBLISHED, (), {"contact_times": contact_times}, grasp)
+        claims = check_claims("experiment", evidence)
         assert len(claims) == 7
         return [i for i, claim in enumerate(claims) if not claim["holds"]]
 
@@ -144,10 +144,3 @@ def test_the_root_mean_squares_are_by_table_and_count_white_once(runs: Runs) -> 
     assert rms({("white/white", 1, 2): 0.8})["contact_times"] == 0.0
     assert rms({("brown/white", 1, 2): 0.8})["mixed_colours"] == pytest.approx(0.8 / 8**0.5)
     assert rms({(0.02, 1, None): 0.8})["time_differences"] == pytest.approx(0.8 / 26**0.5)
-
-
-def test_a_row_is_compared_with_its_own_grasp(runs: Runs) -> None:
-    row = next(r for r in PUBLISHED if (r.condition, r.case, r.finger) == (0.04, 1, None))
-    made = changed(runs, Setting(0.04), 1, time_to_contact=[1.0, 3.0])
-    assert compared(row, made)["simulated"] == 2.0
-    assert compared(row, made)["difference"] == pytest.approx(-0.84)

@@ -12,15 +12,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from conftest import Run as Command
 from grasp_cosim import System
 from grasp_cosim.grasp.published import evaluate as module
-from grasp_cosim.grasp.published.evaluate import evaluate
+from grasp_cosim.grasp.published.evaluate import SOURCES, evaluate
 from grasp_cosim.grasp.published.grasps import Run, Runs, as_run
-from grasp_cosim.grasp.published.tables import Setting, simulated_rows
+from grasp_cosim.grasp.published.tables import Setting, published_rows
+from grasp_cosim.master.simulation import Session
 from grasp_cosim.recording.result import Result
-from report.runs import grasp_run
+from grasp_cosim.system.settings import settings
 
 Evaluated = Callable[..., dict[str, Any]]
 Judge = Callable[[Runs], list[int]]
@@ -39,7 +41,7 @@ TIMES, DIFFERENCES, SIMULTANEOUS, BALANCE, IMPACT, FORCE, TARGET = range(7)
 def runs() -> Runs:
     """The grasps as published, with what the table does not tell; Case 0 hits at 0.29 m/s."""
     times: dict[tuple[Setting, int], list[float]] = {}
-    for row in simulated_rows():
+    for row in published_rows("simulation"):
         if row.finger:
             times.setdefault((row.setting, row.case), []).append(row.published)
     times |= {(setting, 0): [0.1, 0.2] for setting, _ in list(times)}
@@ -61,7 +63,9 @@ def _run(setting: Setting, case: int, times: list[float]) -> Run:
 @pytest.fixture
 def evaluated(grasp: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Evaluated:
     """The report of an evaluation of made grasps, without its pictures."""
-    monkeypatch.setattr(module, "_draw", lambda *_: None)
+    how = replace(SOURCES["simulation"], draw_times=lambda *_: None)
+    monkeypatch.setattr(module, "SOURCES", {"simulation": how})
+    monkeypatch.setattr(module, "_draw_signals", lambda *_: None)
 
     def report(runs: Runs, **values: float) -> dict[str, Any]:
         monkeypatch.setattr(module, "run_all", lambda *_: iter(runs.values()))
@@ -127,6 +131,20 @@ def test_the_largest_deviation_is_said(evaluated: Evaluated, runs: Runs) -> None
     texts = [claim["text"] for claim in evaluated(shifted(runs, 1, 0.083, 0.062))["claims"]]
     assert "within 0.10 s of the published one (largest deviation 0.083 s)" in texts[TIMES]
     assert "within 0.03 s of the published one (largest deviation 0.021 s)" in texts[DIFFERENCES]
+
+
+def test_a_row_is_compared_with_its_own_grasp(evaluated: Evaluated, runs: Runs) -> None:
+    rows = evaluated(changed(runs, Setting(0.04), 1, time_to_contact=[1.0, 3.0]))["rows"]
+    off = {
+        (r["condition"], r["case"], r["finger"]): (r["simulated"], round(r["difference"], 9))
+        for r in rows
+        if round(r["difference"], 9)
+    }
+    assert off == {
+        (0.04, 1, 1): (1.0, 0.06),
+        (0.04, 1, 2): (3.0, 0.51),
+        (0.04, 1, None): (2.0, 0.45),
+    }
 
 
 # ------------------------------------------------------------------------ in themselves
@@ -240,37 +258,57 @@ def test_the_second_column_is_earlier_by_what_the_last_gap_takes(
 
 def test_that_gap_is_met_where_the_signal_says(grasp: System) -> None:
     """Of fingers that close 65 mm in 1 s and 85 mm in 1.2 s, evenly."""
-    made = grasp_run(2001)
-    result = Result(grasp, made.time, made.signals, {}, 1.0, True)
+    time = np.linspace(0.0, 2.0, 2001)
+    right = 0.065 * np.maximum(1.0 - time, 0.0)
+    left = 0.085 * np.maximum(1.0 - time / 1.2, 0.0)
+    signals: dict[str, Any] = {
+        "plant.object_position": np.full_like(time, 0.01),
+        "controller.target_position": 0.01 * np.minimum(2.0 * time, 1.5 - 0.25 * time),
+    }
+    for j, side, gap in ((1, 1.0, right), (2, -1.0, left)):
+        position = 0.01 + side * (0.035 + gap)
+        signals |= {
+            f"plant.gap[{j}]": gap,
+            f"plant.position[{j}]": position,
+            f"plant.velocity[{j}]": np.gradient(position, time),
+            f"plant.contact_force[{j}]": np.where(gap == 0.0, side * 3.4, 0.0),
+            f"plant.contact[{j}]": gap == 0.0,
+        }
+    result = Result(settings(grasp), time, signals, {}, 1.0, True)
     run = as_run(result, Setting(0.01), 2)
     assert run.times == pytest.approx((1.0, 1.2), abs=1e-9)
     expected = (1.0 - 0.37 / 65.0, 1.2 * (1.0 - 0.37 / 85.0))
     assert run.times_at_sensor_contact == pytest.approx(expected, abs=1e-9)
+    assert run.overshoot == pytest.approx(0.01 * 4.0 / 3.0 - 0.01, abs=1e-5)
+    assert run.off_target == pytest.approx(0.0, abs=1e-12)
 
 
 # ------------------------------------------------------------------------------- Ctrl-C
 
 
+@pytest.mark.parametrize("bench", [(), ("--bench",)])
 def test_ctrl_c_is_130_and_nothing_is_written(
-    command: Command, grasp: System, monkeypatch: pytest.MonkeyPatch
+    command: Command, monkeypatch: pytest.MonkeyPatch, bench: tuple[str, ...]
 ) -> None:
     """A grasp that was interrupted is none of the evaluation."""
-    made = grasp_run(11)
+    step = Session.step
 
-    def interrupted(system: System, **_: object) -> Result:
-        return Result(system, made.time, made.signals, {}, 1.0, complete=False)
+    def interrupted(self: Session, steps: int = 1) -> bool:
+        signal.raise_signal(signal.SIGINT)
+        return step(self, steps)
 
     def one_by_one(run: Callable[[Any], Run], jobs: list[Any], *_: object) -> Iterator[Run]:
         return map(run, jobs)
 
     monkeypatch.setattr(module, "run_all", one_by_one)
-    monkeypatch.setattr(module, "simulate", interrupted)
-    code, out, err = command("evaluate")
+    monkeypatch.setattr(Session, "step", interrupted)
+    code, out, err = command("evaluate", *bench)
     assert (code, out, err.split()) == (130, "", ["grasp-cosim:", "interrupted"])
     assert not list(Path().rglob("*.*"))
 
 
 @pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="this system has no /proc")
 def test_ctrl_c_ends_all_its_processes(fmus: Path, tmp_path: Path) -> None:
     """As a terminal sends it: to the command and to the processes in which the grasps run."""
     shutil.copytree(fmus, tmp_path / "fmus/build")

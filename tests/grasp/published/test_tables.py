@@ -5,7 +5,7 @@ from importlib.resources import files
 from pathlib import Path
 
 import pytest
-from grasp_cosim.grasp.published.tables import Row, Setting, experimental_rows, simulated_rows
+from grasp_cosim.grasp.published.tables import Row, Setting, published_rows
 
 SHARED = Path(__file__).parents[4] / "shared" / "paper"
 
@@ -15,7 +15,7 @@ def found(rows: list[Row]) -> dict[tuple[float | str, int, int | None], float]:
 
 
 def test_both_experimental_tables_are_there() -> None:
-    rows = experimental_rows()
+    rows = published_rows("experiment")
     assert len(rows) == (6 + 7) * 2 * 3
     figures = found(rows)
     assert figures[0.05, 1, 2] == 4.81
@@ -26,14 +26,14 @@ def test_both_experimental_tables_are_there() -> None:
 
 
 def test_white_on_both_sides_is_the_position_row() -> None:
-    figures = found(experimental_rows())
+    figures = found(published_rows("experiment"))
     for case in (1, 2):
         for finger in (1, 2, None):
             assert figures["white/white", case, finger] == figures[0.03, case, finger]
 
 
 def test_the_simulated_rows_are_the_other_half() -> None:
-    rows = simulated_rows()
+    rows = published_rows("simulation")
     assert len(rows) == 36
     assert found(rows)[0.03, 1, 1] == 1.15
 
