@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from .realtime.options import Realtime
     from .recording.load import load_run
     from .recording.result import Result
+    from .report.page import Scene
     from .system.description import System
 
 __all__ = [
@@ -88,6 +89,12 @@ def _draw_grasp(result: Result, path: Path) -> None:
     draw_grasp(result, path)
 
 
+def _grasp_scene(result: Result) -> Scene | None:
+    from .grasp.scene import grasp_scene
+
+    return grasp_scene(result)
+
+
 def _draw_signals(result: Result, path: Path) -> None:
     from .report.plot import plot_signals
 
@@ -97,5 +104,5 @@ def _draw_signals(result: Result, path: Path) -> None:
 extensions.readers |= {".toml": _read_toml, ".ssp": _read_ssp}
 if find_spec(f"{__name__}.grasp"):
     extensions.metrics.append(_grasp_metrics)
-    extensions.drawings.append(extensions.Drawing("grasp", _is_grasp, _draw_grasp))
+    extensions.drawings.append(extensions.Drawing("grasp", _is_grasp, _draw_grasp, _grasp_scene))
 extensions.drawings.append(extensions.Drawing("signals", lambda _: True, _draw_signals))

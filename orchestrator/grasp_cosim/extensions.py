@@ -17,11 +17,15 @@ metrics: list[Callable[[], Iterable[Any]]] = []
 
 
 class Drawing(NamedTuple):
-    """A picture of a result: its file's stem, if it fits a result, how to draw it at a path."""
+    """A picture of a result: its file's stem, if it fits a result, how to draw it at a path.
+
+    `scene` makes what the page of such a result has besides (`report.page.Scene`), or None.
+    """
 
     stem: str
     fits: Callable[[Any], bool]
     draw: Callable[[Any, Path], None]
+    scene: Callable[[Any], Any] = lambda _: None
 
 
 drawings: list[Drawing] = []

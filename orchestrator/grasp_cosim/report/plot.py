@@ -1,7 +1,12 @@
-"""Pictures of any result, drawn with matplotlib (the optional extra `plot`)."""
+"""Pictures of any result, drawn with matplotlib (the optional extra `plot`); what they share."""
 
 from __future__ import annotations
 
+import re
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +19,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 BLUE, RED, GREY = "#1f5fa8", "#c0392b", "#7f7f7f"
+COLORS = (BLUE, RED, GREY)
+"""The colours of several things, in turn."""
+
 DPI = 130
 """Of the pictures."""
 
@@ -22,7 +30,7 @@ MOST_NAMED = 12
 
 
 def plot_signals(run: Result, path: Path) -> None:
-    """All signals of any run over time as a PNG, those of the same unit together."""
+    """Draw all signals of any run over time as a PNG, those of the same unit together."""
     units = list(dict.fromkeys(run.units[name] or "" for name in run.signals))
     figure = new_figure(9.0, 1.2 + 2.2 * max(len(units), 1))
     for axes, unit in zip(
@@ -37,7 +45,7 @@ def plot_signals(run: Result, path: Path) -> None:
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """An empty figure, sizes in inches; InputError without matplotlib."""
+    """Return an empty figure, sizes in inches; InputError without matplotlib."""
     try:
         from matplotlib.figure import Figure
     except ImportError as error:
@@ -56,12 +64,37 @@ def save(figure: Figure, path: Path) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     canvas: Any = FigureCanvasAgg(figure)
-    with in_one_piece(path) as part:
+    with in_one_piece(path) as part, _any_letter():
         canvas.print_png(part, metadata={"Software": None})
 
 
+def as_svg(figure: Figure) -> str:
+    """Return the figure as an SVG element for a page: letters as shapes, the same bytes each time.
+
+    It takes the width that the page gives it.
+    """
+    from matplotlib import rc_context
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+    canvas: Any = FigureCanvasSVG(figure)
+    file = StringIO()
+    with rc_context({"svg.hashsalt": "grasp-cosim", "svg.fonttype": "path"}), _any_letter():
+        canvas.print_svg(file, metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
+    _, start, text = file.getvalue().partition("<svg ")
+    text = re.sub(r'(width|height)="[^"]*pt" ', "", text, count=2)
+    return start + text.replace("*{stroke", ".chart *{stroke", 1)  # its rule is for all else
+
+
+@contextmanager
+def _any_letter() -> Iterator[None]:
+    """Let a letter that the font lacks be drawn as a box, which says it too, without a warning."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing")
+        yield
+
+
 def finish(axes: Axes, label: str, legend: bool = True) -> None:
-    """What all axes have: a label of the values, a grid, and a legend unless it is too long."""
+    """Give axes a label of the values and a grid, and a legend unless it is too long."""
     axes.set_ylabel(label)
     axes.grid(True, color="#dddddd", linewidth=0.6)
     if legend:

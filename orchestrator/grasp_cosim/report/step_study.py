@@ -5,14 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .plot import BLUE, GREY, RED, finish, new_figure, save
+from .plot import COLORS, GREY, finish, new_figure, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from ..convergence.step_study import StepStudy
 
-COLORS = (BLUE, RED, GREY)
 MARKERS = ("o", "s", "^", "D", "v", "P")
 """One per quantity or energy, so that lines on top of each other can be told apart."""
 

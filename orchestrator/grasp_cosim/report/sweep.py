@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -35,12 +34,6 @@ def draw_sweep(sweep: Sweep, folder: Path) -> list[Path]:
 
     A metric that no run has is drawn as that. InputError without matplotlib.
     """
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Glyph .* missing")  # shown as a box, which says it too
-        return _draw_pictures(sweep, folder)
-
-
-def _draw_pictures(sweep: Sweep, folder: Path) -> list[Path]:
     drawn = []
     pictures = sweep.study.pictures
     if pictures.map:

@@ -1,29 +1,29 @@
-"""The figure of a paced run's timing: how long the parts of a step took, and its overruns."""
+"""The chart of a paced run's timing: how long the parts of a step took, and its overruns.
+
+A curve is the share of the steps that took longer than a time, over that time, both logarithmic:
+the tail, which decides whether a loop keeps its period, takes as much room as the bulk. A histogram
+would show one step in a million as nothing. Times are in s.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+from itertools import accumulate
+from math import ceil, floor, log10
 from pathlib import Path
 from textwrap import fill
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..realtime.timing import Timing
-from .plot import GREY, RED, finish, new_figure, save
+from ..realtime.timing import Histogram, Spread, Timing
+from .plot import GREY, RED, as_svg, finish, new_figure, save
 from .tables import count
-from .timing_curves import (
+from .timing_words import (
+    BACKLOG,
     QUANTILES,
-    SHORTEST,
-    TOP,
-    Curve,
-    Look,
-    axes,
     culprits,
-    curves,
-    decades,
     duration,
     kept,
     label,
-    late_decades,
-    looks,
     percent,
     quantiles,
     unlisted,
@@ -31,14 +31,20 @@ from .timing_curves import (
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.legend import Legend
+    from matplotlib.figure import Figure
 
-COLORS = {
-    "--ink": "#1d2023", "--muted": "#8a9098",
-    "--c0": "#1b7f79", "--c1": "#b26b00", "--c2": "#7a4fa3", "--c3": "#4c7a1f",
-    "--c4": "#a83279", "--c5": "#5b6470", "--c6": "#2f6fb3", "--c7": "#8c4a2f",
-}  # fmt: skip
-"""Those of the page, by CSS variable."""
+COLORS = (
+    "#1b7f79", "#b26b00", "#7a4fa3", "#4c7a1f", "#a83279", "#5b6470", "#2f6fb3", "#8c4a2f",
+)  # fmt: skip
+"""Those of components; then come the same ones dashed."""
+
+INK, MUTED = "#1d2023", "#8a9098"
+
+DASHES, MARKERS = ("-", "--", ":"), ("o", "D", "s")
+"""By Look.dash."""
+
+SHORTEST = 1e-7
+"""s; an axis begins here at the earliest, where the clock itself is no longer exact."""
 
 MOST_STEMS = 100
 """With more overruns there are no lines down to the axis: they would be a wall."""
@@ -52,143 +58,213 @@ HANDLE = 5
 LETTER = 0.602
 """The width of a letter of DejaVu Sans Mono, as a share of its size."""
 
-DASHES = ("-", "--", ":")
-MARKERS = ("o", "D", "s")
-"""By Look.dash."""
+Point = tuple[float, float]
+"""A time, and the share of the steps that took longer."""
+
+
+class Look(NamedTuple):
+    """How a part is drawn: its colour, and the place of its line and marker in DASHES, MARKERS."""
+
+    color: str
+    dash: int
+
+
+class Curve(NamedTuple):
+    """A part of a step as points from left to right; marks are quantiles and worst."""
+
+    part: str
+    points: tuple[Point, ...]
+    marks: dict[str, Point]
+
+
+OTHERS = {
+    "step": Look(INK, 0),
+    "start": Look(INK, 1),
+    "between": Look(INK, 2),
+    "exchange": Look(MUTED, 0),
+    "recording": Look(MUTED, 1),
+    BACKLOG: Look(MUTED, 2),
+}
+"""The looks of all that is no component."""
 
 
 def draw_timing(timing: Timing, end: float, path: Path) -> None:
-    """The distribution of each part above, the overruns over the run below, as a PNG.
+    """Draw the chart as a PNG, under a sentence on what was kept.
 
-    end is the simulated time in s at the end of the run. InputError without matplotlib.
+    `end` is the simulated time in s at the end of the run. InputError without matplotlib.
     """
-    figure = new_figure(12.0, 8.6)
+    figure = _figure(timing, end)
     title = fill(kept(timing), WIDTH)  # matplotlib's own wrapping takes dollars for formulas
     figure.suptitle(title, fontsize=11, x=0.01, ha="left", parse_math=False)
-    above, below = figure.subplots(2, 1, height_ratios=[1.7, 1.0])
-    _draw_distributions(above, timing)
-    _draw_overruns(below, timing, end)
     save(figure, path)
 
 
-def _draw_distributions(place: Axes, timing: Timing) -> None:
+def timing_svg(timing: Timing, end: float) -> str:
+    """Return the chart as an SVG element, see draw_timing."""
+    return as_svg(_figure(timing, end))
+
+
+def _figure(timing: Timing, end: float) -> Figure:
+    """The distribution of each part above, the overruns over the run below."""
+    figure = new_figure(12.0, 8.6)
+    above, below = figure.subplots(2, 1, height_ratios=[1.7, 1.0])
+    _draw_distributions(above, timing)
+    _draw_overruns(below, timing, end)
+    return figure
+
+
+def looks(timing: Timing) -> dict[str, Look]:
+    """Return the look of every part and culprit: components in colours, all else black and grey."""
+    components = [name for name in (*timing.parts, *timing.culprits) if name not in OTHERS]
+    return OTHERS | {
+        name: Look(COLORS[k % len(COLORS)], k // len(COLORS) % len(DASHES))
+        for k, name in enumerate(dict.fromkeys(components))
+    }
+
+
+def curves(timing: Timing) -> list[Curve]:
+    """Return the curve of each part, the whole step last and so on top."""
+    drawn = [
+        _curve(part, timing.parts[part], histogram) for part, histogram in timing.histograms.items()
+    ]
+    return sorted(drawn, key=lambda curve: curve.part == "step")
+
+
+def _curve(part: str, spread: Spread, histogram: Histogram) -> Curve:
+    edges, counts = histogram
+    tails = list(accumulate(reversed(counts)))[::-1]
+    total = tails[0]
+    # Where nothing fell between two edges the line is level: its ends are enough.
+    bins = [
+        (edges[k], tails[k] / total)
+        for k in range(len(counts))
+        if tails[k] and (counts[k] or (k and counts[k - 1]))
+    ]
+    one = 1.0 / total
+    figures, shares = quantiles(spread), {**QUANTILES, "worst": one}
+    marks = {name: (figures[name], share) for name, share in shares.items() if share >= one}
+    points = sorted({*bins, *marks.values()}, key=lambda p: (p[0], -p[1]))
+    return Curve(part, tuple(points), marks)
+
+
+def decades(times: Iterable[float]) -> tuple[float, float]:
+    """Return powers of ten that hold the times in s, with some room above; 0 s is SHORTEST."""
+    logs = [log10(max(t, SHORTEST)) for t in times if t]
+    low = floor(min(logs, default=log10(SHORTEST)))
+    return 10.0**low, 10.0 ** max(ceil(max(logs, default=low) + 0.05), low + 1)
+
+
+def _draw_distributions(axes: Axes, timing: Timing) -> None:
     """The share of the steps that took longer over the time, of each part."""
-    drawn, look = curves(timing), looks(timing)
-    span = axes(drawn, timing.period)
+    drawn, look, period = curves(timing), looks(timing), timing.period
     for curve in drawn:
-        _draw_curve(place, curve, look[curve.part], span.left)
-    period = timing.period
-    place.axvline(period, color=RED, linewidth=1.6)
-    place.axvspan(period, span.right, color=RED, alpha=0.07, linewidth=0.0)
-    place.annotate(
+        _draw_curve(axes, curve, look[curve.part])
+    points = [point for curve in drawn for point in curve.points]
+    left, right = decades([period, *(t for t, _ in points)])
+    bottom = 10.0 ** floor(log10(min([share for _, share in points], default=0.1)) - 1e-9)
+    axes.axvline(period, color=RED, linewidth=1.6)
+    axes.axvspan(period, right, color=RED, alpha=0.07, linewidth=0.0)
+    axes.annotate(
         f"period {duration(period)}", (period, 1.0), (0, 3), xycoords=("data", "axes fraction"),
         textcoords="offset points", ha="center", va="bottom", fontsize=9, color=RED,
     )  # fmt: skip
     for name, share in QUANTILES.items():
-        if share <= span.bottom:
+        if share <= bottom:
             continue
-        place.axhline(share, color=GREY, linestyle=":", linewidth=0.9)
-        place.annotate(
+        axes.axhline(share, color=GREY, linestyle=":", linewidth=0.9)
+        axes.annotate(
             name, (0.0, share), (5, 2), xycoords=("axes fraction", "data"),
             textcoords="offset points", fontsize=9, color=GREY,
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.8},
         )  # fmt: skip
-    place.set(xscale="log", yscale="log")
-    place.set(xlim=(span.left, span.right), ylim=(span.bottom, TOP))
-    _ticks(place, "x", span.left, span.right)
-    shares = decades(span.bottom, 1.0)
-    place.set_yticks(shares, [percent(share) for share in shares])
-    place.set_yticks([], minor=True)
-    place.set_xlabel("time")
-    finish(place, "share that took longer", legend=False)
-    _legend(place, timing, drawn)
+    axes.set(xscale="log", yscale="log", xlim=(left, right), ylim=(bottom, 1.5), xlabel="time")
+    axes.xaxis.set_major_formatter(_duration)
+    axes.yaxis.set_major_formatter(lambda share, _: percent(share))
+    axes.minorticks_off()
+    finish(axes, "share that took longer", legend=False)
+    _key(axes, timing)
 
 
-def _draw_curve(place: Axes, curve: Curve, look: Look, left: float) -> None:
-    color = COLORS[look.color]
-    x, y = zip(*((max(t, left), share) for t, share in curve.points), strict=True)
-    width = 2.2 if curve.part == "step" else 1.3
-    place.plot(x, y, DASHES[look.dash], color=color, linewidth=width, label=curve.part)
-    marks = [(max(t, left), share) for t, share in curve.marks.values()]
-    place.plot(*zip(*marks[:-1], strict=True) if marks[:-1] else ([], []), ".", color=color)
-    place.plot(*marks[-1], "o", color=color, mfc="white", markersize=5, clip_on=False)
+def _draw_curve(axes: Axes, curve: Curve, look: Look) -> None:
+    line, *marks = (
+        [(max(t, SHORTEST), share) for t, share in points]
+        for points in (curve.points, [*curve.marks.values()][:-1], [curve.marks["worst"]])
+    )
+    axes.plot(
+        *_columns(line), DASHES[look.dash], color=look.color, label=curve.part,
+        linewidth=2.2 if curve.part == "step" else 1.3,
+    )  # fmt: skip
+    axes.plot(*_columns(marks[0]), ".", color=look.color)
+    axes.plot(*_columns(marks[1]), "o", color=look.color, mfc="white", markersize=5, clip_on=False)
 
 
-def _legend(place: Axes, timing: Timing, drawn: list[Curve]) -> None:
+def _columns(points: Sequence[Point]) -> tuple[list[float], list[float]]:
+    return [x for x, _ in points], [y for _, y in points]
+
+
+def _key(axes: Axes, timing: Timing) -> None:
     """The parts in the order of the step, with their figures: a table beside the curves."""
-    lines = {line.get_label(): line for line in place.lines}
-    parts = [part for part in timing.parts if part in {curve.part for curve in drawn}]
-    names = {part: label(part) for part in parts}
-    wide = max(map(len, names.values()), default=0)
-    figures = {part: quantiles(timing.parts[part]) for part in parts}
+    lines = {line.get_label(): line for line in axes.lines}
+    wide = max((len(label(part)) for part in timing.parts), default=0)
     heads = (*QUANTILES, "worst")
     title = " " * (HANDLE + wide + 1) + "".join(f"{head:>9s}" for head in heads)
     rows = [
-        f"{names[part]:{wide}s} " + "".join(f"{duration(t):>9s}" for t in figures[part].values())
-        for part in parts
+        f"{label(part):{wide}s} "
+        + "".join(f"{duration(t):>9s}" for t in quantiles(spread).values())
+        for part, spread in timing.parts.items()
     ]
     font = {"family": "DejaVu Sans Mono", "size": 8}
-    legend = place.legend(
-        [lines[part] for part in parts], rows, loc="upper left", bbox_to_anchor=(1.01, 1.0),
-        title=title, alignment="left", prop=font, title_fontproperties=font,
-        frameon=False, handlelength=HANDLE * LETTER - 0.8, handletextpad=0.8,
+    _legend(
+        axes, [lines[part] for part in timing.parts], rows, title=title, prop=font,
+        title_fontproperties=font, handlelength=HANDLE * LETTER - 0.8, handletextpad=0.8,
     )  # fmt: skip
-    _plain(legend)
 
 
-def _draw_overruns(place: Axes, timing: Timing, end: float) -> None:
+def _draw_overruns(axes: Axes, timing: Timing, end: float) -> None:
     """How late each listed step ended, over the time of the run, in the colour of its culprit."""
     listed = timing.listed
-    place.set_xlim(0.0, max(end, SHORTEST))
-    place.set_xlabel("time in the run in s")
+    axes.set_xlim(0.0, max(end, SHORTEST))
+    axes.set_xlabel("time in the run in s")
+    finish(axes, "late by", legend=False)
     if not listed:
-        place.set_yticks([])
-        place.text(0.5, 0.5, "no overruns", transform=place.transAxes, ha="center", color=GREY)
-        finish(place, "late by", legend=False)
+        axes.set_yticks([])
+        axes.text(0.5, 0.5, "no overruns", transform=axes.transAxes, ha="center", color=GREY)
         return
     look = looks(timing)
     few = len(listed) <= MOST_STEMS
-    low, high = late_decades(listed)
+    low, high = decades(o.late for o in listed)
     for part, times in culprits(timing):  # the rarest on top
         points = [(o.time, max(o.late, low)) for o in listed if o.culprit == part]
-        if points:
-            color, dash = COLORS[look[part].color], look[part].dash
-            x, y = zip(*points, strict=True)
-            if few:
-                place.vlines(x, low, y, color=color, linewidth=0.8, alpha=0.4)
-            place.plot(
-                x, y, MARKERS[dash], color=color, mfc="white" if dash else color,
-                markersize=5.0 if few else 3.0, clip_on=False,
-                label=f"{count(times)} × {label(part)}",
-            )  # fmt: skip
-    place.set(yscale="log", ylim=(low, high))
-    _ticks(place, "y", low, high)
-    _unlisted(place, timing, end)
-    finish(place, "late by", legend=False)
-    legend = place.legend(
-        loc="upper left", bbox_to_anchor=(1.01, 1.0), title="what took too long", fontsize=9,
-        title_fontsize=9, alignment="left", frameon=False,
-    )  # fmt: skip
-    _plain(legend)
-
-
-def _plain(legend: Legend) -> None:
-    """A name with dollars is no formula."""
-    for text in legend.get_texts():
-        text.set_parse_math(False)
-
-
-def _unlisted(place: Axes, timing: Timing, end: float) -> None:
-    """Shade the part of the run whose overruns were counted only."""
-    if rest := unlisted(timing):
-        place.axvspan(timing.listed[-1].time, end, color=GREY, alpha=0.15, linewidth=0.0)
+        if not points:
+            continue
+        color, dash = look[part]
+        times_in_run, lates = _columns(points)
+        if few:
+            axes.vlines(times_in_run, low, lates, color=color, linewidth=0.8, alpha=0.4)
+        axes.plot(
+            times_in_run, lates, MARKERS[dash], color=color, mfc="white" if dash else color,
+            markersize=5.0 if few else 3.0, clip_on=False, label=f"{count(times)} × {label(part)}",
+        )  # fmt: skip
+    axes.set(yscale="log", ylim=(low, high))
+    axes.yaxis.set_major_formatter(_duration)
+    axes.minorticks_off()
+    if rest := unlisted(timing):  # shade the part of the run whose overruns were counted only
+        axes.axvspan(listed[-1].time, end, color=GREY, alpha=0.15, linewidth=0.0)
         text = f"grey: {count(rest)} more, counted only"
-        place.set_title(text, fontsize=9, loc="right", color=GREY)
+        axes.set_title(text, fontsize=9, loc="right", color=GREY)
+    _legend(axes, title="what took too long", fontsize=9, title_fontsize=9)
 
 
-def _ticks(place: Axes, axis: str, low: float, high: float) -> None:
-    """Times at the decades."""
-    at = decades(low, high)
-    set_ticks = place.set_xticks if axis == "x" else place.set_yticks
-    set_ticks(at, [duration(t) for t in at])
-    set_ticks([], minor=True)
+def _legend(axes: Axes, *entries: Sequence[Any], **options: Any) -> None:
+    """A legend to the right of the axes."""
+    legend = axes.legend(
+        *entries, loc="upper left", bbox_to_anchor=(1.01, 1.0), alignment="left", frameon=False,
+        **options,
+    )  # fmt: skip
+    for text in legend.get_texts():
+        text.set_parse_math(False)  # a name with dollars is no formula
+
+
+def _duration(seconds: float, _: float) -> str:
+    """A label of an axis of times."""
+    return duration(seconds)

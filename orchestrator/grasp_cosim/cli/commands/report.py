@@ -30,7 +30,8 @@ def report(run: Path, out: Path | None, as_json: bool) -> int:
     recorded = load_run(run)
     page = out or run / "report.html"
     check_folder(page.parent)
-    write_page(recorded, run.resolve().name, page)
+    scene = recorded.drawing.scene(recorded)
+    write_page(recorded, run.resolve().name, page, scene=scene)
     picture = page.parent / f"{recorded.drawing.stem}.png"
     pictures = []
     try:

@@ -4,7 +4,7 @@
 const FOLD = 8; // rows (or blocks) per block of the next level
 
 // Bytes in eight planes, least significant first, hold the second differences of the bit patterns
-// of doubles, modulo 2^64 (figures/embed.py). The sums are taken in halves of 32 bits.
+// of doubles, modulo 2^64 (report/embed.py). The sums are taken in halves of 32 bits.
 function unpack(planes, rows) {
   const values = new Float64Array(rows), words = new Uint32Array(values.buffer);
   const word = (i, plane) => (planes[plane * rows + i] | planes[(plane + 1) * rows + i] << 8

@@ -76,7 +76,7 @@ function key(event) {
     "+": () => zoom(middle - 0.25 * span, middle + 0.25 * span),
     "-": () => zoom(middle - span, middle + span),
     0: () => zoom(recording.first, recording.last),
-    " ": () => grasp && play(!playing),
+    " ": () => scene && scene.toggle(),
   }[event.key];
   if (!does) return;
   event.preventDefault();
@@ -120,31 +120,11 @@ function connect() {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
 }
 
-async function connectGrasp() {
-  const names = page.grasp.signals;
-  const series = await Promise.all(names.map((name) => recording.series(name)));
-  grasp = new Grasp(recording, page.grasp, new Map(series.map((one) => [one.name, one])));
-  find("scrub").min = recording.first;
-  find("scrub").max = recording.last;
-  find("scrub").addEventListener("input", () => {
-    play(false);
-    seek(Number(find("scrub").value));
-  });
-  find("play").addEventListener("click", () => play(!playing));
-  find("speed").addEventListener("change", redraw);
-  for (const button of document.querySelectorAll("button[data-at]")) {
-    button.addEventListener("click", () => {
-      play(false);
-      seek(Number(button.dataset.at));
-    });
-  }
-}
-
 async function begin() {
   await recording.start();
   cursor = recording.first;
   view = whole();
-  if (page.grasp) await connectGrasp();
+  if (page.scene) scene = await startScene(page.scene);
   connect();
   find("signals").open = innerWidth > 760;
   await recall();

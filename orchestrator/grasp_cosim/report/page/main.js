@@ -4,11 +4,10 @@
 const page = JSON.parse(document.getElementById("page").textContent);
 const state = document.documentElement.dataset;
 const find = (id) => document.getElementById(id);
-const SLOW = 0.02, AROUND = [0.015, 0.06]; // simulated s per s, and s before and after a contact
 
 const recording = new Recording(page);
-let view = null, cursor = 0, hover = null, panels = [], grasp = null, chosen = [...page.shown];
-let playing = false, before = 0, due = false, asked = 0;
+let view = null, cursor = 0, hover = null, panels = [], scene = null, chosen = [...page.shown];
+let due = false, asked = 0;
 
 const clamp = (v, low, high) => Math.min(Math.max(v, low), high);
 const whole = () => ({ from: recording.first, to: Math.max(recording.last, recording.first + 1e-9) });
@@ -36,12 +35,7 @@ function draw() {
   for (const panel of panels) panel.draw(view, page.marks, cursor, hover);
   overview();
   find("span").textContent = `${clock(view.from)} to ${clock(view.to)}`;
-  if (grasp) {
-    grasp.draw(cursor, chosenSpeed() || SLOW);
-    find("scrub").value = cursor;
-    find("clock").textContent = clock(cursor);
-    find("pace").textContent = chosenSpeed() ? "" : `${speed()} × real time`;
-  }
+  if (scene) scene.draw();
   remember();
 }
 
@@ -69,13 +63,13 @@ function overview() {
 // Panels -------------------------------------------------------------------------------------
 const stem = (name) => name.slice(name.indexOf(".") + 1).replace(/\[[^\]]*\]$/, "");
 
-function styles(series) { // blue and red for the fingers of a grasp, else colours in turn
+function styles(series) { // the colours that signals have, else colours in turn
   const kinds = [...new Set(series.map((one) => stem(one.name)))];
   return series.map((one, i) => {
-    const finger = page.grasp && /(?:\[([12])\]|_([12])\..*)$/.exec(one.name);
-    const dash = find("by").value === "unit" ? kinds.indexOf(stem(one.name)) % DASHES.length : 0;
-    if (finger) return { ...one, style: { color: `--finger${finger[1] || finger[2]}`, dash } };
-    return { ...one, style: { color: PALETTE[i % PALETTE.length], dash: 0 } };
+    const own = page.colors[one.name];
+    const dash = own && find("by").value === "unit" ? kinds.indexOf(stem(one.name)) : 0;
+    return { ...one,
+      style: { color: own || PALETTE[i % PALETTE.length], dash: dash % DASHES.length } };
   });
 }
 
@@ -125,32 +119,4 @@ function recall() { // what the address asks for; what it does not say stays
   if (asks.get("at")) cursor = clamp(Number(asks.get("at")) || 0, recording.first, recording.last);
   const names = asks.has("show") ? asks.get("show").split(",") : chosen;
   return choose(names.filter((name) => recording.byName.has(name)));
-}
-
-// The animation ------------------------------------------------------------------------------
-const chosenSpeed = () => Number(find("speed").value); // 0: slow around contacts
-
-function speed() {
-  const { contacts } = page.grasp;
-  const near = contacts.some((c) => cursor >= c.t - AROUND[0] && cursor < c.t + AROUND[1]);
-  return chosenSpeed() || (near ? SLOW : 1);
-}
-
-function play(on) {
-  playing = on;
-  find("play").textContent = on ? "Pause" : "Play";
-  if (on && cursor >= recording.last) cursor = recording.first;
-  before = performance.now();
-  if (on) requestAnimationFrame(advance);
-}
-
-function advance(now) {
-  if (!playing) return;
-  // A frame ends at the next change of speed at the latest, so that no contact is jumped over.
-  const edges = page.grasp.contacts.flatMap((c) => [c.t - AROUND[0], c.t + AROUND[1]]);
-  const next = cursor + speed() * Math.min((now - before) / 1000, 0.1);
-  seek(Math.min(next, ...edges.filter((t) => t > cursor + 1e-9)));
-  before = now;
-  if (cursor >= recording.last) play(false);
-  else requestAnimationFrame(advance);
 }

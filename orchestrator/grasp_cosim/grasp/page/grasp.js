@@ -4,6 +4,7 @@
 const THICK = 24, TALL = 96, MIDDLE = 92, FLOOR = 168; // px of the side view
 const LENS = 2e-3; // m across a magnified contact
 const FLASH = 0.25; // s of real time that a new contact glows
+const SLOW = 0.02, AROUND = [0.015, 0.06]; // simulated s per s, and s before and after a contact
 const SIDE = { 1: 1, 2: -1 }; // where the finger is, seen from the object
 
 class Grasp {
@@ -11,7 +12,7 @@ class Grasp {
     this.recording = recording;
     this.plan = plan; // names of signals, contacts: [{t, finger}]
     this.series = series; // by name
-    this.canvas = document.getElementById("scene");
+    this.canvas = document.getElementById("fingers");
     const reach = (name) => {
       const top = series.get(name).levels.at(-1);
       return [Math.min(...top.low), Math.max(...top.high)];
@@ -183,4 +184,60 @@ class Grasp {
       cell.textContent = series.steps ? (value ? "yes" : "no") : `${text(value * factor)} ${unit}`;
     }
   }
+}
+
+// Playing it ---------------------------------------------------------------------------------
+let playing = false, before = 0;
+const chosenSpeed = () => Number(find("speed").value); // 0: slow around contacts
+
+function speed() {
+  const { contacts } = page.scene;
+  const near = contacts.some((c) => cursor >= c.t - AROUND[0] && cursor < c.t + AROUND[1]);
+  return chosenSpeed() || (near ? SLOW : 1);
+}
+
+function play(on) {
+  playing = on;
+  find("play").textContent = on ? "Pause" : "Play";
+  if (on && cursor >= recording.last) cursor = recording.first;
+  before = performance.now();
+  if (on) requestAnimationFrame(advance);
+}
+
+function advance(now) {
+  if (!playing) return;
+  // A frame ends at the next change of speed at the latest, so that no contact is jumped over.
+  const edges = page.scene.contacts.flatMap((c) => [c.t - AROUND[0], c.t + AROUND[1]]);
+  const next = cursor + speed() * Math.min((now - before) / 1000, 0.1);
+  seek(Math.min(next, ...edges.filter((t) => t > cursor + 1e-9)));
+  before = now;
+  if (cursor >= recording.last) play(false);
+  else requestAnimationFrame(advance);
+}
+
+async function startScene(plan) {
+  const names = plan.signals;
+  const series = await Promise.all(names.map((name) => recording.series(name)));
+  const grasp = new Grasp(recording, plan, new Map(series.map((one) => [one.name, one])));
+  find("scrub").min = recording.first;
+  find("scrub").max = recording.last;
+  find("scrub").addEventListener("input", () => {
+    play(false);
+    seek(Number(find("scrub").value));
+  });
+  find("play").addEventListener("click", () => play(!playing));
+  find("speed").addEventListener("change", redraw);
+  for (const button of document.querySelectorAll("button[data-at]")) {
+    button.addEventListener("click", () => {
+      play(false);
+      seek(Number(button.dataset.at));
+    });
+  }
+  const draw = () => {
+    grasp.draw(cursor, chosenSpeed() || SLOW);
+    find("scrub").value = cursor;
+    find("clock").textContent = clock(cursor);
+    find("pace").textContent = chosenSpeed() ? "" : `${speed()} × real time`;
+  };
+  return { draw, toggle: () => play(!playing) };
 }

@@ -1,0 +1,140 @@
+"""The scene of a grasp for its page: the fingers moving, their contacts, their colours."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from html import escape
+from importlib.resources import files
+from string import Template
+
+import numpy as np
+
+from ..metrics.metric import resolved
+from ..recording.result import Result
+from ..report.page import Scene, Zoom
+from .metrics import FINGERS, first_contact, is_grasp
+
+BEFORE, AFTER = 0.005, 0.03
+"""s around a contact that a button zooms to."""
+
+QUANTITIES = {
+    "gap": "gap", "velocity": "velocity", "contact_force": "contact force", "contact": "touches",
+    "actuator": "actuator force",
+}  # fmt: skip
+"""Heads of the table below the animation, by quantity of a finger."""
+
+Contact = Mapping[str, float]
+"""A moment `t` in s at which a `finger` begins to touch."""
+
+
+def grasp_scene(result: Result) -> Scene | None:
+    """Return the scene of a result; None where it is no grasp."""
+    if not is_grasp(result.by_role):
+        return None
+    named = _signals(result)
+    contacts = _contacts(result)
+    target = resolved("controller.target_position", result.roles)
+    used = [name for by_finger in named.values() for name in by_finger.values()]
+    shown = [
+        named[quantity][j] for quantity in ("gap", "contact_force", "velocity") for j in FINGERS
+    ]
+    return Scene(
+        title="Grasp",
+        html=_html(named, contacts),
+        style=_text("grasp.css"),
+        scripts=_text("grasp.js"),
+        state={**named, "target": target, "signals": [*used, target], "contacts": contacts},
+        shown=[*shown, target],
+        colors=_colors(result),
+        marks=[(c["t"], f"--finger{c['finger']}") for c in contacts],
+        zooms=_zooms(contacts),
+    )
+
+
+def _text(name: str) -> str:
+    return (files(__package__) / "page" / name).read_text("utf-8")
+
+
+def _signals(result: Result) -> dict[str, dict[int, str]]:
+    """The signals that the animation is drawn from, by quantity and finger."""
+    quantities = ("position", "gap", "velocity", "contact_force", "contact")
+    return {
+        **{q: {j: resolved(f"plant.{q}[{j}]", result.roles) for j in FINGERS} for q in quantities},
+        "actuator": _actuators(result),
+    }
+
+
+def _actuators(result: Result) -> dict[int, str]:
+    """The recorded signal that is the force on each finger as it is, where there is one."""
+    forces = {resolved(f"plant.force[{j}]", result.roles): j for j in FINGERS}
+    return {
+        forces[c["to"]]: c["from"]
+        for c in result.settings["connections"]
+        if c["to"] in forces
+        and result.units.get(c["from"]) == "N"
+        and c["factor"] in (None, 1.0)
+        and not c["offset"]
+    }
+
+
+def _contacts(result: Result) -> list[Contact]:
+    """Each moment at which a finger begins to touch, in order of time.
+
+    The first one of each finger is that of the metrics, later ones are the samples themselves.
+    """
+    found = []
+    for j in FINGERS:
+        touching = np.asarray(result.by_role[f"plant.contact[{j}]"]).astype(bool)
+        begins = np.flatnonzero(touching[1:] & ~touching[:-1]) + 1
+        first = first_contact(result.by_role, j)
+        later = begins if touching[0] else begins[1:]
+        moments = ([first.time] if first else []) + result.time[later].tolist()
+        found += [{"t": t, "finger": j} for t in moments]
+    return sorted(found, key=lambda c: c["t"])
+
+
+def _firsts(contacts: Sequence[Contact]) -> dict[int, float]:
+    """The first contact of each finger, in s."""
+    return {j: c["t"] for j in FINGERS for c in contacts[::-1] if c["finger"] == j}
+
+
+def _colors(result: Result) -> dict[str, str]:
+    """The colours of signals that are of one finger: those of an element [1], of a sensor_1."""
+    found = {name: re.search(r"(?:\[([12])\]|_([12])\..*)$", name) for name in result.signals}
+    return {name: f"--finger{m[1] or m[2]}" for name, m in found.items() if m}
+
+
+def _zooms(contacts: Sequence[Contact]) -> list[Zoom]:
+    """Buttons that zoom to the first contacts."""
+    firsts = _firsts(contacts)
+    spans = [(f"Contact of finger {j}", t, t, f"f{j}") for j, t in firsts.items()]
+    if len(firsts) > 1:
+        spans.append(("Both contacts", min(firsts.values()), max(firsts.values()), ""))
+    return [Zoom(text, a - BEFORE, b + AFTER, kind) for text, a, b, kind in spans]
+
+
+def _html(named: Mapping[str, Mapping[int, str]], contacts: Sequence[Contact]) -> str:
+    """The canvas of the animation, its buttons, and the values at its time."""
+    jumps = "\n".join(
+        f'<button type="button" class="f{j}" data-at="{max(t - BEFORE, 0.0)!r}">'
+        f"Before contact {j}</button>"
+        for j, t in _firsts(contacts).items()
+    )
+    shown = {quantity: head for quantity, head in QUANTITIES.items() if named[quantity]}
+    rows = [
+        f'<tr><td><span class="key{j}">finger {j}</span></td>'
+        + "".join(_cell(named[quantity].get(j)) for quantity in shown)
+        + "</tr>"
+        for j in FINGERS
+    ]
+    heads = "".join(f'<th class="n">{head}</th>' for head in shown.values())
+    rows_html = "\n".join(rows)
+    return Template(_text("grasp.html")).substitute(jumps=jumps, heads=heads, rows=rows_html)
+
+
+def _cell(signal: str | None) -> str:
+    """A cell for the value of a signal; an empty one without."""
+    if signal is None:
+        return "<td></td>"
+    return f'<td class="n"><output data-signal="{escape(signal)}"></output></td>'
