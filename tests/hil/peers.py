@@ -13,7 +13,7 @@ from pathlib import Path
 
 from grasp_cosim.hil.bench import Bench, Serving
 from grasp_cosim.hil.server import Server
-from grasp_cosim.interface.interface import read_interface
+from grasp_cosim.interface.read import read_interface
 
 
 def main(fmu: str) -> None:

@@ -11,7 +11,7 @@ from typing import Self
 from grasp_cosim import cli
 from grasp_cosim.hil.bench import Bench, Serving
 from grasp_cosim.hil.server import Server
-from grasp_cosim.interface.interface import read_interface
+from grasp_cosim.interface.read import read_interface
 from grasp_fmus.link.client import Client, Verdict
 from grasp_fmus.link.message import LARGEST, Value
 from grasp_fmus.link.signature import Signature
