@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim.grasp.presets import SYSTEM
-from grasp_cosim.interface.interface import read_interface
+from grasp_cosim.interface.read import read_interface
 from support.native_fmus import build, needs_gcc
 
 FULL = Path("/dev/full")

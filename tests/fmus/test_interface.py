@@ -3,7 +3,8 @@
 from pathlib import Path
 
 import pytest
-from grasp_cosim.interface.interface import Variable, read_interface
+from grasp_cosim.interface.interface import Variable
+from grasp_cosim.interface.read import read_interface
 
 PLANT = """
 force[1]                      input      Real     N      0.0

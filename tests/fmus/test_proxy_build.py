@@ -17,7 +17,7 @@ from conftest import Load
 from fmpy.validation import validate_fmu
 from grasp_cosim import cli
 from grasp_cosim.hil.protocol import link_signature
-from grasp_cosim.interface.interface import read_interface
+from grasp_cosim.interface.read import read_interface
 from grasp_fmus.c_header import c_header
 from grasp_fmus.documentation import icon
 from support import native_fmus
@@ -476,7 +476,7 @@ def test_the_peers_side_as_a_c_header(fmus: Path, run: Run) -> None:
     assert run(original, *both) == (0, "P.fmu: new\nsub/bench.h: written\n", "")
     text = Path("sub/bench.h").read_text("ascii")
     starts = {n: v["start"] for n, v in variables(original).items() if v["start"] is not None}
-    said = {v.name: v.description for v in read_interface(original).variables}
+    said = {v.name: v.description or "" for v in read_interface(original).variables}
     assert text == c_header("GripperPlant", signature, starts, said)
     Path("P.fmu").unlink()
     code, out, _ = run(original, "--c-header", "other.h", "--json")

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from grasp_cosim.hil.served import ServedFmu, Service
 from grasp_cosim.hil.server import Server
-from grasp_cosim.interface.interface import read_interface
+from grasp_cosim.interface.read import read_interface
 
 
 def main(fmu: str) -> None:

@@ -13,7 +13,8 @@ from grasp_cosim.errors import InputError
 from grasp_cosim.fmi.load import load_here
 from grasp_cosim.hil.protocol import link_signature
 from grasp_cosim.hil.served import BACKLOG, ServedFmu, Service
-from grasp_cosim.interface.interface import Value, read_interface
+from grasp_cosim.interface.interface import Value
+from grasp_cosim.interface.read import read_interface
 from support import native_fmus
 from support.proxies import HandProxy
 

@@ -19,7 +19,7 @@ from grasp_cosim.errors import InputError
 from grasp_cosim.hil.protocol import link_signature
 from grasp_cosim.hil.served import ServedFmu, Service
 from grasp_cosim.hil.server import Server
-from grasp_cosim.interface.interface import read_interface
+from grasp_cosim.interface.read import read_interface
 from grasp_fmus.link.message import LARGEST
 from support.proxies import HandProxy, UdpAsk, serving, wait_until
 

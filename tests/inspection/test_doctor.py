@@ -227,7 +227,7 @@ def test_the_environment_of_another_python(tmp_path: Path) -> None:
     ("content", "message"),
     [
         (None, "no such FMU file"),
-        ({}, "No such file or directory: 'modelDescription.xml'"),
+        ({}, "not a readable FMU: no modelDescription.xml at the top of the archive"),
         ({"modelDescription.xml": "<fmi"}, "not a readable FMU: unclosed token"),
         ({"../x": ""}, "not a readable FMU"),
         ("text", "not a readable FMU: File is not a zip file"),
@@ -266,6 +266,8 @@ def test_a_folder_is_no_fmu(tmp_path: Path) -> None:
 def test_an_fmu_of_another_kind_is_not_loaded(version: str, kinds: str, tmp_path: Path) -> None:
     with zipfile.ZipFile(tmp_path / "n.fmu", "w") as archive:
         text = DESCRIPTION.format(version=version, kinds=kinds)
+        if version == "3.0":
+            text = text.replace('<Real start="0"/>', "").replace("ScalarVariable", "Float64")
         archive.writestr("modelDescription.xml", text)
         archive.writestr("binaries/x86_64-linux/N.so", Path(sys.executable).read_bytes()[:64])
     found = {f.check: f for f in examine(tmp_path / "n.fmu")}

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 from grasp_cosim.errors import InputError
-from grasp_cosim.interface.conversion import conversion
+from grasp_cosim.interface.interface import Interface, Variable, kind_of
 from grasp_cosim.interface.units import Unit
-from grasp_cosim.qualification.interface_difference import capability_differences, family
+from grasp_cosim.qualification.interface_difference import capability_differences
 from grasp_cosim.qualification.swap import Swap, prepare_swap
 from grasp_cosim.system.description import System
 from grasp_cosim.system.parts import Condition, Connection, Event, Fault, Initialisation, Port
@@ -201,13 +201,20 @@ def test_a_unit_with_an_offset() -> None:
         "K": Unit("K", (0, 0, 0, 0, 1, 0, 0, 0)),
         "degC": Unit("degC", (0, 0, 0, 0, 1, 0, 0, 0), 1.0, 273.15),
     }
-    there, back = conversion(units, "degC", units, "K"), conversion(units, "K", units, "degC")
+    celsius, kelvin, length, bare = (
+        Interface(
+            Path("x.fmu"), "", "x", (Variable("T", "Real", "input", 0, unit, None, None, None),),
+            units=units,
+        )
+        for unit in ("degC", "K", "m", None)
+    )  # fmt: skip
+    there, back = celsius.conversion("T", kelvin), kelvin.conversion("T", celsius)
     assert there is not None
     assert back is not None
     assert there(20.0) == pytest.approx(293.15)
     assert back(293.15) == pytest.approx(20.0)
-    assert conversion(units, "degC", units, "m") is None
-    assert conversion(units, None, units, "m") == (1.0, 0.0)
+    assert celsius.conversion("T", length) is None
+    assert bare.conversion("T", length) == (1.0, 0.0)
 
 
 def test_outputs_are_converted_back(system: System, tmp_path: Path) -> None:
@@ -309,32 +316,27 @@ def test_a_candidate_for_model_exchange_only(system: System, tmp_path: Path) -> 
     assert result.differences[0].text == "is for model exchange; must be for co-simulation"
 
 
-def report(version: str, **flags: Any) -> dict[str, Any]:
-    return {
-        "fmi_version": version,
-        "kinds": ["co-simulation"],
-        "capabilities": flags,
-        "default_experiment": {"step_size": None},
-    }
+def able(version: str, **flags: Any) -> Interface:
+    return Interface(Path("x.fmu"), "", "x", (), version, capabilities=flags)
 
 
 def test_fmi_3_names_of_capabilities_are_those_of_fmi_2() -> None:
-    two = report("2.0", canGetAndSetFMUstate=True, providesDirectionalDerivative=True)
-    three = report("3.0", canGetAndSetFMUState=True, providesDirectionalDerivatives=True)
+    two = able("2.0", canGetAndSetFMUstate=True, providesDirectionalDerivative=True)
+    three = able("3.0", canGetAndSetFMUState=True, providesDirectionalDerivatives=True)
     assert [d.variable for d in capability_differences(two, three, 1e-3)] == ["fmiVersion"]
 
 
 @pytest.mark.parametrize(("internal", "fits"), [(1e-4, True), (1e-3, True), (3e-4, False)])
 def test_a_fixed_internal_step_must_divide_the_step(internal: float, fits: bool) -> None:
-    candidate = report("3.0", fixedInternalStepSize=internal)
-    found = list(capability_differences(report("3.0"), candidate, 1e-3))
+    candidate = able("3.0", fixedInternalStepSize=internal)
+    found = list(capability_differences(able("3.0"), candidate, 1e-3))
     assert [d.severity for d in found] == ([] if fits else ["warns"])
 
 
 def test_types_of_fmi_3_are_those_of_fmi_2() -> None:
-    assert family("Float64") == family("Real") == family("Float32") == "Real"
-    assert family("Int8") == family("UInt64") == family("Enumeration") == family("Integer")
-    assert len({family(t) for t in ("Real", "Integer", "Boolean", "String", "Clock")}) == 5
+    assert kind_of("Float64") == kind_of("Real") == kind_of("Float32") == "Real"
+    assert kind_of("Int8") == kind_of("UInt64") == kind_of("Enumeration") == kind_of("Integer")
+    assert len({kind_of(t) for t in ("Real", "Integer", "Boolean", "String", "Clock")}) == 5
 
 
 def test_renamed_variables_are_compared_by_the_systems_names(

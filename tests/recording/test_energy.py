@@ -8,7 +8,8 @@ import numpy.typing as npt
 import pytest
 from grasp_controller import series
 from grasp_cosim import System
-from grasp_cosim.interface.interface import Interface, read_interface
+from grasp_cosim.interface.interface import Interface
+from grasp_cosim.interface.read import read_interface
 from grasp_cosim.interface.units import Unit
 from grasp_cosim.recording.energy import Bond, ExchangeEnergy, bonds
 from grasp_cosim.system import parts

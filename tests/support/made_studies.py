@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from grasp_cosim import System
-from grasp_cosim.interface.interface import read_interface
+from grasp_cosim.interface.read import read_interface
 from grasp_cosim.sweep.read import read_study
 from grasp_cosim.sweep.study import Study
 from support.native_fmus import build

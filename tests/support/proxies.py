@@ -16,7 +16,7 @@ from grasp_cosim.hil.relay import Relay
 from grasp_cosim.hil.served import ServedFmu, Service
 from grasp_cosim.hil.server import Server
 from grasp_cosim.hil.traffic import Log
-from grasp_cosim.interface.interface import read_interface
+from grasp_cosim.interface.read import read_interface
 from grasp_fmus.link.client import Client, Verdict
 from grasp_fmus.link.message import LARGEST, Value
 from grasp_fmus.link.signature import Signature

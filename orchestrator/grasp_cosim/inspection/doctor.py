@@ -14,12 +14,12 @@ from pathlib import Path
 from shlex import quote
 from shutil import which
 from typing import Literal
-from xml.etree import ElementTree
 
 import fmpy
 
-from ..errors import InputError, choices
-from ..files import check_fmu_file
+from ..errors import choices
+from ..interface.document import unreadable
+from ..interface.read import describe
 from .packed_imports import imports
 
 Status = Literal["ok", "warning", "problem"]
@@ -216,25 +216,19 @@ class Unpacked:
 
 def unpack(fmu: Path, folder: Path) -> Unpacked:
     """Unpack an FMU to a folder; InputError where it is none."""
-    check_fmu_file(fmu)
+    found = describe(fmu)
     try:
         fmpy.extract(fmu, folder)
-        # the FMU's code is run, so its XML is no more of a danger
-        root = ElementTree.parse(folder / "modelDescription.xml").getroot()  # noqa: S314
     except Exception as error:  # FMPy and zipfile raise whatever they like
-        reason = " ".join(str(error).replace(f"{folder}/", "").split())
-        raise InputError(f"{fmu}: not a readable FMU: {reason}") from error
-    version = root.get("fmiVersion", "unknown")
-    kinds = {e.tag: e for e in root if e.tag in ("CoSimulation", "ModelExchange")}
-    identifier = kinds[min(kinds)].get("modelIdentifier", "") if kinds else ""
-    system = fmpy.platform_tuple if version.startswith("3") else fmpy.platform
-    binary = folder / "binaries" / system / f"{identifier}{fmpy.sharedLibraryExtension}"
+        raise unreadable(fmu, str(error).replace(f"{folder}/", "")) from error
+    system = fmpy.platform_tuple if found.version.startswith("3") else fmpy.platform
+    binary = folder / "binaries" / system / f"{found.identifier}{fmpy.sharedLibraryExtension}"
     made = [folder / "resources" / name for name in ("slavemodule.txt", "pythonfmu")]
     return Unpacked(
         folder,
-        kind=", ".join([f"FMI {version}", *sorted(kinds)]),
-        tool=root.get("generationTool", "an unknown tool"),
-        guid=root.get("guid", ""),
+        kind=", ".join([f"FMI {found.version}", *found.kinds]),
+        tool=found.tool or "an unknown tool",
+        guid=found.guid,
         binary=binary,
         linked=_run("env", "LC_ALL=C", "ldd", "-r", str(binary))[1] if LINUX else "",
         python=any(p.exists() for p in made)

@@ -1,17 +1,15 @@
 """What an FMU declares: its variables, units and capabilities."""
 
 import math
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal, get_args
-from xml.etree import ElementTree
+from typing import Literal, get_args
 
 from ..errors import InputError, choices
-from ..files import check_fmu_file
-from .model_description import FROM_TYPE, read_description
-from .units import BASE, Unit
+from .units import IDENTITY, Conversion, Unit, conversion
 
 Value = float | int | bool | str
 Kind = Literal["Real", "Integer", "Boolean", "String", "Binary", "Clock"]
@@ -27,6 +25,9 @@ _WHOLE = {
     for prefix in ("", "U")
     for bits in (8, 16, 32, 64)
 }
+TYPES = ("Real", "Integer", "Boolean", "String", "Enumeration")
+TYPES_3 = ("Float64", "Float32", *_WHOLE, "Boolean", "String", "Binary", "Enumeration", "Clock")
+"""The types of variables in FMI 1.0 and 2.0, and in FMI 3.0."""
 LARGEST_SINGLE = (2.0 - 2.0**-23) * 2.0**127
 """The largest finite Float32."""
 
@@ -40,6 +41,35 @@ def limits(fmi_type: str, version: str) -> tuple[float, float]:
     return _WHOLE.get(fmi_type, (-math.inf, math.inf))
 
 
+def kind_of(fmi_type: str) -> Kind:
+    """The kind that the system makes of an FMI type of any version."""
+    if fmi_type.startswith(("Real", "Float")):
+        return "Real"
+    return fmi_type if fmi_type in KINDS else "Integer"  # type: ignore[return-value]
+
+
+def typed(fmi_type: str, text: str | None) -> Value | None:
+    """The value in its type; the text itself where it is none, and for what JSON has no number."""
+    kind = kind_of(fmi_type)
+    if text is None or kind in ("String", "Binary", "Clock"):
+        return text
+    if kind == "Boolean":
+        return {"true": True, "1": True, "false": False, "0": False}.get(text.strip(), text)
+    try:
+        number = float(text) if kind == "Real" else int(text)
+        return number if math.isfinite(number) else str(number)
+    except (ValueError, OverflowError):
+        return text
+
+
+def as_float(value: Value | None, absent: float) -> float:
+    """A declared number as a float; `absent` where there is none, or none that is a number."""
+    try:
+        return absent if value is None else float(value)
+    except ValueError:
+        return absent
+
+
 @dataclass(frozen=True, slots=True)
 class Enumeration:
     """A type of whole numbers that have names."""
@@ -50,15 +80,15 @@ class Enumeration:
 
 @dataclass(frozen=True, slots=True)
 class Variable:
-    """A variable; unit is None and start, low, high are absent where none is declared.
+    """A variable; unit, start, minimum, maximum, magnitude and initial are None if not declared.
 
-    type is the FMI type (Real, Float32, Int8, ...), kind what the system makes of it. dependencies
-    are the inputs an output depends on directly, None where that is not declared, which means all;
-    initial_dependencies the same in initialisation mode. shape is () but for an array. low and high
-    are what is declared; beyond that a value must fit into its type. nominal is the magnitude that
-    its values are compared with, 1 where none is declared, as FMI has it. relative says that it is
-    a difference, to which the offset of a unit does not apply. enumeration is the type of an
-    Enumeration.
+    type is the FMI type (Real, Float32, Int8, ...), kind what the system makes of it. start is its
+    text, of an array that of all elements or, in starts, of each. minimum, maximum and magnitude,
+    the nominal value, are as typed() gives them. dependencies are the variables an output depends
+    on directly, None where that is not declared, which means all inputs; initial_dependencies the
+    same in initialisation mode. shape is () but for an array. relative says that it is a
+    difference, to which the offset of a unit does not apply. enumeration is the type of an
+    Enumeration. alias says that it is another name of a variable that comes before.
     """
 
     name: str
@@ -67,17 +97,43 @@ class Variable:
     reference: int
     unit: str | None
     start: str | None
-    low: float
-    high: float
+    minimum: Value | None
+    maximum: Value | None
     type: str = "Real"
     variability: str = "continuous"
     dependencies: tuple[str, ...] | None = None
     initial_dependencies: tuple[str, ...] | None = None
     shape: tuple[int, ...] = ()
-    description: str = ""
-    nominal: float = 1.0
+    description: str | None = None
+    magnitude: Value | None = None
     relative: bool = False
     enumeration: Enumeration | None = None
+    initial: str | None = None
+    display_unit: str | None = None
+    starts: tuple[str, ...] = ()
+    alias: bool = False
+
+    @property
+    def low(self) -> float:
+        """The smallest value that is declared valid; beyond that a value must fit into its type."""
+        return as_float(self.minimum, -math.inf)
+
+    @property
+    def high(self) -> float:
+        """The largest value that is declared valid."""
+        return as_float(self.maximum, math.inf)
+
+    @property
+    def nominal(self) -> float:
+        """The magnitude that its values are compared with, 1 if none is declared, as FMI has it."""
+        return abs(as_float(self.magnitude, 1.0)) or 1.0
+
+    @property
+    def start_value(self) -> Value | list[Value | None] | None:
+        """The start value as typed() gives it, a list for an array."""
+        if not self.shape or self.start is None:
+            return typed(self.type, self.start)
+        return [typed(self.type, text) for text in self.starts or self.start.split()]
 
     @property
     def items(self) -> dict[str, int]:
@@ -85,8 +141,13 @@ class Variable:
         return dict(self.enumeration.items) if self.enumeration else {}
 
     @property
+    def settable(self) -> bool:
+        """True if it can be given a value."""
+        return self.causality in SETTABLE
+
+    @property
     def supported(self) -> bool:
-        """Whether a master can set, connection and record it."""
+        """True if a master can set, connect and record it."""
         return self.kind in SUPPORTED and not self.shape
 
     @property
@@ -97,7 +158,14 @@ class Variable:
 
 @dataclass(frozen=True)
 class Interface:
-    """The interface of a co-simulation FMU of FMI 2.0 or 3.0; guid is the instantiation token."""
+    """The interface of an FMU; guid is the instantiation token, tool what it was made with.
+
+    kinds are CoSimulation, ModelExchange, ScheduledExecution. capabilities are those of the first
+    kind and, where a later kind has another value, of that kind, 'FLAG (model exchange)'.
+    experiment is the default one: start_time, stop_time, tolerance and step_size, as typed() gives
+    them. platforms are those it has a binary for. flaw is the first number that could not be read,
+    for which no master takes the FMU.
+    """
 
     path: Path
     guid: str
@@ -105,27 +173,69 @@ class Interface:
     variables: tuple[Variable, ...]
     version: str = "2.0"
     units: Mapping[str, Unit] = field(default_factory=dict)
-    can_save_state: bool = False
-    """Whether states can be saved and restored."""
-    can_vary_step: bool = False
-    """Whether the communication step may vary."""
+    kinds: tuple[str, ...] = ("CoSimulation",)
+    capabilities: Mapping[str, Value | None] = field(default_factory=dict)
+    experiment: Mapping[str, Value | None] = field(default_factory=dict)
+    platforms: tuple[str, ...] = ()
     python: bool = False
-    """Whether it was made with pythonfmu: its binary calls Python, and keeps the GIL."""
-    early_return: bool = False
-    """Whether a step may end early, FMI 3.0."""
-    once_per_process: bool = False
-    """Whether a process can have one instance of it only."""
-    step: float | None = None
-    """The communication step in s that its default experiment names."""
+    """True if it was made with pythonfmu: its binary calls Python, and keeps the GIL."""
+    model_name: str | None = None
+    tool: str | None = None
+    flaw: str = ""
 
     @cached_property
     def by_name(self) -> dict[str, Variable]:
         """The variables by their names."""
         return {v.name: v for v in self.variables}
 
+    @cached_property
+    def _capabilities(self) -> dict[str, Value | None]:
+        return {_plain(flag): value for flag, value in self.capabilities.items()}
+
+    def capability(self, flag: str) -> Value | None:
+        """The value of a capability, under the name that FMI 2.0 or 3.0 has for it."""
+        return self._capabilities.get(_plain(flag))
+
+    @property
+    def can_save_state(self) -> bool:
+        """True if states can be saved and restored."""
+        return self.capability("canGetAndSetFMUstate") is True
+
+    @property
+    def can_vary_step(self) -> bool:
+        """True if the communication step may vary."""
+        return self.capability("canHandleVariableCommunicationStepSize") is True
+
+    @property
+    def early_return(self) -> bool:
+        """True if a step may end early, FMI 3.0."""
+        return self.capability("mightReturnEarlyFromDoStep") is True
+
+    @property
+    def once_per_process(self) -> bool:
+        """True if a process can have one instance of it only."""
+        return self.capability("canBeInstantiatedOnlyOncePerProcess") is True
+
+    @property
+    def step(self) -> float | None:
+        """The communication step in s that its default experiment names."""
+        step = self.experiment.get("step_size")
+        return None if step is None else float(step)
+
     def of(self, *causalities: str) -> list[Variable]:
         """The variables of the given causalities, in the order of declaration."""
         return [v for v in self.variables if v.causality in causalities]
+
+    def conversion(self, name: str, other: "Interface") -> Conversion | None:
+        """The conversion of a variable into the unit that `other` has it in; None for no way.
+
+        A unit that is not declared is taken as the other one.
+        """
+        source, target = self.by_name[name].unit, other.by_name[name].unit
+        if source is None or target is None or source == target:
+            return IDENTITY
+        start, end = self.units.get(source), other.units.get(target)
+        return conversion(start, end) if start and end else None
 
     def renamed(self, rename: Mapping[str, str], place: str = "rename") -> "Interface":
         """The same under other names: rename maps a new name to the FMU's own.
@@ -158,7 +268,7 @@ class Interface:
         place names where the value comes from. An item of an enumeration may be given by its name.
         With text, a string may stand for a number or a boolean, as on a command line.
         """
-        settable = [v.name for v in self.of(*SETTABLE)]
+        settable = [v.name for v in self.variables if v.settable]
         if name not in settable:
             raise InputError(
                 f"{place}: {self.path.name} has no input or parameter {name!r}; "
@@ -206,136 +316,9 @@ def check_rename(rename: Mapping[str, str], names: Collection[str], path: Path, 
             )
 
 
-@lru_cache(maxsize=64)
-def _read(path: Path, modified: int) -> Interface:
-    model, root, files = read_description(path)
-    version, experiment = model.fmiVersion, model.defaultExperiment
-    if version.partition(".")[0] not in ("2", "3"):
-        raise InputError(f"{path}: FMI {version}; must be an FMI 2.0 or 3.0 co-simulation FMU")
-    if model.coSimulation is None:
-        kind = "model exchange" if model.modelExchange else "scheduled execution"
-        raise InputError(f"{path}: for {kind} only; must be a co-simulation FMU")
-    try:
-        variables, units = tuple(_variables(model, root)), tuple(read_units(root))
-        step = experiment.stepSize if experiment else None
-        step = None if step is None else float(step)
-    except ValueError as error:
-        raise InputError(f"{path}: not a readable FMU: {error}") from error
-    return Interface(
-        path,
-        model.guid or "",
-        model.coSimulation.modelIdentifier,
-        variables,
-        version,
-        {unit.name: unit for unit in units},
-        model.coSimulation.canGetAndSetFMUstate,
-        model.coSimulation.canHandleVariableCommunicationStepSize,
-        "resources/slavemodule.txt" in files,
-        model.coSimulation.mightReturnEarlyFromDoStep,
-        model.coSimulation.canBeInstantiatedOnlyOncePerProcess,
-        step,
-    )
-
-
-def read_interface(path: Path) -> Interface:
-    """The interface of the FMU at path; InputError where there is none."""
-    check_fmu_file(path)
-    return _read(path.resolve(), path.stat().st_mtime_ns)
-
-
-def read_units(root: ElementTree.Element) -> Iterator[Unit]:
-    """The units that are defined in terms of the SI base units; ValueError for one that is none."""
-    for element in root.iterfind("UnitDefinitions/Unit"):
-        base = element.find("BaseUnit")
-        if base is None:
-            continue
-        name = element.get("name", "")
-        factor, offset = float(base.get("factor", "1")), float(base.get("offset", "0"))
-        if not factor or not math.isfinite(factor) or not math.isfinite(offset):
-            raise ValueError(f"unit {name!r}: factor = {factor:g}, offset = {offset:g}")
-        yield Unit(name, tuple(int(base.get(key, "0")) for key in BASE), factor, offset)
-
-
-def _variables(model: Any, root: ElementTree.Element) -> Iterator[Variable]:
-    """The variables; of an input's alias names none, as an input has one source."""
-    elements = {e.get("name"): e for e in root.iterfind("ModelVariables/*")}
-    inputs = tuple(v.name for v in model.modelVariables if v.causality == "input" and not v.alias)
-    now = _dependencies(model.outputs, inputs, None)
-    initially = _dependencies(model.initialUnknowns, inputs, inputs)
-    for v in model.modelVariables:
-        if v.alias is None or v.causality != "input":
-            own = (v.alias or v).name
-            yield _variable(v, elements[own], now.get(own), initially.get(own))
-
-
-def _dependencies(
-    unknowns: Any, inputs: tuple[str, ...], undeclared: tuple[str, ...] | None
-) -> dict[str, tuple[str, ...] | None]:
-    """By name of an unknown, the inputs it depends on; undeclared where the FMU does not say."""
-    found = {}
-    for unknown in unknowns:
-        names = {v.name for v in unknown.dependencies or ()}
-        declared = tuple(name for name in inputs if name in names)
-        found[unknown.variable.name] = undeclared if unknown.dependencies is None else declared
-    return found
-
-
-def _variable(
-    v: Any,
-    element: ElementTree.Element,
-    dependencies: tuple[str, ...] | None,
-    initial_dependencies: tuple[str, ...] | None,
-) -> Variable:
-    declared = {
-        key: getattr(v, key) or element.get(key) or getattr(v.declaredType, key, None)
-        for key in FROM_TYPE
-    }
-    kind = _kind(v.type)
-    numeric = kind in ("Real", "Integer")
-    low, high = (declared[key] if numeric else None for key in ("min", "max"))
-    return Variable(
-        v.name,
-        kind,
-        v.causality or "local",
-        v.valueReference,
-        declared["unit"],
-        v.start,
-        -math.inf if low is None else float(low),
-        math.inf if high is None else float(high),
-        v.type,
-        v.variability,
-        dependencies,
-        initial_dependencies,
-        tuple(v.shape or ()),
-        v.description or "",
-        abs(float(declared["nominal"] or 1.0)) or 1.0,
-        _relative(v, element),
-        _enumeration(v),
-    )
-
-
-def _enumeration(v: Any) -> Enumeration | None:
-    declared = v.declaredType if v.type == "Enumeration" else None
-    if not declared:
-        return None
-    return Enumeration(declared.name, tuple((i.name, int(i.value)) for i in declared.items))
-
-
-def _relative(v: Any, element: ElementTree.Element) -> bool:
-    """Whether it is a difference; FMPy overlooks where a variable itself says so."""
-    said = [text for e in (element, *element) if (text := e.get("relativeQuantity"))]
-    return (
-        said[0] in ("true", "1") if said else bool(getattr(v.declaredType, "relativeQuantity", 0))
-    )
-
-
-def _kind(fmi_type: str) -> Kind:
-    """What the system makes of an FMI type."""
-    if fmi_type in ("Real", "Float64", "Float32"):
-        return "Real"
-    if fmi_type in KINDS:
-        return fmi_type  # type: ignore[return-value]
-    return "Integer"
+def _plain(flag: str) -> str:
+    """A capability by a name that FMI 2 and 3 have in common."""
+    return flag.lower().removesuffix("s")
 
 
 def _convert(variable: Variable, value: Value, version: str) -> Value | None:
@@ -346,10 +329,8 @@ def _convert(variable: Variable, value: Value, version: str) -> Value | None:
         if isinstance(value, str):
             return {"true": True, "1": True, "false": False, "0": False}.get(value.lower())
         return value if isinstance(value, bool) else None
-    if isinstance(value, bool):
-        return None
-    number = _whole(value) if variable.kind == "Integer" else _real(value)
-    if number is None or not math.isfinite(number):
+    number = None if isinstance(value, bool) else _number(value, variable.kind == "Integer")
+    if number is None:
         return None
     low, high = limits(variable.type, version)
     fits = low <= number <= high and variable.low <= number <= variable.high
@@ -357,24 +338,16 @@ def _convert(variable: Variable, value: Value, version: str) -> Value | None:
     return number if fits else None
 
 
-def _real(value: float | int | str) -> float | None:
-    try:
-        return float(value)
-    except (ValueError, OverflowError):
-        return None
-
-
-def _whole(value: float | int | str) -> int | None:
-    """Exact, also where a float is not; 3.0 and "3.0" are whole, too."""
-    try:
-        return int(value) if isinstance(value, int | str) else _whole_float(value)
-    except ValueError:
-        number = _real(value)
-        return None if number is None else _whole_float(number)
-
-
-def _whole_float(number: float) -> int | None:
-    return int(number) if number.is_integer() else None
+def _number(value: float | int | str, whole: bool) -> float | int | None:
+    """A finite number; a whole one is exact where a float is not, 3.0 and "3.0" are whole, too."""
+    if whole and not isinstance(value, float):
+        with suppress(ValueError):
+            return int(value)
+    with suppress(ValueError, OverflowError):
+        number = float(value)
+        if math.isfinite(number) and (number.is_integer() or not whole):
+            return int(number) if whole else number
+    return None
 
 
 def _expected(variable: Variable) -> str:

@@ -1,8 +1,13 @@
-"""Units as FMI and SSP define them: factor, offset and exponents of the SI base units."""
+"""Units as FMI and SSP define them, and the conversion from one to another."""
 
 from dataclasses import dataclass
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+import numpy.typing as npt
 
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+Number = TypeVar("Number", float, npt.NDArray[np.float64])
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,11 +20,23 @@ class Unit:
     offset: float = 0.0
 
 
-def conversion(source: Unit, target: Unit) -> tuple[float, float] | None:
-    """Factor and offset so that target value = factor * source value + offset.
+class Conversion(NamedTuple):
+    """target = factor * source + offset."""
 
-    None where the dimensions differ.
-    """
+    factor: float
+    offset: float
+
+    def __call__(self, value: Number) -> Number:
+        """Return `value`, a number or an array, in the target's unit."""
+        return self.factor * value + self.offset
+
+
+IDENTITY = Conversion(1.0, 0.0)
+
+
+def conversion(source: Unit, target: Unit) -> Conversion | None:
+    """The conversion of values from one unit to another; None where the dimensions differ."""
     if source.exponents != target.exponents:
         return None
-    return source.factor / target.factor, (source.offset - target.offset) / target.factor
+    factor, offset = source.factor / target.factor, (source.offset - target.offset) / target.factor
+    return Conversion(factor, offset)

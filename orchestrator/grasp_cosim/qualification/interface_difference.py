@@ -7,14 +7,16 @@ It warns where results may differ, and is a note where nothing in this system de
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import inf, isclose
+from math import isclose
 from typing import Any, Literal
 
+from ..checks import is_number
 from ..errors import choices
-from ..interface.conversion import IDENTITY, Conversion, Units, conversion
-from ..interface.interface import SUPPORTED, Value
+from ..interface.capabilities import KINDS
+from ..interface.interface import SETTABLE, Interface, Value, Variable, as_float
+from ..interface.units import IDENTITY, Conversion
 from ..system.description import System
 from ..system.parts import NANOSECONDS, Port
 
@@ -24,10 +26,7 @@ Kind = Literal[
     "missing", "extra", "type", "causality", "variability", "unit", "range", "items", "start",
     "dependency", "capability", "system",
 ]  # fmt: skip
-Described = Mapping[str, Any]
-"""A variable as inspect_fmu() gives it."""
-
-COMPARED = ("input", "output", "parameter", "structuralParameter")
+COMPARED = (*SETTABLE, "output")
 """Other variables are an FMU's own business."""
 
 LOST: Mapping[str, tuple[Severity, str]] = {
@@ -84,21 +83,8 @@ class Use:
     loops: str
 
     def uses(self, name: str) -> bool:
-        """Whether the system depends on the variable."""
+        """True if the system depends on the variable."""
         return name in self.connected or name in self.values or name in self.stated
-
-
-@dataclass(frozen=True, slots=True)
-class Declared:
-    """What an FMU declares, as inspect_fmu() gives it, under the system's names, and its units."""
-
-    report: Mapping[str, Any]
-    units: Units
-
-    @property
-    def variables(self) -> dict[str, Described]:
-        """The variables by name."""
-        return {v["name"]: v for v in self.report["variables"]}
 
 
 def use_of(system: System, name: str) -> Use:
@@ -130,51 +116,30 @@ def use_of(system: System, name: str) -> Use:
     )
 
 
-def renamed(report: Mapping[str, Any], rename: Mapping[str, str]) -> dict[str, Any]:
-    """The report of inspect_fmu() under the system's names; rename maps those to the FMU's."""
-    names = {own: new for new, own in rename.items()}
-    variables = [
-        {
-            **v,
-            "name": names.get(v["name"], v["name"]),
-            "dependencies": v["dependencies"] and [names.get(d, d) for d in v["dependencies"]],
-        }
-        for v in report["variables"]
-    ]
-    return {**report, "variables": variables}
-
-
 def interface_differences(
-    original: Declared, candidate: Declared, use: Use, given: Mapping[str, Value]
+    original: Interface, candidate: Interface, use: Use, given: Mapping[str, Value]
 ) -> list[Difference]:
     """All differences of variables and capabilities, in the order of the original's variables.
 
-    given are values, in the candidate's unit, for variables that only the candidate has.
+    Both are under the system's names. given are values, in the candidate's unit, for variables
+    that only the candidate has.
     """
-    ours, theirs = original.variables, candidate.variables
+    ours, theirs = original.by_name, candidate.by_name
     found: list[Difference] = []
-    for name, variable in ours.items():
-        if variable["causality"] not in COMPARED:
-            continue
-        if name in theirs:
-            change = conversion(
-                original.units, variable["unit"], candidate.units, theirs[name]["unit"]
-            )
-            found += _changed(variable, theirs[name], use, change)
+    for variable in original.of(*COMPARED):
+        if variable.name in theirs:
+            change = original.conversion(variable.name, candidate)
+            found += _changed(variable, theirs[variable.name], use, change)
         else:
-            found.append(_missing(variable, use, theirs.values()))
-    found += [
-        _extra(variable, use, given)
-        for name, variable in theirs.items()
-        if name not in ours and variable["causality"] in COMPARED
-    ]
-    return found + list(capability_differences(original.report, candidate.report, use.step))
+            found.append(_missing(variable, use, candidate))
+    found += [_extra(v, use, given) for v in candidate.of(*COMPARED) if v.name not in ours]
+    return found + list(capability_differences(original, candidate, use.step))
 
 
-def _missing(old: Described, use: Use, theirs: Iterable[Described]) -> Difference:
-    name, causality = old["name"], old["causality"]
+def _missing(old: Variable, use: Use, candidate: Interface) -> Difference:
+    name, causality = old.name, old.causality
     if use.uses(name):
-        alike = [v["name"] for v in theirs if v["causality"] == causality]
+        alike = [v.name for v in candidate.of(causality)]
         how = "connected" if name in use.connected else "set" if name in use.values else "used"
         text = (
             f"{causality} is {how} in the system, but missing; if it has another name: "
@@ -185,9 +150,9 @@ def _missing(old: Described, use: Use, theirs: Iterable[Described]) -> Differenc
     return Difference(severity, "missing", name, f"{causality} is missing")
 
 
-def _extra(new: Described, use: Use, given: Mapping[str, Value]) -> Difference:
-    name, causality = new["name"], new["causality"]
-    if causality == "input" and not _supported(new):
+def _extra(new: Variable, use: Use, given: Mapping[str, Value]) -> Difference:
+    name, causality = new.name, new.causality
+    if causality == "input" and not new.supported:
         return Difference("notes", "extra", name, "new input that keeps its start value")
     if causality == "input" and name not in given:
         text = f"new input without a source; give it a value: --set '{use.component}.{name}=VALUE'"
@@ -196,58 +161,59 @@ def _extra(new: Described, use: Use, given: Mapping[str, Value]) -> Difference:
 
 
 def _changed(
-    old: Described, new: Described, use: Use, change: Conversion | None
+    old: Variable, new: Variable, use: Use, change: Conversion | None
 ) -> Iterator[Difference]:
     """Of a variable that both have; change is from the old unit to the new, None for no way."""
-    name = old["name"]
+    name = old.name
     used = use.uses(name)
     serious: Severity = "blocks" if used else "warns"
-    if family(old["type"]) != family(new["type"]):
-        text = f"is {new['type']}, must be {old['type']}"
-        yield Difference(serious, "type", name, text, old["type"], new["type"])
+    if old.kind != new.kind:
+        text = f"is {new.type}, must be {old.type}"
+        yield Difference(serious, "type", name, text, old.type, new.type)
         return
-    if old["dimensions"] != new["dimensions"]:
-        text = f"has dimensions {new['dimensions']}, must have {old['dimensions']}"
-        yield Difference(serious, "type", name, text, old["dimensions"], new["dimensions"])
+    if old.shape != new.shape:
+        was, now = list(old.shape), list(new.shape)
+        text = f"has dimensions {now}, must have {was}"
+        yield Difference(serious, "type", name, text, was, now)
         return
-    if new["type"] == "Float32" != old["type"]:
+    if new.type == "Float32" != old.type:
         text = "is Float32: 7 digits instead of 16"
-        yield Difference("warns", "type", name, text, old["type"], new["type"])
-    if old["causality"] != new["causality"]:
+        yield Difference("warns", "type", name, text, old.type, new.type)
+    if old.causality != new.causality:
         yield _causality(old, new, use)
-    elif old["variability"] != new["variability"]:
+    elif old.variability != new.variability:
         yield _variability(old, new, use)
-    if old["unit"] != new["unit"]:
+    if old.unit != new.unit:
         yield _unit(old, new, use, change)
-    if change is not None and family(old["type"]) in {"Real", "Integer"}:
+    if change is not None and old.kind in ("Real", "Integer"):
         yield from _range(old, new, use, change)
-    if old["items"] and new["items"] and old["items"] != new["items"]:
+    if old.items and new.items and old.items != new.items:
         yield _items(old, new, use)
-    if settable(old) and settable(new):
+    if old.settable and new.settable:
         yield from _start(old, new, use, change)
 
 
-def _causality(old: Described, new: Described, use: Use) -> Difference:
-    name, was, now = old["name"], old["causality"], new["causality"]
+def _causality(old: Variable, new: Variable, use: Use) -> Difference:
+    name, was, now = old.name, old.causality, new.causality
     lonely = now == "input" and name not in use.connected and name not in use.values
-    value_only = settable(old) and settable(new) and name not in use.connected
+    value_only = old.settable and new.settable and name not in use.connected
     severity: Severity = "blocks" if lonely or (use.uses(name) and not value_only) else "warns"
     more = f", or have a value: --set '{use.component}.{name}=VALUE'" if lonely else ""
     text = f"is {_a(now)}, must be {_a(was)}{more}"
     return Difference(severity, "causality", name, text, was, now)
 
 
-def _variability(old: Described, new: Described, use: Use) -> Difference:
-    name, was, now = old["name"], old["variability"], new["variability"]
+def _variability(old: Variable, new: Variable, use: Use) -> Difference:
+    name, was, now = old.name, old.variability, new.variability
     if name in use.tuned and now in ("fixed", "constant"):
         text = f"is {now}, but an event sets it; must be {was}"
         return Difference("blocks", "variability", name, text, was, now)
-    severity: Severity = "notes" if settable(old) and old["causality"] != "input" else "warns"
+    severity: Severity = "notes" if old.settable and old.causality != "input" else "warns"
     return Difference(severity, "variability", name, f"is {now} instead of {was}", was, now)
 
 
-def _unit(old: Described, new: Described, use: Use, change: Conversion | None) -> Difference:
-    name, was, now = old["name"], old["unit"], new["unit"]
+def _unit(old: Variable, new: Variable, use: Use, change: Conversion | None) -> Difference:
+    name, was, now = old.name, old.unit, new.unit
     used: Severity = "blocks" if use.uses(name) else "warns"
     if change is None:
         severity, text = used, f"is in {now}, which cannot be converted to {was}"
@@ -267,12 +233,11 @@ def _unit(old: Described, new: Described, use: Use, change: Conversion | None) -
     return Difference(severity, "unit", name, text, was, now)
 
 
-def _range(old: Described, new: Described, use: Use, change: Conversion) -> Iterator[Difference]:
+def _range(old: Variable, new: Variable, use: Use, change: Conversion) -> Iterator[Difference]:
     """Of what the original takes or gives, that which the candidate does not declare valid."""
-    name, unit = old["name"], f" {new['unit']}" if new["unit"] else ""
-    was = [change(_limit(old["min"], -inf)), change(_limit(old["max"], inf))]
-    now = [_limit(new["min"], -inf), _limit(new["max"], inf)]
-    declared = [old["min"], old["max"]], [new["min"], new["max"]]
+    name, unit = old.name, f" {new.unit}" if new.unit else ""
+    was, now = [change(old.low), change(old.high)], [new.low, new.high]
+    declared = [old.minimum, old.maximum], [new.minimum, new.maximum]
     value = change(float(use.values[name])) if name in use.values else now[0]
     if not now[0] <= value <= now[1]:
         text = (
@@ -280,14 +245,14 @@ def _range(old: Described, new: Described, use: Use, change: Conversion) -> Iter
         )
         yield Difference("blocks", "range", name, text, *declared)
     elif _less(was[0], now[0]) or _less(now[1], was[1]):
-        severity: Severity = "notes" if old["causality"] == "output" else "warns"
+        severity: Severity = "notes" if old.causality == "output" else "warns"
         text = f"takes {now[0]:g} to {now[1]:g}{unit} instead of {was[0]:g} to {was[1]:g}{unit}"
         yield Difference(severity, "range", name, text, *declared)
 
 
-def _items(old: Described, new: Described, use: Use) -> Difference:
+def _items(old: Variable, new: Variable, use: Use) -> Difference:
     """Of two enumerations; what the system gives or takes are numbers."""
-    name, was, now = old["name"], old["items"], new["items"]
+    name, was, now = old.name, old.items, new.items
     moved = [item for item in was if now.get(item) != was[item]]
     severity: Severity = "blocks" if moved and use.uses(name) else "warns" if moved else "notes"
     text = f"has other items; not as before: {choices(moved)}"
@@ -295,91 +260,51 @@ def _items(old: Described, new: Described, use: Use) -> Difference:
 
 
 def _start(
-    old: Described, new: Described, use: Use, change: Conversion | None
+    old: Variable, new: Variable, use: Use, change: Conversion | None
 ) -> Iterator[Difference]:
-    name, was, now = old["name"], old["start"], new["start"]
+    name, was, now = old.name, old.start_value, new.start_value
     if name in use.values or _same(was, now, change):
         return
     severity: Severity = "notes" if name in use.connected else "warns"
-    units = [f" {v['unit']}" if v["unit"] else "" for v in (new, old)]
+    units = [f" {v.unit}" if v.unit else "" for v in (new, old)]
     text = f"starts with {_shown(now)}{units[0]} instead of {_shown(was)}{units[1]}"
     yield Difference(severity, "start", name, text, was, now)
 
 
 def capability_differences(
-    original: Mapping[str, Any], candidate: Mapping[str, Any], step: float
+    original: Interface, candidate: Interface, step: float
 ) -> Iterator[Difference]:
-    """Of the reports of inspect_fmu(): version, kind and step capability; step in s is the one
-    the component is to make.
-    """
-    versions = original["fmi_version"], candidate["fmi_version"]
+    """Version, kind and step capability; step in s is the one the component is to make."""
+    versions = original.version, candidate.version
     if versions[0] != versions[1]:
         text = f"FMI {versions[1]} instead of {versions[0]}"
         yield Difference("notes", "capability", "fmiVersion", text, *versions)
-    if "co-simulation" not in candidate["kinds"]:
-        text = f"is for {choices(candidate['kinds'])}; must be for co-simulation"
-        yield Difference(
-            "blocks", "capability", "kind", text, original["kinds"], candidate["kinds"]
-        )
+    if "CoSimulation" not in candidate.kinds:
+        was, now = ([KINDS[kind] for kind in fmu.kinds] for fmu in (original, candidate))
+        text = f"is for {choices(now)}; must be for co-simulation"
+        yield Difference("blocks", "capability", "kind", text, was, now)
         return
-    ours, theirs = _flags(original), _flags(candidate)
     for flags, lost in ((LOST, True), (GAINED, False)):
         for flag, (severity, text) in flags.items():
-            was, now = bool(ours.get(_plain(flag))), bool(theirs.get(_plain(flag)))
-            if was != now and was == lost:
-                yield Difference(severity, "capability", flag, text, was, now)
-    yield from _steps(ours, theirs, candidate["default_experiment"]["step_size"], step)
+            had, has = bool(original.capability(flag)), bool(candidate.capability(flag))
+            if had != has and had == lost:
+                yield Difference(severity, "capability", flag, text, had, has)
+    yield from _steps(original, candidate, step)
 
 
-def _steps(
-    ours: Mapping[str, Any], theirs: Mapping[str, Any], default: Any, step: float
-) -> Iterator[Difference]:
+def _steps(original: Interface, candidate: Interface, step: float) -> Iterator[Difference]:
     flag = "canHandleVariableCommunicationStepSize"
-    if ours.get(_plain(flag)) and not theirs.get(_plain(flag)):
-        own = _limit(default, step)
-        severity: Severity = "notes" if isclose(own, step, rel_tol=SAME) else "warns"
+    if original.capability(flag) and not candidate.capability(flag):
+        default = candidate.experiment.get("step_size")
+        same = isclose(as_float(default, step), step, rel_tol=SAME)
         text = f"steps of one size only: {step:g} s here, its default is {_shown(default)} s"
-        yield Difference(severity, "capability", flag, text, True, False)
-    internal = theirs.get(_plain("fixedInternalStepSize"))
-    size = _limit(internal, 0.0)
+        yield Difference("notes" if same else "warns", "capability", flag, text, True, False)
+    flag = "fixedInternalStepSize"
+    was, now = original.capability(flag), candidate.capability(flag)
+    size = as_float(now, 0.0)
     if size > 0.0 and not isclose(step / size, max(1, round(step / size)), rel_tol=1e-9):
         text = f"steps by {size:g} s inside, of which the step of {step:g} s is no whole multiple"
-        was = ours.get(_plain("fixedInternalStepSize"))
-        yield Difference("warns", "capability", "fixedInternalStepSize", text, was, internal)
-
-
-def family(type_: str) -> str:
-    """What the system makes of an FMI type of any version: Real, Integer, Boolean, ..."""
-    if type_.startswith(("Real", "Float")):
-        return "Real"
-    return "Integer" if type_.startswith(("Int", "UInt", "Enumeration")) else type_
-
-
-def settable(variable: Described) -> bool:
-    """Whether it can be given a value."""
-    return variable["causality"] in ("input", "parameter", "structuralParameter")
-
-
-def _supported(variable: Described) -> bool:
-    """Whether the master can set it; it leaves other inputs alone."""
-    return family(variable["type"]) in SUPPORTED and not variable["dimensions"]
-
-
-def _flags(report: Mapping[str, Any]) -> dict[str, Any]:
-    return {_plain(flag): value for flag, value in report["capabilities"].items()}
-
-
-def _plain(flag: str) -> str:
-    """A capability by a name that FMI 2 and 3 have in common."""
-    return flag.lower().removesuffix("s")
-
-
-def _limit(declared: Any, absent: float) -> float:
-    """A limit as a number; absent where there is none, or none that is a number."""
-    try:
-        return absent if declared is None else float(declared)
-    except (TypeError, ValueError):
-        return absent
+        yield Difference("warns", "capability", flag, text, was, now)
 
 
 def _less(a: float, b: float) -> bool:
@@ -387,11 +312,10 @@ def _less(a: float, b: float) -> bool:
 
 
 def _same(was: Any, now: Any, change: Conversion | None) -> bool:
-    """Whether two start values are one, in the unit of each."""
+    """True if two start values are one, in the unit of each."""
     if isinstance(was, list) and isinstance(now, list):
         return len(was) == len(now) and all(map(_same, was, now, [change] * len(was)))
-    numbers = [isinstance(v, float | int) and not isinstance(v, bool) for v in (was, now)]
-    if not all(numbers) or change is None:
+    if change is None or not is_number(was) or not is_number(now):
         return bool(was == now)
     return isclose(change(float(was)), float(now), rel_tol=SAME)
 

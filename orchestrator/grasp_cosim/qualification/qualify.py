@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError, SimulationError
-from ..interface.conversion import IDENTITY
 from ..interface.interface import Value
+from ..interface.units import IDENTITY
 from ..master.simulation import simulate
 from ..metrics.metric import Metric, Signals, measure, registered
 from ..recording.result import Result

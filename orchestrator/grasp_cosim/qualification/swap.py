@@ -7,21 +7,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ..errors import InputError, choices
-from ..inspection.inspection import inspect_fmu
-from ..interface.conversion import IDENTITY, Conversion, conversion, units_of
-from ..interface.interface import Value, check_rename
+from ..interface.interface import Interface, Value
+from ..interface.read import describe
+from ..interface.units import IDENTITY, Conversion
 from ..system.description import System
 from ..system.parts import Component, Isolation
-from .feedthrough import Reports, feedthrough_differences
-from .interface_difference import (
-    SEVERITIES,
-    Declared,
-    Difference,
-    family,
-    interface_differences,
-    renamed,
-    use_of,
-)
+from .feedthrough import Interfaces, feedthrough_differences
+from .interface_difference import SEVERITIES, Difference, interface_differences, use_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,15 +48,15 @@ def prepare_swap(
 ) -> Swap:
     """The swap that qualify() describes; InputError where its arguments are wrong."""
     place = system.component(component, f"--as {component}")
-    reports = {c.name: renamed(inspect_fmu(c.fmu), c.rename) for c in system.components}
-    ours = Declared(reports[component], units_of(place.fmu))
+    interfaces = {c.name: describe(c.fmu).renamed(c.rename) for c in system.components}
+    ours = interfaces[component]
     theirs = _candidate(candidate, rename, ours)
     common, own = _split(component, values, ours, theirs)
     system = system.revised({}, common, ("--as", "--set"))
     use = use_of(system, component)
     differences = [
         *interface_differences(ours, theirs, use, own),
-        *feedthrough_differences(system, component, reports, theirs.report, use),
+        *feedthrough_differences(system, component, interfaces, theirs, use),
     ]
     swapped = None
     if not any(d.severity == "blocks" for d in differences):
@@ -82,31 +74,30 @@ def prepare_swap(
         tuple(sorted(differences, key=lambda d: SEVERITIES.index(d.severity))),
         swapped,
         _back(component, ours, theirs),
-        _nominals(reports),
+        _nominals(interfaces),
     )
 
 
-def _candidate(path: Path, rename: Mapping[str, str], ours: Declared) -> Declared:
-    report = inspect_fmu(path)
-    check_rename(rename, [v["name"] for v in report["variables"]], path, "--rename")
+def _candidate(path: Path, rename: Mapping[str, str], ours: Interface) -> Interface:
+    theirs = describe(path).renamed(rename, "--rename")
     for new, own in rename.items():
-        if new not in ours.variables:
+        if new not in ours.by_name:
             raise InputError(
                 f"--rename: {new!r} = {own!r}: the original has no variable {new!r}; "
-                f"valid: {choices(ours.variables)}"
+                f"valid: {choices(ours.by_name)}"
             )
-    return Declared(renamed(report, rename), units_of(path))
+    return theirs
 
 
 def _split(
-    component: str, values: Mapping[str, Value], ours: Declared, theirs: Declared
+    component: str, values: Mapping[str, Value], ours: Interface, theirs: Interface
 ) -> tuple[dict[str, Value], dict[str, Value]]:
     """The values for the original's system, and by variable those for the candidate alone."""
     common: dict[str, Value] = {}
     own: dict[str, Value] = {}
     for key, value in values.items():
         name, _, variable = key.partition(".")
-        known = variable in ours.variables or variable not in theirs.variables
+        known = variable in ours.by_name or variable not in theirs.by_name
         if name != component or known:
             common[key] = value
         else:
@@ -114,19 +105,15 @@ def _split(
     return common, own
 
 
-def _converted(values: Mapping[str, Value], ours: Declared, theirs: Declared) -> dict[str, Value]:
+def _converted(values: Mapping[str, Value], ours: Interface, theirs: Interface) -> dict[str, Value]:
     """The original's values in the candidate's units."""
     result: dict[str, Value] = {}
     for name, value in values.items():
-        change = _between(name, ours, theirs)
-        real = family(theirs.variables[name]["type"]) == "Real"
-        result[name] = change(float(value)) if real and change not in (None, IDENTITY) else value
+        change = ours.conversion(name, theirs)
+        if change and change != IDENTITY and theirs.by_name[name].kind == "Real":
+            value = change(float(value))
+        result[name] = value
     return result
-
-
-def _between(name: str, source: Declared, target: Declared) -> Conversion | None:
-    units = source.variables[name]["unit"], target.variables[name]["unit"]
-    return conversion(source.units, units[0], target.units, units[1])
 
 
 def _put_in(system: System, place: Component, own: Mapping[str, Value]) -> System | Difference:
@@ -147,18 +134,17 @@ def _put_in(system: System, place: Component, own: Mapping[str, Value]) -> Syste
         return Difference("blocks", "system", place.name, str(error))
 
 
-def _back(component: str, ours: Declared, theirs: Declared) -> dict[str, Conversion | None]:
+def _back(component: str, ours: Interface, theirs: Interface) -> dict[str, Conversion | None]:
     return {
-        f"{component}.{name}": _between(name, theirs, ours)
-        for name, variable in ours.variables.items()
-        if variable["causality"] == "output" and name in theirs.variables
+        f"{component}.{v.name}": theirs.conversion(v.name, ours)
+        for v in ours.of("output")
+        if v.name in theirs.by_name
     }
 
 
-def _nominals(reports: Reports) -> dict[str, float | None]:
+def _nominals(interfaces: Interfaces) -> dict[str, float | None]:
     return {
-        f"{component}.{v['name']}": v["nominal"] if isinstance(v["nominal"], float) else None
-        for component, report in reports.items()
-        for v in report["variables"]
-        if v["causality"] == "output"
+        f"{component}.{v.name}": v.magnitude if isinstance(v.magnitude, float) else None
+        for component, interface in interfaces.items()
+        for v in interface.of("output")
     }

@@ -193,7 +193,7 @@ def _sort_ports(ways: Iterable[_Way]) -> None:
             rank[box, side, port] = min(rank.get((box, side, port), wanted), wanted)
     for box, side, _ in rank:
         ports = box.inputs if side == "input" else box.outputs
-        ports.sort(key=lambda port: rank[box, side, port])  # noqa: B023 - called at once
+        ports.sort(key=lambda port: rank[box, side, port])
 
 
 def _spread(columns: Sequence[Sequence[_Box]], ways: Iterable[_Way]) -> float:

@@ -19,7 +19,8 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from ..errors import InputError, choices
-from ..interface.interface import Value, read_interface
+from ..interface.interface import Value
+from ..interface.read import read_interface
 from ..system.description import System, in_nanoseconds
 from ..system.parts import NANOSECONDS, Component, Connection, Port
 from .annotation import TYPE, Beside, Extras, no_extras, read_extras

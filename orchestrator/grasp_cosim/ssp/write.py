@@ -18,7 +18,8 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..interface.interface import Value, Variable, read_interface
+from ..interface.interface import Value, Variable
+from ..interface.read import read_interface
 from ..interface.units import Unit
 from ..system.description import System
 from ..system.parts import NANOSECONDS, Component, Connection, Port

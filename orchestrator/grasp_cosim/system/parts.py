@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, get_args
 
-from ..interface.interface import Interface, Value, read_interface
+from ..interface.interface import Interface, Value
+from ..interface.read import read_interface
 
 Isolation = Literal["none", "process"]
 ISOLATIONS: tuple[str, ...] = get_args(Isolation)

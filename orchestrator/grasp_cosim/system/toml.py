@@ -38,7 +38,8 @@ from typing import Any
 
 from ..checks import as_table, check_keys, check_values, toml_table
 from ..errors import InputError, choices
-from ..interface.interface import Value, read_interface
+from ..interface.interface import Value
+from ..interface.read import read_interface
 from .description import System, as_scheme, in_nanoseconds
 from .parts import ISOLATIONS, Component, Connection, Initialisation, Isolation, Port
 from .scenario import read_events, read_faults

@@ -16,8 +16,8 @@ from grasp_fmus.variable import Variable as ProxyVariable
 from ...errors import InputError
 from ...files import check_folder, write_text
 from ...hil.protocol import link_signature
-from ...inspection.inspection import inspect_fmu
-from ...interface.interface import Interface, Value, Variable, read_interface
+from ...interface.interface import Interface, Value, Variable
+from ...interface.read import read_interface
 from ...interface.units import BASE
 from ..frame import json_option
 
@@ -89,7 +89,7 @@ def proxy(
         if c_header is not None:
             starts = {v.name: _start(interface.by_name[v.name]) for v in signature.request}
             known = {name: start for name, start in starts.items() if start is not None}
-            said = {v.name: v.description for v in interface.variables}
+            said = {v.name: v.description or "" for v in interface.variables}
             text = header(interface.identifier, signature, known, said)
             write_text(c_header, text)
             lines.append(f"{c_header}: written")
@@ -120,26 +120,19 @@ def _original(interface: Interface, names: list[str]) -> "Original":
     """What a proxy has from the FMU; names are the variables to exchange, in order."""
     from grasp_fmus.proxy_build import Original
 
-    experiment = inspect_fmu(interface.path)["default_experiment"]
     known = {name for name in names if interface.by_name[name].causality != "output"}
-    units = {
-        unit.name: Unit(
-            {key: power for key, power in zip(BASE, unit.exponents, strict=True) if power},
-            factor=unit.factor,
-            offset=unit.offset,
-        )
-        for unit in interface.units.values()
-    }
     return Original(
         interface.path.name,
         [_variable(interface, interface.by_name[name], known) for name in names],
-        units,
-        Experiment(
-            experiment["start_time"],
-            experiment["stop_time"],
-            experiment["tolerance"],
-            experiment["step_size"],
-        ),
+        {
+            unit.name: Unit(
+                {key: power for key, power in zip(BASE, unit.exponents, strict=True) if power},
+                factor=unit.factor,
+                offset=unit.offset,
+            )
+            for unit in interface.units.values()
+        },
+        Experiment(*(None if v is None else float(v) for v in interface.experiment.values())),
         interface.can_vary_step,
     )
 
@@ -161,7 +154,7 @@ def _variable(interface: Interface, v: Variable, known: set[str]) -> ProxyVariab
         _start(v),
         v.variability,
         None if all(map(math.isinf, limits)) else limits,
-        v.description,
+        v.description or "",
         None if v.kind != "Real" or v.nominal == 1.0 else v.nominal,
         v.relative,
         initial_dependencies=initially,

@@ -10,7 +10,7 @@ from ...hil.address import is_loopback, text
 from ...hil.protocol import shared_key
 from ...hil.served import ServedFmu, Service
 from ...hil.server import DEFAULT_ADDRESS, Server
-from ...interface.interface import read_interface
+from ...interface.read import read_interface
 from ...system.description import in_nanoseconds
 from ..frame import INTERRUPTED, NEGATIVE, fail, json_option, pair
 from ..signals import ended_by_signals

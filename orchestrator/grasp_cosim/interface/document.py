@@ -1,0 +1,94 @@
+"""The modelDescription.xml of an FMU as a tree; an archive or document made to do harm is refused.
+
+Limits are checked before anything is unpacked: what the directory of the archive says is all that
+its files can yield.
+"""
+
+import zipfile
+from pathlib import Path
+from typing import IO, Any, NamedTuple, NoReturn
+from xml.etree import ElementTree
+from xml.parsers import expat
+
+from ..errors import InputError
+from ..files import check_fmu_file
+
+NAME = "modelDescription.xml"
+LARGEST = 100_000_000
+"""Bytes of a modelDescription.xml: some 300,000 variables, more than the largest FMUs have."""
+LARGEST_UNPACKED, MOST_EXPANSION = 500_000_000, 50
+"""Bytes of all files, allowed beyond that if the archive is at least one 50th as large: binaries
+and tables pack 2 to 20 times, a bomb hundreds of times."""
+DEEPEST = 256
+"""Elements within each other: the standard needs 6, the annotations of tools some more."""
+CHUNK = 65536
+
+
+class Document(NamedTuple):
+    """The root element of a modelDescription.xml, and the names of all files in its archive."""
+
+    root: ElementTree.Element
+    files: tuple[str, ...]
+
+
+def read_document(path: Path) -> Document:
+    """Read the description in the FMU at `path`; InputError where there is none."""
+    check_fmu_file(path)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            entries = {i.filename.replace("\\", "/"): i for i in archive.infolist()}
+            if NAME not in entries:
+                raise ValueError(f"no {NAME} at the top of the archive")
+            _check_sizes(
+                entries[NAME].file_size,
+                sum(i.file_size for i in archive.infolist()),
+                path.stat().st_size,
+            )
+            with archive.open(NAME) as file:
+                root = _parsed(file)
+        if not root.get("fmiVersion"):
+            raise ValueError(f"no fmiVersion in {NAME}")
+    except Exception as error:  # zipfile and its decompressors raise whatever they like
+        raise unreadable(path, error) from error
+    return Document(root, tuple(entries))
+
+
+def unreadable(path: Path, error: Exception | str) -> InputError:
+    """The one line for an FMU that cannot be read."""
+    reason = " ".join(str(error).split()) or type(error).__name__
+    return InputError(f"{path}: not a readable FMU: {reason}")
+
+
+def _check_sizes(description: int, total: int, packed: int) -> None:
+    """ValueError where a file of `packed` bytes holds too much, all sizes in bytes."""
+    if description > LARGEST:
+        raise ValueError(f"{NAME} has {description} bytes; must have at most {LARGEST}")
+    most = max(LARGEST_UNPACKED, MOST_EXPANSION * packed)
+    if total > most:
+        raise ValueError(f"its files have {total} bytes unpacked; must have at most {most}")
+
+
+def _parsed(file: IO[bytes]) -> ElementTree.Element:
+    builder = ElementTree.TreeBuilder()
+    parser = expat.ParserCreate(None, "}")
+    open_: list[str] = []
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        open_.append(tag)
+        if len(open_) > DEEPEST:
+            raise ValueError(f"{tag} in {NAME} is more than {DEEPEST} elements deep")
+        builder.start(tag, attributes)
+
+    def end(tag: str) -> None:
+        open_.pop()
+        builder.end(tag)
+
+    def refuse(name: str, *_: Any) -> NoReturn:
+        raise ValueError(f"{NAME} has a document type {name!r}, which may define entities")
+
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.CharacterDataHandler, parser.StartDoctypeDeclHandler = builder.data, refuse
+    while chunk := file.read(CHUNK):
+        parser.Parse(chunk, False)
+    parser.Parse(b"", True)
+    return builder.close()

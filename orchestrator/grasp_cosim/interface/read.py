@@ -1,0 +1,327 @@
+"""The one reader of a model description: FMI 1.0, 2.0 and 3.0, from whichever tool.
+
+What it reads is checked. A number that only a master needs may be wrong: that is a flaw, for which
+read_interface() refuses the FMU, but describe() does not.
+"""
+
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+from ..errors import InputError
+from ..files import check_fmu_file
+from .capabilities import KINDS, capabilities_of, kinds_of
+from .document import read_document, unreadable
+from .interface import TYPES, TYPES_3, Enumeration, Interface, Variable, kind_of, typed
+from .units import BASE, Unit
+
+LARGEST_REFERENCE = 2**32 - 1
+"""A value reference is an unsigned integer of 32 bits."""
+CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029]")
+"""Characters that end a line of a message or table, or move the cursor of a terminal."""
+EXPERIMENT = {
+    "start_time": "startTime", "stop_time": "stopTime", "tolerance": "tolerance",
+    "step_size": "stepSize",
+}  # fmt: skip
+PARAMETERS = {
+    "structuralParameter": "exact", "parameter": "exact", "calculatedParameter": "calculated",
+}  # fmt: skip
+SIGNALS = {"input": "exact", "output": "calculated", "local": "calculated"}
+INITIAL: Mapping[str, Mapping[str, str]] = {
+    "constant": {"output": "exact", "local": "exact"},
+    "fixed": {**PARAMETERS, "local": "calculated"},
+    "tunable": {**PARAMETERS, "local": "calculated"},
+    "discrete": SIGNALS,
+    "continuous": SIGNALS,
+}
+"""By variability and causality, what the initial of a variable is where it is not declared."""
+Names = tuple[str, ...] | None
+"""The variables that one depends on; None where that is not declared."""
+
+
+def read_interface(path: Path) -> Interface:
+    """The interface of the FMU at `path`, for a master; InputError where it cannot run it.
+
+    An input has one source, so its aliases are left out.
+    """
+    check_fmu_file(path)
+    return _for_master(path.resolve(), path.stat().st_mtime_ns)
+
+
+@lru_cache(maxsize=64)
+def _for_master(path: Path, modified: int) -> Interface:
+    found = describe(path)
+    if found.version == "1.0":
+        raise InputError(f"{path}: FMI 1.0; must be an FMI 2.0 or 3.0 co-simulation FMU")
+    if "CoSimulation" not in found.kinds:
+        kind = KINDS[next(iter(found.kinds), "ScheduledExecution")]
+        raise InputError(f"{path}: for {kind} only; must be a co-simulation FMU")
+    if found.flaw:
+        raise unreadable(path, found.flaw)
+    sources = tuple(v for v in found.variables if not (v.alias and v.causality == "input"))
+    return replace(found, variables=sources)
+
+
+def describe(path: Path) -> Interface:
+    """What the FMU at `path` declares, whether a master takes it or not.
+
+    InputError where there is no FMU, or what it declares makes no sense.
+    """
+    root, files = read_document(path)
+    version = root.get("fmiVersion", "")
+    try:
+        if version not in ("1.0", "2.0") and not version.startswith("3."):
+            raise ValueError(f"Unsupported FMI version: {version}")
+        reader = _Reader(root, version[0])
+        variables, units = reader.variables(), reader.units()
+        experiment = {} if (e := root.find("DefaultExperiment")) is None else e.attrib
+        with reader.tolerated():
+            _real("DefaultExperiment: stepSize", experiment.get("stepSize", "0"))
+    except ValueError as error:
+        raise unreadable(path, error) from error
+    kinds = kinds_of(root, reader.major)
+    identified = root if reader.major == "1" else next(iter(kinds.values()), root)
+    return Interface(
+        path,
+        root.get("instantiationToken" if reader.major == "3" else "guid", ""),
+        identified.get("modelIdentifier", ""),
+        variables,
+        version,
+        units,
+        tuple(kinds),
+        capabilities_of(kinds, reader.major),
+        {key: typed("Real", experiment.get(name)) for key, name in EXPERIMENT.items()},
+        _platforms(files),
+        "resources/slavemodule.txt" in files,
+        root.get("modelName"),
+        root.get("generationTool"),
+        reader.flaws[0] if reader.flaws else "",
+    )
+
+
+def _platforms(files: Iterable[str]) -> tuple[str, ...]:
+    """The folders with a shared library right inside."""
+    parts = [name.split("/") for name in files if name.endswith((".so", ".dll", ".dylib"))]
+    return tuple(sorted({p[1] for p in parts if p[0] == "binaries" and len(p) == 3}))
+
+
+class _Reader:
+    """Reads the variables and units of a description; flaws are what can be tolerated."""
+
+    def __init__(self, root: Element, major: str) -> None:
+        self.root, self.major = root, major
+        self.flaws: list[str] = []
+        parent = root.find("ModelVariables")
+        if parent is None:
+            raise ValueError("no ModelVariables")
+        self.elements = [e for e in parent if e.get("name") is not None]
+        self.references = [
+            _whole(
+                f"variable {_name(e)!r}: valueReference", e.get("valueReference"), LARGEST_REFERENCE
+            )
+            for e in self.elements
+        ]
+        keys = self.references if major == "3" else range(1, len(self.elements) + 1)
+        self.places = dict(zip(keys, self.elements, strict=True))
+        types = {n: t for t in root.iterfind("TypeDefinitions/*") if (n := t.get("name"))}
+        self.types = types if major == "3" else {n: t[0] for n, t in types.items() if len(t)}
+        self.enumerations = {name: self.enumeration(name, t) for name, t in self.types.items()}
+
+    @contextmanager
+    def tolerated(self) -> Iterator[None]:
+        """What is wrong with a number becomes a flaw."""
+        try:
+            yield
+        except ValueError as error:
+            self.flaws.append(str(error))
+
+    def enumeration(self, name: str, declared: Element) -> Enumeration:
+        """A declared type as an enumeration; the items of FMI 1.0 are counted."""
+        items = []
+        for count, item in enumerate(declared.iterfind("Item"), 1):
+            label = _printable(f"type {name!r}: item", item.get("name", ""))
+            text = str(count) if self.major == "1" else item.get("value")
+            with self.tolerated():
+                items.append((label, _whole(f"type {name!r}: item {label!r}", text)))
+        return Enumeration(name, tuple(items))
+
+    def units(self) -> dict[str, Unit]:
+        """The units that are defined in terms of the SI base units."""
+        found = {}
+        for element in self.root.iterfind("UnitDefinitions/Unit"):
+            name, base = _printable("unit", element.get("name", "")), element.find("BaseUnit")
+            if base is not None:
+                with self.tolerated():
+                    found[name] = _unit(name, base)
+        return found
+
+    def variables(self) -> tuple[Variable, ...]:
+        """The variables, then the aliases of FMI 3.0, each with a name of its own."""
+        now, initially = self.unknowns("Output"), self.unknowns("InitialUnknown")
+        inputs = tuple(_name(e) for e in self.elements if e.get("causality") == "input")
+        initially = {name: inputs if n is None else n for name, n in initially.items()}
+        found = [
+            self.variable(e, reference, now.get(_name(e)), initially.get(_name(e)))
+            for e, reference in zip(self.elements, self.references, strict=True)
+        ]
+        for v, element in zip(tuple(found), self.elements, strict=True):
+            found += [_alias(v, e) for e in element.iterfind("Alias")]
+        names = set()
+        for v in found:
+            if v.name in names:
+                raise ValueError(f"two variables have the name {v.name!r}; must be unique")
+            names.add(_printable("variable", v.name))
+        return tuple(found)
+
+    def unknowns(self, group: str) -> dict[str, Names]:
+        """By name of an unknown what it depends on; FMI 1.0 has that at its variables."""
+        if self.major == "1":
+            direct = {_name(e): e.find("DirectDependency") for e in self.elements}
+            return {
+                name: tuple(child.text for child in e.iter("Name") if child.text)
+                for name, e in direct.items()
+                if e is not None
+            }
+        key, way = (
+            ("valueReference", group) if self.major == "3" else ("index", f"{group}s/Unknown")
+        )
+
+        def called(place: str, text: str | None) -> str:
+            found = self.places.get(_whole(place, text))
+            if found is None:
+                raise ValueError(f"{place} = {text!r}: must be the {key} of a variable")
+            return _name(found)
+
+        found: dict[str, Names] = {}
+        for element in self.root.iterfind(f"ModelStructure/{way}"):
+            name, listed = called(f"{group}: {key}", element.get(key)), element.get("dependencies")
+            place = f"{group} {name!r}: dependencies"
+            needs = None if listed is None else listed.split()
+            found[name] = None if needs is None else tuple(called(place, text) for text in needs)
+        return found
+
+    def variable(self, element: Element, reference: int, now: Names, initially: Names) -> Variable:
+        """One variable, which depends on others now and in initialisation mode."""
+        name, types = _name(element), TYPES_3 if self.major == "3" else TYPES
+        place = f"variable {name!r}"
+        value = element if self.major == "3" else next((e for e in element if e.tag in types), None)
+        if value is None or value.tag not in types:
+            raise ValueError(f"{place}: has no type; must be one of {', '.join(types)}")
+        kind = kind_of(value.tag)
+        declared = self.types.get(value.get("declaredType", ""))
+        sources = (element, value) if declared is None else (declared, element, value)
+        said = {key: text for e in sources for key, text in e.attrib.items() if text}
+        limits = [said.get(key) for key in ("min", "max", "nominal")]
+        if kind not in ("Real", "Integer"):
+            limits = [None, None, None]
+        for key, text in zip(("min", "max", "nominal"), limits, strict=True):
+            with self.tolerated():
+                _real(f"{place}: {key}", text or "0")
+        low, high, magnitude = (typed(value.tag, text) for text in limits)
+        causality, variability = self.nature(element, kind)
+        starts = tuple(e.get("value", "") for e in element.iterfind("Start"))
+        start = value.get("start")
+        if self.major == "3" and kind in ("String", "Binary"):
+            start = starts[0] if starts else None
+        initial = {} if self.major == "1" else INITIAL.get(variability, {})
+        is_enumeration = value.tag == "Enumeration"
+        return Variable(
+            name,
+            kind,
+            causality,
+            reference,
+            said.get("unit"),
+            start,
+            low,
+            high,
+            value.tag,
+            variability,
+            now,
+            initially,
+            tuple(self.size(place, e) for e in element.iterfind("Dimension")),
+            element.get("description"),
+            magnitude,
+            said.get("relativeQuantity") in ("true", "1"),
+            self.enumerations.get(value.get("declaredType", "")) if is_enumeration else None,
+            element.get("initial") or initial.get(causality),
+            said.get("displayUnit"),
+            starts,
+        )
+
+    def nature(self, element: Element, kind: str) -> tuple[str, str]:
+        """Causality and variability; the latter depends on the type where it is not declared."""
+        causality = element.get("causality") or "local"
+        variability = element.get("variability")
+        if self.major == "1":
+            causality = "local" if causality == "internal" else causality
+            if variability == "parameter":
+                return "parameter", "fixed"
+        if variability or self.major != "3":
+            return causality, variability or "continuous"
+        if causality in PARAMETERS:
+            return causality, "fixed"
+        return causality, "continuous" if kind == "Real" else "discrete"
+
+    def size(self, place: str, dimension: Element) -> int:
+        """The size of an array in a dimension, at the start where a variable holds it."""
+        text, reference = dimension.get("start"), dimension.get("valueReference")
+        if text is None:
+            holds = self.places.get(_whole(f"{place}: Dimension: valueReference", reference))
+            text = None if holds is None else holds.get("start")
+        return _whole(f"{place}: Dimension", text)
+
+
+def _alias(v: Variable, element: Element) -> Variable:
+    return replace(
+        v,
+        name=_name(element),
+        description=element.get("description") or v.description,
+        display_unit=element.get("displayUnit") or v.display_unit,
+        alias=True,
+    )
+
+
+def _unit(name: str, base: Element) -> Unit:
+    place = f"unit {name!r}"
+    exponents = tuple(_whole(f"{place}: {key}", base.get(key, "0")) for key in BASE)
+    factor = _real(f"{place}: factor", base.get("factor", "1"))
+    offset = _real(f"{place}: offset", base.get("offset", "0"))
+    if not factor or not math.isfinite(factor) or not math.isfinite(offset):
+        raise ValueError(f"{place}: factor = {factor:g}, offset = {offset:g}")
+    return Unit(name, exponents, factor, offset)
+
+
+def _name(element: Element) -> str:
+    return element.get("name", "")
+
+
+def _printable(what: str, name: str) -> str:
+    """The name; ValueError where it holds a control character."""
+    if CONTROL.search(name):
+        raise ValueError(f"{what} {name!r}: must have no control characters")
+    return name
+
+
+def _real(place: str, text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise ValueError(f"{place} = {text!r}: must be a number") from None
+
+
+def _whole(place: str, text: str | None, high: int | None = None) -> int:
+    """The whole number in a text, from 0 to high where that is given."""
+    try:
+        number = int(text or "")
+        if high is None or 0 <= number <= high:
+            return number
+    except ValueError:
+        pass
+    must = "a whole number" + ("" if high is None else f" from 0 to {high}")
+    found = "missing" if text is None else repr(text)
+    raise ValueError(f"{place} = {found}: must be {must}")

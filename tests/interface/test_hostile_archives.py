@@ -1,0 +1,213 @@
+"""Archives and descriptions made to do harm, or to deceive, are refused in one line."""
+
+import struct
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from grasp_cosim.errors import InputError
+from grasp_cosim.inspection.doctor import examine
+from grasp_cosim.inspection.inspection import inspect_fmu
+from grasp_cosim.interface import document
+from grasp_cosim.interface.read import describe, read_interface
+
+HEAD = '<fmiModelDescription fmiVersion="2.0" modelName="M" guid="{1}">'
+TAIL = '<CoSimulation modelIdentifier="m"/></fmiModelDescription>'
+PLAIN = f"{HEAD}<ModelVariables/>{TAIL}"
+GIGABYTE = 1 << 30
+
+Write = Callable[..., Path]
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Write:
+    """Writes an FMU of a description."""
+
+    def fmu(description: str | bytes) -> Path:
+        with zipfile.ZipFile(tmp_path / "x.fmu", "w", zipfile.ZIP_DEFLATED) as archive:
+            archive.writestr("modelDescription.xml", description)
+        return tmp_path / "x.fmu"
+
+    return fmu
+
+
+def refused(path: Path, *words: str) -> None:
+    """By every reader, in one line that begins with the file."""
+    for reader in (describe, read_interface, inspect_fmu, examine):
+        with pytest.raises(InputError) as caught:
+            reader(path)
+        assert str(caught.value).startswith(f"{path}: not a readable FMU: "), caught.value
+        assert len(str(caught.value).splitlines()) == 1
+        assert all(word in str(caught.value) for word in words), caught.value
+
+
+def of_zeros(path: Path, name: str, size: int, description: str = "") -> Path:
+    """An FMU with a file of that many zeros, and the description if one is given."""
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        if description:
+            archive.writestr("modelDescription.xml", description)
+        with archive.open(name, "w", force_zip64=True) as file:
+            chunk = bytes(1 << 20)
+            for _ in range(size >> 20):
+                file.write(chunk)
+    return path
+
+
+def test_a_description_of_a_gigabyte_is_not_unpacked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = of_zeros(tmp_path / "x.fmu", "modelDescription.xml", GIGABYTE)
+    assert path.stat().st_size < 6_000_000
+    monkeypatch.setattr(zipfile.ZipFile, "open", None)
+    refused(path, f"modelDescription.xml has {GIGABYTE} bytes; must have at most 100000000")
+
+
+def test_a_gigabyte_in_all_is_not_unpacked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = of_zeros(tmp_path / "x.fmu", "resources/zeros", GIGABYTE, PLAIN)
+    assert path.stat().st_size < 6_000_000
+    monkeypatch.setattr(zipfile.ZipFile, "open", None)
+    refused(path, f"its files have {GIGABYTE + len(PLAIN)} bytes unpacked; must have at most 5")
+
+
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+def test_many_files_of_one_name_count_each(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with zipfile.ZipFile(tmp_path / "x.fmu", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("modelDescription.xml", PLAIN)
+        for _ in range(2):
+            archive.writestr("z", bytes(1000))
+    monkeypatch.setattr(document, "LARGEST_UNPACKED", 1500)
+    monkeypatch.setattr(document, "MOST_EXPANSION", 0)
+    refused(tmp_path / "x.fmu", f"its files have {2000 + len(PLAIN)} bytes")
+
+
+def test_a_large_archive_may_hold_much(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Limits are for what grows when it is unpacked, not for large FMUs."""
+    monkeypatch.setattr(document, "LARGEST_UNPACKED", 10)
+    with zipfile.ZipFile(tmp_path / "x.fmu", "w") as archive:
+        archive.writestr("modelDescription.xml", PLAIN)
+        archive.writestr("resources/table", bytes(100_000))
+    assert describe(tmp_path / "x.fmu").identifier == "m"
+
+
+def test_a_directory_that_lies_yields_no_more_than_it_says(write: Write) -> None:
+    """A zip file whose directory has a small size for a description that unpacks to more."""
+    path = write(PLAIN + " " * 10_000)
+    data = bytearray(path.read_bytes())
+    for signature, offset in ((b"PK\x01\x02", 24), (b"PK\x03\x04", 22)):
+        at = data.index(signature) + offset
+        assert struct.unpack_from("<I", data, at)[0] == len(PLAIN) + 10_000
+        struct.pack_into("<I", data, at, 100)
+    path.write_bytes(bytes(data))
+    refused(path)
+
+
+@pytest.mark.parametrize("depth", [document.DEEPEST + 1, 200_000])
+def test_elements_too_deep(write: Write, depth: int) -> None:
+    inside = depth - 1
+    deep = f"{HEAD}{'<a>' * inside}{'</a>' * inside}<ModelVariables/>{TAIL}"
+    refused(write(deep), f"more than {document.DEEPEST} elements deep")
+
+
+def test_elements_as_deep_as_allowed(write: Write) -> None:
+    inside = document.DEEPEST - 1
+    deep = f"{HEAD}{'<a>' * inside}{'</a>' * inside}<ModelVariables/>{TAIL}"
+    assert read_interface(write(deep)).identifier == "m"
+
+
+LAUGHS = "".join(f'<!ENTITY a{i + 1} "{f"&a{i};" * 10}">' for i in range(9))
+
+
+@pytest.mark.parametrize(
+    "doctype",
+    [
+        f'<!DOCTYPE d [<!ENTITY a0 "ha">{LAUGHS}]>',
+        '<!DOCTYPE d SYSTEM "file:///etc/passwd">',
+        '<!DOCTYPE d [<!ENTITY a9 SYSTEM "file:///etc/hostname">]>',
+        "<!DOCTYPE d []>",
+    ],
+)
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+def test_a_document_type_is_refused(write: Write, doctype: str, encoding: str) -> None:
+    named = PLAIN.replace('modelName="M"', 'modelName="&a9;"') if "a9" in doctype else PLAIN
+    text = f'<?xml version="1.0" encoding="{encoding}"?>{doctype}{named}'
+    refused(write(text.encode(encoding)), "has a document type 'd', which may define entities")
+
+
+def test_an_encrypted_archive(write: Write) -> None:
+    path = write(PLAIN)
+    data = bytearray(path.read_bytes())
+    for signature, offset in ((b"PK\x01\x02", 8), (b"PK\x03\x04", 6)):
+        data[data.index(signature) + offset] |= 1
+    path.write_bytes(bytes(data))
+    refused(path, "encrypted")
+
+
+def variable(attributes: str) -> str:
+    return f"<ScalarVariable {attributes}><Real/></ScalarVariable>"
+
+
+def described(*variables: str) -> str:
+    return f"{HEAD}<ModelVariables>{''.join(variables)}</ModelVariables>{TAIL}"
+
+
+def test_two_variables_of_one_name(write: Write) -> None:
+    twice = [variable(f'name="a" valueReference="{i}"') for i in range(2)]
+    refused(write(described(*twice)), "two variables have the name 'a'; must be unique")
+
+
+@pytest.mark.parametrize("alias", ["x", "y"])
+def test_an_alias_of_a_name_that_is_taken(write: Write, alias: str) -> None:
+    text = described(
+        f'<Float64 name="x" valueReference="0"><Alias name="{alias}"/></Float64>',
+        '<Float64 name="y" valueReference="1"/>',
+    )
+    path = write(text.replace('"2.0"', '"3.0"').replace("guid", "instantiationToken"))
+    refused(path, f"two variables have the name '{alias}'")
+
+
+@pytest.mark.parametrize("reference", [str(2**32), "-1", "x", "", "1.0", "9" * 5000])
+def test_a_value_reference_of_more_than_32_bits(write: Write, reference: str) -> None:
+    path = write(described(variable(f'name="a" valueReference="{reference}"')))
+    refused(path, f"variable 'a': valueReference = '{reference}': must be a whole number from 0 to")
+
+
+def test_no_value_reference(write: Write) -> None:
+    refused(write(described(variable('name="a"'))), "variable 'a': valueReference = missing")
+
+
+def test_the_largest_value_reference(write: Write) -> None:
+    path = write(described(variable(f'name="a" valueReference="{2**32 - 1}"')))
+    assert read_interface(path).by_name["a"].reference == 2**32 - 1
+
+
+@pytest.mark.parametrize("character", ["&#10;", "&#9;", "&#13;", "\x7f", "\x9b", "\u2028"])
+def test_a_control_character_in_a_name(write: Write, character: str) -> None:
+    path = write(described(variable(f'name="a{character}b" valueReference="1"')))
+    refused(path, "must have no control characters")
+
+
+@pytest.mark.parametrize(
+    ("definition", "what"),
+    [
+        ('<UnitDefinitions><Unit name="a&#27;[2J"/></UnitDefinitions>', "not well-formed"),
+        ('<UnitDefinitions><Unit name="a&#10;"/></UnitDefinitions>', "unit 'a\\n'"),
+        (
+            '<TypeDefinitions><SimpleType name="T"><Enumeration><Item name="a&#10;" value="1"/>'
+            "</Enumeration></SimpleType></TypeDefinitions>",
+            "type 'T': item 'a\\n'",
+        ),
+    ],
+)
+def test_a_control_character_in_other_names(write: Write, definition: str, what: str) -> None:
+    text = PLAIN.replace("<ModelVariables/>", f"{definition}<ModelVariables/>")
+    if what == "not well-formed":
+        refused(write(text), "reference to invalid character number")
+    else:
+        refused(write(text), what, "must have no control characters")
+
+
+def test_names_in_other_scripts_are_names(write: Write) -> None:
+    name = "Größe.圧力[1]"
+    path = write(described(variable(f'name="{name}" valueReference="1"')))
+    assert list(read_interface(path).by_name) == [name]

@@ -1,0 +1,232 @@
+"""The reader against FMPy's, and what it takes although a master does not."""
+
+import math
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import pytest
+from grasp_cosim.errors import InputError
+from grasp_cosim.interface.interface import Interface, Value
+from grasp_cosim.interface.read import describe, read_interface
+from support.native_fmus import build, needs_gcc
+
+FMI_2 = """<fmiModelDescription fmiVersion="2.0" modelName="M" guid="{1}">
+  <CoSimulation modelIdentifier="m"/>
+  <UnitDefinitions><Unit name="mm"><BaseUnit m="1" factor="0.001"/></Unit></UnitDefinitions>
+  <TypeDefinitions><SimpleType name="Mode"><Enumeration><Item name="open" value="1"/>
+    <Item name="shut" value="2"/></Enumeration></SimpleType></TypeDefinitions>
+  <DefaultExperiment stepSize="0.01"/>
+  <ModelVariables>
+    <ScalarVariable name="u" valueReference="0" causality="input"><Real start="0"/>
+    </ScalarVariable>
+    <ScalarVariable name="y" valueReference="1" causality="output">
+      <Real min="1" max="2" nominal="3"/></ScalarVariable>
+    <ScalarVariable name="mode" valueReference="2" causality="parameter" variability="fixed">
+      <Enumeration declaredType="Mode" start="2"/></ScalarVariable>
+  </ModelVariables>
+  <ModelStructure><Outputs><Unknown index="2" dependencies="1"/></Outputs></ModelStructure>
+</fmiModelDescription>"""
+
+FMI_3 = """<fmiModelDescription fmiVersion="3.0" modelName="M" instantiationToken="{1}">
+  <CoSimulation modelIdentifier="m"/>
+  <ModelVariables>
+    <Float64 name="u" valueReference="7" causality="input" start="0" unit="m">
+      <Alias name="v" description="again"/></Float64>
+    <Float64 name="y" valueReference="8" causality="output" initial="calculated">
+      <Dimension valueReference="9"/><Dimension start="2"/><Alias name="z"/></Float64>
+    <UInt64 name="n" valueReference="9" causality="structuralParameter" start="3"/>
+  </ModelVariables>
+  <ModelStructure><Output valueReference="8" dependencies="7"/><InitialUnknown valueReference="8"/>
+  </ModelStructure></fmiModelDescription>"""
+
+OURS = (
+    "GripperPlant", "GripperPlantCompliant", "GripperPlantMovable", "GripperPlantMuJoCo",
+    "ProximitySensor", "GraspController",
+)  # fmt: skip
+Write = Callable[[str], Path]
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Write:
+    """Writes an FMU of a description."""
+
+    def fmu(description: str) -> Path:
+        with zipfile.ZipFile(tmp_path / "x.fmu", "w") as archive:
+            archive.writestr("modelDescription.xml", description)
+        return tmp_path / "x.fmu"
+
+    return fmu
+
+
+def number(text: str | None, absent: float) -> float:
+    return absent if text is None else float(text)
+
+
+def value(fmi_type: str, text: str | None) -> Value | None:
+    if text is None or fmi_type in ("String", "Binary"):
+        return text
+    if fmi_type == "Boolean":
+        return text == "true"
+    return float(text) if fmi_type.startswith(("Real", "Float")) else int(text)
+
+
+def names(variables: list[Any] | None) -> tuple[str, ...] | None:
+    return None if variables is None else tuple(v.name for v in variables)
+
+
+def same_as_fmpy(path: Path) -> Interface:
+    """Compare each typed field with what FMPy reads, validating; return what is read."""
+    ours, theirs = read_interface(path), fmpy.read_model_description(path)
+    able = theirs.coSimulation
+    assert (ours.guid, ours.version, ours.model_name) == (
+        theirs.guid, theirs.fmiVersion, theirs.modelName,
+    )  # fmt: skip
+    assert (ours.identifier, ours.tool) == (able.modelIdentifier, theirs.generationTool)
+    assert ours.can_save_state == able.canGetAndSetFMUstate
+    assert ours.can_vary_step == able.canHandleVariableCommunicationStepSize
+    assert ours.early_return == able.mightReturnEarlyFromDoStep
+    assert ours.once_per_process == able.canBeInstantiatedOnlyOncePerProcess
+    experiment = theirs.defaultExperiment
+    assert ours.step == (float(experiment.stepSize) if experiment else None)
+    for unit in theirs.unitDefinitions:
+        if unit.baseUnit is not None:
+            base = unit.baseUnit
+            assert ours.units[unit.name].exponents == (
+                base.kg, base.m, base.s, base.A, base.K, base.mol, base.cd, base.rad,
+            )  # fmt: skip
+            assert ours.units[unit.name].factor == base.factor
+            assert ours.units[unit.name].offset == base.offset
+    now = {u.variable.name: names(u.dependencies) for u in theirs.outputs}
+    initially = {u.variable.name: names(u.dependencies) for u in theirs.initialUnknowns}
+    inputs = tuple(v.name for v in theirs.modelVariables if v.causality == "input")
+    for mine, his in zip(ours.variables, theirs.modelVariables, strict=True):
+        for key in ("name", "causality", "variability", "initial", "type", "unit", "start"):
+            assert getattr(mine, key) == getattr(his, key), his.name
+        assert (mine.reference, mine.description) == (his.valueReference, his.description)
+        assert (mine.shape, mine.display_unit) == (his.shape, his.displayUnit)
+        assert mine.start_value == value(his.type, his.start)
+        assert (mine.low, mine.high) == (number(his.min, -math.inf), number(his.max, math.inf))
+        assert mine.nominal == number(his.nominal, 1.0)
+        assert mine.relative == bool(his.relativeQuantity)
+        assert mine.dependencies == now.get(his.name)
+        expected = initially.get(his.name)
+        assert mine.initial_dependencies == (
+            inputs if expected is None and his.name in initially else expected
+        )
+        items = his.declaredType.items if his.type == "Enumeration" and his.declaredType else ()
+        assert mine.items == {item.name: int(item.value) for item in items}
+    return ours
+
+
+@pytest.mark.parametrize("name", OURS)
+def test_our_fmus_are_read_as_fmpy_reads_them(fmus: Path, name: str) -> None:
+    interface = same_as_fmpy(fmus / f"{name}.fmu")
+    assert interface.python
+    assert interface.units
+
+
+@needs_gcc
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_native_fmus_are_read_as_fmpy_reads_them(tmp_path: Path, version: str) -> None:
+    interface = same_as_fmpy(build(tmp_path, version=version, units={"x": "m"}))
+    assert not interface.python
+    assert interface.by_name["x"].unit == "m"
+
+
+def test_all_of_a_small_one(write: Write) -> None:
+    interface = same_as_fmpy(write(FMI_2))
+    assert interface.by_name["mode"].items == {"open": 1, "shut": 2}
+    assert interface.by_name["y"].dependencies == ("u",)
+
+
+def test_aliases_and_dimensions_of_fmi_3(write: Write) -> None:
+    path = write(FMI_3)
+    everything, runs = describe(path), read_interface(path)
+    assert [v.name for v in everything.variables] == ["u", "y", "n", "v", "z"]
+    assert [v.name for v in runs.variables] == ["u", "y", "n", "z"]
+    assert everything.by_name["v"].description == "again"
+    assert everything.by_name["v"].unit == "m"
+    assert runs.by_name["z"].shape == (3, 2)
+    assert runs.by_name["z"].dependencies == ("u",)
+    assert runs.by_name["y"].initial_dependencies == ("u",)
+
+
+FLAWS = [
+    ('min="1"', 'min="x"', "variable 'y': min = 'x': must be a number"),
+    ('max="2"', 'max="1,5"', "variable 'y': max = '1,5': must be a number"),
+    ('nominal="3"', 'nominal="-"', "variable 'y': nominal = '-': must be a number"),
+    ('m="1"', 'm="0.5"', "unit 'mm': m = '0.5': must be a whole number"),
+    ('"0.001"', '"x"', "unit 'mm': factor = 'x': must be a number"),
+    ('"0.001"', '"inf"', "unit 'mm': factor = inf, offset = 0"),
+    ('value="1"', 'value="I"', "type 'Mode': item 'open' = 'I': must be a whole number"),
+    ('stepSize="0.01"', 'stepSize="1ms"', "DefaultExperiment: stepSize = '1ms': must be a number"),
+]
+
+
+@pytest.mark.parametrize(("before", "after", "message"), FLAWS)
+def test_a_number_that_only_a_master_needs(
+    write: Write, before: str, after: str, message: str
+) -> None:
+    assert FMI_2.count(before) == 1
+    path = write(FMI_2.replace(before, after))
+    assert describe(path).flaw == message
+    with pytest.raises(InputError) as caught:
+        read_interface(path)
+    assert str(caught.value) == f"{path}: not a readable FMU: {message}"
+
+
+@pytest.mark.parametrize(
+    ("xml", "before", "after", "message"),
+    [
+        (FMI_2, 'index="2"', 'index="0"', "Output: index = '0': must be the index of a variable"),
+        (FMI_2, '<Real start="0"/>', "", "variable 'u': has no type; must be one of Real, Integer"),
+        (FMI_3, "UInt64", "UInt128", "variable 'n': has no type; must be one of Float64"),
+        (FMI_3, 'dependencies="7"', 'dependencies="6"', "Output 'y': dependencies = '6': must be"),
+        (FMI_3, 'start="3"', "", "variable 'y': Dimension = missing: must be a whole number"),
+        (
+            FMI_3,
+            '<Dimension start="2"/>',
+            '<Dimension start="x"/>',
+            "variable 'y': Dimension = 'x'",
+        ),
+        (FMI_3, "ModelVariables", "Variables", "no ModelVariables"),
+    ],
+)
+def test_what_makes_no_sense_to_anybody(
+    write: Write, xml: str, before: str, after: str, message: str
+) -> None:
+    assert before in xml
+    path = write(xml.replace(before, after))
+    with pytest.raises(InputError) as caught:
+        describe(path)
+    assert str(caught.value).startswith(f"{path}: not a readable FMU: {message}")
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "message"),
+    [
+        ("<CoSimulation", "<ModelExchange", "for model exchange only; must be a co-simulation FMU"),
+        ("<CoSimulation", "<ScheduledExecution", "for scheduled execution only; must be a co-sim"),
+        ('"2.0"', '"1.0"', "FMI 1.0; must be an FMI 2.0 or 3.0 co-simulation FMU"),
+    ],
+)
+def test_what_no_master_runs_can_be_described(
+    write: Write, before: str, after: str, message: str
+) -> None:
+    xml = FMI_3 if "Scheduled" in after else FMI_2
+    path = write(xml.replace(before, after))
+    assert "u" in describe(path).by_name
+    with pytest.raises(InputError) as caught:
+        read_interface(path)
+    assert str(caught.value).startswith(f"{path}: {message}")
+
+
+def test_a_file_is_read_once_until_it_changes(write: Write) -> None:
+    path = write(FMI_2)
+    first = read_interface(path)
+    assert read_interface(path) is first
+    write(FMI_2.replace('"u"', '"w"'))
+    assert "w" in read_interface(path).by_name
