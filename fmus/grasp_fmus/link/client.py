@@ -7,24 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
 
-from .message import (
-    BUSY,
-    END,
-    FAILED,
-    FORGED,
-    HELLO,
-    INITIALISE,
-    OTHER_INTERFACE,
-    OUTPUTS,
-    REFUSE,
-    STEP,
-    UNKNOWN,
-    WELCOME,
-    Codec,
-    Message,
-    Sealer,
-    Value,
-)
+from . import message
+from .message import Codec, Message, Sealer, Value
 from .signature import Signature
 
 WINDOW = 4096
@@ -99,7 +83,7 @@ class Client:
         self._sequence = self._first_step = self._newest = self._seen = self._awaited = 0
         self._greeting = True
         self.refusal = None
-        return self._pack(HELLO, now, self.signature.text.encode())
+        return self._pack(message.HELLO, now, self.signature.text.encode())
 
     def initialise(self, time: float, values: Sequence[Value], now: int) -> bytes:
         """INITIALISE with inputs and parameters; time in s.
@@ -108,18 +92,18 @@ class Client:
         """
         body = self._request.pack(values)
         self._next()
-        return self._pack(INITIALISE, now, body, time)
+        return self._pack(message.INITIALISE, now, body, time)
 
     def step(self, time: float, step: float, values: Sequence[Value], now: int) -> bytes:
         """STEP from time over step, both in s, with inputs and parameters. To be sent once."""
         body = self._request.pack(values)
         self._next()
         self._first_step = self._first_step or self._sequence
-        return self._pack(STEP, now, body, time, step)
+        return self._pack(message.STEP, now, body, time, step)
 
     def end(self, now: int) -> bytes:
         """END; there is no answer to it."""
-        return self._pack(END, now, b"")
+        return self._pack(message.END, now, b"")
 
     def miss(self) -> None:
         """Give up the step under way; its answer is late from now on."""
@@ -147,15 +131,15 @@ class Client:
         """Judge a datagram, whatever it holds."""
         m = self._sealer.open(datagram)
         if isinstance(m, str):
-            self.counters.forged += m == FORGED
+            self.counters.forged += m == message.FORGED
             return self._reject()
         if m.session != self._session:
             return self._reject()
-        if m.kind == OUTPUTS and m.cookie == self._cookie and not self._greeting:
+        if m.kind == message.OUTPUTS and m.cookie == self._cookie and not self._greeting:
             return self._receive_outputs(m, now)
-        if m.kind == WELCOME:
+        if m.kind == message.WELCOME:
             return self._receive_welcome(m, now)
-        if m.kind == REFUSE:
+        if m.kind == message.REFUSE:
             return self._receive_refusal(m)
         return self._reject()
 
@@ -178,13 +162,13 @@ class Client:
         if not expected or m.cookie != self._cookie or not (self._greeting or self._awaited):
             return self._reject()
         text = m.body.decode(errors="replace")
-        if m.code == OTHER_INTERFACE:
+        if m.code == message.OTHER_INTERFACE:
             text = f"the peer has another interface: {self.signature.difference(text) or 'unnamed'}"
-        elif m.code == BUSY:
+        elif m.code == message.BUSY:
             text = "the peer is busy with another proxy"
-        elif m.code == UNKNOWN:
+        elif m.code == message.UNKNOWN:
             text = "the peer does not know this session"
-        elif m.code == FAILED:
+        elif m.code == message.FAILED:
             text = f"the peer failed: {' '.join(text.split())}"
         else:
             return self._reject()
