@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from grasp_fmus.build import SCRIPTS
 from grasp_fmus.packing import packages, with_imports
+from grasp_fmus.shipped import SCRIPTS
 
 ROOT = Path(__file__).parent.parent
 BLOCKS = {

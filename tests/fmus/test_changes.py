@@ -8,10 +8,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from grasp_fmus.build import SCRIPTS
 from grasp_fmus.contract import declared
 from grasp_fmus.fmu import build_fmu
 from grasp_fmus.folder import Built
+from grasp_fmus.shipped import SCRIPTS
 from proximity_sensor import channel
 
 SENSOR = Path(__file__).parents[2] / "sensor"
