@@ -1,4 +1,4 @@
-"""The bench side of a proxy FMU as one C99 header, for a target that is programmed in C.
+"""Writes the bench side of a proxy FMU as one C99 header, for a target that is programmed in C.
 
 link.h.in is the header itself, as C for a model called model; here it gets the name and the
 variables. What it does is what link/peer.py does. Protocol: link/README.md

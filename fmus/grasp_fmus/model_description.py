@@ -1,4 +1,4 @@
-"""modelDescription.xml of FMI 2.0, from the variables of a slave."""
+"""Writes modelDescription.xml of FMI 2.0 from the variables of a slave."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -43,7 +43,7 @@ UNITS: dict[str, Unit] = {
 
 
 class Experiment(NamedTuple):
-    """A default experiment, times in s; None where nothing is said."""
+    """A default experiment, times in s; None for what is not given."""
 
     start: float | None = 0.0
     stop: float | None = 3.0

@@ -16,24 +16,24 @@ WINDOW = 4096
 
 
 class Verdict(Enum):
-    """What a datagram is to the request under way."""
+    """The meaning of a datagram for the request under way."""
 
     NOTHING = auto()
-    """Not its answer: go on waiting."""
+    """It is not the answer: go on waiting."""
     ANSWERED = auto()
     REFUSED = auto()
-    """refusal says why."""
+    """The reason is in Client.refusal."""
 
 
 @dataclass(slots=True)
 class Counters:
-    """What became of the steps, and what else came.
+    """Counts of steps by their fate, and of all else that came.
 
-    missed: steps without an answer in time. late: answers to steps that came after their step was
-    given up; out_of_order: of these, those after the answer to a newer one, which were dropped.
-    Every answer comes in time, late, or never: missed = late + never.
-    duplicated: answers that had come already. rejected: what was no datagram of this session.
-    forged: of these, those without the tag of the key.
+    `missed`: steps without an answer in time. `late`: answers to steps that came after their step
+    was given up; `out_of_order`: of these, those after the answer to a newer one, which were
+    dropped. Every answer comes in time, late, or never: missed = late + never.
+    `duplicated`: answers that had come already. `rejected`: datagrams that were not of this
+    session. `forged`: of these, those without the tag of the key.
     """
 
     missed: int = 0
@@ -46,7 +46,7 @@ class Counters:
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """Why the peer refused, by code of REFUSE and in words."""
+    """The reason why the peer refused, as a code of REFUSE and in words."""
 
     code: int
     text: str
@@ -61,11 +61,11 @@ class Client:
         self.counters = Counters()
         self.refusal: Refusal | None = None
         self.outputs: list[Value] | None = None
-        """Of the newest answer; None before the first."""
+        """The outputs of the newest answer; None before the first."""
         self.outputs_time = 0.0
-        """What they belong to, in s."""
+        """The time that they belong to, in s."""
         self.round_trip = 0
-        """Of the newest answer, in ns."""
+        """The time between the newest answer and its request, in ns."""
         self._sealer = Sealer(key)
         self._request = Codec(signature.request)
         self._answer = Codec(signature.answer)
@@ -78,7 +78,7 @@ class Client:
     # Requests
 
     def greet(self, session: int, now: int) -> bytes:
-        """HELLO, to begin a session of that number, which must be a new one, 64 bits at random."""
+        """Return HELLO, to begin a session of that number: a new one, 64 bits at random."""
         self._session, self._cookie = session, 0
         self._sequence = self._first_step = self._newest = self._seen = self._awaited = 0
         self._greeting = True
@@ -86,7 +86,7 @@ class Client:
         return self._pack(message.HELLO, now, self.signature.text.encode())
 
     def initialise(self, time: float, values: Sequence[Value], now: int) -> bytes:
-        """INITIALISE with inputs and parameters; time in s.
+        """Return INITIALISE with the values of inputs and parameters; `time` in s.
 
         ValueError where a string is too long.
         """
@@ -95,14 +95,14 @@ class Client:
         return self._pack(message.INITIALISE, now, body, time)
 
     def step(self, time: float, step: float, values: Sequence[Value], now: int) -> bytes:
-        """STEP from time over step, both in s, with inputs and parameters. To be sent once."""
+        """Return STEP from `time` over `step`, both in s, with `values`. To be sent once."""
         body = self._request.pack(values)
         self._next()
         self._first_step = self._first_step or self._sequence
         return self._pack(message.STEP, now, body, time, step)
 
     def end(self, now: int) -> bytes:
-        """END; there is no answer to it."""
+        """Return END; there is no answer to it."""
         return self._pack(message.END, now, b"")
 
     def miss(self) -> None:
@@ -128,7 +128,7 @@ class Client:
     # Answers
 
     def receive(self, datagram: bytes, now: int) -> Verdict:
-        """Judge a datagram, whatever it holds."""
+        """Return the verdict on a datagram, whatever it holds; `now` in ns."""
         m = self._sealer.open(datagram)
         if isinstance(m, str):
             self.counters.forged += m == message.FORGED

@@ -25,12 +25,12 @@ GREETED = 64
 
 @dataclass(slots=True)
 class PeerCounters:
-    """What was received: requests, by what became of them.
+    """Counts of the datagrams received, by their fate.
 
-    steps and initialisations: done. repeated: answered again. duplicated: steps that had come
-    already; stale: those older than the last. foreign: of another interface, or of a session that
-    is not known. malformed: no datagram of this protocol, or with values that are none. forged:
-    without the tag of the key. busy: HELLOs while another session was under way.
+    `steps` and `initialisations`: done. `repeated`: answered again. `duplicated`: steps that had
+    come already; `stale`: steps older than the last. `foreign`: of another interface, or of a
+    session that is not known. `malformed`: no datagram of this protocol, or with invalid values.
+    `forged`: without the tag of the key. `busy`: HELLOs while another session was under way.
     """
 
     steps: int = 0
@@ -44,14 +44,14 @@ class PeerCounters:
     busy: int = 0
 
     def as_dict(self) -> dict[str, int]:
-        """The counters by name."""
+        """Return the counts by name."""
         return asdict(self)
 
 
 class Request(NamedTuple):
-    """What to do: INITIALISE, STEP or END; times in s.
+    """A request to carry out: INITIALISE, STEP or END; times in s.
 
-    values are inputs, then parameters. fresh: set the model up anew, a session begins.
+    `values` are inputs, then parameters. With `fresh` a session begins: set the model up anew.
     """
 
     kind: int
@@ -74,7 +74,7 @@ class Peer:
         key: bytes | None = None,
         cookie: Callable[[], int] = lambda: randbits(64) or 1,
     ) -> None:
-        """Cookie makes numbers from 1 to 2**64 - 1 that nobody can guess.
+        """`cookie` makes numbers from 1 to 2**64 - 1 that nobody can guess.
 
         ValueError where the key is too short.
         """
@@ -94,11 +94,11 @@ class Peer:
 
     @property
     def stepping(self) -> bool:
-        """Whether the session under way has begun to step."""
+        """True if the session under way has begun to step."""
         return self._stepping
 
     def receive(self, datagram: bytes, now: int) -> Action:
-        """Judge a datagram, whatever it holds; now in ns of a monotonic clock."""
+        """Return what to do about a datagram; `now` in ns of a monotonic clock."""
         m = self._sealer.open(datagram)
         if isinstance(m, str):
             return self._drop("forged" if m == message.FORGED else "malformed")
@@ -111,11 +111,11 @@ class Peer:
         return self._in_session(m, now)
 
     def outputs(self, values: list[Value], time: float) -> bytes:
-        """The answer to the last request: outputs, and the time in s that they belong to."""
+        """Return the answer to the last request: outputs, and the time in s they belong to."""
         return self._keep(message.OUTPUTS, 0, time, self._answer.pack(values))
 
     def failed(self, reason: str) -> bytes:
-        """The answer to the last request where it cannot be done; the session is over."""
+        """Return the answer to the last request where it cannot be done; end the session."""
         m = self._last
         answer = self._keep(message.REFUSE, message.FAILED, 0.0, reason.encode()[:LARGEST_REASON])
         self._over()
@@ -168,7 +168,7 @@ class Peer:
         return self._do(m, now, fresh=False)
 
     def _begin(self, m: Message, now: int) -> Action:
-        """The first INITIALISE of a session makes it the one under way."""
+        """Make the session of the first INITIALISE the one under way."""
         if m.kind == message.INITIALISE and self._refused == (m.session, m.cookie, m.sequence):
             self.counters.repeated += 1
             return self._last_answer
@@ -212,7 +212,7 @@ class Peer:
         return self._last_answer
 
     def _pack(self, m: Message, kind: int, code: int, time: float, body: bytes) -> bytes:
-        """An answer to m."""
+        """Return an answer to the request `m`."""
         return self._sealer.pack(
             Message(
                 kind, code, self.signature.hash, m.session, m.cookie, m.sequence, time, 0.0,
