@@ -21,6 +21,8 @@ BLUE, RED, AMBER, GREY = "#2f74c0", "#cf4434", "#e09b24", "#7d8893"
 WHITE = "#ffffff"
 SIZE = 256
 """Width and height in px; the pictures are drawn in these coordinates, y upwards."""
+ROUND = "round,pad=0,rounding_size=10"
+"""The style of a box, radius in px."""
 
 
 def main(folder: Path) -> None:
@@ -63,15 +65,12 @@ def gripper_plant_movable(axes: Axes) -> None:
 
 def gripper_plant_mujoco(axes: Axes) -> None:
     """The object as a mesh, as a simulator of bodies shows it."""
-    _gripper(axes)
-    _box(axes, 84, 24, 88, 108, AMBER)
+    gripper_plant(axes)
     for y in (78, 114):
         axes.plot([102, 154], [y, y - 36], color=WHITE, lw=6, solid_capstyle="round")
     frame = [(102, 42), (154, 42), (154, 114), (102, 114)]
     axes.add_patch(Polygon(frame, fill=False, edgecolor=WHITE, lw=6, joinstyle="round"))
     axes.plot([102, 154], [78, 78], color=WHITE, lw=6, solid_capstyle="round")
-    _arrow(axes, 56, 78, 26, 0, RED, 16)
-    _arrow(axes, 200, 78, -26, 0, BLUE, 16)
 
 
 def proximity_sensor(axes: Axes) -> None:
@@ -99,8 +98,7 @@ def grasp_controller(axes: Axes) -> None:
 
 def proxy(axes: Axes) -> None:
     """A block in outline, and what goes to and fro between it and the real one."""
-    style = "round,pad=0,rounding_size=10"
-    outline = FancyBboxPatch((26, 150), 204, 80, style, fill=False, edgecolor=BLUE, lw=9, ls=":")
+    outline = FancyBboxPatch((26, 150), 204, 80, ROUND, fill=False, edgecolor=BLUE, lw=9, ls=":")
     axes.add_patch(outline)
     _box(axes, 20, 16, 216, 84, BLUE)
     _arrow(axes, 92, 148, 0, -44, RED, 16)
@@ -116,7 +114,7 @@ ICONS: dict[str, Callable[[Axes], None]] = {
     "GraspController": grasp_controller,
     "Proxy": proxy,
 }
-"""What draws the icon of each FMU, and of all proxies."""
+"""The function that draws the icon of each FMU, and of all proxies."""
 
 
 def _gripper(axes: Axes) -> None:
@@ -127,8 +125,7 @@ def _gripper(axes: Axes) -> None:
 
 
 def _box(axes: Axes, left: float, bottom: float, width: float, height: float, color: str) -> None:
-    style = "round,pad=0,rounding_size=10"
-    axes.add_patch(FancyBboxPatch((left, bottom), width, height, style, color=color, lw=0))
+    axes.add_patch(FancyBboxPatch((left, bottom), width, height, ROUND, color=color, lw=0))
 
 
 def _arrow(axes: Axes, x: float, y: float, dx: float, dy: float, color: str, width: float) -> None:

@@ -15,8 +15,9 @@ from types import ModuleType
 import pytest
 from grasp_cosim import System, cli
 from grasp_cosim.grasp.presets import SYSTEM
-from grasp_fmus.build import SCRIPTS, build
+from grasp_fmus.build import build
 from grasp_fmus.fmu import build_fmu
+from grasp_fmus.shipped import SCRIPTS
 from hypothesis import settings
 from support.fmi2 import Fmu
 from support.packages import skip_where_it_cannot_run

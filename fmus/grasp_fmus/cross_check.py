@@ -1,4 +1,4 @@
-"""The files of the FMI cross-check beside an FMU: inputs, reference results, options.
+"""Makes the files of the FMI cross-check beside an FMU: inputs, reference results, options.
 
 The reference is the block itself, run in plain Python, never the FMU: an importer that reproduces
 it has run the FMU as it was meant. Format: FMI cross-check rules 4.1, sections 9.1.4 and 10.
@@ -11,6 +11,7 @@ at its very time and sets the very numbers in it.
 
 import math
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 from .contract import Block, Field, build_params, declared, packer, unpacker
@@ -30,7 +31,7 @@ Signal = Callable[[float], float]
 
 
 def cross_check_files(name: str, block: Block) -> dict[str, bytes]:
-    """NAME_in.csv, NAME_ref.csv and NAME_ref.opt of the FMU name, by file name.
+    """Return NAME_in.csv, NAME_ref.csv and NAME_ref.opt of the FMU `name`, by file name.
 
     Without inputs there is no NAME_in.csv. ValueError if an output of the block is not finite.
     """
@@ -40,7 +41,10 @@ def cross_check_files(name: str, block: Block) -> dict[str, bytes]:
     times = [k * STEP_SIZE for k in range(STEPS + 1)]
     samples = [[signal(t) for signal in signals] for t in times]
     results = list(_run(block, fields, samples))
-    _check_finite(name, outputs, times, results)
+    for t, row in zip(times, results, strict=True):
+        for variable, value in zip(outputs, row, strict=True):
+            if not math.isfinite(value):
+                raise ValueError(f"{name}: {variable} = {value!r} at {t} s: must be finite")
     files = {
         f"{name}_ref.csv": _csv(outputs, times, results),
         f"{name}_ref.opt": _options(times[0], times[-1]),
@@ -53,7 +57,7 @@ def _names(fields: list[Field], causality: str) -> list[str]:
 
 
 def _run(block: Block, fields: list[Field], samples: list[list[Any]]) -> Iterator[list[Any]]:
-    """The outputs after initialisation and after every step."""
+    """Yield the outputs after initialisation and after every step."""
     start = [value for f in fields for value in f.starts]
     p = build_params(block, fields, start)
     pack, unpack = packer(block.Inputs, fields), unpacker(fields)
@@ -63,15 +67,6 @@ def _run(block: Block, fields: list[Field], samples: list[list[Any]]) -> Iterato
     for u in inputs[:-1]:
         x = block.step(p, x, u, STEP_SIZE)
         yield unpack(block.outputs(p, x, u))
-
-
-def _check_finite(
-    name: str, variables: list[str], times: list[float], rows: list[list[Any]]
-) -> None:
-    for t, row in zip(times, rows, strict=True):
-        for variable, value in zip(variables, row, strict=True):
-            if not math.isfinite(value):
-                raise ValueError(f"{name}: {variable} = {value!r} at {t} s: must be finite")
 
 
 def _csv(variables: list[str], times: list[float], rows: list[list[Any]]) -> bytes:
@@ -85,7 +80,7 @@ def _literal(value: float | bool) -> str:
 
 
 def _options(start: float, stop: float) -> bytes:
-    """The rules' SolverType is left out: FMPy reads numbers only."""
+    """Return the options without the rules' SolverType: FMPy reads numbers only."""
     options = {
         "StartTime": start,
         "StopTime": stop,
@@ -97,25 +92,24 @@ def _options(start: float, stop: float) -> bytes:
 
 
 def _signals(name: str, fields: list[Field]) -> list[Callable[[float], float | bool]]:
-    """A signal per input: from the FMU whose name this one's begins with, or of its own."""
+    """Return a signal per input: that of the FMU whose name this one's begins with, or its own."""
     known = next((s for of, s in SIGNALS.items() if name.startswith(of)), {})
     return [
-        _held(start) if f.kind is bool else _rounded(known.get(variable) or _swing(f, start))
+        partial(_held, start)
+        if f.kind is bool
+        else _rounded(known.get(variable) or _swing(f, start))
         for f in fields
         if f.causality == "input"
         for variable, start in zip(f.names, f.starts, strict=True)
     ]
 
 
-def _held(start: bool | None) -> Callable[[float], bool]:
-    def signal(t: float) -> bool:
-        return bool(start)
-
-    return signal
+def _held(start: bool | None, t: float) -> bool:
+    return bool(start)
 
 
 def _swing(f: Field, start: float | None) -> Signal:
-    """From the start value out by the nominal value and back."""
+    """Return a signal from the start value out by the nominal value and back."""
     first, width = start or 0.0, f.nominal or 1.0
     return lambda t: first + width * _rise(t, 0.0, 1.0) - width * _rise(t, 1.5, 2.5)
 
@@ -126,19 +120,19 @@ def _rounded(signal: Signal) -> Signal:
 
 
 def _rise(t: float, start: float, stop: float) -> float:
-    """From 0 at start to 1 at stop, level before and after."""
+    """Rise from 0 at `start` to 1 at `stop`, level before and after."""
     s = min(max((t - start) / (stop - start), 0.0), 1.0)
     return s * s * (3.0 - 2.0 * s)
 
 
 def _rate(t: float, start: float, stop: float) -> float:
-    """The derivative of _rise()."""
+    """Return the derivative of _rise()."""
     s = min(max((t - start) / (stop - start), 0.0), 1.0)
     return 6.0 * s * (1.0 - s) / (stop - start)
 
 
 def _push(t: float, stop: float) -> float:
-    """One way until half of stop, the other way until stop: a body at rest is at rest again."""
+    """Push one way until half of `stop`, then the other: a body at rest is at rest again."""
     return math.sin(2.0 * math.pi * t / stop) if t < stop else 0.0
 
 
@@ -170,4 +164,4 @@ SIGNALS: dict[str, dict[str, Signal]] = {
         ),
     },
 }  # fmt: skip
-"""What the inputs of each FMU do, by name. A real input that is not here swings out and back."""
+"""The signals of each FMU's inputs by name. A real input that is not here swings out and back."""

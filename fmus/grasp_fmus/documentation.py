@@ -21,7 +21,7 @@ built with <code>grasp-cosim $command --bind-python</code>. Python's standard li
 through <code>PYTHONHOME</code>, or through <code>python3</code> on the <code>PATH</code>."""
 _BOUND = """Nothing where there is <code>$library</code>, to which this FMU is bound: it brings it
 along, and knows where its standard library is. On another machine build it there."""
-"""What a host on Linux needs."""
+"""The needs of a host on Linux, for an FMU bound to a libpython and for any other."""
 
 
 class Making(NamedTuple):

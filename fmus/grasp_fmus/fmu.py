@@ -12,7 +12,6 @@ import sys
 import zipfile
 from collections.abc import Mapping, Sequence
 from functools import cache
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +22,7 @@ from .documentation import BLOCK, Making, icon, licences, page
 from .folder import Built, file_hash, write_file
 from .model_description import Description, model_description, version
 from .packing import package_folder, with_imports
+from .shipped import slave_class
 
 BINARIES = package_folder("pythonfmu") / "resources" / "binaries"
 HASH = "CONTENT_HASH"
@@ -98,16 +98,6 @@ def write_fmu(
     if there is None:
         return Built(target, "new", hash=file_hash(data))
     return Built(target, "changed", changes(before, files), file_hash(data))
-
-
-def slave_class(script: Path) -> Any:
-    """Return the class in a script, which has the script's name."""
-    spec = spec_from_file_location(script.stem, script)
-    if spec is None or spec.loader is None:
-        raise ImportError(f"{script}: must be a Python file")
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return getattr(module, script.stem)
 
 
 def _renamed(sources: Mapping[str, bytes]) -> dict[str, bytes]:

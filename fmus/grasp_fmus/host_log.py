@@ -36,9 +36,9 @@ fmi2CallbackFunctions, which begins with the logger; in that: componentEnvironme
 
 
 def host_log(address: int, instance: str) -> Log | None:
-    """The logger of the host for an instance; None where it does not stand where it should.
+    """Return the logger of the host for an instance; None where it is not where it should be.
 
-    address is that of pythonfmu's logger. The instance name, found where it is expected, is the
+    `address` is that of pythonfmu's logger. The instance name, found where it is expected, is the
     proof that the layout is the known one: that of 64 bit Linux. There a string of up to 15 bytes
     stands in the object itself. A host without a logger gets none.
     """
@@ -68,7 +68,7 @@ def _silent(status: int, message: str) -> None:
 
 
 def as_format(message: str) -> str:
-    """The message for a host's logger, which is a printf."""
+    """Return the message for a host's logger, which is a printf."""
     return message.replace("%", "%%")
 
 

@@ -1,4 +1,4 @@
-"""What pythonfmu 0.7.0's loader needs, so that any number of instances can come and go."""
+"""Gives pythonfmu 0.7.0's loader what it needs for any number of instances to come and go."""
 
 import ctypes
 import sys
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class Component:
-    """What pythonfmu takes for the class: it makes instances, one alive at a time.
+    """Stands for the class that pythonfmu looks for: it makes instances, one alive at a time.
 
     pythonfmu asks the class, not the instance, to serialise a state.
     """
@@ -23,7 +23,7 @@ class Component:
         self._instance: ref[Slave]
 
     def __call__(self, **kwargs: Any) -> "Slave":
-        """A fresh instance, at instantiation and at every reset."""
+        """Make a fresh instance, at instantiation and at every reset."""
         instance = self._slave(self, **kwargs)
         self._instance = ref(instance)
         return instance
@@ -59,7 +59,7 @@ class Once(type):
     """
 
     def __new__(cls, name: str, bases: tuple[type, ...], namespace: dict[str, Any]) -> Any:
-        """The class, when the script is imported; when it is run again, a Component."""
+        """Return the class when the script is imported, a Component when it is run again."""
         script = namespace["__module__"]
         if script not in _made:
             made = super().__new__(cls, name, bases, namespace)

@@ -1,4 +1,4 @@
-"""modelDescription.xml of FMI 2.0, from the variables of a slave."""
+"""Writes modelDescription.xml of FMI 2.0 from the variables of a slave."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -11,7 +11,7 @@ from .variable import Scalar, Variable
 
 
 class Unit(NamedTuple):
-    """Exponents of the SI base units, and what people read: name and factor from the unit.
+    """Exponents of the SI base units, and the name and factor of a unit to display.
 
     value in base units = factor * value + offset.
     """
@@ -43,7 +43,7 @@ UNITS: dict[str, Unit] = {
 
 
 class Experiment(NamedTuple):
-    """A default experiment, times in s; None where nothing is said."""
+    """A default experiment, times in s; None for what is not given."""
 
     start: float | None = 0.0
     stop: float | None = 3.0
@@ -58,28 +58,28 @@ CAPABILITIES: Mapping[str, bool] = {
     "canGetAndSetFMUstate": True,
     "canSerializeFMUstate": True,
 }
-"""Of an FMU made from a block."""
+"""The capabilities of an FMU made from a block."""
 
 
 @dataclass(frozen=True)
 class Description:
-    """What a model description says; the value reference of a variable is its position."""
+    """The content of a model description; the value reference of a variable is its position."""
 
     name: str
     summary: str
     variables: Sequence[Variable]
     units: Mapping[str, Unit] = field(default_factory=lambda: UNITS)
-    """Those that are defined; of a variable's unit that is not here, there is the name alone."""
+    """The definitions of units; a variable's unit that is not here is a name alone."""
     capabilities: Mapping[str, bool] = field(default_factory=lambda: CAPABILITIES)
     experiment: Experiment = Experiment()
     statuses: Sequence[int] = (DISCARD, ERROR)
-    """Those that it logs with messages."""
+    """The statuses that are logged with messages."""
     structured: bool = True
-    """Whether all names are in FMI's structured naming convention."""
+    """True if all names are in FMI's structured naming convention."""
 
 
 def model_description(d: Description, guid: str) -> bytes:
-    """The document as UTF-8."""
+    """Return modelDescription.xml in UTF-8."""
     root = Element(
         "fmiModelDescription",
         fmiVersion="2.0",
@@ -134,10 +134,8 @@ def _add_units(root: Element, d: Description) -> None:
             continue
         unit = d.units[name]
         base = {key: str(power) for key, power in unit.base.items()}
-        if unit.factor != 1.0:
-            base["factor"] = repr(unit.factor)
-        if unit.offset != 0.0:
-            base["offset"] = repr(unit.offset)
+        base |= {"factor": repr(unit.factor)} if unit.factor != 1.0 else {}
+        base |= {"offset": repr(unit.offset)} if unit.offset != 0.0 else {}
         SubElement(element, "BaseUnit", base)
         if unit.display:
             display, factor = unit.display
@@ -179,7 +177,7 @@ def _initial(v: Variable) -> str:
 
 
 def _attributes(v: Variable, units: Mapping[str, Unit]) -> dict[str, str]:
-    """Of its type's element."""
+    """Return the attributes of the element of its type."""
     attributes: dict[str, str] = {}
     if v.enumeration:
         attributes["declaredType"] = v.enumeration.name
@@ -203,16 +201,12 @@ def _add_structure(root: Element, variables: Sequence[Variable]) -> None:
     index = {v.name: i for i, v in enumerate(variables, 1)}
     structure = SubElement(root, "ModelStructure")
     outputs = [v for v in variables if v.causality == "output"]
-    unknowns = [v for v in outputs if _initial(v) != "exact"]
-    for section, listed in (("Outputs", outputs), ("InitialUnknowns", unknowns)):
-        if not listed:
-            continue
-        parent = SubElement(structure, section)
-        for v in listed:
-            known = v.dependencies if section == "Outputs" else v.initial_dependencies
-            SubElement(
-                parent,
-                "Unknown",
-                index=str(index[v.name]),
-                dependencies=" ".join(str(index[name]) for name in known),
-            )
+    unknowns = {
+        "Outputs": [(v, v.dependencies) for v in outputs],
+        "InitialUnknowns": [(v, v.initial_dependencies) for v in outputs if _initial(v) != "exact"],
+    }
+    for section, listed in unknowns.items():
+        parent = SubElement(structure, section) if listed else structure
+        for v, known in listed:
+            dependencies = " ".join(str(index[name]) for name in known)
+            SubElement(parent, "Unknown", index=str(index[v.name]), dependencies=dependencies)

@@ -9,7 +9,6 @@ import ast
 import re
 import sys
 from collections.abc import Iterator, Mapping
-from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -24,11 +23,10 @@ def with_imports(sources: Mapping[str, bytes]) -> dict[str, bytes]:
     while waiting:
         path = waiting.pop()
         for module in _imported(path, found[path]):
-            for file in _files(module):
-                if file not in found:
-                    package, _, rest = file.partition("/")
-                    found[file] = (package_folder(package) / rest).read_bytes()
-                    waiting.append(file)
+            for name, file in _files(module):
+                if name not in found:
+                    found[name] = file.read_bytes()
+                    waiting.append(name)
     return found
 
 
@@ -75,14 +73,13 @@ def _run(tree: ast.AST) -> Iterator[ast.AST]:
             yield from _run(node)
 
 
-@cache
-def _files(module: str) -> tuple[str, ...]:
-    """Return the files that importing a module runs, by path; nothing for what is no module."""
+def _files(module: str) -> Iterator[tuple[str, Path]]:
+    """Yield the files that importing a module runs, with their paths in the FMU."""
     package, *rest = module.split(".")
-    place = package_folder(package).joinpath(*rest)
-    above = [f"{'/'.join([package, *rest[:i]])}/__init__.py" for i in range(len(rest))]
-    if (place / "__init__.py").is_file():
-        return (*above, f"{module.replace('.', '/')}/__init__.py")
-    if place.with_suffix(".py").is_file():
-        return (*above, f"{module.replace('.', '/')}.py")
-    return ()
+    folder = package_folder(package)
+    place = folder.joinpath(*rest)
+    own = place / "__init__.py" if place.is_dir() else place.with_suffix(".py")
+    if own.is_file():
+        above = (folder.joinpath(*rest[:i]) / "__init__.py" for i in range(len(rest)))
+        for file in (*above, own):
+            yield f"{package}/{file.relative_to(folder).as_posix()}", file

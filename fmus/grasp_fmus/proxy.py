@@ -1,14 +1,14 @@
 """The slave of a proxy: at every step it exchanges its variables with a peer over UDP.
 
-Beside those of the original it has parameters and outputs of its own, proxy.*. In initialisation
+Besides those of the original it has parameters and outputs of its own, proxy.*. In initialisation
 mode outputs follow every set, as those of the original do; after that every step.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from time import monotonic_ns
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, get_args, get_type_hints
 from weakref import finalize
 
 from .base import INITIALISING, INSTANTIATED, STEPPING, RefusalError, Slave, reported
@@ -23,7 +23,7 @@ TIMEOUT = 0.01
 """s. The step of the original is no measure: 0.1 ms is less than many a network needs."""
 
 HOLD, FAILSAFE, STOP = ON_LOSS = ("hold", "failsafe", "stop")
-"""What a proxy does when the peer is lost."""
+"""The choices of proxy.on_loss, for when the peer is lost."""
 
 NOT_CONNECTED, CONNECTED, MISSING, LOST = range(4)
 """The values of proxy.state."""
@@ -33,102 +33,102 @@ _NANOSECONDS = 1e9
 
 
 class Settings(NamedTuple):
-    """The parameters proxy.*, but for those of the outputs."""
+    """The parameters proxy.*, but for those of the outputs: type, unit, limits, description."""
 
-    host: str = "127.0.0.1"
-    port: int = PORT
-    timeout: float = TIMEOUT
-    connect_timeout: float = 5.0
-    misses_tolerated: int = 3
-    on_loss: str = STOP
-    resume: bool = False
-    key_file: str = ""
-
-
-_SETTINGS: dict[str, tuple[str, tuple[float, float] | None, str]] = {
-    "host": ("", None, "name or IPv4 address of the peer"),
-    "port": ("", (1, 65535), "its UDP port"),
-    "timeout": ("s", (1e-6, 3600.0), "longest wait for the outputs of a step, by the clock"),
-    "connect_timeout": (
-        "s", (1e-3, 3600.0), "longest wait for an answer in initialisation mode, by the clock",
-    ),
-    "misses_tolerated": ("", (0, MOST), "misses in a row before the peer is lost with one more"),
-    "on_loss": ("", None, "hold: outputs stay; failsafe: proxy.failsafe.*; stop: fmi2Error"),
-    "resume": ("", None, "go on asking a lost peer, and come back when it answers"),
-    "key_file": ("", None, "file with a key shared with the peer, 16 bytes or more; empty: none"),
-}  # fmt: skip
-"""By name: unit, limits, description."""
-
-_DIAGNOSTICS: tuple[tuple[str, type[Scalar], str, str], ...] = (
-    (
-        "state",
-        int,
-        "",
-        "0 not connected, 1 connected, 2 missing: outputs held, 3 lost: on_loss holds",
-    ),
-    ("missed", int, "", "steps without an answer in time"),
-    ("consecutive_missed", int, "", "of these, those since the last answer in time"),
-    ("late", int, "", "answers that came after their step was given up"),
-    ("out_of_order", int, "", "of these, those after the answer to a newer step: dropped"),
-    ("duplicated", int, "", "answers that had come already"),
-    ("rejected", int, "", "datagrams that were malformed, foreign or not authentic"),
-    ("sessions", int, "", "sessions begun; more than 1: the peer's model was set up anew"),
-    ("round_trip_time", float, "s", "of the newest answer"),
-    (
-        "age",
+    host: Annotated[str, "", None, "name or IPv4 address of the peer"] = "127.0.0.1"
+    port: Annotated[int, "", (1, 65535), "its UDP port"] = PORT
+    timeout: Annotated[
+        float, "s", (1e-6, 3600.0), "longest wait for the outputs of a step, by the clock"
+    ] = TIMEOUT
+    connect_timeout: Annotated[
         float,
         "s",
-        "simulation time since that which the outputs belong to; below 0: the peer is ahead",
-    ),
-)
-"""Name, kind, unit, description."""
+        (1e-3, 3600.0),
+        "longest wait for an answer in initialisation mode, by the clock",
+    ] = 5.0
+    misses_tolerated: Annotated[
+        int, "", (0, MOST), "misses in a row before the peer is lost with one more"
+    ] = 3
+    on_loss: Annotated[
+        str, "", None, "hold: outputs stay; failsafe: proxy.failsafe.*; stop: fmi2Error"
+    ] = STOP
+    resume: Annotated[bool, "", None, "go on asking a lost peer, and come back when it answers"] = (
+        False
+    )
+    key_file: Annotated[
+        str, "", None, "file with a key shared with the peer, 16 bytes or more; empty: none"
+    ] = ""
+
 
 DEFAULTS = Settings()
+
+_DIAGNOSTICS: Mapping[str, tuple[type[Scalar], str, str]] = {
+    "state": (
+        int, "", "0 not connected, 1 connected, 2 missing: outputs held, 3 lost: on_loss holds",
+    ),
+    "missed": (int, "", "steps without an answer in time"),
+    "consecutive_missed": (int, "", "of these, those since the last answer in time"),
+    "late": (int, "", "answers that came after their step was given up"),
+    "out_of_order": (int, "", "of these, those after the answer to a newer step: dropped"),
+    "duplicated": (int, "", "answers that had come already"),
+    "rejected": (int, "", "datagrams that were malformed, foreign or not authentic"),
+    "sessions": (int, "", "sessions begun; more than 1: the peer's model was set up anew"),
+    "round_trip_time": (float, "s", "of the newest answer"),
+    "age": (
+        float, "s",
+        "simulation time since that which the outputs belong to; below 0: the peer is ahead",
+    ),
+}  # fmt: skip
+"""Type, unit and description of the outputs proxy.* by their names."""
 
 ZEROS: dict[type[Scalar], Scalar] = {float: 0.0, bool: False, int: 0, str: ""}
 """The value of a variable that has no start value."""
 
 
 def own_variables(outputs: Sequence[Variable], settings: Settings = DEFAULTS) -> list[Variable]:
-    """What a proxy has beside the original: settings, hold, failsafe, diagnostics.
+    """Return what a proxy has besides the original: settings, hold, failsafe, diagnostics.
 
-    The settings are start values.
+    `outputs` are those of the original; `settings` are start values.
     """
+    own = []
+    declared = get_type_hints(Settings, include_extras=True).items()
     starts: Sequence[Scalar] = settings
-    parameters = [
-        Variable(
-            f"proxy.{name}", type(start), "parameter", unit, start, "fixed", limits, description
+    for (name, hint), start in zip(declared, starts, strict=True):
+        kind, unit, limits, text = get_args(hint)
+        own.append(Variable(f"proxy.{name}", kind, "parameter", unit, start, "fixed", limits, text))
+    for v in outputs:
+        text = f"of a lost peer: {v.name} stays as it is"
+        own.append(
+            Variable(
+                f"proxy.hold.{v.name}", bool, "parameter", "", False, "fixed", description=text
+            )
         )
-        for (name, (unit, limits, description)), start in zip(
-            _SETTINGS.items(), starts, strict=True
+    for v in outputs:
+        text, zero = f"of a lost peer: value of {v.name}", ZEROS[v.kind]
+        name = f"proxy.failsafe.{v.name}"
+        own.append(
+            Variable(
+                name, v.kind, "parameter", v.unit, zero, "fixed", None, text, relative=v.relative
+            )
         )
-    ]
-    holds = [
-        Variable(
-            f"proxy.hold.{v.name}", bool, "parameter", "", False, "fixed",
-            description=f"of a lost peer: {v.name} stays as it is",
-        )
-        for v in outputs
-    ]  # fmt: skip
-    failsafes = [
-        Variable(
-            f"proxy.failsafe.{v.name}", v.kind, "parameter", v.unit, ZEROS[v.kind], "fixed",
-            description=f"of a lost peer: value of {v.name}", relative=v.relative,
-        )
-        for v in outputs
-    ]  # fmt: skip
-    diagnostics = [
-        Variable(
-            f"proxy.{name}", kind, "output", unit,
-            variability="continuous" if kind is float else "discrete", description=description,
-        )
-        for name, kind, unit, description in _DIAGNOSTICS
-    ]  # fmt: skip
-    return [*parameters, *holds, *failsafes, *diagnostics]
+    for name, (kind, unit, text) in _DIAGNOSTICS.items():
+        variability = "continuous" if kind is float else "discrete"
+        own.append(Variable(f"proxy.{name}", kind, "output", unit, None, variability, None, text))
+    return own
+
+
+def _refused(call: str) -> Callable[..., Any]:
+    """Return a function for a call about states, all of which are refused."""
+
+    @reported
+    def refuse(self: Slave, *_: Any) -> None:
+        raise RefusalError(f"{call}: a proxy has no state, it is the peer's")
+
+    return refuse
 
 
 class Fmi2Proxy(Slave):
-    """A proxy as an FMI 2.0 co-simulation slave; a subclass says of what.
+    """A proxy as an FMI 2.0 co-simulation slave; a subclass names the original.
 
     Values are in the order: inputs, parameters, outputs of the original, then own_variables().
     """
@@ -138,7 +138,7 @@ class Fmi2Proxy(Slave):
     variables: tuple[Variable, ...]
     """Those of the original: inputs, parameters, outputs."""
     settings = DEFAULTS
-    """Where its own parameters start."""
+    """The start values of its own parameters."""
     clock: Callable[[], int] = staticmethod(monotonic_ns)
 
     def _prepare(self) -> None:
@@ -173,10 +173,10 @@ class Fmi2Proxy(Slave):
         self._check_step(current_time, step_size)
         if self._inputs is None:
             self._refresh()
-        settings, connection = self._read_settings(), self._required()
+        settings, connection = self._read_settings(), self._connection
+        assert connection is not None  # noqa: S101 - there is one from initialisation on
         if self._state != LOST or settings.resume:
-            deadline = self.clock() + round(settings.timeout * _NANOSECONDS)
-            anew = self._state == LOST
+            deadline, anew = self._deadline(settings.timeout), self._state == LOST
             if connection.step(current_time, step_size, self._inputs, deadline, anew):
                 self._note_answer(connection)
             else:
@@ -198,23 +198,10 @@ class Fmi2Proxy(Slave):
 
     # State
 
-    @reported
-    def _get_fmu_state(self) -> None:
-        raise RefusalError("fmi2GetFMUstate: a proxy has no state, it is the peer's")
-
-    @reported
-    def _set_fmu_state(self, snapshot: Any) -> None:
-        raise RefusalError("fmi2SetFMUstate: a proxy has no state, it is the peer's")
-
-    @reported
-    def state_to_bytes(self, snapshot: Any) -> bytes:
-        """Refused."""
-        raise RefusalError("fmi2SerializeFMUstate: a proxy has no state, it is the peer's")
-
-    @reported
-    def state_from_bytes(self, data: bytes) -> Any:
-        """Refused."""
-        raise RefusalError("fmi2DeSerializeFMUstate: a proxy has no state, it is the peer's")
+    _get_fmu_state = _refused("fmi2GetFMUstate")
+    _set_fmu_state = _refused("fmi2SetFMUstate")
+    state_to_bytes = _refused("fmi2SerializeFMUstate")
+    state_from_bytes = _refused("fmi2DeSerializeFMUstate")
 
     # The peer
 
@@ -225,14 +212,14 @@ class Fmi2Proxy(Slave):
         inputs = self._values[self._request]
         if self._phase == INITIALISING:
             connection, settings = self._connected(), self._read_settings()
-            deadline = self.clock() + round(settings.connect_timeout * _NANOSECONDS)
+            deadline = self._deadline(settings.connect_timeout)
             if not connection.initialise(self._time, inputs, deadline):
                 self._give_up(connection, settings)
             self._take(connection)
         self._inputs = inputs
 
     def _connected(self) -> Connection:
-        """The connection, with a session, to where the settings say; RefusalError without one."""
+        """Return the connection with a session to the peer of the settings, or RefusalError."""
         settings = self._read_settings()
         address = (settings.host, settings.port, settings.key_file)
         if self._connection is not None and self._address == address:
@@ -246,15 +233,14 @@ class Fmi2Proxy(Slave):
             raise RefusalError(f"{_peer(settings)}: no connection: {reason}") from error
         self._connection, self._address = connection, address
         self._close = finalize(self, connection.close)
-        deadline = self.clock() + round(settings.connect_timeout * _NANOSECONDS)
-        if not connection.greet(deadline):
+        if not connection.greet(self._deadline(settings.connect_timeout)):
             self._give_up(connection, settings)
         self._values[self._diagnostics.start] = self._state = CONNECTED
         return connection
 
-    def _required(self) -> Connection:
-        assert self._connection is not None  # noqa: S101 - there is one from initialisation on
-        return self._connection
+    def _deadline(self, timeout: float) -> int:
+        """Return the time in ns of the clock that is `timeout` s from now."""
+        return self.clock() + round(timeout * _NANOSECONDS)
 
     def _disconnect(self) -> None:
         if self._connection is not None:
@@ -263,23 +249,23 @@ class Fmi2Proxy(Slave):
             self._values[self._diagnostics.start] = self._state = NOT_CONNECTED
 
     def _give_up(self, connection: Connection, settings: Settings) -> None:
-        """Say why initialisation failed, as RefusalError; the host may try again."""
+        """Raise RefusalError with the reason why initialisation failed; the host may try again."""
         self._disconnect()
         if connection.refusal:
             raise RefusalError(f"{_peer(settings)}: {connection.refusal.text}")
-        trouble = f" ({connection.trouble})" if connection.trouble else ""
         raise RefusalError(
-            f"no answer from {_peer(settings)} within {settings.connect_timeout:g} s{trouble}: is "
-            f"the peer running there, and has it {'the same' if settings.key_file else 'no'} key? "
+            f"no answer from {_peer(settings)} within {settings.connect_timeout:g} s"
+            f"{connection.trouble}: is the peer running there, and has it "
+            f"{'the same' if settings.key_file else 'no'} key? "
             f"e.g. grasp-cosim serve {self.original} --port {settings.port}"
         )
 
     def _note_answer(self, connection: Connection) -> None:
         if self._state == LOST:
-            anew = " in a new session, its model set up anew" * (
-                connection.sessions > self._sessions
-            )
-            self._log(WARNING, f"{_peer(self._read_settings())}: the peer answers again{anew}")
+            text = f"{_peer(self._read_settings())}: the peer answers again"
+            if connection.sessions > self._sessions:
+                text += " in a new session, its model set up anew"
+            self._log(WARNING, text)
         self._sessions = connection.sessions
         self._state, self._missed = CONNECTED, 0
 
@@ -293,29 +279,23 @@ class Fmi2Proxy(Slave):
 
     def _lose(self, connection: Connection, settings: Settings) -> None:
         self._state = LOST
+        reason = f"no answer within {settings.timeout:g} s{connection.trouble}"
         if connection.refusal:
             reason = connection.refusal.text
-        else:
-            trouble = f" ({connection.trouble})" if connection.trouble else ""
-            reason = f"no answer within {settings.timeout:g} s{trouble}"
         self._loss = f"{_peer(settings)} is lost, {self._missed} missed in a row: {reason}"
         if settings.on_loss == STOP:
             return
         self._log(WARNING, f"{self._loss}; proxy.on_loss = {settings.on_loss}")
         self._take(connection)
         if settings.on_loss == FAILSAFE:
-            places = zip(
-                self._values[self._outputs],
-                self._values[self._holds],
-                self._values[self._failsafes],
-                strict=True,
-            )
-            self._values[self._outputs] = [now if hold else safe for now, hold, safe in places]
+            places = (self._outputs, self._holds, self._failsafes)
+            each = zip(*(self._values[place] for place in places), strict=True)
+            self._values[self._outputs] = [now if hold else safe for now, hold, safe in each]
 
     # Values
 
     def _read_settings(self) -> Settings:
-        """The settings now; RefusalError where one is none."""
+        """Return the settings now; RefusalError where one is invalid."""
         if self._params is None:
             settings = Settings(*self._values[self._settings])
             if settings.on_loss not in ON_LOSS:
@@ -337,19 +317,15 @@ class Fmi2Proxy(Slave):
         client = connection.client
         c = client.counters
         counts = (
-            c.missed, self._missed, c.late, c.out_of_order, c.duplicated, c.rejected,
+            self._state, c.missed, self._missed, c.late, c.out_of_order, c.duplicated, c.rejected,
             connection.sessions,
         )  # fmt: skip
-        self._values[self._diagnostics] = [
-            self._state,
-            *(min(count, MOST) for count in counts),
-            client.round_trip / _NANOSECONDS,
-            self._time - client.outputs_time,
-        ]
+        times = (client.round_trip / _NANOSECONDS, self._time - client.outputs_time)
+        self._values[self._diagnostics] = [*(min(count, MOST) for count in counts), *times]
 
 
 def _slices(sizes: Sequence[int]) -> list[slice]:
-    """Places in a list, one after the other."""
+    """Return consecutive slices of a list, of these sizes."""
     ends = [sum(sizes[: i + 1]) for i in range(len(sizes))]
     return [slice(end - size, end) for size, end in zip(sizes, ends, strict=True)]
 
@@ -360,7 +336,7 @@ def _as_sent(v: Variable) -> LinkVariable:
 
 
 def _limited(v: Variable) -> Variable:
-    """As a host may set it: the peer checks values, but for what cannot be sent."""
+    """Return the variable with the limits of what can be sent; the peer checks the rest."""
     return replace(v, limits=(0, STRING_SIZE - 1)) if v.kind is str else v
 
 
@@ -369,7 +345,7 @@ def _peer(settings: Settings) -> str:
 
 
 def _key(file: str) -> bytes | None:
-    """The shared key; None without a file."""
+    """Return the shared key in a file, None without a file; RefusalError where it is invalid."""
     try:
         return read_key(Path(file)) if file else None
     except OSError as error:

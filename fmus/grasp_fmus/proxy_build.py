@@ -25,9 +25,9 @@ _IDENTIFIER = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 
 @dataclass(frozen=True)
 class Original:
-    """What a proxy has from the FMU whose place it takes; file is its name.
+    """The FMU whose place a proxy takes; `file` is its name.
 
-    variables are its inputs, parameters and outputs, in this order.
+    `variables` are its inputs, parameters and outputs, in this order.
     """
 
     file: str
@@ -43,10 +43,10 @@ def build_proxy(
     settings: Settings = DEFAULTS,
     bind_python: str | None = None,
 ) -> Built:
-    """Build the proxy of an FMU; its own parameters start at settings.
+    """Build the proxy of an FMU; its own parameters start at `settings`.
 
-    bind_python is as in build(). A proxy that is there already with the same content is left alone.
-    ValueError where the stem of target is no identifier of C, a setting is out of its range, or a
+    `bind_python` is as in build(). A proxy that is there with the same content is left alone.
+    ValueError where the stem of `target` is no identifier of C, a setting is out of its range, or a
     name is taken.
     """
     name = target.stem
@@ -96,7 +96,7 @@ def _description(name: str, original: Original, own: Sequence[Variable]) -> Desc
 
 
 def _script(name: str, original: Original, settings: Settings) -> str:
-    """The script of the FMU: what its slave needs to know of the original."""
+    """Return the script of the FMU: all that its slave needs to know of the original."""
     lines = [
         f"        Variable({v.name!r}, {v.kind.__name__}, {v.causality!r}, {v.unit!r}, "
         f"{v.start!r}, {v.variability!r}),\n"
@@ -112,7 +112,7 @@ def _script(name: str, original: Original, settings: Settings) -> str:
 
 
 def _card(own: Sequence[Variable]) -> str:
-    """The protocol, and what a proxy has beside the original's variables, in Markdown."""
+    """Return the proxy's own variables and the protocol, in Markdown."""
     cells = [
         (f"`{v.name}`", v.causality, TYPES[v.kind], v.unit, _start(v), _limits(v), v.description)
         for v in own

@@ -1,4 +1,4 @@
-"""The whole state of a slave, as a value and as bytes.
+"""Turns the whole state of a slave into bytes and back.
 
 Bytes: 8 of magic, 16 of the FMU's content hash, 16 of check sum, then IEEE doubles, little-endian:
 phase, time, inputs and parameters, the block's state, in the order of declaration.
@@ -14,25 +14,25 @@ HEAD = 40
 
 
 class Snapshot(NamedTuple):
-    """What a slave is at a moment: everything else follows from it."""
+    """The state of a slave at a moment: everything else follows from it."""
 
     phase: int
     time: float
     settable: tuple[Any, ...]
     """The values of inputs and parameters."""
     state: Any
-    """The block's."""
+    """The state of the block."""
 
 
 def to_bytes(snapshot: Snapshot, content: str) -> bytes:
-    """The snapshot of an FMU with that content hash."""
+    """Return the bytes of a snapshot of the FMU with the content hash `content`."""
     numbers = [snapshot.phase, snapshot.time, *snapshot.settable, *_scalars(snapshot.state)]
     payload = struct.pack(f"<{len(numbers)}d", *numbers)
     return MAGIC + content.encode() + _checksum(content, payload) + payload
 
 
 def from_bytes(data: bytes, content: str, like: Snapshot) -> Snapshot:
-    """The snapshot that these bytes hold, in the shape of another.
+    """Return the snapshot that these bytes hold, in the shape of the snapshot `like`.
 
     ValueError says what is wrong with them.
     """

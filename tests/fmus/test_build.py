@@ -9,10 +9,11 @@ from pathlib import Path
 
 import pytest
 from grasp_fmus import fmu
-from grasp_fmus.build import SCRIPTS, build
+from grasp_fmus.build import build
 from grasp_fmus.fmu import HASH, build_fmu
 from grasp_fmus.folder import STAMP, Built, is_current, sources_hash
 from grasp_fmus.packing import package_folder, packages
+from grasp_fmus.shipped import SCRIPTS
 
 NAMES = [
     "GraspController",

@@ -8,13 +8,13 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
-from grasp_fmus.build import SCRIPTS
 from grasp_fmus.fmu import build_fmu
 from grasp_fmus.link.message import END, HELLO, INITIALISE, STEP
 from grasp_fmus.link.signature import Signature
 from grasp_fmus.model_description import Experiment
 from grasp_fmus.proxy import Settings
 from grasp_fmus.proxy_build import Original, build_proxy
+from grasp_fmus.shipped import SCRIPTS
 from support.fmi2 import ERROR, OK, Fmu, Instance
 from support.pythons import VERSIONS, python
 from support.scripted_peer import SIGNATURE, VARIABLES, ScriptedPeer

@@ -8,10 +8,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from grasp_fmus.build import SCRIPTS
 from grasp_fmus.contract import declared
 from grasp_fmus.fmu import build_fmu
 from grasp_fmus.folder import Built
+from grasp_fmus.shipped import SCRIPTS
 from proximity_sensor import channel
 
 SENSOR = Path(__file__).parents[2] / "sensor"
@@ -33,6 +33,11 @@ Edit = tuple[str, str, str]
 
 An empty text is that of a file which is not there yet.
 """
+
+LENS: tuple[Edit, Edit] = (
+    ("proximity_sensor/lens.py", "", '"""A lens."""\n'),
+    (OPTICS, "from dataclasses", "from . import lens\nfrom dataclasses"),
+)
 
 Build = Callable[..., Built]
 
@@ -93,8 +98,8 @@ def test_a_change_is_reported_once(build: Build) -> None:
             [(CARD, "# ", "# The ")], ["documentation/index.html: changed"], id="card"
         ),
         pytest.param(
-            [("proximity_sensor/lens.py", "", '"""A lens."""\n')],
-            ["resources/proximity_sensor/lens.py: added"],
+            [*LENS],
+            ["resources/proximity_sensor/lens.py: added", SOURCE],
             id="file",
         ),
         pytest.param(
@@ -162,6 +167,11 @@ def test_what_changed_and_nothing_else(build: Build, edits: list[Edit], lines: l
     assert build(*edits) == Built(path, "changed", tuple(lines))
 
 
+def test_a_file_that_nothing_imports_changes_nothing(build: Build) -> None:
+    path = build().path
+    assert build(LENS[0]) == Built(path, "unchanged", ())
+
+
 def test_variables_that_follow_move_up(build: Build) -> None:
     """The value reference is part of the interface: a host may have it written down."""
     text = '    """What the sensor looks at."""\n'
@@ -176,8 +186,8 @@ def test_variables_that_follow_move_up(build: Build) -> None:
 
 
 def test_a_file_removed(build: Build) -> None:
-    build(("proximity_sensor/lens.py", "", '"""A lens."""\n'))
-    assert build().changes == ("resources/proximity_sensor/lens.py: removed",)
+    build(*LENS)
+    assert build().changes == ("resources/proximity_sensor/lens.py: removed", SOURCE)
 
 
 def archive(*members: tuple[str, bytes]) -> bytes:

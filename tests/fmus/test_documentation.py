@@ -11,9 +11,9 @@ from xml.etree import ElementTree
 
 import pytest
 from grasp_fmus import documentation
-from grasp_fmus.build import SCRIPTS
 from grasp_fmus.contract import Field, declared
 from grasp_fmus.documentation import PROXY, icon, licences, page
+from grasp_fmus.shipped import SCRIPTS
 
 ROOT = Path(__file__).parents[2]
 

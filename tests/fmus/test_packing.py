@@ -7,10 +7,10 @@ from zipfile import ZipFile
 
 import pytest
 from grasp_fmus.block_build import build_block
-from grasp_fmus.build import SCRIPTS
 from grasp_fmus.model_description import Experiment
 from grasp_fmus.packing import IMPORT, packages, with_imports
 from grasp_fmus.proxy_build import Original, build_proxy
+from grasp_fmus.shipped import SCRIPTS
 
 NAMES = sorted(script.stem for script in SCRIPTS.glob("*.py"))
 SPRING = Path(__file__).parents[2] / "docs" / "spring_plant.py"

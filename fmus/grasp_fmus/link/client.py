@@ -7,24 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
 
-from .message import (
-    BUSY,
-    END,
-    FAILED,
-    FORGED,
-    HELLO,
-    INITIALISE,
-    OTHER_INTERFACE,
-    OUTPUTS,
-    REFUSE,
-    STEP,
-    UNKNOWN,
-    WELCOME,
-    Codec,
-    Message,
-    Sealer,
-    Value,
-)
+from . import message
+from .message import Codec, Message, Sealer, Value
 from .signature import Signature
 
 WINDOW = 4096
@@ -32,24 +16,24 @@ WINDOW = 4096
 
 
 class Verdict(Enum):
-    """What a datagram is to the request under way."""
+    """The meaning of a datagram for the request under way."""
 
     NOTHING = auto()
-    """Not its answer: go on waiting."""
+    """It is not the answer: go on waiting."""
     ANSWERED = auto()
     REFUSED = auto()
-    """refusal says why."""
+    """The reason is in Client.refusal."""
 
 
 @dataclass(slots=True)
 class Counters:
-    """What became of the steps, and what else came.
+    """Counts of steps by their fate, and of all else that came.
 
-    missed: steps without an answer in time. late: answers to steps that came after their step was
-    given up; out_of_order: of these, those after the answer to a newer one, which were dropped.
-    Every answer comes in time, late, or never: missed = late + never.
-    duplicated: answers that had come already. rejected: what was no datagram of this session.
-    forged: of these, those without the tag of the key.
+    `missed`: steps without an answer in time. `late`: answers to steps that came after their step
+    was given up; `out_of_order`: of these, those after the answer to a newer one, which were
+    dropped. Every answer comes in time, late, or never: missed = late + never.
+    `duplicated`: answers that had come already. `rejected`: datagrams that were not of this
+    session. `forged`: of these, those without the tag of the key.
     """
 
     missed: int = 0
@@ -62,7 +46,7 @@ class Counters:
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """Why the peer refused, by code of REFUSE and in words."""
+    """The reason why the peer refused, as a code of REFUSE and in words."""
 
     code: int
     text: str
@@ -77,11 +61,11 @@ class Client:
         self.counters = Counters()
         self.refusal: Refusal | None = None
         self.outputs: list[Value] | None = None
-        """Of the newest answer; None before the first."""
+        """The outputs of the newest answer; None before the first."""
         self.outputs_time = 0.0
-        """What they belong to, in s."""
+        """The time that they belong to, in s."""
         self.round_trip = 0
-        """Of the newest answer, in ns."""
+        """The time between the newest answer and its request, in ns."""
         self._sealer = Sealer(key)
         self._request = Codec(signature.request)
         self._answer = Codec(signature.answer)
@@ -94,32 +78,32 @@ class Client:
     # Requests
 
     def greet(self, session: int, now: int) -> bytes:
-        """HELLO, to begin a session of that number, which must be a new one, 64 bits at random."""
+        """Return HELLO, to begin a session of that number: a new one, 64 bits at random."""
         self._session, self._cookie = session, 0
         self._sequence = self._first_step = self._newest = self._seen = self._awaited = 0
         self._greeting = True
         self.refusal = None
-        return self._pack(HELLO, now, self.signature.text.encode())
+        return self._pack(message.HELLO, now, self.signature.text.encode())
 
     def initialise(self, time: float, values: Sequence[Value], now: int) -> bytes:
-        """INITIALISE with inputs and parameters; time in s.
+        """Return INITIALISE with the values of inputs and parameters; `time` in s.
 
         ValueError where a string is too long.
         """
         body = self._request.pack(values)
         self._next()
-        return self._pack(INITIALISE, now, body, time)
+        return self._pack(message.INITIALISE, now, body, time)
 
     def step(self, time: float, step: float, values: Sequence[Value], now: int) -> bytes:
-        """STEP from time over step, both in s, with inputs and parameters. To be sent once."""
+        """Return STEP from `time` over `step`, both in s, with `values`. To be sent once."""
         body = self._request.pack(values)
         self._next()
         self._first_step = self._first_step or self._sequence
-        return self._pack(STEP, now, body, time, step)
+        return self._pack(message.STEP, now, body, time, step)
 
     def end(self, now: int) -> bytes:
-        """END; there is no answer to it."""
-        return self._pack(END, now, b"")
+        """Return END; there is no answer to it."""
+        return self._pack(message.END, now, b"")
 
     def miss(self) -> None:
         """Give up the step under way; its answer is late from now on."""
@@ -144,18 +128,18 @@ class Client:
     # Answers
 
     def receive(self, datagram: bytes, now: int) -> Verdict:
-        """Judge a datagram, whatever it holds."""
+        """Return the verdict on a datagram, whatever it holds; `now` in ns."""
         m = self._sealer.open(datagram)
         if isinstance(m, str):
-            self.counters.forged += m == FORGED
+            self.counters.forged += m == message.FORGED
             return self._reject()
         if m.session != self._session:
             return self._reject()
-        if m.kind == OUTPUTS and m.cookie == self._cookie and not self._greeting:
+        if m.kind == message.OUTPUTS and m.cookie == self._cookie and not self._greeting:
             return self._receive_outputs(m, now)
-        if m.kind == WELCOME:
+        if m.kind == message.WELCOME:
             return self._receive_welcome(m, now)
-        if m.kind == REFUSE:
+        if m.kind == message.REFUSE:
             return self._receive_refusal(m)
         return self._reject()
 
@@ -178,13 +162,13 @@ class Client:
         if not expected or m.cookie != self._cookie or not (self._greeting or self._awaited):
             return self._reject()
         text = m.body.decode(errors="replace")
-        if m.code == OTHER_INTERFACE:
+        if m.code == message.OTHER_INTERFACE:
             text = f"the peer has another interface: {self.signature.difference(text) or 'unnamed'}"
-        elif m.code == BUSY:
+        elif m.code == message.BUSY:
             text = "the peer is busy with another proxy"
-        elif m.code == UNKNOWN:
+        elif m.code == message.UNKNOWN:
             text = "the peer does not know this session"
-        elif m.code == FAILED:
+        elif m.code == message.FAILED:
             text = f"the peer failed: {' '.join(text.split())}"
         else:
             return self._reject()

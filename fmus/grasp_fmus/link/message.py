@@ -1,4 +1,4 @@
-"""Datagrams: a header of 80 bytes, a body, and where a key is shared 32 bytes of HMAC-SHA256."""
+"""Packs and opens datagrams: a header of 80 bytes, a body, 32 of HMAC-SHA256 if a key is shared."""
 
 import hmac
 import struct
@@ -16,27 +16,27 @@ HELLO, WELCOME, REFUSE, INITIALISE, STEP, OUTPUTS, END = range(1, 8)
 """Kinds of datagrams."""
 
 OTHER_INTERFACE, BUSY, UNKNOWN, FAILED = range(1, 5)
-"""Why a peer refuses: the code of a REFUSE."""
+"""The reasons why a peer refuses: codes of REFUSE."""
 
 HEAD = struct.Struct(f"<4sHBB{HASH_SIZE}sQQQddqII")
 TAG_SIZE = 32
 LARGEST = 65_507
 """Bytes of a UDP datagram over IPv4."""
 PORT = 5501
-"""Where a peer listens if nobody says otherwise."""
+"""The default UDP port of a peer."""
 
 STRING_SIZE = 128
 SMALLEST_KEY = 16
 """Bytes of a shared key, at least."""
 
 MALFORMED, FORGED = "malformed", "forged"
-"""Why a datagram is none: it is not of this protocol, or its tag is not that of the key."""
+"""The faults of a datagram: it is not of this protocol, or its tag is not that of the key."""
 
 _CODES = {"Real": "d", "Integer": "q", "Boolean": "Q", "String": f"{STRING_SIZE}s"}
 
 
 class Message(NamedTuple):
-    """A datagram taken apart; times in s but for sent, which is in ns of the proxy's clock."""
+    """A datagram taken apart; times in s, but `sent` in ns of the proxy's clock."""
 
     kind: int
     code: int
@@ -61,7 +61,7 @@ class Sealer:
         self._tag_size = TAG_SIZE if key else 0
 
     def pack(self, m: Message) -> bytes:
-        """The datagram of a message; ValueError where it would be too large."""
+        """Return the datagram of a message; ValueError where it would be too large."""
         head = HEAD.pack(
             MAGIC, VERSION, m.kind, m.code, m.interface, m.session, m.cookie, m.sequence, m.time,
             m.step, m.sent, len(m.body), 0,
@@ -73,7 +73,7 @@ class Sealer:
         return datagram + hmac.digest(self._key, datagram, "sha256") if self._key else datagram
 
     def open(self, datagram: bytes) -> Message | str:
-        """The message of a datagram, or why it is none: MALFORMED or FORGED."""
+        """Return the message in a datagram, or the fault of it: MALFORMED or FORGED."""
         end = len(datagram) - self._tag_size
         if end < HEAD.size or len(datagram) > LARGEST:
             return MALFORMED
@@ -103,7 +103,7 @@ class Codec:
         self.size = self._struct.size
 
     def pack(self, values: Sequence[Value]) -> bytes:
-        """The body of values; ValueError where a string is too long."""
+        """Return the body that holds these values; ValueError where a string is too long."""
         if self._strings:
             values = list(values)
             for i, name in self._strings:
@@ -111,10 +111,10 @@ class Codec:
         return self._struct.pack(*values)
 
     def unpack(self, body: bytes) -> list[Value] | None:
-        """The values of a body; None where it has another size or holds what is no value.
+        """Return the values of a body; None where its size is wrong or a value is invalid.
 
-        That is a Real that is not finite, an Integer beyond 32 bits, a Boolean other than 0 and 1,
-        a string that is not UTF-8 or not filled up with NUL, at least one.
+        Invalid is a Real that is not finite, an Integer beyond 32 bits, a Boolean other than 0 and
+        1, a string that is not UTF-8 or not filled up with NUL, at least one.
         """
         if len(body) != self.size:
             return None
@@ -151,7 +151,7 @@ def _as_bytes(name: str, text: str) -> bytes:
 
 
 def read_key(path: Path) -> bytes:
-    """The key in a file, without line ends around it; OSError, or ValueError where it is short."""
+    """Return the key in a file, without line ends around it; ValueError where it is too short."""
     key = path.read_bytes().strip(b"\r\n")
     Sealer(key)
     return key

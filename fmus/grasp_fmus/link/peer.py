@@ -9,24 +9,8 @@ from dataclasses import asdict, dataclass
 from secrets import randbits
 from typing import NamedTuple
 
-from .message import (
-    BUSY,
-    END,
-    FAILED,
-    FORGED,
-    HELLO,
-    INITIALISE,
-    OTHER_INTERFACE,
-    OUTPUTS,
-    REFUSE,
-    STEP,
-    UNKNOWN,
-    WELCOME,
-    Codec,
-    Message,
-    Sealer,
-    Value,
-)
+from . import message
+from .message import Codec, Message, Sealer, Value
 from .signature import Signature
 
 ALIVE = 1_000_000_000
@@ -41,12 +25,12 @@ GREETED = 64
 
 @dataclass(slots=True)
 class PeerCounters:
-    """What was received: requests, by what became of them.
+    """Counts of the datagrams received, by their fate.
 
-    steps and initialisations: done. repeated: answered again. duplicated: steps that had come
-    already; stale: those older than the last. foreign: of another interface, or of a session that
-    is not known. malformed: no datagram of this protocol, or with values that are none. forged:
-    without the tag of the key. busy: HELLOs while another session was under way.
+    `steps` and `initialisations`: done. `repeated`: answered again. `duplicated`: steps that had
+    come already; `stale`: steps older than the last. `foreign`: of another interface, or of a
+    session that is not known. `malformed`: no datagram of this protocol, or with invalid values.
+    `forged`: without the tag of the key. `busy`: HELLOs while another session was under way.
     """
 
     steps: int = 0
@@ -60,14 +44,14 @@ class PeerCounters:
     busy: int = 0
 
     def as_dict(self) -> dict[str, int]:
-        """The counters by name."""
+        """Return the counts by name."""
         return asdict(self)
 
 
 class Request(NamedTuple):
-    """What to do: INITIALISE, STEP or END; times in s.
+    """A request to carry out: INITIALISE, STEP or END; times in s.
 
-    values are inputs, then parameters. fresh: set the model up anew, a session begins.
+    `values` are inputs, then parameters. With `fresh` a session begins: set the model up anew.
     """
 
     kind: int
@@ -90,7 +74,7 @@ class Peer:
         key: bytes | None = None,
         cookie: Callable[[], int] = lambda: randbits(64) or 1,
     ) -> None:
-        """Cookie makes numbers from 1 to 2**64 - 1 that nobody can guess.
+        """`cookie` makes numbers from 1 to 2**64 - 1 that nobody can guess.
 
         ValueError where the key is too short.
         """
@@ -110,30 +94,30 @@ class Peer:
 
     @property
     def stepping(self) -> bool:
-        """Whether the session under way has begun to step."""
+        """True if the session under way has begun to step."""
         return self._stepping
 
     def receive(self, datagram: bytes, now: int) -> Action:
-        """Judge a datagram, whatever it holds; now in ns of a monotonic clock."""
+        """Return what to do about a datagram; `now` in ns of a monotonic clock."""
         m = self._sealer.open(datagram)
         if isinstance(m, str):
-            return self._drop("forged" if m == FORGED else "malformed")
-        if m.kind == HELLO:
+            return self._drop("forged" if m == message.FORGED else "malformed")
+        if m.kind == message.HELLO:
             return self._hello(m, now)
-        if m.kind not in (INITIALISE, STEP, END):
+        if m.kind not in (message.INITIALISE, message.STEP, message.END):
             return self._drop("malformed")
         if m.interface != self.signature.hash:
             return self._drop("foreign")
         return self._in_session(m, now)
 
     def outputs(self, values: list[Value], time: float) -> bytes:
-        """The answer to the last request: outputs, and the time in s that they belong to."""
-        return self._keep(OUTPUTS, 0, time, self._answer.pack(values))
+        """Return the answer to the last request: outputs, and the time in s they belong to."""
+        return self._keep(message.OUTPUTS, 0, time, self._answer.pack(values))
 
     def failed(self, reason: str) -> bytes:
-        """The answer to the last request where it cannot be done; the session is over."""
+        """Return the answer to the last request where it cannot be done; end the session."""
         m = self._last
-        answer = self._keep(REFUSE, FAILED, 0.0, reason.encode()[:LARGEST_REASON])
+        answer = self._keep(message.REFUSE, message.FAILED, 0.0, reason.encode()[:LARGEST_REASON])
         self._over()
         if m is not None:
             self._refused = m.session, m.cookie, m.sequence
@@ -152,12 +136,12 @@ class Peer:
             return self._drop("malformed")
         if m.interface != self.signature.hash:
             self.counters.foreign += 1
-            return self._refuse(m, OTHER_INTERFACE, self.signature.text.encode())
+            return self._refuse(m, message.OTHER_INTERFACE, self.signature.text.encode())
         if m.body != self.signature.text.encode():
             return self._drop("malformed")
         if self._busy(m.session, now):
             self.counters.busy += 1
-            return self._refuse(m, BUSY)
+            return self._refuse(m, message.BUSY)
         if self._live is not None and self._live[0] == m.session:
             cookie = self._live[1]
         else:
@@ -165,35 +149,35 @@ class Peer:
             self._greeted[m.session] = cookie
             if len(self._greeted) > GREETED:
                 self._greeted.popitem(last=False)
-        return self._pack(m._replace(cookie=cookie), WELCOME, 0, 0.0, b"")
+        return self._pack(m._replace(cookie=cookie), message.WELCOME, 0, 0.0, b"")
 
     def _in_session(self, m: Message, now: int) -> Action:
         if self._live != (m.session, m.cookie):
             return self._begin(m, now)
-        if m.kind == END:
+        if m.kind == message.END:
             self._over()
-            return Request(END, m.time, 0.0, [], fresh=False)
+            return Request(message.END, m.time, 0.0, [], fresh=False)
         last = self._last.sequence if self._last else 0
         if m.sequence < last:
             return self._drop("stale")
         if m.sequence == last:
-            if m.kind == STEP or self._last_answer is None:
+            if m.kind == message.STEP or self._last_answer is None:
                 return self._drop("duplicated")
             self.counters.repeated += 1
             return self._last_answer
         return self._do(m, now, fresh=False)
 
     def _begin(self, m: Message, now: int) -> Action:
-        """The first INITIALISE of a session makes it the one under way."""
-        if m.kind == INITIALISE and self._refused == (m.session, m.cookie, m.sequence):
+        """Make the session of the first INITIALISE the one under way."""
+        if m.kind == message.INITIALISE and self._refused == (m.session, m.cookie, m.sequence):
             self.counters.repeated += 1
             return self._last_answer
-        if self._greeted.get(m.session) != m.cookie or m.kind != INITIALISE:
+        if self._greeted.get(m.session) != m.cookie or m.kind != message.INITIALISE:
             self.counters.foreign += 1
-            return None if m.kind == END else self._refuse(m, UNKNOWN)
+            return None if m.kind == message.END else self._refuse(m, message.UNKNOWN)
         if self._busy(m.session, now):
             self.counters.busy += 1
-            return self._refuse(m, BUSY)
+            return self._refuse(m, message.BUSY)
         request = self._do(m, now, fresh=True)
         if isinstance(request, Request):
             del self._greeted[m.session]
@@ -202,14 +186,14 @@ class Peer:
 
     def _do(self, m: Message, now: int, fresh: bool) -> Action:
         values = self._request.unpack(m.body)
-        if values is None or (m.kind == STEP) != (m.step > 0.0):
+        if values is None or (m.kind == message.STEP) != (m.step > 0.0):
             return self._drop("malformed")
-        if m.kind == INITIALISE and self._stepping and not fresh:
+        if m.kind == message.INITIALISE and self._stepping and not fresh:
             return self._drop("malformed")
         # Only what is new counts as heard: who repeats a recorded datagram keeps nobody away
         self._heard = now
         self._last, self._last_answer, self._refused = m, None, None
-        if m.kind == STEP:
+        if m.kind == message.STEP:
             self._stepping = True
             self.counters.steps += 1
         else:
@@ -220,7 +204,7 @@ class Peer:
         self._live, self._last, self._stepping = None, None, False
 
     def _refuse(self, m: Message, code: int, body: bytes = b"") -> bytes:
-        return self._pack(m, REFUSE, code, 0.0, body)
+        return self._pack(m, message.REFUSE, code, 0.0, body)
 
     def _keep(self, kind: int, code: int, time: float, body: bytes) -> bytes:
         assert self._last is not None  # noqa: S101 - there is a request to answer
@@ -228,7 +212,7 @@ class Peer:
         return self._last_answer
 
     def _pack(self, m: Message, kind: int, code: int, time: float, body: bytes) -> bytes:
-        """An answer to m."""
+        """Return an answer to the request `m`."""
         return self._sealer.pack(
             Message(
                 kind, code, self.signature.hash, m.session, m.cookie, m.sequence, time, 0.0,

@@ -18,7 +18,7 @@ NAMED = 4
 
 
 class LinkVariable(NamedTuple):
-    """A variable as both sides must have it; unit is None where it has none."""
+    """A variable as both sides must have it; `unit` is None where it has none."""
 
     name: str
     kind: Kind
@@ -28,7 +28,7 @@ class LinkVariable(NamedTuple):
 
 @dataclass(frozen=True)
 class Signature:
-    """What is exchanged, in the order of the wire: inputs, parameters, outputs.
+    """The variables exchanged, in the order of the datagrams: inputs, parameters, outputs.
 
     ValueError where a name has a character that the text cannot hold, or comes twice.
     """
@@ -62,22 +62,22 @@ class Signature:
 
     @cached_property
     def request(self) -> tuple[LinkVariable, ...]:
-        """What a request carries: inputs, then parameters."""
+        """The variables that a request carries: inputs, then parameters."""
         return tuple(v for v in self.variables if v.causality != "output")
 
     @cached_property
     def answer(self) -> tuple[LinkVariable, ...]:
-        """What an answer carries: outputs."""
+        """The variables that an answer carries: outputs."""
         return self.of("output")
 
     def of(self, causality: Causality) -> tuple[LinkVariable, ...]:
-        """The variables of a causality, in order."""
+        """Return the variables of a causality, in order."""
         return tuple(v for v in self.variables if v.causality == causality)
 
     def difference(self, other: str) -> str:
-        """How the text of another signature differs from this one, as half a line; empty: not.
+        """Return the differences of another signature's text from this one, as half a line.
 
-        The other's text may be anything.
+        It is empty where there are none. The other's text may be anything.
         """
         ours, theirs = _lines(self.text), _lines(other)
         found = [f"there is no {_words(ours[name])}" for name in ours if name not in theirs]
@@ -94,12 +94,12 @@ class Signature:
 
 
 def _lines(text: str) -> dict[str, str]:
-    """The lines of a text by the name at their end."""
+    """Return the lines of a text by the name at their end."""
     return {line.rpartition("\t")[2]: line for line in text.splitlines()}
 
 
 def _words(line: str) -> str:
-    """A line in words: output gap[1], Real in m."""
+    """Return a line in words: output gap[1], Real in m."""
     causality, _, rest = line.partition("\t")
     kind, _, rest = rest.partition("\t")
     unit, _, name = rest.partition("\t")
