@@ -182,7 +182,6 @@ def sources() -> dict[str, str]:
     return read_modules(ROOT / "orchestrator/grasp_cosim")
 
 
-@pytest.mark.xfail(strict=True, reason="imports upward and in circles are left: see --runxfail")
 def test_a_room_imports_from_rooms_below_it_and_nothing_goes_in_a_circle(
     sources: dict[str, str],
 ) -> None:
@@ -195,8 +194,9 @@ def test_a_room_imports_from_rooms_below_it_and_nothing_goes_in_a_circle(
     assert not found, "\n".join(["", *found])
 
 
-def test_only_the_top_and_the_command_line_import_by_name(sources: dict[str, str]) -> None:
-    assert {room(module) for module in calls(sources, BY_NAME)} <= {"__init__", "cli"}
+def test_an_import_by_name_is_of_an_extra_or_at_the_top(sources: dict[str, str]) -> None:
+    """checks.py imports extras, which are others' packages."""
+    assert {room(module) for module in calls(sources, BY_NAME)} <= {"__init__", "checks", "cli"}
 
 
 def test_all_files_are_read(sources: dict[str, str]) -> None:

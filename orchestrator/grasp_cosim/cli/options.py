@@ -9,7 +9,8 @@ from typing import Any, TypeVar
 
 import click
 
-from ..system.description import SCHEMES, System
+from ..system.description import System
+from ..system.structure import SCHEMES
 from .frame import load_system, pair, together, with_preset
 
 Group = TypeVar("Group")

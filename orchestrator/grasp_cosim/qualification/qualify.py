@@ -19,8 +19,9 @@ from ..interface.units import IDENTITY
 from ..master.simulation import simulate
 from ..metrics.metric import Metric, Signals, measure, registered
 from ..recording.result import Result
-from ..system.description import SCHEMES, System
+from ..system.description import System
 from ..system.parts import NANOSECONDS, Isolation
+from ..system.structure import SCHEMES
 from .bands import SHARE, Band, Bands, check_patterns, entry_for, metric_band, signal_band
 from .interface_difference import Difference
 from .swap import Swap, prepare_swap

@@ -15,8 +15,9 @@ from lxml import etree  # type: ignore[import-untyped]
 
 from ..errors import InputError, choices
 from ..interface.interface import Value
-from ..system.description import Scheme, System
+from ..system.description import System
 from ..system.parts import Event, Fault, Initialisation, Isolation, Port
+from ..system.structure import Scheme
 from .document import add
 
 TYPE = "grasp-cosim"

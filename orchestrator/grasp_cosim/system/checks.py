@@ -5,18 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from ..errors import InputError, choices
 from ..interface.interface import SUPPORTED, Value, Variable, limits
 from ..interface.units import conversion
 from .parts import LOOPS, NANOSECONDS, Component, Connection, Port
-
-if TYPE_CHECKING:
-    from .description import System
+from .structure import Structure
 
 
-def check_components(system: System) -> None:
+def check_components(system: Structure) -> None:
     """InputError where an FMU that a process can have once is in it twice."""
     first: dict[Path, str] = {}
     for component in system.components:
@@ -49,7 +46,7 @@ def _label(items: Mapping[str, int], value: Value) -> str | None:
     return next((name for name, number in items.items() if number == value), None)
 
 
-def check_connections(system: System) -> None:
+def check_connections(system: Structure) -> None:
     """InputError at the first connection or input that is not as it must be."""
     sources: dict[Port, Connection] = {}
     for connection in system.connections:
@@ -87,7 +84,7 @@ def check_connections(system: System) -> None:
         )
 
 
-def connection_transform(system: System, connection: Connection) -> tuple[float, float]:
+def connection_transform(system: Structure, connection: Connection) -> tuple[float, float]:
     """Factor and offset of a connection, (1.0, 0.0) for the identity.
 
     What the connection declares, or else the conversion between the units of its ends. InputError
@@ -127,7 +124,7 @@ def connection_transform(system: System, connection: Connection) -> tuple[float,
     return factor, 0.0 if target.relative else offset
 
 
-def transforms(system: System) -> dict[Port, tuple[float, float]]:
+def transforms(system: Structure) -> dict[Port, tuple[float, float]]:
     """Factor and offset of every connection, by its target: see connection_transform()."""
     return {
         connection.target: connection_transform(system, connection)
@@ -135,7 +132,7 @@ def transforms(system: System) -> dict[Port, tuple[float, float]]:
     }
 
 
-def remarks(system: System) -> tuple[str, ...]:
+def remarks(system: Structure) -> tuple[str, ...]:
     """What a user should know of a system that is valid, a line each.
 
     Values that lose digits, units that cannot be compared, variables that are left alone.
@@ -164,11 +161,11 @@ def remarks(system: System) -> tuple[str, ...]:
     return tuple(lines)
 
 
-def _place(system: System, connection: Connection) -> str:
+def _place(system: Structure, connection: Connection) -> str:
     return f"{system.name}: connections[{system.connections.index(connection)}] '{connection}'"
 
 
-def _end(system: System, connection: Connection, causality: str) -> Variable:
+def _end(system: Structure, connection: Connection, causality: str) -> Variable:
     """The variable at the end of a connection that has the causality."""
     place = _place(system, connection)
     port = connection.source if causality == "output" else connection.target
@@ -183,7 +180,7 @@ def _end(system: System, connection: Connection, causality: str) -> Variable:
 
 
 def _check_types(
-    system: System, connection: Connection, source: Variable, target: Variable
+    system: Structure, connection: Connection, source: Variable, target: Variable
 ) -> None:
     """InputError where the target's type does not hold what the source puts out."""
     place = _place(system, connection)
@@ -214,12 +211,12 @@ def _check_types(
             )
 
 
-def _limits(system: System, port: Port, variable: Variable) -> tuple[float, float]:
+def _limits(system: Structure, port: Port, variable: Variable) -> tuple[float, float]:
     version = system.component(port.component, str(port)).interface.version
     return limits(variable.type, version)
 
 
-def _holds_singles(system: System, connection: Connection, source: Variable) -> bool:
+def _holds_singles(system: Structure, connection: Connection, source: Variable) -> bool:
     """Whether a Float32 holds every value of an integer exactly."""
     low, high = _limits(system, connection.source, source)
     return -(2**24) <= low <= high <= 2**24
@@ -240,7 +237,7 @@ def _declared(place: str, connection: Connection, target: Variable) -> tuple[flo
     return factor, offset
 
 
-def check_steps(system: System) -> None:
+def check_steps(system: Structure) -> None:
     """InputError where a step does not divide what it must."""
     step, stop = system.step_ns / NANOSECONDS, system.stop_ns / NANOSECONDS
     if system.stop_ns % system.step_ns:
@@ -265,7 +262,7 @@ def check_steps(system: System) -> None:
             )
 
 
-def check_initialisation(system: System) -> None:
+def check_initialisation(system: Structure) -> None:
     """InputError where an option of the initialisation is not as it must be."""
     place, chosen = f"{system.name}: [initialisation]", system.initialisation
     if chosen.loops not in LOOPS:

@@ -1,9 +1,9 @@
 """The system description: components, connections and the experiment, checked once."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any
 
 from .. import extensions
 from ..errors import InputError, choices
@@ -15,37 +15,17 @@ from .checks import (
     check_items,
     check_steps,
 )
-from .parts import NANOSECONDS, Component, Connection, Event, Fault, Initialisation
+from .parts import NANOSECONDS
 from .scenario_checks import check_scenario
+from .structure import SCHEMES, Scheme, Structure
 
-Scheme = Literal["sequential", "jacobi"]
-SCHEMES: tuple[str, ...] = get_args(Scheme)
 LONGEST = 1e9
 """s; a time in nanoseconds then fits into 64 bits."""
 
 
 @dataclass(frozen=True, slots=True)
-class System:
-    """A checked system: every name exists, every input has one source or keeps a value.
-
-    step_ns and stop_ns are in nanoseconds; stop_ns is a whole multiple of step_ns, and so is the
-    step of each component. notes are what its reader decided or did not use, one line each. roles
-    name the component that plays a role, such as plant; where they do not, the component of that
-    name plays it. presets are values under a name, like {"bench": {"sensor_1.noise.seed": 1}}.
-    """
-
-    name: str
-    components: tuple[Component, ...]
-    connections: tuple[Connection, ...]
-    step_ns: int
-    stop_ns: int
-    scheme: Scheme
-    events: tuple[Event, ...] = ()
-    faults: tuple[Fault, ...] = ()
-    initialisation: Initialisation = Initialisation()
-    notes: tuple[str, ...] = field(default=(), compare=False)
-    roles: Mapping[str, str] = field(default_factory=dict)
-    presets: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
+class System(Structure):
+    """A checked system: every name exists, every input has one source or keeps a value."""
 
     def __post_init__(self) -> None:
         check_steps(self)
@@ -76,25 +56,6 @@ class System:
         reader = extensions.readers.get(path.suffix.lower(), extensions.readers[".toml"])
         system: System = reader(path, Path(fmus) if fmus else None, step, stop)
         return system
-
-    @property
-    def total_steps(self) -> int:
-        """The number of communication steps from 0 to the stop time."""
-        return self.stop_ns // self.step_ns
-
-    def period(self, name: str) -> int:
-        """The own step of the component of that name, in communication steps of the system."""
-        own = self.component(name, name).step_ns
-        return 1 if own is None else own // self.step_ns
-
-    def component(self, name: str, place: str) -> Component:
-        """The component of that name; place says who asks, for the error message."""
-        for component in self.components:
-            if component.name == name:
-                return component
-        raise InputError(
-            f"{place}: no component {name!r}; valid: {choices(c.name for c in self.components)}"
-        )
 
     def start(self, key: str) -> float:
         """The number that 'component.variable' starts with: given in the system, or by its FMU."""

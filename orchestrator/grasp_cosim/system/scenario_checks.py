@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from ..checks import choice, whole
 from ..errors import InputError, choices
 from ..interface.interface import Interface, Value
 from .faults import FAULTS
 from .parts import NANOSECONDS, RELATIONS, Condition, Event, Fault, Port
-
-if TYPE_CHECKING:
-    from .description import System
+from .structure import Structure
 
 
-def check_scenario(system: System) -> None:
+def check_scenario(system: Structure) -> None:
     """InputError at the first event or fault that is not as it must be."""
     for i, event in enumerate(system.events):
         _check_event(system, event, f"{system.name}: events[{i}]")
@@ -23,7 +20,7 @@ def check_scenario(system: System) -> None:
         _check_fault(system, fault, f"{system.name}: faults[{i}]")
 
 
-def _check_event(system: System, event: Event, place: str) -> None:
+def _check_event(system: Structure, event: Event, place: str) -> None:
     if (event.at_ns is None) == (event.when is None):
         raise InputError(f"{place}: must have either at, a time in s, or when, a condition")
     if not event.set:
@@ -34,7 +31,7 @@ def _check_event(system: System, event: Event, place: str) -> None:
         check_setting(system, port, value, f"{place}: set.{port}")
 
 
-def _settable(system: System) -> list[Port]:
+def _settable(system: Structure) -> list[Port]:
     """What an event may set: tunable parameters and inputs without a connection."""
     connected = {connection.target for connection in system.connections}
     return [
@@ -47,7 +44,7 @@ def _settable(system: System) -> list[Port]:
     ]
 
 
-def check_setting(system: System, port: Port, value: Value, place: str) -> None:
+def check_setting(system: Structure, port: Port, value: Value, place: str) -> None:
     """InputError where the value cannot be set at the port during a run."""
     interface = system.component(port.component, place).interface
     for connection in system.connections:
@@ -67,7 +64,7 @@ def check_setting(system: System, port: Port, value: Value, place: str) -> None:
     interface.parse(place, port.variable, value)
 
 
-def _check_condition(system: System, condition: Condition, place: str) -> None:
+def _check_condition(system: Structure, condition: Condition, place: str) -> None:
     interface = system.component(condition.port.component, place).interface
     valid = [v.name for v in interface.of("output") if v.supported and v.kind != "String"]
     if condition.port.variable not in valid:
@@ -87,7 +84,7 @@ def _check_condition(system: System, condition: Condition, place: str) -> None:
         raise InputError(f"{place}: {condition.port} is {kind}; must be compared with {expected}")
 
 
-def _check_fault(system: System, fault: Fault, place: str) -> None:
+def _check_fault(system: Structure, fault: Fault, place: str) -> None:
     targets = [connection.target for connection in system.connections]
     if fault.target not in targets:
         raise InputError(
@@ -128,7 +125,7 @@ def _check_parameters(fault: Fault, interface: Interface, place: str) -> None:
             interface.parse(f"{place}: {name}", fault.target.variable, fault.parameters[name])
 
 
-def _check_window(system: System, fault: Fault, place: str) -> None:
+def _check_window(system: Structure, fault: Fault, place: str) -> None:
     step = system.step_ns
     if fault.end_ns is not None and -(-fault.start_ns // step) >= -(-fault.end_ns // step):
         raise InputError(

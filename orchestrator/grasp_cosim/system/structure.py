@@ -1,0 +1,55 @@
+"""What a system is made of, as its checks and its readers see it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal, get_args
+
+from ..errors import InputError, choices
+from ..interface.interface import Value
+from .parts import Component, Connection, Event, Fault, Initialisation
+
+Scheme = Literal["sequential", "jacobi"]
+SCHEMES: tuple[str, ...] = get_args(Scheme)
+
+
+@dataclass(frozen=True, slots=True)
+class Structure:
+    """Components, their connections, and the experiment.
+
+    step_ns and stop_ns are in nanoseconds; stop_ns is a whole multiple of step_ns, and so is the
+    step of each component. notes are what its reader decided or did not use, one line each. roles
+    name the component that plays a role, such as plant; where they do not, the component of that
+    name plays it. presets are values under a name, like {"bench": {"sensor_1.noise.seed": 1}}.
+    """
+
+    name: str
+    components: tuple[Component, ...]
+    connections: tuple[Connection, ...]
+    step_ns: int
+    stop_ns: int
+    scheme: Scheme
+    events: tuple[Event, ...] = ()
+    faults: tuple[Fault, ...] = ()
+    initialisation: Initialisation = Initialisation()
+    notes: tuple[str, ...] = field(default=(), compare=False)
+    roles: Mapping[str, str] = field(default_factory=dict)
+    presets: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
+
+    @property
+    def total_steps(self) -> int:
+        """The number of communication steps from 0 to the stop time."""
+        return self.stop_ns // self.step_ns
+
+    def period(self, name: str) -> int:
+        """The own step of the component of that name, in communication steps of the system."""
+        own = self.component(name, name).step_ns
+        return 1 if own is None else own // self.step_ns
+
+    def component(self, name: str, place: str) -> Component:
+        """The component of that name; place says who asks, for the error message."""
+        for component in self.components:
+            if component.name == name:
+                return component
+        raise InputError(
+            f"{place}: no component {name!r}; valid: {choices(c.name for c in self.components)}"
+        )
