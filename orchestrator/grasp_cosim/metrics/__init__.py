@@ -1,4 +1,5 @@
-"""What a metric is: a function of recorded signals with a name, a unit and a description.
+"""Metrics: functions of recorded signals with a name, a unit and a description.
 
-Imports errors and extensions only; which metrics there are is decided higher up.
+Signals by role, the registry, metrics from a user's file; which there are is decided higher up.
+Imports the ground floor: errors, extensions.
 """

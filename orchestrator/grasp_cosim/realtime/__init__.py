@@ -1,1 +1,5 @@
-"""Runs paced by the clock: pacing, what the operating system grants, and timing statistics."""
+"""Runs paced by the clock.
+
+Waiting for the next step, what the operating system grants, and the statistics of the times.
+Imports fmi, system and what is below them.
+"""

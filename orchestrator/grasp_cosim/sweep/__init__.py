@@ -1,1 +1,5 @@
-"""Many runs of one system: designs, parallel and resumable runs, what they say together."""
+"""Studies: many runs of one system.
+
+Designs, parallel and resumable runs, the folder of a study, Sobol indices.
+Imports master, metrics, system and what is below them.
+"""

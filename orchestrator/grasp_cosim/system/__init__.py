@@ -1,1 +1,5 @@
-"""The system description: what is connected, with which values, over which time."""
+"""The description of a system, checked once.
+
+Components, connections, events, faults, roles and presets; from and to TOML.
+Imports interface and the ground floor.
+"""

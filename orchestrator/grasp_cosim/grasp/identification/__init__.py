@@ -1,1 +1,1 @@
-"""What the bench's friction must be, from contact times or from a recorded log."""
+"""The friction of the bench, from contact times or from a recorded log, by least squares."""

@@ -1,1 +1,1 @@
-"""The paper's table and figures beside ours."""
+"""The tables and figures of the paper beside ours, and its claims."""
