@@ -20,6 +20,7 @@ from .document import read_document, unreadable
 from .interface import TYPES, TYPES_3, Enumeration, Interface, Variable, kind_of, typed
 from .units import BASE, Unit
 
+NUMERIC = ("Real", "Integer")
 LARGEST_REFERENCE = 2**32 - 1
 """A value reference is an unsigned integer of 32 bits."""
 CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029]")
@@ -216,13 +217,10 @@ class _Reader:
         declared = self.types.get(value.get("declaredType", ""))
         sources = (element, value) if declared is None else (declared, element, value)
         said = {key: text for e in sources for key, text in e.attrib.items() if text}
-        limits = [said.get(key) for key in ("min", "max", "nominal")]
-        if kind not in ("Real", "Integer"):
-            limits = [None, None, None]
-        for key, text in zip(("min", "max", "nominal"), limits, strict=True):
+        limits = {k: said[k] for k in ("min", "max", "nominal") if k in said and kind in NUMERIC}
+        for key, text in limits.items():
             with self.tolerated():
-                _real(f"{place}: {key}", text or "0")
-        low, high, magnitude = (typed(value.tag, text) for text in limits)
+                _real(f"{place}: {key}", text)
         causality, variability = self.nature(element, kind)
         starts = tuple(e.get("value", "") for e in element.iterfind("Start"))
         start = value.get("start")
@@ -237,15 +235,15 @@ class _Reader:
             reference,
             said.get("unit"),
             start,
-            low,
-            high,
+            typed(value.tag, limits.get("min")),
+            typed(value.tag, limits.get("max")),
             value.tag,
             variability,
             now,
             initially,
             tuple(self.size(place, e) for e in element.iterfind("Dimension")),
             element.get("description"),
-            magnitude,
+            typed(value.tag, limits.get("nominal")),
             said.get("relativeQuantity") in ("true", "1"),
             self.enumerations.get(value.get("declaredType", "")) if is_enumeration else None,
             element.get("initial") or initial.get(causality),

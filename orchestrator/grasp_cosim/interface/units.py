@@ -1,13 +1,14 @@
 """Units as FMI and SSP define them, and the conversion from one to another."""
 
 from dataclasses import dataclass
-from typing import NamedTuple, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
-import numpy as np
-import numpy.typing as npt
+if TYPE_CHECKING:  # reading a description needs no numpy, which takes time to load
+    import numpy as np
+    import numpy.typing as npt
 
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
-Number = TypeVar("Number", float, npt.NDArray[np.float64])
+Number = TypeVar("Number", float, "npt.NDArray[np.float64]")
 
 
 @dataclass(frozen=True, slots=True)
