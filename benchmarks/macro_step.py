@@ -54,7 +54,7 @@ def parts() -> None:
             calls.append(
                 Call(_timed(call.python, f"{name} {'step' if i in steps else 'values'}", spent))
             )
-        run = make_loop(replace(plan, calls=tuple(calls)), "python")
+        run = make_loop(replace(plan, calls=calls), "python")
         rows = np.empty((STEPS, len(plan.values)))
         rounds = []
         for first in range(0, ROUNDS * STEPS, STEPS):

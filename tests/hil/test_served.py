@@ -4,7 +4,7 @@ import math
 import re
 import zipfile
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from pathlib import Path
 
 import numpy as np
@@ -73,7 +73,7 @@ def directly(fmu: Path, gaps: list[float], reflectance: float) -> list[Value]:
     interface = read_interface(fmu)
     gap, intensity = interface.by_name["gap"], interface.by_name["intensity"]
     found = []
-    with load_here("sensor", interface) as sensor:
+    with closing(load_here("sensor", interface)) as sensor:
         sensor.enter_initialization({"reflectance": reflectance, "gap": gaps[0]}, None)
         found += sensor.get([intensity])
         sensor.exit_initialization()

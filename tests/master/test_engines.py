@@ -14,7 +14,7 @@ import pytest
 from grasp_cosim import InputError, SimulationError, System, simulate
 from grasp_cosim.fmi import instance
 from grasp_cosim.fmi.instance import STEP_2, Call, Native
-from grasp_cosim.grasp.system import SYSTEM
+from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.master import compiled, loop
 from grasp_cosim.master import engine as engines
 from grasp_cosim.master.engine import Engine
@@ -186,15 +186,13 @@ def test_a_value_that_is_not_finite_at_t_0_is_kept_too(
     assert mock.calls[-1] == "close"
 
 
-def native(count: int) -> tuple[Call, ...]:
-    return tuple(Call(lambda: 0, Native(STEP_2, 0, 0)) for _ in range(count))
+def native(count: int) -> list[Call]:
+    return [Call(lambda: 0, Native(STEP_2, 0, 0))] * count
 
 
-def plan(calls: tuple[Call, ...], period: int = 1) -> Plan:
-    operations = tuple((loop.CALL, i, i + 1, period, 0) for i in range(len(calls)))
-    return Plan(
-        np.zeros(1), np.zeros(2), {}, operations, (), (), (), calls, (0,) * len(calls), []
-    )  # fmt: skip
+def plan(calls: list[Call], period: int = 1) -> Plan:
+    operations = [(loop.CALL, i, i + 1, period, 0) for i in range(len(calls))]
+    return Plan(np.zeros(1), np.zeros(2), {}, operations, calls=calls, owners=[0] * len(calls))
 
 
 @pytest.fixture
@@ -219,7 +217,7 @@ ENOUGH = round(engines.START_UP / (10 * engines.SAVED))
         (plan(native(20)), ENOUGH // 2 + 1, True),
         (plan(native(10), period=4), 4 * ENOUGH - 1, False),
         (plan(native(10), period=4), 4 * ENOUGH + 4, True),
-        (plan((Call(lambda: 0),) * 10), 100 * ENOUGH, False),
+        (plan([Call(lambda: 0)] * 10), 100 * ENOUGH, False),
         (plan(native(1)), None, True),
     ],
 )

@@ -34,11 +34,9 @@ def numba(engine: Engine) -> None:
 
 
 def plan(values: Any, operations: Any, **parts: Any) -> Plan:
-    parts = {"connections": (), "casts": (), "buffers": (), "calls": (), **parts}
-    return Plan(
-        np.array(values, float), np.zeros(2), {}, tuple(operations), parts["connections"],
-        parts["casts"], parts["buffers"], parts["calls"], (0,) * len(parts["calls"]), [],
-    )  # fmt: skip
+    lists = {name: list(part) for name, part in parts.items()}
+    owners = [0] * len(lists.get("calls", ()))
+    return Plan(np.array(values, float), np.zeros(2), {}, list(operations), **lists, owners=owners)
 
 
 def run(made: Plan, engine: Engine, steps: int, operation: int = 0) -> tuple[Any, Any]:

@@ -85,11 +85,11 @@ class Child:
         return status
 
     def ask(self, method: str, *arguments: Any, timeout: float = TIMEOUT) -> Any:
-        """What a method of the worker returns. InputError and SimulationError as it raises them."""
+        """Return the value of a worker's method; InputError or SimulationError if it raises one."""
         return self._request(CALL, (method, arguments), timeout)
 
     def start(self, method: str, *arguments: Any) -> None:
-        """The same while the FMU is loaded or initialised: InputError also where it is lost."""
+        """Ask while the FMU is loaded or initialised: InputError also where its process is lost."""
         try:
             self.ask(method, *arguments, timeout=START_TIMEOUT)
         except SimulationError as error:

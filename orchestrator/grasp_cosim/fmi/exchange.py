@@ -1,4 +1,4 @@
-"""What the master's process and that of a component share: memory for values, and commands.
+"""Memory for values and commands between the master's process and that of a component.
 
 A macro step is one round trip. The master puts inputs and the time into the shared memory, sends
 STEP and waits for the status; the component's process passes the inputs on that are pending, steps,

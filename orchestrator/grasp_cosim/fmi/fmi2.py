@@ -26,7 +26,7 @@ from .instance import STEP_2, TRANSFER_2, Call, Native
 from .loaded import KEPT, LOGGER, LoadedInstance
 
 _messages: defaultdict[str, deque[str]] = defaultdict(lambda: deque(maxlen=KEPT))
-"""What FMUs logged, by instance. FMPy's logger proxy is one per process, so is this."""
+"""Messages that FMUs logged, by instance. FMPy's logger proxy is one per process, so is this."""
 
 
 def _log(_: Any, instance: bytes | None, status: int, category: Any, message: bytes | None) -> None:
@@ -44,7 +44,7 @@ addLoggerProxy(ctypes.byref(_callbacks))
 
 
 class FmuInstance(LoadedInstance):
-    """One instance of an FMI 2.0 co-simulation FMU. Use as a context manager."""
+    """One instance of an FMI 2.0 co-simulation FMU."""
 
     PREFIX = "fmi2"
     SHAPE = TRANSFER_2

@@ -32,7 +32,7 @@ class _Slave(FMU3Slave):  # type: ignore[misc]  # FMPy has no types
 
 
 class Fmi3Instance(LoadedInstance):
-    """One instance of an FMI 3.0 co-simulation FMU. Use as a context manager."""
+    """One instance of an FMI 3.0 co-simulation FMU."""
 
     PREFIX = "fmi3"
     SHAPE = TRANSFER_3

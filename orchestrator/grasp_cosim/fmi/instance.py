@@ -1,4 +1,4 @@
-"""What the master needs of a component, whichever FMI version or process it lives in."""
+"""The interface of a component to the master, for every FMI version and process."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -59,7 +59,7 @@ class Instance(Protocol):
 
     @property
     def interface(self) -> Interface:
-        """What it declares, under the system's names."""
+        """Its declared interface, under the system's names."""
 
     def enter_initialization(
         self, values: Mapping[str, Value], stop: float | None, start: float = 0.0
@@ -93,7 +93,7 @@ class Instance(Protocol):
         """The call that advances by step seconds from the time in clock[0]; EARLY is a status."""
 
     def last_successful_time(self) -> float | None:
-        """Where a discarded or shortened step ended, in s; None where the FMU does not say."""
+        """Return the end of a discarded or shortened step in s, None if the FMU does not say."""
 
     def failure(self, status: int, time: float) -> SimulationError:
         """The error for a call that returned a bad status at time in s."""

@@ -1,4 +1,4 @@
-"""What an instance in this process is, whichever version of FMI it speaks.
+"""An instance of an FMU in this process: the parts that FMI 2.0 and 3.0 have in common.
 
 FMPy loads the binary and runs the life cycle. In the loop its wrappers would allocate and convert
 at every call (2.5 us instead of 0.5 us), so the loop calls the FMI functions directly, on buffers
@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 from urllib.parse import quote
 
 import fmpy
@@ -35,7 +35,7 @@ _NATIVE_FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int)
 """Calls of a Python FMU keep the GIL, which it would have to take back at once."""
 
 _PYTHONFMU_PREFIX = re.compile(r"Fatal py exception encountered: \[\w+\] \w+\s")
-"""What pythonfmu logs of an exception begins so; nothing else is kept where the FMU said more."""
+"""Begins a message of pythonfmu about an exception; kept only if the FMU logged nothing else."""
 
 _TRACEBACK = "Traceback (most recent call last)"
 _OF_KIND: Mapping[str, Callable[[Any], Value]] = {
@@ -57,10 +57,10 @@ KEPT = 12
 
 
 class LoadedInstance(ABC):
-    """One instance of a co-simulation FMU in this process. Use as a context manager."""
+    """One instance of a co-simulation FMU in this process."""
 
     PREFIX: ClassVar[str]
-    """What its FMI functions begin with."""
+    """The first letters of its FMI functions."""
 
     SHAPE: ClassVar[int]
     """The shape of those that set and get: TRANSFER_2, or TRANSFER_3 with the count at the end."""
@@ -89,7 +89,7 @@ class LoadedInstance(ABC):
 
     @abstractmethod
     def _read_log(self) -> list[str]:
-        """What this instance logged since the last call."""
+        """Return the messages logged since the last call."""
 
     @abstractmethod
     def _start(self, values: Mapping[str, Value], stop: float | None, start: float) -> None:
@@ -101,11 +101,11 @@ class LoadedInstance(ABC):
 
     @abstractmethod
     def _wants_the_end(self) -> bool:
-        """Whether the step that was discarded or ended early asks for the end of the simulation."""
+        """Return True if the FMU asked for the end of the simulation in a step that it rejected."""
 
     @abstractmethod
     def _reached(self) -> float | None:
-        """Where that step ended, in s; None where the FMU does not say."""
+        """Return the end of that step in s, None if the FMU does not say."""
 
     @abstractmethod
     def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
@@ -134,13 +134,6 @@ class LoadedInstance(ABC):
             os.chdir(here)  # where loading fails, FMPy stays in the library's folder
         self._worst = 0
         return slave
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Close the instance."""
-        self.close()
 
     def close(self) -> None:
         """Terminate and free the FMU as far as it permits; remove what was extracted."""
@@ -209,7 +202,7 @@ class LoadedInstance(ABC):
         setter([variable.reference], [_OF_KIND[variable.kind](value)])
 
     def last_successful_time(self) -> float | None:
-        """Where a discarded or shortened step ended, in s; None where the FMU does not say.
+        """Return the end of a discarded or shortened step in s, None if the FMU does not say.
 
         SimulationError where the FMU asks for the end of the simulation.
         """
@@ -269,7 +262,7 @@ class LoadedInstance(ABC):
         return as_reason(self._messages()).removeprefix(": ") or " ".join(str(error).split())
 
     def _messages(self) -> list[str]:
-        """What this instance logged and nobody has read yet."""
+        """Return the logged messages that have not been read yet."""
         own = re.compile(rf"\A{re.escape(self.name)}, t = \S+ s: ")  # so our FMUs begin
         said = [own.sub("", text, count=1) for text in (*self._unread, *self._read_log())]
         self._unread.clear()
@@ -277,7 +270,7 @@ class LoadedInstance(ABC):
 
 
 def _used_here(member: str) -> bool:
-    """Whether a file of an FMU is of use to an instance here; binaries for others are not."""
+    """Return True if an instance here may need this file of the FMU: no binary for others."""
     return member.startswith(_OF_THIS_MACHINE) or not member.startswith(_UNUSED)
 
 

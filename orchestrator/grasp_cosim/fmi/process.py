@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +18,7 @@ POSIX = os.name == "posix"
 
 
 class ProcessInstance:
-    """One instance of a co-simulation FMU in a process of its own. Use as a context manager."""
+    """One instance of a co-simulation FMU in a process of its own."""
 
     def __init__(self, name: str, interface: Interface) -> None:
         """Start the process and instantiate; InputError where the FMU does not load."""
@@ -35,13 +35,6 @@ class ProcessInstance:
         except BaseException:
             self._child.end()
             raise
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Close the instance."""
-        self.close()
 
     def close(self) -> None:
         """Terminate and free the FMU as far as it permits, and end its process."""
@@ -101,7 +94,7 @@ class ProcessInstance:
         return Call(advance)
 
     def last_successful_time(self) -> float | None:
-        """Where a discarded or shortened step ended, in s; None where the FMU does not say."""
+        """Return the end of a discarded or shortened step in s, None if the FMU does not say."""
         time: float | None = self._child.ask("last_successful_time")
         return time
 

@@ -20,7 +20,7 @@ from .instance import EARLY, WARNING, Call, Instance
 from .load import load_here
 
 Answer = tuple[str, Any, list[str]]
-"""Of which kind it is, what it is, and notes or warnings."""
+"""The kind of an answer ("value" or an error's name), its value, and notes or warnings."""
 
 
 class Worker:

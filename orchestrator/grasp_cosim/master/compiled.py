@@ -48,20 +48,6 @@ address, d a double, i an int, b a byte.
 """
 
 
-class CallTable(NamedTuple):
-    """The calls as columns: see fmi.instance.Native."""
-
-    shape: npt.NDArray[np.int64]
-    function: npt.NDArray[np.int64]
-    instance: npt.NDArray[np.int64]
-    references: npt.NDArray[np.int64]
-    size: npt.NDArray[np.int64]
-    data: npt.NDArray[np.int64]
-    step: npt.NDArray[np.float64]
-    flags: npt.NDArray[np.int64]
-    last: npt.NDArray[np.int64]
-
-
 class BufferTable(NamedTuple):
     """Buffers of other types than float64: codes of their types, and addresses."""
 
@@ -75,13 +61,11 @@ class Calls:
     def __init__(self, calls: Sequence[Call]) -> None:
         self._callbacks: list[Any] = []
         natives = [call.native or self._python(call.python) for call in calls]
-        columns: list[npt.NDArray[Any]] = [
-            np.array(
-                [getattr(n, name) for n in natives], np.float64 if name == "step" else np.int64
-            )
-            for name in CallTable._fields
-        ]
-        self.table = CallTable(*columns)
+        self.table = Native._make(
+            np.array([call[i] for call in natives], np.float64 if name == "step" else np.int64)
+            for i, name in enumerate(Native._fields)
+        )
+        """The calls as columns: each field of a Native is an array."""
 
     def _python(self, function: Callable[[], int]) -> Native:
         self._callbacks.append(ctypes.PYFUNCTYPE(ctypes.c_int)(function))

@@ -8,7 +8,7 @@ from ..system.faults import FAULTS, INITIAL, Draws
 from ..system.parts import Fault, Port
 
 FaultFunction = Callable[[float, int], float]
-"""What becomes of a value at a step number."""
+"""Changes a value passed at a step number."""
 
 
 def first_step(time_ns: int, step_ns: int) -> int:

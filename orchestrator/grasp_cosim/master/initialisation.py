@@ -19,6 +19,8 @@ from ..system.description import System
 from ..system.faults import INITIAL
 from ..system.parts import Connection, Initialisation, Port
 
+Floats = npt.NDArray[np.float64]
+
 DIFFERENCE = 1e-7
 """Relative change of an input for the derivatives of Newton's method."""
 
@@ -142,12 +144,7 @@ class Propagation:
             f"residual of {choice.tolerance:g} in {choice.iterations} iterations; {_advice()}"
         )
 
-    def _slope(
-        self,
-        x: npt.NDArray[np.float64],
-        g: npt.NDArray[np.float64],
-        nominal: npt.NDArray[np.float64],
-    ) -> npt.NDArray[np.float64]:
+    def _slope(self, x: Floats, g: Floats, nominal: Floats) -> Floats:
         """The derivatives of what comes back at the cuts, by what is put in there."""
         columns = []
         for i in range(len(x)):
@@ -156,8 +153,8 @@ class Propagation:
             columns.append((self._evaluate(moved) - g) / (moved[i] - x[i]))
         return np.array(columns).T
 
-    def _evaluate(self, x: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        """What comes back at the cuts when x is put in there."""
+    def _evaluate(self, x: Floats) -> Floats:
+        """Return the values that come back at the cuts when `x` is put in there."""
         cuts = self.order.cuts
         self._pass_on(dict(zip(cuts, x.tolist(), strict=True)))
         return np.array([self._arriving(self._connections[port]) for port in cuts], np.float64)

@@ -30,7 +30,7 @@ CHUNK = 1024
 """The most steps between two times that rows are handed on."""
 
 ENOUGH = 32
-"""So many rows are handed on at the end of advance(): one by one would cost more than a step."""
+"""The rows that advance() collects before it hands them on: one alone costs more than a step."""
 
 LONG = 0.1
 """s of wall time after which it hands on any."""
@@ -144,7 +144,7 @@ class Master:
         return self._rows[self._handed_on - self._base : self.steps_done - self._base]
 
     def _enough(self) -> bool:
-        """Whether rows wait no longer: they are many, or have waited long, or are the last."""
+        """Return True if the rows are many, have waited long or include the last one."""
         if self.steps_done == self.total_steps:
             return True
         if self._pacer is None and len(self._waiting()) >= ENOUGH:  # a pacer has its own occasions

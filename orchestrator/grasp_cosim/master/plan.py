@@ -6,7 +6,7 @@ buffer of their type beside the vector. Strings are no numbers: a connection bet
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -40,15 +40,15 @@ class Plan:
     values: npt.NDArray[np.float64]
     clock: npt.NDArray[np.float64]
     slots: Mapping[Port, int]
-    operations: tuple[Operation, ...]
-    connections: tuple[tuple[int, int, float, float], ...]
-    casts: tuple[tuple[int, int, int], ...]
-    buffers: tuple[npt.NDArray[Any], ...]
-    calls: tuple[Call, ...]
-    owners: tuple[int, ...]
+    operations: list[Operation] = field(default_factory=list)
+    connections: list[tuple[int, int, float, float]] = field(default_factory=list)
+    casts: list[tuple[int, int, int]] = field(default_factory=list)
+    buffers: list[npt.NDArray[Any]] = field(default_factory=list)
+    calls: list[Call] = field(default_factory=list)
+    owners: list[int] = field(default_factory=list)
     """By call, the index of the component that it is made to; -1 for a call of the master's own."""
-    raised: list[BaseException]
-    """What Python calls raised that returned RAISED: it must not pass through compiled code."""
+    raised: list[BaseException] = field(default_factory=list)
+    """Errors of the Python calls that returned RAISED: they must not pass through compiled code."""
 
 
 def slots_of(system: System, instances: Sequence[Instance]) -> dict[Port, int]:
@@ -93,14 +93,7 @@ class Planner:
         self.pacer = pacer
         self.stamps = 0
         self.transforms = transforms(system)
-        self.clock = np.zeros(2)
-        self.operations: list[Operation] = []
-        self.connections: list[tuple[int, int, float, float]] = []
-        self.casts: list[tuple[int, int, int]] = []
-        self.buffers: list[npt.NDArray[Any]] = []
-        self.calls: list[Call] = []
-        self.owners: list[int] = []
-        self.raised: list[BaseException] = []
+        self.made = Plan(values, np.zeros(2), slots)
 
     def plan(self) -> Plan:
         """The program of a macro step in the scheme of the system, and what it works on."""
@@ -127,18 +120,7 @@ class Planner:
             for name in names:
                 self._step(name)
                 self._stamp()
-        return Plan(
-            self.values,
-            self.clock,
-            self.slots,
-            tuple(self.operations),
-            tuple(self.connections),
-            tuple(self.casts),
-            tuple(self.buffers),
-            tuple(self.calls),
-            tuple(self.owners),
-            self.raised,
-        )
+        return self.made
 
     def _move(self, name: str, phase: int) -> None:
         """The connections that end at a component, then their faults."""
@@ -150,13 +132,13 @@ class Planner:
         ]
         numbers = [connection for connection in connections if connection.target in self.slots]
         for kind in (COPY, SCALE):
-            first = len(self.connections)
+            first = len(self.made.connections)
             for connection in numbers:
                 transform = self.transforms[connection.target]
                 if (transform == (1.0, 0.0)) == (kind == COPY):
                     ends = self.slots[connection.source], self.slots[connection.target]
-                    self.connections.append((*ends, *transform))
-            self._operation(kind, first, len(self.connections), period, phase)
+                    self.made.connections.append((*ends, *transform))
+            self._operation(kind, first, len(self.made.connections), period, phase)
         for connection in connections:
             if connection.target in self.faults:
                 self._fault(connection.target, period, phase)
@@ -186,7 +168,7 @@ class Planner:
         self._python(lambda _: target.set([taken_in], source.get([put_out])), period, phase)
 
     def _python(self, function: Callable[[int], None], period: int, phase: int) -> None:
-        clock = memoryview(self.clock)  # type: ignore[arg-type]
+        clock = memoryview(self.made.clock)  # type: ignore[arg-type]
 
         def call() -> int:
             function(int(clock[1]))
@@ -198,7 +180,7 @@ class Planner:
         """Advance a component and fetch its outputs, at the end of its own step."""
         period = self.system.period(name)
         step = period * self.system.step_ns / NANOSECONDS
-        call = self.instances[name].stepper(self.clock, step)
+        call = self.instances[name].stepper(self.made.clock, step)
         self._call(STEP, call, name, period, period - 1)
         self._transfer(name, "output", period - 1)
 
@@ -212,11 +194,12 @@ class Planner:
             first = self.slots[Port(name, taken[0].name)]
             data: npt.NDArray[Any] = self.values[first : first + len(taken)]
             element = np.dtype(dtype(instance.interface.version, fmi_type))
-            casts = (len(self.casts), len(self.casts) + len(taken))
+            casts = (len(self.made.casts), len(self.made.casts) + len(taken))
             if element != np.float64:
                 data = np.zeros(len(taken), element)
-                self.casts += [(len(self.buffers), i, first + i) for i in range(len(taken))]
-                self.buffers.append(data)
+                buffer = len(self.made.buffers)
+                self.made.casts.extend((buffer, i, first + i) for i in range(len(taken)))
+                self.made.buffers.append(data)
             if element != np.float64 and causality == "input":
                 self._operation(STORE, *casts, period, phase)
             action = "set" if causality == "input" else "get"
@@ -226,24 +209,24 @@ class Planner:
                 self._operation(LOAD_LONG if long else LOAD, *casts, period, phase)
 
     def _call(self, kind: int, call: Call, name: str | None, period: int, phase: int) -> None:
-        self._operation(kind, len(self.calls), len(self.calls) + 1, period, phase)
-        self.calls.append(call if call.native else Call(self._guarded(call.python)))
+        self._operation(kind, len(self.made.calls), len(self.made.calls) + 1, period, phase)
+        self.made.calls.append(call if call.native else Call(self._guarded(call.python)))
         names = [component.name for component in self.system.components]
-        self.owners.append(-1 if name is None else names.index(name))
+        self.made.owners.append(-1 if name is None else names.index(name))
 
     def _guarded(self, function: Callable[[], int]) -> Callable[[], int]:
         def call() -> int:
             try:
                 return function()
             except BaseException as error:
-                self.raised.append(error)
+                self.made.raised.append(error)
                 return RAISED
 
         return call
 
     def _operation(self, kind: int, first: int, last: int, period: int, phase: int) -> None:
         if last > first:
-            self.operations.append((kind, first, last, period, phase))
+            self.made.operations.append((kind, first, last, period, phase))
 
 
 def _by_type(instance: Instance, causality: str) -> list[tuple[str, list[Variable]]]:

@@ -63,7 +63,7 @@ class Scenario:
         self._settable: set[Port] = set()
 
     def before_step(self, step: int) -> None:
-        """What happens at communication point step, before the step that begins there.
+        """Do what is due at communication point `step`, before the step that begins there.
 
         Steps come in order. SimulationError where a component refuses a value.
         """
@@ -152,7 +152,7 @@ class _PendingEvent:
         return [f"{port} = {literal(value)}{reason}" for port, value in self.event.set.items()]
 
     def reason(self) -> str:
-        """What it waits for."""
+        """Return why it has not happened."""
         if self.event.when is not None:
             return f"{self.event.when} never held"
         return f"no step began at or after t = {(self.event.at_ns or 0) / NANOSECONDS:.9g} s"

@@ -139,7 +139,7 @@ class Session:
 
     @property
     def complete(self) -> bool:
-        """Whether the stop time is reached, without a failure."""
+        """True if the stop time is reached, without a failure."""
         return self._master.steps_done == self._master.total_steps and not self._failed
 
     def step(self, steps: int = 1) -> bool:
@@ -195,7 +195,7 @@ class Session:
             self._master.scenario.set(name, value, self._master.steps_done)
 
     def result(self) -> Result:
-        """What was recorded until now.
+        """Return the result recorded until now.
 
         SimulationError, with the result, where a listener does not take it.
         """
@@ -265,7 +265,7 @@ class Simulate:
         step and stop in s and the scheme replace those of the system. progress shows a bar on
         standard error if that is a terminal. every keeps only each n-th communication point, and
         the last. listeners get what is kept while it is recorded. engine is "python", "compiled"
-        (needs numba) or "auto", compiled where numba is installed; the results have the same bits.
+        (needs numba) or "auto", compiled where that pays; the results have the same bits.
         realtime paces the run by the clock: the result has a timing, and the same bits. metrics are
         worked out beside those that every result is asked for.
         Ctrl-C ends the run early: the result is what was recorded, with complete = False.

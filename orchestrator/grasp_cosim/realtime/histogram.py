@@ -20,7 +20,7 @@ RESOLUTION = 2.0**-BITS
 """The width of a bin is this part of its octave."""
 
 COARSE = 3
-"""Of bars(): 2**COARSE bins to a bar."""
+"""bars() puts 2**COARSE bins into a bar."""
 
 Times = npt.NDArray[np.float64]
 """Times in ns: whole numbers from 0 on."""
@@ -34,7 +34,7 @@ def bins_of(times: Times) -> npt.NDArray[np.int64]:
 
 
 def lower_edge(number: int) -> float:
-    """Where the bin of that number begins, in ns; that of BINS is behind the last bin."""
+    """Return the lower edge of bin `number` in ns; that of BINS is behind the last bin."""
     if number == 0:
         return 0.0
     octave, place = divmod(number - 1, 1 << BITS)
@@ -42,7 +42,7 @@ def lower_edge(number: int) -> float:
 
 
 class Spread(NamedTuple):
-    """What a histogram comes to, in ns; worst is exact and was at step worst_at.
+    """Statistics of a histogram, in ns; `worst` is exact and was at step `worst_at`.
 
     The others are the longest times of the bins that they fall into: too long by at most 1/128.
     """
@@ -58,7 +58,7 @@ class Histograms:
     """Several histograms side by side, which take rows of times."""
 
     def __init__(self, count: int) -> None:
-        """So many histograms."""
+        """Make `count` empty histograms."""
         self._counts = np.zeros((count, BINS), np.int64)
         self._flat = self._counts.reshape(-1)
         self._offsets = BINS * np.arange(count)
@@ -91,7 +91,7 @@ class Histograms:
         return np.array([_longest(int(i)) for i in (behind >= ranks).argmax(axis=1)])
 
     def spread(self, i: int) -> Spread | None:
-        """What histogram i comes to; None while it is empty."""
+        """Return the statistics of histogram `i`, None while it is empty."""
         worst = int(self._worst[i])
         if worst < 0:
             return None
@@ -121,9 +121,8 @@ class Histograms:
         for begin, end, count in bars:
             if not count:
                 continue
-            if edges and edges[-1] != begin:
-                heights.append(0)
             if not edges or edges[-1] != begin:
+                heights += [0] if edges else []
                 edges.append(begin)
             heights.append(count)
             edges.append(end)
@@ -136,5 +135,5 @@ def _longest(number: int) -> int:
 
 
 def _rank(per_mille: int, count: int) -> int:
-    """How many values are at most the quantile."""
+    """Return the number of values up to the quantile."""
     return -(-count * per_mille // 1000)

@@ -22,7 +22,7 @@ from .timing import Histogram, Overrun, Spread, Timing
 
 HEAD = 4
 ARRIVED, LATE, DUE, BEGIN = range(HEAD)
-"""What the pacer writes of a step, in ns: when the step before had ended, by how much that was
+"""Places of times in ns that the pacer writes: when the step before had ended, by how much that was
 after its deadline, when the step should begin, when it did. The ends of its segments follow.
 """
 
@@ -39,7 +39,7 @@ Table = npt.NDArray[np.float64]
 
 
 def segments_of(system: System) -> tuple[int, ...]:
-    """Whose time it is between the stamps of a step: a component by index, or the exchange, -1.
+    """Return the owner of each segment of a step: a component by index, or the exchange, -1.
 
     The components are called one after the other; in the Jacobi scheme all take their inputs
     before the first one steps.
@@ -64,7 +64,7 @@ class Meter:
                 )
         self.segments = segments_of(system)
         self.overruns = 0
-        """How many there were."""
+        """The number of steps that ended late."""
         self._system, self._realtime, self._period = system, realtime, period
         self._names = (*names, EXCHANGE)
         self._periods = np.array([1, 1, *map(system.period, names), 1, 1])
@@ -116,13 +116,13 @@ class Meter:
         )
 
     def live(self) -> str:
-        """How it goes, in a few words."""
+        """Return the state of the run in a few words."""
         worst = self._inside.worst(0) / 1e6
         factor = self._real_time_factor()
         return f"{factor:.3g}x, worst step {worst:.3g} ms, {self.overruns} overruns"
 
     def timing(self, granted: Sequence[str], refused: Sequence[str]) -> Timing:
-        """What it all came to so far; granted and refused are what the operating system did."""
+        """Return the timing so far, with the answers of the operating system."""
         spreads, histograms = {}, {}
         inside = enumerate((STEP, START, *self._names, BETWEEN))
         for name, found, i in (
@@ -180,7 +180,7 @@ class Meter:
             self._blame(steps[late], after[late, LATE], suspects[late])
 
     def _recorded(self, steps: Steps) -> Table:
-        """What was spent on recording after each of these steps, which are in a row."""
+        """Return the time in ns that recording took after each of these consecutive steps."""
         spent = np.zeros(len(steps))
         first, last = int(steps[0]), int(steps[-1])
         taken = [entry for entry in self._recordings if entry[0] <= last]
@@ -197,7 +197,7 @@ class Meter:
         return np.add.reduceat(segments[:, self._order], self._firsts, axis=1)
 
     def _happened(self, steps: Steps) -> npt.NDArray[np.bool_] | None:
-        """Which parts there are in these steps: a slow component is not called in all of them."""
+        """Return the parts that ran, a row per step; None if all did, as slow components do not."""
         periods = self._periods
         if (periods == 1).all():
             return None
@@ -226,7 +226,7 @@ class Meter:
             )
 
     def _find_usual(self) -> Table:
-        """What the suspects usually take: the median over all steps.
+        """Return the usual times of the suspects in ns: the medians over all steps.
 
         Where a step takes longer than its period anyhow, nothing that it usually takes is an
         excuse, and no backlog a reason.

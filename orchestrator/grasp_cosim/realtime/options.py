@@ -1,4 +1,4 @@
-"""How a run is to be paced by the clock."""
+"""Options of a run that is paced by the clock."""
 
 import math
 from dataclasses import dataclass
@@ -7,13 +7,14 @@ from numbers import Real
 from pathlib import Path
 from typing import Literal, get_args
 
+from ..checks import choice, whole
 from ..errors import InputError, choices
 
 Overrun = Literal["catch-up", "continue", "stop"]
 OVERRUNS: tuple[str, ...] = get_args(Overrun)
 
 ONLINE = Path("/sys/devices/system/cpu/online")
-"""Where Linux lists the CPUs that it runs, as in 0-3,6."""
+"""The file in which Linux lists its CPUs, as in 0-3,6."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,14 +22,14 @@ class Realtime:
     """A run in real time; InputError where a value is none of those given here."""
 
     factor: float = 1.0
-    """How many times as fast as real time, > 0."""
+    """Speed relative to real time, > 0."""
     overrun: Overrun = "catch-up"
-    """What follows a step that ends after the next one should have begun: "catch-up" keeps to the
+    """Treatment of a step that ends after the next one should have begun: "catch-up" keeps to the
     schedule, late steps are done without waiting; "continue" shifts the schedule by the delay;
     "stop" ends the run with a SimulationError.
     """
     priority: int | None = None
-    """Of SCHED_FIFO, 1 to 99; None leaves the scheduling as it is."""
+    """Priority of SCHED_FIFO, 1 to 99; None leaves the scheduling as it is."""
     cpu: int | None = None
     """The number of the CPU to stay on, one of this machine; None leaves it to the system."""
     lock_memory: bool = False
@@ -38,11 +39,11 @@ class Realtime:
         factor = self.factor
         if isinstance(factor, bool) or not isinstance(factor, Real) or not 0 < factor < math.inf:
             raise InputError(f"factor = {factor!r}: must be a finite number > 0")
-        if self.overrun not in OVERRUNS:
-            raise InputError(f"overrun = {self.overrun!r}: must be one of {choices(OVERRUNS)}")
-        _check_whole("priority", self.priority, 1, 99)
-        _check_whole("cpu", self.cpu, 0, 2**16)
+        choice("overrun", self.overrun, OVERRUNS)
+        if self.priority is not None:
+            whole("priority", self.priority, 1, 99, must="a whole number from 1 to 99")
         if self.cpu is not None:
+            whole("cpu", self.cpu, 0, 2**16, must=f"a whole number from 0 to {2**16}")
             _check_cpu(self.cpu)
         if not isinstance(self.lock_memory, bool):
             raise InputError(f"lock_memory = {self.lock_memory!r}: must be True or False")
@@ -63,13 +64,6 @@ class Realtime:
 
 YEAR_NS = 366 * 24 * 3600 * 10**9
 """The longest period."""
-
-
-def _check_whole(name: str, value: int | None, least: int, most: int) -> None:
-    if value is None:
-        return
-    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-        raise InputError(f"{name} = {value!r}: must be a whole number from {least} to {most}")
 
 
 def _check_cpu(cpu: int) -> None:

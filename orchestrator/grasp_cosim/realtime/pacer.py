@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from ..fmi.instance import CLOCK, Call, Native
 from ..system.description import System
-from .meter import ARRIVED, BEGIN, DUE, HEAD, LATE, Meter
+from .meter import ARRIVED, BEGIN, DUE, HEAD, LATE, Meter, Steps, Table
 from .options import Realtime
 from .timing import Timing
 
@@ -29,7 +29,7 @@ BREATH_NS = 500_000_000
 """At a real-time priority the longest time without a sleep, as nothing else may get to run."""
 
 SOME = 64
-"""So many rows are handed on while it waits, if there is time for it."""
+"""The rows that are handed on together while it waits, if there is time for it."""
 
 AFTER = 512
 """Steps after which times are handed on to the meter even where there is no time for it."""
@@ -71,7 +71,7 @@ class Pacer:
         self.meter = Meter(system, realtime, period)
         self._period = period.as_integer_ratio()
         self.breathes = False
-        """Whether it has to sleep from time to time for the sake of others."""
+        """True if it has to sleep from time to time for the sake of other processes."""
         self._policy = realtime.overrun
         self._halted = halted
         self._clock = clock or Clock()
@@ -81,7 +81,7 @@ class Pacer:
         self._base = 0
         self._base_step: int | None = None
         self._end: tuple[int, int] | None = None
-        self._pending: tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]] | None = None
+        self._pending: tuple[Steps, Table] | None = None
         self._taken = 0
         self._hand_on: Callable[[int], None] = lambda _: None
         self._measuring = self._recording = 0
@@ -90,13 +90,13 @@ class Pacer:
 
     @property
     def sleeps(self) -> bool:
-        """Whether there is time to sleep between two steps."""
+        """True if there is time to sleep between two steps."""
         numerator, denominator = self._period
         return numerator > SPIN_NS * denominator
 
     @property
     def width(self) -> int:
-        """How many values it needs in a row."""
+        """The number of values it needs in a row."""
         return HEAD + len(self.meter.segments)
 
     def bind(self, values: npt.NDArray[np.float64], hand_on: Callable[[int], None]) -> None:
@@ -123,17 +123,8 @@ class Pacer:
         self._keep += [seconds, data]
         function = ctypes.CDLL(None).clock_gettime
         address = ctypes.cast(function, ctypes.c_void_p).value or 0
-        return Call(
-            python,
-            Native(
-                CLOCK,
-                address,
-                time.CLOCK_MONOTONIC,
-                seconds.ctypes.data,
-                origin,
-                data.ctypes.data,
-            ),
-        )
+        words, place = seconds.ctypes.data, data.ctypes.data
+        return Call(python, Native(CLOCK, address, time.CLOCK_MONOTONIC, words, origin, place))
 
     def __call__(self, step: int) -> None:
         """Wait for the beginning of a step.
@@ -153,12 +144,7 @@ class Pacer:
         """The last step has just ended, where another step would begin; OverrunError as above."""
         self._end = self._arrive(step)
 
-    def record(
-        self,
-        steps: npt.NDArray[np.int64],
-        rows: npt.NDArray[np.float64],
-        hand_on: Callable[[], None],
-    ) -> None:
+    def record(self, steps: Steps, rows: Table, hand_on: Callable[[], None]) -> None:
         """Take steps that were done: the numbers they lead to, and what was written of each.
 
         Hands their rows on, which counts as recording. What the times come to is found out while
@@ -168,27 +154,22 @@ class Pacer:
         self._timed(self._taken - 1, lambda: self._take(steps - 1, rows, hand_on))
 
     def timing(self, granted: Sequence[str], refused: Sequence[str]) -> Timing:
-        """What the times came to so far: see Meter.timing()."""
+        """Return the timing so far: see Meter.timing()."""
         self._settle()
         return self.meter.timing(granted, refused)
 
     def live(self, settled: bool = False) -> str:
-        """How it goes, in a few words: in the run without what is measured later, or settled."""
+        """Return the state of the run in a few words, `settled` with what is not measured yet."""
         if settled:
             self._settle()
         return self.meter.live()
 
     def verdict(self) -> str:
-        """What led to an OverrunError, when the steps until then are recorded."""
+        """Return the cause of an OverrunError, once the steps until then are recorded."""
         self._settle()
         return self.meter.verdict()
 
-    def _take(
-        self,
-        steps: npt.NDArray[np.int64],
-        rows: npt.NDArray[np.float64],
-        hand_on: Callable[[], None],
-    ) -> None:
+    def _take(self, steps: Steps, rows: Table, hand_on: Callable[[], None]) -> None:
         self._measure()
         start = self._now()
         self._pending = steps, rows.copy()
@@ -267,4 +248,4 @@ class Pacer:
 
 
 HAS_CLOCK = sys.platform == "linux" and sys.maxsize > 2**32
-"""Whether compiled code can read time.monotonic_ns(): clock_gettime with two words of 64 bits."""
+"""True if compiled code can read time.monotonic_ns(): clock_gettime with two 64-bit words."""

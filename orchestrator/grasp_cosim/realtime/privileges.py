@@ -1,4 +1,4 @@
-"""What a paced run asks of the operating system. It does without what is not permitted."""
+"""Requests of a paced run to the operating system. It does without what is not permitted."""
 
 import ctypes
 import gc
@@ -71,7 +71,7 @@ LOCKING = (
 
 
 THROTTLE = Path("/proc/sys/kernel")
-"""Where Linux says for how long in a period a thread of a real-time priority may run."""
+"""The folder in which Linux limits the share of a period for threads of a real-time priority."""
 
 
 def _throttled() -> list[str]:

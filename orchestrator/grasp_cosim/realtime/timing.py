@@ -1,4 +1,4 @@
-"""What the timing of a paced run came to, as plain data. Times are in s."""
+"""The timing of a paced run, as plain data. Times are in s."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ class Overrun(NamedTuple):
 
 
 class Spread(NamedTuple):
-    """How long a part took; worst_at is the simulated time at which its step began."""
+    """Durations of a part; `worst_at` is the simulated time at which the worst step began."""
 
     median: float
     p99: float
@@ -41,7 +41,7 @@ class Histogram(NamedTuple):
 
 @dataclass(frozen=True)
 class Timing:
-    """How a run kept to the clock.
+    """The timing of a run: how well it kept to the clock.
 
     factor is what was asked for, real_time_factor what came of it. overruns and culprits, by
     name, count all of them; listed are the first ones. parts and histograms are by name: step (the
@@ -64,7 +64,7 @@ class Timing:
     histograms: Mapping[str, Histogram]
 
     def as_dict(self) -> dict[str, Any]:
-        """The same as run.json has it."""
+        """Return the timing as run.json has it."""
         return {
             "factor": self.factor,
             "period": self.period,
@@ -89,26 +89,16 @@ class Timing:
 
     @classmethod
     def from_dict(cls, place: str, found: Any) -> Self:
-        """What as_dict() gave; InputError, naming the place, where it is something else."""
+        """Read what as_dict() gave; InputError, naming the `place`, if it is something else."""
         try:
             overruns = found["overruns"]
             timing = cls(
-                factor=float(found["factor"]),
-                period=float(found["period"]),
-                overrun=str(found["overrun"]),
+                **{key: kind(found[key]) for key, kind in PLAIN.items()},
                 granted=tuple(map(str, found["granted"])),
                 refused=tuple(map(str, found["refused"])),
-                steps=int(found["steps"]),
-                real_time_factor=float(found["real_time_factor"]),
                 overruns=int(overruns["count"]),
                 listed=tuple(
-                    Overrun(
-                        int(o["step"]),
-                        float(o["time"]),
-                        float(o["late"]),
-                        str(o["culprit"]),
-                        float(o["took"]),
-                    )
+                    Overrun(*(kind(o[key]) for key, kind in Overrun.__annotations__.items()))
                     for o in overruns["listed"]
                 ),
                 culprits={str(name): int(n) for name, n in overruns["culprits"].items()},
@@ -162,3 +152,6 @@ def _whole(histogram: Histogram) -> bool:
 
 SPREAD_KEYS = ("median", "p99", "p99.9", "worst", "worst_at")
 """The fields of a Spread as run.json names them."""
+
+PLAIN = {"factor": float, "period": float, "overrun": str, "steps": int, "real_time_factor": float}
+"""The fields of a Timing that run.json has as they are."""

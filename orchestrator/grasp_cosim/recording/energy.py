@@ -237,13 +237,13 @@ class _Ledger:
         return total[1:]
 
     def _forces(self, rows: Floats) -> Floats:
-        """What the sources put out, in the units of the held forces."""
+        """Return the outputs of the sources, in the units of the held forces."""
         factor, offset = self._of_force
         forces: Floats = factor * rows[:, self._source] + offset
         return forces
 
     def _positions(self, rows: Floats) -> Floats:
-        """What the sources have seen, in the units of the positions."""
+        """Return the positions that the sources have seen, in the units of the positions."""
         factor, offset = self._of_seen
         positions: Floats = (rows[:, self._seen] - offset) / factor
         return positions

@@ -29,14 +29,14 @@ INITIAL = -1
 """The step number of the exchanges in initialisation mode."""
 
 Act = Callable[[float, int, bool], float]
-"""What becomes of a value at a step number, where the fault acts or does not."""
+"""Changes a value passed at a step number; the flag says if the fault acts."""
 
 Parameters = Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """Where a parameter of a fault may lie, and whether it must be given."""
+    """The range of a parameter of a fault; `needed` if it must be given."""
 
     low: float = -math.inf
     high: float = math.inf

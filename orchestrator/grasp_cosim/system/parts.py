@@ -45,7 +45,7 @@ class Component:
 
     @property
     def interface(self) -> Interface:
-        """What the FMU declares, under the system's names."""
+        """The declared interface of the FMU, under the system's names."""
         return read_interface(self.fmu).renamed(self.rename, f"{self.name}: rename")
 
 
@@ -107,7 +107,7 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """What a connection does to the values it passes, in steps from t >= start_ns to t < end_ns.
+    """A change of the values that a connection passes, in steps from t >= start_ns to t < end_ns.
 
     end_ns is None where there is no end. With a condition it begins where that holds first in this
     window, and stays. The connection is named by its target. What the kinds do and their
@@ -125,7 +125,7 @@ class Fault:
 
 @dataclass(frozen=True, slots=True)
 class Initialisation:
-    """How algebraic loops at t = 0 are solved: refused, or iterated to a relative tolerance."""
+    """Options for algebraic loops at t = 0: refused, or iterated to a relative tolerance."""
 
     loops: Loops = "iterate"
     tolerance: float = 1e-10

@@ -1,4 +1,4 @@
-"""What must hold of events and faults: they act on what exists, in a way that it permits."""
+"""Checks of events and faults: they act on what exists, in a way that it permits."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def _check_event(system: Structure, event: Event, place: str) -> None:
 
 
 def _settable(system: Structure) -> list[Port]:
-    """What an event may set: tunable parameters and inputs without a connection."""
+    """Return the ports an event may set: tunable parameters and inputs without a connection."""
     connected = {connection.target for connection in system.connections}
     return [
         port
