@@ -325,16 +325,10 @@ class Slave(metaclass=Once):
 
     def _check_values(self, vrs: list[int], values: list[Any]) -> None:
         for vr, value in zip(vrs, values, strict=True):
-            v = self._variables[vr]
-            low, high = v.limits or (-inf, inf)
-            if v.kind is str:
-                size = len(value.encode())
-                if not low <= size <= high:
-                    raise RefusalError(
-                        f"{v.name} = {value!r}: must have {low:g} to {high:g} bytes in UTF-8"
-                    )
-            elif not (low <= value <= high and isfinite(value)):
-                raise RefusalError(f"{v.name} = {value!r}{v.in_unit}: must be {v.allowed}")
+            try:
+                self._variables[vr].check(value)
+            except ValueError as error:
+                raise RefusalError(str(error)) from error
 
     # Reports
 

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Annotated
 
+from block_variables import Parameter
+
 Window = tuple[float, float, float, float, float, float, float, float, float, float]
 """The last ten samples in V, the oldest first."""
 
@@ -11,7 +13,7 @@ Window = tuple[float, float, float, float, float, float, float, float, float, fl
 class Params:
     """Nothing but the switch."""
 
-    enabled: Annotated[bool, "", "median of the last ten samples"] = False
+    enabled: Annotated[bool, Parameter("median of the last ten samples")] = False
 
 
 def median(w: Window) -> float:
