@@ -37,10 +37,7 @@ class Params:
     ] = 25.0
     viscosity: Annotated[
         Pair, Parameter("D_pj, viscosity of the virtual force", unit="N.s", low=-1e3, high=1e3)
-    ] = (
-        0.6,
-        -0.6,
-    )
+    ] = (0.6, -0.6)
     intensity_floor: Annotated[
         float,
         Parameter("intensity below which the sensor sees nothing", unit="V", low=1e-12, high=1e3),

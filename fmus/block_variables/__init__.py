@@ -64,7 +64,7 @@ def check(params: Any, group: str = "") -> None:
 
     `group` is the name of the field under which the parameters of a block hold `params`.
     """
-    for name, declared in _parameters(type(params)):
+    for name, declared in _parameters(type(params)):  # type: ignore[arg-type]  # any type can be hashed
         value = getattr(params, name)
         label = f"{group}.{name}" if group else name
         for number in value if isinstance(value, tuple) else (value,):

@@ -22,7 +22,11 @@ from block_variables import Input, Output, Parameter
 
 from .variable import Causality, Enumeration, Scalar, Variable
 
-DECLARATIONS = {"parameter": Parameter, "input": Input, "output": Output}
+DECLARATIONS: dict[Causality, type[Parameter | Input | Output]] = {
+    "parameter": Parameter,
+    "input": Input,
+    "output": Output,
+}
 
 
 class Block(Protocol):

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from math import inf
-from typing import Literal
+from typing import Any, Literal
 
 from block_variables import check_value
 
@@ -60,7 +60,7 @@ class Variable:
         """Its unit after a number, with a space before it; empty where it has none."""
         return f" {self.unit}" if self.unit else ""
 
-    def check(self, value: Scalar) -> None:
+    def check(self, value: Any) -> None:
         """Raise ValueError where it may not have this value; the limits of a text are its bytes."""
         low, high = self.limits or (-inf, inf)
         if not isinstance(value, str):

@@ -84,13 +84,16 @@ class Params:
         return Side(half + x_m, m_1, rub_1), Side(half - x_m, m_2, rub_2)
 
 
+Force: TypeAlias = Annotated[
+    Pair, Input("u_j, actuator force on the finger", unit="N", nominal=1.0)
+]
+"""The input of every plant."""
+
+
 class Inputs(NamedTuple):
     """Held over the step."""
 
-    force: Annotated[Pair, Input("u_j, actuator force on the finger", unit="N", nominal=1.0)] = (
-        0.0,
-        0.0,
-    )
+    force: Force = (0.0, 0.0)
 
 
 Position: TypeAlias = Annotated[

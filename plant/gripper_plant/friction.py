@@ -43,10 +43,7 @@ class Params:
     ] = (0.0, 0.0)
     viscous: Annotated[
         Pair, Parameter("B_j, viscous friction of the finger", unit="N.s/m", low=0.0, high=1e3)
-    ] = (
-        0.0,
-        0.0,
-    )
+    ] = (0.0, 0.0)
     stribeck_velocity: Annotated[
         float,
         Parameter(

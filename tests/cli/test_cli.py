@@ -163,8 +163,10 @@ def test_nothing_to_draw_is_found_at_once(command: Run, fmus: Path, tmp_path: Pa
 
 
 def test_a_vendor_plant_with_one_more_input(command: Run, altered: Altered) -> None:
-    force = 'actuator force on the finger", 1.0] = (0.0, 0.0)\n'
-    ambient = '    ambient: Annotated[float, "K", "temperature", 300.0] = 300.0\n'
+    force = "    force: Force = (0.0, 0.0)\n"
+    ambient = (
+        '    ambient: Annotated[float, Input("temperature", unit="K", nominal=300.0)] = 300.0\n'
+    )
     fmu = altered("GripperPlant", "gripper_plant/fingers.py", force, force + ambient)
     code, _, err = command("run", "--stop", "0.01", "--swap", f"plant={fmu}")
     assert code == 2

@@ -20,14 +20,18 @@ from dataclasses import dataclass
 from math import exp
 from typing import Annotated, NamedTuple
 
+from block_variables import Input, Output, Parameter
+
 
 @dataclass(frozen=True)
 class Params:
-    time_constant: Annotated[float, "s", "T, time constant", (1e-3, 1e3)] = 0.5
+    time_constant: Annotated[
+        float, Parameter("T, time constant", unit="s", low=1e-3, high=1e3)
+    ] = 0.5
 
 
 class Inputs(NamedTuple):
-    u: Annotated[float, "N", "what it follows", 1.0] = 1.0
+    u: Annotated[float, Input("what it follows", unit="N", nominal=1.0)] = 1.0
 
 
 class State(NamedTuple):
@@ -35,7 +39,7 @@ class State(NamedTuple):
 
 
 class Outputs(NamedTuple):
-    y: Annotated[float, "N", "what follows", 1.0, set()]
+    y: Annotated[float, Output("what follows", unit="N", nominal=1.0, depends_on=set())]
 
 
 def initial_state(p, u):
