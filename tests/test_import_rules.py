@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from grasp_fmus.packing import packages, with_imports
-from grasp_fmus.shipped import SCRIPTS
+from grasp_fmus.shipped import SCRIPTS, blocks
 from support.imports import (
     Import,
     calls,
@@ -135,12 +135,7 @@ def test_the_fmu_adapter_knows_no_physics_but_for_the_scripts() -> None:
         if n in OURS - {"grasp_fmus", "block_variables"}
     }
     assert found == {
-        ("GripperPlant.py", "gripper_plant"),
-        ("GripperPlantCompliant.py", "gripper_plant"),
-        ("GripperPlantMovable.py", "gripper_plant"),
-        ("GripperPlantMuJoCo.py", "gripper_plant"),
-        ("ProximitySensor.py", "proximity_sensor"),
-        ("GraspController.py", "grasp_controller"),
+        (f"{name}.py", block.__name__.partition(".")[0]) for name, block in blocks().items()
     }
 
 

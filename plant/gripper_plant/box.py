@@ -34,7 +34,11 @@ A box that does more than that within one rattles, and what is left of the sub-s
 
 @dataclass(frozen=True)
 class Params(fingers.Params):
-    """Parameters of every plant with a box; a value outside its range raises ValueError."""
+    """Parameters of every plant with a box; a value outside its range raises ValueError.
+
+    A light box: mu·m·g = 0.15 N shift it, and it slides before it tilts, as mu < W/H and the
+    fingers push at half its height.
+    """
 
     object_mass: Annotated[
         float, Parameter("m, mass of the object", unit="kg", low=1e-3, high=1e3)

@@ -21,7 +21,10 @@ ITERATIONS = 8
 
 @dataclass(frozen=True)
 class Params(fingers.Params):
-    """Parameters; a value outside its declared range raises ValueError."""
+    """Parameters; a value outside its declared range raises ValueError.
+
+    A paper cup: the grasp of 3.1 N takes 6 mm of it, and 10 mm are too much.
+    """
 
     kelvin_voigt: KelvinVoigt = KelvinVoigt()
     hunt_crossley: HuntCrossley = HuntCrossley()

@@ -31,7 +31,11 @@ SETTLED = 1e-11
 
 @dataclass(frozen=True, slots=True)
 class KelvinVoigt:
-    """Parameters; a value outside its declared range raises ValueError."""
+    """Parameters; a value outside its declared range raises ValueError.
+
+    By default a side of a paper cup: 1 N/mm, damped by a fifth of critical under a finger of 0.5
+    kg.
+    """
 
     stiffness: Annotated[
         float, Parameter("k, stiffness of the surface", unit="N/m", low=1e-3, high=1e7)
@@ -46,7 +50,11 @@ class KelvinVoigt:
 
 @dataclass(frozen=True, slots=True)
 class HuntCrossley:
-    """Parameters; a value outside its declared range raises ValueError."""
+    """Parameters; a value outside its declared range raises ValueError.
+
+    n = 1.5 is Hertz's, a sphere on a plane. By default 3.1 N are 2.9 mm deep, as soft as the paper
+    cup.
+    """
 
     enabled: Annotated[bool, Parameter("Hunt-Crossley contact; off, Kelvin-Voigt")] = False
     stiffness: Annotated[

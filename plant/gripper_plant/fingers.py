@@ -44,7 +44,12 @@ class Side(NamedTuple):
 
 @dataclass(frozen=True)  # no slots: what is worked out from the parameters is kept
 class Params:
-    """Parameters of every plant; a value outside its declared range raises ValueError."""
+    """Parameters of every plant; a value outside its declared range raises ValueError.
+
+    The paper's gripper and object: fingers 110 mm to either side, an object of 70 mm 30 mm off the
+    middle, so that one finger arrives first unless layer 3 sees to it. It names no friction, no
+    limit.
+    """
 
     finger_mass: Annotated[
         Pair, Parameter("m_j, mass of the finger", unit="kg", low=1e-3, high=1e3)

@@ -40,7 +40,10 @@ Coordinates = tuple[float, float, float, float, float]
 
 @dataclass(frozen=True)
 class Params(standing.Params):
-    """Parameters; a value outside its declared range raises ValueError."""
+    """Parameters; a value outside its declared range raises ValueError.
+
+    T = 5 ms is alpha = beta = 200 1/s of rigid.py, and fifty timesteps long.
+    """
 
     object_fixed: Annotated[
         bool, Parameter("the object is fixed; off, it stands free on a floor")

@@ -1,6 +1,6 @@
 """Ambient light: the raw voltage has an offset, which may drift after its calibration.
 
-    c(t) = c + drift·t,   c = 0.35 V as in the paper's fit
+    c(t) = c + drift·t,   c = 0.35 V as in the paper's fit, Sec. IV.A
 
 The compensation at the end of the chain takes off the calibrated value c, not the drift. The run
 begins with the calibration.

@@ -66,8 +66,9 @@ class Params(optics.Params):
                 f"{highest:g}"
             )
         if self.surface in surfaces.REFLECTANCE and self.reflectance != GIVEN_WITH_CUSTOM_ONLY:
+            named = surfaces.Surface(self.surface).name.lower()
             raise ValueError(
-                f"reflectance = {self.reflectance!r} with surface = {self.surface.name.lower()}: "
+                f"reflectance = {self.reflectance!r} with surface = {named}: "
                 f"must be {GIVEN_WITH_CUSTOM_ONLY:g}, its default; surface = custom takes others"
             )
 

@@ -12,7 +12,10 @@ from block_variables import Parameter, check
 
 @dataclass(frozen=True, slots=True)
 class Params:
-    """Parameters; a value outside its declared range raises ValueError."""
+    """Parameters; a value outside its declared range raises ValueError.
+
+    16 bits over 20 V are usual for controllers like the paper's.
+    """
 
     enabled: Annotated[bool, Parameter("conversion to digital values")] = False
     bits: Annotated[int, Parameter("resolution", low=1, high=32)] = 16

@@ -11,7 +11,7 @@ Window = tuple[float, float, float, float, float, float, float, float, float, fl
 
 @dataclass(frozen=True, slots=True)
 class Params:
-    """Nothing but the switch."""
+    """Nothing but the switch: the ten samples are those of the paper's bench, Sec. IV.B."""
 
     enabled: Annotated[bool, Parameter("median of the last ten samples")] = False
 

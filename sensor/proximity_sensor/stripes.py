@@ -14,7 +14,10 @@ from block_variables import Parameter, check
 
 @dataclass(frozen=True, slots=True)
 class Params:
-    """Parameters; a value outside its declared range raises ValueError."""
+    """Parameters; a value outside its declared range raises ValueError.
+
+    The ratio is that of the paper's black paper to the white one; the lengths have no source.
+    """
 
     enabled: Annotated[bool, Parameter("the surface is striped along the approach")] = False
     ratio: Annotated[

@@ -20,7 +20,7 @@ OPTICS, CARD = "proximity_sensor/optics.py", "README.md"
 CLOCK = "proximity_sensor/clock.py"
 """Of the parameters the last."""
 
-GAIN = "high=1e6)\n    ] = 0.0024"
+GAIN = "low=0.0, high=1e6)\n    ] = 0.0024"
 EXPONENT = '"n, diffusion exponent", unit="1", low=0.1, high=10.0)'
 OUTPUT = (
     "    intensity: Annotated[\n        float, "
@@ -106,17 +106,17 @@ def test_a_change_is_reported_once(build: Build) -> None:
             id="file",
         ),
         pytest.param(
-            [(OPTICS, GAIN, "(0.0, 1e6)] = 0.0025")],
+            [(OPTICS, GAIN, GAIN.replace("0.0024", "0.0025"))],
             ["gain: nominal 0.0024 -> 0.0025", "gain: start 0.0024 -> 0.0025", DESCRIPTION, SOURCE],
             id="start",
         ),
         pytest.param(
-            [(OPTICS, GAIN, "(1e-9, 5.0)] = 0.0024")],
+            [(OPTICS, GAIN, GAIN.replace("low=0.0, high=1e6", "low=1e-9, high=5.0"))],
             ["gain: max 1000000.0 -> 5.0", "gain: min 0.0 -> 1e-09", DESCRIPTION, SOURCE],
             id="range",
         ),
         pytest.param(
-            [(OPTICS, GAIN, '(0.0, 1e6), "tunable"] = 0.0024')],
+            [(OPTICS, GAIN, GAIN.replace("1e6", "1e6, tunable=True"))],
             ["gain: variability fixed -> tunable", DESCRIPTION, SOURCE],
             id="variability",
         ),

@@ -154,7 +154,7 @@ def test_an_importer_with_a_step_of_its_own_passes(folder: Path, name: str) -> N
     ("name", "source", "before", "after"),
     [
         ("ProximitySensor", "proximity_sensor/optics.py", "p.gain *", "1.0001 * p.gain *"),
-        ("GripperPlant", "gripper_plant/fingers.py", "return half +", "return 1e-6 + half +"),
+        ("GripperPlant", "gripper_plant/fingers.py", "Side(half +", "Side(1e-6 + half +"),
         ("GraspController", "grasp_controller/series.py", "u.position), 0.0", "u.position), 1e-4"),
     ],
 )
