@@ -33,8 +33,7 @@ SETTLED = 1e-11
 class KelvinVoigt:
     """Parameters; a value outside its declared range raises ValueError.
 
-    By default a side of a paper cup: 1 N/mm, damped by a fifth of critical under a finger of 0.5
-    kg.
+    By default a side of a paper cup: 1 N/mm, damped by a fifth of critical under 0.5 kg.
     """
 
     stiffness: Annotated[
@@ -52,8 +51,7 @@ class KelvinVoigt:
 class HuntCrossley:
     """Parameters; a value outside its declared range raises ValueError.
 
-    n = 1.5 is Hertz's, a sphere on a plane. By default 3.1 N are 2.9 mm deep, as soft as the paper
-    cup.
+    n = 1.5 is Hertz's, a sphere on a plane. By default 3.1 N are 2.9 mm deep, as in the paper cup.
     """
 
     enabled: Annotated[bool, Parameter("Hunt-Crossley contact; off, Kelvin-Voigt")] = False
