@@ -39,8 +39,7 @@ bench: .venv/dev
 	$(BIN)/python -m benchmarks.masters
 
 cards: .venv/run
-	$(BIN)/python -m grasp_fmus.cards plant/README.md=gripper_plant.rigid,gripper_plant.compliant,gripper_plant.movable,gripper_plant.mujoco_box \
-		sensor/README.md=proximity_sensor.channel controller/README.md=grasp_controller.series
+	$(BIN)/python -m grasp_fmus.cards
 
 .venv/run: pyproject.toml constraints.txt
 	$(if $(PYTHON),,$(error grasp-cosim needs Python 3.11 or newer; name one with PYTHON=...))

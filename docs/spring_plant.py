@@ -16,29 +16,49 @@ from dataclasses import dataclass
 from math import ceil
 from typing import Annotated, NamedTuple
 
+from block_variables import Input, Output, Parameter, check
+
 Pair = tuple[float, float]
 """A value per finger: right, left."""
 
 
 @dataclass(frozen=True, slots=True)
 class Params:
-    """name: Annotated[type, unit, description, (lowest, highest)] = start."""
+    """Each with its meaning, unit and range; check() refuses what is out of it."""
 
-    finger_mass: Annotated[Pair, "kg", "m_j, mass of the finger", (1e-3, 1e3)] = (0.5, 0.5)
+    finger_mass: Annotated[
+        Pair, Parameter("m_j, mass of the finger", unit="kg", low=1e-3, high=1e3)
+    ] = (0.5, 0.5)
     initial_position: Annotated[
-        Pair, "m", "x_init,j, position of the fingertip at the start", (-10.0, 10.0)
+        Pair,
+        Parameter(
+            "x_init,j, position of the fingertip at the start", unit="m", low=-10.0, high=10.0
+        ),
     ] = (0.11, -0.11)
-    object_width: Annotated[float, "m", "W, width of the object", (0.0, 10.0)] = 0.07
+    object_width: Annotated[
+        float, Parameter("W, width of the object", unit="m", low=0.0, high=10.0)
+    ] = 0.07
     initial_object_position: Annotated[
-        float, "m", "x_0, centre of the object at the start", (-10.0, 10.0)
+        float, Parameter("x_0, centre of the object at the start", unit="m", low=-10.0, high=10.0)
     ] = 0.03
-    object_mass: Annotated[float, "kg", "m, mass of the object", (1e-3, 1e3)] = 0.1
-    spring_stiffness: Annotated[float, "N/m", "k, stiffness of the spring", (0.0, 1e6)] = 100.0
-    spring_damping: Annotated[float, "N.s/m", "d, damping of the spring", (0.0, 1e3)] = 2.0
-    face_stiffness: Annotated[float, "N/m", "k_c, stiffness of a face", (1.0, 1e6)] = 10000.0
-    face_damping: Annotated[float, "N.s/m", "d_c, damping of a face", (0.0, 1e4)] = 20.0
+    object_mass: Annotated[
+        float, Parameter("m, mass of the object", unit="kg", low=1e-3, high=1e3)
+    ] = 0.1
+    spring_stiffness: Annotated[
+        float, Parameter("k, stiffness of the spring", unit="N/m", low=0.0, high=1e6)
+    ] = 100.0
+    spring_damping: Annotated[
+        float, Parameter("d, damping of the spring", unit="N.s/m", low=0.0, high=1e3)
+    ] = 2.0
+    face_stiffness: Annotated[
+        float, Parameter("k_c, stiffness of a face", unit="N/m", low=1.0, high=1e6)
+    ] = 10000.0
+    face_damping: Annotated[
+        float, Parameter("d_c, damping of a face", unit="N.s/m", low=0.0, high=1e4)
+    ] = 20.0
 
     def __post_init__(self) -> None:
+        check(self)
         right, left = self.initial_position
         x, b = self.initial_object_position, 0.5 * self.object_width
         if not left <= x - b <= x + b <= right:
@@ -46,9 +66,12 @@ class Params:
 
 
 class Inputs(NamedTuple):
-    """name: Annotated[type, unit, description, nominal value] = start."""
+    """Each with its start value; nominal is the size that it usually has."""
 
-    force: Annotated[Pair, "N", "u_j, actuator force on the finger", 1.0] = (0.0, 0.0)
+    force: Annotated[Pair, Input("u_j, actuator force on the finger", unit="N", nominal=1.0)] = (
+        0.0,
+        0.0,
+    )
 
 
 class State(NamedTuple):
@@ -62,15 +85,34 @@ class State(NamedTuple):
 
 
 class Outputs(NamedTuple):
-    """name: Annotated[type, unit, description, nominal value, inputs that reach it at once]."""
+    """Each with the inputs it depends on without a step: none here, all goes through the state."""
 
-    position: Annotated[Pair, "m", "x_j, position of the fingertip", 0.1, set()]
-    velocity: Annotated[Pair, "m/s", "x_j', velocity of the fingertip", 0.1, set()]
-    gap: Annotated[Pair, "m", "l_j, distance from the sensor face to the surface", 0.1, set()]
-    contact_force: Annotated[Pair, "N", "f_cj, force of the object on the finger", 1.0, set()]
-    contact: Annotated[tuple[bool, bool], "", "the finger touches the object", set()]
-    object_position: Annotated[float, "m", "x, centre of the object", 0.1, set()]
-    spring_force: Annotated[float, "N", "-k·(x - x_0) - d·x', on the object", 1.0, set()]
+    position: Annotated[
+        Pair, Output("x_j, position of the fingertip", unit="m", nominal=0.1, depends_on=set())
+    ]
+    velocity: Annotated[
+        Pair, Output("x_j', velocity of the fingertip", unit="m/s", nominal=0.1, depends_on=set())
+    ]
+    gap: Annotated[
+        Pair,
+        Output(
+            "l_j, distance from the sensor face to the surface",
+            unit="m",
+            nominal=0.1,
+            depends_on=set(),
+        ),
+    ]
+    contact_force: Annotated[
+        Pair,
+        Output("f_cj, force of the object on the finger", unit="N", nominal=1.0, depends_on=set()),
+    ]
+    contact: Annotated[tuple[bool, bool], Output("the finger touches the object", depends_on=set())]
+    object_position: Annotated[
+        float, Output("x, centre of the object", unit="m", nominal=0.1, depends_on=set())
+    ]
+    spring_force: Annotated[
+        float, Output("-k·(x - x_0) - d·x', on the object", unit="N", nominal=1.0, depends_on=set())
+    ]
 
 
 def initial_state(p: Params, u: Inputs) -> State:

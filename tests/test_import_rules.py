@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from grasp_fmus.packing import packages, with_imports
-from grasp_fmus.shipped import SCRIPTS
+from grasp_fmus.shipped import SCRIPTS, blocks
 from support.imports import (
     Import,
     calls,
@@ -26,7 +26,7 @@ BLOCKS = {
     "sensor": "proximity_sensor",
     "controller": "grasp_controller",
 }
-OURS = {*BLOCKS.values(), "grasp_fmus", "grasp_cosim"}
+OURS = {*BLOCKS.values(), "block_variables", "grasp_fmus", "grasp_cosim"}
 
 
 LINK = "grasp_fmus.link"
@@ -73,11 +73,13 @@ def imported_at_once(source: str) -> set[str]:
 
 
 @pytest.mark.parametrize(("folder", "package"), BLOCKS.items())
-def test_a_block_imports_the_standard_library_only(folder: str, package: str) -> None:
+def test_a_block_imports_the_standard_library_and_its_declarations_only(
+    folder: str, package: str
+) -> None:
     foreign = {
         (file, name)
         for file, name in imports(ROOT / folder / package)
-        if name not in sys.stdlib_module_names
+        if name not in {*sys.stdlib_module_names, "block_variables"}
     }
     assert foreign == ({("mujoco_box.py", "mujoco")} if package == "gripper_plant" else set())
 
@@ -127,14 +129,13 @@ def test_the_protocol_of_the_link_is_known_to_both_its_ends_alone_and_knows_nobo
 
 
 def test_the_fmu_adapter_knows_no_physics_but_for_the_scripts() -> None:
-    found = {(f, n) for f, n in imports(ROOT / "fmus/grasp_fmus") if n in OURS - {"grasp_fmus"}}
+    found = {
+        (f, n)
+        for f, n in imports(ROOT / "fmus/grasp_fmus")
+        if n in OURS - {"grasp_fmus", "block_variables"}
+    }
     assert found == {
-        ("GripperPlant.py", "gripper_plant"),
-        ("GripperPlantCompliant.py", "gripper_plant"),
-        ("GripperPlantMovable.py", "gripper_plant"),
-        ("GripperPlantMuJoCo.py", "gripper_plant"),
-        ("ProximitySensor.py", "proximity_sensor"),
-        ("GraspController.py", "grasp_controller"),
+        (f"{name}.py", block.__name__.partition(".")[0]) for name, block in blocks().items()
     }
 
 
@@ -151,6 +152,12 @@ def test_what_is_packed_into_fmus_imports_the_standard_library_only() -> None:
         if name.partition(".")[0] not in sys.stdlib_module_names | ours
     }
     assert foreign == {("gripper_plant/mujoco_box.py", "mujoco")}
+
+
+def test_the_declaration_of_variables_imports_the_standard_library_only() -> None:
+    found = {name for _, name in imports(ROOT / "fmus/block_variables")}
+    assert found
+    assert found <= sys.stdlib_module_names
 
 
 # ------------------------------------------------------------------ rooms of the orchestrator

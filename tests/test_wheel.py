@@ -39,5 +39,6 @@ def test_wheel_runs_in_an_empty_folder(tmp_path: Path) -> None:
     python("-m", "grasp_cosim", "report", "results", cwd=empty, path=site)
     assert (empty / "results/report.html").read_text("utf-8").endswith("</html>\n")
     assert {p.name for p in site.iterdir() if p.is_dir() and "-" not in p.name} == {
-        "bin", "grasp_cosim", "grasp_controller", "grasp_fmus", "gripper_plant", "proximity_sensor",
+        "bin", "block_variables", "grasp_cosim", "grasp_controller", "grasp_fmus", "gripper_plant",
+        "proximity_sensor",
     }  # fmt: skip

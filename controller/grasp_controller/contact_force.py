@@ -8,19 +8,28 @@ At rest on an object of width W the fingers press with K_i·W/2.
 from dataclasses import dataclass
 from typing import Annotated
 
+from block_variables import Parameter, check
+
 from .impedance import Motion
-from .ranges import check
 
 
 @dataclass(frozen=True, slots=True)
 class Params:
-    """Parameters; a value outside its declared range raises ValueError."""
+    """Parameters; a value outside its declared range raises ValueError.
 
-    damping: Annotated[float, "N.s/m", "D_i, damping of the impedance", (0.0, 1e5)] = 14.0
-    stiffness: Annotated[float, "N/m", "K_i, stiffness of the impedance", (0.0, 1e6)] = 98.0
+    The paper's gains. D_i = 2·sqrt(K_i·m_j) is critical damping of a finger of 0.5 kg; K_i·W/2 is
+    the grasp, 3.43 N on an object of 70 mm.
+    """
+
+    damping: Annotated[
+        float, Parameter("D_i, damping of the impedance", unit="N.s/m", low=0.0, high=1e5)
+    ] = 14.0
+    stiffness: Annotated[
+        float, Parameter("K_i, stiffness of the impedance", unit="N/m", low=0.0, high=1e6)
+    ] = 98.0
 
     def __post_init__(self) -> None:
-        check(self)
+        check(self, "contact_force")
 
 
 def force(p: Params, x: float, x_dot: float, x_v1: Motion) -> float:

@@ -9,9 +9,10 @@ Each finger has a virtual object of its own; both follow the target of layer 3.
 from dataclasses import dataclass
 from typing import Annotated
 
+from block_variables import Parameter, check
+
 from . import impedance
 from .impedance import Motion
-from .ranges import check
 
 Pair = tuple[float, float]
 """A value per finger: right, left."""
@@ -22,22 +23,34 @@ Motions = tuple[Motion, Motion]
 
 @dataclass(frozen=True, slots=True)
 class Params:
-    """Parameters; a value outside its declared range raises ValueError."""
+    """Parameters; a value outside its declared range raises ValueError.
 
-    enabled: Annotated[bool, "", "layer 2 on; off, the fingers head for the target directly"] = True
-    mass: Annotated[float, "kg", "M_a1, virtual mass", (1e-3, 1e3)] = 1.0
-    damping: Annotated[float, "N.s/m", "D_a1, virtual damping", (0.0, 1e5)] = 10.0
-    stiffness: Annotated[float, "N/m", "K_a1, virtual stiffness", (1e-3, 1e6)] = 25.0
-    viscosity: Annotated[Pair, "N.s", "D_pj, viscosity of the virtual force", (-1e3, 1e3)] = (
-        0.6,
-        -0.6,
-    )
+    The paper's gains. D_a1 = 2·sqrt(K_a1·M_a1) is critical damping, at 5 rad/s. By Eq. (9) f_p is
+    that of a damper D_pj·n/(l + l_0), 138 N.s/m at the surface, where K_a1·W/2 = 0.9 N pulls: so a
+    finger arrives with 6 mm/s. The floor is far below all in reach: a white surface gives 1 uV from
+    0.9 km.
+    """
+
+    enabled: Annotated[
+        bool, Parameter("layer 2 on; off, the fingers head for the target directly")
+    ] = True
+    mass: Annotated[float, Parameter("M_a1, virtual mass", unit="kg", low=1e-3, high=1e3)] = 1.0
+    damping: Annotated[
+        float, Parameter("D_a1, virtual damping", unit="N.s/m", low=0.0, high=1e5)
+    ] = 10.0
+    stiffness: Annotated[
+        float, Parameter("K_a1, virtual stiffness", unit="N/m", low=1e-3, high=1e6)
+    ] = 25.0
+    viscosity: Annotated[
+        Pair, Parameter("D_pj, viscosity of the virtual force", unit="N.s", low=-1e3, high=1e3)
+    ] = (0.6, -0.6)
     intensity_floor: Annotated[
-        float, "V", "intensity below which the sensor sees nothing", (1e-12, 1e3)
+        float,
+        Parameter("intensity below which the sensor sees nothing", unit="V", low=1e-12, high=1e3),
     ] = 1e-6
 
     def __post_init__(self) -> None:
-        check(self)
+        check(self, "impact_reduction")
 
 
 def virtual_forces(p: Params, xi: Pair, xi_before: Pair, h: float) -> Pair:

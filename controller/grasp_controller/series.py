@@ -9,6 +9,8 @@ Card: controller/README.md
 from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 
+from block_variables import Input, Output
+
 from . import contact_force as layer_1
 from . import impact_reduction as layer_2
 from . import simultaneous_contact as layer_3
@@ -30,10 +32,17 @@ class Params:
 class Inputs(NamedTuple):
     """Samples of the gripper and of its sensors."""
 
-    position: Annotated[Pair, "m", "x_j, position of the fingertip", 0.1] = (0.11, -0.11)
-    velocity: Annotated[Pair, "m/s", "x_j', velocity of the fingertip", 0.1] = (0.0, 0.0)
+    position: Annotated[Pair, Input("x_j, position of the fingertip", unit="m", nominal=0.1)] = (
+        0.11,
+        -0.11,
+    )
+    velocity: Annotated[Pair, Input("x_j', velocity of the fingertip", unit="m/s", nominal=0.1)] = (
+        0.0,
+        0.0,
+    )
     intensity: Annotated[
-        Pair, "V", "xi_j, offset-compensated output of the proximity sensor", 0.1
+        Pair,
+        Input("xi_j, offset-compensated output of the proximity sensor", unit="V", nominal=0.1),
     ] = (0.03, 0.03)
 
 
@@ -54,16 +63,37 @@ class Outputs(NamedTuple):
     """
 
     force: Annotated[
-        Pair, "N", "u_j, actuator force on the finger", 1.0, {"position", "velocity[j]"}
+        Pair,
+        Output(
+            "u_j, actuator force on the finger",
+            unit="N",
+            nominal=1.0,
+            depends_on={"position", "velocity[j]"},
+        ),
     ]
-    target_position: Annotated[float, "m", "x_v,2, target of both fingers", 0.1, {"position"}]
+    target_position: Annotated[
+        float,
+        Output("x_v,2, target of both fingers", unit="m", nominal=0.1, depends_on={"position"}),
+    ]
     virtual_position: Annotated[
-        Pair, "m", "x_vj,1, virtual object of the finger", 0.1, {"position"}
+        Pair,
+        Output(
+            "x_vj,1, virtual object of the finger", unit="m", nominal=0.1, depends_on={"position"}
+        ),
     ]
     simultaneous_contact_force: Annotated[
-        float, "N", "f_s, virtual force of layer 3", 1.0, set(), {"intensity"}
+        float,
+        Output(
+            "f_s, virtual force of layer 3",
+            unit="N",
+            nominal=1.0,
+            depends_on=set(),
+            depends_initially_on={"intensity"},
+        ),
     ]
-    impact_reduction_force: Annotated[Pair, "N", "f_pj, virtual force of layer 2", 1.0, set()]
+    impact_reduction_force: Annotated[
+        Pair, Output("f_pj, virtual force of layer 2", unit="N", nominal=1.0, depends_on=set())
+    ]
 
 
 def initial_state(p: Params, u: Inputs) -> State:

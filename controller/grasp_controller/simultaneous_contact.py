@@ -11,23 +11,36 @@ from dataclasses import dataclass
 from math import tanh
 from typing import Annotated
 
+from block_variables import Parameter, check
+
 from . import impedance
 from .impedance import Motion
-from .ranges import check
 
 
 @dataclass(frozen=True, slots=True)
 class Params:
-    """Parameters; a value outside its declared range raises ValueError."""
+    """Parameters; a value outside its declared range raises ValueError.
 
-    enabled: Annotated[bool, "", "layer 3 on; off, the target is the middle of the fingers"] = True
-    mass: Annotated[float, "kg", "M_a2, virtual mass", (1e-3, 1e3)] = 1.0
-    damping: Annotated[float, "N.s/m", "D_a2, virtual damping", (0.0, 1e5)] = 12.0
-    stiffness: Annotated[float, "N/m", "K_a2, virtual stiffness", (1e-3, 1e6)] = 36.0
-    gain: Annotated[float, "N", "K_s, gain of the virtual force", (-1e3, 1e3)] = 3.0
+    The paper's gains. D_a2 = 2·sqrt(K_a2·M_a2) is critical damping, at 6 rad/s. K_s·tanh(1)/K_a2 =
+    63 mm is the furthest that the target can stay from the middle of the fingers.
+    """
+
+    enabled: Annotated[
+        bool, Parameter("layer 3 on; off, the target is the middle of the fingers")
+    ] = True
+    mass: Annotated[float, Parameter("M_a2, virtual mass", unit="kg", low=1e-3, high=1e3)] = 1.0
+    damping: Annotated[
+        float, Parameter("D_a2, virtual damping", unit="N.s/m", low=0.0, high=1e5)
+    ] = 12.0
+    stiffness: Annotated[
+        float, Parameter("K_a2, virtual stiffness", unit="N/m", low=1e-3, high=1e6)
+    ] = 36.0
+    gain: Annotated[
+        float, Parameter("K_s, gain of the virtual force", unit="N", low=-1e3, high=1e3)
+    ] = 3.0
 
     def __post_init__(self) -> None:
-        check(self)
+        check(self, "simultaneous_contact")
 
 
 def virtual_force(p: Params, xi: tuple[float, float]) -> float:

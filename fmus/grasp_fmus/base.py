@@ -88,6 +88,53 @@ def reported(call: Callable[Concatenate[_S, _P], _R]) -> Callable[Concatenate[_S
     return reporting
 
 
+def _getter(kind: type[Scalar]) -> Callable[[Any, list[int]], list[Any]]:
+    """The method of Slave that reads variables of a kind."""
+
+    def get(self: "Slave", vrs: list[int]) -> list[Any]:
+        """Values of the given references."""
+        try:
+            access = self._last_read[kind]
+            if vrs != access.vrs:
+                access = self._reads[kind].get(tuple(vrs)) or self._readable(vrs, kind)
+                self._last_read[kind] = access
+            if self._inputs is None and access.outputs:
+                self._refresh()
+        except BaseException as error:
+            raise self._reported(error) from None
+        where = access.where
+        return self._values[where] if where else [self._values[vr] for vr in vrs]
+
+    return get
+
+
+def _setter(kind: type[Scalar]) -> Callable[[Any, list[int], list[Any]], None]:
+    """The method of Slave that writes variables of a kind."""
+    real = kind is float
+
+    def set_(self: "Slave", vrs: list[int], values: list[Any]) -> None:
+        """Set inputs or parameters, all or none; outputs follow when they are next asked for."""
+        try:
+            access = self._last_write[kind]
+            if vrs != access.vrs:
+                access = self._writes[kind].get(tuple(vrs)) or self._writable(vrs, kind)
+                self._last_write[kind] = access
+            if access.limited or (real and not isfinite(sum(values))):
+                self._check_values(vrs, values)
+        except BaseException as error:
+            raise self._reported(error) from None
+        if access.where:
+            self._values[access.where] = values
+        else:
+            for vr, value in zip(vrs, values, strict=True):
+                self._values[vr] = value
+        if access.parameters:
+            self._params = None
+        self._inputs = None
+
+    return set_
+
+
 class Slave(metaclass=Once):
     """An FMI 2.0 co-simulation slave, as pythonfmu calls it.
 
@@ -128,7 +175,7 @@ class Slave(metaclass=Once):
         self._reads: dict[type[Scalar], Accesses] = {kind: {} for kind in TYPES}
         self._writes: dict[type[Scalar], Accesses] = {kind: {} for kind in TYPES}
         # The last of each: the host nearly always asks for the same again
-        self._real_read = self._boolean_read = self._real_write = _NONE
+        self._last_read, self._last_write = dict.fromkeys(TYPES, _NONE), dict.fromkeys(TYPES, _NONE)
 
     # The life cycle
 
@@ -162,94 +209,10 @@ class Slave(metaclass=Once):
 
     # Values
 
-    def get_real(self, vrs: list[int]) -> list[Any]:
-        """Values of the given references."""
-        try:
-            access = self._real_read
-            if vrs != access.vrs:
-                access = self._reads[float].get(tuple(vrs)) or self._readable(vrs, float)
-                self._real_read = access
-            if self._inputs is None and access.outputs:
-                self._refresh()
-        except BaseException as error:
-            raise self._reported(error) from None
-        where = access.where
-        return self._values[where] if where else [self._values[vr] for vr in vrs]
-
-    def get_boolean(self, vrs: list[int]) -> list[Any]:
-        """Values of the given references."""
-        try:
-            access = self._boolean_read
-            if vrs != access.vrs:
-                access = self._reads[bool].get(tuple(vrs)) or self._readable(vrs, bool)
-                self._boolean_read = access
-            if self._inputs is None and access.outputs:
-                self._refresh()
-        except BaseException as error:
-            raise self._reported(error) from None
-        where = access.where
-        return self._values[where] if where else [self._values[vr] for vr in vrs]
-
-    def get_integer(self, vrs: list[int]) -> list[Any]:
-        """Values of the given references."""
-        return self._get(int, vrs)
-
-    def get_string(self, vrs: list[int]) -> list[Any]:
-        """Values of the given references."""
-        return self._get(str, vrs)
-
-    def set_real(self, vrs: list[int], values: list[Any]) -> None:
-        """Set inputs or parameters, all or none; outputs follow when they are next asked for."""
-        try:
-            access = self._real_write
-            if vrs != access.vrs:
-                access = self._writes[float].get(tuple(vrs)) or self._writable(vrs, float)
-                self._real_write = access
-            if access.limited or not isfinite(sum(values)):
-                self._check_values(vrs, values)
-        except BaseException as error:
-            raise self._reported(error) from None
-        if access.parameters or not access.where:
-            self._store(vrs, values, access)
-        else:
-            self._values[access.where] = values
-            self._inputs = None
-
-    def set_boolean(self, vrs: list[int], values: list[Any]) -> None:
-        """Set inputs or parameters, all or none; outputs follow when they are next asked for."""
-        self._set(bool, vrs, values)
-
-    def set_integer(self, vrs: list[int], values: list[Any]) -> None:
-        """Set inputs or parameters, all or none; outputs follow when they are next asked for."""
-        self._set(int, vrs, values)
-
-    def set_string(self, vrs: list[int], values: list[Any]) -> None:
-        """Set inputs or parameters, all or none; outputs follow when they are next asked for."""
-        self._set(str, vrs, values)
-
-    @reported
-    def _get(self, kind: type[Scalar], vrs: list[int]) -> list[Any]:
-        access = self._reads[kind].get(tuple(vrs)) or self._readable(vrs, kind)
-        if self._inputs is None and access.outputs:
-            self._refresh()
-        return [self._values[vr] for vr in vrs]
-
-    @reported
-    def _set(self, kind: type[Scalar], vrs: list[int], values: list[Any]) -> None:
-        access = self._writes[kind].get(tuple(vrs)) or self._writable(vrs, kind)
-        if access.limited:
-            self._check_values(vrs, values)
-        self._store(vrs, values, access)
-
-    def _store(self, vrs: list[int], values: list[Any], access: Access) -> None:
-        if access.where:
-            self._values[access.where] = values
-        else:
-            for vr, value in zip(vrs, values, strict=True):
-                self._values[vr] = value
-        if access.parameters:
-            self._params = None
-        self._inputs = None
+    get_real, set_real = _getter(float), _setter(float)
+    get_boolean, set_boolean = _getter(bool), _setter(bool)
+    get_integer, set_integer = _getter(int), _setter(int)
+    get_string, set_string = _getter(str), _setter(str)
 
     # State
 
@@ -325,16 +288,10 @@ class Slave(metaclass=Once):
 
     def _check_values(self, vrs: list[int], values: list[Any]) -> None:
         for vr, value in zip(vrs, values, strict=True):
-            v = self._variables[vr]
-            low, high = v.limits or (-inf, inf)
-            if v.kind is str:
-                size = len(value.encode())
-                if not low <= size <= high:
-                    raise RefusalError(
-                        f"{v.name} = {value!r}: must have {low:g} to {high:g} bytes in UTF-8"
-                    )
-            elif not (low <= value <= high and isfinite(value)):
-                raise RefusalError(f"{v.name} = {value!r}{v.in_unit}: must be {v.allowed}")
+            try:
+                self._variables[vr].check(value)
+            except ValueError as error:
+                raise RefusalError(str(error)) from error
 
     # Reports
 

@@ -12,7 +12,7 @@ import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
 from functools import partial
-from math import inf, isfinite, isnan
+from math import isfinite, isnan
 from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any
@@ -173,14 +173,8 @@ def _check_declaration(found: list[Variable]) -> None:
         if not v.name.isascii():
             raise ValueError(f"{v.name}: must be of ASCII letters, digits and _")
         if v.causality != "output":
-            _check_start(v, v.start)
-
-
-def _check_start(v: Variable, start: Any) -> None:
-    _check_type(v, start, (v.kind,))
-    low, high = v.limits or (-inf, inf)
-    if not (low <= start <= high and isfinite(start)):
-        raise ValueError(f"{v.name} = {start!r}{v.in_unit}: must be {v.allowed}")
+            _check_type(v, v.start, (v.kind,))
+            v.check(v.start)
 
 
 def _check_type(v: Variable, value: Any, kinds: tuple[type[Any], ...]) -> None:

@@ -3,12 +3,12 @@
 `make cards` writes them; the tests check that they are up to date.
 """
 
-import importlib
-import sys
 from collections.abc import Mapping
+from importlib import import_module
 from pathlib import Path
 
 from .contract import Block, Field, declared
+from .shipped import blocks
 
 BEGIN, END = "<!-- variables -->\n", "<!-- end of variables -->\n"
 
@@ -80,17 +80,21 @@ def _feedthrough(f: Field) -> str:
     return ", ".join(f"`{name}`" for name in sorted(f.feedthrough)) or "none"
 
 
-def main(cards: list[str]) -> None:
-    """Update the cards, each given as CARD=MODULE, or CARD=MODULE,MODULE,... for several blocks."""
-    for card in cards:
-        path, _, modules = card.partition("=")
-        blocks: dict[str, Block] = {
-            module.rpartition(".")[2]: importlib.import_module(module)
-            for module in modules.split(",")
-        }
-        text = updated(Path(path).read_text("utf-8"), blocks)
-        Path(path).write_text(text, "utf-8")
+def blocks_by_card() -> dict[Path, dict[str, Block]]:
+    """Return the blocks that have a script, by the names of their modules, card by card."""
+    cards: dict[Path, dict[str, Block]] = {}
+    for block in blocks().values():
+        package, _, name = block.__name__.partition(".")
+        folder = Path(import_module(package).__file__ or "").parents[1]
+        cards.setdefault(folder / "README.md", {})[name] = block
+    return cards
+
+
+def main() -> None:
+    """Update the cards."""
+    for card, described in blocks_by_card().items():
+        card.write_text(updated(card.read_text("utf-8"), described), "utf-8")
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

@@ -1,30 +1,32 @@
-"""What a block declares, as a flat list of variables.
+"""The declaration of a block, as a flat list of variables.
 
 A block is a module with Params, Inputs, State, Outputs, initial_state(), step() and outputs().
-Every field of Params, Inputs and Outputs carries
+Every field of Params, Inputs and Outputs is declared with block_variables:
 
-    name: Annotated[type, unit, description, ...] = default
+    name: Annotated[type, Parameter("meaning", unit="m", low=0.0, high=1.0)] = default
 
 with float, bool, a tuple of one of them, or (in Params) int, an IntEnum or another such class as
 its type. An IntEnum is an enumeration of FMI, its members in lower case are the names of the items.
-A tuple becomes name[1], name[2], a nested class name.field. After the description follow, in any
-order,
-
-- for a parameter its range (lowest, highest), and "tunable" if it may change at run time;
-- for a real input or output its nominal value, a float;
-- for an output the set of inputs that reach it without a step, {"gap"}, or {"velocity[j]"} for the
-  one with its own index; set() where there is none. A second set says which reach it during
-  initialisation, when the state itself is made from the inputs; without it they are the same.
+A tuple becomes name[1], name[2], a nested class name.field.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, is_dataclass
 from dataclasses import fields as dataclass_fields
 from enum import IntEnum
 from functools import cache
+from math import inf
 from typing import Annotated, Any, Protocol, get_args, get_origin, get_type_hints
 
+from block_variables import Input, Output, Parameter
+
 from .variable import Causality, Enumeration, Scalar, Variable
+
+DECLARATIONS: dict[Causality, type[Parameter | Input | Output]] = {
+    "parameter": Parameter,
+    "input": Input,
+    "output": Output,
+}
 
 
 class Block(Protocol):
@@ -266,38 +268,46 @@ def _kind(name: str, causality: Causality, base: Any) -> type[Any]:
 
 
 def _field(path: tuple[str, ...], causality: Causality, hint: Any, start: Any) -> Field:
-    name = ".".join(path)
-    if get_origin(hint) is not Annotated:
-        raise TypeError(f"{name}: no unit and description; declare it as Annotated[...]")
-    base, unit, description, *rest = get_args(hint)
+    name, valid = ".".join(path), DECLARATIONS[causality]
+    base, declared = get_args(hint)[:2] if get_origin(hint) is Annotated else (hint, None)
+    if not isinstance(declared, valid):
+        raise TypeError(f'{name}: must be Annotated[type, {valid.__name__}("meaning", unit=...)]')
     size = len(get_args(base)) if get_origin(base) is tuple else None
     kind = _kind(name, causality, base)
-    limits = next((r for r in rest if isinstance(r, tuple)), None)
-    enumeration = None
+    limits = enumeration = nominal = None
+    now: Collection[str] = ()
+    initially: Collection[str] | None = None
+    if isinstance(declared, Parameter):
+        if (declared.low, declared.high) != (-inf, inf):
+            limits = (declared.low, declared.high)
+        if kind is float:
+            nominal = abs(start[0] if size else start) or None
+    elif kind is float:
+        if declared.nominal is None:
+            raise TypeError(f"{name}: must have a nominal value, nominal=...")
+        nominal = float(declared.nominal)
+    if isinstance(declared, Output):
+        if declared.depends_on is None:
+            raise TypeError(
+                f"{name}: must have the inputs that reach it without a step, depends_on={{...}}"
+            )
+        now, initially = declared.depends_on, declared.depends_initially_on
     if issubclass(kind, IntEnum):
         items = tuple((member.name.lower(), int(member)) for member in kind)
         enumeration = Enumeration(kind.__name__, items)
         limits, kind, start = (min(kind), max(kind)), int, int(start)
-    reached_from = [frozenset(r) for r in rest if isinstance(r, (set, frozenset))]
-    if causality == "output" and not reached_from:
-        raise TypeError(f"{name}: must have the set of inputs that reach it without a step")
-    nominal = next((r for r in rest if isinstance(r, float)), None)
-    if kind is float and causality == "parameter":
-        nominal = abs(start[0] if size else start) or None
-    elif kind is float and nominal is None:
-        raise TypeError(f"{name}: must have a nominal value, a float")
     return Field(
         path,
         causality,
         kind,
         size,
-        unit,
-        description,
-        limits=limits,
-        tunable="tunable" in rest,
-        nominal=nominal,
-        feedthrough=reached_from[0] if reached_from else frozenset(),
-        initial_feedthrough=reached_from[-1] if reached_from else frozenset(),
-        start=start,
-        enumeration=enumeration,
+        declared.unit,
+        declared.description,
+        limits,
+        isinstance(declared, Parameter) and declared.tunable,
+        nominal,
+        frozenset(now),
+        frozenset(now if initially is None else initially),
+        start,
+        enumeration,
     )

@@ -101,12 +101,10 @@ def licences() -> dict[str, bytes]:
     return {file: _licence(distribution) for file, distribution in _LICENCES.items()}
 
 
-def icon(name: str) -> bytes:
-    """Return model.png of the FMU `name`; FileNotFoundError if there is none."""
-    try:
-        return (ICONS / f"{name}.png").read_bytes()
-    except FileNotFoundError as error:
-        raise FileNotFoundError(f"{name}: no icon; fmus/draw_icons.py draws one") from error
+def icon(name: str) -> bytes | None:
+    """Return model.png of the FMU `name`; None where fmus/draw_icons.py draws none for it."""
+    file = ICONS / f"{name}.png"
+    return file.read_bytes() if file.exists() else None
 
 
 def _licence(distribution: str) -> bytes:

@@ -141,11 +141,12 @@ class Fmi2Slave(Slave):
 
     def _refresh(self) -> None:
         """Work out the outputs; before the end of initialisation the initial state as well."""
-        self._read()
+        _, evaluate, pack, unpack = self._functions
+        params = self._read_params() if self._params is None else self._params
+        self._inputs = inputs = pack(self._values)
         if self._phase < STEPPING:
-            self._state = self._initial_state(self._params, self._inputs)
-        _, evaluate, _, unpack = self._functions
-        values = unpack(evaluate(self._params, self._state, self._inputs))
+            self._state = self._initial_state(params, inputs)
+        values = unpack(evaluate(params, self._state, inputs))
         if not isfinite(sum(values)) and (text := self._not_finite(values)):
             raise RefusalError(f"{text}: must be finite")
         self._values[self._outputs] = values
@@ -156,14 +157,8 @@ class Fmi2Slave(Slave):
         except ImportError as error:
             raise RefusalError(str(error)) from error
 
-    def _read(self) -> None:
-        """Params and Inputs from the list of values."""
-        if self._params is None:
-            self._read_params()
-        _, _, pack, _ = self._functions
-        self._inputs = pack(self._values)
-
     def _read_params(self) -> Any:
+        """Params from the list of values."""
         try:
             self._params = build_params(self.block, self._fields, self._values)
         except ValueError as error:

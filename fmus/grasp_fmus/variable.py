@@ -1,7 +1,10 @@
 """A scalar variable of an FMU, as its slave and its description need it."""
 
 from dataclasses import dataclass
-from typing import Literal
+from math import inf
+from typing import Any, Literal
+
+from block_variables import check_value
 
 Scalar = float | bool | int | str
 Causality = Literal["input", "output", "parameter"]
@@ -57,10 +60,12 @@ class Variable:
         """Its unit after a number, with a space before it; empty where it has none."""
         return f" {self.unit}" if self.unit else ""
 
-    @property
-    def allowed(self) -> str:
-        """What number it may be, in words: from 0.001 to 1000 kg."""
-        if not self.limits:
-            return "a finite number"
-        low, high = self.limits
-        return f"from {low:g} to {high:g}{self.in_unit}"
+    def check(self, value: Any) -> None:
+        """Raise ValueError where it may not have this value; the limits of a text are its bytes."""
+        low, high = self.limits or (-inf, inf)
+        if not isinstance(value, str):
+            check_value(self.name, value, self.unit, low, high)
+        elif not low <= len(value.encode()) <= high:
+            raise ValueError(
+                f"{self.name} = {value!r}: must have {low:g} to {high:g} bytes in UTF-8"
+            )

@@ -17,6 +17,8 @@ from dataclasses import dataclass
 from math import atan2, copysign, cos, sin, tan
 from typing import Annotated, NamedTuple
 
+from block_variables import Output, Parameter
+
 from . import fingers, friction
 from .contact import time_to_contact
 
@@ -30,18 +32,27 @@ A box that does more than that within one rattles, and what is left of the sub-s
 """
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Params(fingers.Params):
-    """Parameters of every plant with a box; a value outside its range raises ValueError."""
+    """Parameters of every plant with a box; a value outside its range raises ValueError.
 
-    object_mass: Annotated[float, "kg", "m, mass of the object", (1e-3, 1e3)] = 0.05
-    object_height: Annotated[float, "m", "H, height of the object", (1e-3, 10.0)] = 0.1
-    contact_height: Annotated[
-        float, "m", "h, height of the fingertips above the floor", (0.0, 10.0)
+    A light box: mu·m·g = 0.15 N shift it, and it slides before it tilts, as mu < W/H and the
+    fingers push at half its height.
+    """
+
+    object_mass: Annotated[
+        float, Parameter("m, mass of the object", unit="kg", low=1e-3, high=1e3)
     ] = 0.05
-    floor_friction: Annotated[float, "1", "mu, friction of the object on the floor", (0.0, 1.0)] = (
-        0.3
-    )
+    object_height: Annotated[
+        float, Parameter("H, height of the object", unit="m", low=1e-3, high=10.0)
+    ] = 0.1
+    contact_height: Annotated[
+        float,
+        Parameter("h, height of the fingertips above the floor", unit="m", low=0.0, high=10.0),
+    ] = 0.05
+    floor_friction: Annotated[
+        float, Parameter("mu, friction of the object on the floor", unit="1", low=0.0, high=1.0)
+    ] = 0.3
 
     def __post_init__(self) -> None:
         fingers.Params.__post_init__(self)
@@ -61,8 +72,13 @@ class Outputs(NamedTuple):
     contact_force: fingers.ContactForce
     contact: fingers.Contact
     object_position: fingers.ObjectPosition
-    tilt: Annotated[float, "rad", "theta, tilt of the object, to the right", 0.1, set()]
-    toppled: Annotated[bool, "", "the object has tilted past its balance", set()]
+    tilt: Annotated[
+        float,
+        Output(
+            "theta, tilt of the object, to the right", unit="rad", nominal=0.1, depends_on=set()
+        ),
+    ]
+    toppled: Annotated[bool, Output("the object has tilted past its balance", depends_on=set())]
 
 
 class Shape(NamedTuple):

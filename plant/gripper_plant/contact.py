@@ -14,19 +14,30 @@ and never less than zero: the object pushes, it does not hold. Card: plant/READM
 """
 
 from math import inf, sqrt
+from typing import NamedTuple
 
 from . import friction
 from . import substeps as own
+from .fingers import Side
 
 Finger = tuple[float, float, float]
 """Position s in m and velocity in m/s (opening positive), contact force in N (>= 0)."""
+
+
+class Rates(NamedTuple):
+    """Of the stabilised constraint: damping and natural rate, 1/s."""
+
+    alpha: float
+    beta: float
+
 
 ITERATIONS = 8
 """To find the contact force beside friction: each leaves 1/19 of the error, or less."""
 
 
-def substeps(alpha: float, beta: float, h: float) -> int:
-    """Number of equal sub-steps that resolve the contact (alpha, beta in 1/s) within h seconds."""
+def substeps(rates: Rates, h: float) -> int:
+    """Number of equal sub-steps that resolve the contact within h seconds."""
+    alpha, beta = rates
     return own.count(max(2.0 * alpha, beta), h)
 
 
@@ -45,28 +56,18 @@ def time_to_contact(gap: float, rate: float, acceleration: float) -> float:
     return (sqrt(discriminant) + rate) / -acceleration if acceleration < 0.0 else inf
 
 
-def advance(
-    s: float,
-    v: float,
-    surface: float,
-    m: float,
-    f: float,
-    alpha: float,
-    beta: float,
-    h: float,
-    rub: friction.Law = friction.NONE,
-) -> Finger:
-    """Advance a finger of m kg at s m with v m/s by h seconds, the actuator force f in N held.
+def advance(side: Side, rates: Rates, s: float, v: float, f: float, h: float) -> Finger:
+    """Advance a finger at s m with v m/s by h seconds, the actuator force f in N held.
 
-    surface is where the object begins, in m; alpha and beta are the stabilisation rates in 1/s.
     Without friction free flight is exact, and so is the moment of contact within a sub-step.
     """
+    surface, m, rub = side
     if friction.acts(rub):
-        return _advance_rubbing(s, v, surface, m, f, alpha, beta, h, rub)
+        return _advance_rubbing(side, rates, s, v, f, h)
     if time_to_contact(s - surface, v, f / m) >= h:
         return _fly(s, v, f / m, h)
     contact_force = 0.0
-    n = substeps(alpha, beta, h)
+    n = substeps(rates, h)
     d = h / n
     for _ in range(n):
         free = time_to_contact(s - surface, v, f / m)
@@ -76,22 +77,14 @@ def advance(
             if free > 0.0:
                 _, v, _ = _fly(s, v, f / m, free)
                 s = surface
-            s, v, contact_force = _touch(s, v, surface, m, f, alpha, beta, d - free)
+            s, v, contact_force = _touch(side, rates, s, v, f, d - free)
     return s, v, contact_force
 
 
-def _advance_rubbing(
-    s: float,
-    v: float,
-    surface: float,
-    m: float,
-    f: float,
-    alpha: float,
-    beta: float,
-    h: float,
-    rub: friction.Law,
-) -> Finger:
+def _advance_rubbing(side: Side, rates: Rates, s: float, v: float, f: float, h: float) -> Finger:
     """advance() of a finger with friction, which acts beside the contact force."""
+    surface, m, rub = side
+    alpha, beta = rates
     contact_force = 0.0
     n = own.count(max(2.0 * alpha, beta, friction.rate(rub, m)), h)
     d = h / n
@@ -104,26 +97,18 @@ def _advance_rubbing(
         if free > 0.0:
             _, v = friction.move(s, v, m, f, rub, free)
             s = surface
-        s, v, contact_force = _touch_rubbing(s, v, surface, m, f, alpha, beta, d - free, rub)
+        s, v, contact_force = _touch_rubbing(side, rates, s, v, f, d - free)
     return s, v, contact_force
 
 
-def _touch_rubbing(
-    s: float,
-    v: float,
-    surface: float,
-    m: float,
-    f: float,
-    alpha: float,
-    beta: float,
-    d: float,
-    rub: friction.Law,
-) -> Finger:
+def _touch_rubbing(side: Side, rates: Rates, s: float, v: float, f: float, d: float) -> Finger:
     """One step of the stabilised constraint beside friction; the contact force is held over it.
 
     The force is that of the mean rate and the mean gap, found by iteration. It takes the energy
     2·alpha·m·d·(mean velocity)^2 and gives none.
     """
+    surface, m, rub = side
+    alpha, beta = rates
     contact_force = max(0.0, -f)
     after, rate = s, v
     for _ in range(ITERATIONS if d > 0.0 else 0):
@@ -138,13 +123,13 @@ def _fly(s: float, v: float, acceleration: float, d: float) -> Finger:
     return s + 0.5 * d * (v + after), after, 0.0
 
 
-def _touch(
-    s: float, v: float, surface: float, m: float, f: float, alpha: float, beta: float, d: float
-) -> Finger:
+def _touch(side: Side, rates: Rates, s: float, v: float, f: float, d: float) -> Finger:
     """One trapezoidal step of the stabilised constraint; the contact force is held over it.
 
     The rule takes the energy 2·alpha·m·d·(mean velocity)^2 and gives none, whatever d is.
     """
+    surface, m, _ = side
+    alpha, beta = rates
     constrained = -(2.0 * alpha * v + beta * beta * (s - surface + 0.5 * d * v)) / (
         1.0 + alpha * d + 0.25 * beta * beta * d * d
     )
@@ -152,18 +137,17 @@ def _touch(
     acceleration = (f + contact_force) / m
     after, v_after, _ = _fly(s, v, acceleration, d)
     if after > surface:
-        return _leave(surface - s, v, acceleration, surface, m, f, d)
+        return _leave(side, surface - s, v, acceleration, f, d)
     return after, v_after, contact_force
 
 
-def _leave(
-    depth: float, v: float, acceleration: float, surface: float, m: float, f: float, d: float
-) -> Finger:
+def _leave(side: Side, depth: float, v: float, acceleration: float, f: float, d: float) -> Finger:
     """The contact lets go where the finger passes the surface, depth m further out.
 
     A finger that would be back before the end of the sub-step stays: so short a bounce is not
     resolved, and taking its energy lets a pressed finger come to rest.
     """
+    surface, m, _ = side
     leaving = sqrt(max(0.0, v * v + 2.0 * acceleration * depth))
     rest = d - (2.0 * depth / (v + leaving) if depth > 0.0 else 0.0)
     if time_to_contact(0.0, leaving, f / m) < rest:

@@ -14,7 +14,7 @@ from math import pow as power
 from math import sqrt
 from typing import Annotated
 
-from .ranges import check
+from block_variables import Parameter, check
 
 Law = tuple[float, float, float, float]
 """k in N/m^n, n, c in N.s/m, lambda in s/m."""
@@ -31,26 +31,42 @@ SETTLED = 1e-11
 
 @dataclass(frozen=True, slots=True)
 class KelvinVoigt:
-    """Parameters; a value outside its declared range raises ValueError."""
+    """Parameters; a value outside its declared range raises ValueError.
 
-    stiffness: Annotated[float, "N/m", "k, stiffness of the surface", (1e-3, 1e7)] = 1000.0
-    damping: Annotated[float, "N.s/m", "c, damping of the surface", (0.0, 1e5)] = 10.0
+    By default a side of a paper cup: 1 N/mm, damped by a fifth of critical under 0.5 kg.
+    """
+
+    stiffness: Annotated[
+        float, Parameter("k, stiffness of the surface", unit="N/m", low=1e-3, high=1e7)
+    ] = 1000.0
+    damping: Annotated[
+        float, Parameter("c, damping of the surface", unit="N.s/m", low=0.0, high=1e5)
+    ] = 10.0
 
     def __post_init__(self) -> None:
-        check(self, "kelvin_voigt.")
+        check(self, "kelvin_voigt")
 
 
 @dataclass(frozen=True, slots=True)
 class HuntCrossley:
-    """Parameters; a value outside its declared range raises ValueError."""
+    """Parameters; a value outside its declared range raises ValueError.
 
-    enabled: Annotated[bool, "", "Hunt-Crossley contact; off, Kelvin-Voigt"] = False
-    stiffness: Annotated[float, "N/m^n", "k, stiffness of the surface", (1e-3, 1e9)] = 20000.0
-    exponent: Annotated[float, "1", "n, exponent of the depth", (1.0, 3.0)] = 1.5
-    damping: Annotated[float, "s/m", "lambda, damping relative to the force", (0.0, 1e3)] = 1.0
+    n = 1.5 is Hertz's, a sphere on a plane. By default 3.1 N are 2.9 mm deep, as in the paper cup.
+    """
+
+    enabled: Annotated[bool, Parameter("Hunt-Crossley contact; off, Kelvin-Voigt")] = False
+    stiffness: Annotated[
+        float, Parameter("k, stiffness of the surface", unit="N/m^n", low=1e-3, high=1e9)
+    ] = 20000.0
+    exponent: Annotated[
+        float, Parameter("n, exponent of the depth", unit="1", low=1.0, high=3.0)
+    ] = 1.5
+    damping: Annotated[
+        float, Parameter("lambda, damping relative to the force", unit="s/m", low=0.0, high=1e3)
+    ] = 1.0
 
     def __post_init__(self) -> None:
-        check(self, "hunt_crossley.")
+        check(self, "hunt_crossley")
 
 
 def law(kelvin_voigt: KelvinVoigt, hunt_crossley: HuntCrossley) -> Law:

@@ -5,11 +5,13 @@ u_1 < 0 and the object pushes it back with f_c1 >= 0. Finger 2 mirrors it. Card:
 """
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from math import copysign
 from typing import Annotated, NamedTuple, TypeAlias
 
+from block_variables import Input, Output, Parameter, check
+
 from . import friction as finger_friction
-from .ranges import check
 
 Pair = tuple[float, float]
 """A value per finger: right, left."""
@@ -20,24 +22,49 @@ class Actuator:
     """Parameters; a value outside its declared range raises ValueError."""
 
     force_limit: Annotated[
-        Pair, "N", "largest force of the actuator, either way; 0 is no limit", (0.0, 1e6)
+        Pair,
+        Parameter(
+            "largest force of the actuator, either way; 0 is no limit", unit="N", low=0.0, high=1e6
+        ),
     ] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        check(self, "actuator.")
+        check(self, "actuator")
 
 
-@dataclass(frozen=True, slots=True)
+class Side(NamedTuple):
+    """A finger and its face of the object, in the direction in which the finger opens."""
+
+    surface: float
+    """Where the object begins at the start, m."""
+    mass: float
+    """Of the finger, kg."""
+    friction: finger_friction.Law
+
+
+@dataclass(frozen=True)  # no slots: what is worked out from the parameters is kept
 class Params:
-    """Parameters of every plant; a value outside its declared range raises ValueError."""
+    """Parameters of every plant; a value outside its declared range raises ValueError.
 
-    finger_mass: Annotated[Pair, "kg", "m_j, mass of the finger", (1e-3, 1e3)] = (0.5, 0.5)
+    The paper's gripper and object: fingers 110 mm to either side, an object of 70 mm 30 mm off the
+    middle, so that one finger arrives first unless layer 3 sees to it. It names no friction, no
+    limit.
+    """
+
+    finger_mass: Annotated[
+        Pair, Parameter("m_j, mass of the finger", unit="kg", low=1e-3, high=1e3)
+    ] = (0.5, 0.5)
     initial_position: Annotated[
-        Pair, "m", "x_init,j, position of the fingertip at the start", (-10.0, 10.0)
+        Pair,
+        Parameter(
+            "x_init,j, position of the fingertip at the start", unit="m", low=-10.0, high=10.0
+        ),
     ] = (0.11, -0.11)
-    object_width: Annotated[float, "m", "W, width of the object", (0.0, 10.0)] = 0.07
+    object_width: Annotated[
+        float, Parameter("W, width of the object", unit="m", low=0.0, high=10.0)
+    ] = 0.07
     initial_object_position: Annotated[
-        float, "m", "x_m, centre of the object at the start", (-10.0, 10.0)
+        float, Parameter("x_m, centre of the object at the start", unit="m", low=-10.0, high=10.0)
     ] = 0.03
     friction: finger_friction.Params = field(default=finger_friction.Params(), kw_only=True)
     actuator: Actuator = field(default=Actuator(), kw_only=True)
@@ -53,23 +80,51 @@ class Params:
                 f"{left:g} and {right:g} m"
             )
 
+    @cached_property
+    def sides(self) -> tuple[Side, Side]:
+        """Right and left."""
+        x_m, half = self.initial_object_position, 0.5 * self.object_width
+        m_1, m_2 = self.finger_mass
+        rub_1, rub_2 = finger_friction.laws(self.friction)
+        return Side(half + x_m, m_1, rub_1), Side(half - x_m, m_2, rub_2)
+
+
+Force: TypeAlias = Annotated[
+    Pair, Input("u_j, actuator force on the finger", unit="N", nominal=1.0)
+]
+"""The input of every plant."""
+
 
 class Inputs(NamedTuple):
     """Held over the step."""
 
-    force: Annotated[Pair, "N", "u_j, actuator force on the finger", 1.0] = (0.0, 0.0)
+    force: Force = (0.0, 0.0)
 
 
-Position: TypeAlias = Annotated[Pair, "m", "x_j, position of the fingertip", 0.1, set()]
-Velocity: TypeAlias = Annotated[Pair, "m/s", "x_j', velocity of the fingertip", 0.1, set()]
+Position: TypeAlias = Annotated[
+    Pair, Output("x_j, position of the fingertip", unit="m", nominal=0.1, depends_on=set())
+]
+Velocity: TypeAlias = Annotated[
+    Pair, Output("x_j', velocity of the fingertip", unit="m/s", nominal=0.1, depends_on=set())
+]
 Gap: TypeAlias = Annotated[
-    Pair, "m", "l_j, distance from the sensor face to the object surface", 0.1, set()
+    Pair,
+    Output(
+        "l_j, distance from the sensor face to the object surface",
+        unit="m",
+        nominal=0.1,
+        depends_on=set(),
+    ),
 ]
 ContactForce: TypeAlias = Annotated[
-    Pair, "N", "f_cj, force of the object on the finger", 1.0, set()
+    Pair, Output("f_cj, force of the object on the finger", unit="N", nominal=1.0, depends_on=set())
 ]
-Contact: TypeAlias = Annotated[tuple[bool, bool], "", "the finger touches the object", set()]
-ObjectPosition: TypeAlias = Annotated[float, "m", "centre of the object", 0.1, set()]
+Contact: TypeAlias = Annotated[
+    tuple[bool, bool], Output("the finger touches the object", depends_on=set())
+]
+ObjectPosition: TypeAlias = Annotated[
+    float, Output("centre of the object", unit="m", nominal=0.1, depends_on=set())
+]
 """What every plant puts out, in this order."""
 
 
@@ -78,12 +133,6 @@ def forces(p: Actuator, u: Inputs) -> Pair:
     u_1, u_2 = u.force
     most_1, most_2 = p.force_limit
     return _limited(u_1, most_1), _limited(u_2, most_2)
-
-
-def surfaces(p: Params) -> Pair:
-    """Where the object begins for each finger at the start, in its own opening direction, m."""
-    x_m, half = p.initial_object_position, 0.5 * p.object_width
-    return half + x_m, half - x_m
 
 
 def reach(p: Params, velocity: Pair, u: Inputs, h: float) -> Pair:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from math import copysign, exp
 from typing import Annotated
 
-from .ranges import check
+from block_variables import Parameter, check
 
 Pair = tuple[float, float]
 """A value per finger: right, left."""
@@ -27,22 +27,39 @@ NONE: Law = (0.0, 0.0, 0.0, 1.0)
 
 @dataclass(frozen=True, slots=True)
 class Params:
-    """Parameters; a value outside its declared range raises ValueError."""
+    """Parameters; a value outside its declared range raises ValueError.
 
-    coulomb: Annotated[Pair, "N", "F_Cj, Coulomb friction of the finger", (0.0, 1e3)] = (0.0, 0.0)
-    static: Annotated[
-        Pair, "N", "F_Sj, breakaway force of the finger; less than F_Cj counts as F_Cj", (0.0, 1e3)
+    The paper's simulation has none, so none is the default. v_s has no source; it matters where F_S
+    > F_C.
+    """
+
+    coulomb: Annotated[
+        Pair, Parameter("F_Cj, Coulomb friction of the finger", unit="N", low=0.0, high=1e3)
     ] = (0.0, 0.0)
-    viscous: Annotated[Pair, "N.s/m", "B_j, viscous friction of the finger", (0.0, 1e3)] = (
-        0.0,
-        0.0,
-    )
+    static: Annotated[
+        Pair,
+        Parameter(
+            "F_Sj, breakaway force of the finger; less than F_Cj counts as F_Cj",
+            unit="N",
+            low=0.0,
+            high=1e3,
+        ),
+    ] = (0.0, 0.0)
+    viscous: Annotated[
+        Pair, Parameter("B_j, viscous friction of the finger", unit="N.s/m", low=0.0, high=1e3)
+    ] = (0.0, 0.0)
     stribeck_velocity: Annotated[
-        float, "m/s", "v_s, velocity over which friction falls from F_Sj to F_Cj", (1e-6, 1e3)
+        float,
+        Parameter(
+            "v_s, velocity over which friction falls from F_Sj to F_Cj",
+            unit="m/s",
+            low=1e-6,
+            high=1e3,
+        ),
     ] = 0.01
 
     def __post_init__(self) -> None:
-        check(self, "friction.")
+        check(self, "friction")
 
 
 def laws(p: Params) -> tuple[Law, Law]:

@@ -11,6 +11,8 @@ from functools import lru_cache
 from math import ceil, cos, hypot, sin
 from typing import Annotated, Any, NamedTuple
 
+from block_variables import Parameter
+
 from . import box as standing
 from . import fingers
 from .box import Outputs as Outputs
@@ -36,16 +38,26 @@ Coordinates = tuple[float, float, float, float, float]
 """Of finger 1, of finger 2 (x); of the middle of the box (x, z), in m; its tilt in rad."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Params(standing.Params):
-    """Parameters; a value outside its declared range raises ValueError."""
+    """Parameters; a value outside its declared range raises ValueError.
 
-    object_fixed: Annotated[bool, "", "the object is fixed; off, it stands free on a floor"] = True
-    fingertip_radius: Annotated[float, "m", "R, radius of the fingertips", (1e-4, 1.0)] = 0.005
-    contact_time_constant: Annotated[
-        float, "s", "T, time constant in which a contact settles", (2e-5, 0.1)
+    T = 5 ms is alpha = beta = 200 1/s of rigid.py, and fifty timesteps long.
+    """
+
+    object_fixed: Annotated[
+        bool, Parameter("the object is fixed; off, it stands free on a floor")
+    ] = True
+    fingertip_radius: Annotated[
+        float, Parameter("R, radius of the fingertips", unit="m", low=1e-4, high=1.0)
     ] = 0.005
-    timestep: Annotated[float, "s", "longest timestep of MuJoCo", (1e-5, 1e-3)] = 1e-4
+    contact_time_constant: Annotated[
+        float,
+        Parameter("T, time constant in which a contact settles", unit="s", low=2e-5, high=0.1),
+    ] = 0.005
+    timestep: Annotated[
+        float, Parameter("longest timestep of MuJoCo", unit="s", low=1e-5, high=1e-3)
+    ] = 1e-4
 
     def __post_init__(self) -> None:
         standing.Params.__post_init__(self)

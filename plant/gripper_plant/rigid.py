@@ -4,23 +4,39 @@ Signs as in fingers.py. Card: plant/README.md
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated, NamedTuple
 
-from . import contact, fingers, friction
+from block_variables import Parameter
+
+from . import contact, fingers
 from .fingers import Inputs as Inputs
 from .fingers import Pair as Pair
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Params(fingers.Params):
-    """Parameters; a value outside its declared range raises ValueError."""
+    """Parameters; a value outside its declared range raises ValueError.
+
+    The paper names Baumgarte's method but no rates. alpha = beta is critical damping; at 200 1/s a
+    finger that arrives with 6 mm/s sinks in by 11 um and is back within some 20 ms.
+    """
 
     baumgarte_alpha: Annotated[
-        float, "1/s", "alpha, damping rate of the contact stabilisation", (1.0, 1e5)
+        float,
+        Parameter(
+            "alpha, damping rate of the contact stabilisation", unit="1/s", low=1.0, high=1e5
+        ),
     ] = 200.0
     baumgarte_beta: Annotated[
-        float, "1/s", "beta, natural rate of the contact stabilisation", (1.0, 1e5)
+        float,
+        Parameter("beta, natural rate of the contact stabilisation", unit="1/s", low=1.0, high=1e5),
     ] = 200.0
+
+    @cached_property
+    def rates(self) -> contact.Rates:
+        """Those of the contact."""
+        return contact.Rates(self.baumgarte_alpha, self.baumgarte_beta)
 
 
 class State(NamedTuple):
@@ -49,22 +65,19 @@ def initial_state(p: Params, u: Inputs) -> State:
 
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
     """Advance both fingers by h seconds (h > 0), the forces held; each in its opening direction."""
-    m_1, m_2 = p.finger_mass
     x_1, x_2 = x.position
     v_1, v_2 = x.velocity
     u_1, u_2 = fingers.forces(p.actuator, u)
-    rub_1, rub_2 = friction.laws(p.friction)
-    right, left = fingers.surfaces(p)
-    alpha, beta = p.baumgarte_alpha, p.baumgarte_beta
-    s_1, v_1, f_1 = contact.advance(x_1, v_1, right, m_1, u_1, alpha, beta, h, rub_1)
-    s_2, v_2, f_2 = contact.advance(-x_2, -v_2, left, m_2, -u_2, alpha, beta, h, rub_2)
+    right, left = p.sides
+    s_1, v_1, f_1 = contact.advance(right, p.rates, x_1, v_1, u_1, h)
+    s_2, v_2, f_2 = contact.advance(left, p.rates, -x_2, -v_2, -u_2, h)
     return State((s_1, -s_2), (v_1, 0.0 - v_2), (f_1, 0.0 - f_2))
 
 
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     """What the sensors see; no input reaches an output without a step."""
     x_1, x_2 = x.position
-    right, left = fingers.surfaces(p)
+    (right, _, _), (left, _, _) = p.sides
     gap_1, gap_2 = x_1 - right, -x_2 - left
     return Outputs(
         x.position,

@@ -1,6 +1,6 @@
 """Ambient light: the raw voltage has an offset, which may drift after its calibration.
 
-    c(t) = c + drift·t,   c = 0.35 V as in the paper's fit
+    c(t) = c + drift·t,   c = 0.35 V as in the paper's fit, Sec. IV.A
 
 The compensation at the end of the chain takes off the calibrated value c, not the drift. The run
 begins with the calibration.
@@ -9,19 +9,24 @@ begins with the calibration.
 from dataclasses import dataclass
 from typing import Annotated
 
-from .ranges import check
+from block_variables import Parameter, check
 
 
 @dataclass(frozen=True, slots=True)
 class Params:
     """Parameters; a value outside its declared range raises ValueError."""
 
-    enabled: Annotated[bool, "", "offset by ambient light, and its compensation"] = False
-    offset: Annotated[float, "V", "c, offset at the calibration", (-10.0, 10.0)] = 0.35
-    drift: Annotated[float, "V/s", "rate of the offset after the calibration", (-10.0, 10.0)] = 0.0
+    enabled: Annotated[bool, Parameter("offset by ambient light, and its compensation")] = False
+    offset: Annotated[
+        float, Parameter("c, offset at the calibration", unit="V", low=-10.0, high=10.0)
+    ] = 0.35
+    drift: Annotated[
+        float,
+        Parameter("rate of the offset after the calibration", unit="V/s", low=-10.0, high=10.0),
+    ] = 0.0
 
     def __post_init__(self) -> None:
-        check("ambient", self)
+        check(self, "ambient")
 
 
 def voltage(p: Params, t: float) -> float:

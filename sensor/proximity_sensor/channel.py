@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, NamedTuple
 
+from block_variables import Parameter
+
 from . import (
     ambient_light,
     clock,
@@ -32,6 +34,9 @@ Outputs = optics.Outputs
 NOTHING = optics.State()
 """The optics have no memory."""
 
+GIVEN_WITH_CUSTOM_ONLY = optics.Params().reflectance
+"""The reflectance beside a surface that is chosen by name, which has its own."""
+
 WARM_UP = 100
 """Samples of noise that are in filter and median at the start."""
 
@@ -48,7 +53,8 @@ class Params(optics.Params):
     median: sliding_median.Params = sliding_median.Params()
     sampling: clock.Params = clock.Params()
     surface: Annotated[
-        surfaces.Surface, "", "a surface by name; custom has the reflectance given", "tunable"
+        surfaces.Surface,
+        Parameter("a surface by name; custom has the reflectance given", tunable=True),
     ] = surfaces.Surface.CUSTOM
 
     def __post_init__(self) -> None:
@@ -58,6 +64,12 @@ class Params(optics.Params):
             raise ValueError(
                 f"filter.cutoff = {self.filter.cutoff!r} Hz: must be below half of sampling.rate, "
                 f"{highest:g}"
+            )
+        if self.surface in surfaces.REFLECTANCE and self.reflectance != GIVEN_WITH_CUSTOM_ONLY:
+            named = surfaces.Surface(self.surface).name.lower()
+            raise ValueError(
+                f"reflectance = {self.reflectance!r} with surface = {named}: "
+                f"must be {GIVEN_WITH_CUSTOM_ONLY:g}, its default; surface = custom takes others"
             )
 
     @cached_property

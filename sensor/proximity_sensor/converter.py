@@ -7,21 +7,25 @@ from dataclasses import dataclass
 from math import floor, ldexp
 from typing import Annotated
 
-from .ranges import check
+from block_variables import Parameter, check
 
 
 @dataclass(frozen=True, slots=True)
 class Params:
-    """Parameters; a value outside its declared range raises ValueError."""
+    """Parameters; a value outside its declared range raises ValueError.
 
-    enabled: Annotated[bool, "", "conversion to digital values"] = False
-    bits: Annotated[int, "", "resolution", (1, 32)] = 16
+    16 bits over 20 V are usual for controllers like the paper's.
+    """
+
+    enabled: Annotated[bool, Parameter("conversion to digital values")] = False
+    bits: Annotated[int, Parameter("resolution", low=1, high=32)] = 16
     range: Annotated[
-        tuple[float, float], "V", "lower and upper end of the input range", (-1e3, 1e3)
+        tuple[float, float],
+        Parameter("lower and upper end of the input range", unit="V", low=-1e3, high=1e3),
     ] = (-10.0, 10.0)
 
     def __post_init__(self) -> None:
-        check("adc", self)
+        check(self, "adc")
         low, high = self.range
         if not low < high:
             raise ValueError(f"adc.range = {low!r}, {high!r} V: the second must be above the first")

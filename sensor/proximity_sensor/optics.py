@@ -4,28 +4,41 @@ The output is offset-compensated: zero when nothing is near. Card: sensor/README
 """
 
 from dataclasses import dataclass
-from typing import Annotated, NamedTuple, get_type_hints
+from typing import Annotated, NamedTuple
+
+from block_variables import Input, Output, Parameter, check
 
 
 @dataclass(frozen=True, slots=True)
 class Params:
-    """Parameters; a value outside its declared range raises ValueError."""
+    """Parameters; a value outside its declared range raises ValueError.
+
+    K and n are the paper's fit to the white surface, R^2 = 0.9992; l_0 is by design of the sensor.
+    """
 
     reflectance: Annotated[
-        float, "1", "alpha, reflectance of the surface relative to white", (0.0, 10.0), "tunable"
+        float,
+        Parameter(
+            "alpha, reflectance of the surface relative to white",
+            unit="1",
+            low=0.0,
+            high=10.0,
+            tunable=True,
+        ),
     ] = 1.0
-    gain: Annotated[float, "V.m^n", "K = G·psi, fitted to the white surface", (0.0, 1e6)] = 0.0024
-    diffusion_exponent: Annotated[float, "1", "n, diffusion exponent", (0.1, 10.0)] = 1.1506
+    gain: Annotated[
+        float, Parameter("K = G·psi, fitted to the white surface", unit="V.m^n", low=0.0, high=1e6)
+    ] = 0.0024
+    diffusion_exponent: Annotated[
+        float, Parameter("n, diffusion exponent", unit="1", low=0.1, high=10.0)
+    ] = 1.1506
     offset_distance: Annotated[
-        float, "m", "l_0, from the sensor face to the sensing element", (1e-6, 1.0)
+        float,
+        Parameter("l_0, from the sensor face to the sensing element", unit="m", low=1e-6, high=1.0),
     ] = 0.005
 
     def __post_init__(self) -> None:
-        for name, hint in get_type_hints(Params, include_extras=True).items():
-            unit, _, (low, high), *_ = hint.__metadata__
-            value = getattr(self, name)
-            if not low <= value <= high:
-                raise ValueError(f"{name} = {value!r} {unit}: must be from {low:g} to {high:g}")
+        check(self)
 
     @property
     def alpha(self) -> float:
@@ -36,7 +49,10 @@ class Params:
 class Inputs(NamedTuple):
     """What the sensor looks at."""
 
-    gap: Annotated[float, "m", "l, distance from the sensor face to the object surface", 0.1] = 0.1
+    gap: Annotated[
+        float,
+        Input("l, distance from the sensor face to the object surface", unit="m", nominal=0.1),
+    ] = 0.1
 
 
 class State(NamedTuple):
@@ -46,7 +62,9 @@ class State(NamedTuple):
 class Outputs(NamedTuple):
     """What the sensor delivers."""
 
-    intensity: Annotated[float, "V", "xi, offset-compensated output", 0.1, {"gap"}]
+    intensity: Annotated[
+        float, Output("xi, offset-compensated output", unit="V", nominal=0.1, depends_on={"gap"})
+    ]
 
 
 def initial_state(p: Params, u: Inputs) -> State:

@@ -3,15 +3,17 @@
 from dataclasses import dataclass
 from typing import Annotated
 
+from block_variables import Parameter
+
 Window = tuple[float, float, float, float, float, float, float, float, float, float]
 """The last ten samples in V, the oldest first."""
 
 
 @dataclass(frozen=True, slots=True)
 class Params:
-    """Nothing but the switch."""
+    """Nothing but the switch: the ten samples are those of the paper's bench, Sec. IV.B."""
 
-    enabled: Annotated[bool, "", "median of the last ten samples"] = False
+    enabled: Annotated[bool, Parameter("median of the last ten samples")] = False
 
 
 def median(w: Window) -> float:

@@ -9,25 +9,36 @@ from dataclasses import dataclass
 from math import floor
 from typing import Annotated
 
-from .ranges import check
+from block_variables import Parameter, check
 
 
 @dataclass(frozen=True, slots=True)
 class Params:
-    """Parameters; a value outside its declared range raises ValueError."""
+    """Parameters; a value outside its declared range raises ValueError.
 
-    enabled: Annotated[bool, "", "the surface is striped along the approach"] = False
+    The ratio is that of the paper's black paper to the white one; the lengths have no source.
+    """
+
+    enabled: Annotated[bool, Parameter("the surface is striped along the approach")] = False
     ratio: Annotated[
-        float, "1", "reflectance of every other stripe relative to the first", (0.0, 1e3)
+        float,
+        Parameter(
+            "reflectance of every other stripe relative to the first", unit="1", low=0.0, high=1e3
+        ),
     ] = 0.57
-    period: Annotated[float, "m", "length of two stripes along the gap", (1e-6, 10.0)] = 0.02
-    phase: Annotated[float, "m", "gap at the middle of a first stripe", (-10.0, 10.0)] = 0.0
-    edge: Annotated[float, "m", "length over which stripes blend, a spot of light", (1e-9, 1.0)] = (
-        0.002
-    )
+    period: Annotated[
+        float, Parameter("length of two stripes along the gap", unit="m", low=1e-6, high=10.0)
+    ] = 0.02
+    phase: Annotated[
+        float, Parameter("gap at the middle of a first stripe", unit="m", low=-10.0, high=10.0)
+    ] = 0.0
+    edge: Annotated[
+        float,
+        Parameter("length over which stripes blend, a spot of light", unit="m", low=1e-9, high=1.0),
+    ] = 0.002
 
     def __post_init__(self) -> None:
-        check("pattern", self)
+        check(self, "pattern")
 
 
 def factor(p: Params, l: float) -> float:

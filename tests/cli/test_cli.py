@@ -13,6 +13,7 @@ import pytest
 from conftest import Altered, Run
 from grasp_cosim import System, cli, simulate
 from grasp_fmus import documentation
+from grasp_fmus.shipped import blocks
 from support.cases import CASES
 
 METRICS = {
@@ -163,8 +164,10 @@ def test_nothing_to_draw_is_found_at_once(command: Run, fmus: Path, tmp_path: Pa
 
 
 def test_a_vendor_plant_with_one_more_input(command: Run, altered: Altered) -> None:
-    force = 'actuator force on the finger", 1.0] = (0.0, 0.0)\n'
-    ambient = '    ambient: Annotated[float, "K", "temperature", 300.0] = 300.0\n'
+    force = "    force: Force = (0.0, 0.0)\n"
+    ambient = (
+        '    ambient: Annotated[float, Input("temperature", unit="K", nominal=300.0)] = 300.0\n'
+    )
     fmu = altered("GripperPlant", "gripper_plant/fingers.py", force, force + ambient)
     code, _, err = command("run", "--stop", "0.01", "--swap", f"plant={fmu}")
     assert code == 2
@@ -212,14 +215,7 @@ def test_build_names_what_it_built(command: Run, tmp_path: Path) -> None:
     code, out, _ = command("build", "--out", "here", "--json")
     built = [Path(p) for p in json.loads(out)["fmus"]]
     assert code == 0
-    assert [p.name for p in built] == [
-        "GraspController.fmu",
-        "GripperPlant.fmu",
-        "GripperPlantCompliant.fmu",
-        "GripperPlantMovable.fmu",
-        "GripperPlantMuJoCo.fmu",
-        "ProximitySensor.fmu",
-    ]
+    assert [p.name for p in built] == [f"{name}.fmu" for name in blocks()]
     assert all((tmp_path / p).is_file() for p in built)
 
 
@@ -229,10 +225,7 @@ def test_the_built_in_grasp_builds_its_fmus(
     monkeypatch.chdir(tmp_path)
     assert cli.main(["run", "--stop", "0.01", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["steps"] == 100
-    assert sorted(p.name for p in (tmp_path / "fmus/build").glob("*.fmu")) == [
-        "GraspController.fmu", "GripperPlant.fmu", "GripperPlantCompliant.fmu",
-        "GripperPlantMovable.fmu", "GripperPlantMuJoCo.fmu", "ProximitySensor.fmu",
-    ]  # fmt: skip
+    assert {p.stem for p in (tmp_path / "fmus/build").glob("*.fmu")} == set(blocks())
 
 
 def test_inspect_shows_the_interface(command: Run, fmus: Path) -> None:
@@ -297,10 +290,10 @@ def test_a_python_that_is_none(command: Run) -> None:
 def test_a_missing_file_without_a_name_is_told(
     command: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(documentation, "ICONS", Path("nowhere"))
+    monkeypatch.setattr(documentation, "_LICENCES", {"license.txt": "no-such-package"})
     code, _, err = command("build")
     assert code == 2
-    assert "no icon; fmus/draw_icons.py draws one" in err
+    assert "no-such-package: no licenses/LICENSE among its metadata; install it with pip" in err
 
 
 @pytest.mark.parametrize("verb", ["inspect", "doctor"])

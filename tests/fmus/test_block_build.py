@@ -20,14 +20,18 @@ from dataclasses import dataclass
 from math import exp
 from typing import Annotated, NamedTuple
 
+from block_variables import Input, Output, Parameter
+
 
 @dataclass(frozen=True)
 class Params:
-    time_constant: Annotated[float, "s", "T, time constant", (1e-3, 1e3)] = 0.5
+    time_constant: Annotated[
+        float, Parameter("T, time constant", unit="s", low=1e-3, high=1e3)
+    ] = 0.5
 
 
 class Inputs(NamedTuple):
-    u: Annotated[float, "N", "what it follows", 1.0] = 1.0
+    u: Annotated[float, Input("what it follows", unit="N", nominal=1.0)] = 1.0
 
 
 class State(NamedTuple):
@@ -35,7 +39,7 @@ class State(NamedTuple):
 
 
 class Outputs(NamedTuple):
-    y: Annotated[float, "N", "what follows", 1.0, set()]
+    y: Annotated[float, Output("what follows", unit="N", nominal=1.0, depends_on=set())]
 
 
 def initial_state(p, u):
@@ -134,7 +138,7 @@ def test_any_ends_of_lines_do(tmp_path: Path, end: str) -> None:
             "import gripper_plant\nfrom math",
             "line 7: gripper_plant must be imported at the top level, with single spaces, ",
         ),
-        ("def step(", "def step((", "line 32: is no Python: "),
+        ("def step(", "def step((", "line 36: is no Python: "),
         ("from math", "1 / 0\nfrom math", "line 7: import: ZeroDivisionError: division by zero"),
         ("from math", "raise SystemExit(3)\nfrom math", "line 7: import: SystemExit: 3"),
         (
@@ -146,11 +150,14 @@ def test_any_ends_of_lines_do(tmp_path: Path, end: str) -> None:
         ("from math", "\0\nfrom math", "is no Python: source code string cannot contain null "),
         ("def step", "def advance", "has no step; a block has Params, Inputs, State, Outputs, "),
         ("= 1.0\n", "\n", "Inputs(): TypeError: "),
-        ('follows", 1.0, ', 'follows", ', "declaration: TypeError: y: must have a nominal value"),
+        (", nominal=1.0, depends", ", depends", "declaration: TypeError: y: must have a nominal "),
+        (", depends_on=set()", "", "declaration: TypeError: y: must have the inputs that reach"),
+        ("high=1e3", "hihg=1e3", "line 16: import: TypeError: Parameter.__init__() got an unexpec"),
+        ('Input("what', 'Output("what', 'declaration: TypeError: u: must be Annotated[type, Inpu'),
         ("u: Annotated[float,", "u: Annotated[int,", "declaration: TypeError: u is int: must be "),
         ("y: Annotated[float,", "y: Annotated[str,", "declaration: TypeError: y is str: must be "),
-        ("State(0.0)", "Stat(0.0)", "line 29: initial_state(): NameError: name 'Stat' is not "),
-        ("x.y - u.u", "x.y - u.v", "line 33: step(): AttributeError: 'Inputs' object has no "),
+        ("State(0.0)", "Stat(0.0)", "line 33: initial_state(): NameError: name 'Stat' is not "),
+        ("x.y - u.u", "x.y - u.v", "line 37: step(): AttributeError: 'Inputs' object has no "),
         ("Outputs(x.y)", "(x.y, x.y)", "outputs(): ValueError: too many values to unpack"),
         ("exp(-h / p.time_constant)", "float('nan')", "step(): ValueError: State.y = nan: must "),
         ("Outputs(x.y)", "Outputs(x.y - 1e999)", "outputs(): ValueError: y = -inf N: must be fini"),

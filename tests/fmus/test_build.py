@@ -10,19 +10,13 @@ from pathlib import Path
 import pytest
 from grasp_fmus import fmu
 from grasp_fmus.build import build
+from grasp_fmus.documentation import icon
 from grasp_fmus.fmu import HASH, build_fmu
 from grasp_fmus.folder import STAMP, Built, is_current, sources_hash
 from grasp_fmus.packing import package_folder, packages
-from grasp_fmus.shipped import SCRIPTS
+from grasp_fmus.shipped import SCRIPTS, blocks
 
-NAMES = [
-    "GraspController",
-    "GripperPlant",
-    "GripperPlantCompliant",
-    "GripperPlantMovable",
-    "GripperPlantMuJoCo",
-    "ProximitySensor",
-]
+NAMES = list(blocks())
 FMUS = [f"{name}.fmu" for name in NAMES]
 CHECKED = [name for name in NAMES if name != "GripperPlantMuJoCo"]
 """Those with cross-check files; of the other they would check the package that it needs."""
@@ -42,6 +36,10 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 def times(folder: Path) -> dict[str, int]:
     return {path.name: path.stat().st_mtime_ns for path in folder.iterdir()}
+
+
+def test_there_is_a_plant_a_sensor_and_a_controller() -> None:
+    assert {"GraspController", "GripperPlant", "ProximitySensor"} <= set(NAMES)
 
 
 def test_builds_the_fmus_with_their_cross_check_files(fmus: Path) -> None:
@@ -84,7 +82,7 @@ def test_everything_an_fmu_should_have(fmus: Path, name: str) -> None:
         found = {n for n in archive.namelist() if not n.startswith("resources/")}
     assert found - {n for n in found if n.startswith("documentation/licenses/")} == {
         "modelDescription.xml",
-        "model.png",
+        *(["model.png"] if icon(name) else []),
         "documentation/index.html",
         f"binaries/linux64/{name}.so",
         f"binaries/win64/{name}.dll",

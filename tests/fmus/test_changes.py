@@ -20,11 +20,14 @@ OPTICS, CARD = "proximity_sensor/optics.py", "README.md"
 CLOCK = "proximity_sensor/clock.py"
 """Of the parameters the last."""
 
-GAIN = "(0.0, 1e6)] = 0.0024"
-EXPONENT = '"n, diffusion exponent", (0.1, 10.0)]'
-OUTPUT = '    intensity: Annotated[float, "V", "xi, offset-compensated output", 0.1, {"gap"}]\n'
+GAIN = "low=0.0, high=1e6)\n    ] = 0.0024"
+EXPONENT = '"n, diffusion exponent", unit="1", low=0.1, high=10.0)'
+OUTPUT = (
+    "    intensity: Annotated[\n        float, "
+    'Output("xi, offset-compensated output", unit="V", nominal=0.1, depends_on={"gap"})\n    ]\n'
+)
 FORMULA = "p.gain * p.alpha / (l + p.offset_distance) ** p.diffusion_exponent"
-RATE = "(1.0, 1e6)] = 10_000.0\n"
+RATE = "high=1e6)\n    ] = 10_000.0\n"
 
 DESCRIPTION, SOURCE = "modelDescription.xml: changed", f"resources/{OPTICS}: changed"
 
@@ -103,17 +106,17 @@ def test_a_change_is_reported_once(build: Build) -> None:
             id="file",
         ),
         pytest.param(
-            [(OPTICS, GAIN, "(0.0, 1e6)] = 0.0025")],
+            [(OPTICS, GAIN, GAIN.replace("0.0024", "0.0025"))],
             ["gain: nominal 0.0024 -> 0.0025", "gain: start 0.0024 -> 0.0025", DESCRIPTION, SOURCE],
             id="start",
         ),
         pytest.param(
-            [(OPTICS, GAIN, "(1e-9, 5.0)] = 0.0024")],
+            [(OPTICS, GAIN, GAIN.replace("low=0.0, high=1e6", "low=1e-9, high=5.0"))],
             ["gain: max 1000000.0 -> 5.0", "gain: min 0.0 -> 1e-09", DESCRIPTION, SOURCE],
             id="range",
         ),
         pytest.param(
-            [(OPTICS, GAIN, '(0.0, 1e6), "tunable"] = 0.0024')],
+            [(OPTICS, GAIN, GAIN.replace("1e6", "1e6, tunable=True"))],
             ["gain: variability fixed -> tunable", DESCRIPTION, SOURCE],
             id="variability",
         ),
@@ -145,7 +148,8 @@ def test_a_change_is_reported_once(build: Build) -> None:
         pytest.param(
             [
                 (CLOCK, RATE,
-                 f'{RATE}    jitter: Annotated[float, "s", "jitter", (0.0, 1.0)] = 0.0\n'),
+                 f"{RATE}    jitter: Annotated[float, "
+                 'Parameter("jitter", unit="s", low=0.0, high=1.0)] = 0.0\n'),
             ],
             [
                 "sampling.jitter: added",
@@ -175,7 +179,7 @@ def test_a_file_that_nothing_imports_changes_nothing(build: Build) -> None:
 def test_variables_that_follow_move_up(build: Build) -> None:
     """The value reference is part of the interface: a host may have it written down."""
     text = '    """What the sensor looks at."""\n'
-    added = f'{text}\n    tilt: Annotated[float, "1", "tilt", 0.1] = 0.0\n'
+    added = f'{text}\n    tilt: Annotated[float, Input("tilt", unit="1", nominal=0.1)] = 0.0\n'
     build()
     lines = build((OPTICS, text, added)).changes
     names = [name for f in declared(channel) for name in f.names]

@@ -74,7 +74,11 @@ def test_a_packed_module_imports_the_standard_library_and_packed_ones(
     ours = {module for module in imported if module not in sys.stdlib_module_names}
     at_need = {"mujoco"} if name == "GripperPlantMuJoCo" else set()
     assert ours == {file.partition("/")[0] for file in packed if "/" in file} | at_need
-    assert ours >= {f"{BLOCKS[name].name}_{content}", f"grasp_fmus_{content}"}
+    assert ours >= {
+        f"{BLOCKS[name].name}_{content}",
+        f"grasp_fmus_{content}",
+        f"block_variables_{content}",
+    }
 
 
 def imports(tree: ast.AST) -> Iterator[str]:
@@ -223,7 +227,7 @@ import GripperPlantMuJoCo, ProximitySensor
 MODULES = {
     name: module for name, module in sys.modules.items()
     if name.partition(".")[0] in (
-        "gripper_plant", "proximity_sensor", "grasp_controller", "grasp_fmus",
+        "gripper_plant", "proximity_sensor", "grasp_controller", "grasp_fmus", "block_variables",
         "GraspController", "GripperPlant", "GripperPlantCompliant", "GripperPlantMovable",
         "GripperPlantMuJoCo", "ProximitySensor",
     )

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 from typing import Annotated, Any, NamedTuple
 
 import pytest
+from block_variables import Input, Output, Parameter
 from grasp_fmus.contract import (
     build_params,
     count,
@@ -22,9 +23,9 @@ Pair = tuple[float, float]
 
 @dataclass(frozen=True)
 class Inner:
-    on: Annotated[bool, "", "a switch"] = True
-    bits: Annotated[int, "", "a whole number", (1, 9)] = 3
-    rate: Annotated[Pair, "1/s", "rates", (-2.0, 3.0)] = (-0.5, 0.25)
+    on: Annotated[bool, Parameter("a switch")] = True
+    bits: Annotated[int, Parameter("a whole number", low=1, high=9)] = 3
+    rate: Annotated[Pair, Parameter("rates", unit="1/s", low=-2.0, high=3.0)] = (-0.5, 0.25)
 
     def __post_init__(self) -> None:
         if self.rate[0] > 1.0:
@@ -33,22 +34,35 @@ class Inner:
 
 @dataclass(frozen=True)
 class Params:
-    mass: Annotated[float, "kg", "m, a mass", (0.5, 7.0)] = 2.0
+    mass: Annotated[float, Parameter("m, a mass", unit="kg", low=0.5, high=7.0)] = 2.0
     inner: Inner = Inner()
-    offset: Annotated[float, "m", "from zero", (-1.0, 1.0), "tunable"] = 0.0
+    offset: Annotated[float, Parameter("from zero", unit="m", low=-1.0, high=1.0, tunable=True)] = (
+        0.0
+    )
 
 
 class Inputs(NamedTuple):
-    gap: Annotated[float, "m", "a distance", 0.1] = 0.3
-    force: Annotated[Pair, "N", "two forces", 5.0] = (1.0, -1.0)
-    armed: Annotated[tuple[bool, bool], "", "two switches"] = (False, True)
+    gap: Annotated[float, Input("a distance", unit="m", nominal=0.1)] = 0.3
+    force: Annotated[Pair, Input("two forces", unit="N", nominal=5.0)] = (1.0, -1.0)
+    armed: Annotated[tuple[bool, bool], Input("two switches")] = (False, True)
 
 
 class Outputs(NamedTuple):
-    both: Annotated[Pair, "N", "from all forces", 2.0, {"force"}]
-    own: Annotated[Pair, "m", "from its own force", 3.0, {"armed", "force[j]"}]
-    late: Annotated[float, "m", "only at the start", 4.0, set(), {"gap"}]
-    never: Annotated[bool, "", "from no input", set()]
+    both: Annotated[Pair, Output("from all forces", unit="N", nominal=2.0, depends_on={"force"})]
+    own: Annotated[
+        Pair, Output("from its own force", unit="m", nominal=3.0, depends_on={"armed", "force[j]"})
+    ]
+    late: Annotated[
+        float,
+        Output(
+            "only at the start",
+            unit="m",
+            nominal=4.0,
+            depends_on=set(),
+            depends_initially_on={"gap"},
+        ),
+    ]
+    never: Annotated[bool, Output("from no input", depends_on=set())]
 
 
 def block(params: Any = Params, inputs: Any = Inputs, outputs: Any = Outputs) -> Any:
@@ -183,29 +197,31 @@ def test_a_field_must_be_annotated(parts: dict[str, Any], name: str) -> None:
 
 
 class Unreached(NamedTuple):
-    force: Annotated[float, "N", "reached by who knows what", 1.0]
+    force: Annotated[float, Output("reached by who knows what", unit="N", nominal=1.0)]
 
 
 class UnreachedSwitch(NamedTuple):
-    force: Annotated[bool, "", "reached by who knows what"]
+    force: Annotated[bool, Output("reached by who knows what")]
 
 
 @pytest.mark.parametrize("outputs", [Unreached, UnreachedSwitch])
 def test_an_output_must_say_what_reaches_it(outputs: Any) -> None:
-    with pytest.raises(TypeError, match=r"^force: must have the set of inputs that reach it"):
+    with pytest.raises(
+        TypeError, match=r"^force: must have the inputs that reach it .*depends_on="
+    ):
         declared(block(outputs=outputs))
 
 
 class InputWithoutNominal(NamedTuple):
-    force: Annotated[float, "N", "how large?"] = 1.0
+    force: Annotated[float, Input("how large?", unit="N")] = 1.0
 
 
 class PairWithoutNominal(NamedTuple):
-    force: Annotated[Pair, "N", "how large?"] = (1.0, 1.0)
+    force: Annotated[Pair, Input("how large?", unit="N")] = (1.0, 1.0)
 
 
 class OutputWithoutNominal(NamedTuple):
-    force: Annotated[float, "N", "how large?", set()]
+    force: Annotated[float, Output("how large?", unit="N", depends_on=set())]
 
 
 @pytest.mark.parametrize(
@@ -217,20 +233,23 @@ class OutputWithoutNominal(NamedTuple):
     ],
 )
 def test_a_real_input_or_output_must_have_a_nominal_value(parts: dict[str, Any]) -> None:
-    with pytest.raises(TypeError, match=r"^force: must have a nominal value, a float"):
+    with pytest.raises(TypeError, match=r"^force: must have a nominal value, nominal="):
         declared(block(**parts))
 
 
 class Misspelt(NamedTuple):
-    misspelt: Annotated[float, "m", "", 1.0, {"gapp"}]
+    misspelt: Annotated[float, Output("", unit="m", nominal=1.0, depends_on={"gapp"})]
 
 
 class NoPair(NamedTuple):
-    own: Annotated[Pair, "m", "", 1.0, {"gap[j]"}]
+    own: Annotated[Pair, Output("", unit="m", nominal=1.0, depends_on={"gap[j]"})]
 
 
 class NoSuchAtTheStart(NamedTuple):
-    late: Annotated[float, "m", "", 1.0, set(), {"force[1]"}]
+    late: Annotated[
+        float,
+        Output("", unit="m", nominal=1.0, depends_on=set(), depends_initially_on={"force[1]"}),
+    ]
 
 
 @pytest.mark.parametrize(
@@ -251,7 +270,7 @@ class NoInputs(NamedTuple):
 
 
 class Source(NamedTuple):
-    level: Annotated[float, "m", "", 1.0, set()]
+    level: Annotated[float, Output("", unit="m", nominal=1.0, depends_on=set())]
 
 
 def test_a_block_may_have_no_inputs() -> None:
@@ -267,7 +286,7 @@ class Colour(IntEnum):
 
 @dataclass(frozen=True)
 class Coloured:
-    colour: Annotated[Colour, "", "a choice", "tunable"] = Colour.DARK_BLUE
+    colour: Annotated[Colour, Parameter("a choice", tunable=True)] = Colour.DARK_BLUE
 
 
 def test_an_int_enum_is_an_enumeration() -> None:
@@ -279,50 +298,53 @@ def test_an_int_enum_is_an_enumeration() -> None:
 
 
 class Choice(NamedTuple):
-    colour: Annotated[Colour, "", "a choice"] = Colour.RED
+    colour: Annotated[Colour, Input("a choice")] = Colour.RED
 
 
 class WholeNumber(NamedTuple):
-    number: Annotated[int, "", "a number"] = 1
+    number: Annotated[int, Input("a number")] = 1
 
 
 class WholeNumbers(NamedTuple):
-    number: Annotated[tuple[int, int], "", "two numbers"] = (1, 2)
+    number: Annotated[tuple[int, int], Input("two numbers")] = (1, 2)
 
 
 class Chosen(NamedTuple):
-    colour: Annotated[Colour, "", "a choice", set()]
+    colour: Annotated[Colour, Output("a choice", depends_on=set())]
 
 
 class Optional(NamedTuple):
-    gap: Annotated[float | None, "m", "a distance", 0.1] = None
+    gap: Annotated[float | None, Input("a distance", unit="m", nominal=0.1)] = None
 
 
 class Mixed(NamedTuple):
-    both: Annotated[tuple[float, bool], "m", "a distance, and whether it is one", 0.1, set()]
+    both: Annotated[
+        tuple[float, bool],
+        Output("a distance, and whether it is one", unit="m", nominal=0.1, depends_on=set()),
+    ]
 
 
 class AnyNumber(NamedTuple):
-    gap: Annotated[tuple[float, ...], "m", "distances", 0.1] = ()
+    gap: Annotated[tuple[float, ...], Input("distances", unit="m", nominal=0.1)] = ()
 
 
 class NoNumber(NamedTuple):
-    gap: Annotated[tuple[()], "m", "distances", 0.1] = ()
+    gap: Annotated[tuple[()], Input("distances", unit="m", nominal=0.1)] = ()
 
 
 @dataclass(frozen=True)
 class Colours:
-    colours: Annotated[tuple[Colour, Colour], "", "two choices"] = (Colour.RED, Colour.RED)
+    colours: Annotated[tuple[Colour, Colour], Parameter("two choices")] = (Colour.RED, Colour.RED)
 
 
 @dataclass(frozen=True)
 class OptionalParameter:
-    mass: Annotated[float | None, "kg", "a mass", (0.5, 7.0)] = None
+    mass: Annotated[float | None, Parameter("a mass", unit="kg", low=0.5, high=7.0)] = None
 
 
 @dataclass(frozen=True)
 class Text:
-    title: Annotated[str, "", "a text"] = ""
+    title: Annotated[str, Parameter("a text")] = ""
 
 
 @pytest.mark.parametrize(

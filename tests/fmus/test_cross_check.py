@@ -11,6 +11,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import pytest
+from block_variables import Input, Output
 from conftest import Altered
 from fmpy import read_model_description, simulate_fmu
 from fmpy.cross_check.validate_vendor_repo import read_csv as read_csv_of_the_rules
@@ -153,7 +154,7 @@ def test_an_importer_with_a_step_of_its_own_passes(folder: Path, name: str) -> N
     ("name", "source", "before", "after"),
     [
         ("ProximitySensor", "proximity_sensor/optics.py", "p.gain *", "1.0001 * p.gain *"),
-        ("GripperPlant", "gripper_plant/fingers.py", "return half +", "return 1e-6 + half +"),
+        ("GripperPlant", "gripper_plant/fingers.py", "Side(half +", "Side(1e-6 + half +"),
         ("GraspController", "grasp_controller/series.py", "u.position), 0.0", "u.position), 1e-4"),
     ],
 )
@@ -210,14 +211,14 @@ class Params:
 class Inputs(NamedTuple):
     """A switch and a signal."""
 
-    on: Annotated[bool, "", "a switch"] = True
-    signal: Annotated[float, "1", "a signal", 2.0] = 1.0
+    on: Annotated[bool, Input("a switch")] = True
+    signal: Annotated[float, Input("a signal", unit="1", nominal=2.0)] = 1.0
 
 
 class Outputs(NamedTuple):
     """The inverse of something that reaches zero, if it is wanted."""
 
-    value: Annotated[float, "1", "the value", 1.0, {"signal"}]
+    value: Annotated[float, Output("the value", unit="1", nominal=1.0, depends_on={"signal"})]
 
 
 def other(power: float) -> Any:

@@ -1,30 +1,25 @@
 """The page, the licences and the icon that every FMU holds."""
 
-import importlib
 import runpy
 import struct
 import zipfile
 from importlib import metadata
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 from xml.etree import ElementTree
 
 import pytest
 from grasp_fmus import documentation
 from grasp_fmus.contract import Field, declared
 from grasp_fmus.documentation import PROXY, icon, licences, page
-from grasp_fmus.shipped import SCRIPTS
+from grasp_fmus.fmu import build_fmu
+from grasp_fmus.shipped import SCRIPTS, blocks
 
 ROOT = Path(__file__).parents[2]
 
-BLOCKS = {
-    "GripperPlant": ("plant", "gripper_plant.rigid"),
-    "GripperPlantCompliant": ("plant", "gripper_plant.compliant"),
-    "GripperPlantMovable": ("plant", "gripper_plant.movable"),
-    "GripperPlantMuJoCo": ("plant", "gripper_plant.mujoco_box"),
-    "ProximitySensor": ("sensor", "proximity_sensor.channel"),
-    "GraspController": ("controller", "grasp_controller.series"),
-}
+BLOCKS = blocks()
+ICONS = sorted(file.stem for file in documentation.ICONS.glob("*.png"))
 SECTIONS = {
     "How the host must find Python": [
         "inside the binary of pythonfmu", "64 bit", "Python 3.11 or newer", "a Python process",
@@ -52,7 +47,7 @@ def name(request: pytest.FixtureRequest) -> str:
 @pytest.fixture(scope="module")
 def html(name: str) -> str:
     """The page of an FMU, from its card in the repository."""
-    card = (ROOT / BLOCKS[name][0] / "README.md").read_text("utf-8")
+    card = folder(BLOCKS[name]).joinpath("README.md").read_text("utf-8")
     return page(name, "A summary", card, "1.2.3")
 
 
@@ -91,10 +86,6 @@ def rendered(markdown: str) -> str:
     return html.partition("grasp-cosim 1.2.3.</p>\n")[2].partition("<h2>How the host")[0].strip()
 
 
-def test_every_fmu_has_a_card_here() -> None:
-    assert {script.stem for script in SCRIPTS.glob("*.py")} == set(BLOCKS)
-
-
 def test_the_page_is_well_formed_and_says_what_it_is(html: str, name: str) -> None:
     root = parsed(html)
     assert html.startswith("<!DOCTYPE html>\n")
@@ -107,7 +98,7 @@ def test_the_page_is_well_formed_and_says_what_it_is(html: str, name: str) -> No
 
 
 def test_every_variable_is_in_the_table(html: str, name: str) -> None:
-    fields = declared(importlib.import_module(BLOCKS[name][1]))
+    fields = declared(BLOCKS[name])
     rows = [[text(cell) for cell in row] for row in parsed(html).iter("tr")]
     described = {row[0]: row for row in rows if len(row) == 7}
     for f in fields:
@@ -115,23 +106,26 @@ def test_every_variable_is_in_the_table(html: str, name: str) -> None:
         assert f.causality in row[1]
         assert row[2] == f.unit
         assert row[6] == f.description
-    assert set(described) == {"variable", *variables_of(BLOCKS[name][0])}
+    assert set(described) == {"variable", *variables_of(folder(BLOCKS[name]))}
 
 
 def shown(f: Field) -> str:
     return ".".join(f.path) + (f"[1..{f.size}]" if f.size else "")
 
 
-def variables_of(folder: str) -> set[str]:
+def folder(block: Any) -> Path:
+    """Where its card lies."""
+    return Path(block.__file__).parents[1]
+
+
+def variables_of(card: Path) -> set[str]:
     """Of all FMUs that share a card."""
-    modules = [
-        importlib.import_module(module) for card, module in BLOCKS.values() if card == folder
-    ]
-    return {shown(f) for module in modules for f in declared(module)}
+    sharing = [block for block in BLOCKS.values() if folder(block) == card]
+    return {shown(f) for block in sharing for f in declared(block)}
 
 
 def test_the_equations_are_set_as_they_are_written(html: str, name: str) -> None:
-    card = (ROOT / BLOCKS[name][0] / "README.md").read_text("utf-8")
+    card = folder(BLOCKS[name]).joinpath("README.md").read_text("utf-8")
     equations = [line.strip() for line in card.splitlines() if line.startswith("    ")]
     set_as_code = "".join("".join(e.itertext()) for e in parsed(html).iter("pre"))
     assert equations
@@ -226,9 +220,9 @@ def test_a_missing_licence_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
         licences()
 
 
-@pytest.mark.parametrize("name", [*BLOCKS, "Proxy"])
+@pytest.mark.parametrize("name", ICONS)
 def test_the_icon_is_a_small_picture_with_a_transparent_background(name: str) -> None:
-    png = icon(name)
+    png = icon(name) or b""
     assert png.startswith(b"\x89PNG\r\n\x1a\n")
     length, kind, width, height, depth, color = struct.unpack(">I4sIIBB", png[8:26])
     assert (length, kind, width, height, depth) == (13, b"IHDR", 256, 256, 8)
@@ -237,18 +231,22 @@ def test_the_icon_is_a_small_picture_with_a_transparent_background(name: str) ->
     assert b"tEXt" not in png  # neither program nor date
 
 
-def test_icons_differ_and_there_is_one_per_fmu_and_one_for_proxies() -> None:
+def test_icons_differ_and_each_is_of_an_fmu_or_of_proxies() -> None:
     files = list(documentation.ICONS.iterdir())
-    assert {file.name for file in files} == {f"{name}.png" for name in (*BLOCKS, "Proxy")}
+    assert {"GraspController", "GripperPlant", "ProximitySensor", "Proxy"} <= set(ICONS)
+    assert set(ICONS) <= {*BLOCKS, "Proxy"}
     assert len({file.read_bytes() for file in files}) == len(files)
 
 
-def test_a_missing_icon_is_named() -> None:
-    with pytest.raises(FileNotFoundError, match=r"^Nonesuch: no icon; fmus/draw_icons\.py"):
-        icon("Nonesuch")
+def test_an_fmu_need_not_have_an_icon(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(documentation, "ICONS", tmp_path)
+    assert icon("GripperPlant") is None
+    built = build_fmu(SCRIPTS / "GripperPlant.py", tmp_path)
+    with zipfile.ZipFile(built.path) as archive:
+        assert "model.png" not in archive.namelist()
 
 
-@pytest.mark.parametrize("name", [*BLOCKS, "Proxy"])
+@pytest.mark.parametrize("name", ICONS)
 def test_the_script_draws_the_icons(tmp_path: Path, name: str) -> None:
     image = pytest.importorskip("matplotlib.image")
     runpy.run_path(str(ROOT / "fmus" / "draw_icons.py"))["main"](tmp_path)
@@ -266,7 +264,8 @@ def test_the_fmu_holds_page_licences_and_icon(fmus: Path, name: str) -> None:
         assert links(html)
         for link in links(html):
             assert archive.read(f"documentation/{link}") == licences()[Path(link).name]
-        assert archive.read("model.png") == icon(name)
+        if name in ICONS:
+            assert archive.read("model.png") == icon(name)
 
 
 def test_a_bound_fmu_says_what_it_is_bound_to() -> None:

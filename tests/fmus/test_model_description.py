@@ -75,7 +75,8 @@ class Declared(NamedTuple):
     kind: type[Any]
     unit: str
     start: Any
-    rest: tuple[Any, ...]
+    limits: tuple[float, float] | None
+    nominal: float | None
 
 
 def declarations(block: Any) -> dict[str, Declared]:
@@ -93,13 +94,18 @@ def _declarations(cls: Any, causality: str, values: Any) -> Iterator[tuple[str, 
             for inner, found in _declarations(hint, causality, value):
                 yield f"{name}.{inner}", found
             continue
-        kind, unit, _, *rest = get_args(hint)
+        kind, declared = get_args(hint)
+        limits = (declared.low, declared.high) if causality == "parameter" else (-inf, inf)
+        facts = (None if limits == (-inf, inf) else limits, getattr(declared, "nominal", None))
         if get_origin(kind) is tuple:
             for index, item in enumerate(get_args(kind)):
                 start = None if value is None else value[index]
-                yield f"{name}[{index + 1}]", Declared(causality, item, unit, start, tuple(rest))
+                yield (
+                    f"{name}[{index + 1}]",
+                    Declared(causality, item, declared.unit, start, *facts),
+                )
         else:
-            yield name, Declared(causality, kind, unit, value, tuple(rest))
+            yield name, Declared(causality, kind, declared.unit, value, *facts)
 
 
 # The file as a whole
@@ -254,12 +260,7 @@ def test_booleans_say_true_or_false(root: Element) -> None:
 
 
 def test_min_and_max_are_the_range_of_the_parameter(root: Element, name: str) -> None:
-    expected = {
-        n: limits
-        for n, d in declarations(BLOCKS[name]).items()
-        for limits in d.rest
-        if isinstance(limits, tuple)
-    }
+    expected = {n: d.limits for n, d in declarations(BLOCKS[name]).items() if d.limits}
     expected |= {
         n: (min(d.kind), max(d.kind))
         for n, d in declarations(BLOCKS[name]).items()
@@ -288,7 +289,7 @@ def test_nominal_values_are_those_declared(root: Element, name: str) -> None:
         if d.causality == "parameter":
             expected[n] = abs(d.start) if d.kind is float else 0.0
         else:
-            expected[n] = next((r for r in d.rest if isinstance(r, float)), 0.0)
+            expected[n] = d.nominal or 0.0
     expected = {n: nominal for n, nominal in expected.items() if nominal}
     found = {n: float(r.attrib["nominal"]) for n, r in reals(root).items() if "nominal" in r.attrib}
     assert found == expected

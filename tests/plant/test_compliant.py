@@ -7,7 +7,7 @@ from math import cos, exp, sin, sqrt
 
 import numpy as np
 import pytest
-from gripper_plant import compliant, contact_laws, fingers, friction
+from gripper_plant import compliant, contact_laws, friction
 from gripper_plant.compliant import Inputs, Pair, Params, State
 from gripper_plant.contact_laws import HuntCrossley, KelvinVoigt, mean_force
 from hypothesis import given
@@ -28,7 +28,7 @@ LAWS = {"Kelvin-Voigt": VOIGT, "Hunt-Crossley": HUNT}
 
 def arrival(p: Params) -> State:
     """Finger 1 at the surface, on its way in."""
-    right, _ = fingers.surfaces(p)
+    right = p.sides[0].surface
     return State((right, -0.11), (-V, 0.0), (0.0, 0.0), False)
 
 
@@ -44,13 +44,13 @@ def after(p: Params, x: State, force: Pair, h: float, n: int) -> State:
 
 
 def depth(p: Params, x: State) -> float:
-    return fingers.surfaces(p)[0] - x.position[0]
+    return p.sides[0].surface - x.position[0]
 
 
 def stored(p: Params, x: State) -> float:
     """Energy of the motion and of both sides of the object, J."""
     law = contact_laws.law(p.kelvin_voigt, p.hunt_crossley)
-    right, left = fingers.surfaces(p)
+    right, left = (side.surface for side in p.sides)
     gaps = (x.position[0] - right, -x.position[1] - left)
     kinetic = sum(0.5 * m * v * v for m, v in zip(p.finger_mass, x.velocity, strict=True))
     return kinetic + sum(contact_laws.energy(law, -gap) for gap in gaps)
@@ -125,7 +125,7 @@ def test_the_order_of_convergence(name: str) -> None:
     The object is so narrow that no step is divided.
     """
     p, t = replace(LAWS[name], object_width=0.02), 0.03
-    start = arrival(p)._replace(position=(fingers.surfaces(p)[0] + 0.00137, -0.11))
+    start = arrival(p)._replace(position=(p.sides[0].surface + 0.00137, -0.11))
     steps = [150, 300, 600, 1200]
     fine = after(p, start, (-0.5, 0.0), t / 19200, 19200)
     errors = [

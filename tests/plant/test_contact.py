@@ -8,8 +8,9 @@ from math import ceil, exp, floor, inf, isclose, pi, sqrt
 import numpy as np
 import numpy.typing as npt
 import pytest
-from gripper_plant import rigid
-from gripper_plant.contact import Finger, advance, substeps, time_to_contact
+from gripper_plant import contact, friction, rigid
+from gripper_plant.contact import Finger, Rates, time_to_contact
+from gripper_plant.fingers import Side
 from gripper_plant.rigid import Inputs, Pair, Params, State
 from hypothesis import assume, given
 from hypothesis import strategies as st
@@ -32,6 +33,18 @@ SPEEDS = st.floats(1e-3, 1.0)
 
 BAUMGARTE = [(200.0, 200.0), (400.0, 200.0), (60.0, 200.0)]
 """Critical, strong and weak damping."""
+
+
+def advance(
+    s: float, v: float, surface: float, m: float, f: float, alpha: float, beta: float, h: float
+) -> Finger:
+    """A finger without friction, h seconds later."""
+    side = Side(surface, m, friction.NONE)
+    return contact.advance(side, Rates(alpha, beta), s, v, f, h)
+
+
+def substeps(alpha: float, beta: float, h: float) -> int:
+    return contact.substeps(Rates(alpha, beta), h)
 
 
 def run(

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from gripper_plant import contact, fingers, friction, rigid
-from gripper_plant.fingers import Actuator, Inputs
+from gripper_plant.fingers import Actuator, Inputs, Side
 from gripper_plant.friction import Law, Params, move, resistance
 from hypothesis import given
 from hypothesis import strategies as st
@@ -237,10 +237,10 @@ def test_without_friction_the_fingers_are_those_of_the_contact_alone() -> None:
     p, h = rigid.Params(), 1e-3
     assert not any(map(friction.acts, (*friction.laws(p.friction), friction.NONE)))
     x = rigid.initial_state(p, Inputs())
-    finger = (0.11, 0.0, 0.0)
+    finger, side = (0.11, 0.0, 0.0), Side(0.065, 0.5, friction.NONE)
     for _ in range(400):
         s, v, _ = finger
-        finger = contact.advance(s, v, 0.065, 0.5, -2.0, 200.0, 200.0, h)
+        finger = contact.advance(side, contact.Rates(200.0, 200.0), s, v, -2.0, h)
         x = rigid.step(p, x, Inputs((-2.0, 0.0)), h)
         assert (x.position[0], x.velocity[0], x.contact_force[0]) == finger
     assert finger[2] > 0.0
@@ -266,7 +266,7 @@ def test_a_value_outside_its_range_is_refused(parameter: Parameter) -> None:
             Params(**{parameter.name: value})
         text = str(caught.value)
         assert text.startswith(f"friction.{parameter.name} = {number!r} {parameter.unit}: ")
-        assert text.endswith(f"must be from {parameter.low:g} to {parameter.high:g}")
+        assert text.endswith(parameter.valid)
 
 
 def test_a_force_limit_below_zero_is_refused() -> None:

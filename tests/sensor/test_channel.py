@@ -341,8 +341,7 @@ def test_a_value_outside_its_range_is_refused(stage: str, parameter: Parameter) 
         with pytest.raises(ValueError, match=r"^\w+\.\w+ = ") as caught:
             block(**{parameter.name: value})
         assert str(caught.value) == (
-            f"{stage}.{parameter.name} = {number!r}{unit}: "
-            f"must be from {parameter.low:g} to {parameter.high:g}"
+            f"{stage}.{parameter.name} = {number!r}{unit}: {parameter.valid}"
         )
 
 
@@ -367,5 +366,7 @@ def test_the_filter_must_fit_the_sampling() -> None:
 
 
 def test_the_optics_check_their_parameters_here_too() -> None:
-    with pytest.raises(ValueError, match=r"^gain = -1\.0 V\.m\^n: must be from 0 to 1e\+06$"):
+    with pytest.raises(
+        ValueError, match=r"^gain = -1\.0 V\.m\^n: must be from 0 to 1e\+06 V\.m\^n$"
+    ):
         Params(gain=-1.0)

@@ -15,6 +15,12 @@ class Parameter:
     high: float
     default: Any
 
+    @property
+    def valid(self) -> str:
+        """The end of the message about another number."""
+        in_unit = f" {self.unit}" if self.unit else ""
+        return f"must be from {self.low:g} to {self.high:g}{in_unit}"
+
     def variants(self, value: float) -> list[Any]:
         """The default with value in place of the number, or of either number of the pair."""
         if isinstance(self.default, tuple):
@@ -34,6 +40,8 @@ def parameters(block: type[Any]) -> list[Parameter]:
     found = []
     for name, hint in get_type_hints(block, include_extras=True).items():
         if not is_dataclass(hint) and hint.__origin__ is not bool:
-            unit, _, (low, high), *_ = hint.__metadata__
-            found.append(Parameter(name, unit, low, high, getattr(default, name)))
+            (declared,) = hint.__metadata__
+            found.append(
+                Parameter(name, declared.unit, declared.low, declared.high, getattr(default, name))
+            )
     return found

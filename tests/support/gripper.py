@@ -25,4 +25,4 @@ def assert_ranges_are_checked(part: type[Any], prefix: str = "", but: tuple[str,
                 part(**{parameter.name: value})
             text = str(caught.value)
             assert text.startswith(f"{prefix}{parameter.name} = {number!r} {parameter.unit}: ")
-            assert text.endswith(f"must be from {parameter.low:g} to {parameter.high:g}")
+            assert text.endswith(parameter.valid)

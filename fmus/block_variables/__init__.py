@@ -1,0 +1,90 @@
+"""How a block declares its variables, and the one check of their ranges.
+
+    class Inputs(NamedTuple):
+        gap: Annotated[float, Input("l, distance to the object", unit="m", nominal=0.1)] = 0.1
+
+Every field of Params, Inputs and Outputs is Annotated with its type and a Parameter, Input or
+Output. FMI variable, check and card follow from that. Standard library only: blocks import this
+package, and every FMU brings it along.
+"""
+
+from collections.abc import Collection
+from dataclasses import KW_ONLY, dataclass
+from functools import cache
+from math import inf, isfinite
+from typing import Any, get_type_hints
+
+__all__ = ["Input", "Output", "Parameter", "check", "check_value"]
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A parameter, valid from `low` to `high`; `tunable` if it may change at run time.
+
+    `unit` is one of SI, in FMI's way of writing it; empty for what has none.
+    """
+
+    description: str
+    _: KW_ONLY
+    unit: str = ""
+    low: float = -inf
+    high: float = inf
+    tunable: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Input:
+    """An input; `nominal` is the size that a real one usually has."""
+
+    description: str
+    _: KW_ONLY
+    unit: str = ""
+    nominal: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Output:
+    """An output; `depends_on` are the inputs that reach it without a step (direct feedthrough).
+
+    Of arrays, "velocity[j]" is the element with the same index. `depends_initially_on` are the
+    inputs that do so in initialisation mode, where the state itself is made from the inputs; left
+    out, they are the same.
+    """
+
+    description: str
+    _: KW_ONLY
+    unit: str = ""
+    nominal: float | None = None
+    depends_on: Collection[str] | None = None
+    depends_initially_on: Collection[str] | None = None
+
+
+def check(params: Any, group: str = "") -> None:
+    """Raise ValueError, naming the parameter, where a number of `params` is out of its range.
+
+    `group` is the name of the field under which the parameters of a block hold `params`.
+    """
+    for name, declared in _parameters(type(params)):  # type: ignore[arg-type]  # any type can be hashed
+        value = getattr(params, name)
+        label = f"{group}.{name}" if group else name
+        for number in value if isinstance(value, tuple) else (value,):
+            check_value(label, number, declared.unit, declared.low, declared.high)
+
+
+def check_value(
+    name: str, value: float, unit: str = "", low: float = -inf, high: float = inf
+) -> None:
+    """Raise ValueError unless `value` is a finite number from `low` to `high`."""
+    if not (low <= value <= high and isfinite(value)):
+        in_unit = f" {unit}" if unit else ""
+        limited = (low, high) != (-inf, inf)
+        valid = f"from {low:g} to {high:g}{in_unit}" if limited else "a finite number"
+        raise ValueError(f"{name} = {value!r}{in_unit}: must be {valid}")
+
+
+@cache
+def _parameters(kind: type[Any]) -> list[tuple[str, Parameter]]:
+    """Return the fields of `kind` that are declared as a Parameter; read once per class."""
+    hints = get_type_hints(kind, include_extras=True)
+    found = ((name, getattr(hint, "__metadata__", (None,))[0]) for name, hint in hints.items())
+    return [(name, declared) for name, declared in found if isinstance(declared, Parameter)]
