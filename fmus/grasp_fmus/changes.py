@@ -5,6 +5,7 @@ import re
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
+from typing import Any
 from xml.etree import ElementTree
 
 DESCRIPTION = "modelDescription.xml"
@@ -30,22 +31,31 @@ def changes(before: Mapping[str, bytes], after: Mapping[str, bytes]) -> tuple[st
     It says what was added, removed, or changed, and for a variable the value before.
     """
     try:
-        variables = tuple(_variable_changes(before[DESCRIPTION], after[DESCRIPTION]))
+        old, new = _attributes(before[DESCRIPTION]), _attributes(after[DESCRIPTION])
     except (KeyError, ElementTree.ParseError):
         return ("what was there is no FMU",)
-    return variables + tuple(_file_changes(_plain(before), _plain(after)))
+    return (*_changes(old, new), *_changes(_plain(before), _plain(after)))
 
 
-def _variable_changes(before: bytes, after: bytes) -> Iterator[str]:
-    old, new = _attributes(before), _attributes(after)
-    for name in sorted({*old, *new}):
-        if name not in old or name not in new:
-            yield f"{name}: {'added' if name in new else 'removed'}"
-            continue
-        for key in sorted({*old[name], *new[name]}):
-            was, now = old[name].get(key), new[name].get(key)
-            if was != now:
-                yield f"{name}: {key} {was or 'none'} -> {now or 'none'}"
+def _changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[str]:
+    """Yield a line for each name whose value differs, or for each attribute in the value."""
+    for name, was, now in _differences(before, after):
+        if was is None or now is None:
+            yield f"{name}: {'added' if was is None else 'removed'}"
+        elif isinstance(was, bytes):
+            yield f"{name}: changed"
+        else:
+            for key, old, new in _differences(was, now):
+                yield f"{name}: {key} {old or 'none'} -> {new or 'none'}"
+
+
+def _differences(
+    before: Mapping[str, Any], after: Mapping[str, Any]
+) -> Iterator[tuple[str, Any, Any]]:
+    """Yield names whose values differ, with both, in order; None where there is none."""
+    for name in sorted({*before, *after}):
+        if before.get(name) != after.get(name):
+            yield name, before.get(name), after.get(name)
 
 
 def _attributes(description: bytes) -> dict[str, dict[str, str]]:
@@ -58,14 +68,6 @@ def _attributes(description: bytes) -> dict[str, dict[str, str]]:
         }
         for variable in root.iter("ScalarVariable")
     }
-
-
-def _file_changes(before: Mapping[str, bytes], after: Mapping[str, bytes]) -> Iterator[str]:
-    for name in sorted({*before, *after}):
-        if name not in before or name not in after:
-            yield f"{name}: {'added' if name in after else 'removed'}"
-        elif before[name] != after[name]:
-            yield f"{name}: changed"
 
 
 def _plain(members: Mapping[str, bytes]) -> dict[str, bytes]:

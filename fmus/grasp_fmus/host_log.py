@@ -15,20 +15,11 @@ Log = Callable[[int, str], None]
 WARNING, DISCARD, ERROR = 1, 2, 3
 """FMI statuses."""
 
-CATEGORIES = {
-    WARNING: "logStatusWarning",
-    DISCARD: "logStatusDiscard",
-    ERROR: "logStatusError",
-}
+CATEGORIES = {WARNING: "logStatusWarning", DISCARD: "logStatusDiscard", ERROR: "logStatusError"}
 """The categories in use, by status; their names are those of the FMI standard."""
 
 _LOGGER = ctypes.CFUNCTYPE(
-    None,
-    ctypes.c_void_p,
-    ctypes.c_char_p,
-    ctypes.c_int,
-    ctypes.c_char_p,
-    ctypes.c_char_p,
+    None, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p
 )
 _NAME, _NAME_LENGTH, _SHORT_NAME, _CALLBACKS, _ENVIRONMENT = 0x10, 0x18, 0x20, 0x48, 0x20
 """Offsets, in the object: the instance name (a std::string of libstdc++) and the address of

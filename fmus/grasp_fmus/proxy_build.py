@@ -10,9 +10,9 @@ from .documentation import PROXY, icon
 from .fmu import write_fmu
 from .folder import Built
 from .host_log import ERROR, WARNING
-from .model_description import UNITS, Description, Experiment, Unit
+from .model_description import CAPABILITIES, UNITS, Description, Experiment, Unit
 from .proxy import DEFAULTS, Settings, own_variables
-from .variable import TYPES, Variable
+from .variable import Variable
 
 CARD = Path(__file__).parent / "link" / "README.md"
 
@@ -83,9 +83,8 @@ def _description(name: str, original: Original, own: Sequence[Variable]) -> Desc
         variables,
         {"s": UNITS["s"], **original.units},
         {
-            "needsExecutionTool": True,
+            **CAPABILITIES,
             "canHandleVariableCommunicationStepSize": original.can_vary_step,
-            "canNotUseMemoryManagementFunctions": True,
             "canGetAndSetFMUstate": False,
             "canSerializeFMUstate": False,
         },
@@ -113,11 +112,12 @@ def _script(name: str, original: Original, settings: Settings) -> str:
 
 def _card(own: Sequence[Variable]) -> str:
     """Return the proxy's own variables and the protocol, in Markdown."""
-    cells = [
-        (f"`{v.name}`", v.causality, TYPES[v.kind], v.unit, _start(v), _limits(v), v.description)
-        for v in own
-    ]
-    rows = [f"| {' | '.join(cell.replace('|', '&#124;') for cell in row)} |\n" for row in cells]
+    rows = []
+    for v in own:
+        start = "" if v.start is None else str(v.start).lower()
+        limits = f"{v.limits[0]:g} to {v.limits[1]:g}" if v.limits else ""
+        cells = (f"`{v.name}`", v.causality, v.type, v.unit, start, limits, v.description)
+        rows.append(f"| {' | '.join(cell.replace('|', '&#124;') for cell in cells)} |\n")
     return (
         "## Variables of the proxy\n\n"
         "All others are those of the original.\n\n"
@@ -125,11 +125,3 @@ def _card(own: Sequence[Variable]) -> str:
         f"|---|---|---|---|---|---|---|\n{''.join(rows)}\n"
         f"{CARD.read_text('utf-8')}"
     )
-
-
-def _start(v: Variable) -> str:
-    return "" if v.start is None else str(v.start).lower()
-
-
-def _limits(v: Variable) -> str:
-    return f"{v.limits[0]:g} to {v.limits[1]:g}" if v.limits else ""

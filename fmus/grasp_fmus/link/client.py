@@ -118,12 +118,8 @@ class Client:
     def _pack(
         self, kind: int, now: int, body: bytes, time: float = 0.0, step: float = 0.0
     ) -> bytes:
-        interface, sequence = self.signature.hash, self._sequence
-        return self._sealer.pack(
-            Message(
-                kind, 0, interface, self._session, self._cookie, sequence, time, step, now, body
-            )
-        )
+        fields = (kind, 0, self.signature.hash, self._session, self._cookie, self._sequence)
+        return self._sealer.pack(Message(*fields, time, step, now, body))
 
     # Answers
 

@@ -36,7 +36,7 @@ _CODES = {"Real": "d", "Integer": "q", "Boolean": "Q", "String": f"{STRING_SIZE}
 
 
 class Message(NamedTuple):
-    """A datagram taken apart; times in s, but `sent` in ns of the proxy's clock."""
+    """A datagram taken apart, as in HEAD; times in s, but `sent` in ns of the proxy's clock."""
 
     kind: int
     code: int
@@ -62,13 +62,10 @@ class Sealer:
 
     def pack(self, m: Message) -> bytes:
         """Return the datagram of a message; ValueError where it would be too large."""
-        head = HEAD.pack(
-            MAGIC, VERSION, m.kind, m.code, m.interface, m.session, m.cookie, m.sequence, m.time,
-            m.step, m.sent, len(m.body), 0,
-        )  # fmt: skip
-        datagram = head + m.body
-        if len(datagram) + self._tag_size > LARGEST:
-            size = len(datagram) + self._tag_size
+        *fields, body = m
+        datagram = HEAD.pack(MAGIC, VERSION, *fields, len(body), 0) + body
+        size = len(datagram) + self._tag_size
+        if size > LARGEST:
             raise ValueError(f"datagram of {size} bytes: must be {LARGEST} at most")
         return datagram + hmac.digest(self._key, datagram, "sha256") if self._key else datagram
 
@@ -77,18 +74,16 @@ class Sealer:
         end = len(datagram) - self._tag_size
         if end < HEAD.size or len(datagram) > LARGEST:
             return MALFORMED
-        (magic, version, kind, code, interface, session, cookie, sequence, time, step, sent, size,
-         zero) = HEAD.unpack_from(datagram)  # fmt: skip
+        magic, version, *fields, size, zero = HEAD.unpack_from(datagram)
         if magic != MAGIC or version != VERSION:
             return MALFORMED
         if self._key is not None:
             tag = hmac.digest(self._key, datagram[:end], "sha256")
             if not hmac.compare_digest(tag, datagram[end:]):
                 return FORGED
-        if size != end - HEAD.size or zero or not HELLO <= kind <= END or not isfinite(time + step):
-            return MALFORMED
-        body = datagram[HEAD.size : end]
-        return Message(kind, code, interface, session, cookie, sequence, time, step, sent, body)
+        m = Message._make((*fields, datagram[HEAD.size : end]))
+        known = HELLO <= m.kind <= END and isfinite(m.time + m.step)
+        return m if known and size == len(m.body) and not zero else MALFORMED
 
 
 class Codec:

@@ -213,9 +213,5 @@ class Peer:
 
     def _pack(self, m: Message, kind: int, code: int, time: float, body: bytes) -> bytes:
         """Return an answer to the request `m`."""
-        return self._sealer.pack(
-            Message(
-                kind, code, self.signature.hash, m.session, m.cookie, m.sequence, time, 0.0,
-                m.sent, body,
-            )
-        )  # fmt: skip
+        fields = (kind, code, self.signature.hash, m.session, m.cookie, m.sequence)
+        return self._sealer.pack(Message(*fields, time, 0.0, m.sent, body))
