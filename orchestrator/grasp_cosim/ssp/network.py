@@ -14,6 +14,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
+from ..checks import known
 from ..errors import InputError, choices
 from ..interface.interface import Interface, Variable
 from ..interface.units import Unit
@@ -183,10 +184,7 @@ class Network:
         if end.element is None:
             connector = _connector(place, system.name, system.connectors, end.connector)
             return Node(path, end.connector), not connector.gives
-        if end.element not in system.elements:
-            raise InputError(
-                f"{place}: no element {end.element!r}; valid: {choices(system.elements)}"
-            )
+        known(f"{place}: no element", end.element, system.elements)
         connectors = system.elements[end.element].connectors
         connector = _connector(place, end.element, connectors, end.connector)
         return Node((*path, end.element), end.connector), connector.gives
@@ -196,26 +194,17 @@ def read_network(top: SystemElement, part: Mapping[Path, Part]) -> Network:
     """The net of a system and of those in it; InputError at a connector that its FMU lacks."""
     for component in part.values():
         _check_connectors(component)
-    return Network(dict(systems_of(top)), part)
+    return Network({p: e for p, e in elements_of(top) if isinstance(e, SystemElement)}, part)
 
 
-def systems_of(system: SystemElement, path: Path = ()) -> Iterator[tuple[Path, SystemElement]]:
-    """The system and those in it, with their paths."""
-    yield path, system
-    for name, element in system.elements.items():
-        if isinstance(element, SystemElement):
-            yield from systems_of(element, (*path, name))
-
-
-def components_of(
-    system: SystemElement, path: Path = ()
-) -> Iterator[tuple[Path, ComponentElement]]:
-    """The components of the system and of those in it, in the order of the file."""
-    for name, element in system.elements.items():
-        if isinstance(element, SystemElement):
-            yield from components_of(element, (*path, name))
-        else:
-            yield (*path, name), element
+def elements_of(
+    element: ComponentElement | SystemElement, path: Path = ()
+) -> Iterator[tuple[Path, ComponentElement | SystemElement]]:
+    """The element and all in it, with their paths, in the order of the file."""
+    yield path, element
+    if isinstance(element, SystemElement):
+        for name, inner in element.elements.items():
+            yield from elements_of(inner, (*path, name))
 
 
 def _check_connectors(part: Part) -> None:
@@ -244,10 +233,7 @@ def kind_of(connector: Connector) -> str | None:
 
 
 def _connector(place: str, owner: str, connectors: Mapping[str, Connector], name: str) -> Connector:
-    if name not in connectors:
-        raise InputError(
-            f"{place}: {owner} has no connector {name!r}; valid: {choices(connectors)}"
-        )
+    known(f"{place}: {owner} has no connector", name, connectors)
     return connectors[name]
 
 

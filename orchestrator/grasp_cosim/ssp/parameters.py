@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ..errors import InputError, choices
-from ..interface.interface import SETTABLE, Value, Variable
+from ..interface.interface import SETTABLE, Value
 from ..interface.units import Unit
 from .archive import Archive
 from .document import at, checked, children, is_true, parse, short
@@ -261,14 +261,9 @@ def _value(network: Network, node: Node, given: Parameter) -> Value:
         raise InputError(
             f"{given.place}: {node} is {variable.causality}; only inputs and parameters are set"
         )
-    if not (given.type == "Enumeration" and variable.items):
-        _check_type(given, node, variable)
-    return part.interface.parse(given.place, node.name, given.value)
-
-
-def _check_type(given: Parameter, node: Node, variable: Variable) -> None:
-    exact = given.type == variable.kind
-    if not exact and (given.type, variable.kind) != ("Integer", "Real"):
+    fits = given.type == variable.kind or (given.type, variable.kind) == ("Integer", "Real")
+    if not fits and not (given.type == "Enumeration" and variable.items):
         raise InputError(
             f"{given.place}: {given.type}; {node} is {variable.kind}, must be the same"
         )
+    return part.interface.parse(given.place, node.name, given.value)

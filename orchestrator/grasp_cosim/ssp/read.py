@@ -26,7 +26,7 @@ from ..system.parts import NANOSECONDS, Component, Connection, Port
 from .annotation import TYPE, Beside, Extras, no_extras, read_extras
 from .archive import STRUCTURE, Archive
 from .document import at, child, children, parse, qualified
-from .network import Carried, Hop, Network, Part, Path, components_of, read_network
+from .network import Carried, Hop, Network, Part, Path, elements_of, read_network
 from .order import flow_order
 from .parameters import read_settings
 from .tree import ComponentElement, read_system
@@ -40,7 +40,7 @@ def read_ssp(path: FilePath, step: float | None = None, stop: float | None = Non
     root = parse(file, archive.read(STRUCTURE), "ssd")
     units = read_units(file, root, "ssd")
     top = read_system(file, child(root, "ssd:System"), units)
-    parts = {p: _part(archive, element) for p, element in components_of(top)}
+    parts = {p: _part(archive, e) for p, e in elements_of(top) if isinstance(e, ComponentElement)}
     if not parts:
         raise InputError(f"{top.place}: system {top.name!r} has no components; must have some")
     network = read_network(top, parts)
