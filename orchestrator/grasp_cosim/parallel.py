@@ -178,7 +178,7 @@ class _Worker:
         self._process.close()
 
     def _end(self) -> str:
-        """How the process, whose pipe has ended, came to its end."""
+        """Return how the process, whose pipe has ended, came to its end."""
         self._process.join(PATIENCE)
         code = self._process.exitcode
         if code is None:

@@ -72,7 +72,7 @@ def checked(place: str, root: Any, form: str) -> Any:
 
 
 def at(place: str, element: Any) -> str:
-    """Where an element is: file and line."""
+    """Return the place of an element, file and line."""
     return f"{place}:{element.sourceline}"
 
 

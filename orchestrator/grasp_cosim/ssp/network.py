@@ -59,7 +59,7 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class Carried:
-    """What hops make of a number x: factor * x + offset, in unit.
+    """A number x after some hops: factor * x + offset, in unit.
 
     unit is None where it is not known. settled is False where a transformation has led to a
     connector without a unit, so that the unit is a guess.
@@ -138,7 +138,7 @@ class Network:
         return connector.kind, kind_of(connector)
 
     def carry(self, hop: Hop, carried: Carried) -> Carried:
-        """What the hop makes of what it is given; InputError where units do not fit."""
+        """Return what is carried after one more hop; InputError where units do not fit."""
         place, target = hop.connection.place, self.unit(hop.target)
         factor, offset, unit = carried.factor, carried.offset, carried.unit
         if unit and target and not hop.connection.suppress:
@@ -155,7 +155,7 @@ class Network:
         return Carried(target or unit, factor, offset, settled)
 
     def decided_by_units(self, hops: list[Hop], carried: Carried) -> bool:
-        """Whether the units that the two FMUs declare say all about the way along the hops."""
+        """True if the units that the two FMUs declare say all about the way along the hops."""
         if any(h.connection.suppress or h.connection.transformation for h in hops):
             return False
         nodes = hops[0].source, hops[-1].target

@@ -92,7 +92,7 @@ def _bindings(network: Network) -> Iterator[tuple[Path, Binding]]:
 def _given(
     archive: Archive, file: str, binding: Binding, units: Mapping[str, Unit], notes: list[str]
 ) -> Iterator[Given]:
-    """What a binding gives; notes get what is not mapped."""
+    """Yield what a binding gives; `notes` get what is not mapped."""
     parameters = {
         binding.prefix + name: parameter
         for name, parameter in _set(archive, file, binding, units).items()
@@ -175,7 +175,7 @@ def _mapping(
 
 
 def _nodes(network: Network, path: Path, name: str) -> Iterator[Node]:
-    """What a name means at a system or component: variables and connectors, maybe several."""
+    """Yield the variables and connectors that a name means at a system or component."""
     part = network.parts.get(path)
     if part is not None:
         if name in part.interface.by_name:
@@ -190,7 +190,7 @@ def _nodes(network: Network, path: Path, name: str) -> Iterator[Node]:
 
 
 def _spread(network: Network, node: Node, given: Parameter) -> Iterator[tuple[Node, Parameter]]:
-    """Where a value at a node arrives: there, or at the components that its system passes it to."""
+    """Yield the variables of components that get a value at a node, there or passed on to."""
     if node.path in network.parts:
         yield node, given
         return

@@ -129,7 +129,7 @@ def _connections(
 
 
 def _carried(network: Network, hops: list[Hop]) -> Carried:
-    """What the way from component to component makes of a value; InputError where it must not."""
+    """Follow a value from component to component; InputError where the way is not allowed."""
     carried = Carried(network.unit(hops[0].source))
     variable = network.variable(hops[0].source)
     kind: str = variable.kind
@@ -242,7 +242,7 @@ def _step(
 
 
 def _unused(archive: Archive, root: Any) -> Iterator[str]:
-    """What has no bearing on the run, so that it is known."""
+    """Yield a note for each part of the archive that has no bearing on the run."""
     for name in archive.names:
         if name.endswith(".ssd") and "/" not in name and name != STRUCTURE:
             yield f"variant {name} is not used; {STRUCTURE} is"

@@ -21,7 +21,7 @@ from .design import MOST, Design, Points
 from .distributions import Distribution
 
 PROXIES = "proxies."
-"""How columns begin that a system with proxies has besides."""
+"""The beginning of the columns that a system with proxies has besides."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ class Map:
 
 @dataclass(frozen=True, slots=True)
 class Pictures:
-    """What is drawn of a study: a map, and the distributions of metrics."""
+    """The pictures of a study: a map, and the distributions of metrics."""
 
     map: Map | None = None
     distributions: tuple[str, ...] = ()
@@ -166,7 +166,7 @@ class Study:
         return low + int(np.random.default_rng([self.design.seed, MOST]).integers(room))
 
     def _noise(self, index: int) -> int:
-        """Which runs share their seeds: in a row of a saltelli design A and all A with one of B.
+        """Return the number of a set of seeds; A and all A with one of B of a saltelli row share it.
 
         Noise is then another parameter that stays while one changes, not a part of each's effect.
         """
