@@ -6,7 +6,7 @@ Every message is `PLACE = VALUE: must be ...`: where the value comes from, the v
 import math
 import sys
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -68,6 +68,12 @@ def choice(place: str, value: Any, valid: Iterable[Any]) -> Any:
     if isinstance(value, bool) or value not in listed:
         raise InputError(f"{place} = {value!r}: must be one of {choices(listed)}")
     return value
+
+
+def known(said: str, name: Any, valid: Collection[Any], after: str = "") -> None:
+    """InputError "SAID 'name'AFTER; valid: ..." where `name` is not one of `valid`."""
+    if name not in valid:
+        raise InputError(f"{said} {name!r}{after}; valid: {choices(valid)}")
 
 
 def as_table(place: str, value: Any) -> dict[str, Any]:

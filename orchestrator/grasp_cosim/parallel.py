@@ -7,9 +7,8 @@ we die, the pipes end, and the processes with them.
 
 import os
 import signal
-import threading
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from contextlib import closing, contextmanager, suppress
+from collections.abc import Callable, Generator, Iterable, Sequence
+from contextlib import closing, suppress
 from functools import partial
 from itertools import islice
 from multiprocessing import get_context
@@ -138,8 +137,12 @@ class _Worker:
         self.pipe, theirs = context.Pipe()
         self._started = False
         self._process: BaseProcess = context.Process(target=_work, args=(theirs,))
-        with _deaf_to_ctrl_c(), theirs:
+        blocked = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])  # Ctrl-C is for us
+        try:
             self._process.start()
+        finally:
+            theirs.close()
+            signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
 
     def give(self, run: Callable[[Job], Any], job: Job) -> None:
         """Have it do a job; where it has died meanwhile, received() says so."""
@@ -175,7 +178,7 @@ class _Worker:
         self._process.close()
 
     def _end(self) -> str:
-        """How the process, whose pipe has ended, came to its end."""
+        """Return how the process, whose pipe has ended, came to its end."""
         self._process.join(PATIENCE)
         code = self._process.exitcode
         if code is None:
@@ -188,21 +191,9 @@ class _Worker:
 def _work(pipe: Connection) -> None:
     """The life of a process: say that it has started, then a job after the other."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a run collects it itself, and ends early
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
     with suppress(EOFError, OSError, KeyboardInterrupt):
         pipe.send(None)
         while True:
             run, job = pipe.recv()
             pipe.send(run(job))
-
-
-@contextmanager
-def _deaf_to_ctrl_c() -> Iterator[None]:
-    """A process begun inside ignores Ctrl-C, which is for us; only the main thread can do so."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    previous = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, previous)

@@ -21,7 +21,7 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True, slots=True)
 class Service:
-    """How an FMU is served.
+    """The way in which an FMU is served.
 
     `lockstep`: step on request; else by an own clock, in steps of `step_ns` or of the length that
     the proxy asks for. `watchdog_ns`: without a request for so long the inputs go to what

@@ -10,7 +10,7 @@ from .loop import Loop, received
 from .served import Say, ServedFmu
 
 DEFAULT_ADDRESS: Address = ("127.0.0.1", PORT)
-"""Where an FMU is served if nobody says otherwise: where a proxy looks for it."""
+"""The address that a proxy looks at if nobody says otherwise."""
 
 BURST = 64
 """The most datagrams that are taken before the clock is looked at again."""

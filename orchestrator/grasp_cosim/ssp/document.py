@@ -72,7 +72,7 @@ def checked(place: str, root: Any, form: str) -> Any:
 
 
 def at(place: str, element: Any) -> str:
-    """Where an element is: file and line."""
+    """Return the place of an element, file and line."""
     return f"{place}:{element.sourceline}"
 
 
@@ -99,17 +99,13 @@ def to_bytes(root: Any) -> bytes:
 
 def new(name: str, /, **attributes: str) -> Any:
     """A root element; the prefixes are those of the standard."""
-    return etree.Element(qualified(name), attributes, nsmap=_prefixes(name))
+    prefixes = {prefix: NAMESPACES[prefix] for prefix in sorted({"ssc", name.partition(":")[0]})}
+    return etree.Element(qualified(name), attributes, nsmap=prefixes)
 
 
 def add(parent: Any, name: str, /, **attributes: str) -> Any:
     """A new child at the end of parent."""
     return etree.SubElement(parent, qualified(name), attributes)
-
-
-def _prefixes(name: str) -> dict[str, str]:
-    used = {"ssc", name.partition(":")[0]}
-    return {prefix: NAMESPACES[prefix] for prefix in sorted(used)}
 
 
 @lru_cache(maxsize=len(ROOTS))

@@ -14,6 +14,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
+from ..checks import known
 from ..errors import InputError, choices
 from ..interface.interface import Interface, Variable
 from ..interface.units import Unit
@@ -58,7 +59,7 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class Carried:
-    """What hops make of a number x: factor * x + offset, in unit.
+    """A number x after some hops: factor * x + offset, in unit.
 
     unit is None where it is not known. settled is False where a transformation has led to a
     connector without a unit, so that the unit is a guess.
@@ -137,7 +138,7 @@ class Network:
         return connector.kind, kind_of(connector)
 
     def carry(self, hop: Hop, carried: Carried) -> Carried:
-        """What the hop makes of what it is given; InputError where units do not fit."""
+        """Return what is carried after one more hop; InputError where units do not fit."""
         place, target = hop.connection.place, self.unit(hop.target)
         factor, offset, unit = carried.factor, carried.offset, carried.unit
         if unit and target and not hop.connection.suppress:
@@ -154,7 +155,7 @@ class Network:
         return Carried(target or unit, factor, offset, settled)
 
     def decided_by_units(self, hops: list[Hop], carried: Carried) -> bool:
-        """Whether the units that the two FMUs declare say all about the way along the hops."""
+        """True if the units that the two FMUs declare say all about the way along the hops."""
         if any(h.connection.suppress or h.connection.transformation for h in hops):
             return False
         nodes = hops[0].source, hops[-1].target
@@ -183,10 +184,7 @@ class Network:
         if end.element is None:
             connector = _connector(place, system.name, system.connectors, end.connector)
             return Node(path, end.connector), not connector.gives
-        if end.element not in system.elements:
-            raise InputError(
-                f"{place}: no element {end.element!r}; valid: {choices(system.elements)}"
-            )
+        known(f"{place}: no element", end.element, system.elements)
         connectors = system.elements[end.element].connectors
         connector = _connector(place, end.element, connectors, end.connector)
         return Node((*path, end.element), end.connector), connector.gives
@@ -196,26 +194,17 @@ def read_network(top: SystemElement, part: Mapping[Path, Part]) -> Network:
     """The net of a system and of those in it; InputError at a connector that its FMU lacks."""
     for component in part.values():
         _check_connectors(component)
-    return Network(dict(systems_of(top)), part)
+    return Network({p: e for p, e in elements_of(top) if isinstance(e, SystemElement)}, part)
 
 
-def systems_of(system: SystemElement, path: Path = ()) -> Iterator[tuple[Path, SystemElement]]:
-    """The system and those in it, with their paths."""
-    yield path, system
-    for name, element in system.elements.items():
-        if isinstance(element, SystemElement):
-            yield from systems_of(element, (*path, name))
-
-
-def components_of(
-    system: SystemElement, path: Path = ()
-) -> Iterator[tuple[Path, ComponentElement]]:
-    """The components of the system and of those in it, in the order of the file."""
-    for name, element in system.elements.items():
-        if isinstance(element, SystemElement):
-            yield from components_of(element, (*path, name))
-        else:
-            yield (*path, name), element
+def elements_of(
+    element: ComponentElement | SystemElement, path: Path = ()
+) -> Iterator[tuple[Path, ComponentElement | SystemElement]]:
+    """The element and all in it, with their paths, in the order of the file."""
+    yield path, element
+    if isinstance(element, SystemElement):
+        for name, inner in element.elements.items():
+            yield from elements_of(inner, (*path, name))
 
 
 def _check_connectors(part: Part) -> None:
@@ -244,10 +233,7 @@ def kind_of(connector: Connector) -> str | None:
 
 
 def _connector(place: str, owner: str, connectors: Mapping[str, Connector], name: str) -> Connector:
-    if name not in connectors:
-        raise InputError(
-            f"{place}: {owner} has no connector {name!r}; valid: {choices(connectors)}"
-        )
+    known(f"{place}: {owner} has no connector", name, connectors)
     return connectors[name]
 
 

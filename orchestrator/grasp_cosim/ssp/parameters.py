@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ..errors import InputError, choices
-from ..interface.interface import SETTABLE, Value, Variable
+from ..interface.interface import SETTABLE, Value
 from ..interface.units import Unit
 from .archive import Archive
 from .document import at, checked, children, is_true, parse, short
@@ -92,7 +92,7 @@ def _bindings(network: Network) -> Iterator[tuple[Path, Binding]]:
 def _given(
     archive: Archive, file: str, binding: Binding, units: Mapping[str, Unit], notes: list[str]
 ) -> Iterator[Given]:
-    """What a binding gives; notes get what is not mapped."""
+    """Yield what a binding gives; `notes` get what is not mapped."""
     parameters = {
         binding.prefix + name: parameter
         for name, parameter in _set(archive, file, binding, units).items()
@@ -175,7 +175,7 @@ def _mapping(
 
 
 def _nodes(network: Network, path: Path, name: str) -> Iterator[Node]:
-    """What a name means at a system or component: variables and connectors, maybe several."""
+    """Yield the variables and connectors that a name means at a system or component."""
     part = network.parts.get(path)
     if part is not None:
         if name in part.interface.by_name:
@@ -190,7 +190,7 @@ def _nodes(network: Network, path: Path, name: str) -> Iterator[Node]:
 
 
 def _spread(network: Network, node: Node, given: Parameter) -> Iterator[tuple[Node, Parameter]]:
-    """Where a value at a node arrives: there, or at the components that its system passes it to."""
+    """Yield the variables of components that get a value at a node, there or passed on to."""
     if node.path in network.parts:
         yield node, given
         return
@@ -261,14 +261,9 @@ def _value(network: Network, node: Node, given: Parameter) -> Value:
         raise InputError(
             f"{given.place}: {node} is {variable.causality}; only inputs and parameters are set"
         )
-    if not (given.type == "Enumeration" and variable.items):
-        _check_type(given, node, variable)
-    return part.interface.parse(given.place, node.name, given.value)
-
-
-def _check_type(given: Parameter, node: Node, variable: Variable) -> None:
-    exact = given.type == variable.kind
-    if not exact and (given.type, variable.kind) != ("Integer", "Real"):
+    fits = given.type == variable.kind or (given.type, variable.kind) == ("Integer", "Real")
+    if not fits and not (given.type == "Enumeration" and variable.items):
         raise InputError(
             f"{given.place}: {given.type}; {node} is {variable.kind}, must be the same"
         )
+    return part.interface.parse(given.place, node.name, given.value)

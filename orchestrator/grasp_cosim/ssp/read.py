@@ -26,7 +26,7 @@ from ..system.parts import NANOSECONDS, Component, Connection, Port
 from .annotation import TYPE, Beside, Extras, no_extras, read_extras
 from .archive import STRUCTURE, Archive
 from .document import at, child, children, parse, qualified
-from .network import Carried, Hop, Network, Part, Path, components_of, read_network
+from .network import Carried, Hop, Network, Part, Path, elements_of, read_network
 from .order import flow_order
 from .parameters import read_settings
 from .tree import ComponentElement, read_system
@@ -40,7 +40,7 @@ def read_ssp(path: FilePath, step: float | None = None, stop: float | None = Non
     root = parse(file, archive.read(STRUCTURE), "ssd")
     units = read_units(file, root, "ssd")
     top = read_system(file, child(root, "ssd:System"), units)
-    parts = {p: _part(archive, element) for p, element in components_of(top)}
+    parts = {p: _part(archive, e) for p, e in elements_of(top) if isinstance(e, ComponentElement)}
     if not parts:
         raise InputError(f"{top.place}: system {top.name!r} has no components; must have some")
     network = read_network(top, parts)
@@ -129,7 +129,7 @@ def _connections(
 
 
 def _carried(network: Network, hops: list[Hop]) -> Carried:
-    """What the way from component to component makes of a value; InputError where it must not."""
+    """Follow a value from component to component; InputError where the way is not allowed."""
     carried = Carried(network.unit(hops[0].source))
     variable = network.variable(hops[0].source)
     kind: str = variable.kind
@@ -242,7 +242,7 @@ def _step(
 
 
 def _unused(archive: Archive, root: Any) -> Iterator[str]:
-    """What has no bearing on the run, so that it is known."""
+    """Yield a note for each part of the archive that has no bearing on the run."""
     for name in archive.names:
         if name.endswith(".ssd") and "/" not in name and name != STRUCTURE:
             yield f"variant {name} is not used; {STRUCTURE} is"

@@ -8,7 +8,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from ..errors import InputError, choices
+from ..checks import known
+from ..errors import InputError
 from ..interface.units import Unit
 from .document import at, child, children, is_true, short
 from .units import named
@@ -184,11 +185,8 @@ def _connector(place: str, entry: Any, units: Mapping[str, Unit]) -> Connector:
         raise InputError(f"{place}: connector {name!r}: kind 'inout' is not supported")
     types = [short(e.tag).removeprefix("ssc:") for e in entry if short(e.tag).startswith("ssc:")]
     declared = types[0] if types else None
-    if declared is not None and declared not in _TYPES:
-        raise InputError(
-            f"{place}: connector {name!r}: type {declared!r} is not supported; "
-            f"valid: {choices(_TYPES)}"
-        )
+    if declared is not None:
+        known(f"{place}: connector {name!r}: type", declared, _TYPES, " is not supported")
     unit = child(entry, "ssc:Real").get("unit") if declared == "Real" else None
     return Connector(place, name, kind, declared, named(f"{place}: {name!r}", unit, units))
 

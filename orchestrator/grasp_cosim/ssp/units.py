@@ -4,7 +4,8 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from ..errors import InputError, choices
+from ..checks import known
+from ..errors import InputError
 from ..interface.units import BASE, Unit, conversion
 from .document import add, at, child, children
 
@@ -21,8 +22,7 @@ def named(place: str, name: str | None, units: Mapping[str, Unit]) -> Unit | Non
     """Return the unit of that name, None for None; InputError where it is not defined."""
     if name is None:
         return None
-    if name not in units:
-        raise InputError(f"{place}: unit {name!r} is not defined; valid: {choices(units)}")
+    known(f"{place}: unit", name, units, " is not defined")
     return units[name]
 
 

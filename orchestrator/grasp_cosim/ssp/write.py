@@ -198,27 +198,31 @@ def _write_connection(connections: Any, system: System, connection: Connection) 
 def _own(system: System, port: Port) -> tuple[Port, Unit | None]:
     """The port under the FMU's own name, and its unit."""
     component = system.component(port.component, str(port))
-    variable = component.interface.by_name[port.variable]
     own = component.rename.get(port.variable, port.variable)
-    return Port(port.component, own), component.interface.units.get(variable.unit or "")
+    return Port(port.component, own), _declared(
+        component, component.interface.by_name[port.variable]
+    )
 
 
 def _units(components: Iterable[Component]) -> dict[str, Unit]:
     """The units of all variables by name; of two that mean something else the first."""
     units: dict[str, Unit] = {}
     for component in components:
-        known = component.interface.units
         for variable in component.interface.variables:
-            unit = known.get(variable.unit or "")
-            if unit:
+            if unit := _declared(component, variable):
                 units.setdefault(unit.name, unit)
     return dict(sorted(units.items()))
 
 
 def _unit(component: Component, variable: Variable, units: Mapping[str, Unit]) -> Unit | None:
     """The unit to write at a variable; none where its name means something else in the archive."""
-    unit = component.interface.units.get(variable.unit or "")
+    unit = _declared(component, variable)
     return unit if unit and same(unit, units[unit.name]) else None
+
+
+def _declared(component: Component, variable: Variable) -> Unit | None:
+    """The unit that the FMU declares for a variable and defines."""
+    return component.interface.units.get(variable.unit or "")
 
 
 def _text(place: str, variable: Variable, value: Value) -> str:

@@ -98,7 +98,7 @@ _one_at_a_time = threading.Lock()
 
 
 def run_shipped(shipment: Shipment, job: Job) -> Outcome:
-    """What a worker of the cluster does."""
+    """Do a job in a worker of the cluster."""
     with _one_at_a_time:
         return run_job(unpacked(shipment), job)
 

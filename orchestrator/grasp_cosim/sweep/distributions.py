@@ -20,7 +20,7 @@ class Distribution(Protocol):
 
     @property
     def levels(self) -> int | None:
-        """How many values there are, None where they are a continuum."""
+        """The number of values, None where they are a continuum."""
 
     @property
     def extremes(self) -> tuple[Value, ...]:
@@ -38,7 +38,7 @@ class Listed:
 
     @property
     def levels(self) -> int:
-        """How many values there are."""
+        """The number of values."""
         return len(self.values)
 
     @property

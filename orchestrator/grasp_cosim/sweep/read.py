@@ -269,7 +269,7 @@ def _value(place: str, value: Any) -> Value:
 
 
 def _in(place: str, make: Callable[[], Made]) -> Made:
-    """What make returns; its InputError begins with the place."""
+    """Return what `make` returns; its InputError begins with the place."""
     try:
         return make()
     except InputError as error:

@@ -14,7 +14,7 @@ from ..system.description import System
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """What all runs share: the system, the signals whose last value is kept, a user's metrics."""
+    """All that runs share: the system, the signals whose last value is kept, a user's metrics."""
 
     system: System
     outputs: tuple[str, ...]
@@ -31,7 +31,7 @@ class Job:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What a run came to: the metrics by column, or the error, one line."""
+    """The outcome of a run: the metrics by column, or the error, one line."""
 
     index: int
     metrics: Mapping[str, Value | None]

@@ -18,7 +18,7 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float64]
 
 RESAMPLES = 200
-"""Of the bootstrap."""
+"""The number of resamples of the bootstrap."""
 
 COVER = (2.5, 97.5)
 """%, of the intervals."""
@@ -29,7 +29,7 @@ ROUNDING = 1e-12
 
 @dataclass(frozen=True, slots=True)
 class Index:
-    """Of one parameter: the indices, and for each the 95 % interval of a bootstrap over rows."""
+    """The indices of one parameter, each with the 95 % interval of a bootstrap over rows."""
 
     parameter: str
     first: float
@@ -40,7 +40,7 @@ class Index:
 
 @dataclass(frozen=True, slots=True)
 class Sensitivity:
-    """Of one metric: rows of the design that were complete, of all, and the indices."""
+    """The indices of one metric, and how many rows of all of the design were complete."""
 
     metric: str
     rows: int

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
+from ..checks import is_whole
 from ..errors import InputError, SimulationError
 from ..files import write_text
 from .run import Outcome
@@ -124,14 +124,10 @@ def _read(path: Path, runs: int) -> Outcome:
 def _check_outcome(outcome: Outcome, name: str, runs: int) -> None:
     """ValueError where it is not what keep() writes to a file of that name."""
     index, metrics, error = outcome.index, outcome.metrics, outcome.error
-    whole = isinstance(index, int) and not isinstance(index, bool)
-    if not whole or not 0 <= index < runs or _name(index) != name:
+    if not is_whole(index) or not 0 <= index < runs or _name(index) != name:
         raise ValueError(f"index = {index!r}")
-    if not isinstance(metrics, dict) or not all(map(_is_metric, metrics.values())):
+    kinds = float | int | str | None
+    if not isinstance(metrics, dict) or not all(isinstance(m, kinds) for m in metrics.values()):
         raise ValueError(f"metrics = {metrics!r}")
     if error is not None and not isinstance(error, str):
         raise ValueError(f"error = {error!r}")
-
-
-def _is_metric(value: Any) -> bool:
-    return value is None or isinstance(value, float | int | str)

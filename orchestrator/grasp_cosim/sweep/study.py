@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ..checks import known
 from ..errors import InputError, choices
 from ..interface.interface import Value, Variable
 from ..metrics.metric import Metric, available, registered
@@ -20,7 +21,7 @@ from .design import MOST, Design, Points
 from .distributions import Distribution
 
 PROXIES = "proxies."
-"""How columns begin that a system with proxies has besides."""
+"""The beginning of the columns that a system with proxies has besides."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +49,7 @@ class Map:
 
 @dataclass(frozen=True, slots=True)
 class Pictures:
-    """What is drawn of a study: a map, and the distributions of metrics."""
+    """The pictures of a study: a map, and the distributions of metrics."""
 
     map: Map | None = None
     distributions: tuple[str, ...] = ()
@@ -78,7 +79,10 @@ class Study:
         self._check_names()
         self._check_outputs()
         for name in self.seeds:
-            self._check_seed(name)
+            kind = self.variable(name).kind
+            if kind != "Integer":
+                said = f"{self.name}: seeds: {name} is of type {kind}"
+                raise InputError(f"{said}; must be an Integer")
         for parameter in sorted(self.parameters, key=_is_ratio):  # whose references come first
             self._check_values(parameter)
         self._check_pictures()
@@ -104,7 +108,7 @@ class Study:
         return values
 
     def values(self, index: int) -> dict[str, Value]:
-        """What the variables of the system are set to in a run."""
+        """Return the values of the variables of the system in a run."""
         point = self.point(index)
         return {**self._driven(point), **{name: point[name] for name in self.seeds}}
 
@@ -112,11 +116,8 @@ class Study:
         """The declared variable of 'component.variable'; InputError where there is none."""
         component, _, variable = name.partition(".")
         interface = self.system.component(component, f"{self.name}: {name}").interface
-        if variable not in interface.by_name:
-            raise InputError(
-                f"{self.name}: {name}: {interface.path.name} has no variable {variable!r}; "
-                f"valid: {choices(interface.by_name)}"
-            )
+        said = f"{self.name}: {name}: {interface.path.name} has no variable"
+        known(said, variable, interface.by_name)
         return interface.by_name[variable]
 
     @cached_property
@@ -165,7 +166,7 @@ class Study:
         return low + int(np.random.default_rng([self.design.seed, MOST]).integers(room))
 
     def _noise(self, index: int) -> int:
-        """Which runs share their seeds: in a row of a saltelli design A and all A with one of B.
+        """Return the number of a set of seeds; A and all A with one of B of a saltelli row share it.
 
         Noise is then another parameter that stays while one changes, not a part of each's effect.
         """
@@ -193,8 +194,8 @@ class Study:
             twice = next((n for n in listed if listed.count(n) > 1), None)
             if twice is not None:
                 raise InputError(f"{self.name}: {what} {twice!r} twice; must be there once")
-        known = [name for m in registered(self.metrics) for name in (m.name, *m.columns)]
-        taken = {"index", "error", *known, *self.outputs, *self.seeds}
+        metrics = [name for m in registered(self.metrics) for name in (m.name, *m.columns)]
+        taken = {"index", "error", *metrics, *self.outputs, *self.seeds}
         wrong = next((n for n in names if n in taken or n.startswith(PROXIES)), None)
         if wrong is not None:
             raise InputError(
@@ -210,7 +211,7 @@ class Study:
                 )
 
     def _check_pictures(self) -> None:
-        """What is to be drawn will be there, and be numbers."""
+        """InputError where a picture is of something that will not be there, or no number."""
         numeric = [
             p.name
             for p in self.parameters
@@ -221,11 +222,7 @@ class Study:
         picture = self.pictures.map
         if picture:
             for name in (picture.x, picture.y):
-                if name not in numeric:
-                    raise InputError(
-                        f"{self.name}: figures.map: no parameter {name!r} with numbers; valid: "
-                        f"{choices(numeric)}"
-                    )
+                known(f"{self.name}: figures.map: no parameter", name, numeric, " with numbers")
             if picture.x == picture.y:
                 raise InputError(
                     f"{self.name}: figures.map: x = y = {picture.x!r}; must be two parameters"
@@ -260,10 +257,7 @@ class Study:
     def _check_outputs(self) -> None:
         declared = self._declared
         for name in self.outputs:
-            if name not in declared:
-                raise InputError(
-                    f"{self.name}: outputs: no output {name!r}; valid: {choices(declared)}"
-                )
+            known(f"{self.name}: outputs: no output", name, declared)
         if not self.outputs and not self.expected:
             reasons = available(registered(self.metrics), declared, self.system.roles)[1]
             raise InputError(
@@ -271,13 +265,8 @@ class Study:
                 f"whose signals metrics need{f' ({choices(reasons)})' if reasons else ''}"
             )
 
-    def _check_seed(self, name: str) -> None:
-        kind = self.variable(name).kind
-        if kind != "Integer":
-            raise InputError(f"{self.name}: seeds: {name} is of type {kind}; must be an Integer")
-
     def _check_values(self, parameter: Parameter) -> None:
-        """What the variables may be set to is of their types and in their ranges."""
+        """InputError where a value of a parameter is not of the type and range of its variables."""
         place = f"{self.name}: {parameter.name}"
         for name in parameter.variables:
             kind = self.variable(name).kind

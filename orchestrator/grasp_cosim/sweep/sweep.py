@@ -44,7 +44,7 @@ class Sweep:
 
     @cached_property
     def sensitivities(self) -> tuple[Sensitivity, ...]:
-        """Of each metric that varies, in a saltelli design; of any other none."""
+        """The indices of each metric that varies, in a saltelli design; of any other none."""
         if self.study.design.kind != "saltelli":
             return ()
         names = [p.name for p in self.study.parameters]

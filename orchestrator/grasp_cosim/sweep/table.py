@@ -20,7 +20,7 @@ from .study import Study
 Column = Sequence[Any]
 
 STATISTICS = ("least", "p5", "median", "p95", "greatest", "mean")
-"""What is said of a metric, besides how many runs have one."""
+"""The statistics of a metric, besides how many runs have one."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Table:
         return np.array([np.nan if v is None or isinstance(v, str) else float(v) for v in values])
 
     def summary(self) -> dict[str, dict[str, float | int | None]]:
-        """Of each metric: how many runs have a finite one, its least and greatest, its mean, and
+        """For each metric: how many runs have a finite one, its least and greatest, its mean, and
         the values below which 5 %, 50 % and 95 % lie.
         """
         return {name: _summary(self.numbers(name)) for name in self.metrics}
