@@ -10,8 +10,8 @@ from pathlib import Path
 import pyarrow.parquet as pq  # type: ignore[import-untyped]
 import pytest
 from grasp_cosim import InputError, System, cli
-from grasp_cosim.grasp.presets import with_bench
-from grasp_cosim.sweep.read import built_in, read_study, study_file
+from grasp_cosim.grasp.presets import STUDIES, with_bench, with_preset
+from grasp_cosim.sweep.read import read_study, study_file
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -166,10 +166,14 @@ def test_wrong_input_is_one_line_and_exit_2(
     assert sorted(p.name for p in tmp_path.iterdir()) == ["study.toml"]
 
 
-def test_no_such_study_names_the_built_in_ones(command: Run) -> None:
+@pytest.mark.usefixtures("command")
+def test_no_such_study_names_the_built_in_ones(capsys: pytest.CaptureFixture[str]) -> None:
     code = cli.main(["sweep", "map"])
     assert code == 2
-    assert built_in() == ["bench_monte_carlo", "grasp_sensitivity", "reflectance_map"]
+    assert capsys.readouterr().err == (
+        "grasp-cosim: map: no such study; must be a .toml file or bench_monte_carlo, "
+        "grasp_sensitivity, reflectance_map\n"
+    )
 
 
 def test_a_plot_of_nothing_is_refused_before_the_runs(command: Run, tmp_path: Path) -> None:
@@ -199,7 +203,7 @@ def test_a_study_of_the_bench_is_that_of_run_bench(tmp_path: Path, grasp: System
             "[figures]", '[values]\n"sensor_1.adc.bits" = 12\n[figures]'
         )
     )
-    study = read_study(path, lambda _: grasp)
+    study = read_study(path, lambda _: grasp, with_preset)
     off = {"controller.simultaneous_contact.enabled": False, "sensor_1.adc.bits": 12}
     off |= {"controller.impact_reduction.enabled": False}
     expected = with_bench(grasp).with_values(off).with_experiment(step=1e-3, stop=0.02)
@@ -211,13 +215,14 @@ def test_a_bench_that_does_not_fit_is_one_line(tmp_path: Path, grasp: System) ->
     path.write_text(f"bench = true\n{STUDY}")
     plant = replace(grasp.components[0], values={"force[1]": 0.0, "force[2]": 0.0})
     bare = replace(grasp, components=(plant,), connections=())
-    with pytest.raises(InputError, match=r"^study.toml: bench = true: bench_preset.toml sensor_1"):
-        read_study(path, lambda _: bare)
+    place = r"\[presets.bench\] of grasp.toml"
+    with pytest.raises(InputError, match=rf"^study.toml: bench = true: {place}: sensor_1"):
+        read_study(path, lambda _: bare, with_preset)
 
 
 @pytest.mark.parametrize("name", ["bench_monte_carlo", "grasp_sensitivity", "reflectance_map"])
 def test_a_built_in_study_fits_the_grasp(name: str, grasp: System) -> None:
-    study = read_study(study_file(name), lambda _: grasp)
+    study = read_study(study_file(name, STUDIES), lambda _: grasp, with_preset)
     assert study.runs >= 200
     for index in (0, study.runs - 1):
         study.system.with_values(study.values(index))

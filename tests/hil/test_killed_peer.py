@@ -129,15 +129,15 @@ def run_until_killed(system: System, peers: Peers, seed: int) -> Result | None:
         lost = f"127.0.0.1:{port} is lost, {TOLERATED + 1} missed in a row"
         if lost not in str(error) or policy != "stop":
             raise
-        return error.result
+        kept: Result | None = error.result
+        return kept
     finally:
         killer.join()
 
 
 def check(result: Result) -> None:
     """Whenever it was killed, what was recorded is what the parameters promise."""
-    system = result.system
-    policy = system.component("controller", "test").values["proxy.on_loss"]
+    policy = result.settings["components"]["controller"]["values"]["proxy.on_loss"]
     state, row = result["controller.proxy.state"], result["controller.proxy.consecutive_missed"]
     forces = {name: result[f"controller.{name}"] for name in FAILSAFE}
     assert len(result.time) == len(state) == (STEPS + 1 if result.complete else len(state))

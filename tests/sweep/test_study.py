@@ -5,10 +5,11 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim import InputError, System
+from grasp_cosim.grasp.metrics import METRICS
 from grasp_cosim.sweep.design import Design
 from grasp_cosim.sweep.distributions import Listed, Uniform
 from grasp_cosim.sweep.run import Job, Task, run_job
-from grasp_cosim.sweep.study import METRICS, Map, Parameter, Pictures, Study, grasp_columns
+from grasp_cosim.sweep.study import Map, Parameter, Pictures, Study
 
 RATIO = Parameter("ratio", ("sensor_1.reflectance",), Uniform(0.5, 2.0), "sensor_2.reflectance")
 LEFT = Parameter("left", ("sensor_2.reflectance",), Uniform(0.5, 1.0))
@@ -127,10 +128,12 @@ def test_the_columns_of_a_grasp_are_those_that_a_run_leaves(
     grasp: System, fmus: Path, plant: str
 ) -> None:
     system = grasp.swap("plant", fmus / f"{plant}.fmu").with_experiment(step=1e-3, stop=0.01)
-    outputs = [f"{c.name}.{v.name}" for c in system.components for v in c.interface.of("output")]
+    study = Study("made", system, (MASS,), RANDOM)
     found = run_job(Task(system, ()), Job(0, {})).metrics
-    assert sorted(found) == sorted(grasp_columns(outputs))
-    assert set(found) <= set(METRICS)
+    assert list(found) == [column for m in study.expected for column in m.columns]
+    every = [column for m in METRICS for column in m.columns]
+    assert [column for column in every if column in found] == list(found)
+    assert all(study.metric_of(column) for column in found)
 
 
 def test_a_picture_of_what_the_plant_does_not_tell(grasp: System) -> None:
