@@ -15,9 +15,11 @@ False, None where the moment never comes, or a list of these, one per finger for
 from __future__ import annotations
 
 import hashlib
+import pickle
 import sys
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -116,23 +118,28 @@ class Metric:
         return f"{self.title}, {self.entries[place]}" if self.entries else self.title
 
     def __reduce__(self) -> tuple[Any, ...]:
+        """To another process a metric goes by the text of its file, or by where it is found."""
         if self.origin is not None:
             return _from_text, (*self.origin, self.name)
-        if any(self is m for m in registered()):
-            return _registered, (self.name,)
-        return _made, tuple(getattr(self, name) for name in _FIELDS)
+        if any(m is self for m in _of_every_result()):
+            return _found, (self.name,)
+        module, name = (getattr(self.function, key, "") for key in ("__module__", "__qualname__"))
+        if getattr(sys.modules.get(module), name, None) is self:  # it replaced its function there
+            return _at, (module, name)
+        return Metric, tuple(getattr(self, field) for field in self.__dataclass_fields__)
 
 
-_FIELDS = tuple(Metric.__dataclass_fields__)
+def _of_every_result() -> list[Metric]:
+    return [m for source in extensions.metrics for m in source()]
 
 
-def _made(*values: Any) -> Metric:
-    return Metric(*values)
+def _found(name: str) -> Metric:
+    return next(m for m in _of_every_result() if m.name == name)
 
 
-def _registered(name: str) -> Metric:
-    """The metric of that name that every result is asked for, in another process."""
-    return next(m for m in registered() if m.name == name)
+def _at(module: str, name: str) -> Metric:
+    metric: Metric = getattr(import_module(module), name)
+    return metric
 
 
 def metric(name: str, **more: Any) -> Callable[[Function], Metric]:
@@ -171,12 +178,29 @@ class Measured:
 
 def registered(more: Iterable[Metric] = ()) -> tuple[Metric, ...]:
     """All metrics that a result is asked for, then `more`; InputError where two have one name."""
-    found = [m for source in extensions.metrics for m in source()] + list(more)
+    found = [*_of_every_result(), *more]
     names = [m.name for m in found]
     twice = next((n for n in names if names.count(n) > 1), None)
     if twice is not None:
         raise InputError(f"metric {twice!r}: is there twice; must have another name")
     return tuple(found)
+
+
+def check_portable(metrics: Iterable[Metric]) -> None:
+    """InputError where a metric cannot go to other processes, as those of many runs have to."""
+    for m in metrics:
+        try:
+            pickle.dumps(m)
+        except Exception as error:  # pickle has one of its own for each reason
+            raise InputError(
+                f"metric {m.name!r}: cannot go to another process ({_said(error)}); must be a "
+                "function under @metric(name) in a module or a file"
+            ) from error
+
+
+def _said(error: BaseException) -> str:
+    """What an error says, in one line."""
+    return " ".join(f"{type(error).__name__}: {error}".split())
 
 
 def measure(signals: Signals, metrics: Iterable[Metric]) -> Measured:
@@ -194,8 +218,7 @@ def measure(signals: Signals, metrics: Iterable[Metric]) -> Measured:
         except MissingSignalError as error:
             missing.append(f"no {m.name}: {error}")
         except Exception as error:  # a user's function may raise anything
-            said = f"{type(error).__name__}: {error}"
-            raise InputError(f"metric {m.name!r}: {' '.join(said.split())}") from error
+            raise InputError(f"metric {m.name!r}: {_said(error)}") from error
     return Measured(values, tuple(m for m in there if m.name in values), tuple(missing))
 
 
@@ -279,8 +302,7 @@ def _run(name: str, text: str) -> tuple[Metric, ...]:
             del sys.modules[module_name]
             if not isinstance(error, Exception | SystemExit):
                 raise
-            said = f"{type(error).__name__}: {error}"
-            raise InputError(f"--metrics {name}: {' '.join(said.split())}") from error
+            raise InputError(f"--metrics {name}: {_said(error)}") from error
     found = [value for value in vars(module).values() if isinstance(value, Metric)]
     return tuple(replace(m, origin=(name, text)) for m in dict.fromkeys(found))
 

@@ -14,7 +14,7 @@ import numpy as np
 from ..checks import known
 from ..errors import InputError, choices
 from ..interface.interface import Value, Variable
-from ..metrics.metric import Metric, available, registered
+from ..metrics.metric import Metric, available, check_portable, registered
 from ..system.description import System
 from ..system.settings import settings
 from .design import MOST, Design, Points
@@ -76,6 +76,7 @@ class Study:
     def __post_init__(self) -> None:
         if not self.parameters:
             raise InputError(f"{self.name}: no [[parameters]]; must be at least one")
+        check_portable(self.metrics)
         self._check_names()
         self._check_outputs()
         for name in self.seeds:
@@ -166,7 +167,7 @@ class Study:
         return low + int(np.random.default_rng([self.design.seed, MOST]).integers(room))
 
     def _noise(self, index: int) -> int:
-        """Return the number of a set of seeds; A and all A with one of B of a saltelli row share it.
+        """Return the number of a set of seeds; a saltelli row has one for B, one for all others.
 
         Noise is then another parameter that stays while one changes, not a part of each's effect.
         """
