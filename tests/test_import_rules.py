@@ -195,8 +195,9 @@ def test_a_room_imports_from_rooms_below_it_and_nothing_goes_in_a_circle(
     assert not found, "\n".join(["", *found])
 
 
-def test_only_the_top_and_the_command_line_import_by_name(sources: dict[str, str]) -> None:
-    assert {room(module) for module in calls(sources, BY_NAME)} <= {"__init__", "cli"}
+def test_only_three_rooms_import_by_name(sources: dict[str, str]) -> None:
+    """The top its public names, the command line its commands, checks what an extra brings."""
+    assert {room(module) for module in calls(sources, BY_NAME)} <= {"__init__", "cli", "checks"}
 
 
 def test_all_files_are_read(sources: dict[str, str]) -> None:
