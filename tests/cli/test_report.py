@@ -26,8 +26,9 @@ def test_the_page_and_the_picture_are_beside_the_run(
     assert cli.main(["report", str(folder)]) == 0
     out, err = capsys.readouterr()
     html = (folder / "report.html").read_text("utf-8")
-    assert html == page_html(load_run(folder), "results")
-    assert html == page_html(grasp_run(), "results")
+    for run in (load_run(folder), grasp_run()):
+        assert html == page_html(run, "results", scene=run.drawing.scene(run))
+    assert 'id="scene"' in html
     assert (folder / "grasp.png").read_bytes().startswith(b"\x89PNG")
     assert out.splitlines()[0].startswith(f"{folder / 'report.html'}: ")
     assert out.splitlines()[1:] == [str(folder / "grasp.png")]
@@ -88,7 +89,7 @@ def test_without_matplotlib_there_is_the_page_alone(
     [
         ("run.json", None, "run.json: No such file"),
         ("signals.csv", None, "signals.csv: No such file"),
-        ("run.json", '{"units": {}}', "units are those of none; must be those of the columns"),
+        ("run.json", '{"units": {}}', "run.json: no entry 'system'; must be as"),
     ],
 )
 def test_a_folder_that_is_no_run_is_one_line(

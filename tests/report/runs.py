@@ -1,11 +1,11 @@
-"""Runs made up for the pages: a grasp by formula, and any number of components in a ring."""
+"""Results made up for the pages: a grasp by formula, and any number of components in a ring."""
 
-import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from grasp_cosim.recording.load import Run
+from grasp_cosim.recording.result import Rejection, Result
+from grasp_cosim.system.parts import NANOSECONDS
 
 WIDTH, CENTRE = 0.07, 0.01
 TOUCH = {1: 1.0, 2: 1.2}
@@ -16,14 +16,15 @@ SIDE = {1: 1.0, 2: -1.0}
 EXPERIMENT = {
     "system": "grasp.toml",
     "scheme": "sequential",
-    "initialisation": {"loops": "iterate", "tolerance": 1e-10, "iterations": 50},
-    "steps": 2000,
-    "wall_time": 1.5,
-    "real_time_factor": 1.25,
-    "complete": True,
     "step": 1e-3,
     "stop": 2.0,
+    "initialisation": {"loops": "iterate", "tolerance": 1e-10, "iterations": 50},
 }
+
+
+def evenly(rows: int, span_ns: int) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Times in s as they are recorded, so that they are the same when read back."""
+    return np.asarray(np.arange(rows) * (span_ns // max(rows - 1, 1)) / NANOSECONDS)
 
 
 def component(fmu: str, **values: Any) -> dict[str, Any]:
@@ -42,9 +43,9 @@ def position(finger: int, t: float) -> float:
     return START[finger] + (end - START[finger]) * min(t / TOUCH[finger], 1.0)
 
 
-def grasp_run(rows: int = 2001) -> Run:
+def grasp_run(rows: int = 2001) -> Result:
     """Two fingers that close on an object, one 0.2 s after the other, 2 s long."""
-    time = np.linspace(0.0, 2.0, rows)
+    time = evenly(rows, 2 * NANOSECONDS)
     signals: dict[str, Any] = {}
     for j in (1, 2):
         x = np.array([position(j, t) for t in time])
@@ -68,9 +69,6 @@ def grasp_run(rows: int = 2001) -> Run:
     units |= {"plant.object_position": "m", "controller.target_position": "m"}
     settings = {
         **EXPERIMENT,
-        "time_to_contact": [1.0, 1.2],
-        "time_difference": 0.2,
-        "impact_velocity": [0.065, None],
         "components": {
             "plant": component("GripperPlant.fmu", object_width=WIDTH),
             "sensor_1": component("ProximitySensor.fmu"),
@@ -86,15 +84,19 @@ def grasp_run(rows: int = 2001) -> Run:
         ],
         "events": [{"at": 0.5, "set": {"sensor_1.reflectance": 0.6}}],
         "faults": [{"connection": "controller.intensity[1]", "kind": "bias", "value": 0.1}],
-        "log": ["t = 0.5 s: sensor_1.reflectance = 0.6"],
-        "rejections": {"sensor_2": {"count": 3, "first": 0.25}},
+        "roles": {},
     }
-    return Run(time, signals, units, {"plant.gap[1]": "l_1, distance"}, settings)
+    return Result(
+        settings, time, signals, units, wall_time=1.5, complete=True,
+        descriptions={"plant.gap[1]": "l_1, distance"},
+        rejections={"sensor_2": Rejection(3, 0.25)},
+        log=("t = 0.5 s: sensor_1.reflectance = 0.6",),
+    )  # fmt: skip
 
 
-def ring_run(names: list[str], rows: int = 50) -> Run:
+def ring_run(names: list[str], rows: int = 50) -> Result:
     """Components connected in a ring, each with an output y."""
-    time = np.linspace(0.0, 1.0, rows)
+    time = evenly(rows, 98 * NANOSECONDS // 100)
     signals = {f"{name}.y": np.sin(time + k) for k, name in enumerate(names)}
     settings = {
         **EXPERIMENT,
@@ -105,23 +107,13 @@ def ring_run(names: list[str], rows: int = 50) -> Run:
         ],
         "events": [],
         "faults": [],
-        "log": [],
-        "rejections": {},
+        "roles": {},
     }
-    return Run(time, signals, dict.fromkeys(signals), {}, settings)
+    return Result(settings, time, signals, dict.fromkeys(signals), wall_time=1.5, complete=True)
 
 
-def write_run(folder: Path, run: Run) -> None:
+def write_run(folder: Path, result: Result) -> None:
     """As `run --out` does."""
     folder.mkdir()
-    names = ",".join(f'"{name}"' for name in ("time", *run.signals))
-    columns = [run.time, *(v.astype(float) for v in run.signals.values())]
-    rows = (",".join(map(repr, row)) for row in np.column_stack(columns).tolist())
-    (folder / "signals.csv").write_text("\n".join((names, *rows)) + "\n", "utf-8")
-    about = {
-        "units": dict(run.units),
-        "types": {name: str(v.dtype) for name, v in run.signals.items()},
-        "descriptions": dict(run.descriptions),
-        **({"realtime": run.timing.as_dict()} if run.timing else {}),
-    }
-    (folder / "run.json").write_text(json.dumps({**run.settings, **about}), "utf-8")
+    result.to_csv(folder / "signals.csv")
+    result.to_json(folder / "run.json")

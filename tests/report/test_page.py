@@ -6,11 +6,10 @@ from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
-import numpy as np
 import pytest
-from grasp_cosim.errors import InputError
-from grasp_cosim.recording.load import Run
-from grasp_cosim.report.page import page_html, write_page
+from grasp_cosim.metrics.metric import Metric
+from grasp_cosim.recording.result import Result
+from grasp_cosim.report.page import Scene, Zoom, page_html, write_page
 from report.runs import grasp_run, ring_run
 from report.test_embed import unpacked
 from report.timings import paced
@@ -57,16 +56,17 @@ class Elements(HTMLParser):
     [grasp_run(), ring_run(["a", "b"]), replace(grasp_run(), timing=paced(steps=2000))],
     ids=["grasp", "ring", "paced"],
 )
-def test_the_page_is_whole_and_needs_nothing_from_outside(run: Run) -> None:
+def test_the_page_is_whole_and_needs_nothing_from_outside(run: Result) -> None:
     html = page_html(run, "results")
     page = Elements(html)
     for tag, attributes in page.found:
-        for name in ("src", "href", "action", "data", "srcset"):
+        for name in ("src", "href", "xlink:href", "action", "data", "srcset"):
             value = attributes.get(name)
             assert value is None or value.startswith("#") or value == "data:,", (tag, value)
         assert tag not in ("iframe", "object", "embed", "img", "base")
     addresses = set(re.findall(r"https?://[^\s\"'<>)]*", html))
-    assert addresses == {"http://www.w3.org/2000/svg"}  # a name, which nothing is loaded from
+    names = {"http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink"}
+    assert addresses <= names  # from which nothing is loaded
     assert "@import" not in html
     assert not re.search(r"url\((?!#)", html)
     assert len(page.ids()) == len(set(page.ids()))
@@ -118,7 +118,6 @@ def test_metrics_and_settings_are_there() -> None:
     text = Elements(page_html(grasp_run(), "results")).visible
     for expected in (
         "2 s in 2\N{NARROW NO-BREAK SPACE}000 steps of 1 ms, sequential",
-        "impact velocity65.0000nonemm/s",
         "GripperPlant.fmu",
         "object_width = 0.07",
         "at = 0.5, set = (sensor_1.reflectance = 0.6)",
@@ -132,88 +131,85 @@ def test_metrics_and_settings_are_there() -> None:
     assert "not complete" not in text
 
 
-def test_metrics_of_the_object_are_in_degrees_and_words() -> None:
-    run = grasp_run()
-    more = {"object_tilt": 0.5, "toppled": False, "squeeze": 0.006, "damaged": True}
-    text = Elements(page_html(replace(run, settings={**run.settings, **more}), "r")).visible
-    for expected in (
-        "object tilt28.6479deg", "object toppledno", "object squeezed by6.0000mm",
-        "object damagedyes",
-    ):  # fmt: skip
-        assert expected in text
-
-
 def test_a_run_that_was_broken_off_says_so() -> None:
     run = grasp_run()
-    broken = replace(run, settings={**run.settings, "complete": False})
+    broken = replace(run, complete=False)
     assert "not complete" in Elements(page_html(broken, "results")).visible
 
 
-def test_metrics_without_a_label_are_shown_as_they_are() -> None:
-    run = ring_run(["a"])
-    more = replace(run, settings={**run.settings, "margin_left": 0.125, "bands": {"low": 1}})
-    text = Elements(page_html(more, "results")).visible
-    assert "margin left0.1250" in text
-    assert "bandslow = 1" in text
+SCENE = Scene(
+    title="Scene",
+    html='<p id="stage"></p>',
+    style="#stage { color: red; }",
+    scripts="const startScene = () => ({ draw() {}, toggle() {} });",
+    state={"moments": [0.5], "text": "</script>"},
+    shown=["plant.gap[2]"],
+    colors={"plant.gap[2]": "--c3"},
+    marks=[(0.5, "--c1")],
+    zooms=[Zoom("<Half>", 0.25, 0.75, "f1")],
+)
 
 
-def test_a_system_that_is_no_grasp_has_no_animation() -> None:
-    html = page_html(ring_run(["a", "b"]), "results")
+def test_a_scene_has_its_section_scripts_colours_buttons_and_marks() -> None:
+    html = page_html(grasp_run(), "results", scene=SCENE)
     page = Elements(html)
+    assert {"scene", "stage"} <= set(page.ids())
+    assert page.found.index(("section", {"id": "scene"})) < page.found.index(
+        ("section", {"id": "traces"})
+    )
+    assert ("a", {"href": "#scene"}) in page.found
+    assert SCENE.style in html
+    assert (
+        html.index("function connect()") > html.index(SCENE.scripts) > html.index("function show")
+    )
+    state = json.loads(page.texts["page"])
+    assert state["scene"] == SCENE.state
+    assert (state["shown"], state["colors"]) == (SCENE.shown, SCENE.colors)
+    assert state["marks"] == [{"t": 0.5, "color": "--c1"}, {"t": 0.5, "color": "--fault"}]
+    button = {"type": "button", "class": "f1", "data-from": "0.25", "data-to": "0.75"}
+    assert ("button", button) in page.found
+    assert "<Half>" in page.visible
+
+
+def test_without_a_scene_the_page_does_without() -> None:
+    page = Elements(page_html(grasp_run(), "results"))
     assert "scene" not in page.ids()
-    assert json.loads(page.texts["page"])["grasp"] is None
-    assert "There are no metrics" in page.visible
-    assert "scene" in Elements(page_html(grasp_run(), "results")).ids()
+    state = json.loads(page.texts["page"])
+    assert (state["scene"], state["colors"]) == (None, {})
+    assert state["shown"] == list(grasp_run().signals)[:6]
 
 
-def test_contacts_begin_where_the_metrics_say_and_again_after_each_release() -> None:
-    run = grasp_run()
-    contact = run.signals["plant.contact[1]"].copy()
-    contact[1500:1600] = False
-    again = replace(run, signals={**run.signals, "plant.contact[1]": contact})
-    page = Elements(page_html(again, "results"))
-    found = [(c["finger"], c["t"]) for c in json.loads(page.texts["page"])["grasp"]["contacts"]]
-    assert [finger for finger, _ in found] == [1, 2, 1]
-    np.testing.assert_allclose([t for _, t in found], [1.0, 1.2, 1.6], atol=1e-9)
+def test_metrics_stand_in_the_columns_of_their_entries() -> None:
+    """One with other entries has a row for each; one without, or a list, is across all."""
+    found = [
+        Metric("a", lambda _: [0.5, 2.0, None], unit="m", entries=("x", "y", "z"), factor=1e3,
+               shown_unit="mm"),
+        Metric("b", lambda _: True),
+        Metric("c_d", lambda _: [0.125, 0.25], unit="s", entries=("left", "right")),
+        Metric("e", lambda _: [1.5, 2.5]),
+    ]  # fmt: skip
+    html = page_html(replace(ring_run(["a"]), more_metrics=tuple(found)), "results")
+    table = html[html.index('id="metrics"') : html.index('id="connections"')]
+    heads = re.findall(r'<th class="n"><span class="key(\d)">(.*?)</span>', table)
+    assert heads == [("1", "x"), ("2", "y"), ("3", "z")]
+    cells = [re.findall(r"<td([^>]*)>(.*?)</td>", row) for row in table.split("<tr>")[2:]]
+    assert [[text for _, text in row] for row in cells] == [
+        ["a", "500.0000", "2000.0000", "none", "mm"],
+        ["b", "yes", ""],
+        ["c d, left", "0.1250", "s"],
+        ["c d, right", "0.2500", "s"],
+        ["e", "1.5000, 2.5000", ""],
+    ]
+    assert cells[1][1][0] == ' class="both" colspan="3"'
 
 
-def test_contacts_and_lines_of_the_log_with_a_time_are_marked() -> None:
+def test_lines_of_the_log_with_a_time_are_marked() -> None:
     run = grasp_run()
     log = ["t = 0.25 s: a.u = 1", "b: 3 steps rejected, first at t = 0.7 s", "t = 1e-3 s: fault"]
-    logged = replace(run, settings={**run.settings, "log": log})
+    logged = replace(run, log=tuple(log))
     page = Elements(page_html(logged, "results"))
     marks = [(m["color"], m["t"]) for m in json.loads(page.texts["page"])["marks"]]
-    assert [color for color, _ in marks] == ["--finger1", "--finger2", "--fault", "--fault"]
-    np.testing.assert_allclose([t for _, t in marks], [1.0, 1.2, 0.25, 0.001], atol=1e-9)
-
-
-def test_the_actuator_force_comes_from_the_connections() -> None:
-    def actuators(factor: float | None, unit: str | None) -> object:
-        run = grasp_run()
-        connections = [
-            {**w, "factor": factor} if w["to"] == "plant.force[1]" else w
-            for w in run.settings["connections"]
-        ]
-        units = {**run.units, "controller.force[1]": unit}
-        changed = replace(run, units=units, settings={**run.settings, "connections": connections})
-        return json.loads(Elements(page_html(changed, "r")).texts["page"])["grasp"]["actuator"]
-
-    both = {"1": "controller.force[1]", "2": "controller.force[2]"}
-    second = {"2": "controller.force[2]"}
-    assert actuators(None, "N") == both
-    assert actuators(1.0, "N") == both
-    assert actuators(-1.0, "N") == second
-    assert actuators(None, "kN") == second
-
-
-def test_an_older_run_folder_is_refused_in_one_line() -> None:
-    run = ring_run(["a"])
-    settings = {k: v for k, v in run.settings.items() if k != "connections"}
-    with pytest.raises(
-        InputError, match=r"^run.json of r: no entry 'connections'; must be"
-    ) as raised:
-        page_html(replace(run, settings=settings), "r")
-    assert "\n" not in str(raised.value)
+    assert marks == [("--fault", 0.25), ("--fault", 0.001)]
 
 
 def test_the_page_is_written_in_one_piece(tmp_path: Path) -> None:

@@ -1,15 +1,12 @@
-"""The static figures: a close-up for each contact, one for both where they are near."""
+"""The picture of any result: its signals by unit."""
 
-import struct
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
-from grasp_cosim.recording.load import Run
 from grasp_cosim.report import plot
 from matplotlib.figure import Figure
-from report.runs import TOUCH, grasp_run, ring_run
+from report.runs import ring_run
 
 
 @pytest.fixture
@@ -24,63 +21,6 @@ def saved(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
 
     monkeypatch.setattr(plot, "save", keep)
     return figures
-
-
-def width(path: Path) -> int:
-    """Of a PNG, in pixels."""
-    head = path.read_bytes()[:24]
-    assert head.startswith(b"\x89PNG")
-    return int(struct.unpack(">I", head[16:20])[0])
-
-
-def touching_from(run: Run, moments: dict[int, float]) -> Run:
-    """The run with contacts that begin at these times only."""
-    contacts = {f"plant.contact[{j}]": run.time >= moments.get(j, np.inf) - 1e-9 for j in (1, 2)}
-    return replace(run, signals={**run.signals, **contacts})
-
-
-@pytest.mark.parametrize(
-    ("moments", "close_ups"),
-    [
-        ({}, []),
-        ({1: 1.0}, [[1]]),
-        ({1: 1.0, 2: 1.2}, [[1], [2]]),
-        ({1: 1.03, 2: 1.0}, [[1, 2]]),
-        ({2: 0.0}, [[2]]),
-    ],
-)
-def test_close_ups_of_the_contacts(
-    moments: dict[int, float],
-    close_ups: list[list[int]],
-    tmp_path: Path,
-    saved: list[Figure],
-) -> None:
-    plot.plot_run(touching_from(grasp_run(), moments), tmp_path / "grasp.png")
-    axes = saved[0].axes
-    assert len(axes) == 3 * (1 + len(close_ups))
-    by_column = [axes[1 + k :: 1 + len(close_ups)] for k in range(len(close_ups))]
-    for fingers, column in zip(close_ups, by_column, strict=True):
-        begin, end = column[0].get_xlim()
-        assert all(begin < moments[j] < end for j in fingers)
-        assert end - begin < 0.1
-        for one in column:
-            assert [line.get_label() for line in one.lines] == [f"finger {j}" for j in fingers]
-            assert one.get_xlim() == (begin, end)
-    assert width(tmp_path / "grasp.png") == int(130 * (7.2 + 2.9 * len(close_ups)))
-
-
-def test_a_close_up_shows_the_samples_around_the_contact(
-    tmp_path: Path, saved: list[Figure]
-) -> None:
-    run = grasp_run()
-    plot.plot_run(run, tmp_path / "grasp.png")
-    gap, force, speed = saved[0].axes[1::3]
-    time, shown = gap.lines[0].get_data()
-    rows = (run.time >= TOUCH[1] - 0.015) & (run.time < TOUCH[1] + 0.03)
-    np.testing.assert_array_equal(time, run.time[rows])
-    np.testing.assert_array_equal(shown, 1e3 * run.signals["plant.gap[1]"][rows])
-    assert np.max(force.lines[0].get_ydata()) == 3.4
-    assert np.max(speed.lines[0].get_ydata()) == pytest.approx(65.0)
 
 
 def test_all_signals_by_unit(tmp_path: Path, saved: list[Figure]) -> None:

@@ -11,11 +11,12 @@ Times = tuple[float | None, float | None]
 
 
 def _study(times: list[Times], energies: list[Mapping[str, float]]) -> StepStudy:
+    names = ("first", "second")
     runs = (
-        StepRun(100_000 * 2**i, pair, energy)
+        StepRun(100_000 * 2**i, dict(zip(names, pair, strict=True)), energy)
         for i, (pair, energy) in enumerate(zip(times, energies, strict=True))
     )
-    return StepStudy("hand.toml", "sequential", 3.0, 200_000, 1e-3, tuple(runs))
+    return StepStudy("hand.toml", "sequential", 3.0, 200_000, 1e-3, "s", names, tuple(runs))
 
 
 def _size(path: Path) -> tuple[int, int]:
@@ -34,7 +35,7 @@ LAST_MISSING: list[Times] = [*LINEAR[:4], (None, None)]
 
 
 @pytest.mark.parametrize("times", [LINEAR, NOTHING, [(1.0, None)] * 5, FIRST_ONLY, LAST_MISSING])
-def test_any_contact_times_can_be_drawn(times: list[Times], tmp_path: Path) -> None:
+def test_any_quantities_can_be_drawn(times: list[Times], tmp_path: Path) -> None:
     draw_step_study(_study(times, [{}] * 5), tmp_path / "study.png")
     assert [p.name for p in tmp_path.iterdir()] == ["study.png"]
     assert _size(tmp_path / "study.png")[0] == 936

@@ -1,5 +1,7 @@
 """The figure of a paced run's timing, however the run went: one must always come out."""
 
+import re
+import xml.etree.ElementTree as ET
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,8 +10,7 @@ import pytest
 from grasp_cosim.realtime.timing import Overrun, Timing
 from grasp_cosim.report import timing as drawn
 from grasp_cosim.report.plot import RED
-from grasp_cosim.report.timing import COLORS, draw_timing
-from grasp_cosim.report.timing_curves import looks
+from grasp_cosim.report.timing import draw_timing, looks, timing_svg
 from matplotlib.colors import same_color
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -61,7 +62,7 @@ def test_every_part_has_a_curve_and_the_period_is_a_red_line(
     above = figure_of(timing, monkeypatch).axes[0]
     lines = {str(line.get_label()): line for line in above.lines}
     for part, spread in timing.parts.items():
-        assert same_color(lines[part].get_color(), COLORS[looks(timing)[part].color])
+        assert same_color(lines[part].get_color(), looks(timing)[part].color)
         assert points(lines[part])[-1] == [spread.worst, 1.0 / timing.steps]
     limits = [line for line in above.lines if same_color(line.get_color(), RED)]
     assert [points(line) for line in limits] == [[[PERIOD, 0.0], [PERIOD, 1.0]]]
@@ -92,14 +93,38 @@ def test_overruns_are_in_the_colours_of_their_culprits(monkeypatch: pytest.Monke
     assert list(lines) == ["3 × plant", "1 × late start", "1 × backlog"]
     for line, name in zip(lines.values(), moments, strict=True):
         assert points(line) == [list(moments[name])]
-        assert same_color(line.get_color(), COLORS[looks(timing)[name].color])
+        assert same_color(line.get_color(), looks(timing)[name].color)
     assert below.get_xlim() == (0.0, 3.0)
     assert below.get_title(loc="right") == "grey: 2 more, counted only"
+
+
+def test_the_axes_hold_all_curves_and_the_period(monkeypatch: pytest.MonkeyPatch) -> None:
+    above = figure_of(paced(), monkeypatch).axes[0]
+    assert above.get_xlim() == pytest.approx((1e-7, 1e-2))
+    assert above.get_ylim() == pytest.approx((1e-5, 1.5))
 
 
 def test_without_overruns_it_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     below = figure_of(paced(steps=3000, hiccups=0), monkeypatch).axes[1]
     assert [text.get_text() for text in below.texts] == ["no overruns"]
+
+
+def test_as_svg_it_has_every_name_and_is_an_element_for_a_page(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    timing = paced(steps=3000, components={"<b>--!>": 1e-6, "$x_1$": 1e-6})
+    svg = timing_svg(timing, 3.0)
+    assert svg == timing_svg(timing, 3.0)
+    root = ET.fromstring(svg)
+    assert root.tag == "{http://www.w3.org/2000/svg}svg"
+    assert "width" not in root.attrib
+    assert root.attrib["viewBox"].split()[:2] == ["0", "0"]
+    assert re.findall(r"<style[^>]*>(.)", svg) == ["."]  # no rule for the rest of the page
+    curves = [e for e in root.iter() if e.get("d", "").count("L") > 20]
+    assert len(curves) >= len(timing.parts)
+    comments = re.findall(r"<!--(.*?)-->", svg, re.DOTALL)
+    assert any("&lt;b&gt;" in text for text in comments)
+    assert svg.count("<!--") == svg.count("-->") == len(comments)
 
 
 @pytest.mark.slow

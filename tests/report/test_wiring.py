@@ -52,21 +52,9 @@ class Diagram:
 
 
 def corners(path: str) -> list[Point]:
-    """The points of a path of M, C, H, V and q, control points left out."""
-    x = y = 0.0
-    points = []
-    for command, text in re.findall(r"([MCHVq])([^MCHVq]*)", path):
-        numbers = [float(n) for n in text.split()]
-        if command == "H":
-            x = numbers[0]
-        elif command == "V":
-            y = numbers[0]
-        elif command == "q":
-            x, y = x + numbers[2], y + numbers[3]
-        else:
-            x, y = numbers[-2:]
-        points.append((x, y))
-    return points
+    """The points of a path of M, L, C and Q, control points left out."""
+    numbers = [[float(n) for n in text.split()] for text in re.findall(r"[MLCQ]([^MLCQ]*)", path)]
+    return [(n[-2], n[-1]) for n in numbers]
 
 
 def link(text: str, label: str = "", fault: bool = False) -> Link:

@@ -7,19 +7,13 @@ from dataclasses import asdict
 from html import escape
 from typing import Any
 
+from ..metrics.metric import Metric
 from ..recording.result import Result
 
 EXPERIMENT = (
-    "system",
-    "step",
-    "stop",
-    "scheme",
-    "initialisation",
-    "steps",
-    "wall_time",
-    "real_time_factor",
+    "system", "step", "stop", "scheme", "initialisation", "steps", "wall_time", "real_time_factor",
     "complete",
-)
+)  # fmt: skip
 """Entries of run.json that say how the run was made, in the order in which they are shown."""
 
 _UNITS = {"step": "s", "stop": "s", "wall_time": "s"}
@@ -38,21 +32,45 @@ def summary(run: Mapping[str, Any]) -> str:
 
 
 def metrics_table(result: Result) -> str:
-    """The metrics of a result, a column for each of several values, and why others are missing."""
+    """Return the metrics of a result, and why others are missing.
+
+    There is a column for each of several values, like those of two fingers; a metric that has
+    others has a row for each.
+    """
     measured = result.measured
-    rows = [
-        _metric(m.title, measured.values[m.name], m.factor, m.display_unit)
-        for m in measured.metrics
-    ]
+    heads = next((m.entries for m in measured.metrics if m.entries), ())
+    rows = []
+    for m in measured.metrics:
+        values = measured.values[m.name]
+        if not m.entries or m.entries == heads:
+            rows.append(_metric(m.title, values if m.entries else [values], m, len(heads)))
+            continue
+        for column, value in zip(m.columns, values, strict=True):
+            rows.append(_metric(m.column_title(column), [value], m, len(heads)))
     why = "".join(f"<p>{escape(line)}</p>" for line in measured.missing)
     if not rows:
         return why or "<p>There are no metrics of this system.</p>"
-    entries = next((m.entries for m in measured.metrics if m.entries), ("", ""))
-    heads = "".join(
-        f'<th class="n"><span class="key{j}">{escape(entry)}</span></th>'
-        for j, entry in enumerate(entries, start=1)
+    cells = "".join(
+        f'<th class="n"><span class="key{j}">{escape(head)}</span></th>'
+        for j, head in enumerate(heads, start=1)
     )
-    return table(f"<th></th>{heads}<th></th>", rows) + why
+    return table(f"<th></th>{cells}<th></th>" if heads else "", rows) + why
+
+
+def _metric(title: str, values: Sequence[Any], metric: Metric, columns: int) -> str:
+    """A row: a cell per value, or one across all columns."""
+    one = f' class="both" colspan="{max(columns, 1)}"'
+    how = one if len(values) == 1 else ' class="n"'
+    cells = "".join(f"<td{how}>{escape(_scaled(v, metric.factor))}</td>" for v in values)
+    return f"<td>{escape(title)}</td>{cells}<td>{escape(metric.display_unit)}</td>"
+
+
+def _scaled(value: Any, factor: float) -> str:
+    if isinstance(value, list):
+        return ", ".join(_scaled(v, factor) for v in value)
+    if isinstance(value, float):
+        return f"{factor * value:.4f}" if factor * abs(value) < 1e4 else number(factor * value)
+    return number(value)
 
 
 def settings_html(result: Result) -> str:
@@ -69,7 +87,7 @@ def settings_html(result: Result) -> str:
     heads = "<th>component</th><th>FMU</th><th>start values given</th><th></th>"
     experiment = [
         f"<td>{escape(key.replace('_', ' '))}</td>"
-        f"<td>{escape(_plain(run[key]))} {_UNITS.get(key, '')}</td>"
+        f"<td>{escape(number(run[key]))} {_UNITS.get(key, '')}</td>"
         for key in EXPERIMENT
     ]
     lists = [
@@ -106,13 +124,15 @@ def bullets(title: str, lines: Iterable[str], none: str) -> str:
 def entries(values: Mapping[str, Any]) -> str:
     """Like a = 1, b = 2; a mapping within in brackets."""
     return ", ".join(
-        f"{key} = " + (f"({_plain(v)})" if isinstance(v, Mapping) else number(v))
+        f"{key} = " + (f"({number(v)})" if isinstance(v, Mapping) else number(v))
         for key, v in values.items()
     )
 
 
 def number(value: Any, digits: int = 6) -> str:
-    """A value for the eye: floats with so many figures, True and False in words."""
+    """A value for the eye: floats with so many figures, True and False in words, entries()."""
+    if isinstance(value, Mapping):
+        return entries(value)
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):
@@ -125,25 +145,6 @@ def number(value: Any, digits: int = 6) -> str:
 def count(value: int) -> str:
     """A whole number in groups of three digits."""
     return f"{value:,}".replace(",", "\N{NARROW NO-BREAK SPACE}")
-
-
-def _metric(label: str, value: Any, factor: float, unit: str) -> str:
-    """A row: a pair has a cell per finger, anything else one across both."""
-    pair = isinstance(value, Sequence) and not isinstance(value, str) and len(value) == 2
-    values = value if pair else [value]
-    how = ' class="n"' if pair else ' class="both" colspan="2"'
-    cells = "".join(f"<td{how}>{escape(_scaled(v, factor))}</td>" for v in values)
-    return f"<td>{escape(label)}</td>{cells}<td>{escape(unit)}</td>"
-
-
-def _scaled(value: Any, factor: float) -> str:
-    if isinstance(value, float):
-        return f"{factor * value:.4f}" if factor * abs(value) < 1e4 else number(factor * value)
-    return _plain(value)
-
-
-def _plain(value: Any) -> str:
-    return entries(value) if isinstance(value, Mapping) else number(value)
 
 
 def _how(component: Mapping[str, Any]) -> str:

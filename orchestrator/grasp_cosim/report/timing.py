@@ -223,7 +223,7 @@ def _key(axes: Axes, timing: Timing) -> None:
 def _draw_overruns(axes: Axes, timing: Timing, end: float) -> None:
     """How late each listed step ended, over the time of the run, in the colour of its culprit."""
     listed = timing.listed
-    axes.set_xlim(0.0, max(end, SHORTEST))
+    axes.set_xlim(0.0, max([end, SHORTEST, *(o.time for o in listed)]))
     axes.set_xlabel("time in the run in s")
     finish(axes, "late by", legend=False)
     if not listed:
