@@ -16,7 +16,7 @@ from report.runs import TOUCH, grasp_run
 def saved(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
     """Collects the figures that are saved."""
     figures: list[Figure] = []
-    save = pictures.save
+    from grasp_cosim.report.plot import save
 
     def keep(figure: Figure, path: Path) -> None:
         figures.append(figure)
