@@ -88,20 +88,20 @@ def describe(path: Path) -> Interface:
     kinds = kinds_of(root, reader.major)
     identified = root if reader.major == "1" else next(iter(kinds.values()), root)
     return Interface(
-        path,
-        root.get("instantiationToken" if reader.major == "3" else "guid", ""),
-        identified.get("modelIdentifier", ""),
-        variables,
-        version,
-        units,
-        tuple(kinds),
-        capabilities_of(kinds, reader.major),
-        {key: typed("Real", experiment.get(name)) for key, name in EXPERIMENT.items()},
-        _platforms(files),
-        "resources/slavemodule.txt" in files,
-        root.get("modelName"),
-        root.get("generationTool"),
-        reader.flaws[0] if reader.flaws else "",
+        path=path,
+        guid=root.get("instantiationToken" if reader.major == "3" else "guid", ""),
+        identifier=identified.get("modelIdentifier", ""),
+        variables=variables,
+        version=version,
+        units=units,
+        kinds=tuple(kinds),
+        capabilities=capabilities_of(kinds, reader.major),
+        experiment={key: typed("Real", experiment.get(name)) for key, name in EXPERIMENT.items()},
+        platforms=_platforms(files),
+        python="resources/slavemodule.txt" in files,
+        model_name=root.get("modelName"),
+        tool=root.get("generationTool"),
+        flaw=reader.flaws[0] if reader.flaws else "",
     )
 
 
@@ -214,7 +214,8 @@ class _Reader:
         if value is None or value.tag not in types:
             raise ValueError(f"{place}: has no type; must be one of {', '.join(types)}")
         kind = kind_of(value.tag)
-        declared = self.types.get(value.get("declaredType", ""))
+        type_name = value.get("declaredType", "")
+        declared = self.types.get(type_name)
         sources = (element, value) if declared is None else (declared, element, value)
         said = {key: text for e in sources for key, text in e.attrib.items() if text}
         limits = {k: said[k] for k in ("min", "max", "nominal") if k in said and kind in NUMERIC}
@@ -229,26 +230,26 @@ class _Reader:
         initial = {} if self.major == "1" else INITIAL.get(variability, {})
         is_enumeration = value.tag == "Enumeration"
         return Variable(
-            name,
-            kind,
-            causality,
-            reference,
-            said.get("unit"),
-            start,
-            typed(value.tag, limits.get("min")),
-            typed(value.tag, limits.get("max")),
-            value.tag,
-            variability,
-            now,
-            initially,
-            tuple(self.size(place, e) for e in element.iterfind("Dimension")),
-            element.get("description"),
-            typed(value.tag, limits.get("nominal")),
-            said.get("relativeQuantity") in ("true", "1"),
-            self.enumerations.get(value.get("declaredType", "")) if is_enumeration else None,
-            element.get("initial") or initial.get(causality),
-            said.get("displayUnit"),
-            starts,
+            name=name,
+            kind=kind,
+            causality=causality,
+            reference=reference,
+            unit=said.get("unit"),
+            start=start,
+            minimum=typed(value.tag, limits.get("min")),
+            maximum=typed(value.tag, limits.get("max")),
+            type=value.tag,
+            variability=variability,
+            dependencies=now,
+            initial_dependencies=initially,
+            shape=tuple(self.size(place, e) for e in element.iterfind("Dimension")),
+            description=element.get("description"),
+            magnitude=typed(value.tag, limits.get("nominal")),
+            relative=said.get("relativeQuantity") in ("true", "1"),
+            enumeration=self.enumerations.get(type_name) if is_enumeration else None,
+            initial=element.get("initial") or initial.get(causality),
+            display_unit=said.get("displayUnit"),
+            starts=starts,
         )
 
     def nature(self, element: Element, kind: str) -> tuple[str, str]:
