@@ -8,12 +8,10 @@ of the whole content; the GUID is that hash.
 import hashlib
 import io
 import re
-import sys
 import zipfile
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 from .binary import bound, libpython, mended, preamble
 from .changes import changes, read_members
@@ -21,7 +19,7 @@ from .contract import declared, variables
 from .documentation import BLOCK, Making, icon, licences, page
 from .folder import Built, file_hash, write_file
 from .model_description import Description, model_description, version
-from .packing import package_folder, with_imports
+from .packing import card_file, package_folder, with_imports
 from .shipped import slave_class
 
 BINARIES = package_folder("pythonfmu") / "resources" / "binaries"
@@ -44,7 +42,7 @@ def build_fmu(script: Path, out: Path, bind_python: str | None = None) -> Built:
     return write_fmu(
         out / f"{name}.fmu",
         description,
-        _card(slave.block),
+        card_file(slave.block.__package__).read_text("utf-8"),
         {script.name: script.read_bytes()},
         bind_python,
         picture=icon(name),
@@ -110,13 +108,6 @@ def _renamed(sources: Mapping[str, bytes]) -> dict[str, bytes]:
         place = f"{package}_{HASH}/{rest}" if rest else f"{Path(name).stem}_{HASH}.py"
         packed[f"resources/{place}"] = imports.sub(rf"from \1_{HASH}".encode(), data)
     return packed
-
-
-def _card(block: Any) -> str:
-    """Return the equation card of a block: in its package once installed, in the sources beside."""
-    folder = Path(sys.modules[block.__package__].__file__ or "").parent
-    inside = folder / "README.md"
-    return (inside if inside.exists() else folder.parent / "README.md").read_text("utf-8")
 
 
 @cache

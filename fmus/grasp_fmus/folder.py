@@ -14,7 +14,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Literal
 
-from .packing import package_folder, packages
+from .packing import card_file, package_folder, packages
 
 STAMP = ".stamp.json"
 
@@ -91,7 +91,7 @@ def _deciding() -> Iterator[tuple[str, Path]]:
     """Yield the files, each with a name that does not depend on where it is installed."""
     for package, folder in packages(__package__).items():
         yield from _below(folder, package)
-        if (card := folder.parent / "README.md").is_file():
+        if (card := card_file(package)).is_file():
             yield f"{package}: card", card
     yield from _below(package_folder("pythonfmu") / "resources" / "binaries", "pythonfmu")
     for name in DISTRIBUTIONS:

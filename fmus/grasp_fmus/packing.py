@@ -51,6 +51,12 @@ def package_folder(package: str) -> Path:
     return Path(spec.origin).parent
 
 
+def card_file(package: str) -> Path:
+    """Return the equation card of a package: in it once it is installed, in the sources beside."""
+    inside = package_folder(package) / "README.md"
+    return inside if inside.exists() else inside.parents[1] / "README.md"
+
+
 def _imported(path: str, source: bytes) -> Iterator[str]:
     """Yield the modules to pack that a source imports, and names in them that may be modules."""
     *package, _ = path.split("/")

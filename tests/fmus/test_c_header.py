@@ -8,7 +8,7 @@ import socket
 import struct
 import subprocess
 from collections.abc import Callable, Iterator
-from dataclasses import fields
+from dataclasses import asdict, fields
 from hashlib import sha256
 from itertools import count
 from pathlib import Path
@@ -624,7 +624,7 @@ def test_the_same_as_the_peer_in_python(driver: Path, key: bytes | None) -> None
     for i, (record, (event, answer)) in enumerate(zip(records, expected, strict=True)):
         assert (record.event, record.answer) == (event, answer), i
     assert counters == reference.peer.counters
-    seen = counters.as_dict()
+    seen = asdict(counters)
     assert min(seen[name] for name in seen if key or name != "forged") > 5, seen
     assert {event for event, _ in expected} == {NOTHING, SEND, DO_INITIALISE, DO_STEP, ENDED}
 
@@ -642,7 +642,7 @@ def test_nothing_that_is_received_does_harm(driver: Path, key: bytes | None) -> 
         driver, "fuzz", key.decode() if key else "-", "100000", "4711",
         pipe=b"".join(map(sized, corpus)),
     )  # fmt: skip
-    counters = PeerCounters(*struct.unpack(f"={len(fields(PeerCounters))}Q", out)).as_dict()
+    counters = asdict(PeerCounters(*struct.unpack(f"={len(fields(PeerCounters))}Q", out)))
     assert min(counters[name] for name in counters if key or name != "forged") > 50, counters
 
 

@@ -90,16 +90,13 @@ class Client:
 
         ValueError where a string is too long.
         """
-        body = self._request.pack(values)
-        self._next()
-        return self._pack(message.INITIALISE, now, body, time)
+        return self._ask(message.INITIALISE, now, values, time)
 
     def step(self, time: float, step: float, values: Sequence[Value], now: int) -> bytes:
         """Return STEP from `time` over `step`, both in s, with `values`. To be sent once."""
-        body = self._request.pack(values)
-        self._next()
+        request = self._ask(message.STEP, now, values, time, step)
         self._first_step = self._first_step or self._sequence
-        return self._pack(message.STEP, now, body, time, step)
+        return request
 
     def end(self, now: int) -> bytes:
         """Return END; there is no answer to it."""
@@ -110,10 +107,14 @@ class Client:
         self._awaited = 0
         self.counters.missed += 1
 
-    def _next(self) -> None:
+    def _ask(
+        self, kind: int, now: int, values: Sequence[Value], time: float, step: float = 0.0
+    ) -> bytes:
+        body = self._request.pack(values)
         self._sequence += 1
         self._awaited = self._sequence
         self._seen = (self._seen << 1) & ((1 << WINDOW) - 1)
+        return self._pack(kind, now, body, time, step)
 
     def _pack(
         self, kind: int, now: int, body: bytes, time: float = 0.0, step: float = 0.0

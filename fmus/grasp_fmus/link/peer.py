@@ -5,7 +5,7 @@ The caller does what an Action says and sends what it gets: at most one datagram
 
 from collections import OrderedDict
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from secrets import randbits
 from typing import NamedTuple
 
@@ -42,10 +42,6 @@ class PeerCounters:
     malformed: int = 0
     forged: int = 0
     busy: int = 0
-
-    def as_dict(self) -> dict[str, int]:
-        """Return the counts by name."""
-        return asdict(self)
 
 
 class Request(NamedTuple):

@@ -94,7 +94,7 @@ class ServedFmu:
 
     def counters(self) -> dict[str, int]:
         """The numbers of what was done and of what was received, by name."""
-        return {**asdict(self.counts), **self.peer.counters.as_dict()}
+        return {**asdict(self.counts), **asdict(self.peer.counters)}
 
     def due(self) -> int | None:
         """Return when `look` has something to do next; None: not before the next datagram."""
