@@ -22,10 +22,10 @@ from typing import Any
 
 from ..files import write_text
 from ..recording.result import Result
+from .diagram import Link, diagram_svg
 from .embed import LIMIT, Shown, fit, packed
 from .tables import count, metrics_table, number, settings_html, summary
 from .timing_html import timing_html
-from .wiring import Link, wiring_svg
 
 AT_FIRST = 6
 """So many signals are shown first where no scene says which."""
@@ -213,7 +213,8 @@ def _connections(result: Result) -> str:
         links.append(Link(source, target, ", ".join(label), fault=c["to"] in faults))
     boxes = {name: c["fmu"] for name, c in result.settings["components"].items()}
     return (
-        f'<div class="diagram">{wiring_svg(boxes, links, result.units)}</div>'
-        '<p class="hint">From left to right in the order of execution. Dashed, below: connections '
-        "back to a component that steps earlier. Hold the pointer over one for its name.</p>"
+        f'<div class="diagram">{diagram_svg(boxes, links, result.units)}</div>'
+        '<p class="hint">From left to right in the order of execution. Above: connections past '
+        "others. Dashed, below: connections back to a component that steps earlier. Hold the "
+        "pointer over one for its name.</p>"
     )

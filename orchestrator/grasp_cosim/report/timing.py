@@ -186,6 +186,7 @@ def _draw_distributions(axes: Axes, timing: Timing) -> None:
 
 
 def _draw_curve(axes: Axes, curve: Curve, look: Look) -> None:
+    """The line with a dot on each quantile and a ring on the worst."""
     line, *marks = (
         [(max(t, SHORTEST), share) for t, share in points]
         for points in (curve.points, [*curve.marks.values()][:-1], [curve.marks["worst"]])

@@ -18,7 +18,7 @@ from ..frame import json_option
 @click.option("--out", type=click.Path(path_type=Path), help="The page. Default: RUN/report.html")
 @json_option
 def report(run: Path, out: Path | None, as_json: bool) -> int:
-    """Make a page of RUN, a folder that `run --out` wrote: traces, animation, wiring, settings.
+    """Make a page of RUN, a folder that `run --out` wrote: traces, metrics, connections, settings.
 
     The page is one file that needs nothing else. A picture is drawn beside it with matplotlib, the
     extra plot, and one more of the timing of a run in real time; without it there is the page

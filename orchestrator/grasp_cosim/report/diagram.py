@@ -22,23 +22,6 @@ LANE, NEST, NEAR, BEND = 18.0, 6.0, 18.0, 5.0
 LETTER, SMALL = 7.2, 6.0
 """px a letter in a box and in a label takes, rather too much than too little."""
 
-STYLE = """
-.diagram text{font:12px var(--sans);fill:var(--ink)}
-.diagram .box rect{fill:var(--lens);stroke:var(--muted)}
-.diagram .box .name{font-weight:600;font-size:13px}
-.diagram .box .more,.diagram .box .unit{fill:var(--muted);font-size:11px}
-.diagram .connection path{fill:none;stroke:transparent;stroke-width:11}
-.diagram .connection .line{stroke:var(--muted);stroke-width:1.3;marker-end:url(#tip)}
-.diagram .connection text{font-size:11px;paint-order:stroke;stroke:var(--paper);stroke-width:4px;
-stroke-linejoin:round}
-.diagram .back .line{stroke:var(--back);stroke-dasharray:6 3;marker-end:url(#tip-back)}
-.diagram .back text{fill:var(--back)}
-.diagram .fault .line{stroke:var(--fault);marker-end:url(#tip-fault)}
-.diagram .fault text{fill:var(--fault)}
-.diagram .connection:hover .line{stroke-width:3}
-#tip path{fill:var(--muted)}#tip-back path{fill:var(--back)}#tip-fault path{fill:var(--fault)}
-"""
-
 
 @dataclass(frozen=True, slots=True)
 class Link:
@@ -113,24 +96,27 @@ class _Way:
         """The text on it: with its name where it is far from its ports."""
         return ", ".join(filter(None, (self.link.name if self.kind else "", self.link.label)))
 
+    @property
+    def wide(self) -> float:
+        """The width of the label in px."""
+        return SMALL * len(self.label)
 
-def wiring_svg(
+
+def diagram_svg(
     boxes: Mapping[str, str], links: Sequence[Link], units: Mapping[str, str | None]
 ) -> str:
     """Return an SVG element: `boxes` are the components in the order of execution, a line on each.
 
-    `units` are those of the outputs, by names like plant.gap[1]. Colours are CSS variables of the
-    page, see STYLE.
+    `units` are those of the outputs, by names like plant.gap[1]. The style is in page/page.css.
     """
     drawn = _boxes(boxes, links)
     place = {name: k for k, name in enumerate(boxes)}
     ways = []
     for link in links:
-        source, target = link.source[0], link.target[0]
-        kind = "back" if place[source] >= place[target] else "over"
-        if kind == "over" and drawn[target].column == drawn[source].column + 1:
-            kind = ""
-        ways.append(_Way(link, drawn[source], drawn[target], kind))
+        source, target = drawn[link.source[0]], drawn[link.target[0]]
+        ahead = "" if target.column == source.column + 1 else "over"
+        kind = "back" if place[source.name] >= place[target.name] else ahead
+        ways.append(_Way(link, source, target, kind))
     columns = [
         [box for box in drawn.values() if box.column == k]
         for k in range(1 + max((box.column for box in drawn.values()), default=-1))
@@ -147,12 +133,12 @@ def wiring_svg(
         for way in ways
     ]
     parts += [_drawn(box, units) for box in drawn.values()]
-    width = MARGIN + max([right, *(MARGIN + 2 * _half(way) for way in lanes)])
+    width = MARGIN + max([right, *(MARGIN + way.wide for way in lanes)])
     height = bottom + (LANE * back + NEST if back else 0.0) + MARGIN
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" role="img" aria-label="wiring diagram" '
+        f'<svg xmlns="http://www.w3.org/2000/svg" role="img" aria-label="connections" '
         f'width="{width:.0f}" height="{height:.0f}" viewBox="0 0 {width:.0f} {height:.0f}">'
-        f"<style>{STYLE}</style><defs>{''.join(map(_tip, ('tip', 'tip-back', 'tip-fault')))}</defs>"
+        f"<defs>{''.join(map(_tip, ('tip', 'tip-back', 'tip-fault')))}</defs>"
         f"{''.join(parts)}</svg>"
     )
 
@@ -202,7 +188,7 @@ def _spread(columns: Sequence[Sequence[_Box]], ways: Iterable[_Way]) -> float:
     coming = Counter(w.target.column for w in ways if w.kind)
     x = MARGIN
     for k, column in enumerate(columns):
-        labels = [SMALL * len(w.label) + NEAR for w in ways if w.target.column == k and not w.kind]
+        labels = [w.wide + NEAR for w in ways if w.target.column == k and not w.kind]
         x += max([GUTTER, *labels]) if k else 0.0
         x += NEAR + NEST * coming[k] if k or coming[k] else 0.0
         width = max(box.needed for box in column)
@@ -240,7 +226,7 @@ def _connection(way: _Way, lane: Sequence[Point], room: float) -> str:
     at, anchor = (to_x - room, to_y - 5), "end"
     if lane:
         path, anchor = _rounded(lane), "middle"
-        at = max((lane[2][0] + lane[3][0]) / 2, MARGIN + _half(way)), lane[2][1] + 4
+        at = max((lane[2][0] + lane[3][0]) / 2, MARGIN + way.wide / 2), lane[2][1] + 4
     text = (
         f'<text x="{at[0]:.1f}" y="{at[1]:.1f}" text-anchor="{anchor}">{escape(way.label)}</text>'
     )
@@ -250,11 +236,6 @@ def _connection(way: _Way, lane: Sequence[Point], room: float) -> str:
         f'<g class="{kind}"><title>{note}</title>'
         f'<path d="{path}"/><path class="line" d="{path}"/>{text if way.label else ""}</g>'
     )
-
-
-def _half(way: _Way) -> float:
-    """Half the width of a label."""
-    return SMALL * len(way.label) / 2
 
 
 def _rounded(points: Sequence[Point]) -> str:
@@ -282,16 +263,16 @@ def _drawn(box: _Box, units: Mapping[str, str | None]) -> str:
         f'<text class="name" x="{left:.1f}" y="{box.y + 19:.1f}">{escape(box.name)}</text>',
         f'<text class="more" x="{left:.1f}" y="{box.y + 34:.1f}">{escape(box.line)}</text>',
     ]
-    for port in box.inputs:
-        y = box.port(box.inputs, port) + 4
-        parts.append(f'<text x="{left:.1f}" y="{y:.1f}">{escape(port)}</text>')
-    for port in box.outputs:
-        y = box.port(box.outputs, port) + 4
-        unit = escape(units.get(f"{box.name}.{port}") or "")
-        parts.append(
-            f'<text x="{right:.1f}" y="{y:.1f}" text-anchor="end">{escape(port)}'
-            f'<tspan class="unit" dx="5">{unit}</tspan></text>'
-        )
+    parts += [
+        f'<text x="{left:.1f}" y="{box.port(box.inputs, port) + 4:.1f}">{escape(port)}</text>'
+        for port in box.inputs
+    ]
+    parts += [
+        f'<text x="{right:.1f}" y="{box.port(box.outputs, port) + 4:.1f}" text-anchor="end">'
+        f'{escape(port)}<tspan class="unit" dx="5">'
+        f"{escape(units.get(f'{box.name}.{port}') or '')}</tspan></text>"
+        for port in box.outputs
+    ]
     return "".join([*parts, "</g>"])
 
 

@@ -1,4 +1,4 @@
-"""The wiring diagram: every connection from its port to its port, boxes apart, feedback below."""
+"""The diagram: every connection from its port to its port, boxes apart, feedback below."""
 
 import itertools
 import random
@@ -6,7 +6,7 @@ import re
 import xml.etree.ElementTree as ET
 
 import pytest
-from grasp_cosim.report.wiring import Link, wiring_svg
+from grasp_cosim.report.diagram import Link, diagram_svg
 from support.slow import slow
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -64,7 +64,7 @@ def link(text: str, label: str = "", fault: bool = False) -> Link:
 
 
 def draw(names: list[str], links: list[Link]) -> Diagram:
-    return Diagram(wiring_svg(dict.fromkeys(names, "X.fmu"), links, {}))
+    return Diagram(diagram_svg(dict.fromkeys(names, "X.fmu"), links, {}))
 
 
 GRASP = ["plant", "sensor_1", "sensor_2", "controller"]
@@ -184,7 +184,7 @@ def test_labels_and_faults_stand_on_their_connections() -> None:
 
 
 def test_names_are_escaped_and_units_shown() -> None:
-    svg = wiring_svg(
+    svg = diagram_svg(
         {"<b>&": "x<y>.fmu"}, [Link(("<b>&", "<o>"), ("<b>&", "<i>"))], {"<b>&.<o>": "µ<"}
     )
     diagram = Diagram(svg)
