@@ -70,6 +70,13 @@ def choice(place: str, value: Any, valid: Iterable[Any]) -> Any:
     return value
 
 
+def text(place: str, value: Any, must: str) -> str:
+    """Return `value`, a string; `must` says what is valid. InputError otherwise."""
+    if not isinstance(value, str):
+        raise InputError(f"{place} = {value!r}: must be {must}")
+    return value
+
+
 def known(said: str, name: Any, valid: Collection[Any], after: str = "") -> None:
     """InputError "SAID 'name'AFTER; valid: ..." where `name` is not one of `valid`."""
     if name not in valid:

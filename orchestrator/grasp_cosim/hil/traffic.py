@@ -72,7 +72,7 @@ class Traffic(Generic[Route]):
     def __init__(self, network: Network, log: Log | None = None) -> None:
         self.counters = {direction: Counters() for direction in DIRECTIONS}
         self._network = network
-        self._log = log
+        self._log: Log = log or (lambda _: None)
         self._begin: int | None = None
         self._newest = dict.fromkeys(DIRECTIONS, 0)
         self._arrivals = count()  # makes the earlier one the first of two that are due at once
@@ -89,12 +89,12 @@ class Traffic(Generic[Route]):
         number = counters.received
         if self._is_out(now):
             counters.outage += 1
-            self._note(Entry(direction, number, 0, "outage", None))
+            self._log(Entry(direction, number, 0, "outage", None))
             return
         passages = self._network.fate(direction, number)
         if not passages:
             counters.lost += 1
-            self._note(Entry(direction, number, 0, "lost", None))
+            self._log(Entry(direction, number, 0, "lost", None))
         counters.duplicated += len(passages) > 1
         held = Held(direction, number, data, route)
         for copy, passage in enumerate(passages):
@@ -129,19 +129,15 @@ class Traffic(Generic[Route]):
         direction, number, *_ = held
         if len(self._held) >= self._network.capacity:
             self.counters[direction].overflow += 1
-            self._note(Entry(direction, number, copy, "overflow", None))
+            self._log(Entry(direction, number, copy, "overflow", None))
             return
         self.counters[direction].held += 1
         heapq.heappush(self._held, (now + passage.delay_ns, next(self._arrivals), held))
         fate: Literal["held back", "passed"] = "held back" if passage.held_back else "passed"
-        self._note(Entry(direction, number, copy, fate, passage.delay_ns / NANOSECONDS))
+        self._log(Entry(direction, number, copy, fate, passage.delay_ns / NANOSECONDS))
 
     def _is_out(self, now: int) -> bool:
         if self._begin is None:
             self._begin = now
         requests = self.counters["request"].received
         return any(o.covers(requests, now - self._begin) for o in self._network.outages)
-
-    def _note(self, entry: Entry) -> None:
-        if self._log:
-            self._log(entry)

@@ -37,8 +37,8 @@ class Shipment:
 
 def ship(task: Task) -> Shipment:
     """The task with its FMUs."""
-    fmus = [c.fmu for c in task.system.components]
-    return Shipment(task, tuple(fmu.read_bytes() for fmu in fmus), hash_of(fmus))
+    contents = tuple(c.fmu.read_bytes() for c in task.system.components)
+    return Shipment(task, contents, hash_of(contents))
 
 
 def run_on_cluster(address: str, task: Task, jobs: Iterable[Job]) -> Generator[Outcome, None, None]:

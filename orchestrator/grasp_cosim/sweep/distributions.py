@@ -3,7 +3,6 @@
 import math
 from dataclasses import dataclass
 from statistics import NormalDist
-from typing import Protocol
 
 import numpy as np
 
@@ -13,21 +12,6 @@ from ..interface.interface import Value
 
 WIDEST = 1e6
 """A normal distribution of which so little is left keeps 9 digits of its quantiles."""
-
-
-class Distribution(Protocol):
-    """Values of one parameter."""
-
-    @property
-    def levels(self) -> int | None:
-        """The number of values, None where they are a continuum."""
-
-    @property
-    def extremes(self) -> tuple[Value, ...]:
-        """Values that must be valid for all to be: the lowest and highest, or each one."""
-
-    def at(self, u: float) -> Value:
-        """The value below which a share u of all lies; u is from 0 to 1."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,6 +96,12 @@ class Normal(_Bounded):
         if share <= 0.0 or share >= 1.0:  # where rounding leaves nothing of a far tail
             return self.low if share <= 0.0 else self.high
         return min(max(normal.inv_cdf(share), self.low), self.high)
+
+
+Distribution = Listed | Uniform | Normal
+"""Values of one parameter: `levels`, how many there are, None where they are a continuum;
+`extremes`, values that must be valid for all to be; at(u), below which a share u of them lies.
+"""
 
 
 def spaced(first: float, last: float, count: int, logarithmic: bool) -> Listed:

@@ -41,7 +41,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ..checks import as_table, check_keys, number, toml_table, whole
+from ..checks import as_table, check_keys, number, text, toml_table, whole
 from ..errors import InputError, choices
 from ..interface.interface import Value
 from ..metrics.metric import Metric, load_metrics
@@ -124,9 +124,7 @@ def read_study(
 def _metrics(place: str, name: Any, folder: Path) -> tuple[Metric, ...]:
     if name is None:
         return ()
-    if not isinstance(name, str):
-        raise InputError(f"{place}: metrics = {name!r}: must be the path of a Python file")
-    return load_metrics(folder / name)
+    return load_metrics(folder / text(f"{place}: metrics", name, "the path of a Python file"))
 
 
 def _system(
@@ -138,13 +136,13 @@ def _system(
 ) -> System:
     """The system with what is the same in all runs."""
     name = table.get("system")
-    if name is not None and not isinstance(name, str):
-        raise InputError(f"{place}: system = {name!r}: must be the path of a .toml or .ssp file")
+    if name is not None:
+        name = folder / text(f"{place}: system", name, "the path of a .toml or .ssp file")
     presets = _presets(place, table)
-    swaps = as_table(f"{place}: [swap]", table.get("swap", {}))
-    for key, fmu in swaps.items():
-        if not isinstance(fmu, str):
-            raise InputError(f"{place}: [swap]: {key} = {fmu!r}: must be the path of an FMU")
+    swaps = {
+        key: folder / text(f"{place}: [swap]: {key}", fmu, "the path of an FMU")
+        for key, fmu in as_table(f"{place}: [swap]", table.get("swap", {})).items()
+    }
     fixed = as_table(f"{place}: [values]", table.get("values", {}))
     for key, value in fixed.items():
         _value(f"{place}: [values]: {key}", value)
@@ -154,14 +152,10 @@ def _system(
                 "one of them"
             )
     load, with_preset = made
-    system = load(None if name is None else folder / name)
+    system = load(name)
     for said, preset in presets.items():
         system = _in(f"{place}: {said}", partial(with_preset, system, preset))
-    revised = system.revised(
-        {key: folder / fmu for key, fmu in swaps.items()},
-        fixed,
-        (f"{place}: [swap]", f"{place}: [values]"),
-    )
+    revised = system.revised(swaps, fixed, (f"{place}: [swap]", f"{place}: [values]"))
     return _in(place, lambda: revised.with_experiment(table.get("step"), table.get("stop")))
 
 
@@ -188,8 +182,8 @@ def _parameter(place: str, entry: Any) -> Parameter:
     ratio_to = entry.get("ratio_to")
     if not isinstance(name, str) or not name.strip() or not name.isprintable():
         raise InputError(f"{place}: name = {name!r}: must be a string of one line")
-    if ratio_to is not None and not isinstance(ratio_to, str):
-        raise InputError(f"{place}: ratio_to = {ratio_to!r}: must be 'component.variable'")
+    if ratio_to is not None:
+        text(f"{place}: ratio_to", ratio_to, "'component.variable'")
     given = [form for form in FORMS if form in entry]
     if len(given) != 1:
         raise InputError(
@@ -240,13 +234,11 @@ def _pictures(place: str, table: Any) -> Pictures:
         return Pictures(None, distributions)
     entry = as_table(f"{place}: map", table["map"])
     check_keys(f"{place}: map", entry, Map.__slots__)
-    for key in ("x", "y", "of"):
-        if not isinstance(entry.get(key), str):
-            raise InputError(f"{place}: map: {key} = {entry.get(key)!r}: must be a name")
+    x, y, of = (text(f"{place}: map: {key}", entry.get(key), "a name") for key in ("x", "y", "of"))
     limit = entry.get("limit")
     if limit is not None:
         limit = number(f"{place}: map: limit", limit)
-    return Pictures(Map(entry["x"], entry["y"], entry["of"], limit), distributions)
+    return Pictures(Map(x, y, of, limit), distributions)
 
 
 def _numbers(place: str, entry: Any, names: Sequence[str]) -> list[float]:

@@ -74,21 +74,11 @@ def sensitivity(
     drawn = generator.integers(len(complete), size=(RESAMPLES, len(complete)))
     again = [indices(complete[d]) for d in drawn if _varies(complete[d])]
     spread = np.percentile(np.array(again), COVER, axis=0)  # (2, first and total, parameters)
-    return Sensitivity(
-        metric,
-        len(complete),
-        len(rows),
-        tuple(
-            Index(
-                name,
-                float(first[i]),
-                (float(spread[0, 0, i]), float(spread[1, 0, i])),
-                float(total[i]),
-                (float(spread[0, 1, i]), float(spread[1, 1, i])),
-            )
-            for i, name in enumerate(parameters)
-        ),
-    )
+    found = []
+    for i, name in enumerate(parameters):
+        of_first, of_total = ((float(low), float(high)) for low, high in spread[:, :, i].T)
+        found.append(Index(name, float(first[i]), of_first, float(total[i]), of_total))
+    return Sensitivity(metric, len(complete), len(rows), tuple(found))
 
 
 def _varies(rows: Floats) -> bool:

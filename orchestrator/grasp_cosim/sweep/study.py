@@ -6,7 +6,6 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -125,7 +124,7 @@ class Study:
     def identity(self) -> dict[str, str]:
         """A hash of all that decides the results: of the study, and of its FMUs' contents."""
         text = json.dumps(self._decisive(), sort_keys=True)
-        fmus = hash_of(c.fmu for c in self.system.components)
+        fmus = hash_of(c.fmu.read_bytes() for c in self.system.components)
         return {"study": hashlib.sha256(text.encode()).hexdigest(), "fmus": fmus}
 
     def _decisive(self) -> dict[str, Any]:
@@ -167,7 +166,7 @@ class Study:
         return low + int(np.random.default_rng([self.design.seed, MOST]).integers(room))
 
     def _noise(self, index: int) -> int:
-        """Return the number of a set of seeds; a saltelli row has one for B, one for all others.
+        """Return the number of the seeds; in a saltelli row A and all A with one of B share it.
 
         Noise is then another parameter that stays while one changes, not a part of each's effect.
         """
@@ -308,11 +307,11 @@ class Study:
             raise InputError(f"{place}: ratio_to: {error}") from error
 
 
-def hash_of(files: Iterable[Path]) -> str:
+def hash_of(contents: Iterable[bytes]) -> str:
     """Return a hash of the contents of files, in their order."""
     digest = hashlib.sha256()
-    for file in files:
-        digest.update(hashlib.sha256(file.read_bytes()).digest())
+    for content in contents:
+        digest.update(hashlib.sha256(content).digest())
     return digest.hexdigest()
 
 
