@@ -1,13 +1,15 @@
 """run --step-study: what it prints and writes, its exit codes, its mistakes in one line."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
 from conftest import Run
 from grasp_cosim import System
-from grasp_cosim.convergence.step_study import StepRun, StepStudy
+from grasp_cosim.convergence.step_study import StepRun, StepStudy, ask
+from grasp_cosim.metrics.metric import Metric
 
 
 @pytest.fixture
@@ -15,12 +17,31 @@ def invented(monkeypatch: pytest.MonkeyPatch) -> list[tuple[System, float]]:
     """In place of the runs, contact times that err by the step; collects what was asked for."""
     asked: list[tuple[System, float]] = []
 
-    def study(system: System, tolerance: float, workers: int, progress: bool) -> StepStudy:
-        asked.append((system, tolerance))
+    def study(
+        system: System,
+        tolerance: float | None,
+        *,
+        of: Sequence[str],
+        metrics: Sequence[Metric],
+        workers: int,
+        progress: bool,
+    ) -> StepStudy:
+        question = ask(system, of, tolerance, metrics)
+        asked.append((system, question.tolerance))
+        first, second = question.quantities
         steps = [system.step_ns * 2**i for i in range(4)]
-        runs = (StepRun(ns, (1.0 + 1e-9 * ns, None), {"plant.exchange_energy[1]": 1e-6 * ns})
-                for ns in steps)  # fmt: skip
-        return StepStudy(system.name, system.scheme, 3.0, system.step_ns, tolerance, tuple(runs))
+        runs = tuple(
+            StepRun(
+                ns,
+                {first: 1.0 + 1e-9 * ns, second: None},
+                {"plant.exchange_energy[1]": 1e-6 * ns},
+            )
+            for ns in steps
+        )
+        return StepStudy(
+            system.name, system.scheme, 3.0, system.step_ns, question.tolerance, question.unit,
+            question.quantities, runs,
+        )  # fmt: skip
 
     monkeypatch.setattr("grasp_cosim.cli.step_study.step_study", study)
     return asked
@@ -31,9 +52,9 @@ def test_the_grasp(command: Run) -> None:
     code, out, err = command("run", "--step-study", "--step", "3.2e-3", "--stop", "1.92")
     assert code == 1
     assert err == ""
-    assert "no step here keeps the contact times within 1 ms; the finest is 0.8 ms" in out
-    assert "finger 1: limit 1.88694" in out
-    assert "finger 2: limit 1.89719" in out
+    assert "no step here keeps time_to_contact within 1 ms; the finest is 0.8 ms" in out
+    assert "time_to_contact[1]: limit 1.88694" in out
+    assert "time_to_contact[2]: limit 1.89719" in out
     assert out.count("observed order 1.0") == 2
 
 

@@ -9,15 +9,19 @@ import pytest
 from grasp_controller import series
 from grasp_cosim import System, simulate
 from grasp_cosim.convergence.extrapolation import Convergence, converge
-from grasp_cosim.convergence.step_study import StepRun, StepStudy, run_step, step_study
+from grasp_cosim.convergence.step_study import StepRun, StepStudy, ask, run_step, step_study
 from grasp_cosim.errors import InputError, SimulationError
 from grasp_cosim.grasp.metrics import FINGERS, first_contact
+from grasp_cosim.metrics.metric import Signals
 from gripper_plant import rigid
 from proximity_sensor import optics
 from support.continuous import Grasp, solve
 from support.direct import closed_loop
 
 MODULE = step_study.__module__
+
+CONTACTS = ("time_to_contact[1]", "time_to_contact[2]")
+"""What a study of a grasp asks about, by default."""
 
 LIMIT_ERROR = 5e-6
 """s; what the extrapolation leaves from steps of 0.8 ms on: of second order, below 0.1 us from
@@ -37,7 +41,7 @@ def _exact() -> tuple[float, ...]:
 def _contact_times(step: float) -> tuple[float, ...]:
     """s; of the blocks called in order, without FMUs."""
     sensor = optics.Params()
-    signals = closed_loop(
+    columns = closed_loop(
         rigid.Params(),
         (sensor, sensor),
         series.Params(),
@@ -45,7 +49,8 @@ def _contact_times(step: float) -> tuple[float, ...]:
         round(3.0 / step),
         until_contact=True,
     )
-    contacts = [first_contact(signals["time"], signals, j) for j in FINGERS]
+    signals = Signals(columns["time"], columns)
+    contacts = [first_contact(signals, j) for j in FINGERS]
     return tuple(c[0] for c in contacts if c)
 
 
@@ -72,8 +77,9 @@ def test_the_grasp_of_fmus_against_the_continuous_solution(grasp: System, scheme
     """Jacobi adds a step of delay at each connection: larger errors, same order and limit."""
     system = grasp.with_experiment(step=1.6e-3, stop=2.0, scheme=scheme)
     study = step_study(system, tolerance=3e-3, steps=[4e-4, 8e-4, 3.2e-3], workers=1)
+    assert tuple(study.limits) == study.quantities == CONTACTS
     for finger in FINGERS:
-        _check_against_the_exact(study.fingers[finger], finger)
+        _check_against_the_exact(study.limits[f"time_to_contact[{finger}]"], finger)
     errors = [
         [abs(t - exact) for t, exact in zip(_times(run), _exact(), strict=True)]
         for run in study.runs
@@ -86,7 +92,7 @@ def test_the_grasp_of_fmus_against_the_continuous_solution(grasp: System, scheme
 
 
 def _times(run: StepRun) -> list[float]:
-    return [t for t in run.contact_times if t is not None]
+    return [t for t in run.values.values() if t is not None]
 
 
 @pytest.mark.slow
@@ -95,15 +101,18 @@ def test_any_number_of_workers_gives_the_same_study(grasp: System) -> None:
     one, two = (step_study(system, workers=n, steps=[1.6e-3, 6.4e-3]) for n in (1, 2))
     assert one == two
     assert [run.step_ns for run in one.runs] == [1_600_000, 3_200_000, 6_400_000]
-    assert all(None not in run.contact_times for run in one.runs)
+    assert all(len(_times(run)) == 2 for run in one.runs)
 
 
 def _study(
     times: Sequence[tuple[float | None, float | None]], tolerance: float = 1e-3
 ) -> StepStudy:
     """A study of invented runs at 0.1, 0.2, 0.4 ms and so on; the system's own step is 0.2 ms."""
-    runs = (StepRun(100_000 * 2**i, pair, {}) for i, pair in enumerate(times))
-    return StepStudy("hand.toml", "sequential", 3.0, 200_000, tolerance, tuple(runs))
+    runs = (
+        StepRun(100_000 * 2**i, dict(zip(CONTACTS, pair, strict=True)), {})
+        for i, pair in enumerate(times)
+    )
+    return StepStudy("hand.toml", "sequential", 3.0, 200_000, tolerance, "s", CONTACTS, tuple(runs))
 
 
 def _linear(i: int, error: float = 1e-3) -> float:
@@ -124,7 +133,7 @@ def test_a_step_of_its_own_that_is_too_long() -> None:
     study = _study([(_linear(i, 3e-3), None) for i in range(4)])
     assert study.largest == 1e-4
     assert not study.holds
-    assert "finger 2: touches in no run" in study.as_text()
+    assert "time_to_contact[2]: has no value in any run" in study.as_text()
     assert study.as_text().endswith("the system's own, 0.2 ms, does not")
 
 
@@ -147,31 +156,38 @@ def test_a_run_without_a_contact_is_out_of_tolerance() -> None:
 
 def test_no_contact_at_all_is_nothing_to_judge() -> None:
     study = _study([(None, None)] * 4)
-    assert (study.largest, study.holds, study.fingers) == (None, False, {})
+    assert (study.largest, study.holds, study.limits) == (None, False, {})
     assert "out of tolerance" not in study.as_text()
     assert study.as_text().endswith(
-        "no finger touches until 3 s: nothing to judge; try a later --stop"
+        "time_to_contact: no value until 3 s, nothing to judge; try a later --stop"
     )
 
 
 def test_noise_is_called_noise() -> None:
     noise = np.random.default_rng(1).normal(1.5, 1e-3, 6)
     study = _study([(float(t), None) for t in noise])
-    assert study.fingers[1].order is None
+    assert study.limits["time_to_contact[1]"].order is None
     assert "no whole order" in study.as_text()
 
 
 def test_the_json_has_a_place_per_finger_and_per_run() -> None:
     study = _study([(_linear(i, 0.3e-3), None) for i in range(4)])
+    first, second = CONTACTS
     found = study.as_json()
     assert (found["holds"], found["largest_step"], found["tolerance"]) == (True, 8e-4, 1e-3)
-    assert [f["finger"] for f in found["fingers"]] == [1]
-    assert found["fingers"][0]["order"] == pytest.approx(1.0)
-    assert found["fingers"][0]["limit"] == pytest.approx(1.5)
+    assert [q["name"] for q in found["quantities"]] == [first]
+    assert found["quantities"][0]["order"] == pytest.approx(1.0)
+    assert found["quantities"][0]["limit"] == pytest.approx(1.5)
     last = found["runs"][-1]
-    assert last["time_to_contact"] == [_linear(3, 0.3e-3), None]
-    assert last["error"] == [pytest.approx(0.6e-3), None]
-    assert last["order"] == [pytest.approx(1.0), None]
+    assert last["value"] == {first: _linear(3, 0.3e-3), second: None}
+    assert last["error"] == {first: pytest.approx(0.6e-3), second: None}
+    assert last["order"] == {first: pytest.approx(1.0), second: None}
+    numbers = {*found, *found["quantities"][0], *last} - {
+        "system", "scheme", "holds", "quantities", "runs", "units", "name", "order", "remark",
+        "kept", "failure",
+    }  # fmt: skip
+    assert set(found["units"]) == numbers
+    assert {found["units"][name] for name in ("tolerance", "value", "error", "step")} == {"s"}
 
 
 def test_energies_are_shown_in_microjoules() -> None:
@@ -192,9 +208,9 @@ def test_the_energies_of_a_run_are_those_at_its_end(
     energies = {f"plant.exchange_energy[{j}]": j * column for j in (1, 2)}
     recorded = replace(result, signals={**result.signals, **energies})
     monkeypatch.setattr(f"{MODULE}.simulate", lambda system: recorded)
-    run = run_step(grasp)
+    run = run_step((grasp, ask(grasp)))
     assert run == StepRun(
-        grasp.step_ns, (None, None), {name: e[-1] for name, e in energies.items()}
+        grasp.step_ns, dict.fromkeys(CONTACTS), {name: e[-1] for name, e in energies.items()}
     )
 
 
@@ -203,7 +219,7 @@ def test_a_run_that_breaks_off_is_a_finding(grasp: System, monkeypatch: pytest.M
         raise SimulationError("plant.gap[1] = nan at step 3: must be finite")
 
     monkeypatch.setattr(f"{MODULE}.simulate", breaks)
-    run = run_step(grasp)
+    run = run_step((grasp, ask(grasp)))
     assert run.failure == "plant.gap[1] = nan at step 3: must be finite"
     study = _study([(_linear(i, 1e-4), None) for i in range(4)])
     study = replace(study, runs=(*study.runs, replace(run, step_ns=1_600_000)))
@@ -215,14 +231,14 @@ def test_an_interrupted_run_ends_the_study(grasp: System, monkeypatch: pytest.Mo
     result = simulate(grasp, step=1e-3, stop=0.01)
     monkeypatch.setattr(f"{MODULE}.simulate", lambda system: replace(result, complete=False))
     with pytest.raises(KeyboardInterrupt):
-        run_step(grasp)
+        run_step((grasp, ask(grasp)))
 
 
 def _no_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     """The steps of the study without their runs."""
     monkeypatch.setattr(
         f"{MODULE}.run_all",
-        lambda run, jobs, *_: [StepRun(job.step_ns, (None, None), {}) for job in jobs],
+        lambda run, jobs, *_: [StepRun(system.step_ns, {}, {}) for system, _ in jobs],
     )
 
 
@@ -268,5 +284,8 @@ def test_a_given_step_that_does_not_fit_is_refused(grasp: System) -> None:
 def test_a_system_without_a_grasp_is_refused_by_name(grasp: System) -> None:
     sensor = replace(grasp.components[1], values={"gap": 0.1})
     system = replace(grasp, name="bench.toml", components=(sensor,), connections=())
-    with pytest.raises(InputError, match=r"bench.toml: no contact times .* several --step"):
+    with pytest.raises(
+        InputError,
+        match=r"bench.toml: nothing .* valid: sensor_1.intensity$",
+    ):
         step_study(system)

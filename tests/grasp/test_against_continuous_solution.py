@@ -1,5 +1,6 @@
 """The sampled closed loop against an independent solution of the equations in continuous time."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 
@@ -8,12 +9,13 @@ import numpy.typing as npt
 import pytest
 from grasp_controller import contact_force, impact_reduction, series, simultaneous_contact
 from grasp_cosim.grasp.metrics import FINGERS, first_contact
+from grasp_cosim.metrics.metric import Signals
 from gripper_plant import rigid
 from hypothesis import Phase, assume, given
 from hypothesis import strategies as st
 from proximity_sensor import optics
 from support.continuous import Grasp, Solution, solve
-from support.direct import Sensors, Signals, closed_loop
+from support.direct import Sensors, closed_loop
 from support.examples import examples
 from support.slow import slow
 
@@ -67,12 +69,13 @@ def _reference_times(g: Grasp) -> Array:
 
 @cache
 def _contact_times(g: Grasp, step: float) -> Array:
-    signals = closed_loop(*_blocks(g), step, round(STOP / step), until_contact=True)
-    contacts = [first_contact(signals["time"], signals, j) for j in FINGERS]
+    columns = closed_loop(*_blocks(g), step, round(STOP / step), until_contact=True)
+    signals = Signals(columns["time"], columns)
+    contacts = [first_contact(signals, j) for j in FINGERS]
     return np.array([np.nan if c is None else c[0] for c in contacts])
 
 
-def _forces(signals: Signals) -> list[float]:
+def _forces(signals: Mapping[str, Array]) -> list[float]:
     return [float(signals[f"plant.contact_force[{j}]"][-1]) for j in FINGERS]
 
 

@@ -7,11 +7,12 @@ from pathlib import Path
 import pytest
 from conftest import Altered
 from grasp_cosim import InputError, SimulationError, System
-from grasp_cosim.grasp.metrics import OF_OBJECT
 from grasp_cosim.qualification.bands import Bands, Given
 from grasp_cosim.qualification.qualify import Compared, qualify
 from grasp_cosim.qualification.verdict import as_bands, as_json, as_text
 from support.cases import CASES
+
+OF_OBJECT = ("object_tilt", "toppled", "squeeze", "damaged")
 
 NUMERICS = ("every second sample", "step 0.002 s", "scheme jacobi")
 

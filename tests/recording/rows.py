@@ -7,10 +7,9 @@ from resource import RLIMIT_FSIZE, getrlimit, setrlimit
 
 import numpy as np
 import numpy.typing as npt
-from grasp_cosim import System
-from grasp_cosim.recording.listener import Listener, Signal
+from grasp_cosim.recording.listener import Experiment, Listener, Signal
 
-SYSTEM = System("bare", (), (), 100_000, 1_000_000_000, "sequential")
+EXPERIMENT = Experiment.of({"system": "bare", "scheme": "sequential", "step": 1e-4, "stop": 1.0})
 SIGNALS = (
     Signal("a.x[1]", "m", "Real", "Where it is"),
     Signal("a.n", None, "Integer"),
@@ -40,7 +39,7 @@ def play(
 ) -> None:
     """A run of these rows. Like the master, it reuses the arrays that it hands on."""
     numbers = np.arange(len(table)) if steps is None else steps
-    listener.begin(SYSTEM, signals)
+    listener.begin(EXPERIMENT, signals)
     for first in range(0, len(table), block):
         part = numbers[first : first + block].copy(), table[first : first + block].copy()
         listener.block(*part)

@@ -17,7 +17,7 @@ from grasp_cosim.recording.csv import CsvListener
 from grasp_cosim.recording.listener import Signal
 from hypothesis import given
 from hypothesis import strategies as st
-from recording.rows import SIGNALS, SYSTEM, full_disk, peak, play, rows
+from recording.rows import EXPERIMENT, SIGNALS, full_disk, peak, play, rows
 
 
 def bits(value: float) -> bytes:
@@ -73,7 +73,7 @@ def test_names_may_have_commas_and_quotes(tmp_path: Path) -> None:
 def test_the_file_takes_its_name_at_the_end(tmp_path: Path, complete: bool) -> None:
     path, table = tmp_path / "new" / "s.csv", rows(10)
     listener = CsvListener(path)
-    listener.begin(SYSTEM, SIGNALS)
+    listener.begin(EXPERIMENT, SIGNALS)
     listener.block(np.arange(10), table)
     (part,) = path.parent.iterdir()
     assert part != path
@@ -112,7 +112,7 @@ def test_memory_does_not_grow_with_a_block(tmp_path: Path) -> None:
 
 def test_a_full_disk_leaves_whole_lines(tmp_path: Path) -> None:
     listener = CsvListener(tmp_path / "s.csv")
-    listener.begin(SYSTEM, SIGNALS)
+    listener.begin(EXPERIMENT, SIGNALS)
     with full_disk(60_000):
         listener.block(np.arange(500), rows(500))
         with pytest.raises(SimulationError, match=r"^.*s.csv: cannot be written: File too large$"):
@@ -152,7 +152,7 @@ def test_a_broken_disk_leaves_whole_lines(tmp_path: Path, monkeypatch: pytest.Mo
 def test_a_place_that_cannot_be_written_is_a_wrong_input(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match=r"^.*file/s.csv: cannot be written: "):
-        CsvListener(tmp_path / "file" / "s.csv").begin(SYSTEM, SIGNALS)
+        CsvListener(tmp_path / "file" / "s.csv").begin(EXPERIMENT, SIGNALS)
     with full_disk(5), pytest.raises(InputError, match=r"^.*s.csv: cannot be written: "):
-        CsvListener(tmp_path / "s.csv").begin(SYSTEM, SIGNALS)
+        CsvListener(tmp_path / "s.csv").begin(EXPERIMENT, SIGNALS)
     assert [path.name for path in tmp_path.iterdir()] == ["file"]

@@ -9,7 +9,12 @@ from grasp_cosim import InputError, System, simulate
 from grasp_cosim.recording.load import load_run
 
 CSV = '"time","a.x","a.on"\n0.0,1.5,1\n0.1,2.5e-300,0\n'
-JSON = {"units": {"a.x": "m", "a.on": None}, "types": {"a.on": "bool"}}
+RUN = {
+    "system": "made.toml", "scheme": "sequential", "step": 0.1, "stop": 0.1,
+    "initialisation": {}, "components": {}, "connections": [], "events": [], "faults": [],
+    "wall_time": 0.5, "complete": True, "log": [], "rejections": {},
+}  # fmt: skip
+JSON = {**RUN, "units": {"a.x": "m", "a.on": None}, "types": {"a.on": "bool"}}
 
 
 def folder(path: Path, csv: str | bytes = CSV, settings: object = JSON) -> Path:
@@ -49,7 +54,7 @@ def test_values_that_are_not_finite_are_kept(tmp_path: Path) -> None:
 
 
 def test_a_single_row_and_a_run_without_signals_are_runs(tmp_path: Path) -> None:
-    run = load_run(folder(tmp_path, '"time"\n0.0\n', {"units": {}}))
+    run = load_run(folder(tmp_path, '"time"\n0.0\n', {**RUN, "units": {}}))
     assert run.time.tolist() == [0.0]
     assert run.signals == {}
 
@@ -98,13 +103,21 @@ def test_damaged_signals_are_refused_in_one_line(
     [
         ("{", "is damaged, no JSON: "),
         ([], "is list; must be a JSON object"),
-        ({}, "no units; must be what"),
-        ({"units": 1}, "units = 1; must be a JSON object"),
+        ({}, "no entry 'system'; must be as `grasp-cosim run --out` writes it"),
+        (JSON | {"units": 1}, "units = 1; must be a JSON object"),
+        ({k: v for k, v in JSON.items() if k != "log"}, "no entry 'log'; must be as `grasp-cosim"),
         ({**JSON, "types": []}, "types = []; must be a JSON object"),
+        ({**JSON, "step": True}, "step = True; must be a number"),
+        ({**JSON, "stop": "3"}, "stop = '3'; must be a number"),
+        ({**JSON, "complete": 1}, "complete = 1; must be true or false"),
+        ({**JSON, "log": {}}, "log = {}; must be a list"),
+        ({**JSON, "system": None}, "system = None; must be a string"),
+        ({**JSON, "roles": ["plant"]}, "roles = ['plant']; must be a JSON object"),
+        ({**JSON, "rejections": {"a": {"count": 1}}}, "rejections: is damaged (KeyError: 'first'"),
         ({**JSON, "types": {"a.on": "x"}}, "type of a.on = 'x': must be one of float64, int32, "),
         ({**JSON, "types": {"a.on": []}}, "type of a.on = []: must be one of float64, int32, "),
         ({**JSON, "types": {"a.x": "int64"}}, "type of a.x = int64: must be a type of its values"),
-        ({"units": {"a.x": "m"}}, "must be those of the columns of signals.csv: a.x, a.on"),
+        ({**RUN, "units": {"a.x": "m"}}, "must be those of the columns of signals.csv: a.x, a.on"),
     ],
 )
 def test_damaged_settings_are_refused_in_one_line(

@@ -9,10 +9,10 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from grasp_cosim import InputError, SimulationError, System
-from grasp_cosim.recording.listener import Signal
+from grasp_cosim.recording.listener import Experiment, Signal
 from grasp_cosim.recording.mdf import PIECE, MdfListener
 from grasp_cosim.system.settings import settings
-from recording.rows import SIGNALS, SYSTEM, full_disk, peak, play, rows
+from recording.rows import EXPERIMENT, SIGNALS, full_disk, peak, play, rows
 
 asammdf = pytest.importorskip("asammdf")
 
@@ -53,7 +53,7 @@ def test_channels_have_units_and_descriptions(tmp_path: Path) -> None:
 def test_the_header_has_the_settings(grasp: System, tmp_path: Path, complete: bool) -> None:
     """An interrupted run is kept all the same."""
     listener = MdfListener(tmp_path / "s.mf4")
-    listener.begin(grasp, SIGNALS)
+    listener.begin(Experiment.of(settings(grasp)), SIGNALS)
     listener.block(np.arange(4), rows(4))
     listener.end(complete)
     with asammdf.MDF(tmp_path / "s.mf4") as file:
@@ -79,7 +79,7 @@ def test_a_run_without_a_row_leaves_no_file(tmp_path: Path) -> None:
 
 def test_a_run_without_signals_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"s.mf4: nothing to record; must be a system with out"):
-        MdfListener(tmp_path / "s.mf4").begin(SYSTEM, ())
+        MdfListener(tmp_path / "s.mf4").begin(EXPERIMENT, ())
 
 
 def test_memory_does_not_grow_with_the_run(tmp_path: Path) -> None:
@@ -89,7 +89,7 @@ def test_memory_does_not_grow_with_the_run(tmp_path: Path) -> None:
 
     def run(blocks: int) -> None:
         listener = MdfListener(tmp_path / f"{blocks}.mf4")
-        listener.begin(SYSTEM, signals)
+        listener.begin(EXPERIMENT, signals)
         for k in range(blocks):
             listener.block(np.arange(1000 * k, 1000 * (k + 1)), table)
         listener.end(True)
@@ -105,7 +105,7 @@ def test_memory_does_not_grow_with_the_run(tmp_path: Path) -> None:
 
 def test_a_full_disk_leaves_nothing(tmp_path: Path) -> None:
     listener = MdfListener(tmp_path / "s.mf4")
-    listener.begin(SYSTEM, SIGNALS)
+    listener.begin(EXPERIMENT, SIGNALS)
     with full_disk(5_000):
         listener.block(np.arange(1000), rows(1000))
         with pytest.raises(SimulationError, match=r"^.*s.mf4: cannot be written: File too large$"):
@@ -116,7 +116,7 @@ def test_a_full_disk_leaves_nothing(tmp_path: Path) -> None:
 def test_a_place_that_cannot_be_written_is_a_wrong_input(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match=r"^.*file/s.mf4: cannot be written: "):
-        MdfListener(tmp_path / "file" / "s.mf4").begin(SYSTEM, SIGNALS)
+        MdfListener(tmp_path / "file" / "s.mf4").begin(EXPERIMENT, SIGNALS)
 
 
 def test_without_asammdf_the_message_says_how_to_get_it(

@@ -7,7 +7,7 @@ import pytest
 from grasp_cosim import InputError
 from grasp_cosim.recording.listener import Signal
 from grasp_cosim.recording.memory import MemoryListener
-from recording.rows import SIGNALS, SYSTEM, peak, play, rows
+from recording.rows import EXPERIMENT, SIGNALS, peak, play, rows
 
 
 @pytest.mark.parametrize("block", [1, 7, 1000])
@@ -30,7 +30,7 @@ def test_time_is_that_of_the_step_numbers() -> None:
 
 def test_there_are_no_rows_before_the_first() -> None:
     memory = MemoryListener()
-    memory.begin(SYSTEM, SIGNALS)
+    memory.begin(EXPERIMENT, SIGNALS)
     assert memory.time.shape == (0,)
     assert [column.shape for column in memory.signals.values()] == [(0,)] * 3
 
@@ -44,7 +44,7 @@ def test_more_rows_than_the_run_has_steps_are_kept_as_well() -> None:
 
 def test_what_was_read_on_the_way_stays_as_it_was() -> None:
     table, memory = rows(100), MemoryListener(every=1000)
-    memory.begin(SYSTEM, SIGNALS)
+    memory.begin(EXPERIMENT, SIGNALS)
     memory.block(np.arange(10), table[:10])
     early = memory.signals
     memory.block(np.arange(10, 100), table[10:])
@@ -53,12 +53,12 @@ def test_what_was_read_on_the_way_stays_as_it_was() -> None:
 
 @pytest.mark.parametrize("stop", [10**18, 10**13])
 def test_a_run_that_does_not_fit_is_refused_at_the_start(stop: int) -> None:
-    long = replace(SYSTEM, step_ns=1, stop_ns=stop)
+    long = replace(EXPERIMENT, step_ns=1, stop_ns=stop)
     many = [Signal(f"a.x[{i}]", None, "Real") for i in range(1000)]
     with pytest.raises(InputError, match=rf"^bare: {stop} steps do not fit into memory; must"):
         MemoryListener().begin(long, many)
 
 
 def test_a_decimated_run_takes_memory_for_what_is_kept_only() -> None:
-    long = replace(SYSTEM, step_ns=1, stop_ns=10**13)
+    long = replace(EXPERIMENT, step_ns=1, stop_ns=10**13)
     assert peak(lambda: MemoryListener(every=10**9).begin(long, SIGNALS)) < 2e6

@@ -68,7 +68,9 @@ def test_mdf_has_the_columns_and_whether_the_run_was_complete(
         assert '<e name="complete">false</e>' in file.header.comment
 
 
-def test_json_has_the_metrics_and_what_led_to_them(result: Result, tmp_path: Path) -> None:
+def test_json_has_the_metrics_and_what_led_to_them(
+    grasp: System, result: Result, tmp_path: Path
+) -> None:
     told = replace(
         result,
         descriptions={"plant.gap[1]": "to the object"},
@@ -79,13 +81,15 @@ def test_json_has_the_metrics_and_what_led_to_them(result: Result, tmp_path: Pat
     found = json.loads((tmp_path / "run.json").read_text())
     assert found == {
         **json.loads(json.dumps(dict(result.metrics))),
-        **settings(result.system),
+        **settings(grasp.with_experiment(stop=0.1)),
         "units": dict(result.units),
         "types": {
             name: {"f": "float64", "b": "bool"}[column.dtype.kind]
             for name, column in result.items()
         },
         "descriptions": {"plant.gap[1]": "to the object"},
+        "metric_units": result.metric_units,
+        "missing_metrics": [],
         "log": ["the plant rejected a step"],
         "rejections": {"plant": {"count": 3, "first": 0.25}},
     }

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim import InputError, System
+from grasp_cosim.grasp.metrics import METRICS
 from grasp_cosim.sweep.design import Design
 from grasp_cosim.sweep.distributions import Listed, Uniform
 from grasp_cosim.sweep.run import Job, Task, run_job
@@ -129,7 +130,10 @@ def test_the_expected_columns_are_those_that_a_run_leaves(
     system = grasp.swap("plant", fmus / f"{plant}.fmu").with_experiment(step=1e-3, stop=0.01)
     study = Study("made", system, (MASS,), RANDOM)
     found = run_job(Task(system, ()), Job(0, {})).metrics
-    assert sorted(found) == sorted(c for m in study.expected for c in m.columns)
+    assert list(found) == [column for m in study.expected for column in m.columns]
+    every = [column for m in METRICS for column in m.columns]
+    assert [column for column in every if column in found] == list(found)
+    assert all(study.metric_of(column) for column in found)
 
 
 def test_a_picture_of_what_the_plant_does_not_tell(grasp: System) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 from ..checks import number
 from ..errors import InputError, SimulationError, choices
 from ..master.simulation import simulate
-from ..metrics.metric import Metric, available, measure, registered
+from ..metrics.metric import Metric, available, check_portable, measure, registered
 from ..parallel import run_all
 from ..system.description import System
 from ..system.parts import NANOSECONDS
@@ -249,6 +249,7 @@ def ask(
     those that every result is asked for. InputError where there is no such quantity, they are of
     several units, or the tolerance is missing or not positive.
     """
+    check_portable(metrics)
     units = {
         f"{c.name}.{v.name}": v.unit
         for c in system.components

@@ -15,9 +15,11 @@ False, None where the moment never comes, or a list of these, one per finger for
 from __future__ import annotations
 
 import hashlib
+import pickle
 import sys
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -116,18 +118,20 @@ class Metric:
         return f"{self.title}, {self.entries[place]}" if self.entries else self.title
 
     def __reduce__(self) -> tuple[Any, ...]:
+        """To another process a metric goes by the text of its file, or by where it is found."""
         if self.origin is not None:
             return _from_text, (*self.origin, self.name)
         if any(self is m for m in registered()):
             return _registered, (self.name,)
-        return _made, tuple(getattr(self, name) for name in _FIELDS)
+        module, name = (getattr(self.function, key, "") for key in ("__module__", "__qualname__"))
+        if getattr(sys.modules.get(module), name, None) is self:  # it replaced its function there
+            return _at, (module, name)
+        return Metric, tuple(getattr(self, field) for field in self.__dataclass_fields__)
 
 
-_FIELDS = tuple(Metric.__dataclass_fields__)
-
-
-def _made(*values: Any) -> Metric:
-    return Metric(*values)
+def _at(module: str, name: str) -> Metric:
+    metric: Metric = getattr(import_module(module), name)
+    return metric
 
 
 def _registered(name: str) -> Metric:
@@ -179,6 +183,23 @@ def registered(more: Iterable[Metric] = ()) -> tuple[Metric, ...]:
     return tuple(found)
 
 
+def check_portable(metrics: Iterable[Metric]) -> None:
+    """InputError where a metric cannot go to other processes, as those of many runs have to."""
+    for m in metrics:
+        try:
+            pickle.dumps(m)
+        except Exception as error:  # pickle has one of its own for each reason
+            raise InputError(
+                f"metric {m.name!r}: cannot go to another process ({_said(error)}); must be a "
+                "function under @metric(name) in a module or a file"
+            ) from error
+
+
+def _said(error: BaseException) -> str:
+    """What an error says, in one line."""
+    return " ".join(f"{type(error).__name__}: {error}".split())
+
+
 def measure(signals: Signals, metrics: Iterable[Metric]) -> Measured:
     """The values of `metrics` in their order, and a line for each that cannot be had.
 
@@ -194,8 +215,7 @@ def measure(signals: Signals, metrics: Iterable[Metric]) -> Measured:
         except MissingSignalError as error:
             missing.append(f"no {m.name}: {error}")
         except Exception as error:  # a user's function may raise anything
-            said = f"{type(error).__name__}: {error}"
-            raise InputError(f"metric {m.name!r}: {' '.join(said.split())}") from error
+            raise InputError(f"metric {m.name!r}: {_said(error)}") from error
     return Measured(values, tuple(m for m in there if m.name in values), tuple(missing))
 
 
@@ -279,8 +299,7 @@ def _run(name: str, text: str) -> tuple[Metric, ...]:
             del sys.modules[module_name]
             if not isinstance(error, Exception | SystemExit):
                 raise
-            said = f"{type(error).__name__}: {error}"
-            raise InputError(f"--metrics {name}: {' '.join(said.split())}") from error
+            raise InputError(f"--metrics {name}: {_said(error)}") from error
     found = [value for value in vars(module).values() if isinstance(value, Metric)]
     return tuple(replace(m, origin=(name, text)) for m in dict.fromkeys(found))
 

@@ -23,14 +23,26 @@ SIGNALS, SETTINGS = "signals.csv", "run.json"
 """The files of a run's folder."""
 
 
-SETTING_KEYS = (
-    "system", "scheme", "step", "stop", "initialisation", "components", "connections", "events",
-    "faults",
-)  # fmt: skip
-"""Entries of run.json that say how the run was made."""
+NUMBER = (int, float)
 
-OUTCOME_KEYS = ("wall_time", "complete", "log", "rejections")
+SETTING_KEYS: Mapping[str, Any] = {
+    "system": str, "scheme": str, "step": NUMBER, "stop": NUMBER, "initialisation": dict,
+    "components": dict, "connections": list, "events": list, "faults": list,
+}  # fmt: skip
+"""Entries of run.json that say how the run was made, and of which types they are."""
+
+OUTCOME_KEYS: Mapping[str, Any] = {
+    "wall_time": NUMBER, "complete": bool, "log": list, "rejections": dict, "units": dict,
+}  # fmt: skip
 """Entries that say what came of it, besides metrics."""
+
+MORE_KEYS: Mapping[str, Any] = {
+    "roles": dict, "types": dict, "descriptions": dict, "metric_units": dict,
+}  # fmt: skip
+"""Entries that may be there."""
+
+FORMS = {str: "a string", NUMBER: "a number", bool: "true or false", list: "a list"}
+"""Types of entries in words; the others are JSON objects."""
 
 
 def load_run(folder: str | Path) -> Result:
@@ -61,11 +73,19 @@ def load_run(folder: str | Path) -> Result:
         wall_time=written["wall_time"],
         complete=written["complete"],
         descriptions=written.get("descriptions", {}),
-        rejections={name: Rejection(**r) for name, r in written["rejections"].items()},
+        rejections=_rejections(f"{path}: rejections", written["rejections"]),
         log=tuple(written["log"]),
         timing=None if realtime is None else Timing.from_dict(f"{path}: realtime", realtime),
         more_metrics=_as_recorded(written),
     )
+
+
+def _rejections(place: str, found: Mapping[str, Any]) -> dict[str, Rejection]:
+    try:
+        return {name: Rejection(int(r["count"]), float(r["first"])) for name, r in found.items()}
+    except (KeyError, TypeError, ValueError) as error:
+        said = f"{type(error).__name__}: {error}"
+        raise InputError(f"{place}: is damaged ({said}); must have count and first each") from error
 
 
 def _as_recorded(written: Mapping[str, Any]) -> tuple[Metric, ...]:
@@ -139,15 +159,19 @@ def _settings(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: is damaged, no JSON: {error}") from error
     if not isinstance(settings, dict):
         raise InputError(f"{path}: is {type(settings).__name__}; must be a JSON object")
-    for key in ("units", *SETTING_KEYS, *OUTCOME_KEYS):
-        if key not in settings:
+    for key, kind in {**SETTING_KEYS, **OUTCOME_KEYS, **MORE_KEYS}.items():
+        if key not in settings and key not in MORE_KEYS:
             raise InputError(
                 f"{path}: no entry {key!r}; must be as `grasp-cosim run --out` writes it"
             )
-    for key in {"units", "types", "descriptions"} & settings.keys():
-        if not isinstance(settings[key], dict):
-            raise InputError(f"{path}: {key} = {settings[key]!r}; must be a JSON object")
+        if key in settings and not _is(settings[key], kind):
+            form = FORMS.get(kind, "a JSON object")
+            raise InputError(f"{path}: {key} = {settings[key]!r}; must be {form}")
     return settings
+
+
+def _is(value: Any, kind: Any) -> bool:
+    return isinstance(value, kind) and (kind is bool or not isinstance(value, bool))
 
 
 def _text(path: Path) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import InputError, choices
 from ..interface.interface import Value, Variable
-from ..metrics.metric import Metric, available, registered
+from ..metrics.metric import Metric, available, check_portable, registered
 from ..system.description import System
 from ..system.settings import settings
 from .design import MOST, Design, Points
@@ -75,6 +75,7 @@ class Study:
     def __post_init__(self) -> None:
         if not self.parameters:
             raise InputError(f"{self.name}: no [[parameters]]; must be at least one")
+        check_portable(self.metrics)
         self._check_names()
         self._check_outputs()
         for name in self.seeds:

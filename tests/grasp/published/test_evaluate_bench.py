@@ -13,7 +13,6 @@ from grasp_cosim.grasp.closing import close
 from grasp_cosim.grasp.presets import with_bench
 from grasp_cosim.grasp.published.bench import evaluate_bench, run_settings
 from grasp_cosim.grasp.published.tables import Setting
-from grasp_cosim.grasp.system import BENCH
 from support.cases import CASES
 
 QUIET = {f"sensor_{j}.noise.enabled": False for j in (1, 2)}
@@ -64,7 +63,9 @@ def test_the_preset_has_friction(bench: System) -> None:
 def test_a_system_that_the_preset_does_not_fit_is_refused(grasp: System) -> None:
     plant = replace(grasp.components[0], values={"force[1]": 0.0, "force[2]": 0.0})
     other = replace(grasp, name="other.toml", components=(plant,), connections=())
-    with pytest.raises(InputError, match=rf"^{BENCH.name} sensor_1.*: no component 'sensor_1'"):
+    with pytest.raises(
+        InputError, match=r"^\[presets.bench\] of grasp.toml: sensor_1.*: no component 'sensor_1'"
+    ):
         with_bench(other)
 
 
