@@ -14,7 +14,7 @@ import pytest
 from grasp_cosim import InputError, SimulationError, System, simulate
 from grasp_cosim.fmi import instance
 from grasp_cosim.fmi.instance import STEP_2, Call, Native
-from grasp_cosim.grasp.system import SYSTEM
+from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.master import compiled, loop
 from grasp_cosim.master import engine as engines
 from grasp_cosim.master.engine import Engine

@@ -139,7 +139,7 @@ class Broken(FileIO):
 def test_a_broken_disk_leaves_whole_lines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("grasp_cosim.recording.csv.FileIO", Broken)
     listener = CsvListener(tmp_path / "s.csv")
-    listener.begin(SYSTEM, SIGNALS)
+    listener.begin(EXPERIMENT, SIGNALS)
     with pytest.raises(SimulationError, match=r"^.*s.csv: cannot be written: Input/output error$"):
         listener.block(np.arange(500), rows(500))
     (part,) = tmp_path.iterdir()

@@ -25,7 +25,7 @@ from grasp_cosim.recording.result import Result
 from grasp_cosim.system.settings import settings
 
 Evaluated = Callable[..., dict[str, Any]]
-Judge = Callable[[Runs], list[int]]
+Judge = Callable[..., list[int]]
 
 SETTLED = 98.0 * 0.07 / 2.0
 """N; K_i·W/2 of the built-in grasp."""
