@@ -121,25 +121,22 @@ class Metric:
         """To another process a metric goes by the text of its file, or by where it is found."""
         if self.origin is not None:
             return _from_text, (*self.origin, self.name)
-        if any(m is self for m in _of_every_result()):
-            return _found, (self.name,)
+        if any(self is m for m in registered()):
+            return _registered, (self.name,)
         module, name = (getattr(self.function, key, "") for key in ("__module__", "__qualname__"))
         if getattr(sys.modules.get(module), name, None) is self:  # it replaced its function there
             return _at, (module, name)
         return Metric, tuple(getattr(self, field) for field in self.__dataclass_fields__)
 
 
-def _of_every_result() -> list[Metric]:
-    return [m for source in extensions.metrics for m in source()]
-
-
-def _found(name: str) -> Metric:
-    return next(m for m in _of_every_result() if m.name == name)
-
-
 def _at(module: str, name: str) -> Metric:
     metric: Metric = getattr(import_module(module), name)
     return metric
+
+
+def _registered(name: str) -> Metric:
+    """The metric of that name that every result is asked for, in another process."""
+    return next(m for m in registered() if m.name == name)
 
 
 def metric(name: str, **more: Any) -> Callable[[Function], Metric]:
@@ -178,7 +175,7 @@ class Measured:
 
 def registered(more: Iterable[Metric] = ()) -> tuple[Metric, ...]:
     """All metrics that a result is asked for, then `more`; InputError where two have one name."""
-    found = [*_of_every_result(), *more]
+    found = [m for source in extensions.metrics for m in source()] + list(more)
     names = [m.name for m in found]
     twice = next((n for n in names if names.count(n) > 1), None)
     if twice is not None:
