@@ -24,7 +24,7 @@ EFFORT = 4
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """What a page shows of a run: time in s and signals, thinned where rows_per_pair is not None.
+    """The rows of a run in its page: time in s and signals, thinned if rows_per_pair is not None.
 
     Then every two rows stand for rows_per_pair recorded ones: the lowest and the highest value of
     each signal among these, in the order in which they came. The last row is the last one recorded.
@@ -38,7 +38,7 @@ class Shown:
 def fit(
     time: npt.NDArray[np.float64], signals: Mapping[str, npt.NDArray[Any]], limit: int = LIMIT
 ) -> Shown:
-    """The run as it is where it has at most limit values, else thinned to fit."""
+    """Return the run as it is if it has at most `limit` values, else thinned to fit."""
     columns = 1 + len(signals)
     if len(time) * columns <= limit:
         return Shown(time, signals, None)

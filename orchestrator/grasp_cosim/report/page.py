@@ -1,6 +1,6 @@
 """A result as one HTML page that needs nothing else: traces, metrics, connections, settings.
 
-What a kind of system has besides, like the animation of a grasp, is a Scene from higher up.
+More for one kind of system, like the animation of a grasp, comes from higher up as a Scene.
 
 The traces are drawn by page/traces.js, 200 lines on a canvas, rather than by a library: plotly
 would add 4.5 MB to each page and slows down from 100,000 points on; uPlot has no Python package,
@@ -43,7 +43,7 @@ class Zoom:
 
 @dataclass(frozen=True)
 class Scene:
-    """What the page of one kind of system has besides that of any.
+    """A section for one kind of system, and more: what is shown first, colours, marks, buttons.
 
     `html` is the content of its section under `title`. `scripts` define startScene(state), which
     returns what draws it and plays it: {draw(), toggle()}. A colour is the name of a CSS variable
@@ -55,7 +55,7 @@ class Scene:
     style: str
     scripts: str
     state: Mapping[str, Any]
-    """What the scripts are told, as JSON."""
+    """Data for the scripts, as JSON has it."""
     shown: Sequence[str] = ()
     """Signals that are shown first."""
     colors: Mapping[str, str] = field(default_factory=dict)
@@ -106,7 +106,7 @@ def page_html(result: Result, title: str, *, scene: Scene | None = None, limit: 
 
 
 def _state(result: Result, shown: Shown, scene: Scene | None) -> dict[str, Any]:
-    """What the scripts are told, besides the values themselves."""
+    """Return the data for the scripts, without the values of the signals."""
     marks = [*(scene.marks if scene else ()), *((t, "--fault") for t in _moments(result.log))]
     return {
         "rows": len(shown.time),

@@ -101,7 +101,7 @@ def _cells(
 
 
 def _crosses(values: npt.NDArray[Any], limit: float) -> bool:
-    """Whether a line at the limit runs through the cells."""
+    """True if a line at the limit runs through the cells."""
     wide = min(values.shape) > 1 and bool(np.ma.count(values))
     return bool(wide and values.min() < limit < values.max())
 
@@ -116,7 +116,7 @@ def _plain_ticks(axis: Axis, steps: Sequence[float] = (1.0, 1.5, 2.0, 3.0, 5.0, 
 
 
 def _geometric(values: Floats) -> bool:
-    """Whether rising values have one ratio, and more than two."""
+    """True if rising values have one ratio, and are more than two."""
     if len(values) < 3 or values[0] <= 0.0:
         return False
     ratios = values[1:] / values[:-1]

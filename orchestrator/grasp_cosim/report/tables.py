@@ -1,4 +1,4 @@
-"""What a run was and what came of it, as HTML: the metrics and the settings of its run.json."""
+"""Tables of a result as HTML: its metrics, its settings."""
 
 from __future__ import annotations
 
@@ -148,7 +148,7 @@ def count(value: int) -> str:
 
 
 def _how(component: Mapping[str, Any]) -> str:
-    """What is special about a component: its own step, its own process, other names."""
+    """The particulars of a component: its own step, its own process, other names."""
     parts = []
     if component["step"] is not None:
         parts.append(f"step {number(1e3 * component['step'])} ms")
