@@ -63,6 +63,24 @@ def test_a_crash_takes_its_own_run_only(tmp_path: Path) -> None:
     assert done.table.numbers("a.x")[[0, 2]].tolist() == pytest.approx([0.6, 0.6])
 
 
+def test_a_system_of_two_components_that_is_no_grasp(tmp_path: Path) -> None:
+    """b integrates what a has integrated; of both the last values are kept, and nothing else."""
+    write_native(tmp_path)
+    text = (tmp_path / "system.toml").read_text()
+    head, _, component = text.partition("[components.a]")
+    second = component.replace("u_Real = 2.0, ", "").replace(", u_Real = 2.0", "")
+    assert second != component
+    (tmp_path / "system.toml").write_text(
+        f'connections = ["a.x -> b.u_Real"]\n{head}[components.a]{component}[components.b]{second}'
+    )
+    study = native_study(tmp_path, GRID.replace("a.steps", "b.x") + "values = [1.0, 2.0]\n")
+    done = sweep(study, tmp_path / "out", workers=1)
+    assert done.failed == 0
+    assert [set(outcome.metrics) for outcome in done.outcomes] == [{"a.x", "b.x"}] * 2
+    once, twice = done.table.numbers("b.x")
+    assert 0.0 < 2.0 * once == pytest.approx(twice)
+
+
 def test_a_run_that_is_refused_is_a_row(tmp_path: Path) -> None:
     study = native_study(write_native(tmp_path), FAILING)
     task = Task(study.system, study.outputs)
