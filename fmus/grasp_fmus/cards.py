@@ -4,10 +4,10 @@
 """
 
 from collections.abc import Mapping
-from importlib import import_module
 from pathlib import Path
 
 from .contract import Block, Field, declared
+from .packing import card_file
 from .shipped import blocks
 
 BEGIN, END = "<!-- variables -->\n", "<!-- end of variables -->\n"
@@ -85,8 +85,7 @@ def blocks_by_card() -> dict[Path, dict[str, Block]]:
     cards: dict[Path, dict[str, Block]] = {}
     for block in blocks().values():
         package, _, name = block.__name__.partition(".")
-        folder = Path(import_module(package).__file__ or "").parents[1]
-        cards.setdefault(folder / "README.md", {})[name] = block
+        cards.setdefault(card_file(package), {})[name] = block
     return cards
 
 

@@ -3,7 +3,6 @@
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import inf
 from pathlib import Path
 
 from .documentation import PROXY, icon
@@ -59,11 +58,8 @@ def build_proxy(
         raise ValueError(f"{original.file}: {taken[0]}: proxy. begins the names of a proxy's own")
     own = own_variables([v for v in original.variables if v.causality == "output"], settings)
     for v in own:
-        low, high = v.limits or (-inf, inf)
-        if isinstance(v.start, float | int) and not low <= v.start <= high:
-            raise ValueError(
-                f"{v.name} = {v.start}{v.in_unit}: must be from {low:g} to {high:g}{v.in_unit}"
-            )
+        if v.start is not None:
+            v.check(v.start)
     return write_fmu(
         target,
         _description(name, original, own),

@@ -28,10 +28,12 @@ class Host:
 
     def __init__(self, fmu: Path, folder: Path) -> None:
         description = read_model_description(fmu)
+        if not folder.exists() or not any(folder.iterdir()):  # never over a library that is loaded
+            extract(fmu, folder)
         self.references = {v.name: v.valueReference for v in description.modelVariables}
         self.slave = FMU2Slave(
             guid=description.guid,
-            unzipDirectory=extract(fmu, folder),
+            unzipDirectory=folder,
             modelIdentifier=description.coSimulation.modelIdentifier,
             instanceName="host",
         )
