@@ -19,8 +19,8 @@ import pickle
 import sys
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from importlib import import_module
 from pathlib import Path
+from pkgutil import resolve_name
 from types import ModuleType
 from typing import Any
 
@@ -138,13 +138,8 @@ class Metric:
             return _registered, (self.name,)
         module, name = (getattr(self.function, key, "") for key in ("__module__", "__qualname__"))
         if getattr(sys.modules.get(module), name, None) is self:  # it replaced its function there
-            return _at, (module, name)
+            return resolve_name, (f"{module}:{name}",)
         return Metric, tuple(getattr(self, field) for field in self.__dataclass_fields__)
-
-
-def _at(module: str, name: str) -> Metric:
-    metric: Metric = getattr(import_module(module), name)
-    return metric
 
 
 def _registered(name: str) -> Metric:
