@@ -21,7 +21,8 @@ def sensor_toml(tmp_path: Path, fmus: Path) -> None:
     [
         (["--step", "1e-3", "--stop", "0.02"], ["grasp.png"]),
         (["--step", "1e-3", "--stop", "0.02", "--realtime"], ["grasp.png", "timing.png"]),
-        (["sensor.toml", "--realtime"], ["timing.png"]),
+        (["sensor.toml"], ["signals.png"]),
+        (["sensor.toml", "--realtime"], ["signals.png", "timing.png"]),
     ],
 )
 def test_what_there_is_to_draw_is_drawn(
@@ -37,7 +38,8 @@ def test_what_there_is_to_draw_is_drawn(
 
 def test_the_timing_goes_to_the_current_folder_without_out(command: Run, tmp_path: Path) -> None:
     assert command("run", "sensor.toml", "--realtime", "--plot")[0] == 0
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["sensor.toml", "timing.png"]
+    found = sorted(p.name for p in tmp_path.iterdir())
+    assert found == ["sensor.toml", "signals.png", "timing.png"]
 
 
 def test_without_matplotlib_a_run_in_real_time_is_refused_at_once(

@@ -35,7 +35,7 @@ WRONG = [
     (
         "[experiment]",
         "[experment]",
-        "unknown entry 'experment'; valid: components, events, experiment, faults",
+        "unknown entry 'experment'; valid: components, connections, events, experiment, faults, ",
     ),
     ("step = 1e-4", "stepp = 1e-4", r"\[experiment\]: unknown entry 'stepp'; valid: scheme, step"),
     ("step = 1e-4", "step = 0", r"experiment.step = 0 s: must be a number greater than 0"),

@@ -318,6 +318,7 @@ def step_study(
     # the finest, which is the longest, first
     jobs = [(replace(system, step_ns=ns), question) for ns in chosen]
     runs = run_all(run_step, jobs, min(workers, len(jobs)), progress, "steps")
+    found = dict.fromkeys(name for run in runs for name in run.values)
     return StepStudy(
         system.name,
         system.scheme,
@@ -325,7 +326,7 @@ def step_study(
         system.step_ns,
         question.tolerance,
         question.unit,
-        question.quantities,
+        tuple(found) or question.quantities,
         tuple(runs),
     )
 

@@ -17,10 +17,10 @@ from __future__ import annotations
 import hashlib
 import pickle
 import sys
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from importlib import import_module
 from pathlib import Path
+from pkgutil import resolve_name
 from types import ModuleType
 from typing import Any
 
@@ -28,10 +28,19 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import extensions
-from ..errors import InputError
+from ..errors import InputError, choices
 
 Value = float | bool | None
-Function = Callable[["Signals"], Value | list[Value]]
+Function = Callable[["Signals"], Value | Sequence[Value]]
+
+
+RESERVED = frozenset((
+    "complete", "components", "connections", "descriptions", "error", "events", "faults", "index",
+    "initialisation", "log", "metric_units", "missing_metrics", "proxies", "real_time_factor",
+    "realtime", "rejections", "roles", "scheme", "step", "steps", "stop", "system", "types",
+    "units", "wall_time",
+))  # fmt: skip
+"""Names beside metrics in run.json and in the table of a sweep."""
 
 
 class MissingSignalError(KeyError):
@@ -117,6 +126,10 @@ class Metric:
         place = self.columns.index(column)
         return f"{self.title}, {self.entries[place]}" if self.entries else self.title
 
+    def __call__(self, signals: Signals) -> Value | Sequence[Value]:
+        """Return what its function does, so that other functions can call it."""
+        return self.function(signals)
+
     def __reduce__(self) -> tuple[Any, ...]:
         """To another process a metric goes by the text of its file, or by where it is found."""
         if self.origin is not None:
@@ -125,13 +138,8 @@ class Metric:
             return _registered, (self.name,)
         module, name = (getattr(self.function, key, "") for key in ("__module__", "__qualname__"))
         if getattr(sys.modules.get(module), name, None) is self:  # it replaced its function there
-            return _at, (module, name)
+            return resolve_name, (f"{module}:{name}",)
         return Metric, tuple(getattr(self, field) for field in self.__dataclass_fields__)
-
-
-def _at(module: str, name: str) -> Metric:
-    metric: Metric = getattr(import_module(module), name)
-    return metric
 
 
 def _registered(name: str) -> Metric:
@@ -142,10 +150,12 @@ def _registered(name: str) -> Metric:
 def metric(name: str, **more: Any) -> Callable[[Function], Metric]:
     """Make a Metric of the function below; `more` are the other fields of a Metric by keyword.
 
-    InputError where `name` is no identifier, so that it can be a column and a key.
+    InputError where `name` is no identifier, so that it can be a column and a key, or RESERVED.
     """
     if not name.isidentifier():
         raise InputError(f"metric {name!r}: must be a name of letters, digits and _")
+    if name in RESERVED:
+        raise InputError(f"metric {name!r}: every run has this beside; must have another name")
     return lambda function: Metric(name, function, **more)
 
 
@@ -197,7 +207,8 @@ def check_portable(metrics: Iterable[Metric]) -> None:
 
 def _said(error: BaseException) -> str:
     """What an error says, in one line."""
-    return " ".join(f"{type(error).__name__}: {error}".split())
+    kind = "" if isinstance(error, InputError) else f"{type(error).__name__}: "
+    return " ".join(f"{kind}{error}".split())
 
 
 def measure(signals: Signals, metrics: Iterable[Metric]) -> Measured:
@@ -205,13 +216,13 @@ def measure(signals: Signals, metrics: Iterable[Metric]) -> Measured:
 
     A line like "no metrics of the grasp: plant lacks contact[1]". A group none of whose roles is
     played by a component is not of this system, which is no news. InputError where a function
-    fails.
+    fails or returns something else than a Metric may have.
     """
     there, missing = available(metrics, signals.by_name, signals.roles)
     values: dict[str, Any] = {}
     for m in there:
         try:
-            values[m.name] = _plain(m.function(signals))
+            values[m.name] = _plain(m, m.function(signals))
         except MissingSignalError as error:
             missing.append(f"no {m.name}: {error}")
         except Exception as error:  # a user's function may raise anything
@@ -264,11 +275,16 @@ def _unknown(needs: Iterable[str], names: Collection[str], roles: Mapping[str, s
     return not any(_plays(component, names) for component in played)
 
 
-def _plain(value: Any) -> Any:
-    """The value with Python's own numbers, in lists."""
-    if isinstance(value, np.ndarray | list | tuple):
-        return [_plain(entry) for entry in value]
-    return value.item() if isinstance(value, np.generic) else value
+def _plain(m: Metric, found: Any) -> Any:
+    """What the function of a metric returned, with Python's own numbers, in a list."""
+    plain = found.tolist() if isinstance(found, np.ndarray | np.generic) else found
+    several = isinstance(plain, list | tuple)
+    values = [v.item() if isinstance(v, np.generic) else v for v in (plain if several else [plain])]
+    if not all(v is None or isinstance(v, bool | int | float) for v in values):
+        raise InputError(f"returned {found!r}; must be a number, True, False, None or a list of it")
+    if m.entries and not (several and len(values) == len(m.entries)):
+        raise InputError(f"returned {found!r}; must be a value for each of {choices(m.entries)}")
+    return values if several else values[0]
 
 
 def load_metrics(path: Path) -> tuple[Metric, ...]:
@@ -301,7 +317,11 @@ def _run(name: str, text: str) -> tuple[Metric, ...]:
                 raise
             raise InputError(f"--metrics {name}: {_said(error)}") from error
     found = [value for value in vars(module).values() if isinstance(value, Metric)]
-    return tuple(replace(m, origin=(name, text)) for m in dict.fromkeys(found))
+    return tuple(
+        replace(m, origin=(name, text))
+        for m in dict.fromkeys(found)
+        if getattr(m.function, "__module__", module_name) == module_name  # not one it imported
+    )
 
 
 def _from_text(name: str, text: str, wanted: str) -> Metric:

@@ -42,11 +42,11 @@ def run_job(task: Task, job: Job) -> Outcome:
     """Run a job; one that fails is an outcome, too. KeyboardInterrupt where it was interrupted."""
     try:
         result = simulate(task.system.with_values(job.values), metrics=task.metrics)
+        if not result.complete:
+            raise KeyboardInterrupt
+        return Outcome(job.index, _kept(result, task.outputs))
     except (InputError, SimulationError) as error:
         return Outcome(job.index, {}, str(error))
-    if not result.complete:
-        raise KeyboardInterrupt
-    return Outcome(job.index, _kept(result, task.outputs))
 
 
 def _kept(result: Result, outputs: tuple[str, ...]) -> dict[str, Value | None]:

@@ -1,0 +1,375 @@
+"""What a metric is: signals by role, values in Python's own numbers, and why there is none."""
+
+import pickle
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from grasp_cosim import InputError, Metric, System, extensions, metric, simulate
+from grasp_cosim.grasp.metrics import METRICS, NEEDS, time_difference
+from grasp_cosim.metrics.metric import (
+    RESERVED,
+    MissingSignalError,
+    Signals,
+    check_portable,
+    load_metrics,
+    measure,
+    registered,
+)
+from grasp_cosim.parallel import run_all
+from grasp_cosim.sweep.run import Job, Task, run_job
+
+TIME = np.array([0.0, 0.5, 1.0])
+GAP = np.array([0.3, 0.2, 0.1])
+
+FILE = '''"""My own."""
+
+from statistics import mean
+
+from grasp_cosim import metric
+from grasp_cosim.grasp.metrics import time_difference
+
+SHARE = 0.5
+
+
+@metric("zeta", unit="m", entries=("begin", "end"))
+def zeta(run):
+    gap = run["plant.gap"]
+    return gap[0], gap[-1]
+
+
+@metric("alpha", unit="m")
+def alpha(run):
+    """Half of the mean of zeta."""
+    return SHARE * mean(zeta(run))
+'''
+
+
+def signals(roles: dict[str, str] | None = None, component: str = "plant") -> Signals:
+    return Signals(TIME, {f"{component}.gap": GAP, f"{component}.on": GAP < 0.15}, roles or {})
+
+
+def made(name: str, function: Callable[[Signals], Any], **more: Any) -> Metric:
+    return metric(name, **more)(function)
+
+
+# ------------------------------------------------------------------------- signals
+
+
+def test_a_signal_is_found_by_the_role_of_its_component_and_by_its_name() -> None:
+    run = signals({"plant": "gripper"}, "gripper")
+    assert run["plant.gap"] is run["gripper.gap"] is run.by_name["gripper.gap"]
+    assert "plant.gap" in run
+    assert list(run) == ["gripper.gap", "gripper.on"]
+    assert len(run) == 2
+
+
+def test_a_component_plays_the_role_of_its_name_where_no_other_does() -> None:
+    assert signals()["plant.gap"] is not None
+    swapped = Signals(TIME, {"plant.gap": GAP, "other.gap": 2 * GAP}, {"plant": "other"})
+    assert swapped["plant.gap"] is swapped.by_name["other.gap"]
+
+
+@pytest.mark.parametrize(
+    ("name", "roles", "reason"),
+    [
+        ("plant.force", {}, "plant lacks force"),
+        ("arm.force", {"arm": "plant"}, "plant lacks force"),
+        ("arm.gap", {}, 'no component is the arm; name it under [roles]: arm = "..."'),
+        ("plan.gap", {}, 'no component is the plan; name it under [roles]: plan = "..."'),
+    ],
+)
+def test_a_signal_that_is_not_there_is_missed_with_the_reason(
+    name: str, roles: dict[str, str], reason: str
+) -> None:
+    run = signals(roles)
+    with pytest.raises(MissingSignalError) as caught:
+        run[name]
+    assert str(caught.value) == reason
+    assert name not in run
+    assert run.get(name) is None
+
+
+# ------------------------------------------------------------------------- values
+
+
+def test_values_come_in_the_order_of_their_metrics_with_their_units() -> None:
+    found = measure(
+        signals(),
+        [
+            made("zeta", lambda run: float(run["plant.gap"][-1]), unit="m"),
+            made("alpha", lambda run: [1.0, None], unit="s", entries=("finger 1", "finger 2")),
+            made("told", lambda run: True),
+        ],
+    )
+    assert list(found.values.items()) == [("zeta", 0.1), ("alpha", [1.0, None]), ("told", True)]
+    assert list(found.units.items()) == [("zeta", "m"), ("alpha", "s"), ("told", None)]
+    assert [m.name for m in found.metrics] == ["zeta", "alpha", "told"]
+    assert found.flat() == {"zeta": 0.1, "alpha[1]": 1.0, "alpha[2]": None, "told": True}
+    assert list(found.flat()) == [c for m in found.metrics for c in m.columns]
+    assert found.missing == ()
+
+
+@pytest.mark.parametrize(
+    ("value", "plain"),
+    [
+        (np.float64(0.5), 0.5),
+        (np.float32(0.5), 0.5),
+        (np.int32(3), 3),
+        (np.bool_(True), True),
+        (np.array(0.5), 0.5),
+        (np.array([0.5, 1.5]), [0.5, 1.5]),
+        (np.array([True, False]), [True, False]),
+        ((np.float64(0.5), None), [0.5, None]),
+        ([np.int64(1), 2.5, False], [1, 2.5, False]),
+        (None, None),
+    ],
+)
+def test_numbers_become_pythons_own(value: Any, plain: Any) -> None:
+    (found,) = measure(signals(), [made("x", lambda _: value)]).values.values()
+    assert repr(found) == repr(plain)
+
+
+@pytest.mark.parametrize(
+    ("value", "entries", "message"),
+    [
+        ("fast", (), "metric 'x': returned 'fast'; must be a number, True, False, None or a list"),
+        (1j, (), "metric 'x': returned 1j; must be a number"),
+        ({"a": 1.0}, (), "metric 'x': returned {'a': 1.0}; must be a number"),
+        ([[1.0]], (), "metric 'x': returned [[1.0]]; must be a number"),
+        (np.ones((1, 2)), (), "metric 'x': returned array([[1., 1.]]); must be a number"),
+        (1.0, ("a", "b"), "metric 'x': returned 1.0; must be a value for each of a, b"),
+        ([1.0], ("a", "b"), "metric 'x': returned [1.0]; must be a value for each of a, b"),
+        (None, ("a", "b"), "metric 'x': returned None; must be a value for each of a, b"),
+    ],
+)
+def test_another_value_is_refused(value: Any, entries: tuple[str, ...], message: str) -> None:
+    with pytest.raises(InputError, match=rf"^{re.escape(message)}") as caught:
+        measure(signals(), [made("x", lambda _: value, entries=entries)])
+    assert "\n" not in str(caught.value)
+
+
+def test_a_function_that_raises_is_a_wrong_input_that_names_it() -> None:
+    def raising(_: Signals) -> float:
+        raise ValueError("no\n  good")
+
+    with pytest.raises(InputError, match=r"^metric 'own': ValueError: no good$"):
+        measure(signals(), [made("own", raising)])
+
+
+def test_a_metric_in_a_sweep_that_raises_fails_its_run_alone(grasp: System) -> None:
+    short = grasp.with_experiment(step=1e-3, stop=0.01)
+
+    def late(run: Signals) -> float:
+        return 1.0 / float(run.time[-1] - 0.01)
+
+    outcome = run_job(Task(short, (), (made("late", late),)), Job(3, {}))
+    assert (outcome.index, outcome.metrics) == (3, {})
+    assert outcome.error == "metric 'late': ZeroDivisionError: float division by zero"
+
+
+# ------------------------------------------------------------------------- what is missing
+
+
+def grasp_signals(without: str = "") -> Signals:
+    """Signals of a grasp that does not move, but for some of them."""
+    names = [n for n in (*NEEDS, "controller.force[1]") if not (without and n.startswith(without))]
+    return Signals(TIME, {name: np.zeros(3) for name in names})
+
+
+def test_a_grasp_has_all_its_metrics_but_those_of_other_objects() -> None:
+    found = measure(grasp_signals(), METRICS)
+    assert [m.name for m in found.metrics] == [m.name for m in METRICS if not m.optional]
+    assert found.missing == ()  # an optional one is left out in silence
+
+
+@pytest.mark.parametrize(
+    ("without", "reason"),
+    [
+        ("plant.contact[1]", "plant lacks contact[1]"),
+        ("controller.target", "controller lacks target_position"),
+    ],
+)
+def test_a_signal_that_a_grasp_lacks_is_said_once(without: str, reason: str) -> None:
+    found = measure(grasp_signals(without), METRICS)
+    assert found.missing == (f"no metrics of the grasp: {reason}",)
+    assert (dict(found.values), found.metrics, found.flat()) == ({}, (), {})
+    found = measure(grasp_signals("controller."), METRICS)
+    assert found.missing == (
+        "no metrics of the grasp: no component is the controller; name it under [roles]: "
+        'controller = "..."',
+    )
+
+
+def test_a_system_that_plays_no_role_of_a_group_is_not_told_of_it() -> None:
+    found = measure(Signals(TIME, {"a.x": GAP}), METRICS)
+    assert (dict(found.values), found.missing) == ({}, ())
+
+
+def test_a_metric_of_its_own_says_what_it_lacks() -> None:
+    needing = made("speed", lambda run: run["plant.speed"][-1], needs=("plant.speed",))
+    trying = made("force", lambda run: run["plant.force"][-1])
+    silent = made("tilt", lambda run: run["plant.tilt"][-1], needs=("plant.tilt",), optional=True)
+    there = made("gap", lambda run: run["plant.gap"][-1])
+    found = measure(signals(), [needing, trying, silent, there])
+    assert found.missing == ("no speed: plant lacks speed", "no force: plant lacks force")
+    assert dict(found.values) == {"gap": 0.1}
+    assert found.metrics == (there,)
+
+
+# ------------------------------------------------------------------------- names
+
+
+@pytest.mark.parametrize("name", ["", "rise time", "1st", "a.b", "gap[1]"])
+def test_a_name_is_a_column_and_a_key(name: str) -> None:
+    with pytest.raises(InputError, match=r"must be a name of letters, digits and _$"):
+        metric(name)
+
+
+def test_what_every_run_tells_is_no_name_of_a_metric(grasp: System, tmp_path: Path) -> None:
+    """No figure of run.json can take the place of a metric, or a metric that of one."""
+    import json
+
+    result = simulate(grasp, step=1e-3, stop=0.01)
+    result.to_json(tmp_path / "run.json")
+    told = set(json.loads((tmp_path / "run.json").read_text()))
+    assert told - {m.name for m in METRICS} <= RESERVED
+    for name in RESERVED:
+        with pytest.raises(InputError, match=f"^metric '{name}': every run has this beside; must "):
+            metric(name)
+
+
+def test_two_metrics_of_one_name_are_refused() -> None:
+    again = made("time_to_contact", lambda _: 1.0)
+    with pytest.raises(InputError, match=r"^metric 'time_to_contact': is there twice; must have"):
+        registered([again])
+    own = made("own", lambda _: 1.0)
+    with pytest.raises(InputError, match=r"^metric 'own': is there twice; must have another name$"):
+        registered([own, own])
+    assert registered([own]) == (*METRICS, own)
+
+
+def test_what_is_registered_is_asked_of_every_result(
+    grasp: System, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(extensions, "metrics", [lambda: [made("end", lambda run: run.time[-1])]])
+    result = simulate(grasp, step=1e-3, stop=0.01)
+    assert dict(result.measured.values) == {"end": 0.01}
+
+
+def test_titles_and_columns() -> None:
+    both = made("rise_time", lambda _: [1.0, 2.0], unit="s", entries=("right", "left"))
+    assert (both.title, both.columns) == ("rise time", ("rise_time[1]", "rise_time[2]"))
+    assert both.column_title("rise_time[2]") == "rise time, left"
+    share = made("share", lambda _: 0.5, unit="1", label="overshoot", factor=1e2, shown_unit="%")
+    assert (share.title, share.columns, share.display_unit) == ("overshoot", ("share",), "%")
+    assert share.column_title("share") == "overshoot"
+    assert [made("x", lambda _: 1.0, unit=u).display_unit for u in ("m", "1", None)] == [
+        "m",
+        "",
+        "",
+    ]
+
+
+# ------------------------------------------------------------------------- files
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Callable[[str], Path]:
+    def write(text: str) -> Path:
+        path = tmp_path / "mine.py"
+        path.write_text(text, "utf-8")
+        return path
+
+    return write
+
+
+def test_a_file_has_its_metrics_in_its_order_and_not_those_it_imports(
+    file: Callable[[str], Path],
+) -> None:
+    zeta, alpha = load_metrics(file(FILE))
+    assert (zeta.name, zeta.columns, alpha.name) == ("zeta", ("zeta[1]", "zeta[2]"), "alpha")
+    assert dict(measure(signals(), registered([zeta, alpha])).values) == {
+        "zeta": [0.3, 0.1],
+        "alpha": 0.1,
+    }
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("def f(:\n", "--metrics mine.py: SyntaxError: invalid syntax (mine.py, line 1)"),
+        ("x = 0\0\n", "--metrics mine.py: SyntaxError: source code string cannot contain null"),
+        ("1 / 0\n", "--metrics mine.py: ZeroDivisionError: division by zero"),
+        ("import sys\nsys.exit(0)\n", "--metrics mine.py: SystemExit: 0"),
+        ("import nowhere_at_all\n", "--metrics mine.py: ModuleNotFoundError: No module named "),
+        ("x = 1\n", ": no metric; must have functions under @metric(name)"),
+        (
+            "from grasp_cosim.grasp.metrics import time_difference\n",
+            ": no metric; must have functions under @metric(name)",
+        ),
+        (
+            "from grasp_cosim import metric\nmetric('step')\n",
+            "--metrics mine.py: metric 'step': every run has this beside; must have another name",
+        ),
+    ],
+)
+def test_a_file_without_metrics_is_one_line(
+    file: Callable[[str], Path], text: str, message: str
+) -> None:
+    path = file(text)
+    for _ in range(2):  # what has failed once is not taken for done
+        with pytest.raises(InputError) as caught:
+            load_metrics(path)
+        assert message in str(caught.value)
+        assert "\n" not in str(caught.value)
+
+
+def test_a_file_that_cannot_be_read_is_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "mine.py"
+    with pytest.raises(InputError, match=r"^--metrics .*mine\.py: .*No such file.*; must be a Pyt"):
+        load_metrics(path)
+    path.write_bytes(b"\xff\xfe")
+    with pytest.raises(InputError, match=r"^--metrics .*mine\.py: .*; must be a Python file$"):
+        load_metrics(path)
+
+
+def test_ctrl_c_in_a_file_is_no_wrong_input(file: Callable[[str], Path]) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        load_metrics(file("raise KeyboardInterrupt\n"))
+
+
+# ------------------------------------------------------------------------- other processes
+
+
+@metric("at_end", unit="m")
+def at_end(run: Signals) -> float:
+    return float(run["plant.gap"][-1])
+
+
+def _measured(job: tuple[Metric, ...]) -> tuple[list[str], dict[str, Any]]:
+    return [m.name for m in job], dict(measure(signals(), job).values)
+
+
+def test_metrics_work_in_another_process(file: Callable[[str], Path]) -> None:
+    """Of a file that is gone meanwhile, of a module, and of every result."""
+    path = file(FILE)
+    own = (*load_metrics(path), at_end)
+    path.unlink()
+    check_portable([*own, time_difference])
+    ((names, values),) = run_all(_measured, [(*own, time_difference)], 1, False, "metrics")
+    assert names == ["zeta", "alpha", "at_end", "time_difference"]
+    assert values == {"zeta": [0.3, 0.1], "alpha": 0.1, "at_end": 0.1}
+
+
+def test_a_metric_of_every_result_comes_back_as_itself() -> None:
+    assert all(pickle.loads(pickle.dumps(m)) is m for m in METRICS)
+    assert pickle.loads(pickle.dumps(at_end)) is at_end
+
+
+def test_a_metric_that_cannot_go_to_another_process_is_refused() -> None:
+    with pytest.raises(InputError, match=r"^metric 'x': cannot go to another process \(.*\); must"):
+        check_portable([at_end, made("x", lambda _: 1.0)])
