@@ -2,6 +2,7 @@
 
 import os
 import signal
+from multiprocessing.context import SpawnProcess
 from pathlib import Path
 
 import pytest
@@ -47,3 +48,16 @@ def test_batches_share_their_processes() -> None:
     with Crew(1) as crew, progress_bar("runs", None, progress=False) as bar:
         first, second = (crew.map(_process, range(2), bar) for _ in range(2))
     assert first == second
+
+
+def test_ctrl_c_while_a_process_starts_is_not_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    start = SpawnProcess.start
+
+    def interrupted(self: SpawnProcess) -> None:
+        start(self)
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(SpawnProcess, "start", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        run_all(_process, range(6), 2, progress=False, what="runs")
+    assert signal.pthread_sigmask(signal.SIG_BLOCK, ()) == set()

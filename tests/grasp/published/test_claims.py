@@ -318,10 +318,8 @@ def test_ctrl_c_ends_all_its_processes(fmus: Path, tmp_path: Path) -> None:
         stdout=subprocess.PIPE, stderr=subprocess.PIPE,
     )  # fmt: skip
     try:
-        while (
-            len(list(Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()))
-            < 3
-        ):
+        children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+        while len(children.read_text().split()) < 3:
             assert process.poll() is None, process.communicate()
             time.sleep(0.01)
         os.killpg(process.pid, signal.SIGINT)
