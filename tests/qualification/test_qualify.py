@@ -26,7 +26,7 @@ def short(grasp: System) -> System:
 @pytest.fixture
 def heavy(altered: Altered) -> Path:
     """The plant with a heavier second finger, which its model description tells."""
-    before = "(1e-3, 1e3)] = (0.5, 0.5)"
+    before = "high=1e3)\n    ] = (0.5, 0.5)"
     after = before.replace("0.5)", "0.6)")
     return altered("GripperPlant", "gripper_plant/fingers.py", before, after)
 
@@ -195,8 +195,8 @@ def test_damage_is_a_difference(grasp: System, fmus: Path, altered: Altered) -> 
     fmu = altered(
         "GripperPlantCompliant",
         "gripper_plant/compliant.py",
-        "(0.0, 10.0)\n    ] = 0.01",
-        "(0.0, 10.0)\n    ] = 0.001",
+        "high=10.0)\n    ] = 0.01",
+        "high=10.0)\n    ] = 0.001",
     )
     cup = grasp.swap("plant", fmus / "GripperPlantCompliant.fmu").with_values(dict(CASES[0]))
     found = qualify(cup.with_experiment(step=1e-3, stop=0.3), "plant", fmu, isolation="none")
@@ -209,7 +209,7 @@ def test_damage_is_a_difference(grasp: System, fmus: Path, altered: Altered) -> 
 @pytest.mark.slow
 def test_a_grasp_with_another_stabilisation_of_the_contact(grasp: System, altered: Altered) -> None:
     """The contact times stay, the contact force shows it."""
-    before = "+ beta * beta * (s"
+    before = "beta * beta * (s"
     fmu = altered(
         "GripperPlant", "gripper_plant/contact.py", before, before.replace("b", "1.5 * b", 1)
     )
