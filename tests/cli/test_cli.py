@@ -150,19 +150,6 @@ def test_a_folder_that_cannot_be_written_is_found_at_once(
     assert len(err.splitlines()) == 1
 
 
-def test_nothing_to_draw_is_found_at_once(command: Run, fmus: Path, tmp_path: Path) -> None:
-    fmu = fmus / "ProximitySensor.fmu"
-    (tmp_path / "sensor.toml").write_text(
-        "[experiment]\nstep = 1e-3\nstop = 0.01\n"
-        f'[components.sensor]\nfmu = "{fmu}"\nvalues = {{ gap = 0.02 }}\n'
-    )
-    assert command("run", "sensor.toml", "--out", "ok")[0] == 0
-    code, _, err = command("run", "sensor.toml", "--out", "results", "--plot")
-    assert code == 2
-    assert "nothing to draw" in err
-    assert not (tmp_path / "results").exists()
-
-
 def test_a_vendor_plant_with_one_more_input(command: Run, altered: Altered) -> None:
     force = "    force: Force = (0.0, 0.0)\n"
     ambient = (
