@@ -102,11 +102,11 @@ class Recorder:
 
 
 def _pair(key: str, factor: float, digits: int) -> Callable[[Result], str]:
-    return lambda run: " / ".join(_number(v, factor, digits) for v in run.settings[key])
+    return lambda run: " / ".join(_number(v, factor, digits) for v in run.metrics[key])
 
 
 def _single(key: str, factor: float, digits: int) -> Callable[[Result], str]:
-    return lambda run: _number(run.settings[key], factor, digits)
+    return lambda run: _number(run.metrics[key], factor, digits)
 
 
 def _number(value: float | None, factor: float, digits: int) -> str:
@@ -130,7 +130,7 @@ def value(run: Result, name: str, otherwise: float) -> float:
 
 def gap_behind(run: Result) -> float:
     """The gap of the second finger at the moment of the first contact, m."""
-    times = run.settings["time_to_contact"]
+    times = run.metrics["time_to_contact"]
     later = 1 + times.index(max(times))
     return float(np.interp(min(times), run.time, run.signals[f"plant.gap[{later}]"]))
 

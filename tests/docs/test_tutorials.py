@@ -83,7 +83,7 @@ def test_the_commands_at_the_beginnings_work(checkout: Path) -> None:
 @pytest.mark.slow
 def test_layers(checkout: Path) -> None:
     (cases, _, _, cup), _ = checked("layers", checkout)
-    case_0, case_1, case_2 = (cases[f"--case {case}"].settings for case in "012")
+    case_0, case_1, case_2 = (cases[f"--case {case}"].metrics for case in "012")
     assert said("layers", r"K_i·W/2 = ([\d.]+) N") == [98.0 * 0.07 / 2.0]
     assert case_0["steady_contact_force"] == pytest.approx([3.43, 3.43], abs=1e-6)
     assert said("layers", r"(\d+) and (\d+) times slower") == [
@@ -129,22 +129,22 @@ def test_limits(checkout: Path) -> None:
 
 def assert_reflectances(reflectances: Any, do: Any) -> None:
     """The ratios up to which the fingers are within 0.1 s, and not beyond."""
-    apart = {ratio: run.settings["time_difference"] for ratio, run in reflectances.items()}
+    apart = {ratio: run.metrics["time_difference"] for ratio, run in reflectances.items()}
     assert said("limits", r"From ([\d.]+) to ([\d.]+) the fingers are within 0.1 s") == [0.9, 1.14]
     assert max(apart["0.9"], apart["1.14"]) <= 0.1 < min(apart["0.89"], apart["1.15"])
     assert said("limits", r"in the middle, from ([\d.]+) to ([\d.]+)\.") == [0.885, 1.13]
     line = "grasp-cosim run --step 2e-3 --stop 2.2 --set plant.initial_object_position=0"
     inside, outside = (
-        [do(f"{line} --set sensor_1.reflectance={r}").settings["time_difference"] for r in ratios]
+        [do(f"{line} --set sensor_1.reflectance={r}").metrics["time_difference"] for r in ratios]
         for ratios in ((0.885, 1.13), (0.88, 1.14))
     )
     assert max(inside) <= 0.1 < min(outside)
     for ratio, run in reflectances.items():
         r = float(ratio.partition(" ")[0]) if "gain" not in ratio else 1.0
         behind = 5e-3 * (max(r, 1.0 / r) ** (1.0 / 1.1506) - 1.0)
-        later = 2 if run.settings["time_to_contact"][0] < run.settings["time_to_contact"][1] else 1
+        later = 2 if run.metrics["time_to_contact"][0] < run.metrics["time_to_contact"][1] else 1
         found = np.interp(
-            min(run.settings["time_to_contact"]), run.time, run.signals[f"plant.gap[{later}]"]
+            min(run.metrics["time_to_contact"]), run.time, run.signals[f"plant.gap[{later}]"]
         )
         assert found == pytest.approx(behind, abs=0.3e-3)  # what the target is behind
 
@@ -183,7 +183,7 @@ def assert_loop(loop: Any) -> None:
     assert swings(loop["--step 0.03"]) == 0
     assert swings(loop["--step 0.04"]) >= 3
     assert said("limits", r"and then (\d+) ms are too many") == [8.0]
-    slow, fast = (loop[f"--scheme jacobi --step {h}"].settings for h in ("8e-3", "5e-3"))
+    slow, fast = (loop[f"--scheme jacobi --step {h}"].metrics for h in ("8e-3", "5e-3"))
     assert max(fast["impact_velocity"]) < 0.0065 < 0.02 < min(slow["impact_velocity"])
 
 
@@ -211,7 +211,7 @@ def test_your_plant(checkout: Path, capsys: pytest.CaptureFixture[str]) -> None:
     k = int(np.flatnonzero(case_1.signals["plant.contact[2]"])[0])
     before = slice(k - 2, k)  # both free: how fast the gap closes is the impact, whoever moves
     rate = -np.diff(case_1.signals["plant.gap[2]"][before]) / np.diff(case_1.time[before])
-    assert case_1.settings["impact_velocity"][1] == pytest.approx(rate[0], rel=0.05)
+    assert case_1.metrics["impact_velocity"][1] == pytest.approx(rate[0], rel=0.05)
     place = case_1.signals["plant.object_position"]
     assert place[k] < place[k - 1]  # finger 2 is the left one
 
