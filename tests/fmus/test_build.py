@@ -158,6 +158,7 @@ SOURCES = (
 )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_every_source_is_in_the_hash(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of copies of the packages, and of the metadata and binaries of what is installed."""
     for package in packages("grasp_fmus"):
@@ -181,6 +182,7 @@ def test_every_source_is_in_the_hash(tmp_path: Path, monkeypatch: pytest.MonkeyP
             before = after
 
 
+@pytest.mark.slow
 def test_several_processes_at_once_leave_one_whole_folder(fmus: Path, tmp_path: Path) -> None:
     script = "import sys, pathlib; from grasp_fmus.build import build; build(pathlib.Path('out'))"
     env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}

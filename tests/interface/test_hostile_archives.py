@@ -54,6 +54,7 @@ def of_zeros(path: Path, name: str, size: int, description: str = "") -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_description_of_a_gigabyte_is_not_unpacked(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -63,6 +64,7 @@ def test_a_description_of_a_gigabyte_is_not_unpacked(
     refused(path, f"modelDescription.xml has {GIGABYTE} bytes; must have at most 100000000")
 
 
+@pytest.mark.slow
 def test_a_gigabyte_in_all_is_not_unpacked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = of_zeros(tmp_path / "x.fmu", "resources/zeros", GIGABYTE, PLAIN)
     assert path.stat().st_size < 6_000_000
