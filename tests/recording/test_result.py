@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from grasp_cosim import Result, SimulationError, System, simulate
+from grasp_cosim import InputError, Result, SimulationError, System, simulate
 from grasp_cosim.files import in_one_piece
 from grasp_cosim.recording.load import load_run
 from grasp_cosim.recording.result import Rejection
@@ -107,6 +107,12 @@ def test_a_result_of_integers_is_written_as_integers(result: Result, tmp_path: P
     counts = np.arange(len(result.time), dtype=np.int64)
     replace(result, signals={"a.n": counts}, units={"a.n": None}).to_csv(tmp_path / "s.csv")
     assert (tmp_path / "s.csv").read_text().splitlines()[-1] == "0.1,1000"
+
+
+def test_a_result_without_signals_has_nothing_to_draw(result: Result, tmp_path: Path) -> None:
+    bare = replace(result, signals={}, units={})
+    with pytest.raises(InputError, match=r"s\.png: nothing to draw; must be a result with "):
+        bare.plot(tmp_path / "s.png")
 
 
 def test_a_file_that_cannot_be_written_is_named_and_not_left_behind(tmp_path: Path) -> None:

@@ -7,7 +7,6 @@ import click
 
 from ...errors import InputError
 from ...files import check_folder
-from ...grasp.presets import STUDIES
 from ...report.plot import new_figure
 from ...report.sweep import draw_sweep
 from ...sweep.read import read_study, study_file
@@ -61,7 +60,7 @@ def sweep(
     """
     if workers is not None and scheduler is not None:
         raise InputError("--workers: must not come with --scheduler, whose workers there are")
-    path = study_file(study, STUDIES)
+    path = _file(study)
     folder = out or Path(path.stem)
     check_folder(folder)
     chosen = read_study(
@@ -84,6 +83,16 @@ def sweep(
         click.echo(f"drew {picture}", err=True)
     click.echo(json.dumps(done.as_json()) if as_json else _as_text(done))
     return NEGATIVE if done.failed == chosen.runs else 0
+
+
+def _file(study: str) -> Path:
+    """The file of a study, given by its path or by the name of a built-in one."""
+    path = Path(study)
+    if path.suffix == ".toml" and path.is_file():
+        return path
+    from ...grasp.presets import STUDIES
+
+    return study_file(study, STUDIES)
 
 
 def _as_text(done: Sweep) -> str:

@@ -1,0 +1,267 @@
+"""The core is a core: a system that is no grasp goes all the way where there is no grasp.
+
+In a process in which nothing below grasp_cosim.grasp can be imported, as if it were deleted.
+"""
+
+import json
+import subprocess
+import sys
+import textwrap
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from support.native_fmus import needs_gcc
+from support.oscillator import write_oscillator
+
+pytestmark = needs_gcc
+
+WITHOUT = """
+import sys
+from importlib.machinery import PathFinder
+
+class Deleted(PathFinder):
+    @classmethod
+    def find_spec(cls, name, path=None, target=None):
+        if f"{name}.".startswith("grasp_cosim.grasp."):
+            return None
+        return super().find_spec(name, path, target)
+
+sys.meta_path[:] = [Deleted if f is PathFinder else f for f in sys.meta_path]
+"""
+"""As if the folder were deleted: find_spec() finds nothing, to import it is a ModuleNotFoundError.
+
+The finder that reads folders is replaced; those of editable installs find top-level packages only.
+"""
+
+METRICS = """
+from math import hypot
+
+from grasp_cosim import metric
+
+
+@metric("amplitude", unit="m", description="of the oscillation")
+def amplitude(run):
+    return hypot(run["left.x"][-1], 1.0 - run["right.x"][-1])
+"""
+
+ROLES = '[roles]\nleft = "a"\nright = "b"\n[presets.twice]\n"a.gain" = 2.0\n'
+
+STUDY = """
+system = "oscillator.toml"
+presets = ["twice"]
+outputs = ["b.x"]
+metrics = "mine.py"
+[design]
+kind = "grid"
+[[parameters]]
+name = "gain"
+variables = ["b.gain"]
+values = [1.0, 2.0]
+"""
+
+Python = Callable[[str], str]
+Command = Callable[..., str]
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """The oscillator with roles and a preset, a file of metrics, a study."""
+    write_oscillator(tmp_path, ROLES)
+    (tmp_path / "mine.py").write_text(METRICS)
+    (tmp_path / "study.toml").write_text(STUDY)
+    return tmp_path
+
+
+@pytest.fixture
+def python(folder: Path) -> Python:
+    """Runs a program in the folder, in a process without a grasp; what it prints.
+
+    Its own processes have no grasp either: they are started by the same file.
+    """
+
+    return lambda program: _output(folder, program)
+
+
+@pytest.fixture
+def command(folder: Path) -> Command:
+    """Runs a command line in the folder, in a process without a grasp; what it prints."""
+    program = "from grasp_cosim.cli import entry\n\nentry()"
+    return lambda *arguments: _output(folder, program, *arguments)
+
+
+def _output(folder: Path, program: str, *arguments: str) -> str:
+    path = folder / "program.py"
+    body = textwrap.indent(textwrap.dedent(program), "    ")
+    path.write_text(f"{WITHOUT}\nif __name__ == '__main__':\n{body}\n")
+    command = [sys.executable, "-B", str(path), *arguments]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_there_is_no_grasp_in_these_processes(python: Python) -> None:
+    """Or the others would show nothing."""
+    python(
+        """
+        from importlib.util import find_spec
+
+        import grasp_cosim
+        from grasp_cosim import extensions
+
+        for name in ("grasp", "grasp.metrics", "grasp.system"):
+            try:
+                __import__(f"grasp_cosim.{name}")
+            except ModuleNotFoundError as error:
+                assert error.name.startswith("grasp_cosim.grasp")
+            else:
+                raise AssertionError(name)
+        assert find_spec("grasp_cosim.grasp") is None
+        assert find_spec("grasp_cosim.metrics.metric") is not None
+        assert extensions.metrics == []
+        assert [d.stem for d in extensions.drawings] == ["signals"]
+        """
+    )
+
+
+def test_every_other_module_can_be_imported(python: Python) -> None:
+    """Those of the commands of a grasp cannot: its FMUs, its figures, its friction."""
+    printed = python(
+        """
+        import pkgutil
+
+        import grasp_cosim
+
+        refused = []
+        for module in pkgutil.walk_packages(grasp_cosim.__path__, "grasp_cosim."):
+            if f"{module.name}.".startswith("grasp_cosim.grasp."):
+                continue
+            if module.name.endswith("__main__"):
+                continue
+            try:
+                __import__(module.name)
+            except ModuleNotFoundError as error:
+                assert error.name.startswith("grasp_cosim.grasp"), module.name
+                refused.append(module.name)
+        print(" ".join(refused))
+        """
+    )
+    assert set(printed.split()) <= {
+        f"grasp_cosim.cli.commands.{name}" for name in ("build", "evaluate", "identify")
+    }
+
+
+def test_a_run_is_written_read_back_drawn_and_reported(python: Python, folder: Path) -> None:
+    python(
+        """
+        from math import hypot
+        from pathlib import Path
+
+        from grasp_cosim import System, load_run, simulate
+        from grasp_cosim.metrics.metric import load_metrics
+        from grasp_cosim.report.page import write_page
+
+        system = System.load("oscillator.toml")
+        result = simulate(system, metrics=load_metrics(Path("mine.py")))
+        amplitude = hypot(result["a.x"][-1], 1.0 - result["b.x"][-1])
+        assert abs(amplitude - 1.0) < 0.01
+        assert result.metrics["amplitude"] == amplitude
+        assert result.measured.missing == ()
+        assert result.metric_units["amplitude"] == "m"
+        result.to_csv("signals.csv")
+        result.to_json("run.json")
+        back = load_run(".")
+        assert back.metrics == result.metrics
+        assert back.metric_units == result.metric_units
+        assert back.roles == {"left": "a", "right": "b"}
+        back.plot("signals.png")
+        write_page(back, "oscillator", Path("page.html"))
+        """
+    )
+    assert (folder / "signals.png").read_bytes().startswith(b"\x89PNG")
+    page = (folder / "page.html").read_text("utf-8")
+    assert "amplitude" in page
+    assert "a.x" in page
+
+
+def test_a_study_is_swept(python: Python) -> None:
+    python(
+        """
+        from pathlib import Path
+
+        from grasp_cosim import System
+        from grasp_cosim.sweep.read import read_study
+        from grasp_cosim.sweep.sweep import sweep
+
+        study = read_study(Path("study.toml"), System.load)
+        done = sweep(study, Path("out"), workers=2)
+        assert done.failed == 0
+        first, second = (outcome.metrics for outcome in done.outcomes)
+        assert list(first) == ["amplitude", "b.x"]
+        assert first["amplitude"] != second["amplitude"]
+        assert study.system.component("a", "").values["gain"] == 2.0
+        """
+    )
+
+
+def test_a_swap_is_qualified(python: Python) -> None:
+    python(
+        """
+        from pathlib import Path
+
+        from grasp_cosim import System
+        from grasp_cosim.metrics.metric import load_metrics
+        from grasp_cosim.qualification.qualify import qualify
+        from grasp_cosim.qualification.verdict import as_json, as_text
+
+        system = System.load("oscillator.toml")
+        found = qualify(system, "b", "integrator.fmu", metrics=load_metrics(Path("mine.py")))
+        assert found.qualified
+        assert [c.name for c in found.metrics] == ["amplitude"]
+        assert "amplitude" in as_text(found)
+        assert as_json(found)["metrics"][0]["unit"] == "m"
+        """
+    )
+
+
+def test_the_step_is_studied(python: Python) -> None:
+    python(
+        """
+        from math import sin
+        from pathlib import Path
+
+        from grasp_cosim import System
+        from grasp_cosim.convergence.step_study import step_study
+        from grasp_cosim.metrics.metric import load_metrics
+
+        system = System.load("oscillator.toml")
+        metrics = load_metrics(Path("mine.py"))
+        study = step_study(system, 0.01, workers=2, of=["a.x", "amplitude"], metrics=metrics)
+        assert abs(study.limits["a.x"].limit - sin(0.64)) < 1e-4
+        assert abs(study.limits["amplitude"].limit - 1.0) < 1e-3
+        assert study.holds
+        """
+    )
+
+
+def test_the_commands_of_any_system_do_without(command: Command, folder: Path) -> None:
+    options = ("--metrics", "mine.py", "--json")
+    ran = json.loads(
+        command("run", "oscillator.toml", "--preset", "twice", "--out", "out", "--plot", *options)
+    )
+    assert (ran["units"]["amplitude"], ran["complete"]) == ("m", True)
+    assert (folder / "out/signals.png").exists()
+    command("report", "out", "--out", "page.html")
+    assert "amplitude" in (folder / "page.html").read_text("utf-8")
+    swept = json.loads(command("sweep", "study.toml", "--workers", "1", "--json"))
+    assert swept["metrics"]["amplitude"]["runs"] == 2
+    judged = json.loads(
+        command("qualify", "integrator.fmu", "--as", "b", "--system", "oscillator.toml", *options)
+    )
+    assert (judged["qualified"], judged["metrics"][0]["name"]) == (True, "amplitude")
+    asked = ("--of", "amplitude", "--tolerance", "0.01")
+    study = json.loads(command("run", "oscillator.toml", "--step-study", *asked, *options))
+    assert study["quantities"][0]["name"] == "amplitude"
+    command("ssp", "oscillator.toml", "-o", "oscillator.ssp")
+    runs = [json.loads(command("run", f"oscillator.{form}", *options)) for form in ("toml", "ssp")]
+    assert runs[0]["amplitude"] == runs[1]["amplitude"]
