@@ -244,6 +244,7 @@ def test_the_step_is_studied(python: Python) -> None:
     )
 
 
+@pytest.mark.slow
 def test_the_commands_of_any_system_do_without(command: Command, folder: Path) -> None:
     options = ("--metrics", "mine.py", "--json")
     ran = json.loads(

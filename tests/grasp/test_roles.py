@@ -1,0 +1,346 @@
+"""The published grasp with components of other names: roles say who is the plant."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import Run
+from grasp_cosim import InputError, Result, System, load_run, simulate
+from grasp_cosim.grasp.metrics import METRICS, NEEDS
+from grasp_cosim.grasp.presets import (
+    CASES,
+    SYSTEM,
+    built_in_presets,
+    with_bench,
+    with_case,
+    with_preset,
+)
+from grasp_cosim.metrics.metric import Signals, measure
+from grasp_cosim.recording.result import UNITS
+from hypothesis import given
+from hypothesis import strategies as st
+
+LOST = ('no metrics of the grasp: no component is the plant; name it under [roles]: plant = "..."',)
+NAMES = {"plant": "gripper", "sensor_1": "right", "sensor_2": "left", "controller": "brain"}
+
+
+def written(fmus: Path, folder: Path, names: Mapping[str, str], roles: bool, presets: bool) -> Path:
+    """The built-in system file with other names of its components, in folder."""
+    text, _, rest = SYSTEM.read_text("utf-8").partition("# Cases of the paper")
+    text += rest.partition("\n")[2] if presets else ""
+    for old, new in names.items():
+        for place in ('"{}.', "-> {}.", "components.{}]"):
+            text = text.replace(place.format(old), place.format(new))
+    text = text.replace('fmu = "', f'fmu = "{fmus}/')
+    if roles:
+        text += "\n[roles]\n" + "".join(f'{old} = "{new}"\n' for old, new in names.items())
+    path = folder / "renamed.toml"
+    path.write_text(text, "utf-8")
+    return path
+
+
+def renamed(signals: Mapping[str, Any], names: Mapping[str, str]) -> dict[str, Any]:
+    found = {}
+    for name, column in signals.items():
+        component, _, variable = name.partition(".")
+        found[f"{names.get(component, component)}.{variable}"] = column
+    return found
+
+
+def of_the_grasp(metrics: Mapping[str, Any]) -> dict[str, Any]:
+    return {k: v for k, v in metrics.items() if k not in UNITS}
+
+
+@pytest.fixture(scope="module")
+def original(grasp: System) -> Result:
+    """Case 0, until both fingers have touched."""
+    return simulate(with_case(grasp, 0), step=1e-3, stop=0.5)
+
+
+@pytest.fixture
+def gripper(fmus: Path, tmp_path: Path) -> System:
+    """The grasp with its plant called gripper, and nobody who says so."""
+    return System.load(written(fmus, tmp_path, {"plant": "gripper"}, roles=False, presets=False))
+
+
+# ------------------------------------------------------------------------- metrics
+
+
+def test_without_a_plant_there_are_no_metrics_and_it_says_why(gripper: System) -> None:
+    result = simulate(gripper, step=1e-3, stop=0.01)
+    assert result.measured.missing == LOST
+    assert dict(result.measured.values) == {}
+    assert set(result.metrics) == set(UNITS)
+    assert result.drawing.stem == "signals"
+
+
+def test_with_roles_they_are_the_same_to_the_bit(
+    original: Result, fmus: Path, tmp_path: Path
+) -> None:
+    system = System.load(written(fmus, tmp_path, NAMES, roles=True, presets=False))
+    result = simulate(with_case(system, 0), step=1e-3, stop=0.5)
+    assert list(result) == list(renamed(original, NAMES))
+    assert "gripper.gap[1]" in result
+    assert of_the_grasp(result.metrics) == of_the_grasp(original.metrics)
+    assert result.measured.missing == ()
+    assert None not in result.metrics["time_to_contact"]
+    assert result.drawing.stem == "grasp"
+
+
+def test_a_run_read_back_is_the_result_it_was(original: Result, fmus: Path, tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    system = System.load(written(fmus, tmp_path, NAMES, roles=True, presets=False))
+    result = simulate(with_case(system, 0), step=1e-3, stop=0.5)
+    result.to_csv(tmp_path / "out/signals.csv")
+    result.to_json(tmp_path / "out/run.json")
+    back = load_run(tmp_path / "out")
+    assert dict(back.metrics) == dict(result.metrics)
+    assert back.metric_units == result.metric_units
+    assert back.measured.missing == result.measured.missing == ()
+    assert (back.roles, back.units) == (result.roles, result.units)
+    assert back.drawing is result.drawing
+    back.plot(tmp_path / "back.png")
+    result.plot(tmp_path / "result.png")
+    assert (tmp_path / "back.png").read_bytes() == (tmp_path / "result.png").read_bytes()
+
+
+def test_what_a_run_lacks_is_read_back_too(gripper: System, tmp_path: Path) -> None:
+    result = simulate(gripper, step=1e-3, stop=0.01)
+    result.to_csv(tmp_path / "signals.csv")
+    result.to_json(tmp_path / "run.json")
+    assert json.loads((tmp_path / "run.json").read_text())["missing_metrics"] == list(LOST)
+    assert load_run(tmp_path).measured.missing == LOST
+    load_run(tmp_path).plot(tmp_path / "signals.png")
+    assert (tmp_path / "signals.png").read_bytes().startswith(b"\x89PNG")
+
+
+@given(
+    st.lists(
+        st.sampled_from(["plant", "controller", "sensor_1", "gripper", "a b", "x", "plant2", "p"]),
+        min_size=2,
+        max_size=2,
+        unique=True,
+    )
+)
+def test_metrics_do_not_depend_on_the_names_of_components(
+    original: Result, chosen: list[str]
+) -> None:
+    """Not even where the controller is called plant, and the plant controller."""
+    names = dict(zip(("plant", "controller"), chosen, strict=True))
+    signals = {name: original[name] for name in NEEDS}
+    expected = measure(Signals(original.time, signals), METRICS)
+    found = measure(Signals(original.time, renamed(signals, names), names), METRICS)
+    assert found.values == expected.values
+    assert found.missing == expected.missing == ()
+    without = {k: v for k, v in renamed(signals, names).items() if not k.endswith("contact[2]")}
+    lacking = measure(Signals(original.time, without, names), METRICS)
+    assert lacking.missing == (f"no metrics of the grasp: {names['plant']} lacks contact[2]",)
+
+
+# ------------------------------------------------------------------------- presets
+
+
+@pytest.mark.parametrize("presets", [True, False], ids=["own presets", "built-in presets"])
+def test_cases_and_bench_find_components_by_their_roles(
+    grasp: System, fmus: Path, tmp_path: Path, presets: bool
+) -> None:
+    system = System.load(written(fmus, tmp_path, NAMES, roles=True, presets=presets))
+    assert bool(system.presets) == presets
+    pairs = [(with_case(system, n), with_case(grasp, n)) for n in CASES]
+    pairs.append((with_bench(system), with_bench(grasp)))
+    pairs.append((with_case(pairs[-1][0], 1), with_case(pairs[-1][1], 1)))
+    for ours, theirs in pairs:
+        for role, name in NAMES.items():
+            assert ours.component(name, "").values == theirs.component(role, "").values
+        assert ours.roles == NAMES
+
+
+def test_a_preset_of_the_file_comes_before_the_built_in_one(
+    grasp: System, fmus: Path, tmp_path: Path
+) -> None:
+    own = replace(grasp, presets={"case_0": {"plant.object_width": 0.06}, "mine": {}})
+    assert with_case(own, 0).start("plant.object_width") == 0.06
+    assert with_case(own, 0).component("controller", "").values == {}
+    assert with_case(own, 1).component("controller", "").values != {}
+    with pytest.raises(InputError, match=r"no preset 'yours'; valid: case_0, mine"):
+        with_preset(own, "yours")
+    assert set(built_in_presets()) == {"bench", *(f"case_{n}" for n in CASES)}
+
+
+def test_without_roles_a_case_says_what_it_does_not_find(fmus: Path, tmp_path: Path) -> None:
+    names = {"controller": "brain"}
+    system = System.load(written(fmus, tmp_path, names, roles=False, presets=False))
+    with pytest.raises(InputError) as caught:
+        with_case(system, 0)
+    assert str(caught.value) == (
+        "[presets.case_0] of grasp.toml: controller.simultaneous_contact.enabled: no component "
+        "'controller'; valid: plant, sensor_1, sensor_2, brain"
+    )
+
+
+# ------------------------------------------------------------------------- commands
+
+
+def enabled(out: str, layer: str) -> Any:
+    run = json.loads(Path(out, "run.json").read_text())
+    return run["components"]["brain"]["values"].get(f"{layer}.enabled")
+
+
+@pytest.mark.parametrize("presets", [True, False], ids=["own presets", "built-in presets"])
+def test_run_takes_presets_of_a_system_with_roles(
+    command: Run, fmus: Path, tmp_path: Path, presets: bool
+) -> None:
+    path = written(fmus, tmp_path, NAMES, roles=True, presets=presets)
+    short = ("run", path, "--step", "1e-3", "--stop", "0.01")
+    for options, expected in (
+        (("--case", "1"), (False, True)),
+        (("--preset", "case_1"), (False, True)),
+        (("--preset", "case_2", "--case", "0"), (False, False)),
+    ):
+        assert command(*short, *options, "--out", "out")[0] == 0
+        layers = ("simultaneous_contact", "impact_reduction")
+        assert tuple(enabled("out", layer) for layer in layers) == expected
+    assert command(*short, "--bench", "--case", "1", "--out", "out")[0] == 0
+    values = json.loads(Path("out/run.json").read_text())["components"]
+    assert values["right"]["values"]["noise.enabled"] is True
+    assert values["gripper"]["values"]["friction.coulomb[2]"] == pytest.approx(1.34, abs=0.01)
+    code, _, err = command(*short, "--preset", "case_9")
+    assert (code, err.count("\n")) == (2, 1)
+    assert "no preset 'case_9'; valid: " in err
+
+
+def test_run_says_why_there_are_no_metrics(command: Run, fmus: Path, tmp_path: Path) -> None:
+    path = written(fmus, tmp_path, {"plant": "gripper"}, roles=False, presets=False)
+    short = ("run", path, "--step", "1e-3", "--stop", "0.01")
+    code, out, _ = command(*short)
+    assert code == 0
+    assert LOST[0] in out.splitlines()
+    code, out, _ = command(*short, "--json")
+    found = json.loads(out)
+    assert (code, found["missing_metrics"]) == (0, list(LOST))
+    assert set(found) == {*UNITS, "units", "missing_metrics"}
+    assert set(found["units"]) == set(UNITS)
+
+
+# ------------------------------------------------------------------------- a user's own
+
+
+OWN = """
+import numpy as np
+
+from grasp_cosim import metric
+
+
+@metric("reach", unit="m", factor=1e3, shown_unit="mm", entries=("finger 1", "finger 2"))
+def reach(run):
+    return [np.ptp(run[f"plant.position[{j}]"]) for j in (1, 2)]
+
+
+@metric("lazy")
+def lazy(run):
+    return reach(run)[0] < 1e-3
+
+
+@metric("heat", unit="K", needs=("plant.temperature",))
+def heat(run):
+    return run["plant.temperature"][-1]
+"""
+
+
+@pytest.fixture
+def own(tmp_path: Path) -> Path:
+    path = tmp_path / "own.py"
+    path.write_text(OWN, "utf-8")
+    return path
+
+
+def test_a_user_s_metrics_are_wherever_those_of_the_grasp_are(
+    command: Run, own: Path, tmp_path: Path
+) -> None:
+    short = ("run", "--case", "0", "--step", "1e-3", "--stop", "0.05", "--metrics", own)
+    code, out, _ = command(*short, "--out", "out")
+    assert code == 0
+    table = {line[:22].strip(): line[22:].split() for line in out.splitlines()}
+    assert table["lazy"] == ["no"]
+    run = json.loads(Path("out/run.json").read_text())
+    assert table["reach"] == [*(f"{1e3 * v:.3f}" for v in run["reach"]), "mm"]
+    assert "no heat: plant lacks temperature" in out.splitlines()
+    assert (run["metric_units"]["reach"], run["metric_units"]["lazy"]) == ("m", None)
+    assert "heat" not in run
+    assert run["missing_metrics"] == ["no heat: plant lacks temperature"]
+
+    code, out, _ = command(*short, "--json")
+    found = json.loads(out)
+    assert code == 0
+    assert (found["reach"], found["lazy"]) == (run["reach"], False)
+    assert (found["units"]["reach"], found["units"]["lazy"]) == ("m", None)
+    assert {*found} - {"units", "missing_metrics"} == {*found["units"]}
+
+    back = load_run("out")
+    assert (back.metrics["reach"], back.metrics["lazy"]) == (run["reach"], False)
+    assert back.metric_units == run["metric_units"]
+    expected = np.ptp(back["plant.position[1]"])
+    assert back.metrics["reach"][0] == expected > 0.0
+
+
+def test_a_user_s_metrics_are_columns_of_a_sweep(command: Run, own: Path, tmp_path: Path) -> None:
+    import pyarrow.parquet as pq  # type: ignore[import-untyped]
+
+    (tmp_path / "study.toml").write_text(
+        'case = 0\nstep = 1e-3\nstop = 0.05\nmetrics = "own.py"\n[design]\nkind = "grid"\n'
+        '[[parameters]]\nname = "mass"\nvariables = ["plant.finger_mass[1]"]\nvalues = [0.5, 2.0]\n'
+        '[figures]\ndistributions = ["reach[1]"]\n'
+    )
+    code, out, _ = command("sweep", "study.toml", "--workers", "1", "--json")
+    assert code == 0
+    assert json.loads(out)["metrics"]["reach[1]"]["runs"] == 2
+    rows = pq.read_table("study/runs.parquet").to_pylist()
+    assert rows[0]["reach[1]"] > rows[1]["reach[1]"] > 0.0
+    assert [row["lazy"] for row in rows] == [False, False]
+    assert "heat" not in rows[0]
+    code, _, err = command("sweep", "study.toml", "--metrics", own, "--out", "other")
+    assert (code, err.count("\n")) == (2, 1)
+    assert "metric 'reach': is there twice" in err
+
+
+def test_a_user_s_metrics_have_bands_in_a_qualification(
+    command: Run, own: Path, fmus: Path, tmp_path: Path
+) -> None:
+    short = (
+        "qualify", fmus / "GripperPlant.fmu", "--as", "plant", "--step", "1e-3", "--stop", "0.05",
+        "--isolation", "none", "--metrics", own,
+    )  # fmt: skip
+    code, out, _ = command(*short, "--json", "--out", "out")
+    found = {m["name"]: m for m in json.loads(out)["metrics"]}
+    assert code == 0
+    assert (found["reach[1]"]["unit"], found["lazy"]["unit"]) == ("m", None)
+    assert found["reach[1]"]["original"] == found["reach[1]"]["candidate"] > 0.0
+    assert "heat" not in found
+    assert "reach[1]" in Path("out/bands_used.toml").read_text()
+    bands = tmp_path / "bands.toml"
+    bands.write_text("[metrics]\nreach = { absolute = 0.125 }\n")
+    code, out, _ = command(*short, "--json", "--bands", bands)
+    judged = {m["name"]: (m["band"], m["band_source"]) for m in json.loads(out)["metrics"]}
+    assert code == 0
+    assert judged["reach[1]"] == judged["reach[2]"] == (0.125, "given")
+    assert judged["lazy"][1] == "derived"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("1 / 0\n", "--metrics own.py: ZeroDivisionError: division by zero"),
+        (OWN.replace('"reach"', '"time_to_contact"'), "metric 'time_to_contact': is there twice"),
+        (OWN.replace('"reach"', '"stop"'), "--metrics own.py: metric 'stop': every run has this"),
+        (OWN.replace("return reach(run)", "return run"), "metric 'lazy': AttributeError: "),
+    ],
+)
+def test_a_user_s_mistake_is_one_line(command: Run, own: Path, text: str, message: str) -> None:
+    own.write_text(text)
+    code, out, err = command("run", "--step", "1e-3", "--stop", "0.01", "--metrics", own, "--json")
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert message in err

@@ -1,0 +1,121 @@
+"""Who plays a role, and values under a name: what a system file may say, and what it may not."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from grasp_cosim import InputError, System
+from grasp_cosim.system.settings import settings
+
+SENSOR = """
+[experiment]
+step = 1e-3
+stop = 0.02
+[components.eye]
+fmu = "{fmu}"
+values = {{ gap = 0.02 }}
+"""
+
+Load = Callable[[str], System]
+
+
+@pytest.fixture
+def load_with(fmus: Path, tmp_path: Path) -> Load:
+    """The system of one sensor, with more text at the end of its file."""
+
+    def load(more: str) -> System:
+        path = tmp_path / "eye.toml"
+        path.write_text(SENSOR.format(fmu=fmus / "ProximitySensor.fmu") + more, "utf-8")
+        return System.load(path)
+
+    return load
+
+
+PRESETS = """
+[presets.dim]
+"eye.reflectance" = 0.5
+"eye.gain" = 0.001
+[presets.bright]
+"eye.reflectance" = 2.0
+"eye.adc.enabled" = true
+"""
+
+
+def test_roles_are_those_of_the_file_and_in_the_settings(load_with: Load) -> None:
+    system = load_with('[roles]\nsensor_1 = "eye"\nlook = "eye"\n')
+    assert system.roles == {"sensor_1": "eye", "look": "eye"}
+    assert settings(system)["roles"] == {"sensor_1": "eye", "look": "eye"}
+    assert load_with("").roles == {}
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        (
+            '[roles]\nsensor_1 = "ear"\n',
+            "eye.toml: [roles]: sensor_1 = 'ear': no component 'ear'; valid: eye",
+        ),
+        (
+            "[roles]\nsensor_1 = 1\n",
+            "eye.toml: [roles]: sensor_1 = 1: must be the name of a component",
+        ),
+        (
+            '[roles]\nsensor_1 = ["eye"]\n',
+            "eye.toml: [roles]: sensor_1 = ['eye']: must be the name of a component",
+        ),
+        ("[[roles]]\n", "eye.toml: [roles]: [{}]; must be a table"),
+        ("[[presets]]\n", "eye.toml: [presets]: [{}]; must be a table"),
+        ("[presets]\ndim = 3\n", "eye.toml: [presets.dim]: 3; must be a table"),
+        (
+            '[presets.dim]\n"eye.gain" = [1]\n',
+            "eye.toml: [presets.dim]: eye.gain = [1]: must be a number, boolean or string",
+        ),
+        (
+            "[presets.dim]\neye.gain = 1\n",
+            "eye.toml: [presets.dim]: eye = {'gain': 1}: must be a number, boolean or string",
+        ),
+    ],
+)
+def test_a_mistake_is_one_line_that_says_where(load_with: Load, more: str, message: str) -> None:
+    with pytest.raises(InputError) as caught:
+        load_with(more)
+    assert str(caught.value).startswith(message)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_preset_sets_its_values_and_a_later_one_goes_first(load_with: Load) -> None:
+    system = load_with(PRESETS)
+    both = system.with_presets("dim", "bright")
+    assert both.component("eye", "").values == {
+        "gap": 0.02, "reflectance": 2.0, "gain": 0.001, "adc.enabled": True,
+    }  # fmt: skip
+    assert system.with_presets("bright", "dim").start("eye.reflectance") == 0.5
+    assert system.with_presets() == system
+    assert both.presets == system.presets
+
+
+def test_a_preset_that_is_not_there_names_those_that_are(load_with: Load) -> None:
+    with pytest.raises(InputError) as caught:
+        load_with(PRESETS).with_presets("dim", "dark")
+    assert str(caught.value) == (
+        "eye.toml: no preset 'dark'; valid: dim, bright; a system file has them as [presets.NAME]"
+    )
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        ('"ear.gain" = 1.0', r"\[presets.odd\] ear.gain: no component 'ear'; valid: eye$"),
+        ('"eye.gane" = 1.0', r"\[presets.odd\] eye.gane: .* no input or parameter 'gane'"),
+        ('"eye.gain" = -1.0', r"\[presets.odd\] eye.gain.* = -1.0: must be "),
+        ('"eye.adc.bits" = 1.5', r"\[presets.odd\] eye.adc.bits.* = 1.5: must be a whole number"),
+        ('"eye.intensity" = 1.0', r"\[presets.odd\] eye.intensity: .* no input or parameter"),
+    ],
+)
+def test_a_preset_is_checked_where_it_is_used(load_with: Load, value: str, message: str) -> None:
+    """A file may have presets that only another swap or build of an FMU takes."""
+    system = load_with(f"{PRESETS}[presets.odd]\n{value}\n")
+    assert system.with_presets("dim").start("eye.gain") == 0.001
+    with pytest.raises(InputError, match=rf"^eye\.toml: {message}") as caught:
+        system.with_presets("odd")
+    assert "\n" not in str(caught.value)
