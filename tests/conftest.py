@@ -75,9 +75,17 @@ def made_once(tmp_path_factory: pytest.TempPathFactory) -> MadeOnce:
 
 
 @pytest.fixture(scope="session")
-def fmus(made_once: MadeOnce) -> Path:
-    """The folder with the freshly built FMUs."""
-    return made_once("fmus", build)
+def fmus() -> Path:
+    """The folder with the FMUs of these sources, built once for all test processes and runs.
+
+    What is not of these sources, or was altered, build() makes anew.
+    """
+    folder = Path(sys.prefix, "fmus_of_the_tests")
+    folder.mkdir(exist_ok=True)
+    with (folder.parent / f"{folder.name}.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        build(folder)
+    return folder
 
 
 @pytest.fixture(scope="session")
