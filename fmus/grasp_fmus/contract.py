@@ -1,13 +1,6 @@
 """The declaration of a block, as a flat list of variables.
 
-A block is a module with Params, Inputs, State, Outputs, initial_state(), step() and outputs().
-Every field of Params, Inputs and Outputs is declared with block_variables:
-
-    name: Annotated[type, Parameter("meaning", unit="m", low=0.0, high=1.0)] = default
-
-with float, bool, a tuple of one of them, or (in Params) int, an IntEnum or another such class as
-its type. An IntEnum is an enumeration of FMI, its members in lower case are the names of the items.
-A tuple becomes name[1], name[2], a nested class name.field.
+What a block is, and how its fields are declared: fmus/README.md.
 """
 
 from collections.abc import Callable, Collection, Iterator
@@ -32,29 +25,18 @@ DECLARATIONS: dict[Causality, type[Parameter | Input | Output]] = {
 class Block(Protocol):
     """The shape of a block module."""
 
-    @property
-    def Params(self) -> type[Any]:
-        """A frozen dataclass that checks itself."""
+    Params: type[Any]
+    Inputs: type[Any]
+    Outputs: type[Any]
 
-    @property
-    def Inputs(self) -> type[Any]:
-        """A NamedTuple."""
-
-    @property
-    def Outputs(self) -> type[Any]:
-        """A NamedTuple."""
-
-    @property
-    def initial_state(self) -> Callable[[Any, Any], Any]:
+    def initial_state(self, p: Any, u: Any, /) -> Any:
         """State from Params and Inputs."""
 
-    @property
-    def step(self) -> Callable[[Any, Any, Any, float], Any]:
-        """State h seconds later from Params, State, Inputs, h."""
+    def step(self, p: Any, x: Any, u: Any, h: float, /) -> Any:
+        """State h seconds later from Params, State and Inputs."""
 
-    @property
-    def outputs(self) -> Callable[[Any, Any, Any], Any]:
-        """Outputs from Params, State, Inputs."""
+    def outputs(self, p: Any, x: Any, u: Any, /) -> Any:
+        """Outputs from Params, State and Inputs."""
 
 
 @dataclass(frozen=True, slots=True)
