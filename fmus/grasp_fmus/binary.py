@@ -1,7 +1,6 @@
 """Mends the Linux binary that pythonfmu 0.7.0 packs, and binds it to a Python for other hosts.
 
-Six places of the binary are rewritten, four of them instructions; and, by the program patchelf, the
-list of the libraries that the loader brings along. The Windows binary stays as it is.
+The Windows binary stays as it is. What is mended, and why: fmus/README.md.
 """
 
 import json
@@ -16,8 +15,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 _DEFAULT_FOLDERS = {
-    Path(root, folder)
-    for root in ("/", "/usr")
+    Path(f"{root}/{folder}").resolve()
+    for root in ("", "/usr")
     for folder in ("lib", "lib64", "lib/x86_64-linux-gnu")
 }
 """Folders in which the loader looks by default."""
@@ -101,24 +100,7 @@ _EDITS = {
 
 
 def mended(binary: bytes) -> bytes:
-    """Return pythonfmu's Linux binary without five of its faults; ValueError for any other binary.
-
-    An exception costs no references. pythonfmu gives up its references to class, instance and log
-    when it reports one, but goes on using them, at the latest when the instance is freed.
-
-    Nor does it crash the host for want of a repr, as it does at the end of the stack.
-
-    A call without a message costs a tenth less. pythonfmu makes the names of a message's attributes
-    at the end of every call; now it does where there is a message.
-
-    A Python exception gives fmi2Error. pythonfmu answers fmi2Fatal, after which FMI forbids every
-    further call to every instance; that clause is made to wait for a type that is never thrown,
-    and the next one, for any std::exception, answers fmi2Error.
-
-    The interpreter is released once, by the destructor of the static object that holds it. The
-    library's own destructor function, which at the end of the process would do so again in freed
-    memory, is taken off the list of those to call.
-    """
+    """Return pythonfmu's Linux binary without its faults; ValueError for any other binary."""
     found = sha256(binary).hexdigest()
     if found != _SHA256:
         raise ValueError(
@@ -140,7 +122,7 @@ def bound(binary: bytes, python: str) -> bytes:
     library = _answers(python).library
     patchelf = _patchelf()
     options = ["--add-needed", library.name]
-    if library.parent.resolve() not in {folder.resolve() for folder in _DEFAULT_FOLDERS}:
+    if library.parent.resolve() not in _DEFAULT_FOLDERS:
         options += ["--set-rpath", str(library.parent)]
     with tempfile.TemporaryDirectory(prefix="grasp_fmus_") as folder:
         file = Path(folder) / "binary.so"
@@ -153,13 +135,7 @@ def bound(binary: bytes, python: str) -> bytes:
 
 
 def preamble(python: str) -> str:
-    """Return the beginning of the script of an FMU that is bound to a Python.
-
-    Two things go wrong where the FMU starts that Python in a host that is not Python. It searches
-    its modules beside the first python3 on the PATH if that is of the same version. And a host that
-    keeps the FMU's symbols to the FMU (RTLD_LOCAL) keeps libpython's from the extension modules as
-    well, such as math. In a Python host the preamble changes nothing.
-    """
+    """Return the beginning of the script of an FMU that is bound to a Python."""
     answers = _answers(python)
     return _PREAMBLE.format(
         version=answers.version, modules=answers.modules[::-1], library=answers.library.name

@@ -85,11 +85,6 @@ def declared(block: Block) -> list[Field]:
     return [*inputs, *outputs, *_parameters(block.Params(), ())]
 
 
-def count(fields: list[Field], *causalities: Causality) -> int:
-    """Number of scalar variables of the given causalities."""
-    return sum(len(f.names) for f in fields if f.causality in causalities)
-
-
 def variables(fields: list[Field]) -> list[Variable]:
     """The scalar variables of fields, in their order.
 
@@ -197,25 +192,20 @@ def build_params(block: Block, fields: list[Field], values: list[Any]) -> Any:
 
 def _build(cls: type[Any], path: tuple[str, ...], values: dict[tuple[str, ...], Any]) -> Any:
     hints = _types(cls)  # type: ignore[arg-type]  # any type can be hashed
-    return cls(
-        **{
-            f.name: _build(hints[f.name], (*path, f.name), values)
-            if is_dataclass(hints[f.name])
-            else _typed(hints[f.name], values[(*path, f.name)])
-            for f in dataclass_fields(cls)
-        }
-    )
+    fields = {}
+    for name in (f.name for f in dataclass_fields(cls)):
+        kind, at = hints[name], (*path, name)
+        if is_dataclass(kind):
+            fields[name] = _build(hints[name], at, values)
+        elif isinstance(kind, type) and issubclass(kind, IntEnum):
+            fields[name] = kind(values[at])
+        else:
+            fields[name] = values[at]
+    return cls(**fields)
 
 
-@cache
-def _types(cls: type[Any]) -> dict[str, Any]:
-    """The types of its fields by name; read once, as Params are made whenever one is set."""
-    return get_type_hints(cls)
-
-
-def _typed(kind: Any, value: Any) -> Any:
-    """The value, as a member where the type is an enumeration."""
-    return kind(value) if isinstance(kind, type) and issubclass(kind, IntEnum) else value
+_types = cache(get_type_hints)
+"""Read once, as Params are made whenever one is set."""
 
 
 def _parameters(params: Any, path: tuple[str, ...]) -> Iterator[Field]:
@@ -238,9 +228,8 @@ def _kind(name: str, causality: Causality, base: Any) -> type[Any]:
     items = set(get_args(base)) if get_origin(base) is tuple else {base}
     is_parameter = causality == "parameter"
     kinds: tuple[type[Any], ...] = (float, bool, int) if is_parameter else (float, bool)
-    for kind in kinds:
-        if items == {kind}:
-            return kind
+    if len(items) == 1 and (kind := items.pop()) in kinds:
+        return kind  # type: ignore[no-any-return]
     if is_parameter and isinstance(base, type) and issubclass(base, IntEnum):
         return base
     got = base.__name__ if isinstance(base, type) else base

@@ -1,8 +1,6 @@
 """Makes an FMU: a script and what it imports, pythonfmu's binaries, description, documentation.
 
-Everything in an FMU follows from the sources, and the same sources give the same bytes. All Python
-FMUs of a process share one sys.modules, so every module is packed under a name that ends in a hash
-of the whole content; the GUID is that hash.
+The same sources give the same bytes. Why modules have a hash in their names: fmus/README.md.
 """
 
 import hashlib
@@ -17,7 +15,7 @@ from .binary import bound, libpython, mended, preamble
 from .changes import changes, read_members
 from .contract import declared, variables
 from .documentation import BLOCK, Making, icon, licences, page
-from .folder import Built, file_hash, write_file
+from .folder import Built, write_file
 from .model_description import Description, model_description, version
 from .packing import card_file, package_folder, with_imports
 from .shipped import slave_class
@@ -87,15 +85,12 @@ def write_fmu(
         name.replace(HASH, content): data.replace(HASH.encode(), content.encode())
         for name, data in template.items()
     }
-    there = target.read_bytes() if target.is_file() else None
-    before = read_members(there or b"")
-    if there is not None and before == files:
-        return Built(target, "unchanged", hash=file_hash(there))
-    data = _archive(files)
-    write_file(target, data)
-    if there is None:
-        return Built(target, "new", hash=file_hash(data))
-    return Built(target, "changed", changes(before, files), file_hash(data))
+    there = target.is_file()
+    before = read_members(target.read_bytes()) if there else {}
+    if before == files:
+        return Built(target, "unchanged")
+    write_file(target, _archive(files))
+    return Built(target, "changed", changes(before, files)) if there else Built(target, "new")
 
 
 def _renamed(sources: Mapping[str, bytes]) -> dict[str, bytes]:
@@ -124,7 +119,6 @@ def _content_hash(members: Mapping[str, bytes]) -> str:
 
 
 def _archive(members: Mapping[str, bytes]) -> bytes:
-    """A ZIP file with sorted entries and one date."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
         for name, data in sorted(members.items()):

@@ -9,15 +9,11 @@ from .documentation import PROXY, icon
 from .fmu import write_fmu
 from .folder import Built
 from .host_log import ERROR, WARNING
-from .model_description import CAPABILITIES, UNITS, Description, Experiment, Unit
+from .model_description import UNITS, Description, Experiment, Unit
 from .proxy import DEFAULTS, Settings, own_variables
 from .variable import Variable
 
 CARD = Path(__file__).parent / "link" / "README.md"
-
-_WORD = r"(?:[A-Za-z_]\w*|'(?:[^'\\]|\\.)+')(?:\[\d+(?:,\d+)*\])?"
-_STRUCTURED = re.compile(rf"{_WORD}(?:\.{_WORD})*", re.ASCII)
-"""Names of FMI's structured naming convention, but for der(), which proxy.hold. cannot precede."""
 
 _IDENTIFIER = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 
@@ -60,33 +56,24 @@ def build_proxy(
     for v in own:
         if v.start is not None:
             v.check(v.start)
+    description = Description(
+        name,
+        f"Proxy of {original.file}: a peer has its outputs, over UDP",
+        [*original.variables, *own],
+        {"s": UNITS["s"], **original.units},
+        original.can_vary_step,
+        has_states=False,
+        experiment=original.experiment,
+        statuses=(WARNING, ERROR),
+    )
     return write_fmu(
         target,
-        _description(name, original, own),
+        description,
         _card(own),
         {f"{name}.py": _script(name, original, settings).encode()},
         bind_python,
         picture=icon("Proxy"),
         making=PROXY,
-    )
-
-
-def _description(name: str, original: Original, own: Sequence[Variable]) -> Description:
-    variables = [*original.variables, *own]
-    return Description(
-        name,
-        f"Proxy of {original.file}: a peer has its outputs, over UDP",
-        variables,
-        {"s": UNITS["s"], **original.units},
-        {
-            **CAPABILITIES,
-            "canHandleVariableCommunicationStepSize": original.can_vary_step,
-            "canGetAndSetFMUstate": False,
-            "canSerializeFMUstate": False,
-        },
-        original.experiment,
-        (WARNING, ERROR),
-        all(_STRUCTURED.fullmatch(v.name) for v in variables),
     )
 
 

@@ -88,11 +88,6 @@ class Peer:
         self._refused: tuple[int, int, int] | None = None  # the request that failed, for its repeat
         self._stepping = False
 
-    @property
-    def stepping(self) -> bool:
-        """True if the session under way has begun to step."""
-        return self._stepping
-
     def receive(self, datagram: bytes, now: int) -> Action:
         """Return what to do about a datagram; `now` in ns of a monotonic clock."""
         m = self._sealer.open(datagram)
@@ -124,8 +119,8 @@ class Peer:
         return None
 
     def _busy(self, session: int, now: int) -> bool:
-        live = self._live
-        return live is not None and live[0] != session and now - self._heard < ALIVE
+        other = self._live is not None and self._live[0] != session
+        return other and now - self._heard < ALIVE
 
     def _hello(self, m: Message, now: int) -> Action:
         if m.sequence or m.cookie:
