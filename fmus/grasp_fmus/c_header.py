@@ -154,7 +154,6 @@ def _struct(group: Group, descriptions: Mapping[str, str]) -> str:
 
 
 def _defaults(group: Group, starts: Mapping[str, Value]) -> str:
-    """Return the macro that initialises the struct."""
     values = [_literal(v, starts.get(v.name, _ZEROS[v.kind])) for v, _, _ in group.members]
     padded = [f"{value}," for value in values[:-1]] + values[-1:]
     names = [_comment(v.name) for v, _, _ in group.members]
@@ -163,7 +162,6 @@ def _defaults(group: Group, starts: Mapping[str, Value]) -> str:
 
 
 def _literal(v: LinkVariable, value: Value) -> str:
-    """Return a start value in C."""
     try:
         packed = Codec([v]).unpack(Codec([v]).pack([value]))
     except (struct.error, OverflowError):

@@ -43,12 +43,8 @@ def variable_tables(blocks: Mapping[str, Block]) -> str:
 
 
 def _table(rows: list[str]) -> str:
-    lines = [
-        "| variable | causality | unit | start | range | feedthrough of | meaning |",
-        "|---|---|---|---|---|---|---|",
-        *rows,
-    ]
-    return "\n".join(lines) + "\n"
+    head = "| variable | causality | unit | start | range | feedthrough of | meaning |"
+    return "\n".join([head, "|---|---|---|---|---|---|---|", *rows, ""])
 
 
 def _row(f: Field) -> str:

@@ -90,8 +90,8 @@ def variables(fields: list[Field]) -> list[Variable]:
 
     At the start outputs depend on all parameters, beside the inputs that are declared.
     """
+    inputs = [f for f in fields if f.causality == "input"]
     parameters = tuple(name for f in fields if f.causality == "parameter" for name in f.names)
-    now, initially = feedthrough(fields, False), feedthrough(fields, True)
     return [
         Variable(
             name,
@@ -103,28 +103,27 @@ def variables(fields: list[Field]) -> list[Variable]:
             f.limits,
             f.description,
             f.nominal,
-            dependencies=tuple(now.get(name, ())),
-            initial_dependencies=(*initially[name], *parameters) if name in initially else (),
+            dependencies=_chosen(inputs, f.feedthrough, index),
+            initial_dependencies=(
+                *_chosen(inputs, f.initial_feedthrough, index),
+                *(parameters if f.causality == "output" else ()),
+            ),
             enumeration=f.enumeration,
         )
         for f in fields
-        for name, start in zip(f.names, f.starts, strict=True)
+        for index, (name, start) in enumerate(zip(f.names, f.starts, strict=True))
     ]
 
 
-def feedthrough(fields: list[Field], initially: bool) -> dict[str, list[str]]:
-    """The inputs that reach each output without a step, by name, in the order of declaration.
-
-    initially asks for those that do so in initialisation mode.
-    """
-    inputs = [f for f in fields if f.causality == "input"]
-    reached: dict[str, list[str]] = {}
-    for f in fields:
-        if f.causality == "output":
-            sources = f.initial_feedthrough if initially else f.feedthrough
-            for index, name in enumerate(f.names):
-                reached[name] = [source for i in inputs for source in _chosen(i, sources, index)]
-    return reached
+def _chosen(inputs: list[Field], sources: frozenset[str], index: int) -> tuple[str, ...]:
+    """Return the scalar inputs that `sources` of the output element `index` stand for."""
+    found: list[str] = []
+    for f in inputs:
+        if f.path[0] in sources:
+            found += f.names
+        elif f"{f.path[0]}[j]" in sources:
+            found.append(f.names[index])
+    return tuple(found)
 
 
 def _check_feedthrough(output: Field, inputs: list[Field]) -> None:
@@ -136,13 +135,6 @@ def _check_feedthrough(output: Field, inputs: list[Field]) -> None:
             f"{output.path[0]}: depends on {', '.join(sorted(unknown))}; "
             f"valid: {', '.join(sorted(valid)) or 'nothing, there are no inputs'}"
         )
-
-
-def _chosen(f: Field, sources: frozenset[str], index: int) -> list[str]:
-    name = ".".join(f.path)
-    if name in sources:
-        return f.names
-    return [f.names[index]] if f"{name}[j]" in sources else []
 
 
 def packer(cls: type[Any], fields: list[Field]) -> Callable[[list[Any]], Any]:
@@ -224,7 +216,6 @@ def _fields(cls: type[Any], causality: Causality, starts: dict[str, Any]) -> Ite
 
 
 def _kind(name: str, causality: Causality, base: Any) -> type[Any]:
-    """The type of the scalars of a field of the type base; TypeError where it may not have that."""
     items = set(get_args(base)) if get_origin(base) is tuple else {base}
     is_parameter = causality == "parameter"
     kinds: tuple[type[Any], ...] = (float, bool, int) if is_parameter else (float, bool)

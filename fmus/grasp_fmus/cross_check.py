@@ -105,7 +105,6 @@ def _rise(t: float, start: float, stop: float) -> float:
 
 
 def _rate(t: float, start: float, stop: float) -> float:
-    """Return the derivative of _rise()."""
     s = min(max((t - start) / (stop - start), 0.0), 1.0)
     return 6.0 * s * (1.0 - s) / (stop - start)
 

@@ -98,27 +98,26 @@ def licences() -> dict[str, bytes]:
 
     FileNotFoundError if one is not installed, or has no licence.
     """
-    return {file: _licence(distribution) for file, distribution in _LICENCES.items()}
+    from importlib import metadata  # takes time to load
+
+    found = {}
+    for file, distribution in _LICENCES.items():
+        try:
+            text = metadata.distribution(distribution).read_text("licenses/LICENSE")
+        except metadata.PackageNotFoundError:
+            text = None
+        if not text:
+            raise FileNotFoundError(
+                f"{distribution}: no licenses/LICENSE among its metadata; install it with pip"
+            )
+        found[file] = text.encode()
+    return found
 
 
 def icon(name: str) -> bytes | None:
     """Return model.png of the FMU `name`; None where fmus/draw_icons.py draws none for it."""
     file = ICONS / f"{name}.png"
     return file.read_bytes() if file.exists() else None
-
-
-def _licence(distribution: str) -> bytes:
-    from importlib import metadata  # takes time to load
-
-    try:
-        text = metadata.distribution(distribution).read_text("licenses/LICENSE")
-    except metadata.PackageNotFoundError:
-        text = None
-    if not text:
-        raise FileNotFoundError(
-            f"{distribution}: no licenses/LICENSE among its metadata; install it with pip"
-        )
-    return text.encode()
 
 
 def _rendered(card: str) -> str:

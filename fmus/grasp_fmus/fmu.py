@@ -80,7 +80,10 @@ def write_fmu(
         "resources/slavemodule.txt": f"{name}_{HASH}".encode(),
         **_renamed(packed),
     }
-    content = _content_hash(template)
+    digest = hashlib.sha256()
+    for member, data in sorted(template.items()):
+        digest.update(f"{member}\0{len(data)}\0".encode() + data)
+    content = digest.hexdigest()[:16]
     files = {
         name.replace(HASH, content): data.replace(HASH.encode(), content.encode())
         for name, data in template.items()
@@ -109,13 +112,6 @@ def _renamed(sources: Mapping[str, bytes]) -> dict[str, bytes]:
 def _linux_binary(bind_python: str | None) -> bytes:
     binary = mended((BINARIES / "linux64/libpythonfmu-export.so").read_bytes())
     return bound(binary, bind_python) if bind_python else binary
-
-
-def _content_hash(members: Mapping[str, bytes]) -> str:
-    digest = hashlib.sha256()
-    for name, data in sorted(members.items()):
-        digest.update(f"{name}\0{len(data)}\0".encode() + data)
-    return digest.hexdigest()[:16]
 
 
 def _archive(members: Mapping[str, bytes]) -> bytes:

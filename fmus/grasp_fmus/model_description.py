@@ -180,7 +180,6 @@ def _initial(v: Variable) -> str:
 
 
 def _attributes(v: Variable, units: Mapping[str, Unit]) -> dict[str, str]:
-    """Return the attributes of the element of its type."""
     attributes: dict[str, str] = {}
     if v.enumeration:
         attributes["declaredType"] = v.enumeration.name

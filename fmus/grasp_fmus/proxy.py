@@ -130,15 +130,14 @@ class Fmi2Proxy(Slave):
     clock: Callable[[], int] = staticmethod(monotonic_ns)
 
     def _prepare(self) -> None:
-        exchanged = Signature(
-            tuple(
-                LinkVariable(v.name, TYPES[v.kind], v.causality, v.unit or None)
-                for v in self.variables
-            )
-        )
+        shared = ((v.name, TYPES[v.kind], v.causality, v.unit or None) for v in self.variables)
+        self._signature = exchanged = Signature(tuple(LinkVariable(*v) for v in shared))
         outputs = self.variables[len(exchanged.request) :]
-        self._signature = exchanged
-        self._variables = [*map(_limited, self.variables), *own_variables(outputs, self.settings)]
+        sent = (0, STRING_SIZE - 1)  # the limits of what can be sent; the peer checks the rest
+        self._variables = [
+            *(replace(v, limits=sent) if v.kind is str else v for v in self.variables),
+            *own_variables(outputs, self.settings),
+        ]
         self._values = [v.kind() if v.start is None else v.start for v in self._variables]
         sizes = (len(exchanged.request), n := len(outputs), len(Settings._fields), n, n)
         self._request, self._outputs, self._settings, self._holds, self._failsafes = _slices(sizes)
@@ -232,7 +231,6 @@ class Fmi2Proxy(Slave):
         return connection
 
     def _deadline(self, timeout: float) -> int:
-        """Return the time in ns of the clock that is `timeout` s from now."""
         return self.clock() + round(timeout * _NANOSECONDS)
 
     def _disconnect(self) -> None:
@@ -299,7 +297,6 @@ class Fmi2Proxy(Slave):
         return self._params  # type: ignore[no-any-return]  # a block's are of any type
 
     def _take(self, connection: Connection) -> None:
-        """Take over the newest outputs."""
         outputs = connection.client.outputs
         assert outputs is not None  # noqa: S101 - there are some from initialisation on
         self._values[self._outputs] = outputs
@@ -319,11 +316,6 @@ class Fmi2Proxy(Slave):
 def _slices(sizes: Sequence[int]) -> list[slice]:
     """Return consecutive slices of a list, of these sizes."""
     return [slice(*pair) for pair in pairwise(accumulate(sizes, initial=0))]
-
-
-def _limited(v: Variable) -> Variable:
-    """Return the variable with the limits of what can be sent; the peer checks the rest."""
-    return replace(v, limits=(0, STRING_SIZE - 1)) if v.kind is str else v
 
 
 def _peer(settings: Settings) -> str:

@@ -8,9 +8,9 @@ from typing import Annotated, Any, NamedTuple
 import pytest
 from block_variables import Input, Output, Parameter
 from grasp_fmus.contract import (
+    Field,
     build_params,
     declared,
-    feedthrough,
     packer,
     unpacker,
     variables,
@@ -117,6 +117,21 @@ def test_nominal_values() -> None:
 def test_an_array_is_as_many_variables_as_it_has_elements() -> None:
     causalities = [v.causality for v in variables(FIELDS)]
     assert causalities == ["input"] * 5 + ["output"] * 6 + ["parameter"] * 6
+
+
+def feedthrough(fields: list[Field], initially: bool) -> dict[str, list[str]]:
+    """The inputs that reach each output without a step, by name, as its variable has them."""
+    found = variables(fields)
+    inputs = {v.name for v in found if v.causality == "input"}
+    return {
+        v.name: [
+            name
+            for name in (v.initial_dependencies if initially else v.dependencies)
+            if name in inputs
+        ]
+        for v in found
+        if v.causality == "output"
+    }
 
 
 def test_feedthrough_while_stepping() -> None:

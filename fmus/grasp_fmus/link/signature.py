@@ -94,7 +94,6 @@ class Signature:
 
 
 def _lines(text: str) -> dict[str, str]:
-    """Return the lines of a text by the name at their end."""
     return {line.rpartition("\t")[2]: line for line in text.splitlines()}
 
 
