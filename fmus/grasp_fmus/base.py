@@ -131,6 +131,8 @@ class Slave(metaclass=Once):
 
     _variables: list[Variable]
     _values: list[Any]
+    state_to_bytes: Callable[[Any], bytes]
+    state_from_bytes: Callable[[bytes], Any]
 
     def __init__(
         self, component: Component, instance_name: str, resources: str, logger: int, visible: int
@@ -201,16 +203,6 @@ class Slave(metaclass=Once):
     get_integer, set_integer = _getter(int), _setter(int)
     get_string, set_string = _getter(str), _setter(str)
 
-    # State
-
-    def state_to_bytes(self, snapshot: Any) -> bytes:
-        """A state of this FMU, serialised."""
-        raise NotImplementedError
-
-    def state_from_bytes(self, data: bytes) -> Any:
-        """A state of this FMU from its bytes."""
-        raise NotImplementedError
-
     # Checks
 
     def _require(self, call: str, phase: int) -> None:
@@ -232,11 +224,10 @@ class Slave(metaclass=Once):
             for v in variables:
                 self._check_settable(v)
         accesses = self._writes[kind] if to_set else self._reads[kind]
-        first = vrs[0] if vrs else 0
-        stop = first + len(vrs)
+        row = range(vrs[0], vrs[0] + len(vrs)) if vrs else range(0)
         access = Access(
             list(vrs),
-            slice(first, stop) if vrs == list(range(first, stop)) else None,
+            slice(row.start, row.stop) if vrs == list(row) else None,
             any(v.causality == "output" for v in variables),
             any(v.causality == "parameter" for v in variables),
             any(v.limits for v in variables),

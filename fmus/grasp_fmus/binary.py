@@ -69,11 +69,6 @@ del prepare
 '''
 
 
-def libpython(python: str) -> Path:
-    """Return the shared library of a Python; ValueError where it has none, or is unfit."""
-    return _answers(python).library
-
-
 _SHA256 = "4be156a552c16f30eb4395805c59855d8d4086056d0f165442565f6c5fbac0c9"
 _EDITS = {
     # In handle_py_exception: for `call clearLogBuffer` a jump past the clean-up, to PyErr_Fetch.
@@ -119,7 +114,7 @@ def bound(binary: bytes, python: str) -> bytes:
     machine. Needs the program patchelf. ValueError where something is missing. The script of the
     FMU must begin with preamble().
     """
-    library = _answers(python).library
+    library = answers(python).library
     patchelf = _patchelf()
     options = ["--add-needed", library.name]
     if library.parent.resolve() not in _DEFAULT_FOLDERS:
@@ -136,21 +131,21 @@ def bound(binary: bytes, python: str) -> bytes:
 
 def preamble(python: str) -> str:
     """Return the beginning of the script of an FMU that is bound to a Python."""
-    answers = _answers(python)
-    return _PREAMBLE.format(
-        version=answers.version, modules=answers.modules[::-1], library=answers.library.name
-    )
+    library, version, modules = answers(python)
+    return _PREAMBLE.format(version=version, modules=modules[::-1], library=library.name)
 
 
-class _Answers(NamedTuple):
+class Answers(NamedTuple):
+    """A Python's shared libpython, its version, and the folders of its standard library."""
+
     library: Path
     version: str
     modules: list[str]
 
 
 @cache
-def _answers(python: str) -> _Answers:
-    """Return a Python's shared libpython, version and folders; ValueError where it is unfit."""
+def answers(python: str) -> Answers:
+    """Ask a Python; ValueError where it is unfit, or has no shared libpython."""
     program = shutil.which(python)
     if program is None:
         raise ValueError(f"Python to bind to: {python}: no such program")
@@ -171,7 +166,7 @@ def _answers(python: str) -> _Answers:
     ]
     for library in candidates:
         if library.is_file():
-            return _Answers(library, said["version"], said["modules"])
+            return Answers(library, said["version"], said["modules"])
     raise ValueError(
         f"Python to bind to: {python}: no {candidates[0]}; must be built with --enable-shared"
     )

@@ -5,7 +5,6 @@ The script is made here; the documentation is the docstring and the table of the
 
 import ast
 import inspect
-import re
 import sys
 import traceback
 from collections.abc import Iterator
@@ -30,8 +29,6 @@ PARTS = ("Params", "Inputs", "State", "Outputs", "initial_state", "step", "outpu
 STEP = 1e-3
 """s; how far a block is advanced to see whether it works."""
 
-_IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
-
 
 def build_block(file: Path, out: Path, bind_python: str | None = None) -> Built:
     """Build the FMU of the block in a file into the folder out: spring_plant.py, SpringPlant.fmu.
@@ -39,7 +36,8 @@ def build_block(file: Path, out: Path, bind_python: str | None = None) -> Built:
     The block may import the standard library, and from the packages of the blocks in SCRIPTS.
     bind_python is as in build(). ValueError, one line, where the file is no such block.
     """
-    if file.suffix != ".py" or not _IDENTIFIER.fullmatch(file.stem):
+    is_identifier = file.stem.isascii() and file.stem.isidentifier()
+    if file.suffix != ".py" or not is_identifier or file.stem.startswith("_"):
         raise ValueError(f"{file}: must be NAME.py, NAME of letters, digits and _, a letter first")
     name = "".join(word[:1].upper() + word[1:] for word in file.stem.split("_"))
     for ours in (script.stem for script in SCRIPTS.glob("*.py")):
@@ -198,8 +196,8 @@ def _kinds(state: Any) -> dict[str, type[Any]]:
 
 def _scalars(name: str, value: Any) -> Iterator[tuple[str, Any]]:
     if isinstance(value, tuple):
-        fields = getattr(value, "_fields", None)
-        labels = [f".{f}" for f in fields] if fields else [f"[{i + 1}]" for i in range(len(value))]
+        fields = [f".{field}" for field in getattr(value, "_fields", ())]
+        labels = fields or [f"[{i + 1}]" for i in range(len(value))]
         for label, item in zip(labels, value, strict=True):
             yield from _scalars(f"{name}{label}", item)
     else:

@@ -3,11 +3,12 @@
 What a block is, and how its fields are declared: fmus/README.md.
 """
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, is_dataclass
 from dataclasses import fields as dataclass_fields
 from enum import IntEnum
 from functools import cache
+from itertools import count, islice
 from math import inf
 from typing import Annotated, Any, Protocol, get_args, get_origin, get_type_hints
 
@@ -143,12 +144,11 @@ def packer(cls: type[Any], fields: list[Field]) -> Callable[[list[Any]], Any]:
     Compiled for the shape of the block, as NamedTuple compiles its constructor: it runs every step.
     """
     parts = []
-    first = 0
+    places = count()
     for f in fields:
         if f.causality == "input":
-            items = ", ".join(f"v[{first + i}]" for i in range(len(f.names)))
+            items = ", ".join(f"v[{next(places)}]" for _ in f.names)
             parts.append(items if f.size is None else f"({items},)")
-            first += len(f.names)
     items = "".join(f"{part}, " for part in parts)
     return _compiled(f"(v): return new(cls, ({items}))", new=tuple.__new__, cls=cls)
 
@@ -174,11 +174,9 @@ def _compiled(definition: str, **names: Any) -> Callable[[Any], Any]:
 def build_params(block: Block, fields: list[Field], values: list[Any]) -> Any:
     """Params from the list of all values; ValueError as the block raises it."""
     by_path: dict[tuple[str, ...], Any] = {}
-    first = 0
+    rest = iter(values)
     for f in fields:
-        stop = first + len(f.names)
-        by_path[f.path] = values[first] if f.size is None else tuple(values[first:stop])
-        first = stop
+        by_path[f.path] = next(rest) if f.size is None else tuple(islice(rest, f.size))
     return _build(block.Params, (), by_path)
 
 
@@ -237,8 +235,7 @@ def _field(path: tuple[str, ...], causality: Causality, hint: Any, start: Any) -
     size = len(get_args(base)) if get_origin(base) is tuple else None
     kind = _kind(name, causality, base)
     limits = enumeration = nominal = None
-    now: Collection[str] = ()
-    initially: Collection[str] | None = None
+    now = initially = frozenset[str]()
     if isinstance(declared, Parameter):
         if (declared.low, declared.high) != (-inf, inf):
             limits = (declared.low, declared.high)
@@ -253,7 +250,9 @@ def _field(path: tuple[str, ...], causality: Causality, hint: Any, start: Any) -
             raise TypeError(
                 f"{name}: must have the inputs that reach it without a step, depends_on={{...}}"
             )
-        now, initially = declared.depends_on, declared.depends_initially_on
+        now = initially = frozenset(declared.depends_on)
+        if declared.depends_initially_on is not None:
+            initially = frozenset(declared.depends_initially_on)
     if issubclass(kind, IntEnum):
         items = tuple((member.name.lower(), int(member)) for member in kind)
         enumeration = Enumeration(kind.__name__, items)
@@ -268,8 +267,8 @@ def _field(path: tuple[str, ...], causality: Causality, hint: Any, start: Any) -
         limits,
         isinstance(declared, Parameter) and declared.tunable,
         nominal,
-        frozenset(now),
-        frozenset(now if initially is None else initially),
+        now,
+        initially,
         start,
         enumeration,
     )

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
-from .binary import bound, libpython, mended, preamble
+from .binary import answers, bound, mended, preamble
 from .changes import changes, read_members
 from .contract import declared, variables
 from .documentation import BLOCK, Making, icon, licences, page
@@ -65,7 +65,7 @@ def write_fmu(
     `card`, in Markdown, `making` and `requires` are for the documentation. `picture` is the icon.
     """
     name = description.name
-    library = libpython(bind_python) if bind_python else None
+    library = answers(bind_python).library if bind_python else None
     html = page(name, description.summary, card, version(), library, making, requires)
     packed = with_imports(sources)
     if bind_python:

@@ -16,9 +16,6 @@ from .link.message import FAILED, PORT, STRING_SIZE, read_key
 from .link.signature import LinkVariable, Signature
 from .variable import TYPES, Scalar, Variable
 
-TIMEOUT = 0.01
-"""s. The step of the original is no measure: 0.1 ms is less than many a network needs."""
-
 HOLD, FAILSAFE, STOP = ON_LOSS = ("hold", "failsafe", "stop")
 """The choices of proxy.on_loss, for when the peer is lost."""
 
@@ -36,7 +33,7 @@ class Settings(NamedTuple):
     port: Annotated[int, "", (1, 65535), "its UDP port"] = PORT
     timeout: Annotated[
         float, "s", (1e-6, 3600.0), "longest wait for the outputs of a step, by the clock"
-    ] = TIMEOUT
+    ] = 0.01  # the step of the original is no measure: 0.1 ms is less than many a network needs
     connect_timeout: Annotated[
         float,
         "s",

@@ -1,6 +1,5 @@
 """Builds the proxy of an FMU: the same variables, and a slave that asks a peer for the outputs."""
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,8 +13,6 @@ from .proxy import DEFAULTS, Settings, own_variables
 from .variable import Variable
 
 CARD = Path(__file__).parent / "link" / "README.md"
-
-_IDENTIFIER = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -45,7 +42,7 @@ def build_proxy(
     name is taken.
     """
     name = target.stem
-    if not _IDENTIFIER.fullmatch(name) or target.suffix != ".fmu":
+    if not (name.isascii() and name.isidentifier()) or target.suffix != ".fmu":
         raise ValueError(
             f"{target.name}: must be NAME.fmu, NAME of letters, digits and _, no digit first"
         )
