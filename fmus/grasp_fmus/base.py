@@ -17,9 +17,6 @@ from .variable import TYPES, Scalar, Variable
 INSTANTIATED, INITIALISING, STEPPING, TERMINATED = range(4)
 PHASES = "before initialisation", "in initialisation mode", "in step mode", "after fmi2Terminate"
 
-MOST_ACCESSES = 64
-"""How many lists of value references are remembered, so that no host can fill the memory."""
-
 TIME_TOLERANCE = 1e-9
 """How far, in s, the host's clock may be from the slave's; relative to the time it is 1e-12."""
 
@@ -146,10 +143,7 @@ class Slave(metaclass=Once):
         self._time = 0.0
         self._params: Any = None  # None: one was set and they are to be read again
         self._inputs: Any = None  # None: something was set and the outputs are out of date
-        try:
-            self._prepare()
-        except BaseException as error:
-            raise self._reported(error) from None
+        reported(type(self)._prepare)(self)
 
     def _prepare(self) -> None:
         """Make what an instance has; then _enter(INSTANTIATED)."""
@@ -232,7 +226,7 @@ class Slave(metaclass=Once):
             any(v.causality == "parameter" for v in variables),
             any(v.limits for v in variables),
         )
-        if len(accesses) == MOST_ACCESSES:
+        if len(accesses) == 64:  # so that no host can fill the memory
             accesses.clear()
         accesses[tuple(vrs)] = access
         return access

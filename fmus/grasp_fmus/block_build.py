@@ -26,9 +26,6 @@ from .variable import Variable
 PARTS = ("Params", "Inputs", "State", "Outputs", "initial_state", "step", "outputs")
 """What a block has."""
 
-STEP = 1e-3
-"""s; how far a block is advanced to see whether it works."""
-
 
 def build_block(file: Path, out: Path, bind_python: str | None = None) -> Built:
     """Build the FMU of the block in a file into the folder out: spring_plant.py, SpringPlant.fmu.
@@ -147,7 +144,7 @@ def _variables(file: Path, block: Any) -> list[Variable]:
         first = block.initial_state(p, u)
         kinds = _kinds(first)
     with _tried(file, "step()"):
-        second = block.step(p, first, u, STEP)
+        second = block.step(p, first, u, 1e-3)
         _check_kinds(_kinds(second), kinds)
     outputs = [v for v in found if v.causality == "output"]
     listed = unpacker(fields)

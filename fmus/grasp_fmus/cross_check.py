@@ -14,12 +14,6 @@ STEP_SIZE = 1.0 / 256.0
 STEPS = 768
 """FMPy's cross-check warns of more than 1,000 rows, the rules refuse more than a megabyte."""
 
-RELATIVE_TOLERANCE = 1e-6
-"""For the comparison alone: mathematical libraries differ in the last digit."""
-
-DIGITS = 9
-"""The inputs are rounded, so that they do not depend on the mathematical library."""
-
 Signal = Callable[[float], float]
 """An input over the time in s."""
 
@@ -76,7 +70,7 @@ def _options(start: float, stop: float) -> bytes:
         "StartTime": start,
         "StopTime": stop,
         "StepSize": STEP_SIZE,
-        "RelTol": RELATIVE_TOLERANCE,
+        "RelTol": 1e-6,  # for the comparison: mathematical libraries differ in the last digit
         "OutputIntervalLength": STEP_SIZE,
     }
     return "".join(f"{name}, {value!r}\n" for name, value in options.items()).encode()
@@ -94,8 +88,8 @@ def _signal(v: Variable, known: Signal | None) -> Signal:
         return lambda _: bool(v.start)
     first, width = float(v.start or 0.0), v.nominal or 1.0
     signal = known or (lambda t: first + width * _rise(t, 0.0, 1.0) - width * _rise(t, 1.5, 2.5))
-    # + 0.0: interpolation does not keep the sign of -0.0.
-    return lambda t: round(signal(t), DIGITS) + 0.0
+    # Rounded, as mathematical libraries differ; interpolation does not keep the sign of -0.0.
+    return lambda t: round(signal(t), 9) + 0.0
 
 
 def _rise(t: float, start: float, stop: float) -> float:

@@ -70,10 +70,8 @@ def page(
         summary=escape(summary.rstrip(".")),
         card=_rendered(card),
         version=escape(version),
-        linux=(
-            Template(_BOUND).substitute(library=escape(str(library)))
-            if library
-            else Template(_ANY).substitute(command=making.command)
+        linux=Template(_BOUND if library else _ANY).substitute(
+            library=escape(str(library)), command=making.command
         ),
         packages=_packages(requires),
         steps=making.steps,

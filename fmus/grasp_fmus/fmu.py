@@ -24,8 +24,6 @@ BINARIES = package_folder("pythonfmu") / "resources" / "binaries"
 HASH = "CONTENT_HASH"
 """Stands for the content hash until it is known."""
 
-_DATE = (1980, 1, 1, 0, 0, 0)
-
 
 def build_fmu(script: Path, out: Path, bind_python: str | None = None) -> Built:
     """Build the FMU of one script into the folder `out`; the script's name is that of the FMU.
@@ -118,7 +116,7 @@ def _archive(members: Mapping[str, bytes]) -> bytes:
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
         for name, data in sorted(members.items()):
-            entry = zipfile.ZipInfo(name, _DATE)
+            entry = zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0))  # the same whenever it is built
             entry.compress_type = zipfile.ZIP_DEFLATED
             entry.external_attr = 0o644 << 16
             archive.writestr(entry, data)

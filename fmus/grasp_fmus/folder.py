@@ -16,9 +16,6 @@ from .packing import card_file, package_folder, packages
 
 STAMP = ".stamp.json"
 
-DISTRIBUTIONS = ("grasp_cosim", "markdown_it_py", "pythonfmu")
-"""Those whose version or licence is in an FMU, or that write a part of it."""
-
 
 @dataclass(frozen=True, slots=True)
 class Built:
@@ -89,7 +86,8 @@ def _deciding() -> Iterator[tuple[str, Path]]:
         if (card := card_file(package)).is_file():
             yield f"{package}: card", card
     yield from _below(package_folder("pythonfmu") / "resources" / "binaries", "pythonfmu")
-    for name in DISTRIBUTIONS:
+    # Those whose version or licence is in an FMU, or that write a part of it
+    for name in ("grasp_cosim", "markdown_it_py", "pythonfmu"):
         for folder in (f for entry in sys.path for f in Path(entry).glob(f"{name}-*.dist-info")):
             for file in ("METADATA", "licenses/LICENSE"):
                 if (folder / file).is_file():

@@ -12,8 +12,6 @@ from .model_description import UNITS, Description, Experiment, Unit
 from .proxy import DEFAULTS, Settings, own_variables
 from .variable import Variable
 
-CARD = Path(__file__).parent / "link" / "README.md"
-
 
 @dataclass(frozen=True)
 class Original:
@@ -92,6 +90,7 @@ def _script(name: str, original: Original, settings: Settings) -> str:
 
 def _card(own: Sequence[Variable]) -> str:
     """Return the proxy's own variables and the protocol, in Markdown."""
+    protocol = Path(__file__).parent / "link" / "README.md"
     rows = []
     for v in own:
         start = "" if v.start is None else str(v.start).lower()
@@ -103,5 +102,5 @@ def _card(own: Sequence[Variable]) -> str:
         "All others are those of the original.\n\n"
         "| variable | causality | type | unit | start | range | meaning |\n"
         f"|---|---|---|---|---|---|---|\n{''.join(rows)}\n"
-        f"{CARD.read_text('utf-8')}"
+        f"{protocol.read_text('utf-8')}"
     )

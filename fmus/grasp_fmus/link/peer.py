@@ -19,9 +19,6 @@ ALIVE = 1_000_000_000
 LARGEST_REASON = 1024
 """Bytes of what a REFUSE says in words."""
 
-GREETED = 64
-"""The most sessions that have said HELLO and not yet begun."""
-
 
 @dataclass(slots=True)
 class PeerCounters:
@@ -143,7 +140,7 @@ class Peer:
         else:
             cookie = self._greeted.get(m.session) or self._make_cookie()
             self._greeted[m.session] = cookie
-            if len(self._greeted) > GREETED:
+            if len(self._greeted) > 64:  # that have not yet begun
                 self._greeted.popitem(last=False)
         return self._pack(m._replace(cookie=cookie), message.WELCOME)
 
@@ -183,9 +180,8 @@ class Peer:
 
     def _do(self, m: Message, now: int, fresh: bool) -> Action:
         values = self._request.unpack(m.body)
-        if values is None or (m.kind == message.STEP) != (m.step > 0.0):
-            return self._drop("malformed")
-        if m.kind == message.INITIALISE and self._stepping and not fresh:
+        too_late = m.kind == message.INITIALISE and self._stepping and not fresh
+        if values is None or too_late or (m.kind == message.STEP) != (m.step > 0.0):
             return self._drop("malformed")
         # Only what is new counts as heard: who repeats a recorded datagram keeps nobody away
         self._heard = now
