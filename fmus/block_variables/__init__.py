@@ -1,11 +1,6 @@
-"""How a block declares its variables, and the one check of their ranges.
+"""How a block declares its variables, and the one check of their ranges. Card: fmus/README.md.
 
-    class Inputs(NamedTuple):
-        gap: Annotated[float, Input("l, distance to the object", unit="m", nominal=0.1)] = 0.1
-
-Every field of Params, Inputs and Outputs is Annotated with its type and a Parameter, Input or
-Output. FMI variable, check and card follow from that. Standard library only: blocks import this
-package, and every FMU brings it along.
+Standard library only: blocks import this package, and every FMU brings it along.
 """
 
 from collections.abc import Collection

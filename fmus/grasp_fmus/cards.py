@@ -43,41 +43,27 @@ def variable_tables(blocks: Mapping[str, Block]) -> str:
 
 
 def _table(rows: list[str]) -> str:
-    lines = [
-        "| variable | causality | unit | start | range | feedthrough of | meaning |",
-        "|---|---|---|---|---|---|---|",
-        *rows,
-    ]
-    return "\n".join(lines) + "\n"
+    head = "| variable | causality | unit | start | range | feedthrough of | meaning |"
+    return "\n".join([head, "|---|---|---|---|---|---|---|", *rows, ""])
 
 
 def _row(f: Field) -> str:
-    return (
-        f"| `{_name(f)}` | {'tunable ' if f.tunable else ''}{f.causality} | {f.unit} "
-        f"| {_start(f)} | {_range(f)} | {_feedthrough(f)} | {f.description} |"
-    )
-
-
-def _name(f: Field) -> str:
-    return ".".join(f.path) + (f"[1..{f.size}]" if f.size else "")
-
-
-def _start(f: Field) -> str:
-    names = {number: name for name, number in f.enumeration.items} if f.enumeration else {}
-    starts = ["" if s is None else names.get(s, str(s).lower()) for s in f.starts]
-    return starts[0] if len(set(starts)) == 1 else ", ".join(starts)
-
-
-def _range(f: Field) -> str:
+    name = ".".join(f.path) + (f"[1..{f.size}]" if f.size else "")
+    tunable = "tunable " if f.tunable else ""
+    limits = f"{f.limits[0]:g} to {f.limits[1]:g}" if f.limits else ""
+    items = {}
     if f.enumeration:
-        return ", ".join(name for name, _ in f.enumeration.items)
-    return f"{f.limits[0]:g} to {f.limits[1]:g}" if f.limits else ""
-
-
-def _feedthrough(f: Field) -> str:
-    if f.causality != "output":
-        return ""
-    return ", ".join(f"`{name}`" for name in sorted(f.feedthrough)) or "none"
+        items = {number: item for item, number in f.enumeration.items}
+        limits = ", ".join(items.values())
+    starts = ["" if s is None else items.get(s, str(s).lower()) for s in f.starts]
+    start = starts[0] if len(set(starts)) == 1 else ", ".join(starts)
+    reached_by = ", ".join(f"`{source}`" for source in sorted(f.feedthrough))
+    if f.causality == "output" and not reached_by:
+        reached_by = "none"
+    return (
+        f"| `{name}` | {tunable}{f.causality} | {f.unit} "
+        f"| {start} | {limits} | {reached_by} | {f.description} |"
+    )
 
 
 def blocks_by_card() -> dict[Path, dict[str, Block]]:

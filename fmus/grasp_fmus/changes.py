@@ -10,9 +10,6 @@ from xml.etree import ElementTree
 
 DESCRIPTION = "modelDescription.xml"
 
-UNREADABLE = (OSError, EOFError, ValueError, RuntimeError, zipfile.BadZipFile, zlib.error)
-"""The errors that zipfile raises for a damaged archive, or a file that is none."""
-
 _CONTENT_HASH = re.compile(rb"_[0-9a-f]{16}(?![0-9a-f])|guid=.[0-9a-f]{16}")
 
 
@@ -21,7 +18,7 @@ def read_members(fmu: bytes) -> dict[str, bytes]:
     try:
         with zipfile.ZipFile(io.BytesIO(fmu)) as archive:
             return {name: archive.read(name) for name in archive.namelist()}
-    except UNREADABLE:
+    except (OSError, EOFError, ValueError, RuntimeError, zipfile.BadZipFile, zlib.error):
         return {}
 
 

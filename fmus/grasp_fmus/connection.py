@@ -89,28 +89,21 @@ class Connection:
 
         With `anew`, begin another session where the peer does not know this one, or there is none.
         """
-        if self._step(time, step, values, deadline, anew):
-            return True
-        if self._stage == READY:
-            self.client.miss()
-        else:  # what is under way is awaited in the next step as well
-            self.client.counters.missed += 1
-        return False
-
-    def _step(
-        self, time: float, step: float, values: Sequence[Value], deadline: int, anew: bool
-    ) -> bool:
         for _ in range(2):
             if self._stage != READY and not (
                 self.greet(deadline) and self.initialise(time, values, deadline)
             ):
-                return False
+                break
             request = self.client.step(time, step, values, self._clock())
             if self._ask(request, deadline, repeat=False):
                 return True
             if not (anew and self.refusal and self.refusal.code == UNKNOWN):
-                return False
+                break
             self._stage = NEW
+        if self._stage == READY:
+            self.client.miss()
+        else:  # what is under way is awaited in the next step as well
+            self.client.counters.missed += 1
         return False
 
     def _ask(self, request: bytes, deadline: int, repeat: bool) -> bool:

@@ -1,20 +1,14 @@
 """The declaration of a block, as a flat list of variables.
 
-A block is a module with Params, Inputs, State, Outputs, initial_state(), step() and outputs().
-Every field of Params, Inputs and Outputs is declared with block_variables:
-
-    name: Annotated[type, Parameter("meaning", unit="m", low=0.0, high=1.0)] = default
-
-with float, bool, a tuple of one of them, or (in Params) int, an IntEnum or another such class as
-its type. An IntEnum is an enumeration of FMI, its members in lower case are the names of the items.
-A tuple becomes name[1], name[2], a nested class name.field.
+What a block is, and how its fields are declared: fmus/README.md.
 """
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, is_dataclass
 from dataclasses import fields as dataclass_fields
 from enum import IntEnum
 from functools import cache
+from itertools import count, islice
 from math import inf
 from typing import Annotated, Any, Protocol, get_args, get_origin, get_type_hints
 
@@ -32,29 +26,18 @@ DECLARATIONS: dict[Causality, type[Parameter | Input | Output]] = {
 class Block(Protocol):
     """The shape of a block module."""
 
-    @property
-    def Params(self) -> type[Any]:
-        """A frozen dataclass that checks itself."""
+    Params: type[Any]
+    Inputs: type[Any]
+    Outputs: type[Any]
 
-    @property
-    def Inputs(self) -> type[Any]:
-        """A NamedTuple."""
-
-    @property
-    def Outputs(self) -> type[Any]:
-        """A NamedTuple."""
-
-    @property
-    def initial_state(self) -> Callable[[Any, Any], Any]:
+    def initial_state(self, p: Any, u: Any, /) -> Any:
         """State from Params and Inputs."""
 
-    @property
-    def step(self) -> Callable[[Any, Any, Any, float], Any]:
-        """State h seconds later from Params, State, Inputs, h."""
+    def step(self, p: Any, x: Any, u: Any, h: float, /) -> Any:
+        """State h seconds later from Params, State and Inputs."""
 
-    @property
-    def outputs(self) -> Callable[[Any, Any, Any], Any]:
-        """Outputs from Params, State, Inputs."""
+    def outputs(self, p: Any, x: Any, u: Any, /) -> Any:
+        """Outputs from Params, State and Inputs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,18 +86,13 @@ def declared(block: Block) -> list[Field]:
     return [*inputs, *outputs, *_parameters(block.Params(), ())]
 
 
-def count(fields: list[Field], *causalities: Causality) -> int:
-    """Number of scalar variables of the given causalities."""
-    return sum(len(f.names) for f in fields if f.causality in causalities)
-
-
 def variables(fields: list[Field]) -> list[Variable]:
     """The scalar variables of fields, in their order.
 
     At the start outputs depend on all parameters, beside the inputs that are declared.
     """
+    inputs = [f for f in fields if f.causality == "input"]
     parameters = tuple(name for f in fields if f.causality == "parameter" for name in f.names)
-    now, initially = feedthrough(fields, False), feedthrough(fields, True)
     return [
         Variable(
             name,
@@ -126,28 +104,27 @@ def variables(fields: list[Field]) -> list[Variable]:
             f.limits,
             f.description,
             f.nominal,
-            dependencies=tuple(now.get(name, ())),
-            initial_dependencies=(*initially[name], *parameters) if name in initially else (),
+            dependencies=_chosen(inputs, f.feedthrough, index),
+            initial_dependencies=(
+                *_chosen(inputs, f.initial_feedthrough, index),
+                *(parameters if f.causality == "output" else ()),
+            ),
             enumeration=f.enumeration,
         )
         for f in fields
-        for name, start in zip(f.names, f.starts, strict=True)
+        for index, (name, start) in enumerate(zip(f.names, f.starts, strict=True))
     ]
 
 
-def feedthrough(fields: list[Field], initially: bool) -> dict[str, list[str]]:
-    """The inputs that reach each output without a step, by name, in the order of declaration.
-
-    initially asks for those that do so in initialisation mode.
-    """
-    inputs = [f for f in fields if f.causality == "input"]
-    reached: dict[str, list[str]] = {}
-    for f in fields:
-        if f.causality == "output":
-            sources = f.initial_feedthrough if initially else f.feedthrough
-            for index, name in enumerate(f.names):
-                reached[name] = [source for i in inputs for source in _chosen(i, sources, index)]
-    return reached
+def _chosen(inputs: list[Field], sources: frozenset[str], index: int) -> tuple[str, ...]:
+    """Return the scalar inputs that `sources` of the output element `index` stand for."""
+    found: list[str] = []
+    for f in inputs:
+        if f.path[0] in sources:
+            found += f.names
+        elif f"{f.path[0]}[j]" in sources:
+            found.append(f.names[index])
+    return tuple(found)
 
 
 def _check_feedthrough(output: Field, inputs: list[Field]) -> None:
@@ -161,25 +138,17 @@ def _check_feedthrough(output: Field, inputs: list[Field]) -> None:
         )
 
 
-def _chosen(f: Field, sources: frozenset[str], index: int) -> list[str]:
-    name = ".".join(f.path)
-    if name in sources:
-        return f.names
-    return [f.names[index]] if f"{name}[j]" in sources else []
-
-
 def packer(cls: type[Any], fields: list[Field]) -> Callable[[list[Any]], Any]:
     """A function from the list of all values to Inputs, which stand at its beginning.
 
     Compiled for the shape of the block, as NamedTuple compiles its constructor: it runs every step.
     """
     parts = []
-    first = 0
+    places = count()
     for f in fields:
         if f.causality == "input":
-            items = ", ".join(f"v[{first + i}]" for i in range(len(f.names)))
+            items = ", ".join(f"v[{next(places)}]" for _ in f.names)
             parts.append(items if f.size is None else f"({items},)")
-            first += len(f.names)
     items = "".join(f"{part}, " for part in parts)
     return _compiled(f"(v): return new(cls, ({items}))", new=tuple.__new__, cls=cls)
 
@@ -205,35 +174,28 @@ def _compiled(definition: str, **names: Any) -> Callable[[Any], Any]:
 def build_params(block: Block, fields: list[Field], values: list[Any]) -> Any:
     """Params from the list of all values; ValueError as the block raises it."""
     by_path: dict[tuple[str, ...], Any] = {}
-    first = 0
+    rest = iter(values)
     for f in fields:
-        stop = first + len(f.names)
-        by_path[f.path] = values[first] if f.size is None else tuple(values[first:stop])
-        first = stop
+        by_path[f.path] = next(rest) if f.size is None else tuple(islice(rest, f.size))
     return _build(block.Params, (), by_path)
 
 
 def _build(cls: type[Any], path: tuple[str, ...], values: dict[tuple[str, ...], Any]) -> Any:
     hints = _types(cls)  # type: ignore[arg-type]  # any type can be hashed
-    return cls(
-        **{
-            f.name: _build(hints[f.name], (*path, f.name), values)
-            if is_dataclass(hints[f.name])
-            else _typed(hints[f.name], values[(*path, f.name)])
-            for f in dataclass_fields(cls)
-        }
-    )
+    fields = {}
+    for name in (f.name for f in dataclass_fields(cls)):
+        kind, at = hints[name], (*path, name)
+        if is_dataclass(kind):
+            fields[name] = _build(hints[name], at, values)
+        elif isinstance(kind, type) and issubclass(kind, IntEnum):
+            fields[name] = kind(values[at])
+        else:
+            fields[name] = values[at]
+    return cls(**fields)
 
 
-@cache
-def _types(cls: type[Any]) -> dict[str, Any]:
-    """The types of its fields by name; read once, as Params are made whenever one is set."""
-    return get_type_hints(cls)
-
-
-def _typed(kind: Any, value: Any) -> Any:
-    """The value, as a member where the type is an enumeration."""
-    return kind(value) if isinstance(kind, type) and issubclass(kind, IntEnum) else value
+_types = cache(get_type_hints)
+"""Read once, as Params are made whenever one is set."""
 
 
 def _parameters(params: Any, path: tuple[str, ...]) -> Iterator[Field]:
@@ -252,13 +214,11 @@ def _fields(cls: type[Any], causality: Causality, starts: dict[str, Any]) -> Ite
 
 
 def _kind(name: str, causality: Causality, base: Any) -> type[Any]:
-    """The type of the scalars of a field of the type base; TypeError where it may not have that."""
     items = set(get_args(base)) if get_origin(base) is tuple else {base}
     is_parameter = causality == "parameter"
     kinds: tuple[type[Any], ...] = (float, bool, int) if is_parameter else (float, bool)
-    for kind in kinds:
-        if items == {kind}:
-            return kind
+    if len(items) == 1 and (kind := items.pop()) in kinds:
+        return kind  # type: ignore[no-any-return]
     if is_parameter and isinstance(base, type) and issubclass(base, IntEnum):
         return base
     got = base.__name__ if isinstance(base, type) else base
@@ -275,8 +235,7 @@ def _field(path: tuple[str, ...], causality: Causality, hint: Any, start: Any) -
     size = len(get_args(base)) if get_origin(base) is tuple else None
     kind = _kind(name, causality, base)
     limits = enumeration = nominal = None
-    now: Collection[str] = ()
-    initially: Collection[str] | None = None
+    now = initially = frozenset[str]()
     if isinstance(declared, Parameter):
         if (declared.low, declared.high) != (-inf, inf):
             limits = (declared.low, declared.high)
@@ -291,7 +250,9 @@ def _field(path: tuple[str, ...], causality: Causality, hint: Any, start: Any) -
             raise TypeError(
                 f"{name}: must have the inputs that reach it without a step, depends_on={{...}}"
             )
-        now, initially = declared.depends_on, declared.depends_initially_on
+        now = initially = frozenset(declared.depends_on)
+        if declared.depends_initially_on is not None:
+            initially = frozenset(declared.depends_initially_on)
     if issubclass(kind, IntEnum):
         items = tuple((member.name.lower(), int(member)) for member in kind)
         enumeration = Enumeration(kind.__name__, items)
@@ -306,8 +267,8 @@ def _field(path: tuple[str, ...], causality: Causality, hint: Any, start: Any) -
         limits,
         isinstance(declared, Parameter) and declared.tunable,
         nominal,
-        frozenset(now),
-        frozenset(now if initially is None else initially),
+        now,
+        initially,
         start,
         enumeration,
     )

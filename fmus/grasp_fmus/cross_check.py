@@ -1,30 +1,18 @@
 """Makes the files of the FMI cross-check beside an FMU: inputs, reference results, options.
 
-The reference is the block itself, run in plain Python, never the FMU: an importer that reproduces
-it has run the FMU as it was meant. Format: FMI cross-check rules 4.1, sections 9.1.4 and 10.
-
-Inputs are applied at the beginning of a step and held, outputs written at its end, before the
-inputs of the next step. Step and times are binary fractions of a second, and whole nanoseconds:
-whether an importer multiplies or adds up, and whatever it does between two rows, it meets each row
-at its very time and sets the very numbers in it.
+Format: FMI cross-check rules 4.1, sections 9.1.4 and 10. Why they are as they are: fmus/README.md.
 """
 
 import math
 from collections.abc import Callable, Iterator
-from functools import partial
 from typing import Any
 
-from .contract import Block, Field, build_params, declared, packer, unpacker
+from .contract import Block, Field, build_params, declared, packer, unpacker, variables
+from .variable import Variable
 
 STEP_SIZE = 1.0 / 256.0
 STEPS = 768
 """FMPy's cross-check warns of more than 1,000 rows, the rules refuse more than a megabyte."""
-
-RELATIVE_TOLERANCE = 1e-6
-"""For the comparison alone: mathematical libraries differ in the last digit."""
-
-DIGITS = 9
-"""The inputs are rounded, so that they do not depend on the mathematical library."""
 
 Signal = Callable[[float], float]
 """An input over the time in s."""
@@ -36,24 +24,21 @@ def cross_check_files(name: str, block: Block) -> dict[str, bytes]:
     Without inputs there is no NAME_in.csv. ValueError if an output of the block is not finite.
     """
     fields = declared(block)
-    inputs, outputs = _names(fields, "input"), _names(fields, "output")
-    signals = _signals(name, fields)
+    inputs = [v for v in variables(fields) if v.causality == "input"]
+    outputs = [v for v in variables(fields) if v.causality == "output"]
+    signals = _signals(name, inputs)
     times = [k * STEP_SIZE for k in range(STEPS + 1)]
     samples = [[signal(t) for signal in signals] for t in times]
     results = list(_run(block, fields, samples))
     for t, row in zip(times, results, strict=True):
-        for variable, value in zip(outputs, row, strict=True):
+        for v, value in zip(outputs, row, strict=True):
             if not math.isfinite(value):
-                raise ValueError(f"{name}: {variable} = {value!r} at {t} s: must be finite")
+                raise ValueError(f"{name}: {v.name} = {value!r} at {t} s: must be finite")
     files = {
         f"{name}_ref.csv": _csv(outputs, times, results),
         f"{name}_ref.opt": _options(times[0], times[-1]),
     }
     return {f"{name}_in.csv": _csv(inputs, times, samples), **files} if inputs else files
-
-
-def _names(fields: list[Field], causality: str) -> list[str]:
-    return [name for f in fields if f.causality == causality for name in f.names]
 
 
 def _run(block: Block, fields: list[Field], samples: list[list[Any]]) -> Iterator[list[Any]]:
@@ -69,8 +54,8 @@ def _run(block: Block, fields: list[Field], samples: list[list[Any]]) -> Iterato
         yield unpack(block.outputs(p, x, u))
 
 
-def _csv(variables: list[str], times: list[float], rows: list[list[Any]]) -> bytes:
-    lines = [",".join(f'"{name}"' for name in ["time", *variables])]
+def _csv(columns: list[Variable], times: list[float], rows: list[list[Any]]) -> bytes:
+    lines = [",".join(['"time"', *(f'"{v.name}"' for v in columns)])]
     lines += [",".join([repr(t), *map(_literal, row)]) for t, row in zip(times, rows, strict=True)]
     return ("\n".join(lines) + "\n").encode()
 
@@ -85,38 +70,26 @@ def _options(start: float, stop: float) -> bytes:
         "StartTime": start,
         "StopTime": stop,
         "StepSize": STEP_SIZE,
-        "RelTol": RELATIVE_TOLERANCE,
+        "RelTol": 1e-6,  # for the comparison: mathematical libraries differ in the last digit
         "OutputIntervalLength": STEP_SIZE,
     }
     return "".join(f"{name}, {value!r}\n" for name, value in options.items()).encode()
 
 
-def _signals(name: str, fields: list[Field]) -> list[Callable[[float], float | bool]]:
+def _signals(name: str, inputs: list[Variable]) -> list[Signal]:
     """Return a signal per input: that of the FMU whose name this one's begins with, or its own."""
     known = next((s for of, s in SIGNALS.items() if name.startswith(of)), {})
-    return [
-        partial(_held, start)
-        if f.kind is bool
-        else _rounded(known.get(variable) or _swing(f, start))
-        for f in fields
-        if f.causality == "input"
-        for variable, start in zip(f.names, f.starts, strict=True)
-    ]
+    return [_signal(v, known.get(v.name)) for v in inputs]
 
 
-def _held(start: bool | None, t: float) -> bool:
-    return bool(start)
-
-
-def _swing(f: Field, start: float | None) -> Signal:
-    """Return a signal from the start value out by the nominal value and back."""
-    first, width = start or 0.0, f.nominal or 1.0
-    return lambda t: first + width * _rise(t, 0.0, 1.0) - width * _rise(t, 1.5, 2.5)
-
-
-def _rounded(signal: Signal) -> Signal:
-    # + 0.0: interpolation does not keep the sign of -0.0.
-    return lambda t: round(signal(t), DIGITS) + 0.0
+def _signal(v: Variable, known: Signal | None) -> Signal:
+    """Return the known signal, or one from the start out by the nominal value and back."""
+    if v.kind is bool:
+        return lambda _: bool(v.start)
+    first, width = float(v.start or 0.0), v.nominal or 1.0
+    signal = known or (lambda t: first + width * _rise(t, 0.0, 1.0) - width * _rise(t, 1.5, 2.5))
+    # Rounded, as mathematical libraries differ; interpolation does not keep the sign of -0.0.
+    return lambda t: round(signal(t), 9) + 0.0
 
 
 def _rise(t: float, start: float, stop: float) -> float:
@@ -126,7 +99,6 @@ def _rise(t: float, start: float, stop: float) -> float:
 
 
 def _rate(t: float, start: float, stop: float) -> float:
-    """Return the derivative of _rise()."""
     s = min(max((t - start) / (stop - start), 0.0), 1.0)
     return 6.0 * s * (1.0 - s) / (stop - start)
 

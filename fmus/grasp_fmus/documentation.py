@@ -70,10 +70,8 @@ def page(
         summary=escape(summary.rstrip(".")),
         card=_rendered(card),
         version=escape(version),
-        linux=(
-            Template(_BOUND).substitute(library=escape(str(library)))
-            if library
-            else Template(_ANY).substitute(command=making.command)
+        linux=Template(_BOUND if library else _ANY).substitute(
+            library=escape(str(library)), command=making.command
         ),
         packages=_packages(requires),
         steps=making.steps,
@@ -98,27 +96,26 @@ def licences() -> dict[str, bytes]:
 
     FileNotFoundError if one is not installed, or has no licence.
     """
-    return {file: _licence(distribution) for file, distribution in _LICENCES.items()}
+    from importlib import metadata  # takes time to load
+
+    found = {}
+    for file, distribution in _LICENCES.items():
+        try:
+            text = metadata.distribution(distribution).read_text("licenses/LICENSE")
+        except metadata.PackageNotFoundError:
+            text = None
+        if not text:
+            raise FileNotFoundError(
+                f"{distribution}: no licenses/LICENSE among its metadata; install it with pip"
+            )
+        found[file] = text.encode()
+    return found
 
 
 def icon(name: str) -> bytes | None:
     """Return model.png of the FMU `name`; None where fmus/draw_icons.py draws none for it."""
     file = ICONS / f"{name}.png"
     return file.read_bytes() if file.exists() else None
-
-
-def _licence(distribution: str) -> bytes:
-    from importlib import metadata  # takes time to load
-
-    try:
-        text = metadata.distribution(distribution).read_text("licenses/LICENSE")
-    except metadata.PackageNotFoundError:
-        text = None
-    if not text:
-        raise FileNotFoundError(
-            f"{distribution}: no licenses/LICENSE among its metadata; install it with pip"
-        )
-    return text.encode()
 
 
 def _rendered(card: str) -> str:

@@ -1,8 +1,6 @@
 """Makes an FMU: a script and what it imports, pythonfmu's binaries, description, documentation.
 
-Everything in an FMU follows from the sources, and the same sources give the same bytes. All Python
-FMUs of a process share one sys.modules, so every module is packed under a name that ends in a hash
-of the whole content; the GUID is that hash.
+The same sources give the same bytes. Why modules have a hash in their names: fmus/README.md.
 """
 
 import hashlib
@@ -13,11 +11,11 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
-from .binary import bound, libpython, mended, preamble
+from .binary import answers, bound, mended, preamble
 from .changes import changes, read_members
 from .contract import declared, variables
 from .documentation import BLOCK, Making, icon, licences, page
-from .folder import Built, file_hash, write_file
+from .folder import Built, write_file
 from .model_description import Description, model_description, version
 from .packing import card_file, package_folder, with_imports
 from .shipped import slave_class
@@ -25,8 +23,6 @@ from .shipped import slave_class
 BINARIES = package_folder("pythonfmu") / "resources" / "binaries"
 HASH = "CONTENT_HASH"
 """Stands for the content hash until it is known."""
-
-_DATE = (1980, 1, 1, 0, 0, 0)
 
 
 def build_fmu(script: Path, out: Path, bind_python: str | None = None) -> Built:
@@ -67,7 +63,7 @@ def write_fmu(
     `card`, in Markdown, `making` and `requires` are for the documentation. `picture` is the icon.
     """
     name = description.name
-    library = libpython(bind_python) if bind_python else None
+    library = answers(bind_python).library if bind_python else None
     html = page(name, description.summary, card, version(), library, making, requires)
     packed = with_imports(sources)
     if bind_python:
@@ -82,20 +78,20 @@ def write_fmu(
         "resources/slavemodule.txt": f"{name}_{HASH}".encode(),
         **_renamed(packed),
     }
-    content = _content_hash(template)
+    digest = hashlib.sha256()
+    for member, data in sorted(template.items()):
+        digest.update(f"{member}\0{len(data)}\0".encode() + data)
+    content = digest.hexdigest()[:16]
     files = {
         name.replace(HASH, content): data.replace(HASH.encode(), content.encode())
         for name, data in template.items()
     }
-    there = target.read_bytes() if target.is_file() else None
-    before = read_members(there or b"")
-    if there is not None and before == files:
-        return Built(target, "unchanged", hash=file_hash(there))
-    data = _archive(files)
-    write_file(target, data)
-    if there is None:
-        return Built(target, "new", hash=file_hash(data))
-    return Built(target, "changed", changes(before, files), file_hash(data))
+    there = target.is_file()
+    before = read_members(target.read_bytes()) if there else {}
+    if before == files:
+        return Built(target, "unchanged")
+    write_file(target, _archive(files))
+    return Built(target, "changed", changes(before, files)) if there else Built(target, "new")
 
 
 def _renamed(sources: Mapping[str, bytes]) -> dict[str, bytes]:
@@ -116,19 +112,11 @@ def _linux_binary(bind_python: str | None) -> bytes:
     return bound(binary, bind_python) if bind_python else binary
 
 
-def _content_hash(members: Mapping[str, bytes]) -> str:
-    digest = hashlib.sha256()
-    for name, data in sorted(members.items()):
-        digest.update(f"{name}\0{len(data)}\0".encode() + data)
-    return digest.hexdigest()[:16]
-
-
 def _archive(members: Mapping[str, bytes]) -> bytes:
-    """A ZIP file with sorted entries and one date."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
         for name, data in sorted(members.items()):
-            entry = zipfile.ZipInfo(name, _DATE)
+            entry = zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0))  # the same whenever it is built
             entry.compress_type = zipfile.ZIP_DEFLATED
             entry.external_attr = 0o644 << 16
             archive.writestr(entry, data)

@@ -1,15 +1,13 @@
 """The folder of built FMUs: its files, and a stamp that says whether they are up to date.
 
-The stamp is a file with one hash of all that decides what the FMUs hold, and the hash of each file
-as it was built. A changed source or version differs in the one, a file that was altered, damaged or
-removed in the other. That takes a few milliseconds, without importing what builds.
+That takes a few milliseconds, without importing what builds. What the stamp holds: fmus/README.md.
 """
 
 import json
 import os
 import sys
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 from typing import Literal
@@ -17,9 +15,6 @@ from typing import Literal
 from .packing import card_file, package_folder, packages
 
 STAMP = ".stamp.json"
-
-DISTRIBUTIONS = ("grasp_cosim", "markdown_it_py", "pythonfmu")
-"""Those whose version or licence is in an FMU, or that write a part of it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,8 +25,6 @@ class Built:
     status: Literal["new", "changed", "unchanged"]
     changes: tuple[str, ...] = ()
     """Files in the FMU, and attributes of its variables, that are not as they were."""
-    hash: str = field(default="", compare=False, repr=False)
-    """That of the file, for the stamp."""
 
 
 def write_file(target: Path, data: bytes) -> None:
@@ -52,11 +45,6 @@ def write_file(target: Path, data: bytes) -> None:
         part.unlink(missing_ok=True)
 
 
-def file_hash(data: bytes) -> str:
-    """Return the hash of a file's content."""
-    return sha256(data).hexdigest()
-
-
 def sources_hash() -> str:
     """Return the hash of all that decides what the FMUs and the files beside them hold.
 
@@ -75,16 +63,20 @@ def is_current(folder: Path, sources: str) -> bool:
     try:
         stamp = json.loads((folder / STAMP).read_bytes())
         return stamp["sources"] == sources and all(
-            file_hash((folder / name).read_bytes()) == was for name, was in stamp["files"].items()
+            _file_hash(folder / name) == was for name, was in stamp["files"].items()
         )
     except (OSError, ValueError, LookupError, TypeError, AttributeError):
         return False  # there is none, or it is damaged, or a file is missing
 
 
-def write_stamp(folder: Path, sources: str, files: Mapping[str, str]) -> None:
-    """Write the stamp of files, hashes by name, that were built from sources with this hash."""
-    stamp = {"sources": sources, "files": dict(sorted(files.items()))}
+def write_stamp(folder: Path, sources: str, files: Iterable[str]) -> None:
+    """Write the stamp of the files of these names, just built from sources with this hash."""
+    stamp = {"sources": sources, "files": {f: _file_hash(folder / f) for f in sorted(files)}}
     write_file(folder / STAMP, json.dumps(stamp, indent=1).encode())
+
+
+def _file_hash(file: Path) -> str:
+    return sha256(file.read_bytes()).hexdigest()
 
 
 def _deciding() -> Iterator[tuple[str, Path]]:
@@ -94,7 +86,8 @@ def _deciding() -> Iterator[tuple[str, Path]]:
         if (card := card_file(package)).is_file():
             yield f"{package}: card", card
     yield from _below(package_folder("pythonfmu") / "resources" / "binaries", "pythonfmu")
-    for name in DISTRIBUTIONS:
+    # Those whose version or licence is in an FMU, or that write a part of it
+    for name in ("grasp_cosim", "markdown_it_py", "pythonfmu"):
         for folder in (f for entry in sys.path for f in Path(entry).glob(f"{name}-*.dist-info")):
             for file in ("METADATA", "licenses/LICENSE"):
                 if (folder / file).is_file():

@@ -44,7 +44,7 @@ def host_log(address: int, instance: str) -> Log | None:
     callbacks = _word(address + _CALLBACKS)
     logger, environment = _word(callbacks), _word(callbacks + _ENVIRONMENT)
     if not logger:
-        return _silent
+        return lambda *_: None
     call = _LOGGER(logger)
 
     def log(status: int, message: str) -> None:
@@ -52,10 +52,6 @@ def host_log(address: int, instance: str) -> Log | None:
         call(environment, name, status, CATEGORIES[status].encode(), text)
 
     return log
-
-
-def _silent(status: int, message: str) -> None:
-    """For a host that has no logger."""
 
 
 def as_format(message: str) -> str:

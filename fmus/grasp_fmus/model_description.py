@@ -1,5 +1,6 @@
 """Writes modelDescription.xml of FMI 2.0 from the variables of a slave."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
@@ -8,6 +9,10 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from .host_log import CATEGORIES, DISCARD, ERROR
 from .variable import Scalar, Variable
+
+_WORD = r"(?:[A-Za-z_]\w*|'(?:[^'\\]|\\.)+')(?:\[\d+(?:,\d+)*\])?"
+_STRUCTURED = re.compile(rf"{_WORD}(?:\.{_WORD})*", re.ASCII)
+"""Names of FMI's structured naming convention, but for der(), which proxy.hold. cannot precede."""
 
 
 class Unit(NamedTuple):
@@ -51,16 +56,6 @@ class Experiment(NamedTuple):
     step: float | None = 1e-4
 
 
-CAPABILITIES: Mapping[str, bool] = {
-    "needsExecutionTool": True,
-    "canHandleVariableCommunicationStepSize": True,
-    "canNotUseMemoryManagementFunctions": True,
-    "canGetAndSetFMUstate": True,
-    "canSerializeFMUstate": True,
-}
-"""The capabilities of an FMU made from a block."""
-
-
 @dataclass(frozen=True)
 class Description:
     """The content of a model description; the value reference of a variable is its position."""
@@ -70,16 +65,16 @@ class Description:
     variables: Sequence[Variable]
     units: Mapping[str, Unit] = field(default_factory=lambda: UNITS)
     """The definitions of units; a variable's unit that is not here is a name alone."""
-    capabilities: Mapping[str, bool] = field(default_factory=lambda: CAPABILITIES)
+    can_vary_step: bool = True
+    has_states: bool = True
     experiment: Experiment = Experiment()
     statuses: Sequence[int] = (DISCARD, ERROR)
     """The statuses that are logged with messages."""
-    structured: bool = True
-    """True if all names are in FMI's structured naming convention."""
 
 
 def model_description(d: Description, guid: str) -> bytes:
     """Return modelDescription.xml in UTF-8."""
+    structured = all(_STRUCTURED.fullmatch(v.name) for v in d.variables)
     root = Element(
         "fmiModelDescription",
         fmiVersion="2.0",
@@ -89,11 +84,19 @@ def model_description(d: Description, guid: str) -> bytes:
         version=version(),
         license="MIT",
         generationTool=f"grasp-cosim with pythonfmu {version('pythonfmu')}",
-        variableNamingConvention="structured" if d.structured else "flat",
+        variableNamingConvention="structured" if structured else "flat",
         numberOfEventIndicators="0",
     )
-    capabilities = {key: _literal(value) for key, value in d.capabilities.items()}
-    SubElement(root, "CoSimulation", {"modelIdentifier": d.name, **capabilities})
+    SubElement(
+        root,
+        "CoSimulation",
+        modelIdentifier=d.name,
+        needsExecutionTool="true",
+        canHandleVariableCommunicationStepSize=_literal(d.can_vary_step),
+        canNotUseMemoryManagementFunctions="true",
+        canGetAndSetFMUstate=_literal(d.has_states),
+        canSerializeFMUstate=_literal(d.has_states),
+    )
     _add_units(root, d)
     _add_enumerations(root, d)
     categories = SubElement(root, "LogCategories")
@@ -177,7 +180,6 @@ def _initial(v: Variable) -> str:
 
 
 def _attributes(v: Variable, units: Mapping[str, Unit]) -> dict[str, str]:
-    """Return the attributes of the element of its type."""
     attributes: dict[str, str] = {}
     if v.enumeration:
         attributes["declaredType"] = v.enumeration.name

@@ -1,8 +1,7 @@
 """Finds what an FMU must bring along: the modules that its script imports, and those they import.
 
-Packages are packed that a module imports at its top level with `from PACKAGE import ...`, other
-than those of the standard library: only such an import can be given the name that the package has
-in the FMU.
+Packages are packed that a module imports at its top level with `from PACKAGE import ...`: only such
+an import can be given the name that the package has in the FMU.
 """
 
 import ast

@@ -1,11 +1,8 @@
-"""The slave of a proxy: at every step it exchanges its variables with a peer over UDP.
-
-Besides those of the original it has parameters and outputs of its own, proxy.*. In initialisation
-mode outputs follow every set, as those of the original do; after that every step.
-"""
+"""The slave of a proxy: at every step it exchanges its variables with a peer over UDP."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from itertools import accumulate, pairwise
 from pathlib import Path
 from time import monotonic_ns
 from typing import Annotated, Any, NamedTuple, get_args, get_type_hints
@@ -16,11 +13,8 @@ from .connection import Connection
 from .host_log import WARNING
 from .link.client import Client
 from .link.message import FAILED, PORT, STRING_SIZE, read_key
-from .link.signature import Kind, LinkVariable, Signature
+from .link.signature import LinkVariable, Signature
 from .variable import TYPES, Scalar, Variable
-
-TIMEOUT = 0.01
-"""s. The step of the original is no measure: 0.1 ms is less than many a network needs."""
 
 HOLD, FAILSAFE, STOP = ON_LOSS = ("hold", "failsafe", "stop")
 """The choices of proxy.on_loss, for when the peer is lost."""
@@ -39,7 +33,7 @@ class Settings(NamedTuple):
     port: Annotated[int, "", (1, 65535), "its UDP port"] = PORT
     timeout: Annotated[
         float, "s", (1e-6, 3600.0), "longest wait for the outputs of a step, by the clock"
-    ] = TIMEOUT
+    ] = 0.01  # the step of the original is no measure: 0.1 ms is less than many a network needs
     connect_timeout: Annotated[
         float,
         "s",
@@ -81,9 +75,6 @@ _DIAGNOSTICS: Mapping[str, tuple[type[Scalar], str, str]] = {
 }  # fmt: skip
 """Type, unit and description of the outputs proxy.* by their names."""
 
-ZEROS: dict[type[Scalar], Scalar] = {float: 0.0, bool: False, int: 0, str: ""}
-"""The value of a variable that has no start value."""
-
 
 def own_variables(outputs: Sequence[Variable], settings: Settings = DEFAULTS) -> list[Variable]:
     """Return what a proxy has besides the original: settings, hold, failsafe, diagnostics.
@@ -98,19 +89,13 @@ def own_variables(outputs: Sequence[Variable], settings: Settings = DEFAULTS) ->
         own.append(Variable(f"proxy.{name}", kind, "parameter", unit, start, "fixed", limits, text))
     for v in outputs:
         text = f"of a lost peer: {v.name} stays as it is"
-        own.append(
-            Variable(
-                f"proxy.hold.{v.name}", bool, "parameter", "", False, "fixed", description=text
-            )
-        )
+        name = f"proxy.hold.{v.name}"
+        own.append(Variable(name, bool, "parameter", "", False, "fixed", None, text))
     for v in outputs:
-        text, zero = f"of a lost peer: value of {v.name}", ZEROS[v.kind]
+        text = f"of a lost peer: value of {v.name}"
         name = f"proxy.failsafe.{v.name}"
-        own.append(
-            Variable(
-                name, v.kind, "parameter", v.unit, zero, "fixed", None, text, relative=v.relative
-            )
-        )
+        safe = Variable(name, v.kind, "parameter", v.unit, v.kind(), "fixed", None, text)
+        own.append(replace(safe, relative=v.relative))
     for name, (kind, unit, text) in _DIAGNOSTICS.items():
         variability = "continuous" if kind is float else "discrete"
         own.append(Variable(f"proxy.{name}", kind, "output", unit, None, variability, None, text))
@@ -142,11 +127,15 @@ class Fmi2Proxy(Slave):
     clock: Callable[[], int] = staticmethod(monotonic_ns)
 
     def _prepare(self) -> None:
-        exchanged = Signature(tuple(_as_sent(v) for v in self.variables))
+        shared = ((v.name, TYPES[v.kind], v.causality, v.unit or None) for v in self.variables)
+        self._signature = exchanged = Signature(tuple(LinkVariable(*v) for v in shared))
         outputs = self.variables[len(exchanged.request) :]
-        self._signature = exchanged
-        self._variables = [*map(_limited, self.variables), *own_variables(outputs, self.settings)]
-        self._values = [ZEROS[v.kind] if v.start is None else v.start for v in self._variables]
+        sent = (0, STRING_SIZE - 1)  # the limits of what can be sent; the peer checks the rest
+        self._variables = [
+            *(replace(v, limits=sent) if v.kind is str else v for v in self.variables),
+            *own_variables(outputs, self.settings),
+        ]
+        self._values = [v.kind() if v.start is None else v.start for v in self._variables]
         sizes = (len(exchanged.request), n := len(outputs), len(Settings._fields), n, n)
         self._request, self._outputs, self._settings, self._holds, self._failsafes = _slices(sizes)
         self._diagnostics = slice(self._failsafes.stop, len(self._values))
@@ -239,7 +228,6 @@ class Fmi2Proxy(Slave):
         return connection
 
     def _deadline(self, timeout: float) -> int:
-        """Return the time in ns of the clock that is `timeout` s from now."""
         return self.clock() + round(timeout * _NANOSECONDS)
 
     def _disconnect(self) -> None:
@@ -303,11 +291,9 @@ class Fmi2Proxy(Slave):
                     f"proxy.on_loss = {settings.on_loss!r}: must be {', '.join(ON_LOSS)}"
                 )
             self._params = settings
-        now: Settings = self._params
-        return now
+        return self._params  # type: ignore[no-any-return]  # a block's are of any type
 
     def _take(self, connection: Connection) -> None:
-        """Take over the newest outputs."""
         outputs = connection.client.outputs
         assert outputs is not None  # noqa: S101 - there are some from initialisation on
         self._values[self._outputs] = outputs
@@ -326,18 +312,7 @@ class Fmi2Proxy(Slave):
 
 def _slices(sizes: Sequence[int]) -> list[slice]:
     """Return consecutive slices of a list, of these sizes."""
-    ends = [sum(sizes[: i + 1]) for i in range(len(sizes))]
-    return [slice(end - size, end) for size, end in zip(sizes, ends, strict=True)]
-
-
-def _as_sent(v: Variable) -> LinkVariable:
-    kind: Kind = TYPES[v.kind]
-    return LinkVariable(v.name, kind, v.causality, v.unit or None)
-
-
-def _limited(v: Variable) -> Variable:
-    """Return the variable with the limits of what can be sent; the peer checks the rest."""
-    return replace(v, limits=(0, STRING_SIZE - 1)) if v.kind is str else v
+    return [slice(*pair) for pair in pairwise(accumulate(sizes, initial=0))]
 
 
 def _peer(settings: Settings) -> str:
@@ -348,7 +323,6 @@ def _key(file: str) -> bytes | None:
     """Return the shared key in a file, None without a file; RefusalError where it is invalid."""
     try:
         return read_key(Path(file)) if file else None
-    except OSError as error:
-        raise RefusalError(f"proxy.key_file = {file!r}: {error.strerror}") from error
-    except ValueError as error:
-        raise RefusalError(f"proxy.key_file = {file!r}: {error}") from error
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", error)
+        raise RefusalError(f"proxy.key_file = {file!r}: {reason}") from error

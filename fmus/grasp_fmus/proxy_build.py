@@ -1,6 +1,5 @@
 """Builds the proxy of an FMU: the same variables, and a slave that asks a peer for the outputs."""
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,17 +8,9 @@ from .documentation import PROXY, icon
 from .fmu import write_fmu
 from .folder import Built
 from .host_log import ERROR, WARNING
-from .model_description import CAPABILITIES, UNITS, Description, Experiment, Unit
+from .model_description import UNITS, Description, Experiment, Unit
 from .proxy import DEFAULTS, Settings, own_variables
 from .variable import Variable
-
-CARD = Path(__file__).parent / "link" / "README.md"
-
-_WORD = r"(?:[A-Za-z_]\w*|'(?:[^'\\]|\\.)+')(?:\[\d+(?:,\d+)*\])?"
-_STRUCTURED = re.compile(rf"{_WORD}(?:\.{_WORD})*", re.ASCII)
-"""Names of FMI's structured naming convention, but for der(), which proxy.hold. cannot precede."""
-
-_IDENTIFIER = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -49,7 +40,7 @@ def build_proxy(
     name is taken.
     """
     name = target.stem
-    if not _IDENTIFIER.fullmatch(name) or target.suffix != ".fmu":
+    if not (name.isascii() and name.isidentifier()) or target.suffix != ".fmu":
         raise ValueError(
             f"{target.name}: must be NAME.fmu, NAME of letters, digits and _, no digit first"
         )
@@ -60,33 +51,24 @@ def build_proxy(
     for v in own:
         if v.start is not None:
             v.check(v.start)
+    description = Description(
+        name,
+        f"Proxy of {original.file}: a peer has its outputs, over UDP",
+        [*original.variables, *own],
+        {"s": UNITS["s"], **original.units},
+        original.can_vary_step,
+        has_states=False,
+        experiment=original.experiment,
+        statuses=(WARNING, ERROR),
+    )
     return write_fmu(
         target,
-        _description(name, original, own),
+        description,
         _card(own),
         {f"{name}.py": _script(name, original, settings).encode()},
         bind_python,
         picture=icon("Proxy"),
         making=PROXY,
-    )
-
-
-def _description(name: str, original: Original, own: Sequence[Variable]) -> Description:
-    variables = [*original.variables, *own]
-    return Description(
-        name,
-        f"Proxy of {original.file}: a peer has its outputs, over UDP",
-        variables,
-        {"s": UNITS["s"], **original.units},
-        {
-            **CAPABILITIES,
-            "canHandleVariableCommunicationStepSize": original.can_vary_step,
-            "canGetAndSetFMUstate": False,
-            "canSerializeFMUstate": False,
-        },
-        original.experiment,
-        (WARNING, ERROR),
-        all(_STRUCTURED.fullmatch(v.name) for v in variables),
     )
 
 
@@ -108,6 +90,7 @@ def _script(name: str, original: Original, settings: Settings) -> str:
 
 def _card(own: Sequence[Variable]) -> str:
     """Return the proxy's own variables and the protocol, in Markdown."""
+    protocol = Path(__file__).parent / "link" / "README.md"
     rows = []
     for v in own:
         start = "" if v.start is None else str(v.start).lower()
@@ -119,5 +102,5 @@ def _card(own: Sequence[Variable]) -> str:
         "All others are those of the original.\n\n"
         "| variable | causality | type | unit | start | range | meaning |\n"
         f"|---|---|---|---|---|---|---|\n{''.join(rows)}\n"
-        f"{CARD.read_text('utf-8')}"
+        f"{protocol.read_text('utf-8')}"
     )

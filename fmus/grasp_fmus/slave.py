@@ -1,35 +1,23 @@
-"""The slave that runs a block behind pythonfmu's FMI 2.0 interface.
-
-Outputs are worked out when they are asked for, from the state and the inputs of that moment, so
-they agree with the inputs in initialisation mode and after every set.
-"""
+"""The slave that runs a block; its outputs are worked out when they are asked for."""
 
 from collections.abc import Callable
 from functools import cache
 from math import inf, isfinite
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 from .base import INSTANTIATED, STEPPING, TIME_TOLERANCE, RefusalError, Slave, reported
-from .contract import Block, Field, build_params, count, declared, packer, unpacker, variables
+from .contract import Block, Field, build_params, declared, packer, unpacker, variables
 from .host_log import DISCARD
 from .snapshot import Snapshot, from_bytes, to_bytes
 from .variable import Variable
 
 
-class _Shape(NamedTuple):
-    """What the instances of a block have in common."""
-
-    fields: list[Field]
-    variables: list[Variable]
-    functions: tuple[Callable[..., Any], ...]
-
-
 @cache
-def _shape(block: Block) -> _Shape:
-    """Made once: that takes longer than all the rest of an instance."""
+def _shape(block: Block) -> tuple[list[Field], list[Variable], tuple[Callable[..., Any], ...]]:
+    """Made once for all instances: that takes longer than all the rest of one."""
     fields = declared(block)
     functions = (block.step, block.outputs, packer(block.Inputs, fields), unpacker(fields))
-    return _Shape(fields, variables(fields), functions)
+    return fields, variables(fields), functions
 
 
 class Fmi2Slave(Slave):
@@ -44,8 +32,9 @@ class Fmi2Slave(Slave):
             self.block  # type: ignore[arg-type]  # a module can be hashed
         )
         self._values = [v.start for v in self._variables]
-        self._first_output = count(self._fields, "input")
-        self._first_parameter = count(self._fields, "input", "output")
+        causalities = [v.causality for v in self._variables]
+        self._first_output = causalities.count("input")
+        self._first_parameter = self._first_output + causalities.count("output")
         self._outputs = slice(self._first_output, self._first_parameter)
         self._state = self._initial_state(self.block.Params(), self.block.Inputs())
         self._enter(INSTANTIATED)
@@ -125,7 +114,6 @@ class Fmi2Slave(Slave):
             raise RefusalError(f"state of another FMU: must be of this one, {self._content}")
 
     def _not_finite(self, values: list[float]) -> str:
-        """Which outputs are not finite."""
         return ", ".join(
             f"{v.name} = {value!r}{v.in_unit}"
             for v, value in zip(self._variables[self._outputs], values, strict=True)
@@ -158,7 +146,6 @@ class Fmi2Slave(Slave):
             raise RefusalError(str(error)) from error
 
     def _read_params(self) -> Any:
-        """Params from the list of values."""
         try:
             self._params = build_params(self.block, self._fields, self._values)
         except ValueError as error:

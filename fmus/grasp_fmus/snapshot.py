@@ -1,8 +1,4 @@
-"""Turns the whole state of a slave into bytes and back.
-
-Bytes: 8 of magic, 16 of the FMU's content hash, 16 of check sum, then IEEE doubles, little-endian:
-phase, time, inputs and parameters, the block's state, in the order of declaration.
-"""
+"""Turns the whole state of a slave into bytes and back. To the byte: States in fmus/README.md."""
 
 import struct
 from collections.abc import Iterator

@@ -1,4 +1,1 @@
-"""The protocol between a proxy FMU and its peer, over UDP. To the byte: README.md in this folder.
-
-Standard library only, without sockets: it is packed into the proxies, and used by the bench side.
-"""
+"""The protocol between a proxy FMU and its peer, without sockets. To the byte: README.md."""

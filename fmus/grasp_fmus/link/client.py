@@ -70,8 +70,7 @@ class Client:
         self._request = Codec(signature.request)
         self._answer = Codec(signature.answer)
         self._session = self._cookie = 0
-        self._sequence = self._first_step = self._newest = 0
-        self._awaited = 0
+        self._sequence = self._first_step = self._newest = self._awaited = 0
         self._greeting = False
         self._seen = 0  # bit i: the request i before the last one was answered
 
@@ -159,17 +158,16 @@ class Client:
         if not expected or m.cookie != self._cookie or not (self._greeting or self._awaited):
             return self._reject()
         text = m.body.decode(errors="replace")
-        if m.code == message.OTHER_INTERFACE:
-            text = f"the peer has another interface: {self.signature.difference(text) or 'unnamed'}"
-        elif m.code == message.BUSY:
-            text = "the peer is busy with another proxy"
-        elif m.code == message.UNKNOWN:
-            text = "the peer does not know this session"
-        elif m.code == message.FAILED:
-            text = f"the peer failed: {' '.join(text.split())}"
-        else:
+        other = self.signature.difference(text) or "unnamed"
+        reasons = {
+            message.OTHER_INTERFACE: f"the peer has another interface: {other}",
+            message.BUSY: "the peer is busy with another proxy",
+            message.UNKNOWN: "the peer does not know this session",
+            message.FAILED: f"the peer failed: {' '.join(text.split())}",
+        }
+        if m.code not in reasons:
             return self._reject()
-        self.refusal = Refusal(m.code, text)
+        self.refusal = Refusal(m.code, reasons[m.code])
         return Verdict.REFUSED
 
     def _receive_outputs(self, m: Message, now: int) -> Verdict:

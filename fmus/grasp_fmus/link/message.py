@@ -5,7 +5,7 @@ import struct
 from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from .signature import HASH_SIZE, LinkVariable, Signature
 
@@ -99,11 +99,17 @@ class Codec:
 
     def pack(self, values: Sequence[Value]) -> bytes:
         """Return the body that holds these values; ValueError where a string is too long."""
-        if self._strings:
-            values = list(values)
-            for i, name in self._strings:
-                values[i] = _as_bytes(name, str(values[i]))  # type: ignore[call-overload]
-        return self._struct.pack(*values)
+        if not self._strings:
+            return self._struct.pack(*values)
+        packed: list[Any] = list(values)
+        for i, name in self._strings:
+            packed[i] = data = str(values[i]).encode()
+            if len(data) >= STRING_SIZE or b"\0" in data:
+                raise ValueError(
+                    f"{name} = {values[i]!r}: must have fewer than {STRING_SIZE} bytes in UTF-8, "
+                    "and no NUL"
+                )
+        return self._struct.pack(*packed)
 
     def unpack(self, body: bytes) -> list[Value] | None:
         """Return the values of a body; None where its size is wrong or a value is invalid.
@@ -134,15 +140,6 @@ class Codec:
         except UnicodeDecodeError:
             return None
         return values
-
-
-def _as_bytes(name: str, text: str) -> bytes:
-    data = text.encode()
-    if len(data) >= STRING_SIZE or "\0" in text:
-        raise ValueError(
-            f"{name} = {text!r}: must have fewer than {STRING_SIZE} bytes in UTF-8, and no NUL"
-        )
-    return data
 
 
 def read_key(path: Path) -> bytes:

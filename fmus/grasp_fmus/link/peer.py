@@ -19,9 +19,6 @@ ALIVE = 1_000_000_000
 LARGEST_REASON = 1024
 """Bytes of what a REFUSE says in words."""
 
-GREETED = 64
-"""The most sessions that have said HELLO and not yet begun."""
-
 
 @dataclass(slots=True)
 class PeerCounters:
@@ -88,11 +85,6 @@ class Peer:
         self._refused: tuple[int, int, int] | None = None  # the request that failed, for its repeat
         self._stepping = False
 
-    @property
-    def stepping(self) -> bool:
-        """True if the session under way has begun to step."""
-        return self._stepping
-
     def receive(self, datagram: bytes, now: int) -> Action:
         """Return what to do about a datagram; `now` in ns of a monotonic clock."""
         m = self._sealer.open(datagram)
@@ -108,44 +100,49 @@ class Peer:
 
     def outputs(self, values: list[Value], time: float) -> bytes:
         """Return the answer to the last request: outputs, and the time in s they belong to."""
-        return self._keep(message.OUTPUTS, 0, time, self._answer.pack(values))
+        assert self._last is not None  # noqa: S101 - there is a request to answer
+        body = self._answer.pack(values)
+        self._last_answer = self._pack(self._last, message.OUTPUTS, 0, body, time)
+        return self._last_answer
 
     def failed(self, reason: str) -> bytes:
         """Return the answer to the last request where it cannot be done; end the session."""
         m = self._last
-        answer = self._keep(message.REFUSE, message.FAILED, 0.0, reason.encode()[:LARGEST_REASON])
+        assert m is not None  # noqa: S101 - there is a request to answer
+        body = reason.encode()[:LARGEST_REASON]
+        self._last_answer = self._pack(m, message.REFUSE, message.FAILED, body)
         self._over()
-        if m is not None:
-            self._refused = m.session, m.cookie, m.sequence
-        return answer
+        self._refused = m.session, m.cookie, m.sequence
+        return self._last_answer
 
     def _drop(self, counter: str) -> Action:
         setattr(self.counters, counter, getattr(self.counters, counter) + 1)
         return None
 
     def _busy(self, session: int, now: int) -> bool:
-        live = self._live
-        return live is not None and live[0] != session and now - self._heard < ALIVE
+        other = self._live is not None and self._live[0] != session
+        return other and now - self._heard < ALIVE
 
     def _hello(self, m: Message, now: int) -> Action:
         if m.sequence or m.cookie:
             return self._drop("malformed")
         if m.interface != self.signature.hash:
             self.counters.foreign += 1
-            return self._refuse(m, message.OTHER_INTERFACE, self.signature.text.encode())
+            text = self.signature.text.encode()
+            return self._pack(m, message.REFUSE, message.OTHER_INTERFACE, text)
         if m.body != self.signature.text.encode():
             return self._drop("malformed")
         if self._busy(m.session, now):
             self.counters.busy += 1
-            return self._refuse(m, message.BUSY)
+            return self._pack(m, message.REFUSE, message.BUSY)
         if self._live is not None and self._live[0] == m.session:
             cookie = self._live[1]
         else:
             cookie = self._greeted.get(m.session) or self._make_cookie()
             self._greeted[m.session] = cookie
-            if len(self._greeted) > GREETED:
+            if len(self._greeted) > 64:  # that have not yet begun
                 self._greeted.popitem(last=False)
-        return self._pack(m._replace(cookie=cookie), message.WELCOME, 0, 0.0, b"")
+        return self._pack(m._replace(cookie=cookie), message.WELCOME)
 
     def _in_session(self, m: Message, now: int) -> Action:
         if self._live != (m.session, m.cookie):
@@ -170,10 +167,11 @@ class Peer:
             return self._last_answer
         if self._greeted.get(m.session) != m.cookie or m.kind != message.INITIALISE:
             self.counters.foreign += 1
-            return None if m.kind == message.END else self._refuse(m, message.UNKNOWN)
+            end = m.kind == message.END
+            return None if end else self._pack(m, message.REFUSE, message.UNKNOWN)
         if self._busy(m.session, now):
             self.counters.busy += 1
-            return self._refuse(m, message.BUSY)
+            return self._pack(m, message.REFUSE, message.BUSY)
         request = self._do(m, now, fresh=True)
         if isinstance(request, Request):
             del self._greeted[m.session]
@@ -182,9 +180,8 @@ class Peer:
 
     def _do(self, m: Message, now: int, fresh: bool) -> Action:
         values = self._request.unpack(m.body)
-        if values is None or (m.kind == message.STEP) != (m.step > 0.0):
-            return self._drop("malformed")
-        if m.kind == message.INITIALISE and self._stepping and not fresh:
+        too_late = m.kind == message.INITIALISE and self._stepping and not fresh
+        if values is None or too_late or (m.kind == message.STEP) != (m.step > 0.0):
             return self._drop("malformed")
         # Only what is new counts as heard: who repeats a recorded datagram keeps nobody away
         self._heard = now
@@ -199,15 +196,9 @@ class Peer:
     def _over(self) -> None:
         self._live, self._last, self._stepping = None, None, False
 
-    def _refuse(self, m: Message, code: int, body: bytes = b"") -> bytes:
-        return self._pack(m, message.REFUSE, code, 0.0, body)
-
-    def _keep(self, kind: int, code: int, time: float, body: bytes) -> bytes:
-        assert self._last is not None  # noqa: S101 - there is a request to answer
-        self._last_answer = self._pack(self._last, kind, code, time, body)
-        return self._last_answer
-
-    def _pack(self, m: Message, kind: int, code: int, time: float, body: bytes) -> bytes:
+    def _pack(
+        self, m: Message, kind: int, code: int = 0, body: bytes = b"", time: float = 0.0
+    ) -> bytes:
         """Return an answer to the request `m`."""
         fields = (kind, code, self.signature.hash, m.session, m.cookie, m.sequence)
         return self._sealer.pack(Message(*fields, time, 0.0, m.sent, body))

@@ -36,8 +36,8 @@ class Signature:
     variables: tuple[LinkVariable, ...]
 
     def __post_init__(self) -> None:
-        ordered = [v for causality in ORDER for v in self.variables if v.causality == causality]
-        object.__setattr__(self, "variables", tuple(ordered))
+        ordered = tuple(v for causality in ORDER for v in self.of(causality))
+        object.__setattr__(self, "variables", ordered)
         seen = set()
         for v in self.variables:
             if set("\t\n\r") & set(f"{v.name}{v.unit or ''}"):
@@ -94,13 +94,10 @@ class Signature:
 
 
 def _lines(text: str) -> dict[str, str]:
-    """Return the lines of a text by the name at their end."""
     return {line.rpartition("\t")[2]: line for line in text.splitlines()}
 
 
 def _words(line: str) -> str:
     """Return a line in words: output gap[1], Real in m."""
-    causality, _, rest = line.partition("\t")
-    kind, _, rest = rest.partition("\t")
-    unit, _, name = rest.partition("\t")
+    causality, kind, unit, name = [*line.split("\t", 3), "", "", ""][:4]
     return f"{causality} {name}, {kind}{'' if unit == '-' else f' in {unit}'}"
