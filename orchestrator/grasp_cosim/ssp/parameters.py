@@ -18,8 +18,8 @@ from ..interface.interface import SETTABLE, Value
 from ..interface.units import Unit
 from .archive import Archive
 from .document import at, checked, children, is_true, parse, short
-from .network import Carried, Network, Node, Path, kind_of
-from .tree import Binding, Content, linear, transformation
+from .network import Carried, Network
+from .tree import Binding, Content, Node, Path, linear, transformation
 from .units import change, named, read_units
 
 _READERS: Mapping[str, Callable[[str], Value]] = {
@@ -67,7 +67,11 @@ def read_settings(
     notes: list[str] = []
     for path, binding in _bindings(network):
         for given in _given(archive, file, binding, units, notes):
-            ends = list(_ends(network, path, given))
+            ends = [
+                arrived
+                for node in _nodes(network, path, given.name)
+                for arrived in _spread(network, node, _adapted(network, node, given))
+            ]
             if not ends:
                 notes.append(f"{given.parameter.place}: no {given.name!r} to give it to; not used")
             for end, parameter in ends:
@@ -81,12 +85,11 @@ def read_settings(
 
 def _bindings(network: Network) -> Iterator[tuple[Path, Binding]]:
     """All bindings with the path of what they are at; who goes before another comes after it."""
-    for path, part in network.parts.items():
-        for binding in part.element.bindings:
-            yield path, binding
-    for path in sorted(network.systems, key=len, reverse=True):
-        for binding in network.systems[path].bindings:
-            yield path, binding
+    components = (part.element for part in network.parts.values())
+    inner_first = sorted(network.systems.values(), key=lambda e: len(e.path), reverse=True)
+    for element in (*components, *inner_first):
+        for binding in element.bindings:
+            yield element.path, binding
 
 
 def _given(
@@ -101,22 +104,22 @@ def _given(
         for name, parameter in parameters.items():
             yield Given(name, parameter, False, None)
         return
-    mapped = set()
-    for place, source, given in _mapping(archive, file, binding, binding.mapping, parameters):
-        mapped.add(source)
-        if given:
-            yield given
+    place, root = _document(archive, file, binding.place, binding.mapping, "ssm")
+    unmapped = dict(parameters)
+    targets: set[str] = set()
+    for element in children(root, "ssm:MappingEntry"):
+        source, target = element.get("source"), element.get("target")
+        where = f"{at(place, element)}: mapping '{source} -> {target}'"
+        if target in targets:
+            raise InputError(f"{where}: {target!r} has two sources; must have one")
+        targets.add(target)
+        unmapped.pop(source, None)
+        if source in parameters:
+            suppress = is_true(element, "suppressUnitConversion")
+            yield Given(target, parameters[source], suppress, transformation(element))
         else:
-            notes.append(f"{place}: no parameter {source!r}; not used")
-    for name, parameter in parameters.items():
-        if name not in mapped:
-            notes.append(f"{parameter.place}: not in the mapping; not used")
-
-
-def _ends(network: Network, path: Path, given: Given) -> Iterator[tuple[Node, Parameter]]:
-    """The variables of components that a value arrives at, and what of it does."""
-    for node in _nodes(network, path, given.name):
-        yield from _spread(network, node, _adapted(network, node, given))
+            notes.append(f"{where}: no parameter {source!r}; not used")
+    notes += [f"{p.place}: not in the mapping; not used" for p in unmapped.values()]
 
 
 def _set(
@@ -153,27 +156,6 @@ def _parameter(place: str, element: Any, units: Mapping[str, Unit]) -> Parameter
     return Parameter(place, kind, _READERS[kind](text), named(place, element.get("unit"), units))
 
 
-def _mapping(
-    archive: Archive,
-    file: str,
-    binding: Binding,
-    mapping: Content,
-    parameters: Mapping[str, Parameter],
-) -> Iterator[tuple[str, str, Given | None]]:
-    """The entries of a mapping: place, source, and what is given, None without such a source."""
-    place, root = _document(archive, file, binding.place, mapping, "ssm")
-    targets: set[str] = set()
-    for element in children(root, "ssm:MappingEntry"):
-        source, target = element.get("source"), element.get("target")
-        where = f"{at(place, element)}: mapping '{source} -> {target}'"
-        if target in targets:
-            raise InputError(f"{where}: {target!r} has two sources; must have one")
-        targets.add(target)
-        parameter = parameters.get(source)
-        suppress, element = is_true(element, "suppressUnitConversion"), transformation(element)
-        yield where, source, Given(target, parameter, suppress, element) if parameter else None
-
-
 def _nodes(network: Network, path: Path, name: str) -> Iterator[Node]:
     """Yield the variables and connectors that a name means at a system or component."""
     part = network.parts.get(path)
@@ -195,7 +177,7 @@ def _spread(network: Network, node: Node, given: Parameter) -> Iterator[tuple[No
         yield node, given
         return
     connector = network.systems[node.path].connectors[node.name]
-    if kind_of(connector) not in (None, given.type) and (connector.type, given.type) != (
+    if connector.value_kind not in (None, given.type) and (connector.type, given.type) != (
         "Real",
         "Integer",
     ):
@@ -205,8 +187,8 @@ def _spread(network: Network, node: Node, given: Parameter) -> Iterator[tuple[No
             carried = network.carry(hop, Carried(given.unit, settled=given.settled))
             number = _linear(given.value, carried.factor, carried.offset)
             passed = replace(given, value=number, unit=carried.unit, settled=carried.settled)
-        elif hop.connection.transformation:
-            raise InputError(f"{hop.connection.place}: transforms a {given.type}; must be Real")
+        elif hop.transformation:
+            raise InputError(f"{hop.place}: transforms a {given.type}; must be Real")
         else:
             passed = given
         yield from _spread(network, hop.target, passed)

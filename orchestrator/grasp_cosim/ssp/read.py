@@ -26,10 +26,10 @@ from ..system.parts import NANOSECONDS, Component, Connection, Port
 from .annotation import TYPE, Beside, Extras, no_extras, read_extras
 from .archive import STRUCTURE, Archive
 from .document import at, child, children, parse, qualified
-from .network import Carried, Hop, Network, Part, Path, elements_of, read_network
+from .network import Carried, Network, Part, read_network
 from .order import flow_order
 from .parameters import read_settings
-from .tree import ComponentElement, read_system
+from .tree import Element, Hop, Path, read_system
 from .units import read_units
 
 
@@ -40,7 +40,7 @@ def read_ssp(path: FilePath, step: float | None = None, stop: float | None = Non
     root = parse(file, archive.read(STRUCTURE), "ssd")
     units = read_units(file, root, "ssd")
     top = read_system(file, child(root, "ssd:System"), units)
-    parts = {p: _part(archive, e) for p, e in elements_of(top) if isinstance(e, ComponentElement)}
+    parts = {e.path: _part(archive, e, e.source) for e in top.within() if e.source is not None}
     if not parts:
         raise InputError(f"{top.place}: system {top.name!r} has no components; must have some")
     network = read_network(top, parts)
@@ -49,10 +49,10 @@ def read_ssp(path: FilePath, step: float | None = None, stop: float | None = Non
     extras = annotated or no_extras(names.values())
     connections = tuple(_connections(network, names, extras))
     values, notes = read_settings(archive, file, network, units)
-    given = [
+    given = (
         _component(names[p], part, values.get(p, {}), extras.components[names[p]])
         for p, part in parts.items()
-    ]
+    )
     components = tuple(_keep_starts(file, given, connections, notes))
     if annotated is None:
         components = _in_order(components, connections, notes)
@@ -74,14 +74,14 @@ def read_ssp(path: FilePath, step: float | None = None, stop: float | None = Non
     )
 
 
-def _part(archive: Archive, element: ComponentElement) -> Part:
+def _part(archive: Archive, element: Element, source: str) -> Part:
     place = f"{element.place}: component {element.name!r}"
-    path = archive.extract(archive.resolve(place, element.source))
+    path = archive.extract(archive.resolve(place, source))
     try:
         interface = read_interface(path)
     except InputError as error:
         reason = str(error).removeprefix(f"{path}: ")
-        raise InputError(f"{place}: {element.source}: {reason}") from error
+        raise InputError(f"{place}: {source}: {reason}") from error
     return Part(element, interface)
 
 
@@ -134,7 +134,7 @@ def _carried(network: Network, hops: list[Hop]) -> Carried:
     variable = network.variable(hops[0].source)
     kind: str = variable.kind
     for hop in hops:
-        place = hop.connection.place
+        place = hop.place
         causality, reached = network.nature(hop.target)
         if variable.causality != "output" or causality == "parameter":
             raise InputError(
@@ -148,7 +148,7 @@ def _carried(network: Network, hops: list[Hop]) -> Carried:
                 "or from Integer to Real"
             )
         kind = reached
-        if hop.connection.transformation and kind != "Real":
+        if hop.transformation and kind != "Real":
             raise InputError(f"{place}: transforms a {kind}; must be Real")
         carried = network.carry(hop, carried)
     return carried

@@ -199,8 +199,8 @@ def _own(system: System, port: Port) -> tuple[Port, Unit | None]:
     """The port under the FMU's own name, and its unit."""
     component = system.component(port.component, str(port))
     own = component.rename.get(port.variable, port.variable)
-    return Port(port.component, own), _declared(
-        component, component.interface.by_name[port.variable]
+    return Port(port.component, own), component.interface.unit(
+        component.interface.by_name[port.variable]
     )
 
 
@@ -209,20 +209,15 @@ def _units(components: Iterable[Component]) -> dict[str, Unit]:
     units: dict[str, Unit] = {}
     for component in components:
         for variable in component.interface.variables:
-            if unit := _declared(component, variable):
+            if unit := component.interface.unit(variable):
                 units.setdefault(unit.name, unit)
     return dict(sorted(units.items()))
 
 
 def _unit(component: Component, variable: Variable, units: Mapping[str, Unit]) -> Unit | None:
     """The unit to write at a variable; none where its name means something else in the archive."""
-    unit = _declared(component, variable)
+    unit = component.interface.unit(variable)
     return unit if unit and same(unit, units[unit.name]) else None
-
-
-def _declared(component: Component, variable: Variable) -> Unit | None:
-    """The unit that the FMU declares for a variable and defines."""
-    return component.interface.units.get(variable.unit or "")
 
 
 def _text(place: str, variable: Variable, value: Value) -> str:
