@@ -1,6 +1,6 @@
 """The order of execution of an archive that names none: along the flow of the data."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 
 
 def flow_order(names: Sequence[str], connections: Iterable[tuple[str, str]]) -> tuple[str, ...]:
@@ -10,10 +10,13 @@ def flow_order(names: Sequence[str], connections: Iterable[tuple[str, str]]) -> 
     sorted by name, and a sequential scheme against the flow delays a value by a step. Inside a loop
     no order is better than that of the file.
     """
-    after: dict[str, set[str]] = {name: set() for name in names}
+    behind: dict[str, set[str]] = {name: set() for name in names}
     for source, target in connections:
-        after[source].add(target)
-    behind = {name: _reachable(after, name) for name in names}
+        behind[source].add(target)
+    for between in names:  # the transitive closure, after Warshall
+        for reached in behind.values():
+            if between in reached:
+                reached |= behind[between]
     order: list[str] = []
     left = list(names)
     while left:
@@ -21,13 +24,3 @@ def flow_order(names: Sequence[str], connections: Iterable[tuple[str, str]]) -> 
         order.append(next(name for name in left if name not in waiting))
         left.remove(order[-1])
     return tuple(order)
-
-
-def _reachable(after: Mapping[str, set[str]], start: str) -> set[str]:
-    found: set[str] = set()
-    ahead = [start]
-    while ahead:
-        new = after[ahead.pop()] - found
-        found |= new
-        ahead += sorted(new)
-    return found

@@ -100,6 +100,10 @@ def read_study(
     random = design["kind"] != "grid" or seeds
     if random and "seed" not in design:
         raise InputError(f"{place}: [design]: no seed; must be a whole number, what is random")
+    own_metrics: tuple[Metric, ...] = ()
+    if "metrics" in table:
+        file = text(f"{place}: metrics", table["metrics"], "the path of a Python file")
+        own_metrics = load_metrics(path.parent / file)
     parameters = tuple(
         _parameter(f"{place}: parameters[{i}]", entry) for i, entry in enumerate(entries)
     )
@@ -117,14 +121,8 @@ def read_study(
         seeds,
         _names(f"{place}: outputs", table.get("outputs", [])),
         _pictures(f"{place}: [figures]", table.get("figures", {})),
-        (*_metrics(place, table.get("metrics"), path.parent), *metrics),
+        (*own_metrics, *metrics),
     )
-
-
-def _metrics(place: str, name: Any, folder: Path) -> tuple[Metric, ...]:
-    if name is None:
-        return ()
-    return load_metrics(folder / text(f"{place}: metrics", name, "the path of a Python file"))
 
 
 def _system(
