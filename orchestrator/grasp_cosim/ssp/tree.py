@@ -4,7 +4,7 @@ What this master cannot run is refused here by its name and line. Geometry and n
 are passed over.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
@@ -18,6 +18,7 @@ FMU = "application/x-fmu-sharedlibrary"
 _SOURCES = ("output", "calculatedParameter")
 _TYPES = ("Real", "Integer", "Boolean", "String", "Enumeration")
 _SIDES = ("start", "end")
+_BINDING = ("ssd:ParameterBindings", "ssd:ParameterBinding")
 
 Path = tuple[str, ...]
 """The names of the elements from the top system, () itself, down to an element."""
@@ -65,35 +66,18 @@ class Hop:
 
 
 @dataclass(frozen=True, slots=True)
-class Content:
-    """A parameter set or mapping: the source of its file, or its element where it is inline."""
-
-    source: str | None
-    inline: Any
-
-
-@dataclass(frozen=True, slots=True)
-class Binding:
-    """A parameter binding; mapping is None where there is none."""
-
-    place: str
-    prefix: str
-    values: Content
-    mapping: Content | None
-
-
-@dataclass(frozen=True, slots=True)
 class Element:
     """A component, the source of whose FMU is in the archive, or a system, which has no source.
 
-    The elements of a system are by name and in the order of the file.
+    The elements of a system are by name and in the order of the file; bindings are the elements of
+    its parameter bindings as they stand.
     """
 
     place: str
     path: Path
     name: str
     connectors: Mapping[str, Connector]
-    bindings: tuple[Binding, ...]
+    bindings: Sequence[Any]
     source: str | None = None
     elements: Mapping[str, "Element"] = field(default_factory=dict)
     hops: tuple[Hop, ...] = ()
@@ -123,7 +107,7 @@ def read_system(file: str, element: Any, units: Mapping[str, Unit], path: Path =
         path,
         name,
         _connectors(file, element, units),
-        tuple(_bindings(file, element)),
+        children(element, *_BINDING),
         elements=_by_name(elements, f"system {name!r}: two elements"),
     )
     connections = children(element, "ssd:Connections", "ssd:Connection")
@@ -175,7 +159,7 @@ def _element(file: str, entry: Any, units: Mapping[str, Unit], parent: Path) -> 
         (*parent, name),
         name,
         _connectors(file, entry, units),
-        tuple(_bindings(file, entry)),
+        children(entry, *_BINDING),
         entry.get("source"),
     )
 
@@ -233,31 +217,3 @@ def _end(place: str, system: Element, element: str | None, name: str) -> tuple[N
     known(f"{place}: {owner.name} has no connector", name, owner.connectors)
     gives_outside = owner.connectors[name].kind in _SOURCES
     return Node(owner.path, name), gives_outside != (owner is system)
-
-
-def _bindings(file: str, element: Any) -> Iterator[Binding]:
-    for entry in children(element, "ssd:ParameterBindings", "ssd:ParameterBinding"):
-        place = f"{at(file, entry)}: {element.get('name')!r}"
-        holder = child(entry, "ssd:ParameterValues")
-        values = _content(place, entry, holder, "parameter-set", "ssv:ParameterSet")
-        mapping = child(entry, "ssd:ParameterMapping")
-        if mapping is not None:
-            mapping = _content(place, mapping, mapping, "parameter-mapping", "ssm:ParameterMapping")
-        yield Binding(place, entry.get("prefix", ""), values, mapping)
-
-
-def _content(place: str, entry: Any, holder: Any, form: str, root: str) -> Content:
-    """The source of a set or mapping, or the element in holder; exactly one of the two."""
-    kind = entry.get("type", f"application/x-ssp-{form}")
-    if kind != f"application/x-ssp-{form}":
-        raise InputError(
-            f"{place}: type {kind!r} is not supported; must be application/x-ssp-{form}"
-        )
-    if entry.get("sourceBase", "SSD") != "SSD":
-        raise InputError(
-            f"{place}: sourceBase 'component' is not supported; put the file into resources/"
-        )
-    content = Content(entry.get("source"), None if holder is None else child(holder, root))
-    if (content.source is None) == (content.inline is None):
-        raise InputError(f"{place}: {form}: must have either a source or an inline {root}")
-    return content
