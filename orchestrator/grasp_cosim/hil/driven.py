@@ -120,7 +120,8 @@ class DrivenFmu:
         changed = [
             (self.interface.by_name[v.name], new)
             for v, old, new in zip(self._signature.request, self._values, values, strict=True)
-            if not _same(old, new) and not (parameters_only and v.causality == "input")
+            if (type(old), old) != (type(new), new)
+            and not (parameters_only and v.causality == "input")
         ]
         self._values = list(values)
         if changed:
@@ -146,10 +147,6 @@ class DrivenFmu:
             self._step = step
             self._bound = self._required().stepper(self._clock, step).python
         return self._bound
-
-
-def _same(old: Value, new: Value) -> bool:
-    return type(old) is type(new) and old == new
 
 
 class _Bound(NamedTuple):

@@ -196,10 +196,8 @@ def _failsafe(interface: Interface, peer: Peer, values: Mapping[str, Value]) -> 
     places = {v.name: i for i, v in enumerate(peer.signature.of("input"))}
     for name in values:
         if name not in places:
-            raise InputError(
-                f"failsafe {name}: no such input of {interface.path.name}; "
-                f"valid: {', '.join(places) or 'none'}"
-            )
+            said = f"failsafe {name}: no such input of {interface.path.name}"
+            raise InputError(f"{said}; valid: {', '.join(places) or 'none'}")
     zero: dict[str, Value] = {"Real": 0.0, "Integer": 0, "Boolean": False, "String": ""}
     found: dict[int, Value] = {}
     for name, place in places.items():

@@ -1,14 +1,7 @@
 """From an SSP 1.0 archive to a system.
 
 What the archive holds is run or refused by name; what the standard lets a tool decide is decided
-here and said in the notes of the system.
-
-- Execution follows the flow of the data, see order.py, in the sequential scheme.
-- SSP has no communication step. It is given (--step), or the smallest step of the FMUs' default
-  experiments that divides the stop time.
-- An input that nothing is connected to keeps its start value.
-- Components in nested systems are named after all systems they are in, joined by an underscore.
-- An archive of ours has an annotation with all that, see annotation.py; then it holds.
+here, as orchestrator/README.md describes, and said in the notes of the system.
 """
 
 import math

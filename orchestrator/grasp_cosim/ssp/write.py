@@ -1,13 +1,6 @@
-"""From a system to an SSP 1.0 archive.
+"""From a system to an SSP 1.0 archive, as orchestrator/README.md describes it.
 
-    SystemStructure.ssd      components, connectors, connections, units, default experiment
-    resources/PLANT.fmu      the FMUs, each once
-    resources/plant.ssv      the values of a component
-
-The connectors have the FMU's own names, so that any tool can run the archive. What SSP has no form
-for is in an annotation, see annotation.py. A connection whose factor and offset are given, or
-follow from units that differ, has a linear transformation and suppresses the conversion of units:
-masters that know no units then compute the same. The same system gives the same bytes.
+The same system gives the same bytes. What SSP has no form for: annotation.py.
 """
 
 import re
