@@ -48,7 +48,8 @@ def read_ssp(path: FilePath, step: float | None = None, stop: float | None = Non
     )
     components = tuple(_keep_starts(file, given, connections, notes))
     if annotated is None:
-        components = _in_order(components, connections, notes)
+        components = flow_order(components, connections)
+        notes.append(f"order of execution: {', '.join(c.name for c in components)}")
     stop_ns = _stop(file, root, stop)
     step_ns = _step(file, parts.values(), stop_ns, step, annotated, notes)
     return System(
@@ -176,18 +177,6 @@ def _keep_starts(
                 )
                 notes.append(f"input {port} is not connected; keeps its start value {start}")
         yield replace(component, values={**component.values, **starts})
-
-
-def _in_order(
-    components: tuple[Component, ...], connections: Iterable[Connection], notes: list[str]
-) -> tuple[Component, ...]:
-    """The components along the flow of the data."""
-    known = {component.name: component for component in components}
-    order = flow_order(
-        tuple(known), [(w.source.component, w.target.component) for w in connections]
-    )
-    notes.append(f"order of execution: {', '.join(order)}")
-    return tuple(known[name] for name in order)
 
 
 def _stop(file: str, root: Any, given: float | None) -> int:

@@ -19,6 +19,7 @@ from ..system.parts import NANOSECONDS, Component, Connection, Port
 from .annotation import extras_of, write_extras
 from .archive import RESOURCES, STRUCTURE, write_archive
 from .document import VERSION, add, new, to_bytes
+from .tree import FMU
 from .units import change, same, write_units
 
 SET = "initialValues"
@@ -117,7 +118,9 @@ def _structure(system: System, sources: Mapping[str, str], bindings: Mapping[str
     units = _units(system.components)
     elements = add(top, "ssd:Elements")
     for component in system.components:
-        _write_component(elements, component, sources, bindings, units)
+        _write_component(
+            elements, component, sources[component.name], bindings.get(component.name), units
+        )
     if system.connections:
         connections = add(top, "ssd:Connections")
         for connection in system.connections:
@@ -132,16 +135,16 @@ def _structure(system: System, sources: Mapping[str, str], bindings: Mapping[str
 def _write_component(
     elements: Any,
     component: Component,
-    sources: Mapping[str, str],
-    bindings: Mapping[str, str],
+    source: str,
+    values: str | None,
     units: Mapping[str, Unit],
 ) -> None:
     element = add(
         elements,
         "ssd:Component",
         name=component.name,
-        type="application/x-fmu-sharedlibrary",
-        source=sources[component.name],
+        type=FMU,
+        source=source,
         implementation="CoSimulation",
     )
     variables = _connected(component)
@@ -152,9 +155,8 @@ def _write_component(
             continue  # an enumeration: its items are in the FMU, so that the type may be left out
         unit = _unit(component, variable, units)
         add(connector, f"ssc:{variable.kind}", **({"unit": unit.name} if unit else {}))
-    if component.name in bindings:
-        held = add(element, "ssd:ParameterBindings")
-        add(held, "ssd:ParameterBinding", source=bindings[component.name])
+    if values:
+        add(add(element, "ssd:ParameterBindings"), "ssd:ParameterBinding", source=values)
 
 
 def _connected(component: Component) -> list[Variable]:

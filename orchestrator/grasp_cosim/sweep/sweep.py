@@ -4,7 +4,7 @@ import json
 import os
 from collections.abc import Generator, Iterable
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -65,7 +65,7 @@ class Sweep:
             "failed": self.failed,
             "first_error": next((o.error for o in self.outcomes if o.error is not None), None),
             "metrics": self.table.summary(),
-            "sensitivity": [s.as_json() for s in self.sensitivities],
+            "sensitivity": [asdict(s) for s in self.sensitivities],
         }
 
 
@@ -109,7 +109,7 @@ def sweep(
         finished = Sweep(study, folder, tuple(done[i] for i in range(study.runs)), resumed)
         write_parquet(finished.table, study, folder / RUNS)
         if finished.sensitivities:
-            found = [s.as_json() for s in finished.sensitivities]
+            found = [asdict(s) for s in finished.sensitivities]
             write_text(folder / SENSITIVITY, json.dumps(found, indent=2) + "\n")
         return finished
 
