@@ -118,7 +118,9 @@ class ServedFmu:
             self._do(action, now)
             return self.peer.outputs(self._fmu.outputs(), self._fmu.time)
         except (InputError, SimulationError, ValueError) as error:
-            return self._fail(str(error))
+            self.counts.failures += 1
+            self._end(str(error))
+            return self.peer.failed(str(error))
 
     def _say_what_is_dropped(self, source: str) -> None:
         """The first time only: whoever looks for the reason of a silence looks here."""
@@ -174,11 +176,6 @@ class ServedFmu:
             self._own_failure = str(error)
             self._say(self._own_failure)
             self._deadline = self._heard = None
-
-    def _fail(self, reason: str) -> bytes:
-        self.counts.failures += 1
-        self._end(reason)
-        return self.peer.failed(reason)
 
     def _end(self, reason: str) -> None:
         """End the session under way, if there is one."""

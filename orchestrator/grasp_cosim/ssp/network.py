@@ -45,10 +45,17 @@ class Carried:
 
 @dataclass(frozen=True)
 class Network:
-    """All systems and components by path, and the hops between their connectors."""
+    """All systems and components by path, and the hops between their connectors.
+
+    InputError at a connector that its FMU lacks.
+    """
 
     systems: Mapping[Path, Element]
     parts: Mapping[Path, Part]
+
+    def __post_init__(self) -> None:
+        for part in self.parts.values():
+            _check_connectors(part)
 
     @cached_property
     def into(self) -> dict[Node, Hop]:
@@ -137,13 +144,6 @@ class Network:
                 return None in (self.unit(node) for node in nodes)  # says what they are
             direct = change(hops[-1].place, units[0], units[1])
         return direct == (carried.factor, carried.offset)
-
-
-def read_network(top: Element, parts: Mapping[Path, Part]) -> Network:
-    """The net of a system and of those in it; InputError at a connector that its FMU lacks."""
-    for part in parts.values():
-        _check_connectors(part)
-    return Network({e.path: e for e in top.within() if e.source is None}, parts)
 
 
 def _check_connectors(part: Part) -> None:

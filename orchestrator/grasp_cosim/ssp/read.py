@@ -7,7 +7,7 @@ here, as orchestrator/README.md describes, and said in the notes of the system.
 import math
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -16,10 +16,10 @@ from ..interface.interface import Value
 from ..interface.read import read_interface
 from ..system.description import System, in_nanoseconds
 from ..system.parts import NANOSECONDS, Component, Connection, Port
-from .annotation import TYPE, Beside, Extras, no_extras, read_extras
+from .annotation import TYPE, Extras, no_extras, read_extras
 from .archive import STRUCTURE, Archive
 from .document import at, child, children, parse, qualified
-from .network import Carried, Network, Part, read_network
+from .network import Carried, Network, Part
 from .order import flow_order
 from .parameters import read_settings
 from .tree import Element, Hop, Path, read_system
@@ -36,16 +36,17 @@ def read_ssp(path: FilePath, step: float | None = None, stop: float | None = Non
     parts = {e.path: _part(archive, e, e.source) for e in top.within() if e.source is not None}
     if not parts:
         raise InputError(f"{top.place}: system {top.name!r} has no components; must have some")
-    network = read_network(top, parts)
+    network = Network({e.path: e for e in top.within() if e.source is None}, parts)
     names = _names(file, parts)
     annotated = _annotated(file, root, names.values())
     extras = annotated or no_extras(names.values())
     connections = tuple(_connections(network, names, extras))
     values, notes = read_settings(archive, file, network, units)
-    given = (
-        _component(names[p], part, values.get(p, {}), extras.components[names[p]])
-        for p, part in parts.items()
-    )
+    given = []
+    for at_path, part in parts.items():
+        beside = extras.components[names[at_path]]
+        own = {beside.new(name): value for name, value in values.get(at_path, {}).items()}
+        given.append(Component(names[at_path], part.interface.path, own, **asdict(beside)))
     components = tuple(_keep_starts(file, given, connections, notes))
     if annotated is None:
         components = flow_order(components, connections)
@@ -146,18 +147,6 @@ def _carried(network: Network, hops: list[Hop]) -> Carried:
             raise InputError(f"{place}: transforms a {kind}; must be Real")
         carried = network.carry(hop, carried)
     return carried
-
-
-def _component(name: str, part: Part, values: Mapping[str, Value], beside: Beside) -> Component:
-    """The component with the values it is given, under the system's names."""
-    return Component(
-        name,
-        part.interface.path,
-        {beside.new(own): value for own, value in values.items()},
-        beside.rename,
-        beside.step_ns,
-        beside.isolation,
-    )
 
 
 def _keep_starts(

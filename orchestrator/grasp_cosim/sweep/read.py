@@ -73,15 +73,10 @@ def read_study(
     parameters = tuple(
         _parameter(f"{place}: parameters[{i}]", entry) for i, entry in enumerate(entries)
     )
+    varied = {*seeds, *(v for p in parameters for v in p.variables)}
     return Study(
         place,
-        _system(
-            place,
-            table,
-            path.parent,
-            (load, preset),
-            {*seeds, *(v for p in parameters for v in p.variables)},
-        ),
+        _system(place, table, path.parent, (load, preset), varied),
         parameters,
         _in(place, lambda: Design(**design)),
         seeds,
