@@ -52,7 +52,7 @@ def relayed(
     delivered: list[tuple[int, Direction, int]] = []
 
     def deliver(until: float) -> None:
-        while (due := traffic.next_due) is not None and due <= until:
+        while (due := traffic.next_due()) is not None and due <= until:
             held = traffic.take(due)
             assert held is not None
             assert held.data == b"%d" % held.number
@@ -168,7 +168,7 @@ def test_the_room_is_for_both_directions_together() -> None:
     assert request == Counters(received=3, duplicated=3, held=3, overflow=3)
     assert reply == Counters(received=3, duplicated=3, held=2, overflow=4)
     assert traffic.take(10**9 - 1) is None
-    assert traffic.next_due == 10**9
+    assert traffic.next_due() == 10**9
 
 
 def test_what_this_machine_refuses_to_send_is_counted() -> None:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from grasp_cosim.errors import InputError
 from grasp_cosim.fmi.load import load_here
+from grasp_cosim.hil.driven import DrivenFmu
 from grasp_cosim.hil.protocol import link_signature
 from grasp_cosim.hil.served import BACKLOG, ServedFmu, Service
 from grasp_cosim.interface.interface import Value
@@ -302,12 +303,14 @@ def test_what_a_proxy_cannot_exchange_is_refused_by_name(tmp_path: Path) -> None
         link_signature(read_interface(fmu))
 
 
-def test_an_output_that_is_not_finite_is_a_failure(tmp_path: Path, clocked: MakeClocked) -> None:
+def test_an_output_that_is_not_finite_is_a_failure(
+    tmp_path: Path, clocked: MakeClocked, monkeypatch: pytest.MonkeyPatch
+) -> None:
     fmu = native_fmus.build(tmp_path, "Native", "2.0")
     it = clocked(fmu, Service(lockstep=True))
     it.proxy.begin(1, starts(fmu))
-    served = it.served
-    served._fmu._get = lambda: [math.nan] * len(served.peer.signature.answer)
+    nothing_finite = [math.nan] * len(it.served.peer.signature.answer)
+    monkeypatch.setattr(DrivenFmu, "_get", lambda *_: nothing_finite)
     with pytest.raises(RuntimeError, match=r"= nan at t = 0\.001 s: must be finite"):
         it.proxy.step(0.0, STEP, starts(fmu))
 

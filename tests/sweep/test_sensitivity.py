@@ -37,7 +37,7 @@ def test_they_are_those_known(values: Floats) -> None:
     found = sensitivity("y", NAMES, values, 1)
     assert found is not None
     for index, first, total in zip(
-        found.indices, (0.3139, 0.4424, 0.0), (0.5576, 0.4424, 0.2437), strict=True
+        found.parameters, (0.3139, 0.4424, 0.0), (0.5576, 0.4424, 0.2437), strict=True
     ):
         assert index.first == pytest.approx(first, abs=0.06)
         assert index.total == pytest.approx(total, abs=0.06)
@@ -53,7 +53,7 @@ def test_a_row_with_a_failed_run_is_left_out(values: Floats) -> None:
     assert found is not None
     assert (found.rows, found.of) == (1024 - 2, 1024)
     rows = np.delete(values.reshape(-1, 5), [1, 100], axis=0)
-    assert [i.first for i in found.indices] == indices(rows)[0].tolist()
+    assert [i.first for i in found.parameters] == indices(rows)[0].tolist()
 
 
 @pytest.mark.parametrize("scale", [1e-300, 1e300])
@@ -61,7 +61,7 @@ def test_they_do_not_depend_on_the_unit(values: Floats, scale: float) -> None:
     few, scaled = (sensitivity("y", NAMES, v[:320], 1) for v in (values, scale * values))
     assert few is not None
     assert scaled is not None
-    for one, other in zip(few.indices, scaled.indices, strict=True):
+    for one, other in zip(few.parameters, scaled.parameters, strict=True):
         assert other.first == pytest.approx(one.first, rel=1e-9, abs=1e-12)
         assert other.total_interval == pytest.approx(one.total_interval, rel=1e-9, abs=1e-12)
 
@@ -83,8 +83,8 @@ def test_noise_is_no_part_of_any_parameter_s_effect(grasp: System) -> None:
     found = sensitivity("y", ["x", "inert"], np.array([value(k) for k in range(study.runs)]), 1)
     assert found is not None
     share = 1.0 / 3.0  # of x: a variance of 0.2^2/12, and the two of noise have it each
-    assert [i.first for i in found.indices] == pytest.approx([share, 0.0], abs=0.08)
-    assert [i.total for i in found.indices] == pytest.approx([share, 0.0], abs=0.08)
+    assert [i.first for i in found.parameters] == pytest.approx([share, 0.0], abs=0.08)
+    assert [i.total for i in found.parameters] == pytest.approx([share, 0.0], abs=0.08)
 
 
 def test_rounding_is_no_variance() -> None:

@@ -68,7 +68,12 @@ class DrivenFmu:
 
     def set(self, values: Sequence[Value]) -> None:
         """Set inputs, and the parameters that are not what they were."""
-        self._put(values)
+        instance, (calls, texts) = self._required(), self._inputs
+        for places, _, data, call in calls:
+            data[:] = [values[i] for i in places]
+            _check(instance, call())
+        if texts:
+            instance.set(list(texts.values()), [values[i] for i in texts])
         self._set_changed(values, parameters_only=True)
 
     def advance(self, time: float, step: float) -> None:
@@ -85,7 +90,7 @@ class DrivenFmu:
     def outputs(self) -> list[Value]:
         """Return the outputs now, in the order of the signature."""
         instance = self._required()
-        values = self._get() if self._stepping else instance.get(self._outputs)
+        values = self._get(instance) if self._stepping else instance.get(self._outputs)
         for v, value in zip(self._outputs, values, strict=True):
             if isinstance(value, float) and not isfinite(value):
                 raise SimulationError(
@@ -111,16 +116,28 @@ class DrivenFmu:
         starts = {v.name: x for v, x in zip(self._signature.request, values, strict=True)}
         instance.enter_initialization(starts, None, time)
         self._values, self.time = list(values), time
-        inputs, answer = self._signature.of("input"), self._signature.answer
-        self._put = _putter(instance, inputs)
-        self._get = _getter(instance, answer)
+        self._inputs = _bound(instance, "set", self._signature.of("input"))
+        self._answer = _bound(instance, "get", self._signature.answer)
         self._step, self._bound = 0.0, None
+
+    def _get(self, instance: Instance) -> list[Value]:
+        calls, texts = self._answer
+        values: list[Value] = [0.0] * len(self._outputs)
+        for places, kind, data, call in calls:
+            _check(instance, call())
+            for i, value in zip(places, data.tolist(), strict=True):
+                values[i] = kind(value)
+        if texts:
+            for i, value in zip(texts, instance.get(list(texts.values())), strict=True):
+                values[i] = value
+        return values
 
     def _set_changed(self, values: Sequence[Value], parameters_only: bool = False) -> None:
         changed = [
             (self.interface.by_name[v.name], new)
             for v, old, new in zip(self._signature.request, self._values, values, strict=True)
-            if not _same(old, new) and not (parameters_only and v.causality == "input")
+            if (type(old), old) != (type(new), new)
+            and not (parameters_only and v.causality == "input")
         ]
         self._values = list(values)
         if changed:
@@ -146,10 +163,6 @@ class DrivenFmu:
             self._step = step
             self._bound = self._required().stepper(self._clock, step).python
         return self._bound
-
-
-def _same(old: Value, new: Value) -> bool:
-    return type(old) is type(new) and old == new
 
 
 class _Bound(NamedTuple):
@@ -182,40 +195,6 @@ def _bound(
     return calls, texts
 
 
-def _checked(instance: Instance, status: int) -> None:
+def _check(instance: Instance, status: int) -> None:
     if status > WARNING:
         raise instance.failure(status, 0.0)
-
-
-def _putter(
-    instance: Instance, variables: Sequence[LinkVariable]
-) -> Callable[[Sequence[Value]], None]:
-    """A function that sets these variables from the beginning of a list of values."""
-    calls, texts = _bound(instance, "set", variables)
-
-    def put(values: Sequence[Value]) -> None:
-        for places, _, data, call in calls:
-            data[:] = [values[i] for i in places]
-            _checked(instance, call())
-        if texts:
-            instance.set(list(texts.values()), [values[i] for i in texts])
-
-    return put
-
-
-def _getter(instance: Instance, variables: Sequence[LinkVariable]) -> Callable[[], list[Value]]:
-    """A function that gets the values of these variables, in their order."""
-    calls, texts = _bound(instance, "get", variables)
-    values: list[Value] = [0.0] * len(variables)
-
-    def get() -> list[Value]:
-        for places, kind, data, call in calls:
-            _checked(instance, call())
-            for i, value in zip(places, data.tolist(), strict=True):
-                values[i] = kind(value)
-        if texts:
-            for i, value in zip(texts, instance.get(list(texts.values())), strict=True):
-                values[i] = value
-        return list(values)
-
-    return get

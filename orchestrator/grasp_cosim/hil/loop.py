@@ -18,12 +18,19 @@ LARGEST = 65_536
 class Loop:
     """Listens at a port once it is made; `run` calls the handlers. Leaving the context closes it.
 
-    A subclass registers a handler for each socket, and says in `due` and `look` what time asks for.
-    InputError where the address has no IPv4 address of this machine, or the port is taken.
+    `due` returns when there is something to do next, in ns of the clock, None for not by time;
+    `look` does what is due at a time. InputError where the address has no IPv4 address of this
+    machine, or the port is taken.
     """
 
-    def __init__(self, address: Address, clock: Callable[[], int] = time.monotonic_ns) -> None:
-        self._clock = clock  # ns
+    def __init__(
+        self,
+        address: Address,
+        due: Callable[[], int | None],
+        look: Callable[[int], None],
+        clock: Callable[[], int] = time.monotonic_ns,
+    ) -> None:
+        self._due, self._look, self._clock = due, look, clock
         self._lock = threading.Lock()  # handlers work on what other threads may read
         self._stopping = False
         with ExitStack() as stack:
@@ -40,14 +47,6 @@ class Loop:
         """Have `handler` called whenever there is something to receive at a socket."""
         self._selector.register(readable, selectors.EVENT_READ, handler)
 
-    def due(self) -> int | None:
-        """Return when `look` has something to do next, in ns of the clock; None: not by time."""
-        raise NotImplementedError
-
-    def look(self, now: int) -> None:
-        """Do what is due at `now`, in ns of the clock."""
-        raise NotImplementedError
-
     def run(self, duration_ns: int | None = None, done: Callable[[], bool] = lambda: False) -> None:
         """Go on until `stop`, until `done`, or for a duration in ns.
 
@@ -63,14 +62,14 @@ class Loop:
     def turn(self, wait_ns: int | None) -> None:
         """Wait for a datagram, for what is due, for `stop` or `wait_ns`; then do what there is."""
         waits = [] if wait_ns is None else [wait_ns]
-        if (due := self.due()) is not None:
+        if (due := self._due()) is not None:
             waits.append(max(due - self._clock(), 0))
         ready = self._selector.select(min(waits) / NANOSECONDS if waits else None)
         with self._lock:
             # the port last: its handler may close another socket that is ready, too
             for key, _ in sorted(ready, key=lambda r: r[0].fileobj is self.port_socket):
                 key.data()
-            self.look(self._clock())
+            self._look(self._clock())
 
     def stop(self) -> None:
         """Make `run` return; may be called from any thread, a signal handler, and repeatedly."""

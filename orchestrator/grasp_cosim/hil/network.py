@@ -8,7 +8,6 @@ import hashlib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import Literal, NamedTuple, get_args
 
 from ..checks import number, whole
@@ -75,10 +74,6 @@ class Outage:
         return self.start <= now < self.until
 
 
-def _undisturbed() -> Mapping[Direction, Conditions]:
-    return MappingProxyType(dict.fromkeys(DIRECTIONS, Conditions()))
-
-
 @dataclass(frozen=True, slots=True)
 class Network:
     """Both directions, the outages, the seed, and how many datagrams may be under way at once.
@@ -86,7 +81,9 @@ class Network:
     InputError where seed is no whole number from 0 on, or capacity none from 1 on.
     """
 
-    conditions: Mapping[Direction, Conditions] = field(default_factory=_undisturbed)
+    conditions: Mapping[Direction, Conditions] = field(
+        default_factory=lambda: dict.fromkeys(DIRECTIONS, Conditions())
+    )
     outages: tuple[Outage, ...] = ()
     seed: int = 0
     capacity: int = 4096

@@ -49,7 +49,7 @@ class Relay(Loop):
         self._traffic = Traffic[_Client](network or Network(), log)
         self._clients: dict[Address, _Client] = {}
         self.peer = resolved(*peer, lowest_port=1)
-        super().__init__((host, port), clock)
+        super().__init__((host, port), self._traffic.next_due, self._send_due, clock)
         self._stack.callback(self._forget_clients)
         self.register(self.port_socket, self._request)
         try:
@@ -64,12 +64,7 @@ class Relay(Loop):
         with self._lock:
             return self._traffic.snapshot()
 
-    def due(self) -> int | None:
-        """Return when the next datagram has to go on, in ns; None where none is under way."""
-        return self._traffic.next_due
-
-    def look(self, now: int) -> None:
-        """Send what has to go on by `now`, in ns."""
+    def _send_due(self, now: int) -> None:
         while held := self._traffic.take(now):
             self._traffic.settle(held, self._sent(held))
 

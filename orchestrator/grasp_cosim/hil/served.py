@@ -118,7 +118,9 @@ class ServedFmu:
             self._do(action, now)
             return self.peer.outputs(self._fmu.outputs(), self._fmu.time)
         except (InputError, SimulationError, ValueError) as error:
-            return self._fail(str(error))
+            self.counts.failures += 1
+            self._end(str(error))
+            return self.peer.failed(str(error))
 
     def _say_what_is_dropped(self, source: str) -> None:
         """The first time only: whoever looks for the reason of a silence looks here."""
@@ -175,11 +177,6 @@ class ServedFmu:
             self._say(self._own_failure)
             self._deadline = self._heard = None
 
-    def _fail(self, reason: str) -> bytes:
-        self.counts.failures += 1
-        self._end(reason)
-        return self.peer.failed(reason)
-
     def _end(self, reason: str) -> None:
         """End the session under way, if there is one."""
         was_one, self._in_session = self._in_session, False
@@ -196,10 +193,8 @@ def _failsafe(interface: Interface, peer: Peer, values: Mapping[str, Value]) -> 
     places = {v.name: i for i, v in enumerate(peer.signature.of("input"))}
     for name in values:
         if name not in places:
-            raise InputError(
-                f"failsafe {name}: no such input of {interface.path.name}; "
-                f"valid: {', '.join(places) or 'none'}"
-            )
+            said = f"failsafe {name}: no such input of {interface.path.name}"
+            raise InputError(f"{said}; valid: {', '.join(places) or 'none'}")
     zero: dict[str, Value] = {"Real": 0.0, "Integer": 0, "Boolean": False, "String": ""}
     found: dict[int, Value] = {}
     for name, place in places.items():

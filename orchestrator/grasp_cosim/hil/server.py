@@ -26,20 +26,12 @@ class Server(Loop):
         self.fmu = fmu
         self._say = say
         try:
-            super().__init__(address)
+            super().__init__(address, fmu.due, fmu.look)
         except InputError:
             fmu.close()
             raise
         self._stack.callback(fmu.close)
         self.register(self.port_socket, self._receive)
-
-    def due(self) -> int | None:
-        """Return when the FMU has something to do next, in ns; None: not before a request."""
-        return self.fmu.due()
-
-    def look(self, now: int) -> None:
-        """Do what is due by the FMU's own clock at `now`, in ns."""
-        self.fmu.look(now)
 
     def serve(self, sessions: int | None = None, duration_ns: int | None = None) -> None:
         """Serve until `stop`, or for so many sessions or so long."""
@@ -54,11 +46,8 @@ class Server(Loop):
                 return
             datagram, source = found
             answer = self.fmu.answer(datagram, text(source), time.monotonic_ns())
-            if answer is not None:
-                self._send(answer, source)
-
-    def _send(self, answer: bytes, source: Address) -> None:
-        try:
-            self.port_socket.sendto(answer, source)
-        except OSError as error:  # to the proxy it is a lost datagram
-            self._say(f"{text(source)}: not sent: {error.strerror or error}")
+            try:
+                if answer is not None:
+                    self.port_socket.sendto(answer, source)
+            except OSError as error:  # to the proxy it is a lost datagram
+                self._say(f"{text(source)}: not sent: {error.strerror or error}")

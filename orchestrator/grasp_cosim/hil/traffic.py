@@ -100,7 +100,6 @@ class Traffic(Generic[Route]):
         for copy, passage in enumerate(passages):
             self._let_through(held, copy, passage, now)
 
-    @property
     def next_due(self) -> int | None:
         """The time at which the next datagram has to go on; None where none is under way."""
         return self._held[0][0] if self._held else None

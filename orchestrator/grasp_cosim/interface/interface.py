@@ -222,6 +222,10 @@ class Interface:
         step = self.experiment.get("step_size")
         return None if step is None else float(step)
 
+    def unit(self, variable: Variable) -> Unit | None:
+        """The unit that is declared for a variable, if it is defined, too."""
+        return self.units.get(variable.unit or "")
+
     def of(self, *causalities: str) -> list[Variable]:
         """The variables of the given causalities, in the order of declaration."""
         return [v for v in self.variables if v.causality in causalities]

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ..errors import InputError
+from ..checks import extra_module
 from ..fmi import instance
 from ..fmi.instance import (
     CLOCK,
@@ -87,13 +87,7 @@ def compiled_loop() -> Callable[..., tuple[int, int, int]]:
 
     InputError without numba.
     """
-    try:
-        import numba
-    except ImportError as error:
-        raise InputError(
-            "numba is not installed, it compiles the loop; "
-            "install it with: pip install 'grasp-cosim[fast]'"
-        ) from error
+    numba = extra_module("numba", "it compiles the loop", "fast")
     _register_invoke()
     _register_buffers()
     before = numba.config.CACHE_DIR

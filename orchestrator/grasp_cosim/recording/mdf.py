@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 import numpy.typing as npt
 
+from ..checks import extra_module
 from ..errors import InputError, SimulationError
 from ..files import in_one_piece, unwritable
 from .listener import Experiment, Signal, times
@@ -101,13 +102,7 @@ class MdfListener:
 
 def check_mdf() -> None:
     """InputError without asammdf."""
-    try:
-        import asammdf  # noqa: F401
-    except ImportError as error:
-        raise InputError(
-            "asammdf is not installed, it writes MDF files; "
-            "install it with: pip install 'grasp-cosim[mdf]'"
-        ) from error
+    extra_module("asammdf", "it writes MDF files", "mdf")
 
 
 def _channel(signal: Signal) -> asammdf.Signal:

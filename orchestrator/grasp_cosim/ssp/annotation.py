@@ -59,16 +59,9 @@ def no_extras(components: Iterable[str]) -> Extras:
 
 def extras_of(system: System) -> Extras:
     """The extras of a system."""
-    return Extras(
-        system.step_ns,
-        system.scheme,
-        {c.name: Beside(dict(c.rename), c.step_ns, c.isolation) for c in system.components},
-        system.initialisation,
-        system.events,
-        system.faults,
-        system.roles,
-        system.presets,
-    )
+    shared = {f.name: getattr(system, f.name) for f in fields(Extras)}
+    beside = {c.name: Beside(dict(c.rename), c.step_ns, c.isolation) for c in system.components}
+    return Extras(**{**shared, "components": beside})
 
 
 def write_extras(annotations: Any, extras: Extras) -> None:
@@ -121,7 +114,8 @@ def _typed(kind: Any, value: Any) -> Any:
     if origin is tuple:
         return tuple(_typed(arguments[0], entry) for entry in _typed(list, value))
     if origin in (Union, UnionType):
-        return None if value is None and type(None) in arguments else _one_of(arguments, value)
+        fitting = [alternative for alternative in arguments if alternative is type(value)]
+        return _typed((fitting or arguments)[0], value)
     if origin is Literal:
         if value not in arguments:
             raise ValueError(f"{value!r}: must be one of {choices(arguments)}")
@@ -129,9 +123,3 @@ def _typed(kind: Any, value: Any) -> Any:
     if type(value) is not kind and (kind, type(value)) != (float, int):
         raise ValueError(f"{value!r}: must be of type {kind.__name__}")
     return value
-
-
-def _one_of(kinds: tuple[Any, ...], value: Any) -> Any:
-    """The value as the first of the types that it fits."""
-    fitting = [kind for kind in kinds if kind is type(value)]
-    return _typed(fitting[0] if fitting else kinds[0], value)

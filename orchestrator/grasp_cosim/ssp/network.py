@@ -10,51 +10,23 @@ all. So the standard has it: schema of SSP 1.0, LinearTransformation and suppres
 A connector of a system without a unit passes on that of the value.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from ..checks import known
 from ..errors import InputError, choices
 from ..interface.interface import Interface, Variable
 from ..interface.units import Unit
-from .tree import ComponentElement, Connection, Connector, End, SystemElement
+from .tree import Element, Hop, Node, Path
 from .units import change, same
-
-Path = tuple[str, ...]
-"""The names of the elements from the top system, () itself, down to an element."""
-
-
-@dataclass(frozen=True, slots=True)
-class Node:
-    """A connector, or a variable of a component."""
-
-    path: Path
-    name: str
-
-    def __str__(self) -> str:
-        return ".".join((*self.path, self.name))
-
-
-@dataclass(frozen=True, slots=True)
-class Hop:
-    """The connection that leads from source to target."""
-
-    connection: Connection
-    source: Node
-    target: Node
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
     """A component: its element, and its interface under the FMU's own names."""
 
-    element: ComponentElement
+    element: Element
     interface: Interface
-
-    def unit(self, name: str) -> Unit | None:
-        """The unit that the FMU declares for a variable and defines."""
-        return self.interface.units.get(self.interface.by_name[name].unit or "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,24 +45,29 @@ class Carried:
 
 @dataclass(frozen=True)
 class Network:
-    """All systems and components by path, and the hops between their connectors."""
+    """All systems and components by path, and the hops between their connectors.
 
-    systems: Mapping[Path, SystemElement]
+    InputError at a connector that its FMU lacks.
+    """
+
+    systems: Mapping[Path, Element]
     parts: Mapping[Path, Part]
+
+    def __post_init__(self) -> None:
+        for part in self.parts.values():
+            _check_connectors(part)
 
     @cached_property
     def into(self) -> dict[Node, Hop]:
         """The hop that leads to a node; InputError where there are two."""
         into: dict[Node, Hop] = {}
-        for path, system in self.systems.items():
-            for connection in system.connections:
-                hop = self._directed(path, system, connection)
-                if hop.target in into:
-                    raise InputError(
-                        f"{connection.place}: {hop.target} has two sources, "
-                        f"{into[hop.target].source} and {hop.source}; must have one"
-                    )
-                into[hop.target] = hop
+        for hop in (hop for system in self.systems.values() for hop in system.hops):
+            if hop.target in into:
+                raise InputError(
+                    f"{hop.place}: {hop.target} has two sources, "
+                    f"{into[hop.target].source} and {hop.source}; must have one"
+                )
+            into[hop.target] = hop
         return into
 
     @cached_property
@@ -107,7 +84,7 @@ class Network:
         while node in self.into:
             hop = self.into[node]
             if hop in hops:
-                raise InputError(f"{hop.connection.place}: leads back to itself")
+                raise InputError(f"{hop.place}: leads back to itself")
             hops.insert(0, hop)
             node = hop.source
         return hops
@@ -123,7 +100,7 @@ class Network:
         if part is None:
             return self.systems[node.path].connectors[node.name].unit
         connector = part.element.connectors.get(node.name)
-        return part.unit(node.name) or (connector.unit if connector else None)
+        return part.interface.unit(self.variable(node)) or (connector.unit if connector else None)
 
     def variable(self, node: Node) -> Variable:
         """The variable of a node of a component."""
@@ -135,20 +112,20 @@ class Network:
             variable = self.variable(node)
             return variable.causality, variable.kind
         connector = self.systems[node.path].connectors[node.name]
-        return connector.kind, kind_of(connector)
+        return connector.kind, connector.value_kind
 
     def carry(self, hop: Hop, carried: Carried) -> Carried:
         """Return what is carried after one more hop; InputError where units do not fit."""
-        place, target = hop.connection.place, self.unit(hop.target)
+        place, target = hop.place, self.unit(hop.target)
         factor, offset, unit = carried.factor, carried.offset, carried.unit
-        if unit and target and not hop.connection.suppress:
+        if unit and target and not hop.suppress:
             if not carried.settled and not same(unit, target):
                 raise InputError(
                     f"{place}: the unit at {hop.source} is not clear, {unit.name} or "
                     f"{target.name}; give that connector a unit"
                 )
             factor, offset = _after(factor, offset, change(place, unit, target))
-        transformation = hop.connection.transformation
+        transformation = hop.transformation
         if transformation is not None:
             factor, offset = _after(factor, offset, transformation)
         settled = target is not None or (carried.settled and transformation is None)
@@ -156,55 +133,17 @@ class Network:
 
     def decided_by_units(self, hops: list[Hop], carried: Carried) -> bool:
         """True if the units that the two FMUs declare say all about the way along the hops."""
-        if any(h.connection.suppress or h.connection.transformation for h in hops):
+        if any(h.suppress or h.transformation for h in hops):
             return False
         nodes = hops[0].source, hops[-1].target
         names = [self.variable(node).unit for node in nodes]
-        units = [self.parts[node.path].unit(node.name) for node in nodes]
+        units = [self.parts[node.path].interface.unit(self.variable(node)) for node in nodes]
         direct = (1.0, 0.0)
         if None not in names and names[0] != names[1]:
             if units[0] is None or units[1] is None:  # a connection is refused, unless the archive
                 return None in (self.unit(node) for node in nodes)  # says what they are
-            direct = change(hops[-1].connection.place, units[0], units[1])
+            direct = change(hops[-1].place, units[0], units[1])
         return direct == (carried.factor, carried.offset)
-
-    def _directed(self, path: Path, system: SystemElement, connection: Connection) -> Hop:
-        (a, gives_a), (b, gives_b) = (
-            self._end(path, system, end, connection.place) for end in connection.ends
-        )
-        if gives_a == gives_b:
-            raise InputError(
-                f"{connection.place}: both {'give' if gives_a else 'take'} a value; "
-                "must lead from one that gives to one that takes"
-            )
-        return Hop(connection, a, b) if gives_a else Hop(connection, b, a)
-
-    def _end(self, path: Path, system: SystemElement, end: End, place: str) -> tuple[Node, bool]:
-        """The node of an end, and whether it gives a value in the system."""
-        if end.element is None:
-            connector = _connector(place, system.name, system.connectors, end.connector)
-            return Node(path, end.connector), not connector.gives
-        known(f"{place}: no element", end.element, system.elements)
-        connectors = system.elements[end.element].connectors
-        connector = _connector(place, end.element, connectors, end.connector)
-        return Node((*path, end.element), end.connector), connector.gives
-
-
-def read_network(top: SystemElement, part: Mapping[Path, Part]) -> Network:
-    """The net of a system and of those in it; InputError at a connector that its FMU lacks."""
-    for component in part.values():
-        _check_connectors(component)
-    return Network({p: e for p, e in elements_of(top) if isinstance(e, SystemElement)}, part)
-
-
-def elements_of(
-    element: ComponentElement | SystemElement, path: Path = ()
-) -> Iterator[tuple[Path, ComponentElement | SystemElement]]:
-    """The element and all in it, with their paths, in the order of the file."""
-    yield path, element
-    if isinstance(element, SystemElement):
-        for name, inner in element.elements.items():
-            yield from elements_of(inner, (*path, name))
 
 
 def _check_connectors(part: Part) -> None:
@@ -216,25 +155,15 @@ def _check_connectors(part: Part) -> None:
                 f"{place}: {part.interface.path.name} has no {connector.kind} of that name; "
                 f"valid: {choices(v.name for v in part.interface.of(connector.kind))}"
             )
-        kind = kind_of(connector)
+        kind = connector.value_kind
         if kind is not None and kind != variable.kind:
             raise InputError(f"{place}: {connector.type}; the FMU has {variable.kind}")
-        declared = part.unit(connector.name)
+        declared = part.interface.unit(variable)
         if declared and connector.unit and not same(declared, connector.unit):
             raise InputError(
                 f"{place}: unit {connector.unit.name} is not what the FMU declares, "
                 f"{declared.name}; must mean the same"
             )
-
-
-def kind_of(connector: Connector) -> str | None:
-    """The kind of value, as an interface has it; None where the type is left out."""
-    return "Integer" if connector.type == "Enumeration" else connector.type
-
-
-def _connector(place: str, owner: str, connectors: Mapping[str, Connector], name: str) -> Connector:
-    known(f"{place}: {owner} has no connector", name, connectors)
-    return connectors[name]
 
 
 def _after(factor: float, offset: float, step: tuple[float, float]) -> tuple[float, float]:

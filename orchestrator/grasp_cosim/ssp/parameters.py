@@ -17,9 +17,9 @@ from ..errors import InputError, choices
 from ..interface.interface import SETTABLE, Value
 from ..interface.units import Unit
 from .archive import Archive
-from .document import at, checked, children, is_true, parse, short
-from .network import Carried, Network, Node, Path, kind_of
-from .tree import Binding, Content, linear, transformation
+from .document import ROOTS, at, checked, child, children, is_true, parse, short
+from .network import Carried, Network
+from .tree import Element, Node, Path, linear, transformation
 from .units import change, named, read_units
 
 _READERS: Mapping[str, Callable[[str], Value]] = {
@@ -30,6 +30,9 @@ _READERS: Mapping[str, Callable[[str], Value]] = {
     "Enumeration": str,
 }
 """From the text of a value to the value, by SSP type; an enumeration by name."""
+
+_KINDS = {"ssv": "parameter-set", "ssm": "parameter-mapping"}
+Units = Mapping[str, Unit]
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +60,7 @@ class Given:
 
 
 def read_settings(
-    archive: Archive, file: str, network: Network, units: Mapping[str, Unit]
+    archive: Archive, file: str, network: Network, units: Units
 ) -> tuple[dict[Path, dict[str, Value]], list[str]]:
     """The value that holds for each variable that is given one; what was not used.
 
@@ -65,9 +68,14 @@ def read_settings(
     """
     values: dict[Path, dict[str, Value]] = {}
     notes: list[str] = []
-    for path, binding in _bindings(network):
-        for given in _given(archive, file, binding, units, notes):
-            ends = list(_ends(network, path, given))
+    for element, binding in _bindings(network):
+        place = f"{at(file, binding)}: {element.name!r}"
+        for given in _given(archive, file, place, binding, units, notes):
+            ends = [
+                arrived
+                for node in _nodes(network, element.path, given.name)
+                for arrived in _spread(network, node, _adapted(network, node, given))
+            ]
             if not ends:
                 notes.append(f"{given.parameter.place}: no {given.name!r} to give it to; not used")
             for end, parameter in ends:
@@ -79,89 +87,30 @@ def read_settings(
     return values, notes
 
 
-def _bindings(network: Network) -> Iterator[tuple[Path, Binding]]:
-    """All bindings with the path of what they are at; who goes before another comes after it."""
-    for path, part in network.parts.items():
-        for binding in part.element.bindings:
-            yield path, binding
-    for path in sorted(network.systems, key=len, reverse=True):
-        for binding in network.systems[path].bindings:
-            yield path, binding
+def _bindings(network: Network) -> Iterator[tuple[Element, Any]]:
+    """All bindings with what they are at; who goes before another comes after it."""
+    components = (part.element for part in network.parts.values())
+    inner_first = sorted(network.systems.values(), key=lambda e: len(e.path), reverse=True)
+    for element in (*components, *inner_first):
+        for binding in element.bindings:
+            yield element, binding
 
 
 def _given(
-    archive: Archive, file: str, binding: Binding, units: Mapping[str, Unit], notes: list[str]
+    archive: Archive, file: str, place: str, binding: Any, units: Units, notes: list[str]
 ) -> Iterator[Given]:
     """Yield what a binding gives; `notes` get what is not mapped."""
-    parameters = {
-        binding.prefix + name: parameter
-        for name, parameter in _set(archive, file, binding, units).items()
-    }
-    if binding.mapping is None:
+    holder = child(binding, "ssd:ParameterValues")
+    place_of_set, root = _document(archive, file, place, binding, holder, "ssv")
+    inherited = units if place_of_set == file else {}
+    parameters = _set(place_of_set, root, binding.get("prefix", ""), inherited)
+    mapping = child(binding, "ssd:ParameterMapping")
+    if mapping is None:
         for name, parameter in parameters.items():
             yield Given(name, parameter, False, None)
         return
-    mapped = set()
-    for place, source, given in _mapping(archive, file, binding, binding.mapping, parameters):
-        mapped.add(source)
-        if given:
-            yield given
-        else:
-            notes.append(f"{place}: no parameter {source!r}; not used")
-    for name, parameter in parameters.items():
-        if name not in mapped:
-            notes.append(f"{parameter.place}: not in the mapping; not used")
-
-
-def _ends(network: Network, path: Path, given: Given) -> Iterator[tuple[Node, Parameter]]:
-    """The variables of components that a value arrives at, and what of it does."""
-    for node in _nodes(network, path, given.name):
-        yield from _spread(network, node, _adapted(network, node, given))
-
-
-def _set(
-    archive: Archive, file: str, binding: Binding, units: Mapping[str, Unit]
-) -> dict[str, Parameter]:
-    place, root = _document(archive, file, binding.place, binding.values, "ssv")
-    inherited = units if binding.values.source is None else {}
-    known = {**inherited, **read_units(place, root, "ssv")}
-    parameters: dict[str, Parameter] = {}
-    for element in children(root, "ssv:Parameters", "ssv:Parameter"):
-        name = element.get("name")
-        where = f"{at(place, element)}: parameter {name!r}"
-        if name in parameters:
-            raise InputError(f"{where}: there are two; must be one")
-        parameters[name] = _parameter(where, element[0], known)
-    return parameters
-
-
-def _document(
-    archive: Archive, file: str, place: str, content: Content, form: str
-) -> tuple[str, Any]:
-    """The name and the root of a document, a file of the archive or inline in `file`."""
-    if content.source is None:
-        return file, checked(file, content.inline, form)
-    entry = archive.resolve(place, content.source)
-    name = f"{archive.place}: {entry}"
-    return name, parse(name, archive.read(entry), form)
-
-
-def _parameter(place: str, element: Any, units: Mapping[str, Unit]) -> Parameter:
-    kind, text = short(element.tag).removeprefix("ssv:"), element.get("value")
-    if kind not in _READERS:
-        raise InputError(f"{place}: type {kind} is not supported; valid: {choices(_READERS)}")
-    return Parameter(place, kind, _READERS[kind](text), named(place, element.get("unit"), units))
-
-
-def _mapping(
-    archive: Archive,
-    file: str,
-    binding: Binding,
-    mapping: Content,
-    parameters: Mapping[str, Parameter],
-) -> Iterator[tuple[str, str, Given | None]]:
-    """The entries of a mapping: place, source, and what is given, None without such a source."""
-    place, root = _document(archive, file, binding.place, mapping, "ssm")
+    place, root = _document(archive, file, place, mapping, mapping, "ssm")
+    unmapped = dict(parameters)
     targets: set[str] = set()
     for element in children(root, "ssm:MappingEntry"):
         source, target = element.get("source"), element.get("target")
@@ -169,9 +118,59 @@ def _mapping(
         if target in targets:
             raise InputError(f"{where}: {target!r} has two sources; must have one")
         targets.add(target)
-        parameter = parameters.get(source)
-        suppress, element = is_true(element, "suppressUnitConversion"), transformation(element)
-        yield where, source, Given(target, parameter, suppress, element) if parameter else None
+        unmapped.pop(source, None)
+        if source in parameters:
+            suppress = is_true(element, "suppressUnitConversion")
+            yield Given(target, parameters[source], suppress, transformation(element))
+        else:
+            notes.append(f"{where}: no parameter {source!r}; not used")
+    notes += [f"{p.place}: not in the mapping; not used" for p in unmapped.values()]
+
+
+def _set(place: str, root: Any, prefix: str, inherited: Units) -> dict[str, Parameter]:
+    known = {**inherited, **read_units(place, root, "ssv")}
+    parameters: dict[str, Parameter] = {}
+    for element in children(root, "ssv:Parameters", "ssv:Parameter"):
+        name = element.get("name")
+        where = f"{at(place, element)}: parameter {name!r}"
+        if prefix + name in parameters:
+            raise InputError(f"{where}: there are two; must be one")
+        parameters[prefix + name] = _parameter(where, element[0], known)
+    return parameters
+
+
+def _document(
+    archive: Archive, file: str, place: str, entry: Any, holder: Any, form: str
+) -> tuple[str, Any]:
+    """The name and the root of a set or mapping: of a file that `entry` names, or inline in holder.
+
+    The name of what is inline is `file`.
+    """
+    kind = _KINDS[form]
+    named_type = entry.get("type", f"application/x-ssp-{kind}")
+    if named_type != f"application/x-ssp-{kind}":
+        raise InputError(
+            f"{place}: type {named_type!r} is not supported; must be application/x-ssp-{kind}"
+        )
+    if entry.get("sourceBase", "SSD") != "SSD":
+        raise InputError(
+            f"{place}: sourceBase 'component' is not supported; put the file into resources/"
+        )
+    source, inline = entry.get("source"), None if holder is None else child(holder, ROOTS[form])
+    if (source is None) == (inline is None):
+        raise InputError(f"{place}: {kind}: must have either a source or an inline {ROOTS[form]}")
+    if source is None:
+        return file, checked(file, inline, form)
+    found = archive.resolve(place, source)
+    name = f"{archive.place}: {found}"
+    return name, parse(name, archive.read(found), form)
+
+
+def _parameter(place: str, element: Any, units: Units) -> Parameter:
+    kind, text = short(element.tag).removeprefix("ssv:"), element.get("value")
+    if kind not in _READERS:
+        raise InputError(f"{place}: type {kind} is not supported; valid: {choices(_READERS)}")
+    return Parameter(place, kind, _READERS[kind](text), named(place, element.get("unit"), units))
 
 
 def _nodes(network: Network, path: Path, name: str) -> Iterator[Node]:
@@ -195,7 +194,7 @@ def _spread(network: Network, node: Node, given: Parameter) -> Iterator[tuple[No
         yield node, given
         return
     connector = network.systems[node.path].connectors[node.name]
-    if kind_of(connector) not in (None, given.type) and (connector.type, given.type) != (
+    if connector.value_kind not in (None, given.type) and (connector.type, given.type) != (
         "Real",
         "Integer",
     ):
@@ -205,8 +204,8 @@ def _spread(network: Network, node: Node, given: Parameter) -> Iterator[tuple[No
             carried = network.carry(hop, Carried(given.unit, settled=given.settled))
             number = _linear(given.value, carried.factor, carried.offset)
             passed = replace(given, value=number, unit=carried.unit, settled=carried.settled)
-        elif hop.connection.transformation:
-            raise InputError(f"{hop.connection.place}: transforms a {given.type}; must be Real")
+        elif hop.transformation:
+            raise InputError(f"{hop.place}: transforms a {given.type}; must be Real")
         else:
             passed = given
         yield from _spread(network, hop.target, passed)

@@ -1,20 +1,13 @@
 """From an SSP 1.0 archive to a system.
 
 What the archive holds is run or refused by name; what the standard lets a tool decide is decided
-here and said in the notes of the system.
-
-- Execution follows the flow of the data, see order.py, in the sequential scheme.
-- SSP has no communication step. It is given (--step), or the smallest step of the FMUs' default
-  experiments that divides the stop time.
-- An input that nothing is connected to keeps its start value.
-- Components in nested systems are named after all systems they are in, joined by an underscore.
-- An archive of ours has an annotation with all that, see annotation.py; then it holds.
+here, as orchestrator/README.md describes, and said in the notes of the system.
 """
 
 import math
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -23,13 +16,13 @@ from ..interface.interface import Value
 from ..interface.read import read_interface
 from ..system.description import System, in_nanoseconds
 from ..system.parts import NANOSECONDS, Component, Connection, Port
-from .annotation import TYPE, Beside, Extras, no_extras, read_extras
+from .annotation import TYPE, Extras, no_extras, read_extras
 from .archive import STRUCTURE, Archive
 from .document import at, child, children, parse, qualified
-from .network import Carried, Hop, Network, Part, Path, elements_of, read_network
+from .network import Carried, Network, Part
 from .order import flow_order
 from .parameters import read_settings
-from .tree import ComponentElement, read_system
+from .tree import Element, Hop, Path, read_system
 from .units import read_units
 
 
@@ -40,22 +33,24 @@ def read_ssp(path: FilePath, step: float | None = None, stop: float | None = Non
     root = parse(file, archive.read(STRUCTURE), "ssd")
     units = read_units(file, root, "ssd")
     top = read_system(file, child(root, "ssd:System"), units)
-    parts = {p: _part(archive, e) for p, e in elements_of(top) if isinstance(e, ComponentElement)}
+    parts = {e.path: _part(archive, e, e.source) for e in top.within() if e.source is not None}
     if not parts:
         raise InputError(f"{top.place}: system {top.name!r} has no components; must have some")
-    network = read_network(top, parts)
+    network = Network({e.path: e for e in top.within() if e.source is None}, parts)
     names = _names(file, parts)
     annotated = _annotated(file, root, names.values())
     extras = annotated or no_extras(names.values())
     connections = tuple(_connections(network, names, extras))
     values, notes = read_settings(archive, file, network, units)
-    given = [
-        _component(names[p], part, values.get(p, {}), extras.components[names[p]])
-        for p, part in parts.items()
-    ]
+    given = []
+    for at_path, part in parts.items():
+        beside = extras.components[names[at_path]]
+        own = {beside.new(name): value for name, value in values.get(at_path, {}).items()}
+        given.append(Component(names[at_path], part.interface.path, own, **asdict(beside)))
     components = tuple(_keep_starts(file, given, connections, notes))
     if annotated is None:
-        components = _in_order(components, connections, notes)
+        components = flow_order(components, connections)
+        notes.append(f"order of execution: {', '.join(c.name for c in components)}")
     stop_ns = _stop(file, root, stop)
     step_ns = _step(file, parts.values(), stop_ns, step, annotated, notes)
     return System(
@@ -74,14 +69,14 @@ def read_ssp(path: FilePath, step: float | None = None, stop: float | None = Non
     )
 
 
-def _part(archive: Archive, element: ComponentElement) -> Part:
+def _part(archive: Archive, element: Element, source: str) -> Part:
     place = f"{element.place}: component {element.name!r}"
-    path = archive.extract(archive.resolve(place, element.source))
+    path = archive.extract(archive.resolve(place, source))
     try:
         interface = read_interface(path)
     except InputError as error:
         reason = str(error).removeprefix(f"{path}: ")
-        raise InputError(f"{place}: {element.source}: {reason}") from error
+        raise InputError(f"{place}: {source}: {reason}") from error
     return Part(element, interface)
 
 
@@ -134,7 +129,7 @@ def _carried(network: Network, hops: list[Hop]) -> Carried:
     variable = network.variable(hops[0].source)
     kind: str = variable.kind
     for hop in hops:
-        place = hop.connection.place
+        place = hop.place
         causality, reached = network.nature(hop.target)
         if variable.causality != "output" or causality == "parameter":
             raise InputError(
@@ -148,22 +143,10 @@ def _carried(network: Network, hops: list[Hop]) -> Carried:
                 "or from Integer to Real"
             )
         kind = reached
-        if hop.connection.transformation and kind != "Real":
+        if hop.transformation and kind != "Real":
             raise InputError(f"{place}: transforms a {kind}; must be Real")
         carried = network.carry(hop, carried)
     return carried
-
-
-def _component(name: str, part: Part, values: Mapping[str, Value], beside: Beside) -> Component:
-    """The component with the values it is given, under the system's names."""
-    return Component(
-        name,
-        part.interface.path,
-        {beside.new(own): value for own, value in values.items()},
-        beside.rename,
-        beside.step_ns,
-        beside.isolation,
-    )
 
 
 def _keep_starts(
@@ -183,18 +166,6 @@ def _keep_starts(
                 )
                 notes.append(f"input {port} is not connected; keeps its start value {start}")
         yield replace(component, values={**component.values, **starts})
-
-
-def _in_order(
-    components: tuple[Component, ...], connections: Iterable[Connection], notes: list[str]
-) -> tuple[Component, ...]:
-    """The components along the flow of the data."""
-    known = {component.name: component for component in components}
-    order = flow_order(
-        tuple(known), [(w.source.component, w.target.component) for w in connections]
-    )
-    notes.append(f"order of execution: {', '.join(order)}")
-    return tuple(known[name] for name in order)
 
 
 def _stop(file: str, root: Any, given: float | None) -> int:

@@ -4,19 +4,35 @@ What this master cannot run is refused here by its name and line. Geometry and n
 are passed over.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 from ..checks import known
 from ..errors import InputError
 from ..interface.units import Unit
-from .document import at, child, children, is_true, short
+from .document import at, child, children, is_true, qualified, short
 from .units import named
 
 FMU = "application/x-fmu-sharedlibrary"
 _SOURCES = ("output", "calculatedParameter")
 _TYPES = ("Real", "Integer", "Boolean", "String", "Enumeration")
+_SIDES = ("start", "end")
+_BINDING = ("ssd:ParameterBindings", "ssd:ParameterBinding")
+
+Path = tuple[str, ...]
+"""The names of the elements from the top system, () itself, down to an element."""
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """A connector, or a variable of a component."""
+
+    path: Path
+    name: str
+
+    def __str__(self) -> str:
+        return ".".join((*self.path, self.name))
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,96 +46,72 @@ class Connector:
     unit: Unit | None
 
     @property
-    def gives(self) -> bool:
-        """True if its element gives the value, seen from outside."""
-        return self.kind in _SOURCES
+    def value_kind(self) -> str | None:
+        """The kind of value, as an interface has it; None where the type is left out."""
+        return "Integer" if self.type == "Enumeration" else self.type
 
 
 @dataclass(frozen=True, slots=True)
-class End:
-    """A connector of an element of the system, or of the system itself where element is None."""
+class Hop:
+    """A connection from source to target.
 
-    element: str | None
-    connector: str
-
-    def __str__(self) -> str:
-        return f"{self.element}.{self.connector}" if self.element else self.connector
-
-
-@dataclass(frozen=True, slots=True)
-class Connection:
-    """Two ends; the transformation is None where there is none, else (factor, offset)."""
+    The transformation is None where there is none, else (factor, offset).
+    """
 
     place: str
-    ends: tuple[End, End]
+    source: Node
+    target: Node
     transformation: tuple[float, float] | None
     suppress: bool
 
 
 @dataclass(frozen=True, slots=True)
-class Content:
-    """A parameter set or mapping: the source of its file, or its element where it is inline."""
+class Element:
+    """A component, the source of whose FMU is in the archive, or a system, which has no source.
 
-    source: str | None
-    inline: Any
-
-
-@dataclass(frozen=True, slots=True)
-class Binding:
-    """A parameter binding; mapping is None where there is none."""
+    The elements of a system are by name and in the order of the file; bindings are the elements of
+    its parameter bindings as they stand.
+    """
 
     place: str
-    prefix: str
-    values: Content
-    mapping: Content | None
-
-
-@dataclass(frozen=True, slots=True)
-class ComponentElement:
-    """A component: an FMU in the archive."""
-
-    place: str
+    path: Path
     name: str
-    source: str
     connectors: Mapping[str, Connector]
-    bindings: tuple[Binding, ...]
+    bindings: Sequence[Any]
+    source: str | None = None
+    elements: Mapping[str, "Element"] = field(default_factory=dict)
+    hops: tuple[Hop, ...] = ()
+
+    def within(self) -> Iterator["Element"]:
+        """Yield the element and all in it, in the order of the file."""
+        yield self
+        for inner in self.elements.values():
+            yield from inner.within()
 
 
-@dataclass(frozen=True, slots=True)
-class SystemElement:
-    """A system with its elements, by name and in the order of the file."""
-
-    place: str
-    name: str
-    elements: Mapping[str, "ComponentElement | SystemElement"]
-    connectors: Mapping[str, Connector]
-    connections: tuple[Connection, ...]
-    bindings: tuple[Binding, ...]
+Part = TypeVar("Part", Connector, Element)
 
 
-Part = TypeVar("Part", Connector, ComponentElement | SystemElement)
-
-
-def read_system(file: str, element: Any, units: Mapping[str, Unit]) -> SystemElement:
+def read_system(file: str, element: Any, units: Mapping[str, Unit], path: Path = ()) -> Element:
     """The system of an element; file names the document, for the error messages."""
-    place = at(file, element)
     name = element.get("name")
     if (unsupported := child(element, "ssd:SignalDictionaries")) is not None:
         raise InputError(
             f"{at(file, unsupported)}: system {name!r}: signal dictionaries are not supported; "
             "connect the components directly"
         )
-    found = child(element, "ssd:Elements")
-    elements = [_element(file, entry, units) for entry in (() if found is None else found)]
-    connections = children(element, "ssd:Connections", "ssd:Connection")
-    return SystemElement(
-        place,
+    entries = element.iterfind(f"{qualified('ssd:Elements')}/*")
+    elements = [_element(file, entry, units, path) for entry in entries]
+    system = Element(
+        at(file, element),
+        path,
         name,
-        _by_name(elements, f"system {name!r}: two elements"),
         _connectors(file, element, units),
-        tuple(_connection(file, entry) for entry in connections),
-        tuple(_bindings(file, element)),
+        children(element, *_BINDING),
+        elements=_by_name(elements, f"system {name!r}: two elements"),
     )
+    connections = children(element, "ssd:Connections", "ssd:Connection")
+    return replace(system, hops=tuple(_hop(file, entry, system) for entry in connections))
 
 
 def transformation(element: Any) -> Any:
@@ -146,12 +138,10 @@ def _by_name(parts: Iterable[Part], twice: str) -> dict[str, Part]:
     return found
 
 
-def _element(
-    file: str, entry: Any, units: Mapping[str, Unit]
-) -> "ComponentElement | SystemElement":
+def _element(file: str, entry: Any, units: Mapping[str, Unit], parent: Path) -> Element:
     tag, name, place = short(entry.tag), entry.get("name"), at(file, entry)
     if tag == "ssd:System":
-        return read_system(file, entry, units)
+        return read_system(file, entry, units, (*parent, name))
     if tag != "ssd:Component":
         raise InputError(f"{place}: {tag} {name!r} is not supported; must be a Component or System")
     kind = entry.get("type", FMU)
@@ -164,12 +154,13 @@ def _element(
             f"{place}: component {name!r}: implementation 'ModelExchange' is not supported; "
             "must be CoSimulation or any"
         )
-    return ComponentElement(
+    return Element(
         place,
+        (*parent, name),
         name,
-        entry.get("source"),
         _connectors(file, entry, units),
-        tuple(_bindings(file, entry)),
+        children(entry, *_BINDING),
+        entry.get("source"),
     )
 
 
@@ -191,49 +182,38 @@ def _connector(place: str, entry: Any, units: Mapping[str, Unit]) -> Connector:
     return Connector(place, name, kind, declared, named(f"{place}: {name!r}", unit, units))
 
 
-def _connection(file: str, entry: Any) -> Connection:
-    ends = tuple(
-        End(entry.get(f"{side}Element") or None, entry.get(f"{side}Connector"))
-        for side in ("start", "end")
-    )
-    place = f"{at(file, entry)}: connection '{ends[0]} - {ends[1]}'"
+def _hop(file: str, entry: Any, system: Element) -> Hop:
+    """A connection of a system, from the end that gives a value there to the one that takes it."""
+    ends = [(entry.get(f"{side}Element"), entry.get(f"{side}Connector")) for side in _SIDES]
+    said = " - ".join(".".join(filter(None, end)) for end in ends)
+    place = f"{at(file, entry)}: connection '{said}'"
     change = transformation(entry)
     if change is not None and not short(change.tag).endswith("LinearTransformation"):
         raise InputError(
             f"{place}: {short(change.tag)} is not supported on a connection; "
             "must be linear, or in the mapping of a parameter"
         )
-    return Connection(
+    (a, gives_a), (b, gives_b) = (_end(place, system, *end) for end in ends)
+    if gives_a == gives_b:
+        raise InputError(
+            f"{place}: both {'give' if gives_a else 'take'} a value; "
+            "must lead from one that gives to one that takes"
+        )
+    return Hop(
         place,
-        (ends[0], ends[1]),
+        a if gives_a else b,
+        b if gives_a else a,
         None if change is None else linear(change),
         is_true(entry, "suppressUnitConversion"),
     )
 
 
-def _bindings(file: str, element: Any) -> Iterator[Binding]:
-    for entry in children(element, "ssd:ParameterBindings", "ssd:ParameterBinding"):
-        place = f"{at(file, entry)}: {element.get('name')!r}"
-        holder = child(entry, "ssd:ParameterValues")
-        values = _content(place, entry, holder, "parameter-set", "ssv:ParameterSet")
-        mapping = child(entry, "ssd:ParameterMapping")
-        if mapping is not None:
-            mapping = _content(place, mapping, mapping, "parameter-mapping", "ssm:ParameterMapping")
-        yield Binding(place, entry.get("prefix", ""), values, mapping)
-
-
-def _content(place: str, entry: Any, holder: Any, form: str, root: str) -> Content:
-    """The source of a set or mapping, or the element in holder; exactly one of the two."""
-    kind = entry.get("type", f"application/x-ssp-{form}")
-    if kind != f"application/x-ssp-{form}":
-        raise InputError(
-            f"{place}: type {kind!r} is not supported; must be application/x-ssp-{form}"
-        )
-    if entry.get("sourceBase", "SSD") != "SSD":
-        raise InputError(
-            f"{place}: sourceBase 'component' is not supported; put the file into resources/"
-        )
-    content = Content(entry.get("source"), None if holder is None else child(holder, root))
-    if (content.source is None) == (content.inline is None):
-        raise InputError(f"{place}: {form}: must have either a source or an inline {root}")
-    return content
+def _end(place: str, system: Element, element: str | None, name: str) -> tuple[Node, bool]:
+    """The node of an end, and whether it gives a value in the system."""
+    owner = system
+    if element:
+        known(f"{place}: no element", element, system.elements)
+        owner = system.elements[element]
+    known(f"{place}: {owner.name} has no connector", name, owner.connectors)
+    gives_outside = owner.connectors[name].kind in _SOURCES
+    return Node(owner.path, name), gives_outside != (owner is system)

@@ -1,13 +1,6 @@
-"""From a system to an SSP 1.0 archive.
+"""From a system to an SSP 1.0 archive, as orchestrator/README.md describes it.
 
-    SystemStructure.ssd      components, connectors, connections, units, default experiment
-    resources/PLANT.fmu      the FMUs, each once
-    resources/plant.ssv      the values of a component
-
-The connectors have the FMU's own names, so that any tool can run the archive. What SSP has no form
-for is in an annotation, see annotation.py. A connection whose factor and offset are given, or
-follow from units that differ, has a linear transformation and suppresses the conversion of units:
-masters that know no units then compute the same. The same system gives the same bytes.
+The same system gives the same bytes. What SSP has no form for: annotation.py.
 """
 
 import re
@@ -26,6 +19,7 @@ from ..system.parts import NANOSECONDS, Component, Connection, Port
 from .annotation import extras_of, write_extras
 from .archive import RESOURCES, STRUCTURE, write_archive
 from .document import VERSION, add, new, to_bytes
+from .tree import FMU
 from .units import change, same, write_units
 
 SET = "initialValues"
@@ -124,7 +118,9 @@ def _structure(system: System, sources: Mapping[str, str], bindings: Mapping[str
     units = _units(system.components)
     elements = add(top, "ssd:Elements")
     for component in system.components:
-        _write_component(elements, component, sources, bindings, units)
+        _write_component(
+            elements, component, sources[component.name], bindings.get(component.name), units
+        )
     if system.connections:
         connections = add(top, "ssd:Connections")
         for connection in system.connections:
@@ -139,16 +135,16 @@ def _structure(system: System, sources: Mapping[str, str], bindings: Mapping[str
 def _write_component(
     elements: Any,
     component: Component,
-    sources: Mapping[str, str],
-    bindings: Mapping[str, str],
+    source: str,
+    values: str | None,
     units: Mapping[str, Unit],
 ) -> None:
     element = add(
         elements,
         "ssd:Component",
         name=component.name,
-        type="application/x-fmu-sharedlibrary",
-        source=sources[component.name],
+        type=FMU,
+        source=source,
         implementation="CoSimulation",
     )
     variables = _connected(component)
@@ -159,9 +155,8 @@ def _write_component(
             continue  # an enumeration: its items are in the FMU, so that the type may be left out
         unit = _unit(component, variable, units)
         add(connector, f"ssc:{variable.kind}", **({"unit": unit.name} if unit else {}))
-    if component.name in bindings:
-        held = add(element, "ssd:ParameterBindings")
-        add(held, "ssd:ParameterBinding", source=bindings[component.name])
+    if values:
+        add(add(element, "ssd:ParameterBindings"), "ssd:ParameterBinding", source=values)
 
 
 def _connected(component: Component) -> list[Variable]:
@@ -199,8 +194,8 @@ def _own(system: System, port: Port) -> tuple[Port, Unit | None]:
     """The port under the FMU's own name, and its unit."""
     component = system.component(port.component, str(port))
     own = component.rename.get(port.variable, port.variable)
-    return Port(port.component, own), _declared(
-        component, component.interface.by_name[port.variable]
+    return Port(port.component, own), component.interface.unit(
+        component.interface.by_name[port.variable]
     )
 
 
@@ -209,20 +204,15 @@ def _units(components: Iterable[Component]) -> dict[str, Unit]:
     units: dict[str, Unit] = {}
     for component in components:
         for variable in component.interface.variables:
-            if unit := _declared(component, variable):
+            if unit := component.interface.unit(variable):
                 units.setdefault(unit.name, unit)
     return dict(sorted(units.items()))
 
 
 def _unit(component: Component, variable: Variable, units: Mapping[str, Unit]) -> Unit | None:
     """The unit to write at a variable; none where its name means something else in the archive."""
-    unit = _declared(component, variable)
+    unit = component.interface.unit(variable)
     return unit if unit and same(unit, units[unit.name]) else None
-
-
-def _declared(component: Component, variable: Variable) -> Unit | None:
-    """The unit that the FMU declares for a variable and defines."""
-    return component.interface.units.get(variable.unit or "")
 
 
 def _text(place: str, variable: Variable, value: Value) -> str:

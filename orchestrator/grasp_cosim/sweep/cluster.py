@@ -90,8 +90,8 @@ def _said(error: BaseException) -> str:
     return (str(error).splitlines() or [type(error).__name__])[0]
 
 
-_unpacked: dict[str, tuple[tempfile.TemporaryDirectory[str], tuple[Path, ...]]] = {}
-"""The FMUs that this process has unpacked, by the key of their shipment."""
+_unpacked: dict[str, tempfile.TemporaryDirectory[str]] = {}
+"""The folders of FMUs that this process has unpacked, by the key of their shipment."""
 
 _one_at_a_time = threading.Lock()
 """All Python FMUs of a process share its modules, and a compiled loop keeps the others waiting."""
@@ -106,14 +106,13 @@ def run_shipped(shipment: Shipment, job: Job) -> Outcome:
 def unpacked(shipment: Shipment) -> Task:
     """The task with FMUs in a folder of this process, which goes with it."""
     components = shipment.task.system.components
-    if shipment.key not in _unpacked:
-        folder = tempfile.TemporaryDirectory(prefix="grasp_sweep_")
-        paths = []
-        for i, (component, content) in enumerate(zip(components, shipment.contents, strict=True)):
-            paths.append(Path(folder.name, str(i), component.fmu.name))
-            paths[-1].parent.mkdir()
-            paths[-1].write_bytes(content)
-        _unpacked[shipment.key] = folder, tuple(paths)
-    paths_here = _unpacked[shipment.key][1]
-    moved = tuple(replace(c, fmu=path) for c, path in zip(components, paths_here, strict=True))
+    known = _unpacked.get(shipment.key)
+    folder = known or tempfile.TemporaryDirectory(prefix="grasp_sweep_")
+    paths = [Path(folder.name, str(i), c.fmu.name) for i, c in enumerate(components)]
+    if not known:
+        for path, content in zip(paths, shipment.contents, strict=True):
+            path.parent.mkdir()
+            path.write_bytes(content)
+        _unpacked[shipment.key] = folder
+    moved = tuple(replace(c, fmu=path) for c, path in zip(components, paths, strict=True))
     return replace(shipment.task, system=replace(shipment.task.system, components=moved))

@@ -1,15 +1,7 @@
 """Designs: which points of the unit cube the runs of a study take, a row per run.
 
-| kind | points | runs |
-|---|---|---|
-| grid | each combination of the listed values, the last parameter fastest | their product |
-| random | independent; the first ones are the same however many follow | runs |
-| latin-hypercube | one in each of `runs` equal slices of every parameter | runs |
-| sobol | a scrambled Sobol sequence, spread evenly | runs, a power of two |
-| saltelli | A, B and, per parameter, A with that of B: for Sobol indices | runs·(parameters + 2) |
-
-In a saltelli design `runs` are those of A, a power of two, too. Every point is a pure function of
-kind, runs, seed, the levels of the parameters, and its index.
+The kinds are in orchestrator/README.md. Every point is a pure function of kind, runs, seed, the
+levels of the parameters, and its index.
 """
 
 import math

@@ -1,38 +1,4 @@
-"""A study from a TOML file.
-
-    system = "grasp.toml"           # or an .ssp, relative to this file; else the built-in one
-    presets = ["bench"]             # of the system; bench = true and case = 2 are short for
-                                    # "bench" and "case_2"; may be left out, as step and stop
-    metrics = "my_metrics.py"       # metrics beside those of every result, relative to this file
-    step = 1e-3                     # s
-    stop = 3.0                      # s
-    seeds = ["sensor_1.noise.seed"] # get another whole number in each run (in each two of a row of
-                                    # a saltelli design: noise is no part of a parameter's effect)
-    outputs = ["plant.gap[1]"]      # their last values are kept beside the metrics
-
-    [swap]                          # FMUs in the place of the system's, relative to this file
-    plant = "Vendor.fmu"
-
-    [values]                        # what is the same in all runs
-    "plant.object_width" = 0.07
-
-    [design]                        # see design.py
-    kind = "grid"                   # random, latin-hypercube, sobol, saltelli with runs and seed
-    seed = 1
-
-    [[parameters]]                  # what varies
-    name = "reflectance ratio"      # by default its variable
-    variables = ["sensor_1.reflectance"]
-    ratio_to = "sensor_2.reflectance"
-    geomspace = { from = 0.5, to = 2.0, count = 21 }
-
-    [figures]
-    map = { x = "reflectance ratio", y = "position", of = "time_difference", limit = 0.1 }
-    distributions = ["time_difference", "time_to_contact[1]"]
-
-A parameter has exactly one of: values = [...], linspace or geomspace = { from, to, count },
-uniform = { low, high }, normal = { mean, standard_deviation, low, high }.
-"""
+"""A study from a TOML file, in the format that orchestrator/README.md describes."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -100,31 +66,24 @@ def read_study(
     random = design["kind"] != "grid" or seeds
     if random and "seed" not in design:
         raise InputError(f"{place}: [design]: no seed; must be a whole number, what is random")
+    own_metrics: tuple[Metric, ...] = ()
+    if "metrics" in table:
+        file = text(f"{place}: metrics", table["metrics"], "the path of a Python file")
+        own_metrics = load_metrics(path.parent / file)
     parameters = tuple(
         _parameter(f"{place}: parameters[{i}]", entry) for i, entry in enumerate(entries)
     )
+    varied = {*seeds, *(v for p in parameters for v in p.variables)}
     return Study(
         place,
-        _system(
-            place,
-            table,
-            path.parent,
-            (load, preset),
-            {*seeds, *(v for p in parameters for v in p.variables)},
-        ),
+        _system(place, table, path.parent, (load, preset), varied),
         parameters,
         _in(place, lambda: Design(**design)),
         seeds,
         _names(f"{place}: outputs", table.get("outputs", [])),
         _pictures(f"{place}: [figures]", table.get("figures", {})),
-        (*_metrics(place, table.get("metrics"), path.parent), *metrics),
+        (*own_metrics, *metrics),
     )
-
-
-def _metrics(place: str, name: Any, folder: Path) -> tuple[Metric, ...]:
-    if name is None:
-        return ()
-    return load_metrics(folder / text(f"{place}: metrics", name, "the path of a Python file"))
 
 
 def _system(

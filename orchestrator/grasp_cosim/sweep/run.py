@@ -8,7 +8,7 @@ from ..errors import InputError, SimulationError
 from ..interface.interface import Value
 from ..master.simulation import simulate
 from ..metrics.metric import Metric
-from ..recording.result import UNITS, Result
+from ..recording.result import UNITS
 from ..system.description import System
 
 
@@ -44,15 +44,11 @@ def run_job(task: Task, job: Job) -> Outcome:
         result = simulate(task.system.with_values(job.values), metrics=task.metrics)
         if not result.complete:
             raise KeyboardInterrupt
-        return Outcome(job.index, _kept(result, task.outputs))
+        metrics = {name: m for name, m in result.metrics.items() if name not in UNITS}
+        last = {name: result[name][-1].item() for name in task.outputs}
+        return Outcome(job.index, dict(_flat("", {**metrics, **last})))
     except (InputError, SimulationError) as error:
         return Outcome(job.index, {}, str(error))
-
-
-def _kept(result: Result, outputs: tuple[str, ...]) -> dict[str, Value | None]:
-    metrics = {k: v for k, v in result.metrics.items() if k not in UNITS}
-    last = {name: result[name][-1].item() for name in outputs}
-    return dict(_flat("", {**metrics, **last}))
 
 
 def _flat(name: str, value: Any) -> Iterator[tuple[str, Value | None]]:

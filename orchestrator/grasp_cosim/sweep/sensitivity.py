@@ -9,8 +9,7 @@ were independent; those of a Sobol sequence are spread more evenly, so the inter
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -45,16 +44,7 @@ class Sensitivity:
     metric: str
     rows: int
     of: int
-    indices: tuple[Index, ...]
-
-    def as_json(self) -> dict[str, Any]:
-        """Plain values for JSON."""
-        return {
-            "metric": self.metric,
-            "rows": self.rows,
-            "of": self.of,
-            "parameters": [asdict(index) for index in self.indices],
-        }
+    parameters: tuple[Index, ...]
 
 
 def sensitivity(

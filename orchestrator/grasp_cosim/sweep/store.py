@@ -93,7 +93,7 @@ class Store:
     def _check(self, path: Path, bound: dict[str, object]) -> None:
         try:
             there = json.loads(path.read_text(encoding="utf-8"))
-        except (OSError, UnicodeDecodeError, ValueError) as error:
+        except (OSError, ValueError) as error:
             raise InputError(f"{path}: not readable: {error}; --out must be another") from error
         if there == bound:
             return
@@ -114,11 +114,11 @@ def _read(path: Path, runs: int) -> Outcome:
     try:
         outcome = Outcome(**json.loads(path.read_text(encoding="utf-8")))
         _check_outcome(outcome, path.name, runs)
-    except (OSError, UnicodeDecodeError, ValueError, TypeError, RecursionError) as error:
+        return outcome
+    except (OSError, ValueError, TypeError, RecursionError) as error:
         raise InputError(
             f"{path}: not readable as a run: {error}; must be removed, the run is then done again"
         ) from error
-    return outcome
 
 
 def _check_outcome(outcome: Outcome, name: str, runs: int) -> None:

@@ -3,7 +3,7 @@
 import hashlib
 import json
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import Any
@@ -83,7 +83,7 @@ class Study:
             if kind != "Integer":
                 said = f"{self.name}: seeds: {name} is of type {kind}"
                 raise InputError(f"{said}; must be an Integer")
-        for parameter in sorted(self.parameters, key=_is_ratio):  # whose references come first
+        for parameter in self._references_first:
             self._check_values(parameter)
         self._check_pictures()
         try:
@@ -135,13 +135,18 @@ class Study:
         return {
             "system": system,
             "parameters": [
-                {**asdict(p), "distribution": _described(p.distribution)} for p in self.parameters
+                {**asdict(p), "distribution": [type(p.distribution).__name__, repr(p.distribution)]}
+                for p in self.parameters
             ],
             "design": asdict(self.design),
             "seeds": self.seeds,
             "outputs": self.outputs,
             **({"metrics": [m.origin or m.name for m in self.metrics]} if self.metrics else {}),
         }
+
+    @property
+    def _references_first(self) -> list[Parameter]:
+        return sorted(self.parameters, key=lambda p: p.ratio_to is not None)
 
     @property
     def _levels(self) -> list[int | None]:
@@ -178,7 +183,7 @@ class Study:
     def _driven(self, point: Mapping[str, Value]) -> dict[str, Value]:
         """The variables by the parameters: first those that stand alone, then the ratios."""
         values: dict[str, Value] = {}
-        for p in sorted(self.parameters, key=_is_ratio):
+        for p in self._references_first:
             value = point[p.name]
             if p.ratio_to is not None:
                 reference = values.get(p.ratio_to)
@@ -313,11 +318,3 @@ def hash_of(contents: Iterable[bytes]) -> str:
     for content in contents:
         digest.update(hashlib.sha256(content).digest())
     return digest.hexdigest()
-
-
-def _is_ratio(parameter: Parameter) -> bool:
-    return parameter.ratio_to is not None
-
-
-def _described(distribution: Distribution) -> Sequence[Any]:
-    return [type(distribution).__name__, repr(distribution)]

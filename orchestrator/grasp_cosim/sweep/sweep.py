@@ -2,9 +2,9 @@
 
 import json
 import os
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Generator, Iterable
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -65,7 +65,7 @@ class Sweep:
             "failed": self.failed,
             "first_error": next((o.error for o in self.outcomes if o.error is not None), None),
             "metrics": self.table.summary(),
-            "sensitivity": [s.as_json() for s in self.sensitivities],
+            "sensitivity": [asdict(s) for s in self.sensitivities],
         }
 
 
@@ -92,41 +92,26 @@ def sweep(
         raise InputError(f"workers = {workers}: must be at least 1")
     store = Store(folder)
     with store.locked():
-        return _finish(study, store, workers, scheduler, progress)
-
-
-def _finish(
-    study: Study, store: Store, workers: int | None, scheduler: str | None, progress: bool
-) -> Sweep:
-    """sweep() in a folder that is ours alone."""
-    done = store.open(study)
-    resumed = len(done)
-    left = (Job(i, study.values(i)) for i in range(study.runs) if i not in done)
-    task = Task(study.system, study.outputs, study.metrics)
-    bar = progress_bar(study.name, study.runs, progress, resumed)
-    with bar, closing(_outcomes(task, left, study.runs - resumed, workers, scheduler)) as outcomes:
-        for outcome in outcomes:
-            store.keep(outcome)
-            done[outcome.index] = outcome
-            bar.update()
-    finished = Sweep(study, store.folder, tuple(done[i] for i in range(study.runs)), resumed)
-    write_parquet(finished.table, study, store.folder / RUNS)
-    if finished.sensitivities:
-        found = [s.as_json() for s in finished.sensitivities]
-        write_text(store.folder / SENSITIVITY, json.dumps(found, indent=2) + "\n")
-    return finished
-
-
-def _outcomes(
-    task: Task, jobs: Iterator[Job], count: int, workers: int | None, scheduler: str | None
-) -> Generator[Outcome, None, None]:
-    """The outcomes of so many jobs, from the cluster or from here."""
-    if not count:
-        return
-    if scheduler is not None:
-        yield from run_on_cluster(scheduler, task, jobs)
-    else:
-        yield from run_here(task, jobs, min(workers or os.cpu_count() or 1, count))
+        done = store.open(study)
+        resumed = len(done)
+        left = [i for i in range(study.runs) if i not in done]
+        jobs = (Job(i, study.values(i)) for i in left)
+        task = Task(study.system, study.outputs, study.metrics)
+        if scheduler is not None and left:
+            results = run_on_cluster(scheduler, task, jobs)
+        else:
+            results = run_here(task, jobs, min(workers or os.cpu_count() or 1, len(left)))
+        with progress_bar(study.name, study.runs, progress, resumed) as bar, closing(results):
+            for outcome in results:
+                store.keep(outcome)
+                done[outcome.index] = outcome
+                bar.update()
+        finished = Sweep(study, folder, tuple(done[i] for i in range(study.runs)), resumed)
+        write_parquet(finished.table, study, folder / RUNS)
+        if finished.sensitivities:
+            found = [asdict(s) for s in finished.sensitivities]
+            write_text(folder / SENSITIVITY, json.dumps(found, indent=2) + "\n")
+        return finished
 
 
 def run_here(task: Task, jobs: Iterable[Job], workers: int) -> Generator[Outcome, None, None]:

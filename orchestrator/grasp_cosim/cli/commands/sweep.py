@@ -114,7 +114,7 @@ def _as_text(done: Sweep) -> str:
 
 def _sensitivity_lines(found: Sensitivity) -> list[str]:
     lines = [f"variance of {found.metric}, {found.rows} of {found.of} rows complete, 95 %:"]
-    for i in found.indices:
+    for i in found.parameters:
         first, total = (
             f"{value:6.3f} ({low:.3f} to {high:.3f})"
             for value, (low, high) in ((i.first, i.first_interval), (i.total, i.total_interval))
