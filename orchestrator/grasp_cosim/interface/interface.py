@@ -1,13 +1,14 @@
 """What an FMU declares: its variables, units and capabilities."""
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Literal, get_args
 
+from ..checks import known
 from ..errors import InputError, choices
 from .units import IDENTITY, Conversion, Unit, conversion
 
@@ -19,17 +20,12 @@ SUPPORTED = ("Real", "Integer", "Boolean", "String")
 
 SETTABLE = ("input", "parameter", "structuralParameter")
 _WHOLE = {
-    f"{prefix}Int{bits}": (
-        (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) if not prefix else (0, 2**bits - 1)
-    )
-    for prefix in ("", "U")
-    for bits in (8, 16, 32, 64)
+    **{f"Int{bits}": (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for bits in (8, 16, 32, 64)},
+    **{f"UInt{bits}": (0, 2**bits - 1) for bits in (8, 16, 32, 64)},
 }
 TYPES = ("Real", "Integer", "Boolean", "String", "Enumeration")
 TYPES_3 = ("Float64", "Float32", *_WHOLE, "Boolean", "String", "Binary", "Enumeration", "Clock")
 """The types of variables in FMI 1.0 and 2.0, and in FMI 3.0."""
-LARGEST_SINGLE = (2.0 - 2.0**-23) * 2.0**127
-"""The largest finite Float32."""
 
 
 def limits(fmi_type: str, version: str) -> tuple[float, float]:
@@ -37,7 +33,8 @@ def limits(fmi_type: str, version: str) -> tuple[float, float]:
     if fmi_type in ("Integer", "Enumeration"):
         return _WHOLE["Int64" if version.startswith("3") else "Int32"]
     if fmi_type == "Float32":
-        return -LARGEST_SINGLE, LARGEST_SINGLE
+        largest = (2.0 - 2.0**-23) * 2.0**127
+        return -largest, largest
     return _WHOLE.get(fmi_type, (-math.inf, math.inf))
 
 
@@ -188,33 +185,15 @@ class Interface:
         """The variables by their names."""
         return {v.name: v for v in self.variables}
 
-    @cached_property
-    def _capabilities(self) -> dict[str, Value | None]:
-        return {_plain(flag): value for flag, value in self.capabilities.items()}
-
     def capability(self, flag: str) -> Value | None:
         """The value of a capability, under the name that FMI 2.0 or 3.0 has for it."""
-        return self._capabilities.get(_plain(flag))
-
-    @property
-    def can_save_state(self) -> bool:
-        """True if states can be saved and restored."""
-        return self.capability("canGetAndSetFMUstate") is True
+        wanted = _plain(flag)
+        return next((v for name, v in self.capabilities.items() if _plain(name) == wanted), None)
 
     @property
     def can_vary_step(self) -> bool:
         """True if the communication step may vary."""
         return self.capability("canHandleVariableCommunicationStepSize") is True
-
-    @property
-    def early_return(self) -> bool:
-        """True if a step may end early, FMI 3.0."""
-        return self.capability("mightReturnEarlyFromDoStep") is True
-
-    @property
-    def once_per_process(self) -> bool:
-        """True if a process can have one instance of it only."""
-        return self.capability("canBeInstantiatedOnlyOncePerProcess") is True
 
     @property
     def step(self) -> float | None:
@@ -249,8 +228,21 @@ class Interface:
         """
         if not rename:
             return self
-        check_rename(rename, self.by_name, self.path, place)
-        names = {own: new for new, own in rename.items()}
+        names: dict[str, str] = {}
+        for new, own in rename.items():
+            entry = f"{place}: {new!r} = {own!r}"
+            known(f"{entry}: {self.path.name} has no variable", own, self.by_name)
+            if own in names:
+                raise InputError(
+                    f"{entry}: {own!r} is renamed to {names[own]!r} already; must have one name"
+                )
+            names[own] = new
+        for new, own in rename.items():
+            if new in self.by_name and new not in names:
+                raise InputError(
+                    f"{place}: {new!r} = {own!r}: {self.path.name} has a variable {new!r} itself; "
+                    "must be a name that is free, or rename that one, too"
+                )
 
         def new_names(listed: tuple[str, ...] | None) -> tuple[str, ...] | None:
             return None if listed is None else tuple(names.get(name, name) for name in listed)
@@ -273,11 +265,7 @@ class Interface:
         With text, a string may stand for a number or a boolean, as on a command line.
         """
         settable = [v.name for v in self.variables if v.settable]
-        if name not in settable:
-            raise InputError(
-                f"{place}: {self.path.name} has no input or parameter {name!r}; "
-                f"valid: {choices(settable)}"
-            )
+        known(f"{place}: {self.path.name} has no input or parameter", name, settable)
         variable = self.by_name[name]
         if not variable.supported:
             raise InputError(
@@ -294,32 +282,6 @@ class Interface:
         return converted
 
 
-def check_rename(rename: Mapping[str, str], names: Collection[str], path: Path, place: str) -> None:
-    """InputError where rename, new names to own, does not fit the names in the FMU at path.
-
-    An own name must exist and be renamed once, a new one must be free. place says where rename
-    comes from.
-    """
-    first: dict[str, str] = {}
-    for new, own in rename.items():
-        entry = f"{place}: {new!r} = {own!r}"
-        if own not in names:
-            raise InputError(
-                f"{entry}: {path.name} has no variable {own!r}; valid: {choices(names)}"
-            )
-        if own in first:
-            raise InputError(
-                f"{entry}: {own!r} is renamed to {first[own]!r} already; must have one name"
-            )
-        first[own] = new
-    for new, own in rename.items():
-        if new in names and new not in first:
-            raise InputError(
-                f"{place}: {new!r} = {own!r}: {path.name} has a variable {new!r} itself; "
-                "must be a name that is free, or rename that one, too"
-            )
-
-
 def _plain(flag: str) -> str:
     """A capability by a name that FMI 2 and 3 have in common."""
     return flag.lower().removesuffix("s")
@@ -333,7 +295,7 @@ def _convert(variable: Variable, value: Value, version: str) -> Value | None:
         if isinstance(value, str):
             return {"true": True, "1": True, "false": False, "0": False}.get(value.lower())
         return value if isinstance(value, bool) else None
-    number = None if isinstance(value, bool) else _number(value, variable.kind == "Integer")
+    number = _number(value, variable.kind == "Integer")
     if number is None:
         return None
     low, high = limits(variable.type, version)
@@ -342,8 +304,10 @@ def _convert(variable: Variable, value: Value, version: str) -> Value | None:
     return number if fits else None
 
 
-def _number(value: float | int | str, whole: bool) -> float | int | None:
+def _number(value: Value, whole: bool) -> float | int | None:
     """A finite number; a whole one is exact where a float is not, 3.0 and "3.0" are whole, too."""
+    if isinstance(value, bool):
+        return None
     if whole and not isinstance(value, float):
         with suppress(ValueError):
             return int(value)
@@ -364,7 +328,8 @@ def _expected(variable: Variable) -> str:
     noun = "a whole number" if variable.kind == "Integer" else "a finite number"
     if variable.type not in ("Real", "Float64", "Integer"):
         noun = f"{noun} of type {variable.type}"
-    unit = f" {variable.unit}" if variable.unit else ""
-    if math.isinf(variable.low) and math.isinf(variable.high):
-        return f"{noun}{f' in{unit}' if unit else ''}"
-    return f"{noun} from {variable.low:g} to {variable.high:g}{unit}"
+    if not (math.isinf(variable.low) and math.isinf(variable.high)):
+        return " ".join(
+            filter(None, [f"{noun} from {variable.low:g} to {variable.high:g}", variable.unit])
+        )
+    return f"{noun} in {variable.unit}" if variable.unit else noun

@@ -21,8 +21,6 @@ from .interface import TYPES, TYPES_3, Enumeration, Interface, Variable, kind_of
 from .units import BASE, Unit
 
 NUMERIC = ("Real", "Integer")
-LARGEST_REFERENCE = 2**32 - 1
-"""A value reference is an unsigned integer of 32 bits."""
 CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029]")
 """Characters that end a line of a message or table, or move the cursor of a terminal."""
 EXPERIMENT = {
@@ -122,9 +120,7 @@ class _Reader:
             raise ValueError("no ModelVariables")
         self.elements = [e for e in parent if e.get("name") is not None]
         self.references = [
-            _whole(
-                f"variable {_name(e)!r}: valueReference", e.get("valueReference"), LARGEST_REFERENCE
-            )
+            _whole(f"variable {_name(e)!r}: valueReference", e.get("valueReference"), 2**32 - 1)
             for e in self.elements
         ]
         keys = self.references if major == "3" else range(1, len(self.elements) + 1)
@@ -170,8 +166,17 @@ class _Reader:
             self.variable(e, reference, now.get(_name(e)), initially.get(_name(e)))
             for e, reference in zip(self.elements, self.references, strict=True)
         ]
-        for v, element in zip(tuple(found), self.elements, strict=True):
-            found += [_alias(v, e) for e in element.iterfind("Alias")]
+        found += [
+            replace(
+                v,
+                name=_name(e),
+                description=e.get("description") or v.description,
+                display_unit=e.get("displayUnit") or v.display_unit,
+                alias=True,
+            )
+            for v, element in zip(found, self.elements, strict=True)
+            for e in element.iterfind("Alias")
+        ]
         names = set()
         for v in found:
             if v.name in names:
@@ -188,9 +193,9 @@ class _Reader:
                 for name, e in direct.items()
                 if e is not None
             }
-        key, way = (
-            ("valueReference", group) if self.major == "3" else ("index", f"{group}s/Unknown")
-        )
+        key, way = "index", f"{group}s/Unknown"
+        if self.major == "3":
+            key, way = "valueReference", group
 
         def called(place: str, text: str | None) -> str:
             found = self.places.get(_whole(place, text))
@@ -202,8 +207,9 @@ class _Reader:
         for element in self.root.iterfind(f"ModelStructure/{way}"):
             name, listed = called(f"{group}: {key}", element.get(key)), element.get("dependencies")
             place = f"{group} {name!r}: dependencies"
-            needs = None if listed is None else listed.split()
-            found[name] = None if needs is None else tuple(called(place, text) for text in needs)
+            found[name] = (
+                listed if listed is None else tuple(called(place, t) for t in listed.split())
+            )
         return found
 
     def variable(self, element: Element, reference: int, now: Names, initially: Names) -> Variable:
@@ -273,16 +279,6 @@ class _Reader:
             holds = self.places.get(_whole(f"{place}: Dimension: valueReference", reference))
             text = None if holds is None else holds.get("start")
         return _whole(f"{place}: Dimension", text)
-
-
-def _alias(v: Variable, element: Element) -> Variable:
-    return replace(
-        v,
-        name=_name(element),
-        description=element.get("description") or v.description,
-        display_unit=element.get("displayUnit") or v.display_unit,
-        alias=True,
-    )
 
 
 def _unit(name: str, base: Element) -> Unit:

@@ -1,19 +1,7 @@
 """Tolerance bands of signals and metrics: given in a file, or derived from the reference itself.
 
-Derived, a band answers one question: can this deviation be told from a mere choice of numerics? The
-original is run again with twice the communication step, and in the other scheme. Of a method of
-order p, the result with twice the step is (2^p - 1) times as far from that with the step as that is
-from the exact one, which is at least its own error; the scheme adds or removes a delay of one step
-at each connection. Of the original itself, every second sample stands against all of them: the peak
-of an impact is recorded as far as a sample falls on it, which a shift of less than a step changes.
-The candidate has such an error of its own, so the band is twice the largest of these deviations.
-
-Nothing smaller than SHARE of the range of a signal, or of a metric, matters, and of a signal that
-hardly moves SMALL of its size, or of its nominal value where it is about 0: the rounding of a
-balance is no difference. That a moment like a first contact shifts by SHARE of the duration is
-allowed, too (see tube.py). csv-compare takes 0.002 for both shares.
-
-A file overrides that where it names a signal or metric, in the unit of the original:
+How they are derived: orchestrator/README.md, Qualification. A file overrides that where it names a
+signal or metric, in the unit of the original:
 
     [signals]
     "plant.gap[1]" = { absolute = 1e-5, relative = 1e-3, time = 2e-3 }
@@ -26,7 +14,6 @@ A file overrides that where it names a signal or metric, in the unit of the orig
 
 import math
 import re
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -34,6 +21,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ..checks import known, number, toml_table
 from ..errors import InputError, choices
 from .tube import Curve, deviation
 
@@ -46,8 +34,6 @@ SMALL = 1e-6
 BOTH = 2.0
 """The numerical errors of two runs, of that of one."""
 
-Source = Literal["given", "derived"]
-
 
 @dataclass(frozen=True, slots=True)
 class Band:
@@ -58,7 +44,7 @@ class Band:
 
     width: float
     time: float
-    source: Source
+    source: Literal["given", "derived"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,16 +57,15 @@ class Given:
 
     @property
     def wide(self) -> bool:
-        """Whether it gives a width; else that is derived."""
+        """True if it gives a width; else that is derived."""
         return self.absolute is not None or self.relative is not None
 
     def band(self, scale: float, derived: Band) -> Band:
         """The band it makes where relative is of scale; what it does not give stays derived."""
-        time = derived.time if self.time is None else self.time
-        if not self.wide:
-            return Band(derived.width, time, "given")
-        width = (self.absolute or 0.0) + (self.relative * scale if self.relative else 0.0)
-        return Band(width, time, "given")
+        width = derived.width
+        if self.wide:
+            width = (self.absolute or 0.0) + (self.relative * scale if self.relative else 0.0)
+        return Band(width, derived.time if self.time is None else self.time, "given")
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,13 +79,9 @@ class Bands:
 
 def read_bands(path: Path) -> Bands:
     """The bands of a TOML file; InputError names the entry that is wrong."""
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file of bands") from None
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"{path}: not readable as TOML: {error}") from error
-    _check_keys(str(path), table, ("signals", "metrics"))
+    table = toml_table(path, "file of bands")
+    for key in table:
+        known(f"{path}: unknown entry", key, ("signals", "metrics"))
     return Bands(
         str(path),
         _entries(f"{path}: [signals]", table.get("signals", {}), ("absolute", "relative", "time")),
@@ -134,8 +115,13 @@ def signal_band(
     time in s is the shift allowed unless given says otherwise, nominal the declared nominal value;
     None stands for 1, as in FMI. A held curve (Booleans, integers) has the derived width 0.
     """
-    derived = Band(_width(reference, again, nominal, time), time, "derived")
-    return given.band(float(np.ptp(reference.values)), derived) if given else derived
+    apart = [float(deviation(reference, other, time).values.max()) for other in again]
+    width, span = BOTH * max(apart, default=0.0), float(np.ptp(reference.values))
+    if not reference.held:
+        size = max(float(np.abs(reference.values).max()), 1.0 if nominal is None else abs(nominal))
+        width = max(SHARE * span, SMALL * size, width)
+    derived = Band(width, time, "derived")
+    return given.band(span, derived) if given else derived
 
 
 def metric_band(
@@ -157,17 +143,8 @@ def metric_band(
     return given.band(size, derived) if given else derived
 
 
-def _width(reference: Curve, again: Iterable[Curve], nominal: float | None, time: float) -> float:
-    apart = [float(deviation(reference, other, time).values.max()) for other in again]
-    numerical = BOTH * max(apart, default=0.0)
-    if reference.held:
-        return numerical
-    size = max(float(np.abs(reference.values).max()), 1.0 if nominal is None else abs(nominal))
-    return max(SHARE * float(np.ptp(reference.values)), SMALL * size, numerical)
-
-
 def _fits(pattern: str, name: str) -> bool:
-    """Whether a name fits a pattern, in which only * is special: names have brackets."""
+    """True if a name fits a pattern, in which only * is special: names have brackets."""
     return re.fullmatch(".*".join(map(re.escape, pattern.split("*"))), name) is not None
 
 
@@ -180,16 +157,9 @@ def _entries(place: str, table: Any, valid: Sequence[str]) -> dict[str, Given]:
 def _given(place: str, entry: Any, valid: Sequence[str]) -> Given:
     if not isinstance(entry, dict) or not entry:
         raise InputError(f"{place} = {entry!r}: must be a table with one of {choices(valid)}")
-    _check_keys(place, entry, valid)
     for key, value in entry.items():
-        number = isinstance(value, float | int) and not isinstance(value, bool)
-        if not number or not value >= 0.0 or (math.isinf(value) and key != "absolute"):
-            more = ", inf where it is not judged" if key == "absolute" else ""
-            raise InputError(f"{place}: {key} = {value!r}: must be a number of at least 0{more}")
+        known(f"{place}: unknown entry", key, valid)
+        more = ", inf where it is not judged" if key == "absolute" else ""
+        if not (more and value == math.inf):
+            number(f"{place}: {key}", value, 0.0, must=f"a number of at least 0{more}")
     return Given(**{key: float(value) for key, value in entry.items()})
-
-
-def _check_keys(place: str, table: Mapping[str, Any], valid: Sequence[str]) -> None:
-    for key in table:
-        if key not in valid:
-            raise InputError(f"{place}: unknown entry {key!r}; valid: {choices(valid)}")

@@ -30,51 +30,41 @@ def feedthrough_differences(
             continue
         before, now = _needs(old, originals[name]), _needs(variable, candidate)
         added = [i for i in now if i in inputs and i not in before]
+        gone = [i for i in before if i not in now]
+        severity: Severity = "notes"
         if added:
-            loop = _loop(system, name, variable.name, added, swapped)
-            yield _added(variable, old, added, loop, use)
-        elif variable.dependencies is not None and set(before) - set(now):
-            gone = choices([i for i in before if i not in now])
-            text = f"does not depend directly on {gone}: a change there shows one step later"
-            yield _difference("notes", variable, old, text)
-
-
-def _added(
-    variable: Variable, old: Variable, added: Sequence[str], loop: Sequence[Port], use: Use
-) -> Difference:
-    how = "may depend" if variable.dependencies is None else "depends"
-    declared = ", as it declares no dependencies" if variable.dependencies is None else ""
-    text = f"{how} directly on {choices(added)}{declared}"
-    if not loop:
-        return _difference("notes", variable, old, f"{text}; closes no loop")
-    path = " -> ".join(map(str, loop))
-    severity: Severity = "blocks" if use.loops == "refuse" else "warns"
-    return _difference(severity, variable, old, f"{text}: an algebraic loop {path}")
-
-
-def _difference(severity: Severity, new: Variable, old: Variable, text: str) -> Difference:
-    listed = [None if v.dependencies is None else list(v.dependencies) for v in (old, new)]
-    return Difference(severity, "dependency", new.name, text, *listed)
+            text = f"depends directly on {choices(added)}"
+            if variable.dependencies is None:
+                text = f"may depend directly on {choices(added)}, as it declares no dependencies"
+            if loop := _loop(system, Port(name, variable.name), added, swapped):
+                severity = "blocks" if use.loops == "refuse" else "warns"
+                text = f"{text}: an algebraic loop {' -> '.join(map(str, loop))}"
+            else:
+                text = f"{text}; closes no loop"
+        elif variable.dependencies is not None and gone:
+            text = (
+                f"does not depend directly on {choices(gone)}: a change there shows one step later"
+            )
+        else:
+            continue
+        listed = [None if v.dependencies is None else list(v.dependencies) for v in (old, variable)]
+        yield Difference(severity, "dependency", variable.name, text, *listed)
 
 
 def _loop(
-    system: System, name: str, output: str, inputs: Sequence[str], interfaces: Interfaces
+    system: System, output: Port, inputs: Sequence[str], interfaces: Interfaces
 ) -> list[Port]:
-    """The shortest way from the output of a component back to it by one of its inputs, or none."""
-    start, ends = Port(name, output), {Port(name, i) for i in inputs}
-    came_from: dict[Port, Port | None] = {start: None}
-    queue = deque([start])
+    """The shortest way from an output back to it by one of its component's inputs, or none."""
+    ends = {Port(output.component, i) for i in inputs}
+    queue, seen = deque([[output]]), {output}
     while queue:
-        port = queue.popleft()
-        if port in ends:
-            path = [start, port]
-            while (before := came_from[path[-1]]) is not None:
-                path.append(before)
-            return path[::-1]
-        for following in _followers(system, port, interfaces):
-            if following not in came_from:
-                came_from[following] = port
-                queue.append(following)
+        path = queue.popleft()
+        if path[-1] in ends:
+            return [*path, output]
+        for following in _followers(system, path[-1], interfaces):
+            if following not in seen:
+                seen.add(following)
+                queue.append([*path, following])
     return []
 
 

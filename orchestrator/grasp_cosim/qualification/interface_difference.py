@@ -29,22 +29,17 @@ Kind = Literal[
 COMPARED = (*SETTABLE, "output")
 """Other variables are an FMU's own business."""
 
-LOST: Mapping[str, tuple[Severity, str]] = {
+RESTRICTIONS: Mapping[str, tuple[Severity, bool, str]] = {
     "canGetAndSetFMUstate": (
-        "warns",
-        "its state cannot be saved: a step that fails is not retried",
+        "warns", True, "its state cannot be saved: a step that fails is not retried",
     ),
-    "canSerializeFMUstate": ("notes", "its state cannot be written to a file"),
-    "providesDirectionalDerivative": ("notes", "it gives no derivatives"),
-}
-"""Capabilities of the original that may be missed."""
-
-GAINED: Mapping[str, tuple[Severity, str]] = {
-    "needsExecutionTool": ("warns", "it runs only where its tool is installed"),
-    "canBeInstantiatedOnlyOncePerProcess": ("warns", "one instance per process"),
-    "mightReturnEarlyFromDoStep": ("warns", "it may end a step before its end"),
-}
-"""Declarations of a candidate that restrict it."""
+    "canSerializeFMUstate": ("notes", True, "its state cannot be written to a file"),
+    "providesDirectionalDerivative": ("notes", True, "it gives no derivatives"),
+    "needsExecutionTool": ("warns", False, "it runs only where its tool is installed"),
+    "canBeInstantiatedOnlyOncePerProcess": ("warns", False, "one instance per process"),
+    "mightReturnEarlyFromDoStep": ("warns", False, "it may end a step before its end"),
+}  # fmt: skip
+"""What a candidate lacks that the original can (True), or declares that the original does not."""
 
 SAME = 1e-12
 """Relative; starts and limits this close are the same number, written or converted otherwise."""
@@ -90,14 +85,10 @@ class Use:
 def use_of(system: System, name: str) -> Use:
     """What the system does with the component of that name."""
     component = system.component(name, system.name)
-    ends = [
-        (port, connection)
-        for connection in system.connections
-        for port in (connection.source, connection.target)
-    ]
-    scaled = [p for p, connection in ends if (connection.factor, connection.offset) != (None, None)]
+    ends = [(port, c) for c in system.connections for port in (c.source, c.target)]
+    scaled = [port for port, c in ends if (c.factor, c.offset) != (None, None)]
     faulty = {fault.target for fault in system.faults}
-    through = [p for p, connection in ends if connection.target in faulty]
+    through = [port for port, c in ends if c.target in faulty]
     tuned = [port for event in system.events for port in event.set]
     conditions = [*(e.when for e in system.events), *(f.when for f in system.faults)]
     asked = [condition.port for condition in conditions if condition]
@@ -165,11 +156,10 @@ def _changed(
 ) -> Iterator[Difference]:
     """Of a variable that both have; change is from the old unit to the new, None for no way."""
     name = old.name
-    used = use.uses(name)
-    serious: Severity = "blocks" if used else "warns"
+    serious: Severity = "blocks" if use.uses(name) else "warns"
+    types = old.type, new.type
     if old.kind != new.kind:
-        text = f"is {new.type}, must be {old.type}"
-        yield Difference(serious, "type", name, text, old.type, new.type)
+        yield Difference(serious, "type", name, f"is {new.type}, must be {old.type}", *types)
         return
     if old.shape != new.shape:
         was, now = list(old.shape), list(new.shape)
@@ -177,8 +167,7 @@ def _changed(
         yield Difference(serious, "type", name, text, was, now)
         return
     if new.type == "Float32" != old.type:
-        text = "is Float32: 7 digits instead of 16"
-        yield Difference("warns", "type", name, text, old.type, new.type)
+        yield Difference("warns", "type", name, "is Float32: 7 digits instead of 16", *types)
     if old.causality != new.causality:
         yield _causality(old, new, use)
     elif old.variability != new.variability:
@@ -239,14 +228,13 @@ def _range(old: Variable, new: Variable, use: Use, change: Conversion) -> Iterat
     was, now = [change(old.low), change(old.high)], [new.low, new.high]
     declared = [old.minimum, old.maximum], [new.minimum, new.maximum]
     value = change(float(use.values[name])) if name in use.values else now[0]
+    valid = f"{now[0]:g} to {now[1]:g}{unit}"
     if not now[0] <= value <= now[1]:
-        text = (
-            f"value {value:.9g}{unit} is set in the system; must be {now[0]:g} to {now[1]:g}{unit}"
-        )
+        text = f"value {value:.9g}{unit} is set in the system; must be {valid}"
         yield Difference("blocks", "range", name, text, *declared)
     elif _less(was[0], now[0]) or _less(now[1], was[1]):
         severity: Severity = "notes" if old.causality == "output" else "warns"
-        text = f"takes {now[0]:g} to {now[1]:g}{unit} instead of {was[0]:g} to {was[1]:g}{unit}"
+        text = f"takes {valid} instead of {was[0]:g} to {was[1]:g}{unit}"
         yield Difference(severity, "range", name, text, *declared)
 
 
@@ -284,11 +272,10 @@ def capability_differences(
         text = f"is for {choices(now)}; must be for co-simulation"
         yield Difference("blocks", "capability", "kind", text, was, now)
         return
-    for flags, lost in ((LOST, True), (GAINED, False)):
-        for flag, (severity, text) in flags.items():
-            had, has = bool(original.capability(flag)), bool(candidate.capability(flag))
-            if had != has and had == lost:
-                yield Difference(severity, "capability", flag, text, had, has)
+    for flag, (severity, lost, text) in RESTRICTIONS.items():
+        had, has = bool(original.capability(flag)), bool(candidate.capability(flag))
+        if had != has and had == lost:
+            yield Difference(severity, "capability", flag, text, had, has)
     yield from _steps(original, candidate, step)
 
 

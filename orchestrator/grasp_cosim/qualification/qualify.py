@@ -22,7 +22,7 @@ from ..recording.result import Result
 from ..system.description import System
 from ..system.parts import NANOSECONDS, Isolation
 from ..system.structure import SCHEMES
-from .bands import SHARE, Band, Bands, check_patterns, entry_for, metric_band, signal_band
+from .bands import SHARE, Band, Bands, Given, check_patterns, entry_for, metric_band, signal_band
 from .interface_difference import Difference
 from .swap import Swap, prepare_swap
 from .tube import Curve, curve, deviation
@@ -31,6 +31,7 @@ FEWEST_STEPS = 2
 """The least shift in time a derived band allows, in steps: one for the step, one for the scheme."""
 
 Curves = Mapping[str, Curve]
+Entries = Mapping[str, Given | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +62,7 @@ class Compared:
 
     @property
     def inside(self) -> bool:
-        """Whether the deviation is in its band."""
+        """True if the deviation is in its band."""
         return self.ratio <= 1.0
 
 
@@ -100,7 +101,7 @@ class Qualification:
 
     @property
     def qualified(self) -> bool:
-        """Whether the candidate may take the original's place."""
+        """True if the candidate may take the original's place."""
         return not (self.blocks or self.failure or self.outside)
 
 
@@ -122,31 +123,36 @@ def qualify(
     set in both systems, in the unit of the original, or in the one that has such a variable. bands
     are derived where they are not given. The candidate runs in a process of its own, which a crash
     does not leave, unless isolation says otherwise. metrics are compared beside those that every
-    result is asked for. InputError where the input is wrong or the
-    original refuses, SimulationError where the original fails, KeyboardInterrupt at Ctrl-C.
+    result is asked for. InputError where the input is wrong or the original refuses,
+    SimulationError where the original fails, KeyboardInterrupt at Ctrl-C.
     """
     bands = bands or Bands()
     swap = prepare_swap(system, component, Path(candidate), rename or {}, values or {}, isolation)
     if swap.swapped is None:
         return Qualification(swap)
-    measures = _Measures(registered(metrics), system.roles)
+    asked = registered(metrics)
     reference = _run(swap.system, progress)
-    original = _curves(reference)
-    _check(bands, original, measures)
-    result, failure = _attempt(swap.swapped, progress)
-    again: tuple[Curves, ...] = ()
-    numerics: tuple[str, ...] = ()
-    if _derives(bands, original, measures):
-        again, numerics = _other_numerics(swap.system, original, progress)
-    candidate_curves = _converted(_curves(result), swap) if result else {}
-    judge = _Judge(swap, bands, reference.units, original, again, measures)
+    original = _Original(swap, _curves(reference), reference.units, asked)
+    signals, singles = original.entries(bands)
+    result, failure = None, None
+    try:
+        result = _run(swap.swapped, progress)
+    except SimulationError as error:
+        result, failure = error.result, str(error)
+    except InputError as error:  # does not load, or refuses its initialisation
+        failure = str(error)
+    again: list[Curves] = []
+    numerics: list[str] = []
+    if not all(entry and entry.wide for entry in (*signals.values(), *singles.values())):
+        again, numerics = _other_numerics(swap.system, original.curves, progress)
+    theirs = _converted(_curves(result), swap) if result else {}
     return Qualification(
         swap,
-        judge.signals(candidate_curves),
-        () if failure else judge.metrics(candidate_curves),
+        original.signals(theirs, again, signals),
+        () if failure else original.metrics(theirs, again, singles),
         failure,
-        numerics,
-        (original, candidate_curves),
+        tuple(numerics),
+        (original.curves, theirs),
         tuple(line for line in result.log if line not in reference.log) if result else (),
     )
 
@@ -158,29 +164,10 @@ def _run(system: System, progress: bool) -> Result:
     return result
 
 
-def _attempt(system: System, progress: bool) -> tuple[Result | None, str | None]:
-    """The candidate's run, as far as it came, and why not further."""
-    try:
-        return _run(system, progress), None
-    except SimulationError as error:
-        return error.result, str(error)
-    except InputError as error:  # does not load, or refuses its initialisation
-        return None, str(error)
-
-
-def _derives(bands: Bands, original: Curves, measures: _Measures) -> bool:
-    """Whether a width is left to be derived."""
-    given = [
-        *(entry_for(bands.signals, name) for name in original),
-        *(entry_for(bands.metrics, name, _plain(name)) for name in measures.values(original)),
-    ]
-    return not all(entry and entry.wide for entry in given)
-
-
 def _other_numerics(
     system: System, original: Curves, progress: bool
-) -> tuple[tuple[Curves, ...], tuple[str, ...]]:
-    """The original with twice the step and in the other scheme, as far as it runs so, and thinned.
+) -> tuple[list[Curves], list[str]]:
+    """The original thinned, with twice the step and in the other scheme, as far as it runs so.
 
     And what they are, in words.
     """
@@ -192,7 +179,7 @@ def _other_numerics(
             said.append(name)
         except (InputError, SimulationError) as error:
             said.append(f"not {name}: {error}")
-    return tuple(runs), tuple(said)
+    return runs, said
 
 
 def _variants(system: System) -> Iterator[tuple[str, System]]:
@@ -212,113 +199,92 @@ def _curves(result: Result) -> dict[str, Curve]:
 
 def _converted(curves: Curves, swap: Swap) -> dict[str, Curve]:
     """The signals in the original's units, but for those that cannot be."""
-    changes = {name: swap.back.get(name, IDENTITY) for name in curves}
     return {
         name: Curve(c.time, change(c.values), c.held)
         for name, c in curves.items()
-        if (change := changes[name]) is not None
+        if (change := swap.back.get(name, IDENTITY)) is not None
     }
 
 
-def _check(bands: Bands, original: Curves, measures: _Measures) -> None:
-    """InputError where an entry of the bands is for nothing."""
-    check_patterns(f"{bands.place}: [signals]", bands.signals, tuple(original))
-    metrics = [n for name in measures.values(original) for n in dict.fromkeys((_plain(name), name))]
-    check_patterns(f"{bands.place}: [metrics]", bands.metrics, metrics)
-
-
 @dataclass(frozen=True, slots=True)
-class _Judge:
-    """Compares a candidate's run with the original's; again are its runs with other numerics."""
+class _Original:
+    """The original's run, with which the candidate's is compared, and the metrics of both."""
 
     swap: Swap
-    bands: Bands
+    curves: Curves
     units: Mapping[str, str | None]
-    original: Curves
-    again: tuple[Curves, ...]
-    measures: _Measures
+    asked: tuple[Metric, ...]
 
-    @property
-    def shift(self) -> float:
-        """The shift in time in s that a derived band allows."""
-        system = self.swap.system
-        return max(SHARE * system.stop_ns, FEWEST_STEPS * system.step_ns) / NANOSECONDS
+    def entries(self, bands: Bands) -> tuple[Entries, Entries]:
+        """Each signal and each metric with its entry; InputError where an entry is for nothing."""
+        names = self._values(self.curves)
+        check_patterns(f"{bands.place}: [signals]", bands.signals, tuple(self.curves))
+        metrics = [n for name in names for n in dict.fromkeys((_plain(name), name))]
+        check_patterns(f"{bands.place}: [metrics]", bands.metrics, metrics)
+        return (
+            {name: entry_for(bands.signals, name) for name in self.curves},
+            {name: entry_for(bands.metrics, name, _plain(name)) for name in names},
+        )
 
-    def signals(self, candidate: Curves) -> tuple[Compared, ...]:
-        """All signals that both have, up to the end of the candidate's run."""
-        found = [self._signal(n, candidate[n]) for n in self.original if n in candidate]
+    def signals(
+        self, candidate: Curves, again: Sequence[Curves], given: Entries
+    ) -> tuple[Compared, ...]:
+        """All signals that both have, up to the end of the candidate's run.
+
+        again are the original's runs with other numerics.
+        """
+        found = []
+        for name, reference in self.curves.items():
+            if name not in candidate:
+                continue
+            theirs, nominal = candidate[name], self.swap.nominals.get(name)
+            others = [run[name] for run in again]
+            band = signal_band(reference, others, nominal, self._shift, given[name])
+            apart = deviation(reference.until(float(theirs.time[-1])), theirs, band.time)
+            worst = apart.values.argmax()
+            time, distance, ours, other = (float(column[worst]) for column in apart)
+            span = float(np.ptp(reference.values))
+            unit = self.units[name]
+            found.append(Compared(name, unit, band, distance, ours, other, time, span))
         return tuple(sorted(found, key=lambda c: -c.ratio))
 
-    def metrics(self, candidate: Curves) -> tuple[Compared, ...]:
+    def metrics(
+        self, candidate: Curves, again: Sequence[Curves], given: Entries
+    ) -> tuple[Compared, ...]:
         """All metrics of the original; one that the candidate's run lacks is None there.
 
         But for optional ones that the candidate's signals do not permit.
         """
-        values, theirs = self.measures.values(self.original), self.measures.values(candidate)
-        others = [self.measures.values(run) for run in self.again]
-        found = []
-        for name, value in values.items():
-            metric = self.measures.metric(name)
+        theirs, others = self._values(candidate), [self._values(run) for run in again]
+        asked, found = {m.name: m for m in self.asked}, []
+        for name, value in self._values(self.curves).items():
+            metric, other = asked[_plain(name)], theirs.get(name)
             if metric.optional and name not in theirs:
                 continue
-            given = entry_for(self.bands.metrics, name, metric.name)
-            least = self._least(metric.unit)
-            band = metric_band(value, [run.get(name) for run in others], least, given)
-            found.append(_compared(name, metric.unit, band, value, theirs.get(name)))
+            least = self._shift if metric.unit == "s" else SHARE if metric.unit == "1" else 0.0
+            band = metric_band(value, [run.get(name) for run in others], least, given[name])
+            if value is None or other is None:
+                apart = 0.0 if value is other else inf
+            else:
+                apart = abs(other - value)
+            found.append(Compared(name, metric.unit, band, apart, value, other))
         return tuple(sorted(found, key=lambda c: -c.ratio))
 
-    def _least(self, unit: str | None) -> float:
-        """The smallest derived width of a metric in that unit, see metric_band."""
-        return self.shift if unit == "s" else SHARE if unit == "1" else 0.0
+    @property
+    def _shift(self) -> float:
+        """The shift in time in s that a derived band allows."""
+        system = self.swap.system
+        return max(SHARE * system.stop_ns, FEWEST_STEPS * system.step_ns) / NANOSECONDS
 
-    def _signal(self, name: str, candidate: Curve) -> Compared:
-        reference = self.original[name]
-        given = entry_for(self.bands.signals, name)
-        others = [run[name] for run in self.again]
-        band = signal_band(reference, others, self.swap.nominals.get(name), self.shift, given)
-        apart = deviation(reference.until(float(candidate.time[-1])), candidate, band.time)
-        worst = int(apart.values.argmax())
-        return Compared(
-            name,
-            self.units[name],
-            band,
-            float(apart.values[worst]),
-            float(apart.reference[worst]),
-            float(apart.candidate[worst]),
-            float(apart.time[worst]),
-            float(np.ptp(reference.values)),
-        )
-
-
-def _compared(
-    name: str, unit: str | None, band: Band, original: float | None, candidate: float | None
-) -> Compared:
-    if original is None or candidate is None:
-        apart = 0.0 if original is candidate else inf
-    else:
-        apart = abs(candidate - original)
-    return Compared(name, unit, band, apart, original, candidate)
-
-
-@dataclass(frozen=True, slots=True)
-class _Measures:
-    """The metrics that runs are compared by, and the roles of the system."""
-
-    metrics: tuple[Metric, ...]
-    roles: Mapping[str, str]
-
-    def values(self, curves: Curves) -> dict[str, float | None]:
+    def _values(self, curves: Curves) -> dict[str, float | None]:
         """The single values by name, like time_to_contact[1]; true is 1 and false 0."""
         if not curves:
             return {}
         time = next(iter(curves.values())).time
-        signals = Signals(time, {n: c.values for n, c in curves.items()}, self.roles)
-        found = measure(signals, self.metrics).flat()
+        roles = self.swap.system.roles
+        signals = Signals(time, {n: c.values for n, c in curves.items()}, roles)
+        found = measure(signals, self.asked).flat()
         return {name: None if v is None else float(v) for name, v in found.items()}
-
-    def metric(self, name: str) -> Metric:
-        """The metric that a single value belongs to."""
-        return next(m for m in self.metrics if m.name == _plain(name))
 
 
 def _plain(value: str) -> str:

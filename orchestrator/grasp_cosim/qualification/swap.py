@@ -6,13 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ..errors import InputError, choices
+from ..checks import known
+from ..errors import InputError
 from ..interface.interface import Interface, Value
 from ..interface.read import describe
 from ..interface.units import IDENTITY, Conversion
 from ..system.description import System
-from ..system.parts import Component, Isolation
-from .feedthrough import Interfaces, feedthrough_differences
+from ..system.parts import Isolation
+from .feedthrough import feedthrough_differences
 from .interface_difference import SEVERITIES, Difference, interface_differences, use_of
 
 
@@ -50,8 +51,12 @@ def prepare_swap(
     place = system.component(component, f"--as {component}")
     interfaces = {c.name: describe(c.fmu).renamed(c.rename) for c in system.components}
     ours = interfaces[component]
-    theirs = _candidate(candidate, rename, ours)
-    common, own = _split(component, values, ours, theirs)
+    theirs = describe(candidate).renamed(rename, "--rename")
+    for new, name in rename.items():
+        known(f"--rename: {new!r} = {name!r}: the original has no variable", new, ours.by_name)
+    extra = {f"{component}.{name}": name for name in theirs.by_name if name not in ours.by_name}
+    own = {extra[key]: value for key, value in values.items() if key in extra}
+    common = {key: value for key, value in values.items() if key not in extra}
     system = system.revised({}, common, ("--as", "--set"))
     use = use_of(system, component)
     differences = [
@@ -61,48 +66,32 @@ def prepare_swap(
     swapped = None
     if not any(d.severity == "blocks" for d in differences):
         converted = _converted(use.values, ours, theirs)
+        for name, value in own.items():
+            text = f"--set {component}.{name}"
+            converted[name] = theirs.parse(text, name, value, text=True)
         place = replace(place, fmu=candidate, rename=rename, values=converted, isolation=isolation)
-        outcome = _put_in(system, place, own)
-        if isinstance(outcome, Difference):
-            differences.append(outcome)
-        else:
-            swapped = outcome
+        components = tuple(place if c.name == component else c for c in system.components)
+        try:
+            swapped = replace(system, components=components)
+        except InputError as error:
+            differences.append(Difference("blocks", "system", component, str(error)))
     return Swap(
         system,
         component,
         candidate,
         tuple(sorted(differences, key=lambda d: SEVERITIES.index(d.severity))),
         swapped,
-        _back(component, ours, theirs),
-        _nominals(interfaces),
+        {
+            f"{component}.{v.name}": theirs.conversion(v.name, ours)
+            for v in ours.of("output")
+            if v.name in theirs.by_name
+        },
+        {
+            f"{name}.{v.name}": v.magnitude if isinstance(v.magnitude, float) else None
+            for name, interface in interfaces.items()
+            for v in interface.of("output")
+        },
     )
-
-
-def _candidate(path: Path, rename: Mapping[str, str], ours: Interface) -> Interface:
-    theirs = describe(path).renamed(rename, "--rename")
-    for new, own in rename.items():
-        if new not in ours.by_name:
-            raise InputError(
-                f"--rename: {new!r} = {own!r}: the original has no variable {new!r}; "
-                f"valid: {choices(ours.by_name)}"
-            )
-    return theirs
-
-
-def _split(
-    component: str, values: Mapping[str, Value], ours: Interface, theirs: Interface
-) -> tuple[dict[str, Value], dict[str, Value]]:
-    """The values for the original's system, and by variable those for the candidate alone."""
-    common: dict[str, Value] = {}
-    own: dict[str, Value] = {}
-    for key, value in values.items():
-        name, _, variable = key.partition(".")
-        known = variable in ours.by_name or variable not in theirs.by_name
-        if name != component or known:
-            common[key] = value
-        else:
-            own[variable] = value
-    return common, own
 
 
 def _converted(values: Mapping[str, Value], ours: Interface, theirs: Interface) -> dict[str, Value]:
@@ -114,37 +103,3 @@ def _converted(values: Mapping[str, Value], ours: Interface, theirs: Interface) 
             value = change(float(value))
         result[name] = value
     return result
-
-
-def _put_in(system: System, place: Component, own: Mapping[str, Value]) -> System | Difference:
-    """The system with the component in its place; a difference where it refuses that."""
-    try:
-        interface = place.interface
-    except InputError as error:
-        return Difference("blocks", "system", place.name, str(error))
-    parsed = {
-        name: interface.parse(f"--set {place.name}.{name}", name, value, text=True)
-        for name, value in own.items()
-    }
-    place = replace(place, values={**place.values, **parsed})
-    components = [place if c.name == place.name else c for c in system.components]
-    try:
-        return replace(system, components=tuple(components))
-    except InputError as error:
-        return Difference("blocks", "system", place.name, str(error))
-
-
-def _back(component: str, ours: Interface, theirs: Interface) -> dict[str, Conversion | None]:
-    return {
-        f"{component}.{v.name}": theirs.conversion(v.name, ours)
-        for v in ours.of("output")
-        if v.name in theirs.by_name
-    }
-
-
-def _nominals(interfaces: Interfaces) -> dict[str, float | None]:
-    return {
-        f"{component}.{v.name}": v.magnitude if isinstance(v.magnitude, float) else None
-        for component, interface in interfaces.items()
-        for v in interface.of("output")
-    }

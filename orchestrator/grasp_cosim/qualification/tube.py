@@ -1,14 +1,6 @@
 """How far two curves are apart where a shift in time is allowed: a tube around each.
 
-A moment like a first contact may come a few steps earlier or later without anything being wrong;
-sample by sample the contact force is then off by its whole size. So a curve is not compared with
-the other's sample but with what the other takes within +-shift of that time, as the reference
-results of the Modelica libraries are compared (csv-compare, pyfunnel: a rectangle moved along the
-reference). Those look only whether the candidate is in the tube of the reference, and miss that an
-impact is lacking altogether. Here both directions count, so the deviation is symmetric.
-
-At the end of a run, what a curve would take next is not known. A linear one is taken to go on as it
-came, point by point mirrored at its last sample; else one that is late there would always be out.
+Why so: orchestrator/README.md, Qualification.
 """
 
 from typing import Any, NamedTuple
@@ -88,16 +80,13 @@ class Deviation(NamedTuple):
 def tube(around: Curve, time: Array, shift: float) -> Tube:
     """The tube around a curve: what it takes from time - shift to time + shift, both in s."""
     around = around.continued(shift)
-    start, end = time - shift - ROUNDING, time + shift + ROUNDING
     edges = around.at(time - shift), around.at(time + shift)
     low, high = np.minimum(*edges), np.maximum(*edges)
-    first = np.searchsorted(around.time, start, side="left")
-    last = np.searchsorted(around.time, end, side="right")
+    first = np.searchsorted(around.time, time - shift - ROUNDING, side="left")
+    last = np.searchsorted(around.time, time + shift + ROUNDING, side="right")
     some = last > first
-    least = _least(around.values, first[some], last[some])
-    largest = -_least(-around.values, first[some], last[some])
-    low[some] = np.minimum(low[some], least)
-    high[some] = np.maximum(high[some], largest)
+    low[some] = np.minimum(low[some], _least(around.values, first[some], last[some]))
+    high[some] = np.maximum(high[some], -_least(-around.values, first[some], last[some]))
     return Tube(time, low, high)
 
 
@@ -108,8 +97,9 @@ def deviation(reference: Curve, candidate: Curve, shift: float) -> Deviation:
     """
     time = np.union1d(reference.time, candidate.time)
     ours, theirs = reference.at(time), candidate.at(time)
-    near_theirs = _nearest(tube(reference, time, shift), theirs)
-    near_ours = _nearest(tube(candidate, time, shift), ours)
+    around_ours, around_theirs = (tube(c, time, shift) for c in (reference, candidate))
+    near_theirs = np.clip(theirs, around_ours.low, around_ours.high)
+    near_ours = np.clip(ours, around_theirs.low, around_theirs.high)
     theirs_out, ours_out = np.abs(theirs - near_theirs), np.abs(ours - near_ours)
     first = theirs_out >= ours_out
     return Deviation(
@@ -118,11 +108,6 @@ def deviation(reference: Curve, candidate: Curve, shift: float) -> Deviation:
         np.where(first, near_theirs, ours),
         np.where(first, theirs, near_ours),
     )
-
-
-def _nearest(allowed: Tube, values: Array) -> Array:
-    """What is allowed and nearest to the values."""
-    return np.clip(values, allowed.low, allowed.high)
 
 
 def _least(values: Array, first: npt.NDArray[np.intp], last: npt.NDArray[np.intp]) -> Array:

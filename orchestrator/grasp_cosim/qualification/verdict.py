@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import asdict
 from math import inf, isfinite
 from typing import Any
 
@@ -24,16 +25,22 @@ WIDE = 0.1
 
 def as_text(q: Qualification) -> str:
     """The verdict, then what is out of band, the worst first, then the interface."""
-    parts = [_head(q)]
+    system, word = q.swap.system, "QUALIFIED" if q.qualified else "NOT QUALIFIED"
+    step, stop = system.step_ns / NANOSECONDS, system.stop_ns / NANOSECONDS
+    head = (
+        f"{word}: {q.swap.candidate.name} as {q.swap.component} (now {q.swap.original.name}), "
+        f"{stop:g} s in steps of {1e3 * step:g} ms, {system.scheme}"
+    )
+    parts = [[head, reason(q)]]
     for name, compared in (("signal", q.signals), ("metric", q.metrics)):
         if compared:
-            parts.append("\n".join(_table(name, compared)))
-    parts.append("\n".join(_differences(q.swap.differences)))
+            parts.append(_table(name, compared))
+    parts.append(_differences(q.swap.differences))
     if q.signals:
-        parts.append("\n".join(_basis(q)))
+        parts.append(_basis(q))
     elif q.failure:
-        parts.append(f"whether this machine loads it: grasp-cosim doctor {q.swap.candidate}")
-    return "\n\n".join(parts)
+        parts.append([f"whether this machine loads it: grasp-cosim doctor {q.swap.candidate}"])
+    return "\n\n".join(map("\n".join, parts))
 
 
 def as_json(q: Qualification) -> dict[str, Any]:
@@ -50,7 +57,7 @@ def as_json(q: Qualification) -> dict[str, Any]:
         "stop": system.stop_ns / NANOSECONDS,
         "scheme": system.scheme,
         "failure": q.failure,
-        "differences": [_difference_json(d) for d in q.swap.differences],
+        "differences": [asdict(d) for d in q.swap.differences],
         "signals": [_compared_json(c) for c in q.signals],
         "metrics": [_compared_json(c) for c in q.metrics],
         "uncompared": list(q.uncompared),
@@ -83,19 +90,6 @@ def reason(q: Qualification) -> str:
         if compared
     ]
     return f"{' and '.join(counts)} out of band"
-
-
-def _head(q: Qualification) -> str:
-    system, word = q.swap.system, "QUALIFIED" if q.qualified else "NOT QUALIFIED"
-    step, stop = system.step_ns / NANOSECONDS, system.stop_ns / NANOSECONDS
-    return "\n".join(
-        [
-            f"{word}: {q.swap.candidate.name} as {q.swap.component} "
-            f"(now {q.swap.original.name}), {stop:g} s in steps of {1e3 * step:g} ms, "
-            f"{system.scheme}",
-            reason(q),
-        ]
-    )
 
 
 def _table(name: str, compared: Sequence[Compared]) -> list[str]:
@@ -154,18 +148,15 @@ def _differences(differences: Sequence[Difference]) -> list[str]:
 def _basis(q: Qualification) -> list[str]:
     given = sum(c.band.source == "given" for c in (*q.signals, *q.metrics))
     derived = len(q.signals) + len(q.metrics) - given
-    lines = []
-    if derived:
-        runs = "; ".join(q.numerics) or "its own range alone"
-        lines.append(f"bands: {given} given, {derived} derived from the original ({runs})")
-    else:
-        lines.append(f"bands: all {given} given")
+    runs = "; ".join(q.numerics) or "its own range alone"
+    lines = [f"bands: {given} given, {derived} derived from the original ({runs})"]
+    if not derived:
+        lines = [f"bands: all {given} given"]
     if wide := [c.name for c in q.signals if c.span and WIDE * c.span < c.band.width < inf]:
         lines.append(f"bands that are wide for the range of their signals: {', '.join(wide)}")
     if q.uncompared:
-        lines.append(
-            f"not compared, as the candidate has no such output: {', '.join(q.uncompared)}"
-        )
+        names = ", ".join(q.uncompared)
+        lines.append(f"not compared, as the candidate has no such output: {names}")
     lines += [f"the candidate's run: {line}" for line in q.log[:ROWS]]
     if len(q.log) > ROWS:
         lines.append(f"the candidate's run: {len(q.log) - ROWS} lines more; --json has all")
@@ -176,28 +167,13 @@ def _number(value: float | None, digits: int) -> str:
     return "none" if value is None else f"{value:.{digits}g}"
 
 
-def _difference_json(d: Difference) -> dict[str, Any]:
-    return {
-        "severity": d.severity,
-        "kind": d.kind,
-        "variable": d.variable,
-        "text": d.text,
-        "original": d.original,
-        "candidate": d.candidate,
-    }
-
-
 def _compared_json(c: Compared) -> dict[str, Any]:
-    def finite(value: float) -> float | None:
-        return value if isfinite(value) else None
-
+    numbers = {"ratio": c.ratio, "deviation": c.deviation, "band": c.band.width}
     return {
         "name": c.name,
         "unit": c.unit,
         "inside": c.inside,
-        "ratio": finite(c.ratio),
-        "deviation": finite(c.deviation),
-        "band": finite(c.band.width),
+        **{key: value if isfinite(value) else None for key, value in numbers.items()},
         "band_time": c.band.time,
         "band_source": c.band.source,
         "time": c.time,

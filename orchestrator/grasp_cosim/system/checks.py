@@ -18,7 +18,8 @@ def check_components(system: Structure) -> None:
     first: dict[Path, str] = {}
     for component in system.components:
         interface = component.interface
-        if interface.once_per_process and component.isolation == "none":
+        once = interface.capability("canBeInstantiatedOnlyOncePerProcess") is True
+        if once and component.isolation == "none":
             other = first.setdefault(interface.path, component.name)
             if other != component.name:
                 raise InputError(

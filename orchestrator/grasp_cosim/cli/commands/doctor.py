@@ -1,13 +1,12 @@
 """The command doctor."""
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 
 import click
 
-from ...inspection.doctor import as_json as findings_json
-from ...inspection.doctor import as_text as findings_text
-from ...inspection.doctor import examine
+from ...inspection.doctor import as_text, examine
 from ..frame import NEGATIVE, json_option
 
 
@@ -24,7 +23,7 @@ def doctor(fmu: Path | None, as_json: bool) -> int:
     """
     findings = examine(fmu)
     if as_json:
-        click.echo(json.dumps({"findings": findings_json(findings)}))
+        click.echo(json.dumps({"findings": [asdict(finding) for finding in findings]}))
     else:
-        click.echo(findings_text(findings))
+        click.echo(as_text(findings))
     return NEGATIVE if any(f.status == "problem" for f in findings) else 0
