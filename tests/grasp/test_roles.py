@@ -331,6 +331,39 @@ def test_a_user_s_metrics_have_bands_in_a_qualification(
 
 
 @pytest.mark.parametrize(
+    ("more", "code", "ends"),
+    [
+        ((), 2, ["grasp-cosim: metric 'lazy': AttributeError: 'Signals' object has no attribute "]),
+        (
+            ("--realtime", "--factor", "1e6", "--overrun", "stop"),
+            3,
+            [
+                "kept what was recorded, in out",
+                "grasp-cosim: grasp.toml: the step at t = 0 s ended ",
+            ],
+        ),
+    ],
+)
+def test_a_metric_that_fails_loses_nothing_of_the_run(
+    command: Run, own: Path, more: tuple[str, ...], code: int, ends: list[str]
+) -> None:
+    """Nor does it hide why a run failed."""
+    own.write_text(OWN.replace("return reach(run)[0] < 1e-3", "return run.reach"))
+    short = ("run", "--step", "1e-3", "--stop", "0.01", "--metrics", own, "--out", "out", *more)
+    found, out, err = command(*short)
+    assert (found, out) == (code, "")
+    assert len(err.splitlines()) == len(ends)
+    assert all(line.startswith(end) for line, end in zip(err.splitlines(), ends, strict=True))
+    run = json.loads(Path("out/run.json").read_text())
+    said = "metric 'lazy': AttributeError: 'Signals' object has no attribute 'reach'"
+    assert run["missing_metrics"] == ["no heat: plant lacks temperature", said]
+    assert ("reach" in run, "lazy" in run) == (True, False)
+    back = load_run("out")
+    assert back.metrics["reach"] == run["reach"]
+    assert back.complete == (code == 2)
+
+
+@pytest.mark.parametrize(
     ("text", "message"),
     [
         ("1 / 0\n", "--metrics own.py: ZeroDivisionError: division by zero"),

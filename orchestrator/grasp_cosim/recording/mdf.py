@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 import numpy.typing as npt
 
+from ..checks import extra_module
 from ..errors import InputError, SimulationError
 from ..files import in_one_piece, unwritable
 from .listener import Experiment, Signal, times
@@ -101,13 +102,7 @@ class MdfListener:
 
 def check_mdf() -> None:
     """InputError without asammdf."""
-    try:
-        import asammdf  # noqa: F401
-    except ImportError as error:
-        raise InputError(
-            "asammdf is not installed, it writes MDF files; "
-            "install it with: pip install 'grasp-cosim[mdf]'"
-        ) from error
+    extra_module("asammdf", "it writes MDF files", "mdf")
 
 
 def _channel(signal: Signal) -> asammdf.Signal:
@@ -125,11 +120,10 @@ def _channel(signal: Signal) -> asammdf.Signal:
 
 def _comment(experiment: Experiment, complete: bool) -> str:
     """The header's comment, in the XML that MDF 4 asks for."""
-    described = experiment.settings
     root = ElementTree.Element("HDcomment")
-    ElementTree.SubElement(root, "TX").text = json.dumps(described)
+    ElementTree.SubElement(root, "TX").text = json.dumps(experiment.settings)
     properties = ElementTree.SubElement(root, "common_properties")
-    for name, value in {**described, "complete": complete}.items():
+    for name, value in {**experiment.settings, "complete": complete}.items():
         if not isinstance(value, dict | list):
             ElementTree.SubElement(properties, "e", name=name).text = json.dumps(value)
     return ElementTree.tostring(root, encoding="unicode")

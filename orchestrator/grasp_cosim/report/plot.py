@@ -10,6 +10,7 @@ from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..checks import extra_module
 from ..errors import InputError
 from ..files import in_one_piece
 from ..recording.result import Result
@@ -50,14 +51,9 @@ def plot_signals(run: Result, path: Path) -> None:
 
 def new_figure(width: float, height: float) -> Figure:
     """Return an empty figure, sizes in inches; InputError without matplotlib."""
-    try:
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise InputError(
-            "matplotlib is not installed, it draws the figures; "
-            "install it with: pip install 'grasp-cosim[plot]'"
-        ) from error
-    return Figure(figsize=(width, height), dpi=DPI, layout="constrained")
+    module = extra_module("matplotlib.figure", "it draws the figures", "plot")
+    figure: Figure = module.Figure(figsize=(width, height), dpi=DPI, layout="constrained")
+    return figure
 
 
 def save(figure: Figure, path: Path) -> None:

@@ -7,7 +7,7 @@ would show one step in a million as nothing. Times are in s.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import accumulate
 from math import ceil, floor, log10
 from pathlib import Path
@@ -15,6 +15,7 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..realtime.timing import Histogram, Spread, Timing
+from ..recording.result import Result
 from .plot import GREY, RED, as_svg, finish, new_figure, save
 from .tables import count
 from .timing_words import (
@@ -86,6 +87,17 @@ OTHERS = {
     BACKLOG: Look(MUTED, 2),
 }
 """The looks of all that is no component."""
+
+
+def draw_result(result: Result, folder: Path) -> Iterator[Path]:
+    """Draw the picture of a result, and the timing if it was paced; yield each PNG once drawn."""
+    picture = folder / f"{result.drawing.stem}.png"
+    result.plot(picture)
+    yield picture
+    if result.timing:
+        picture = folder / "timing.png"
+        draw_timing(result.timing, float(result.time[-1]), picture)
+        yield picture
 
 
 def draw_timing(timing: Timing, end: float, path: Path) -> None:

@@ -1,6 +1,5 @@
 """The command doctor."""
 
-import json
 from pathlib import Path
 
 import click
@@ -8,11 +7,11 @@ import click
 from ...inspection.doctor import as_json as findings_json
 from ...inspection.doctor import as_text as findings_text
 from ...inspection.doctor import examine
-from ..frame import NEGATIVE, json_option
+from ..frame import NEGATIVE, PATH, json_option, show
 
 
 @click.command()
-@click.argument("fmu", required=False, type=click.Path(path_type=Path))
+@click.argument("fmu", required=False, type=PATH)
 @json_option
 def doctor(fmu: Path | None, as_json: bool) -> int:
     """Find out whether this machine will load FMU, and what to do if not.
@@ -23,8 +22,5 @@ def doctor(fmu: Path | None, as_json: bool) -> int:
     Example: grasp-cosim doctor vendor.fmu
     """
     findings = examine(fmu)
-    if as_json:
-        click.echo(json.dumps({"findings": findings_json(findings)}))
-    else:
-        click.echo(findings_text(findings))
+    show(as_json, {"findings": findings_json(findings)}, findings_text(findings))
     return NEGATIVE if any(f.status == "problem" for f in findings) else 0

@@ -1,9 +1,8 @@
 """The command relay."""
 
 import csv
-import json
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
@@ -17,7 +16,7 @@ from ...hil.network import DIRECTIONS, Conditions, Network, Outage, check_time
 from ...hil.relay import Relay
 from ...hil.traffic import Entry, Log
 from ...system.parts import NANOSECONDS
-from ..frame import INTERRUPTED, fail, json_option
+from ..frame import INTERRUPTED, PATH, fail, json_option, show
 from ..signals import ended_by_signals
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -63,7 +62,7 @@ def _number(name: str, unit: str, text: str, default: float = 0.0) -> Callable[[
     help="Datagrams under way at most; more are dropped.",
 )
 @click.option("--duration", type=float, metavar="S", help="Default: until Ctrl-C.")
-@click.option("--log", type=click.Path(path_type=Path), help="CSV with the fate of each datagram.")
+@click.option("--log", type=PATH, help="CSV with the fate of each datagram.")
 @json_option
 def relay(
     peer: str,
@@ -98,7 +97,7 @@ def relay(
         with ended_by_signals(relay.stop) as came:
             _say(relay)
             relay.run(end)
-        click.echo(_json(relay, seed) if as_json else _table(relay))
+        show(as_json, _report(relay, seed), _table(relay))
     if came and duration is not None:
         return fail(f"interrupted before --duration {duration!r} was over", INTERRUPTED)
     return 0
@@ -140,10 +139,11 @@ def _say(relay: Relay) -> None:
     click.echo(f"relaying {text(relay.address)} -> {text(relay.peer)}", err=True)
 
 
-def _json(relay: Relay, seed: int) -> str:
-    counts = {d: {**asdict(c), "dropped": c.dropped} for d, c in relay.counters.items()}
-    ends = {"listening": text(relay.address), "to": text(relay.peer), "seed": seed}
-    return json.dumps({**ends, **counts})
+def _report(relay: Relay, seed: int) -> Mapping[str, Any]:
+    counts: dict[str, Any] = {
+        d: {**asdict(c), "dropped": c.dropped} for d, c in relay.counters.items()
+    }
+    return {"listening": text(relay.address), "to": text(relay.peer), "seed": seed} | counts
 
 
 def _table(relay: Relay) -> str:

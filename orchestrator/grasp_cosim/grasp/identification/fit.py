@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from ...checks import extra_module
 from ...errors import InputError, SimulationError
 
 Vector = npt.NDArray[np.float64]
@@ -76,13 +77,7 @@ class Fit:
 
 def check_scipy() -> None:
     """InputError without scipy."""
-    try:
-        import scipy  # noqa: F401
-    except ImportError as error:
-        raise InputError(
-            "scipy is not installed, it fits the parameters; "
-            "install it with: pip install 'grasp-cosim[identify]'"
-        ) from error
+    extra_module("scipy", "it fits the parameters", "identify")
 
 
 def fit(residuals: Residuals, parameters: Sequence[Parameter], place: str) -> Fit:

@@ -50,21 +50,20 @@ def check_claims(source: Source, evidence: Evidence) -> list[dict[str, Any]]:
 
 def times_are_near(e: Evidence) -> Claim:
     """Each contact time is near the published one."""
-    worst = max(abs(r["difference"]) for r in e.rows if r["finger"])
-    return (
-        f"Each contact time is within {TIME_BAND:.2f} s of the published one "
-        f"(largest deviation {worst:.3f} s).",
-        worst <= TIME_BAND,
-    )
+    return _near("contact time", TIME_BAND, [r for r in e.rows if r["finger"]])
 
 
 def differences_are_near(e: Evidence) -> Claim:
     """Each time difference is near the published one."""
-    worst = max(abs(r["difference"]) for r in e.rows if not r["finger"])
+    return _near("time difference", DIFFERENCE_BAND, [r for r in e.rows if not r["finger"]])
+
+
+def _near(what: str, band: float, rows: Sequence[Mapping[str, Any]]) -> Claim:
+    worst = max(abs(r["difference"]) for r in rows)
     return (
-        f"Each time difference is within {DIFFERENCE_BAND:.2f} s of the published one "
-        f"(largest deviation {worst:.3f} s).",
-        worst <= DIFFERENCE_BAND,
+        f"Each {what} is within {band:.2f} s of the published one (largest deviation {worst:.3f} "
+        "s).",
+        worst <= band,
     )
 
 
