@@ -15,7 +15,6 @@ from grasp_cosim.grasp.presets import (
     CASES,
     SYSTEM,
     built_in_presets,
-    with_bench,
     with_case,
     with_preset,
 )
@@ -151,7 +150,7 @@ def test_cases_and_bench_find_components_by_their_roles(
     system = System.load(written(fmus, tmp_path, NAMES, roles=True, presets=presets))
     assert bool(system.presets) == presets
     pairs = [(with_case(system, n), with_case(grasp, n)) for n in CASES]
-    pairs.append((with_bench(system), with_bench(grasp)))
+    pairs.append((with_preset(system, "bench"), with_preset(grasp, "bench")))
     pairs.append((with_case(pairs[-1][0], 1), with_case(pairs[-1][1], 1)))
     for ours, theirs in pairs:
         for role, name in NAMES.items():

@@ -62,7 +62,9 @@ def bind_python_option(more: str = "") -> Command:
     )
 
 
-def load_system(path: Path | None, step: float | None, stop: float | None) -> System:
+def load_system(
+    path: Path | None = None, step: float | None = None, stop: float | None = None
+) -> System:
     """The system of a file, by default the built-in grasp; what its reader notes is printed."""
     from ..system.description import System
 

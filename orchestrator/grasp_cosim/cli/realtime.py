@@ -69,7 +69,6 @@ def timing_lines(timing: Timing) -> list[str]:
 
 
 def _advice(timing: Timing) -> list[str]:
-    """What could be done about overruns."""
     step = timing.parts["step"]
     if step.median > timing.period:
         return [

@@ -172,15 +172,11 @@ class StepStudy:
             "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True))
             for row in rows
         ]
-        verdicts = ["", *(self._note(i) for i in range(len(self.runs)))]
-        return [
-            f"{line}  {verdict}".rstrip() for line, verdict in zip(lines, verdicts, strict=True)
-        ]
-
-    def _note(self, i: int) -> str:
-        if self.runs[i].failure:
-            return f"failed: {self.runs[i].failure}"
-        return "out of tolerance" if self.limits and not self.kept[i] else ""
+        notes = [""]
+        for run, kept in zip(self.runs, self.kept, strict=True):
+            out = "out of tolerance" if self.limits and not kept else ""
+            notes.append(f"failed: {run.failure}" if run.failure else out)
+        return [f"{line}  {note}".rstrip() for line, note in zip(lines, notes, strict=True)]
 
     def _findings(self) -> list[str]:
         factor, unit = self.shown

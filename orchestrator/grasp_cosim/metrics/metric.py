@@ -219,7 +219,6 @@ def check_portable(metrics: Iterable[Metric]) -> None:
 
 
 def _said(error: BaseException) -> str:
-    """What an error says, in one line."""
     kind = "" if isinstance(error, InputError) else f"{type(error).__name__}: "
     return " ".join(f"{kind}{error}".split())
 

@@ -89,7 +89,6 @@ class MdfListener:
             self._mdf.close()
 
     def _flush(self) -> None:
-        """Hand what has come together to asammdf."""
         rows = self._rows[: self._filled].T
         time = times(self._steps[: self._filled], self._experiment.step_ns)
         channels = [c.astype(element) for c, element in zip(rows, self._types, strict=True)]
@@ -106,7 +105,6 @@ def check_mdf() -> None:
 
 
 def _channel(signal: Signal) -> asammdf.Signal:
-    """A channel without samples."""
     from asammdf import Signal as Channel
 
     return Channel(

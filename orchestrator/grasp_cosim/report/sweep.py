@@ -206,7 +206,6 @@ def _named(study: Study, name: str, value: float) -> str:
 
 
 def _title(study: Study, name: str) -> str:
-    """A column as it is read."""
     metric = study.metric_of(name)
     known = metric is not None and name in metric.columns
     return _plain(metric.column_title(name) if metric and known else name)

@@ -190,7 +190,7 @@ def _draw_distributions(axes: Axes, timing: Timing) -> None:
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.8},
         )  # fmt: skip
     axes.set(xscale="log", yscale="log", xlim=(left, right), ylim=(bottom, 1.5), xlabel="time")
-    axes.xaxis.set_major_formatter(_duration)
+    axes.xaxis.set_major_formatter(lambda seconds, _: duration(seconds))
     axes.yaxis.set_major_formatter(lambda share, _: percent(share))
     axes.minorticks_off()
     finish(axes, "share that took longer", legend=False)
@@ -259,7 +259,7 @@ def _draw_overruns(axes: Axes, timing: Timing, end: float) -> None:
             markersize=5.0 if few else 3.0, clip_on=False, label=f"{count(times)} × {label(part)}",
         )  # fmt: skip
     axes.set(yscale="log", ylim=(low, high))
-    axes.yaxis.set_major_formatter(_duration)
+    axes.yaxis.set_major_formatter(lambda seconds, _: duration(seconds))
     axes.minorticks_off()
     if rest := unlisted(timing):  # shade the part of the run whose overruns were counted only
         axes.axvspan(listed[-1].time, end, color=GREY, alpha=0.15, linewidth=0.0)
@@ -269,15 +269,9 @@ def _draw_overruns(axes: Axes, timing: Timing, end: float) -> None:
 
 
 def _legend(axes: Axes, *entries: Sequence[Any], **options: Any) -> None:
-    """A legend to the right of the axes."""
     legend = axes.legend(
         *entries, loc="upper left", bbox_to_anchor=(1.01, 1.0), alignment="left", frameon=False,
         **options,
     )  # fmt: skip
     for text in legend.get_texts():
         text.set_parse_math(False)  # a name with dollars is no formula
-
-
-def _duration(seconds: float, _: float) -> str:
-    """A label of an axis of times."""
-    return duration(seconds)

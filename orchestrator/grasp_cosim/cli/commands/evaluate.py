@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from ...files import check_folder
-from ...grasp.presets import with_bench
+from ...grasp.presets import with_preset
 from ...grasp.published.evaluate import evaluate as run_evaluation
 from ...grasp.published.tables import Source
 from ..frame import NEGATIVE, PATH, json_option, load_system, show
@@ -26,9 +26,11 @@ def evaluate(bench: bool, out: Path, workers: int, as_json: bool) -> int:
     Example: grasp-cosim evaluate --out results
     """
     check_folder(out)
-    system = load_system(None, None, None)
+    system = load_system()
     source: Source = "experiment" if bench else "simulation"
-    report = run_evaluation(with_bench(system) if bench else system, out, workers, True, source)
+    report = run_evaluation(
+        with_preset(system, "bench") if bench else system, out, workers, True, source
+    )
     holds = all(claim["holds"] for claim in report["claims"])
     show(as_json, report, _verdict(report, out))
     return 0 if holds else NEGATIVE

@@ -60,7 +60,7 @@ def identify(
     check_scipy()
     if out:
         check_folder(out)
-    system = load_system(None, None, None).revised({}, set_values(settings), ("--swap", "--set"))
+    system = load_system().revised({}, set_values(settings), ("--swap", "--set"))
     found = _from_log(system, log, groups) if log else _from_times(system, times, groups, workers)
     if out:
         write_text(out / "values.toml", report.values_toml(found))

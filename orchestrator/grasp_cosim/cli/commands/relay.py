@@ -2,11 +2,11 @@
 
 import csv
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import click
 
@@ -16,13 +16,11 @@ from ...hil.network import DIRECTIONS, Conditions, Network, Outage, check_time
 from ...hil.relay import Relay
 from ...hil.traffic import Entry, Log
 from ...system.parts import NANOSECONDS
-from ..frame import INTERRUPTED, PATH, fail, json_option, show
+from ..frame import INTERRUPTED, PATH, Command, fail, json_option, show
 from ..signals import ended_by_signals
 
-F = TypeVar("F", bound=Callable[..., Any])
 
-
-def _number(name: str, unit: str, text: str, default: float = 0.0) -> Callable[[F], F]:
+def _number(name: str, unit: str, text: str, default: float = 0.0) -> Command:
     """An option that is a number in a unit: s, or P for a probability."""
     return click.option(
         f"--{name}",
@@ -122,7 +120,6 @@ def _outage(given: str) -> Outage:
 
 @contextmanager
 def _written(path: Path | None) -> Iterator[Log | None]:
-    """A log into a CSV file; none where path is None."""
     if path is None:
         yield None
         return

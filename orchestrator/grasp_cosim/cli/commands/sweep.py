@@ -58,12 +58,7 @@ def sweep(
         raise InputError("--workers: must not come with --scheduler, whose workers there are")
     path = _file(study)
     folder = out or Path(path.stem)
-    chosen = read_study(
-        path,
-        lambda system: load_system(system, None, None),
-        with_preset,
-        chosen_metrics(metric_files),
-    )
+    chosen = read_study(path, load_system, with_preset, chosen_metrics(metric_files))
     if plot and chosen.pictures == Pictures():
         raise InputError(f"--plot: {path.name} has no [figures]; must say what to draw")
     check_outputs(folder, plot)

@@ -20,7 +20,7 @@ from ..closing import close
 from ..metrics import FINGERS
 from ..presets import CASES, with_case
 from ..published.tables import Setting, published_rows
-from .fit import Fit, Parameter, Vector, check_scipy, fit
+from .fit import Fit, Parameter, Vector, fit
 from .parameters import RATIO
 
 STEP, STOP = 1e-3, 10.0
@@ -106,7 +106,6 @@ def identify_from_times(
 
     progress counts the grasps on standard error if that is a terminal.
     """
-    check_scipy()
     system = system.with_experiment(STEP, STOP)
     with progress_bar("grasps", None, progress) as bar, Crew(workers) as crew:
 

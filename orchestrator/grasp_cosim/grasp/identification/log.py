@@ -125,7 +125,6 @@ def _signal(log: Signals, name: str, place: str) -> Vector:
 
 
 def _step(time: Vector, place: str) -> float:
-    """The median step in s."""
     if len(time) < 2:
         raise InputError(f"{place}: {len(time)} samples; must be at least two")
     if not (np.diff(time) > 0.0).all() or not np.isfinite(time).all():

@@ -76,7 +76,8 @@ def evaluate(
     }
     _draw_signals(runs, how.shown, out)
     _draw_times(rows, out / "contact_times.png")
-    write_text(out / "evaluation.csv", table_csv(rows))
+    named = [{**r, "finger": r["finger"] or "difference"} for r in rows]
+    write_text(out / "evaluation.csv", table_csv(named))
     write_json(out / "evaluation.json", report)
     write_text(out / "report.md", how.page(report, system))
     return report
@@ -113,15 +114,14 @@ def _compared(row: Row, runs: Runs, at_sensor_contact: bool) -> dict[str, Any]:
     return found
 
 
-def root_mean_square(values: Sequence[float]) -> float:
-    """Root mean square of at least one number."""
+def _rms(values: Sequence[float]) -> float:
     return math.sqrt(sum(v * v for v in values) / len(values))
 
 
 def simulation_rms(published: Sequence[Row], rows: Sequence[Mapping[str, Any]]) -> dict[str, float]:
     """Root mean square of the differences in s, contact times and time differences apart."""
     return {
-        f"{what}{suffix}": root_mean_square([r[key] for r in chosen])
+        f"{what}{suffix}": _rms([r[key] for r in chosen])
         for what, chosen in (
             ("contact_times", [r for r in rows if r["finger"]]),
             ("time_differences", [r for r in rows if not r["finger"]]),
@@ -138,15 +138,14 @@ def bench_rms(published: Sequence[Row], rows: Sequence[Mapping[str, Any]]) -> di
     """
     groups: dict[str, list[float]] = {}
     for row, ours in zip(published, rows, strict=True):
-        names = ["time_differences"]
+        name = "time_differences"
         if row.finger is not None:
             alike = "positions" if row.table == "position" else "equal_colours"
-            names = [alike if row.setting.equal_colours else "mixed_colours"]
-        if names[0] in ("positions", "equal_colours") and row.condition != "white/white":
-            names.append("contact_times")
-        for name in names:
-            groups.setdefault(name, []).append(ours["difference"])
-    return {name: root_mean_square(values) for name, values in sorted(groups.items())}
+            name = alike if row.setting.equal_colours else "mixed_colours"
+        groups.setdefault(name, []).append(ours["difference"])
+        if name in ("positions", "equal_colours") and row.condition != "white/white":
+            groups.setdefault("contact_times", []).append(ours["difference"])
+    return {name: _rms(values) for name, values in sorted(groups.items())}
 
 
 def _draw_signals(runs: Runs, until: float, out: Path) -> None:

@@ -16,11 +16,11 @@ FIGURES = """## Figures
 
 
 def table_csv(rows: Sequence[Mapping[str, Any]]) -> str:
-    """The rows as CSV; `finger` is 1, 2 or `difference`."""
+    """The rows, of one form, as CSV."""
     text = io.StringIO()
     writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
     writer.writeheader()
-    writer.writerows({**r, "finger": r["finger"] or "difference"} for r in rows)
+    writer.writerows(rows)
     return text.getvalue()
 
 
@@ -119,7 +119,6 @@ def _table(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _condition(row: Mapping[str, Any]) -> str:
-    """The position in m, or what else the setting is called by."""
     condition = row["condition"]
     return f"{condition:.2f}" if isinstance(condition, float) else str(condition)
 
