@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from ..convergence.step_study import ask, step_study
+from ..convergence.step_study import step_study
 from ..errors import InputError
 from ..files import write_json
 from ..metrics.metric import Metric
@@ -49,7 +49,6 @@ def study_step(
     or in the current folder.
     """
     of, tolerance = given["quantities"], given["tolerance"]
-    ask(system, of, tolerance, metrics)
     check_outputs(given["out"], given["plot"])
     workers = os.cpu_count() or 1
     study = step_study(system, tolerance, workers=workers, progress=True, of=of, metrics=metrics)

@@ -19,9 +19,6 @@ from .listener import Experiment, Signal, times
 if TYPE_CHECKING:
     import asammdf
 
-VERSION = "4.10"
-"""The first MDF version with compressed blocks; every tool of today reads it."""
-
 TYPES = {"Real": np.float64, "Integer": np.int64, "Boolean": np.uint8}
 """The element type of a channel by its signal's kind."""
 
@@ -59,7 +56,8 @@ class MdfListener:
         folder = self._path.parent
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            self._mdf = MDF(version=VERSION, temporary_folder=str(folder))
+            # the first version with compressed blocks; every tool of today reads it
+            self._mdf = MDF(version="4.10", temporary_folder=str(folder))
         except OSError as error:
             raise InputError(unwritable(self._path, error)) from error
         self._mdf.append([_channel(s) for s in signals], comment="", common_timebase=True)

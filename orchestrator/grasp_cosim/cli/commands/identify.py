@@ -14,7 +14,6 @@ from ...grasp.identification.contact_times import (
     read_contacts,
     scatter,
 )
-from ...grasp.identification.fit import check_scipy
 from ...grasp.identification.log import GROUPS as IN_A_LOG
 from ...grasp.identification.log import identify_from_log
 from ...grasp.identification.parameters import DEFAULT, GROUPS, chosen
@@ -57,7 +56,6 @@ def identify(
     """
     if log and times:
         raise InputError(f"--log {log}: must not come with --times, which is other data")
-    check_scipy()
     if out:
         check_folder(out)
     system = load_system().revised({}, set_values(settings), ("--swap", "--set"))

@@ -31,7 +31,6 @@ OPTIONAL = ("alpha_1", "alpha_2")
 """Of a table of contact times."""
 
 Times = Sequence[float]
-Values = dict[str, float]
 
 
 class Grasp(NamedTuple):
@@ -173,7 +172,7 @@ def contact_times(job: tuple[System, Grasp]) -> Times:
 def _read(place: str, names: Sequence[str], line: Sequence[str]) -> Contact:
     if len(line) != len(names):
         raise InputError(f"{place}: {len(line)} entries; must be {len(names)}, as many as columns")
-    numbers: Values = {}
+    numbers: dict[str, float] = {}
     for name, text in zip(names, line, strict=True):
         try:
             numbers[name] = float(text)
