@@ -125,7 +125,7 @@ def test_there_is_no_grasp_in_these_processes(python: Python) -> None:
 
 
 def test_every_other_module_can_be_imported(python: Python) -> None:
-    """Those of the commands of a grasp cannot: its FMUs, its figures, its friction."""
+    """Those of the commands of a grasp cannot: its figures, its friction."""
     printed = python(
         """
         import pkgutil
@@ -146,9 +146,16 @@ def test_every_other_module_can_be_imported(python: Python) -> None:
         print(" ".join(refused))
         """
     )
-    assert set(printed.split()) <= {
-        f"grasp_cosim.cli.commands.{name}" for name in ("build", "evaluate", "identify")
-    }
+    assert printed.split() == [f"grasp_cosim.cli.commands.{n}" for n in ("evaluate", "identify")]
+
+
+def test_the_help_has_the_commands_of_any_system(command: Command) -> None:
+    listed = command("--help").partition("Commands:\n")[2].splitlines()
+    assert [line.split()[0] for line in listed if line.startswith("  ") and line[2] != " "] == [
+        "build", "doctor", "inspect", "proxy", "qualify", "relay", "report", "run", "serve", "ssp",
+        "sweep",
+    ]  # fmt: skip
+    assert "Default: fmus/build" in command("build", "--help")
 
 
 def test_a_run_is_written_read_back_drawn_and_reported(python: Python, folder: Path) -> None:

@@ -1,12 +1,17 @@
 """Files that are written in one piece, and folders that can be written to."""
 
+import json
 import os
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from .errors import InputError
+
+FMU_FOLDER = Path("fmus/build")
+"""Where the FMUs of this project are built, below the current folder."""
 
 
 def check_folder(folder: Path) -> None:
@@ -33,6 +38,11 @@ def write_text(path: Path, text: str) -> None:
     """Write a file in one piece: there is never half of it."""
     with in_one_piece(path) as part:
         part.write_text(text, encoding="utf-8")
+
+
+def write_json(path: Path, content: Any) -> None:
+    """Write indented JSON in one piece."""
+    write_text(path, json.dumps(content, indent=2) + "\n")
 
 
 @contextmanager

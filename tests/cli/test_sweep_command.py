@@ -10,7 +10,7 @@ from pathlib import Path
 import pyarrow.parquet as pq  # type: ignore[import-untyped]
 import pytest
 from grasp_cosim import InputError, System, cli
-from grasp_cosim.grasp.presets import STUDIES, with_bench, with_preset
+from grasp_cosim.grasp.presets import STUDIES, with_preset
 from grasp_cosim.sweep.read import read_study, study_file
 
 Run = Callable[..., tuple[int, str, str]]
@@ -216,7 +216,7 @@ def test_a_study_of_the_bench_is_that_of_run_bench(tmp_path: Path, grasp: System
     study = read_study(path, lambda _: grasp, with_preset)
     off = {"controller.simultaneous_contact.enabled": False, "sensor_1.adc.bits": 12}
     off |= {"controller.impact_reduction.enabled": False}
-    expected = with_bench(grasp).with_values(off).with_experiment(step=1e-3, stop=0.02)
+    expected = with_preset(grasp, "bench").with_values(off).with_experiment(step=1e-3, stop=0.02)
     assert study.system.components == expected.components
 
 

@@ -15,7 +15,6 @@ from grasp_cosim.grasp.presets import (
     CASES,
     SYSTEM,
     built_in_presets,
-    with_bench,
     with_case,
     with_preset,
 )
@@ -151,7 +150,7 @@ def test_cases_and_bench_find_components_by_their_roles(
     system = System.load(written(fmus, tmp_path, NAMES, roles=True, presets=presets))
     assert bool(system.presets) == presets
     pairs = [(with_case(system, n), with_case(grasp, n)) for n in CASES]
-    pairs.append((with_bench(system), with_bench(grasp)))
+    pairs.append((with_preset(system, "bench"), with_preset(grasp, "bench")))
     pairs.append((with_case(pairs[-1][0], 1), with_case(pairs[-1][1], 1)))
     for ours, theirs in pairs:
         for role, name in NAMES.items():
@@ -328,6 +327,39 @@ def test_a_user_s_metrics_have_bands_in_a_qualification(
     assert code == 0
     assert judged["reach[1]"] == judged["reach[2]"] == (0.125, "given")
     assert judged["lazy"][1] == "derived"
+
+
+@pytest.mark.parametrize(
+    ("more", "code", "ends"),
+    [
+        ((), 2, ["grasp-cosim: metric 'lazy': AttributeError: 'Signals' object has no attribute "]),
+        (
+            ("--realtime", "--factor", "1e6", "--overrun", "stop"),
+            3,
+            [
+                "kept what was recorded, in out",
+                "grasp-cosim: grasp.toml: the step at t = 0 s ended ",
+            ],
+        ),
+    ],
+)
+def test_a_metric_that_fails_loses_nothing_of_the_run(
+    command: Run, own: Path, more: tuple[str, ...], code: int, ends: list[str]
+) -> None:
+    """Nor does it hide why a run failed."""
+    own.write_text(OWN.replace("return reach(run)[0] < 1e-3", "return run.reach"))
+    short = ("run", "--step", "1e-3", "--stop", "0.01", "--metrics", own, "--out", "out", *more)
+    found, out, err = command(*short)
+    assert (found, out) == (code, "")
+    assert len(err.splitlines()) == len(ends)
+    assert all(line.startswith(end) for line, end in zip(err.splitlines(), ends, strict=True))
+    run = json.loads(Path("out/run.json").read_text())
+    said = "metric 'lazy': AttributeError: 'Signals' object has no attribute 'reach'"
+    assert run["missing_metrics"] == ["no heat: plant lacks temperature", said]
+    assert ("reach" in run, "lazy" in run) == (True, False)
+    back = load_run("out")
+    assert back.metrics["reach"] == run["reach"]
+    assert back.complete == (code == 2)
 
 
 @pytest.mark.parametrize(

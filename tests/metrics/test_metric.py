@@ -148,7 +148,7 @@ def test_numbers_become_pythons_own(value: Any, plain: Any) -> None:
 )
 def test_another_value_is_refused(value: Any, entries: tuple[str, ...], message: str) -> None:
     with pytest.raises(InputError, match=rf"^{re.escape(message)}") as caught:
-        measure(signals(), [made("x", lambda _: value, entries=entries)])
+        measure(signals(), [made("x", lambda _: value, entries=entries)]).check()
     assert "\n" not in str(caught.value)
 
 
@@ -156,8 +156,12 @@ def test_a_function_that_raises_is_a_wrong_input_that_names_it() -> None:
     def raising(_: Signals) -> float:
         raise ValueError("no\n  good")
 
-    with pytest.raises(InputError, match=r"^metric 'own': ValueError: no good$"):
-        measure(signals(), [made("own", raising)])
+    found = measure(signals(), [made("own", raising), made("end", lambda run: run.time[-1])])
+    assert found.missing == found.failures == ("metric 'own': ValueError: no good",)
+    assert (dict(found.values), found.units) == ({"end": 1.0}, {"end": None})
+    for asked in (found.check, found.flat):
+        with pytest.raises(InputError, match=r"^metric 'own': ValueError: no good$"):
+            asked()
 
 
 def test_a_metric_in_a_sweep_that_raises_fails_its_run_alone(grasp: System) -> None:

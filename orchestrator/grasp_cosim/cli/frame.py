@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import sys
 import traceback
 from collections.abc import Callable, Sequence
 from functools import reduce
@@ -11,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import InputError
+from ..files import check_folder
 
 if TYPE_CHECKING:
     from ..metrics.metric import Metric
@@ -20,6 +23,9 @@ NEGATIVE, WRONG, FAILED, INTERRUPTED = 1, 2, 3, 130
 """Exit codes beside 0: result negative, input wrong, failure on the way, Ctrl-C."""
 
 Command = Callable[..., Any]
+
+PATH = click.Path(path_type=Path)
+"""The type of an option or argument that is a path."""
 
 
 def together(*options: Command) -> Command:
@@ -33,12 +39,32 @@ metrics_option = click.option(
     "--metrics",
     "metric_files",
     multiple=True,
-    type=click.Path(path_type=Path),
+    type=PATH,
     help="A Python file with metrics of your own.",
 )
 
 
-def load_system(path: Path | None, step: float | None, stop: float | None) -> System:
+def bind_python_option(more: str = "") -> Command:
+    """The option of commands that build FMUs; `more` is added to its help."""
+
+    def given(_: click.Context, __: click.Parameter, python: str | None) -> str | None:
+        if python == "":
+            raise InputError("--bind-python '': must be a Python program, or left out")
+        return python
+
+    return click.option(
+        "--bind-python",
+        is_flag=False,
+        flag_value=sys.executable,
+        metavar="[PYTHON]",
+        callback=given,
+        help=f"For hosts that are not Python: bind to libpython.{more}",
+    )
+
+
+def load_system(
+    path: Path | None = None, step: float | None = None, stop: float | None = None
+) -> System:
     """The system of a file, by default the built-in grasp; what its reader notes is printed."""
     from ..system.description import System
 
@@ -74,6 +100,21 @@ def pair(option: str, text: str, form: str) -> tuple[str, str]:
     if not (left and equals and right):
         raise InputError(f"{option} {text!r}: must be {form}")
     return left, right
+
+
+def check_outputs(out: Path | None, plot: bool) -> None:
+    """InputError where files could not be written to `out` or, to `plot`, here, before any run."""
+    if plot:
+        from ..report.plot import new_figure
+
+        new_figure(1.0, 1.0)
+    if out or plot:
+        check_folder(out or Path())
+
+
+def show(as_json: bool, report: Any, text: str) -> None:
+    """Print a report as one JSON object, or the text for people."""
+    click.echo(json.dumps(report) if as_json else text)
 
 
 def fail(message: str, code: int, debug: bool = False) -> int:

@@ -2,8 +2,12 @@
 
 from importlib import import_module
 from importlib.resources import files
+from importlib.util import find_spec
 
 import click
+
+OF_THE_GRASP = {"evaluate", "identify"}
+"""The commands that there are with the room grasp/ only."""
 
 
 class Commands(click.Group):
@@ -12,7 +16,8 @@ class Commands(click.Group):
     def list_commands(self, ctx: click.Context) -> list[str]:
         """The names of all commands."""
         found = [file.name for file in files(f"{__package__}.commands").iterdir()]
-        return sorted(n.removesuffix(".py") for n in found if n.endswith(".py") and n[0] != "_")
+        names = {n.removesuffix(".py") for n in found if n.endswith(".py") and n[0] != "_"}
+        return sorted(names if find_spec("..grasp", __package__) else names - OF_THE_GRASP)
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
         """The command of that name; None where there is none."""

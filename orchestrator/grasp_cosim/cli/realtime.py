@@ -1,6 +1,7 @@
 """The options of a run in real time, and what is said of its timing."""
 
 from collections.abc import Mapping
+from dataclasses import fields
 from typing import Any
 
 import click
@@ -23,18 +24,14 @@ realtime_options = together(
     click.option("--lock-memory", is_flag=True, help="Keep the memory from being swapped out."),
 )
 
-NAMES = ("factor", "overrun", "priority", "cpu", "lock_memory")
-"""The options that need --realtime, as Realtime names them."""
-
 
 def chosen_realtime(given: Mapping[str, Any]) -> Realtime | None:
     """What the options ask for; `given` are the values of all options of a command by name.
 
     InputError where one of them comes without --realtime.
     """
-    asked = {
-        name: given[name] for name in NAMES if given[name] is not None and given[name] is not False
-    }
+    names = (f.name for f in fields(Realtime))
+    asked = {n: given[n] for n in names if given[n] is not None and given[n] is not False}
     if given["realtime"]:
         return Realtime(**asked)
     for name, value in asked.items():
@@ -72,7 +69,6 @@ def timing_lines(timing: Timing) -> list[str]:
 
 
 def _advice(timing: Timing) -> list[str]:
-    """What could be done about overruns."""
     step = timing.parts["step"]
     if step.median > timing.period:
         return [

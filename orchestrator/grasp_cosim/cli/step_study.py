@@ -1,21 +1,19 @@
 """The step study of the command run."""
 
-import json
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import click
 
-from ..convergence.step_study import ask, step_study
+from ..convergence.step_study import step_study
 from ..errors import InputError
-from ..files import check_folder, write_text
+from ..files import write_json
 from ..metrics.metric import Metric
-from ..report.plot import new_figure
 from ..report.step_study import draw_step_study
 from ..system.description import System
-from .frame import NEGATIVE, together
+from .frame import NEGATIVE, check_outputs, show, together
 
 step_study_options = together(
     click.option(
@@ -28,59 +26,37 @@ step_study_options = together(
         "--tolerance", type=float, help="Of a step study, in the unit of --of; 1e-3 s for times."
     ),
 )
-"""The options of StepStudyOptions."""
 
 
-@dataclass(frozen=True, slots=True)
-class StepStudyOptions:
-    """Whether the step is studied, of which metrics or signals, to which tolerance."""
-
-    step_study: bool
-    quantities: tuple[str, ...]
-    tolerance: float | None
-
-    def check(self, paced: bool) -> None:
-        """InputError where options do not go together."""
-        if self.tolerance is not None and not self.step_study:
-            raise InputError(f"--tolerance {self.tolerance!r}: must come with --step-study")
-        if self.quantities and not self.step_study:
-            raise InputError(f"--of {self.quantities[0]}: must come with --step-study")
-        if paced and self.step_study:
+def check_step_study(given: Mapping[str, Any], paced: bool) -> None:
+    """InputError where options do not go together; `given` are all of a command by name."""
+    if given["step_study"]:
+        if paced:
             raise InputError("--realtime: must not come with --step-study, which is not paced")
+    elif given["tolerance"] is not None:
+        raise InputError(f"--tolerance {given['tolerance']!r}: must come with --step-study")
+    elif given["quantities"]:
+        raise InputError(f"--of {given['quantities'][0]}: must come with --step-study")
 
-    def run(
-        self,
-        system: System,
-        metrics: Sequence[Metric],
-        out: Path | None,
-        plot: bool,
-        as_json: bool,
-    ) -> int:
-        """Study the step of a system, print and write what was found, return the exit code.
 
-        0 where the system's own step keeps what is asked about within the tolerance, else NEGATIVE.
-        `out` is the folder for step_study.json; `plot` draws step_study.png there or in the current
-        folder.
-        """
-        ask(system, self.quantities, self.tolerance, metrics)
-        if out or plot:
-            check_folder(out or Path())
-        if plot:
-            new_figure(1.0, 1.0)  # says at once if matplotlib is missing
-        workers = os.cpu_count() or 1
-        study = step_study(
-            system,
-            self.tolerance,
-            workers=workers,
-            progress=True,
-            of=self.quantities,
-            metrics=metrics,
-        )
-        if out:
-            write_text(out / "step_study.json", json.dumps(study.as_json(), indent=2) + "\n")
-        if plot:
-            path = (out or Path()) / "step_study.png"
-            draw_step_study(study, path)
-            click.echo(f"drew {path}", err=True)
-        click.echo(json.dumps(study.as_json()) if as_json else study.as_text())
-        return 0 if study.holds else NEGATIVE
+def study_step(
+    system: System, metrics: Sequence[Metric], given: Mapping[str, Any], as_json: bool
+) -> int:
+    """Study the step of a system, print and write what was found, return the exit code.
+
+    0 where the system's own step keeps what is asked about within the tolerance, else NEGATIVE.
+    Of the options `given`, out is the folder for step_study.json; plot draws step_study.png there
+    or in the current folder.
+    """
+    of, tolerance = given["quantities"], given["tolerance"]
+    check_outputs(given["out"], given["plot"])
+    workers = os.cpu_count() or 1
+    study = step_study(system, tolerance, workers=workers, progress=True, of=of, metrics=metrics)
+    folder = given["out"] or Path()
+    if given["out"]:
+        write_json(folder / "step_study.json", study.as_json())
+    if given["plot"]:
+        draw_step_study(study, folder / "step_study.png")
+        click.echo(f"drew {folder / 'step_study.png'}", err=True)
+    show(as_json, study.as_json(), study.as_text())
+    return 0 if study.holds else NEGATIVE

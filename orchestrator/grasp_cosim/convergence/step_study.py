@@ -172,15 +172,11 @@ class StepStudy:
             "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True))
             for row in rows
         ]
-        verdicts = ["", *(self._note(i) for i in range(len(self.runs)))]
-        return [
-            f"{line}  {verdict}".rstrip() for line, verdict in zip(lines, verdicts, strict=True)
-        ]
-
-    def _note(self, i: int) -> str:
-        if self.runs[i].failure:
-            return f"failed: {self.runs[i].failure}"
-        return "out of tolerance" if self.limits and not self.kept[i] else ""
+        notes = [""]
+        for run, kept in zip(self.runs, self.kept, strict=True):
+            out = "out of tolerance" if self.limits and not kept else ""
+            notes.append(f"failed: {run.failure}" if run.failure else out)
+        return [f"{line}  {note}".rstrip() for line, note in zip(lines, notes, strict=True)]
 
     def _findings(self) -> list[str]:
         factor, unit = self.shown
@@ -308,7 +304,8 @@ def step_study(
     KeyboardInterrupt at Ctrl-C.
     """
     question = ask(system, of, tolerance, metrics)
-    chosen = _ladder(system) if steps is None else _given(system, steps)
+    given = {system.with_experiment(step=step).step_ns for step in steps or ()}
+    chosen = _ladder(system) if steps is None else sorted(given | {system.step_ns})
     if len(chosen) < FEWEST:
         listed = ", ".join(f"{ns / NANOSECONDS:g}" for ns in chosen)
         raise InputError(
@@ -333,19 +330,11 @@ def step_study(
 
 def _ladder(system: System) -> list[int]:
     """The steps in ns that fit, rising."""
-    wanted = [factor * system.step_ns for factor in FACTORS]
-    return [int(ns) for ns in wanted if ns.denominator == 1 and _fits(system, int(ns))]
-
-
-def _fits(system: System, step_ns: int) -> bool:
-    own = [c.step_ns for c in system.components if c.step_ns is not None]
-    return all(span % step_ns == 0 for span in (system.stop_ns, *own))
-
-
-def _given(system: System, steps: Sequence[float]) -> list[int]:
-    """The given steps and the system's own in ns, rising; InputError where one does not fit."""
-    chosen = {system.with_experiment(step=step).step_ns for step in steps}
-    return sorted(chosen | {system.step_ns})
+    spans = [system.stop_ns, *(c.step_ns for c in system.components if c.step_ns is not None)]
+    wanted = (factor * system.step_ns for factor in FACTORS)
+    return [
+        int(ns) for ns in wanted if ns.denominator == 1 and all(span % ns == 0 for span in spans)
+    ]
 
 
 def run_step(job: tuple[System, Question]) -> StepRun:

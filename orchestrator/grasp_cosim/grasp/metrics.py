@@ -112,9 +112,17 @@ def impact_velocity(signals: Signals, finger: int) -> float | None:
 
 @of_fingers("impact_impulse", "N.s")
 def impact_impulse(signals: Signals, finger: int) -> float | None:
-    """Impulse of the contact force over IMPACT_WINDOW from first contact."""
+    """Impulse of the contact force over IMPACT_WINDOW from first contact, by trapezoids.
+
+    Until the first sample the force is taken as it is there, as one that begins with a jump has it.
+    None if the run ends sooner, or with fewer than two samples.
+    """
     after, force = since_contact(signals, finger)
-    return impulse(after, force, IMPACT_WINDOW)
+    if np.count_nonzero(after <= IMPACT_WINDOW) < 2 or after[-1] < IMPACT_WINDOW:
+        return None
+    inner = after[(after > 0.0) & (after < IMPACT_WINDOW)]
+    times = np.concatenate(([0.0], inner, [IMPACT_WINDOW]))
+    return float(np.trapezoid(np.interp(times, after, force), times))
 
 
 @of_fingers("peak_contact_force", "N")
@@ -131,16 +139,34 @@ def steady_contact_force(signals: Signals, finger: int) -> float:
 
 @of_fingers("force_overshoot", "1", factor=1e2, shown_unit="%")
 def force_overshoot(signals: Signals, finger: int) -> float | None:
-    """Share of the steady force by which the peak exceeds it; None without a steady force."""
-    _, force = since_contact(signals, finger)
-    return overshoot(force, held_force(signals, finger))
+    """Share of the steady force by which the peak since contact exceeds it; 0 if never.
+
+    None without a contact, or without a steady force.
+    """
+    steady, (_, force) = held_force(signals, finger), since_contact(signals, finger)
+    return None if steady is None or not len(force) else max(0.0, float(force.max()) / steady - 1.0)
 
 
 @of_fingers("settling_time", "s")
 def time_to_settle(signals: Signals, finger: int) -> float | None:
-    """Time from first contact until the force stays within SETTLED of the steady one."""
-    after, force = since_contact(signals, finger)
-    return settling_time(after, force, held_force(signals, finger))
+    """Time from first contact until the force stays within SETTLED of the steady one.
+
+    None where it is not within throughout the last STEADY_WINDOW, without a contact, or without a
+    steady force.
+    """
+    steady, (after, force) = held_force(signals, finger), since_contact(signals, finger)
+    if steady is None or not len(after) or after[-1] < STEADY_WINDOW:
+        return None
+    error = force - steady
+    outside = np.flatnonzero(np.abs(error) > SETTLED * steady)
+    if not len(outside):
+        return 0.0
+    k = int(outside[-1])
+    if after[k] >= after[-1] - STEADY_WINDOW:
+        return None
+    edge = copysign(SETTLED * steady, error[k])
+    fraction = (error[k] - edge) / (error[k] - error[k + 1])
+    return float(after[k] + fraction * (after[k + 1] - after[k]))
 
 
 @of_grasp("target_position", "m")
@@ -207,47 +233,6 @@ def since_contact(signals: Signals, finger: int) -> tuple[Floats, Floats]:
     return signals.time[row:] - moment, _force(signals, finger)[row:]
 
 
-def impulse(after: Floats, force: Floats, window: float) -> float | None:
-    """Impulse in N.s of a `force` in N over a `window` in s from first contact, by trapezoids.
-
-    `after` are the seconds since then. Until the first sample the force is taken as it is there, as
-    one that begins with a jump has it. None if it ends sooner, or with fewer than two samples.
-    """
-    if np.count_nonzero(after <= window) < 2 or after[-1] < window:
-        return None
-    inner = after[(after > 0.0) & (after < window)]
-    times = np.concatenate(([0.0], inner, [window]))
-    return float(np.trapezoid(np.interp(times, after, force), times))
-
-
-def overshoot(force: Floats, steady: float | None) -> float | None:
-    """Share of the `steady` force in N by which a `force` since contact exceeds it; 0 if never.
-
-    None without a contact, or without a steady force.
-    """
-    return None if steady is None or not len(force) else max(0.0, float(force.max()) / steady - 1.0)
-
-
-def settling_time(after: Floats, force: Floats, steady: float | None) -> float | None:
-    """Seconds since contact from which on a `force` is within SETTLED of the `steady` one, in N.
-
-    `after` are the seconds since then, at which the force is given. None where it is not within
-    throughout the last STEADY_WINDOW, without a contact, or without a steady force.
-    """
-    if steady is None or not len(after) or after[-1] < STEADY_WINDOW:
-        return None
-    error = force - steady
-    outside = np.flatnonzero(np.abs(error) > SETTLED * steady)
-    if not len(outside):
-        return 0.0
-    k = int(outside[-1])
-    if after[k] >= after[-1] - STEADY_WINDOW:
-        return None
-    edge = copysign(SETTLED * steady, error[k])
-    fraction = (error[k] - edge) / (error[k] - error[k + 1])
-    return float(after[k] + fraction * (after[k + 1] - after[k]))
-
-
 def first_contact(signals: Signals, finger: int) -> FirstContact | None:
     """First contact of a finger; None if it never touches.
 
@@ -274,7 +259,11 @@ def _surface_speed(signals: Signals, finger: int, k: int) -> float:
     What the finger moved less what the gap shrank, over the last whole step of the plant, which
     may be longer than that of the system and holds its outputs in between. 0 where there was none.
     """
-    given = _given(signals, k)
+    changed = np.zeros(k + 1, bool)  # the rows with other outputs of the plant than before
+    changed[0] = True
+    for name in PLANT_OUTPUTS:
+        changed[1:] |= np.diff(signals[name][: k + 1]) != 0
+    given = np.flatnonzero(changed)
     if len(given) < 2:
         return 0.0
     own = int(np.diff(given).min())
@@ -283,15 +272,6 @@ def _surface_speed(signals: Signals, finger: int, k: int) -> float:
     gap = signals[f"plant.gap[{finger}]"][rows]
     surface = CLOSING[finger] * signals[f"plant.position[{finger}]"][rows] + gap
     return float((surface[1] - surface[0]) / (signals.time[last] - signals.time[last - own]))
-
-
-def _given(signals: Signals, k: int) -> npt.NDArray[np.intp]:
-    """The rows up to row k that have other outputs of the plant than the one before; the first."""
-    changed = np.zeros(k + 1, bool)
-    changed[0] = True
-    for name in PLANT_OUTPUTS:
-        changed[1:] |= np.diff(signals[name][: k + 1]) != 0
-    return np.flatnonzero(changed)
 
 
 def time_at_gap(signals: Signals, finger: int, gap: float) -> float | None:

@@ -118,40 +118,26 @@ def draw_targets(axes: Axes, runs: Sequence[tuple[Result, str, str]]) -> None:
 
 
 def draw_contact_times(axes: Axes, rows: Sequence[Mapping[str, Any]], case: int) -> None:
-    """Published (circles) and simulated (lines) contact times over the object position."""
+    """Published contact times (circles) and simulated ones by the conditions of the rows.
+
+    These are positions of the object, simulated as lines, or colours of its surfaces, as dots. The
+    time axis ends at a whole number of seconds above the times of all cases.
+    """
     of_case = [r for r in rows if r["case"] == case and r["finger"]]
+    conditions = [r["condition"] for r in of_case if r["finger"] == FINGERS[0]]
+    if colours := isinstance(conditions[0], str):
+        x = list(range(len(conditions)))
+        axes.set_xticks(x, [c.replace("/", "\n") for c in conditions], fontsize=8)
+    else:
+        x = [1e3 * c for c in conditions]
+        axes.set_xlabel("object position in mm")
     for j in FINGERS:
-        of_finger = [r for r in of_case if r["finger"] == j]
-        x = [1e3 * r["condition"] for r in of_finger]
-        _times(axes, x, of_finger, j, "-")
+        simulated, published = (
+            [r[key] for r in of_case if r["finger"] == j] for key in ("simulated", "published")
+        )
+        axes.plot(x, simulated, "." if colours else "-", color=COLOR[j], label=f"finger {j}")
+        axes.plot(x, published, "o", color=COLOR[j], mfc="none", label=f"finger {j}, published")
     axes.set_title(f"Case {case}", fontsize=10)
-    axes.set_xlabel("object position in mm")
-    _finish_times(axes, rows)
-
-
-def draw_colour_times(axes: Axes, rows: Sequence[Mapping[str, Any]], case: int) -> None:
-    """Published (circles) and simulated (dots) contact times by the colours of the surfaces."""
-    of_case = [r for r in rows if r["case"] == case and r["finger"]]
-    for j in FINGERS:
-        of_finger = [r for r in of_case if r["finger"] == j]
-        _times(axes, range(len(of_finger)), of_finger, j, ".")
-    names = [r["condition"].replace("/", "\n") for r in of_case if r["finger"] == FINGERS[0]]
-    axes.set_xticks(range(len(names)), names, fontsize=8)
-    axes.set_title(f"Case {case}", fontsize=10)
-    _finish_times(axes, rows)
-
-
-def _times(
-    axes: Axes, x: Sequence[float], rows: Sequence[Mapping[str, Any]], finger: int, style: str
-) -> None:
-    colour, name = COLOR[finger], f"finger {finger}"
-    axes.plot(x, [r["simulated"] for r in rows], style, color=colour, label=name)
-    published = [r["published"] for r in rows]
-    axes.plot(x, published, "o", color=colour, mfc="none", label=f"{name}, published")
-
-
-def _finish_times(axes: Axes, rows: Sequence[Mapping[str, Any]]) -> None:
-    """The time axis ends at a whole number of seconds above the times of all cases."""
     latest = max(max(r["simulated"], r["published"]) for r in rows if r["finger"])
     axes.set_ylim(0.0, max(3.0, np.ceil(latest)))
     finish(axes, "time to contact in s")

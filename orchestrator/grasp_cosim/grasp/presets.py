@@ -23,22 +23,14 @@ STUDIES = Path(__file__).parent / "studies"
 CASES = (0, 1, 2)
 """Case 0 is contact force control alone, 1 with impact reduction, 2 with simultaneous contact."""
 
-BENCH = "bench"
-"""The preset of the sensors with their electronics and the identified friction."""
-
 
 def with_case(system: System, case: int) -> System:
     """The system in one of the CASES; InputError where it lacks what a case sets."""
     return with_preset(system, f"case_{case}")
 
 
-def with_bench(system: System) -> System:
-    """The system as on the bench; InputError where it lacks what the preset sets."""
-    return with_preset(system, BENCH)
-
-
 def with_preset(system: System, name: str) -> System:
-    """The system with a preset of its own, or else of the built-in grasp.
+    """The system with a preset of its own, or else of the built-in grasp, case_0 to _2 or bench.
 
     InputError where there is neither, or the system lacks what it sets.
     """

@@ -95,7 +95,6 @@ def _contacts(result: Result) -> list[Contact]:
 
 
 def _firsts(contacts: Sequence[Contact]) -> dict[int, float]:
-    """The first contact of each finger, in s."""
     return {j: c["t"] for j in FINGERS for c in contacts[::-1] if c["finger"] == j}
 
 
@@ -106,7 +105,6 @@ def _colors(result: Result) -> dict[str, str]:
 
 
 def _zooms(contacts: Sequence[Contact]) -> list[Zoom]:
-    """Buttons that zoom to the first contacts."""
     firsts = _firsts(contacts)
     spans = [(f"Contact of finger {j}", t, t, f"f{j}") for j, t in firsts.items()]
     if len(firsts) > 1:
@@ -134,7 +132,6 @@ def _html(named: Mapping[str, Mapping[int, str]], contacts: Sequence[Contact]) -
 
 
 def _cell(signal: str | None) -> str:
-    """A cell for the value of a signal; an empty one without."""
     if signal is None:
         return "<td></td>"
     return f'<td class="n"><output data-signal="{escape(signal)}"></output></td>'

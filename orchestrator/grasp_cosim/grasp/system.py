@@ -1,16 +1,9 @@
 """The built-in system: the published grasp and its FMUs."""
 
-from pathlib import Path
-
 from ..errors import InputError
+from ..files import FMU_FOLDER
 from ..system.description import System
 from .presets import SYSTEM
-
-FMU_FOLDER = Path("fmus/build")
-"""Where the FMUs are built, below the current folder."""
-
-BOUND_FOLDER = Path("fmus/bound")
-"""Where those for hosts that are not Python are built."""
 
 
 def grasp_system() -> System:

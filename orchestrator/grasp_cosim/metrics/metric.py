@@ -161,11 +161,20 @@ def metric(name: str, **more: Any) -> Callable[[Function], Metric]:
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """The values of metrics by name, the metrics they are of, and why others have none."""
+    """The values of metrics by name, the metrics they are of, and why others have none.
+
+    `failures` are those lines of `missing` that say how a function failed.
+    """
 
     values: Mapping[str, Any]
     metrics: tuple[Metric, ...]
     missing: tuple[str, ...]
+    failures: tuple[str, ...] = ()
+
+    def check(self) -> None:
+        """InputError at the first function that failed."""
+        if self.failures:
+            raise InputError(self.failures[0])
 
     @property
     def units(self) -> dict[str, str | None]:
@@ -173,7 +182,11 @@ class Measured:
         return {m.name: m.unit for m in self.metrics}
 
     def flat(self) -> dict[str, Value]:
-        """Single values by name, or name[1], name[2], ... where a metric has several."""
+        """Single values by name, or name[1], name[2], ... where a metric has several.
+
+        InputError where a function failed.
+        """
+        self.check()
         found: dict[str, Value] = {}
         for name, value in self.values.items():
             if isinstance(value, list):
@@ -206,7 +219,6 @@ def check_portable(metrics: Iterable[Metric]) -> None:
 
 
 def _said(error: BaseException) -> str:
-    """What an error says, in one line."""
     kind = "" if isinstance(error, InputError) else f"{type(error).__name__}: "
     return " ".join(f"{kind}{error}".split())
 
@@ -215,19 +227,21 @@ def measure(signals: Signals, metrics: Iterable[Metric]) -> Measured:
     """The values of `metrics` in their order, and a line for each that cannot be had.
 
     A line like "no metrics of the grasp: plant lacks contact[1]". A group none of whose roles is
-    played by a component is not of this system, which is no news. InputError where a function
-    fails or returns something else than a Metric may have.
+    played by a component is not of this system, which is no news. A function that fails, or that
+    returns something else than a Metric may have, is a line like "metric 'own': ValueError: ...".
     """
     there, missing = available(metrics, signals.by_name, signals.roles)
     values: dict[str, Any] = {}
+    failures = []
     for m in there:
         try:
             values[m.name] = _plain(m, m.function(signals))
         except MissingSignalError as error:
             missing.append(f"no {m.name}: {error}")
         except Exception as error:  # a user's function may raise anything
-            raise InputError(f"metric {m.name!r}: {_said(error)}") from error
-    return Measured(values, tuple(m for m in there if m.name in values), tuple(missing))
+            failures.append(f"metric {m.name!r}: {_said(error)}")
+    found = tuple(m for m in there if m.name in values)
+    return Measured(values, found, (*missing, *failures), tuple(failures))
 
 
 def available(

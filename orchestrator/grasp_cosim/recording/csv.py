@@ -1,6 +1,6 @@
 """Writes a run as CSV while it goes on, in the form of the FMI cross-check."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from io import FileIO
 from pathlib import Path
@@ -51,7 +51,8 @@ class CsvListener:
                 columns = [time.tolist(), *rows[piece].T.tolist()]
                 for i in self._whole:
                     columns[i] = [*map(int, columns[i])]
-                self._append(lines(columns))
+                texts = (map(repr, column) for column in columns)
+                self._append("\n".join(map(",".join, zip(*texts, strict=True))) + "\n")
                 self._empty = False
         except OSError as error:
             raise SimulationError(unwritable(self._path, error)) from error
@@ -79,9 +80,3 @@ class CsvListener:
 
 class _NothingRecordedError(Exception):
     """Has the temporary file removed."""
-
-
-def lines(columns: Iterable[Iterable[float]]) -> str:
-    """A line per row of the columns, each value as Python's repr has it."""
-    texts = (map(repr, column) for column in columns)
-    return "\n".join(map(",".join, zip(*texts, strict=True))) + "\n"

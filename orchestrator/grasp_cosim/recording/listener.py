@@ -65,24 +65,6 @@ class Listener(Protocol):
         """Called once after the last row, also after a failure (complete is then False)."""
 
 
-COLUMN: Mapping[str, type[np.generic]] = {
-    "Real": np.float64,
-    "Integer": np.int64,
-    "Boolean": np.bool_,
-}
-"""The element type of a column by its signal's kind."""
-
-
 def times(steps: npt.NDArray[np.int64], step_ns: int) -> npt.NDArray[np.float64]:
     """The communication points in s: k * step_ns / 1e9."""
     return steps * step_ns / NANOSECONDS
-
-
-def columns(
-    signals: Sequence[Signal], rows: npt.NDArray[np.float64]
-) -> dict[str, npt.NDArray[Any]]:
-    """The columns of rows by name, each of its signal's element type.
-
-    Real ones are views. An Integer is exact up to 2**53, as the rows are float64.
-    """
-    return {s.name: rows[:, i].astype(COLUMN[s.kind], copy=False) for i, s in enumerate(signals)}

@@ -5,7 +5,6 @@ import json
 import logging
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..checks import choice
 from ..errors import InputError, choices
 from ..metrics.metric import Metric, Signals, registered
 from ..realtime.timing import Timing
@@ -21,7 +21,6 @@ from .result import UNITS, Rejection, Result
 
 SIGNALS, SETTINGS = "signals.csv", "run.json"
 """The files of a run's folder."""
-
 
 NUMBER = (int, float)
 
@@ -40,6 +39,9 @@ MORE_KEYS: Mapping[str, Any] = {
     "roles": dict, "types": dict, "descriptions": dict, "metric_units": dict,
 }  # fmt: skip
 """Entries that may be there."""
+
+TYPES = ("float64", "int32", "int64", "bool")
+"""The element types of recorded columns."""
 
 FORMS = {str: "a string", NUMBER: "a number", bool: "true or false", list: "a list"}
 """Types of entries in words; the others are JSON objects."""
@@ -91,10 +93,9 @@ def _rejections(place: str, found: Mapping[str, Any]) -> dict[str, Rejection]:
 def _as_recorded(written: Mapping[str, Any]) -> tuple[Metric, ...]:
     """The metrics in run.json that nothing here would work out again, as they are there."""
     known = {*UNITS, *(m.name for m in registered())}
-    units = written.get("metric_units", {})
     return tuple(
-        Metric(name, partial(_constant, written[name]), units[name])
-        for name in units
+        Metric(name, partial(_constant, written[name]), unit)
+        for name, unit in written.get("metric_units", {}).items()
         if name not in known and name in written
     )
 
@@ -103,16 +104,8 @@ def _constant(value: Any, _: Signals) -> Any:
     return value
 
 
-@dataclass(frozen=True, eq=False)
-class Log:
-    """Recorded signals by name on time in s, all float64, without what a run's folder adds."""
-
-    time: npt.NDArray[np.float64]
-    signals: Mapping[str, npt.NDArray[np.float64]]
-
-
-def load_log(path: Path) -> Log:
-    """The signals of a file: CSV with the column "time" and names, or ASAM MDF (.mf4).
+def load_log(path: Path) -> Signals:
+    """The signals of a file, all float64: CSV with the column "time" and names, or ASAM MDF (.mf4).
 
     InputError where it is missing, damaged or of another kind, or where asammdf is not installed.
     """
@@ -123,10 +116,10 @@ def load_log(path: Path) -> Log:
     if path.suffix.lower() != ".csv":
         raise InputError(f"{path}: must be a .csv or .mf4 file")
     names, table = _table(path)
-    return Log(table[:, 0], dict(zip(names, table[:, 1:].T, strict=True)))
+    return Signals(table[:, 0], dict(zip(names, table[:, 1:].T, strict=True)))
 
 
-def _mdf(path: Path) -> Log:
+def _mdf(path: Path) -> Signals:
     """Every channel of the first group that has samples, on its master."""
     check_mdf()
     from asammdf import MDF
@@ -141,20 +134,22 @@ def _mdf(path: Path) -> Log:
     if not channels:
         raise InputError(f"{path}: no channel has samples; must be a recorded log")
     time = channels[0].timestamps
-    return Log(
-        time,
-        {
-            c.name: c.samples.astype(np.float64)
-            for c in channels
-            if c.samples.shape == time.shape and c.samples.dtype.kind in "fiub"
-        },
-    )
+    signals = {
+        c.name: c.samples.astype(np.float64)
+        for c in channels
+        if c.samples.shape == time.shape and c.samples.dtype.kind in "fiub"
+    }
+    return Signals(time, signals)
 
 
 def _settings(path: Path) -> dict[str, Any]:
     """The object in run.json; its mappings by signal are mappings."""
     try:
-        settings = json.loads(_text(path))
+        settings = json.loads(path.read_text("utf-8"))
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: is damaged, no UTF-8 text: {error.reason}") from error
+    except OSError as error:
+        raise _unreadable(path, error) from error
     except json.JSONDecodeError as error:
         raise InputError(f"{path}: is damaged, no JSON: {error}") from error
     if not isinstance(settings, dict):
@@ -164,23 +159,11 @@ def _settings(path: Path) -> dict[str, Any]:
             raise InputError(
                 f"{path}: no entry {key!r}; must be as `grasp-cosim run --out` writes it"
             )
-        if key in settings and not _is(settings[key], kind):
+        wrong = not isinstance(settings.get(key), kind)
+        if key in settings and (wrong or (kind is NUMBER and isinstance(settings[key], bool))):
             form = FORMS.get(kind, "a JSON object")
             raise InputError(f"{path}: {key} = {settings[key]!r}; must be {form}")
     return settings
-
-
-def _is(value: Any, kind: Any) -> bool:
-    return isinstance(value, kind) and (kind is bool or not isinstance(value, bool))
-
-
-def _text(path: Path) -> str:
-    try:
-        return path.read_text("utf-8")
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: is damaged, no UTF-8 text: {error.reason}") from error
-    except OSError as error:
-        raise _unreadable(path, error) from error
 
 
 def _unreadable(path: Path, error: OSError) -> InputError:
@@ -231,20 +214,10 @@ def _header(path: Path) -> list[str]:
 
 def _typed(place: str, column: npt.NDArray[np.float64], name: Any) -> npt.NDArray[Any]:
     """The column with the element type of that name; InputError where its values have another."""
-    if name not in list(TYPES):
-        raise InputError(f"{place} = {name!r}: must be one of {choices(TYPES)}")
+    choice(place, name, TYPES)
     with np.errstate(invalid="ignore"):
-        typed = column.astype(TYPES[name])
+        typed = column.astype(name)
     if not np.array_equal(typed, column, equal_nan=name == "float64"):
         value = column[np.flatnonzero(typed != column)[0]]
         raise InputError(f"{place} = {name}: must be a type of its values, like {value:g}")
     return typed
-
-
-TYPES: Mapping[str, type[np.generic]] = {
-    "float64": np.float64,
-    "int32": np.int32,
-    "int64": np.int64,
-    "bool": np.bool_,
-}
-"""The element types of recorded columns, by their names in run.json."""

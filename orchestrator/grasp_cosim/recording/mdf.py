@@ -19,9 +19,6 @@ from .listener import Experiment, Signal, times
 if TYPE_CHECKING:
     import asammdf
 
-VERSION = "4.10"
-"""The first MDF version with compressed blocks; every tool of today reads it."""
-
 TYPES = {"Real": np.float64, "Integer": np.int64, "Boolean": np.uint8}
 """The element type of a channel by its signal's kind."""
 
@@ -59,7 +56,8 @@ class MdfListener:
         folder = self._path.parent
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            self._mdf = MDF(version=VERSION, temporary_folder=str(folder))
+            # the first version with compressed blocks; every tool of today reads it
+            self._mdf = MDF(version="4.10", temporary_folder=str(folder))
         except OSError as error:
             raise InputError(unwritable(self._path, error)) from error
         self._mdf.append([_channel(s) for s in signals], comment="", common_timebase=True)
@@ -89,7 +87,6 @@ class MdfListener:
             self._mdf.close()
 
     def _flush(self) -> None:
-        """Hand what has come together to asammdf."""
         rows = self._rows[: self._filled].T
         time = times(self._steps[: self._filled], self._experiment.step_ns)
         channels = [c.astype(element) for c, element in zip(rows, self._types, strict=True)]
@@ -106,7 +103,6 @@ def check_mdf() -> None:
 
 
 def _channel(signal: Signal) -> asammdf.Signal:
-    """A channel without samples."""
     from asammdf import Signal as Channel
 
     return Channel(
@@ -120,11 +116,10 @@ def _channel(signal: Signal) -> asammdf.Signal:
 
 def _comment(experiment: Experiment, complete: bool) -> str:
     """The header's comment, in the XML that MDF 4 asks for."""
-    described = experiment.settings
     root = ElementTree.Element("HDcomment")
-    ElementTree.SubElement(root, "TX").text = json.dumps(described)
+    ElementTree.SubElement(root, "TX").text = json.dumps(experiment.settings)
     properties = ElementTree.SubElement(root, "common_properties")
-    for name, value in {**described, "complete": complete}.items():
+    for name, value in {**experiment.settings, "complete": complete}.items():
         if not isinstance(value, dict | list):
             ElementTree.SubElement(properties, "e", name=name).text = json.dumps(value)
     return ElementTree.tostring(root, encoding="unicode")

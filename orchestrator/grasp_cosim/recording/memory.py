@@ -7,7 +7,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ..errors import InputError, SimulationError
-from .listener import Experiment, Signal, columns, times
+from .listener import Experiment, Signal, times
+
+TYPES = {"Real": np.float64, "Integer": np.int64, "Boolean": np.bool_}
+"""The element type of a column by its signal's kind."""
 
 
 class MemoryListener:
@@ -59,8 +62,15 @@ class MemoryListener:
 
     @property
     def signals(self) -> dict[str, npt.NDArray[Any]]:
-        """The recorded columns by name, so far. Rows that come later do not change them."""
-        return columns(self._signals, self._table[: self._rows])
+        """The recorded columns by name, so far. Rows that come later do not change them.
+
+        Real ones are views. An Integer is exact up to 2**53, as the rows are float64.
+        """
+        rows = self._table[: self._rows].T
+        return {
+            s.name: column.astype(TYPES[s.kind], copy=False)
+            for s, column in zip(self._signals, rows, strict=True)
+        }
 
     def _grow(self, rows: int) -> None:
         """Have room for so many rows; MemoryError where there is none."""

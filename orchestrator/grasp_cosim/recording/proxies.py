@@ -28,8 +28,8 @@ def proxy_figures(time: Times, signals: Signals) -> dict[str, dict[str, Any]]:
     lost and back are the communication points at which the peer was lost, and answered again;
     ahead is how far its outputs were from the future at most.
     """
-    proxies = _proxies(signals) if len(time) else []
-    return {name: _figures(time, _diagnostics(name, signals)) for name in proxies}
+    names = [name.removesuffix(_STATE) for name in signals if name.endswith(_STATE)]
+    return {name: _figures(time, signals, f"{name}.proxy.") for name in names if len(time)}
 
 
 def proxy_lines(time: Times, signals: Signals, step: float) -> list[str]:
@@ -41,16 +41,8 @@ def proxy_lines(time: Times, signals: Signals, step: float) -> list[str]:
     return lines
 
 
-def _proxies(signals: Signals) -> list[str]:
-    return [name.removesuffix(_STATE) for name in signals if name.endswith(_STATE)]
-
-
-def _diagnostics(name: str, signals: Signals) -> Signals:
-    start = f"{name}.proxy."
-    return {key.removeprefix(start): v for key, v in signals.items() if key.startswith(start)}
-
-
-def _figures(time: Times, own: Signals) -> dict[str, Any]:
+def _figures(time: Times, signals: Signals, start: str) -> dict[str, Any]:
+    own = {key.removeprefix(start): v for key, v in signals.items() if key.startswith(start)}
     lost = own["state"] == _LOST
     turns = np.diff(lost.astype(np.int8), prepend=0)
     return {

@@ -1,6 +1,5 @@
 """What a run leaves behind: every output at every communication point, as plain data."""
 
-import json
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field, fields
 from functools import cached_property
@@ -11,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import extensions
-from ..files import in_one_piece, write_text
+from ..files import in_one_piece, write_json
 from ..metrics.metric import Measured, Metric, Signals, measure, registered
 from ..realtime.timing import Timing
 from ..system.parts import NANOSECONDS
@@ -95,9 +94,18 @@ class Result(Mapping[str, npt.NDArray[Any]]):
         """The metrics, their units, and why others cannot be had."""
         return measure(self.by_role, registered(self.more_metrics))
 
-    @cached_property
+    @property
     def metrics(self) -> Mapping[str, Any]:
-        """The metrics by name, then the figures of UNITS, then those of any proxies."""
+        """The metrics by name, then the figures of UNITS, then those of any proxies.
+
+        InputError where the function of a metric fails.
+        """
+        self.measured.check()
+        return self._figures
+
+    @cached_property
+    def _figures(self) -> Mapping[str, Any]:
+        """The metrics without those that fail."""
         simulated = float(self.time[-1])
         proxies = proxy_figures(self.time, self.signals)
         return {
@@ -131,9 +139,11 @@ class Result(Mapping[str, npt.NDArray[Any]]):
         """Write the metrics and the settings that led to them, then what is known by signal
         (units, types, descriptions), the units of the metrics, the log, the rejections by
         component, and, as "realtime", the timing of a paced run.
+
+        A metric that fails is a line among the missing ones: the rest of the run is kept.
         """
         report = {
-            **self.metrics,
+            **self._figures,
             **self.settings,
             "units": dict(self.units),
             "types": {name: str(column.dtype) for name, column in self.signals.items()},
@@ -144,7 +154,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
             "rejections": {name: asdict(r) for name, r in self.rejections.items()},
             **({"realtime": self.timing.as_dict()} if self.timing else {}),
         }
-        write_text(Path(path), json.dumps(report, indent=2) + "\n")
+        write_json(Path(path), report)
 
     def plot(self, path: str | Path) -> None:
         """Draw the result as a PNG: a grasp as one, of any other system all signals.

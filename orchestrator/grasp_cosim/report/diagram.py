@@ -239,7 +239,6 @@ def _connection(way: _Way, lane: Sequence[Point], room: float) -> str:
 
 
 def _rounded(points: Sequence[Point]) -> str:
-    """A path through points with round corners."""
     path = "M{:.1f} {:.1f}".format(*points[0])
     for before, corner, after in zip(points, points[1:], points[2:], strict=False):
         path += "L{:.1f} {:.1f}Q{:.1f} {:.1f} {:.1f} {:.1f}".format(
@@ -255,7 +254,6 @@ def _near(corner: Point, point: Point) -> Point:
 
 
 def _drawn(box: _Box, units: Mapping[str, str | None]) -> str:
-    """A box with its name, the line below it and its ports."""
     left, right = box.x + 9, box.x + box.width - 9
     parts = [
         f'<g class="box"><rect x="{box.x:.1f}" y="{box.y:.1f}" width="{box.width:.1f}" '

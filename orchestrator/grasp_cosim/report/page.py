@@ -200,7 +200,6 @@ def _moments(log: Sequence[str]) -> list[float]:
 
 
 def _connections(result: Result) -> str:
-    """Return the connections as a diagram."""
     faults: dict[str, list[str]] = {}
     for fault in result.settings["faults"]:
         faults.setdefault(fault["connection"], []).append(fault["kind"])

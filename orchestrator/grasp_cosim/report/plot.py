@@ -51,8 +51,8 @@ def plot_signals(run: Result, path: Path) -> None:
 
 def new_figure(width: float, height: float) -> Figure:
     """Return an empty figure, sizes in inches; InputError without matplotlib."""
-    matplotlib = extra_module("matplotlib.figure", "it draws the figures", "plot")
-    figure: Figure = matplotlib.Figure(figsize=(width, height), dpi=DPI, layout="constrained")
+    module = extra_module("matplotlib.figure", "it draws the figures", "plot")
+    figure: Figure = module.Figure(figsize=(width, height), dpi=DPI, layout="constrained")
     return figure
 
 

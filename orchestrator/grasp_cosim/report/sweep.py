@@ -64,7 +64,9 @@ def _draw_map(sweep: Sweep, wanted: Map, path: Path) -> None:
             _plain_ticks(axes.yaxis)
         if wanted.limit is not None and _crosses(cells[2], wanted.limit):
             axes.contour(*cells, levels=[wanted.limit], colors=RED, linewidths=1.5)
-            axes.plot([], [], color=RED, label=_named(sweep.study, wanted.of, wanted.limit))
+            unit = _unit(sweep.study, wanted.of) or ""
+            label = f"{_title(sweep.study, wanted.of)} = {wanted.limit:g} {unit}".rstrip()
+            axes.plot([], [], color=RED, label=label)
     else:
         there = np.isfinite(z)
         axes.scatter(x[~there], y[~there], s=14, color=MISSING)
@@ -196,17 +198,11 @@ def _runs(count: int) -> str:
 
 def _label(study: Study, name: str) -> str:
     """A parameter or metric with its unit."""
-    unit = _unit(study, name)
-    title = _title(study, name)
+    unit, title = _unit(study, name), _title(study, name)
     return f"{title} in {unit}" if unit and unit != "1" else title
 
 
-def _named(study: Study, name: str, value: float) -> str:
-    return f"{_title(study, name)} = {value:g} {_unit(study, name) or ''}".rstrip()
-
-
 def _title(study: Study, name: str) -> str:
-    """A column as it is read."""
     metric = study.metric_of(name)
     known = metric is not None and name in metric.columns
     return _plain(metric.column_title(name) if metric and known else name)

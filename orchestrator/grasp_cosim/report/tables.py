@@ -142,13 +142,12 @@ def number(value: Any, digits: int = 6) -> str:
     return str(value)
 
 
-def count(value: int) -> str:
-    """A whole number in groups of three digits."""
-    return f"{value:,}".replace(",", "\N{NARROW NO-BREAK SPACE}")
+def count(value: float, decimals: int = 0) -> str:
+    """A number in groups of three digits."""
+    return f"{value:,.{decimals}f}".replace(",", "\N{NARROW NO-BREAK SPACE}")
 
 
 def _how(component: Mapping[str, Any]) -> str:
-    """The particulars of a component: its own step, its own process, other names."""
     parts = []
     if component["step"] is not None:
         parts.append(f"step {number(1e3 * component['step'])} ms")

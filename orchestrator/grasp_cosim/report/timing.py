@@ -7,7 +7,7 @@ would show one step in a million as nothing. Times are in s.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import accumulate
 from math import ceil, floor, log10
 from pathlib import Path
@@ -15,6 +15,7 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..realtime.timing import Histogram, Spread, Timing
+from ..recording.result import Result
 from .plot import GREY, RED, as_svg, finish, new_figure, save
 from .tables import count
 from .timing_words import (
@@ -86,6 +87,17 @@ OTHERS = {
     BACKLOG: Look(MUTED, 2),
 }
 """The looks of all that is no component."""
+
+
+def draw_result(result: Result, folder: Path) -> Iterator[Path]:
+    """Draw the picture of a result, and the timing if it was paced; yield each PNG once drawn."""
+    picture = folder / f"{result.drawing.stem}.png"
+    result.plot(picture)
+    yield picture
+    if result.timing:
+        picture = folder / "timing.png"
+        draw_timing(result.timing, float(result.time[-1]), picture)
+        yield picture
 
 
 def draw_timing(timing: Timing, end: float, path: Path) -> None:
@@ -178,7 +190,7 @@ def _draw_distributions(axes: Axes, timing: Timing) -> None:
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.8},
         )  # fmt: skip
     axes.set(xscale="log", yscale="log", xlim=(left, right), ylim=(bottom, 1.5), xlabel="time")
-    axes.xaxis.set_major_formatter(_duration)
+    axes.xaxis.set_major_formatter(lambda seconds, _: duration(seconds))
     axes.yaxis.set_major_formatter(lambda share, _: percent(share))
     axes.minorticks_off()
     finish(axes, "share that took longer", legend=False)
@@ -247,7 +259,7 @@ def _draw_overruns(axes: Axes, timing: Timing, end: float) -> None:
             markersize=5.0 if few else 3.0, clip_on=False, label=f"{count(times)} × {label(part)}",
         )  # fmt: skip
     axes.set(yscale="log", ylim=(low, high))
-    axes.yaxis.set_major_formatter(_duration)
+    axes.yaxis.set_major_formatter(lambda seconds, _: duration(seconds))
     axes.minorticks_off()
     if rest := unlisted(timing):  # shade the part of the run whose overruns were counted only
         axes.axvspan(listed[-1].time, end, color=GREY, alpha=0.15, linewidth=0.0)
@@ -257,15 +269,9 @@ def _draw_overruns(axes: Axes, timing: Timing, end: float) -> None:
 
 
 def _legend(axes: Axes, *entries: Sequence[Any], **options: Any) -> None:
-    """A legend to the right of the axes."""
     legend = axes.legend(
         *entries, loc="upper left", bbox_to_anchor=(1.01, 1.0), alignment="left", frameon=False,
         **options,
     )  # fmt: skip
     for text in legend.get_texts():
         text.set_parse_math(False)  # a name with dollars is no formula
-
-
-def _duration(seconds: float, _: float) -> str:
-    """A label of an axis of times."""
-    return duration(seconds)

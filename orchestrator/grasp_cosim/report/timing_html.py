@@ -73,19 +73,13 @@ def _figures(timing: Timing, part: str) -> str:
         return "<td></td>" * (len(QUANTILES) + 2)
     spread = timing.parts[part]
     cells = "".join(
-        f'<td class="n{" warn" if t > timing.period else ""}">{_microseconds(t)}</td>'
+        f'<td class="n{" warn" if t > timing.period else ""}">{count(1e6 * t, 1)}</td>'
         for t in quantiles(spread).values()
     )
     return f'{cells}<td class="n">{number(spread.worst_at)}</td>'
 
 
-def _microseconds(seconds: float) -> str:
-    whole, _, tenths = f"{1e6 * seconds:.1f}".partition(".")
-    return f"{count(int(whole))}.{tenths}"
-
-
 def _listed(timing: Timing) -> str:
-    """The first overruns as a table that opens."""
     listed = timing.listed[:MOST_ROWS]
     if not listed:
         return ""
@@ -95,8 +89,8 @@ def _listed(timing: Timing) -> str:
         title = f"All {total} overruns" if total > 1 else "The overrun"
     rows = (
         f'<td class="n">{number(o.time, 9)}</td><td class="n">{count(o.step)}</td>'
-        f'<td class="n">{_microseconds(o.late)}</td><td>{escape(label(o.culprit))}</td>'
-        f'<td class="n">{_microseconds(o.took)}</td>'
+        f'<td class="n">{count(1e6 * o.late, 1)}</td><td>{escape(label(o.culprit))}</td>'
+        f'<td class="n">{count(1e6 * o.took, 1)}</td>'
         for o in listed
     )
     heads = (

@@ -11,7 +11,8 @@ from grasp_cosim import InputError, System, simulate
 from grasp_cosim.grasp.identification.fit import Fit
 from grasp_cosim.grasp.identification.log import GROUPS, identify_from_log
 from grasp_cosim.grasp.identification.parameters import chosen
-from grasp_cosim.recording.load import Log, load_log
+from grasp_cosim.metrics.metric import Signals
+from grasp_cosim.recording.load import load_log
 from scipy.integrate import solve_ivp
 
 MASS = 0.5
@@ -29,30 +30,30 @@ Array = npt.NDArray[np.float64]
 
 
 @pytest.fixture(scope="module")
-def recorded(grasp: System) -> Log:
+def recorded(grasp: System) -> Signals:
     """A grasp of ours with friction, without noise."""
     values = {**TRUE, "controller.impact_reduction.enabled": True}
     result = simulate(grasp.with_values(values), step=1e-3, stop=2.5)
-    return Log(result.time, dict(result.signals))
+    return Signals(result.time, dict(result.signals))
 
 
-def noisy(log: Log, seed: int) -> Log:
+def noisy(log: Signals, seed: int) -> Signals:
     random = np.random.default_rng(seed)
     return replace(
         log,
-        signals={
+        by_name={
             name: column + random.normal(0.0, NOISE, len(column)) if ".velocity" in name else column
-            for name, column in log.signals.items()
+            for name, column in log.by_name.items()
         },
     )
 
 
-def identified(grasp: System, log: Log, *groups: str) -> Fit:
+def identified(grasp: System, log: Signals, *groups: str) -> Fit:
     parameters = chosen(groups or ("coulomb", "viscous"), GROUPS, "test")
     return identify_from_log(grasp, log, parameters, "test")[1]
 
 
-def scipy_log(friction: dict[str, float], static: float, v_s: float) -> Log:
+def scipy_log(friction: dict[str, float], static: float, v_s: float) -> Signals:
     """Both fingers pushed to and fro by a force of their own, one way at a time."""
     time = np.arange(0.0, 4.0, 1e-4)
     signals: dict[str, Array] = {}
@@ -71,7 +72,7 @@ def scipy_log(friction: dict[str, float], static: float, v_s: float) -> Log:
         signals[f"plant.velocity[{j}]"] = way * solution.y[0]
         signals[f"controller.force[{j}]"] = way * force
         signals[f"plant.contact_force[{j}]"] = np.zeros(len(time))
-    return Log(time, signals)
+    return Signals(time, signals)
 
 
 def held(found: Fit, true: dict[str, float]) -> int:
@@ -81,14 +82,14 @@ def held(found: Fit, true: dict[str, float]) -> int:
 
 
 def test_without_noise_the_friction_of_our_simulation_comes_back(
-    grasp: System, recorded: Log
+    grasp: System, recorded: Signals
 ) -> None:
     found = identified(grasp, recorded)
     for e in found.estimates:
         assert e.value == pytest.approx(TRUE[e.name], rel=2e-3, abs=2e-3), e.name
 
 
-def test_with_noise_the_intervals_hold_it(grasp: System, recorded: Log) -> None:
+def test_with_noise_the_intervals_hold_it(grasp: System, recorded: Signals) -> None:
     counts = [held(identified(grasp, noisy(recorded, seed)), TRUE) for seed in range(20)]
     assert sum(counts) / (20 * len(TRUE)) >= 0.88  # 95 % less 3 sigma of 80 intervals
     found = identified(grasp, noisy(recorded, 0))
@@ -118,7 +119,9 @@ def test_stribeck_friction_comes_back(grasp: System) -> None:
     assert found["plant.friction.stribeck_velocity"] == pytest.approx(0.04, rel=0.02)
 
 
-def test_static_friction_that_is_never_seen_is_not_determined(grasp: System, recorded: Log) -> None:
+def test_static_friction_that_is_never_seen_is_not_determined(
+    grasp: System, recorded: Signals
+) -> None:
     log = scipy_log(TRUE, 0.0, 0.01)
     found = {e.name: e for e in identified(grasp, log, "coulomb", "static").estimates}
     assert found["plant.friction.static[1]"].interval is None
@@ -131,24 +134,24 @@ def test_a_log_is_read_from_both_kinds_of_file(grasp: System, tmp_path: Path, ki
     result.to_csv(path) if kind.endswith("csv") else result.to_mdf(path)
     log = load_log(path)
     assert log.time.tolist() == pytest.approx(result.time.tolist())
-    assert log.signals["plant.velocity[1]"].tolist() == result["plant.velocity[1]"].tolist()
+    assert log.by_name["plant.velocity[1]"].tolist() == result["plant.velocity[1]"].tolist()
 
 
-def test_a_signal_that_is_missing_is_named(grasp: System, recorded: Log) -> None:
-    signals = {k: v for k, v in recorded.signals.items() if k != "controller.force[2]"}
+def test_a_signal_that_is_missing_is_named(grasp: System, recorded: Signals) -> None:
+    signals = {k: v for k, v in recorded.items() if k != "controller.force[2]"}
     with pytest.raises(InputError, match=r"^test: no signal 'controller.force\[2\]'; it has "):
-        identified(grasp, replace(recorded, signals=signals))
+        identified(grasp, replace(recorded, by_name=signals))
 
 
-def test_a_log_in_which_a_finger_rests_is_refused(grasp: System, recorded: Log) -> None:
+def test_a_log_in_which_a_finger_rests_is_refused(grasp: System, recorded: Signals) -> None:
     rest = np.zeros(len(recorded.time))
-    signals = {**recorded.signals, "plant.velocity[1]": rest}
+    signals = {**recorded.by_name, "plant.velocity[1]": rest}
     with pytest.raises(InputError, match=r"^test: finger 1 does not move freely for 0.02 s"):
-        identified(grasp, replace(recorded, signals=signals))
+        identified(grasp, replace(recorded, by_name=signals))
 
 
-def test_a_log_that_is_too_coarse_is_refused(grasp: System, recorded: Log) -> None:
-    coarse = Log(recorded.time[::20], {k: v[::20] for k, v in recorded.signals.items()})
+def test_a_log_that_is_too_coarse_is_refused(grasp: System, recorded: Signals) -> None:
+    coarse = Signals(recorded.time[::20], {k: v[::20] for k, v in recorded.items()})
     with pytest.raises(InputError, match=r"^test: a sample every 0.02 s; must be at most every"):
         identified(grasp, coarse)
 
@@ -156,11 +159,11 @@ def test_a_log_that_is_too_coarse_is_refused(grasp: System, recorded: Log) -> No
 @pytest.mark.parametrize("name", ["plant.velocity[1]", "controller.force[2]"])
 @pytest.mark.parametrize("value", [np.nan, -np.inf])
 def test_a_sample_that_is_no_number_is_named(
-    grasp: System, recorded: Log, name: str, value: float
+    grasp: System, recorded: Signals, name: str, value: float
 ) -> None:
-    spoilt = recorded.signals[name].copy()
+    spoilt = recorded.by_name[name].copy()
     spoilt[[40, 41]] = value
-    log = replace(recorded, signals={**recorded.signals, name: spoilt})
+    log = replace(recorded, by_name={**recorded.by_name, name: spoilt})
     message = (
         rf"^test: {re.escape(name)} = {value} at 0.04 s, one of 2 such samples; must be finite"
     )
@@ -169,25 +172,25 @@ def test_a_sample_that_is_no_number_is_named(
 
 
 @pytest.mark.parametrize("size", [0, 1])
-def test_a_log_of_a_sample_is_refused(grasp: System, recorded: Log, size: int) -> None:
-    log = Log(recorded.time[:size], {k: v[:size] for k, v in recorded.signals.items()})
+def test_a_log_of_a_sample_is_refused(grasp: System, recorded: Signals, size: int) -> None:
+    log = Signals(recorded.time[:size], {k: v[:size] for k, v in recorded.items()})
     with pytest.raises(InputError, match=rf"^test: {size} samples; must be at least two"):
         identified(grasp, log)
 
 
 @pytest.mark.parametrize("value", [0.0, np.nan, np.inf])
-def test_time_that_does_not_grow_is_refused(grasp: System, recorded: Log, value: float) -> None:
+def test_time_that_does_not_grow_is_refused(grasp: System, recorded: Signals, value: float) -> None:
     time = recorded.time.copy()
     time[50] = value
     with pytest.raises(InputError, match=r"^test: the time must be finite and grow from sample to"):
         identified(grasp, replace(recorded, time=time))
 
 
-def test_a_window_with_a_sample_missing_does_not_count(grasp: System, recorded: Log) -> None:
+def test_a_window_with_a_sample_missing_does_not_count(grasp: System, recorded: Signals) -> None:
     """Rows left out while a finger turned round would else look like one way throughout."""
     kept = np.ones(len(recorded.time), dtype=bool)
     kept[100:400] = False
-    gone = Log(recorded.time[kept], {k: v[kept] for k, v in recorded.signals.items()})
+    gone = Signals(recorded.time[kept], {k: v[kept] for k, v in recorded.items()})
     windows, _ = identify_from_log(grasp, gone, chosen(["coulomb"], GROUPS, "test"), "test")
     for w in windows:
         assert not ((w.time > recorded.time[100] - 0.021) & (w.time < recorded.time[100])).any()

@@ -17,7 +17,7 @@ import pytest
 from conftest import Run as Command
 from grasp_cosim import System
 from grasp_cosim.grasp.published import evaluate as module
-from grasp_cosim.grasp.published.evaluate import SOURCES, evaluate
+from grasp_cosim.grasp.published.evaluate import evaluate
 from grasp_cosim.grasp.published.grasps import Run, Runs, as_run
 from grasp_cosim.grasp.published.tables import Setting, published_rows
 from grasp_cosim.master.simulation import Session
@@ -63,9 +63,8 @@ def _run(setting: Setting, case: int, times: list[float]) -> Run:
 @pytest.fixture
 def evaluated(grasp: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Evaluated:
     """The report of an evaluation of made grasps, without its pictures."""
-    how = replace(SOURCES["simulation"], draw_times=lambda *_: None)
-    monkeypatch.setattr(module, "SOURCES", {"simulation": how})
-    monkeypatch.setattr(module, "_draw_signals", lambda *_: None)
+    for draws in ("_draw_times", "_draw_signals"):
+        monkeypatch.setattr(module, draws, lambda *_: None)
 
     def report(runs: Runs, **values: float) -> dict[str, Any]:
         monkeypatch.setattr(module, "run_all", lambda *_: iter(runs.values()))

@@ -10,7 +10,7 @@ import pytest
 from conftest import MadeOnce, Run
 from grasp_cosim import InputError, System
 from grasp_cosim.grasp.closing import close
-from grasp_cosim.grasp.presets import with_bench
+from grasp_cosim.grasp.presets import with_preset
 from grasp_cosim.grasp.published.evaluate import evaluate
 from support.cases import CASES
 
@@ -20,7 +20,7 @@ QUIET = {f"sensor_{j}.noise.enabled": False for j in (1, 2)}
 
 @pytest.fixture(scope="session")
 def bench(grasp: System) -> System:
-    return with_bench(grasp)
+    return with_preset(grasp, "bench")
 
 
 @pytest.fixture(scope="session")
@@ -65,7 +65,7 @@ def test_a_system_that_the_preset_does_not_fit_is_refused(grasp: System) -> None
     with pytest.raises(
         InputError, match=r"\[presets.bench\].* sensor_1.*: no component 'sensor_1'"
     ):
-        with_bench(other)
+        with_preset(other, "bench")
 
 
 def test_run_takes_the_preset_too(command: Run) -> None:

@@ -1,27 +1,21 @@
 """The command build."""
 
-import json
-import sys
 from pathlib import Path
 
 import click
 
 from ...errors import InputError
-from ...files import check_folder
-from ...grasp.system import BOUND_FOLDER, FMU_FOLDER
-from ..frame import json_option
+from ...files import FMU_FOLDER, check_folder
+from ..frame import PATH, bind_python_option, json_option, show
+
+BOUND_FOLDER = Path("fmus/bound")
+"""Where FMUs for hosts that are not Python are built, below the current folder."""
 
 
 @click.command()
-@click.argument("block", required=False, type=click.Path(path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path), help=f"Default: {FMU_FOLDER}")
-@click.option(
-    "--bind-python",
-    is_flag=False,
-    flag_value=sys.executable,
-    metavar="[PYTHON]",
-    help=f"For hosts that are not Python: bind to libpython. Default of --out: {BOUND_FOLDER}",
-)
+@click.argument("block", required=False, type=PATH)
+@click.option("--out", type=PATH, help=f"Default: {FMU_FOLDER}")
+@bind_python_option(f" Default of --out: {BOUND_FOLDER}")
 @json_option
 def build(block: Path | None, out: Path | None, bind_python: str | None, as_json: bool) -> int:
     """Build the FMUs: the plants, GripperPlant*, then ProximitySensor and GraspController.
@@ -39,8 +33,6 @@ def build(block: Path | None, out: Path | None, bind_python: str | None, as_json
     from grasp_fmus.block_build import build_block
     from grasp_fmus.build import build as build_fmus
 
-    if bind_python == "":
-        raise InputError("--bind-python '': must be a Python program, or left out")
     folder = out or (BOUND_FOLDER if bind_python else FMU_FOLDER)
     check_folder(folder)
     try:
@@ -49,10 +41,7 @@ def build(block: Path | None, out: Path | None, bind_python: str | None, as_json
         )
     except ValueError as error:
         raise InputError(f"build: {error}") from error
-    if as_json:
-        report = {str(b.path): {"status": b.status, "changes": list(b.changes)} for b in built}
-        click.echo(json.dumps({"fmus": list(report), "built": report}))
-    else:
-        for b in built:
-            click.echo("\n    ".join((f"{b.path}: {b.status}", *b.changes)))
+    report = {str(b.path): {"status": b.status, "changes": list(b.changes)} for b in built}
+    lines = ("\n    ".join((f"{b.path}: {b.status}", *b.changes)) for b in built)
+    show(as_json, {"fmus": list(report), "built": report}, "\n".join(lines))
     return 0

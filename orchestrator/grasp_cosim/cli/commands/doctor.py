@@ -1,17 +1,16 @@
 """The command doctor."""
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 
 import click
 
 from ...inspection.doctor import as_text, examine
-from ..frame import NEGATIVE, json_option
+from ..frame import NEGATIVE, PATH, json_option, show
 
 
 @click.command()
-@click.argument("fmu", required=False, type=click.Path(path_type=Path))
+@click.argument("fmu", required=False, type=PATH)
 @json_option
 def doctor(fmu: Path | None, as_json: bool) -> int:
     """Find out whether this machine will load FMU, and what to do if not.
@@ -22,8 +21,5 @@ def doctor(fmu: Path | None, as_json: bool) -> int:
     Example: grasp-cosim doctor vendor.fmu
     """
     findings = examine(fmu)
-    if as_json:
-        click.echo(json.dumps({"findings": [asdict(finding) for finding in findings]}))
-    else:
-        click.echo(as_text(findings))
+    show(as_json, {"findings": [asdict(f) for f in findings]}, as_text(findings))
     return NEGATIVE if any(f.status == "problem" for f in findings) else 0

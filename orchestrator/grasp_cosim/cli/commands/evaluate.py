@@ -1,6 +1,5 @@
 """The command evaluate."""
 
-import json
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,14 +8,15 @@ from typing import Any
 import click
 
 from ...files import check_folder
-from ...grasp.presets import with_bench
+from ...grasp.presets import with_preset
 from ...grasp.published.evaluate import evaluate as run_evaluation
-from ..frame import NEGATIVE, json_option, load_system
+from ...grasp.published.tables import Source
+from ..frame import NEGATIVE, PATH, json_option, load_system, show
 
 
 @click.command()
 @click.option("--bench", is_flag=True, help="The experiments, with friction and electronics.")
-@click.option("--out", type=click.Path(path_type=Path), default=Path("results"), show_default=True)
+@click.option("--out", type=PATH, default=Path("results"), show_default=True)
 @click.option("--workers", type=click.IntRange(1), default=os.cpu_count(), show_default="all cores")
 @json_option
 def evaluate(bench: bool, out: Path, workers: int, as_json: bool) -> int:
@@ -26,13 +26,13 @@ def evaluate(bench: bool, out: Path, workers: int, as_json: bool) -> int:
     Example: grasp-cosim evaluate --out results
     """
     check_folder(out)
-    system = load_system(None, None, None)
-    if bench:
-        report = run_evaluation(with_bench(system), out, workers, True, "experiment")
-    else:
-        report = run_evaluation(system, out, workers, True)
+    system = load_system()
+    source: Source = "experiment" if bench else "simulation"
+    report = run_evaluation(
+        with_preset(system, "bench") if bench else system, out, workers, True, source
+    )
     holds = all(claim["holds"] for claim in report["claims"])
-    click.echo(json.dumps(report) if as_json else _verdict(report, out))
+    show(as_json, report, _verdict(report, out))
     return 0 if holds else NEGATIVE
 
 

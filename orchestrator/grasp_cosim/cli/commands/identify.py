@@ -1,13 +1,12 @@
 """The command identify."""
 
-import json
 import os
 from pathlib import Path
 
 import click
 
 from ...errors import InputError
-from ...files import check_folder, write_text
+from ...files import check_folder, write_json, write_text
 from ...grasp.identification import report
 from ...grasp.identification.contact_times import (
     identify_from_times,
@@ -15,22 +14,18 @@ from ...grasp.identification.contact_times import (
     read_contacts,
     scatter,
 )
-from ...grasp.identification.fit import check_scipy
 from ...grasp.identification.log import GROUPS as IN_A_LOG
 from ...grasp.identification.log import identify_from_log
 from ...grasp.identification.parameters import DEFAULT, GROUPS, chosen
 from ...recording.load import load_log
 from ...system.description import System
-from ..frame import json_option, load_system, pair
+from ..frame import PATH, json_option, load_system, show
+from ..options import set_option, set_values
 
 
 @click.command()
-@click.option(
-    "--log", type=click.Path(path_type=Path), help="A recorded log, .csv or .mf4, to fit to."
-)
-@click.option(
-    "--times", type=click.Path(path_type=Path), help="Contact times: x_m,case,finger,time as CSV."
-)
+@click.option("--log", type=PATH, help="A recorded log, .csv or .mf4, to fit to.")
+@click.option("--times", type=PATH, help="Contact times: x_m,case,finger,time as CSV.")
 @click.option(
     "--fit",
     "groups",
@@ -40,8 +35,8 @@ from ..frame import json_option, load_system, pair
     metavar="|".join(GROUPS),
     help="What is fitted; may be given several times.",
 )
-@click.option("--set", "settings", multiple=True, metavar="COMPONENT.VARIABLE=VALUE")
-@click.option("--out", type=click.Path(path_type=Path), help="Folder for values and residuals.")
+@set_option
+@click.option("--out", type=PATH, help="Folder for values and residuals.")
 @click.option("--workers", type=click.IntRange(1), default=os.cpu_count(), show_default="all cores")
 @json_option
 def identify(
@@ -61,17 +56,15 @@ def identify(
     """
     if log and times:
         raise InputError(f"--log {log}: must not come with --times, which is other data")
-    check_scipy()
     if out:
         check_folder(out)
-    values = dict(pair("--set", text, "COMPONENT.VARIABLE=VALUE") for text in settings)
-    system = load_system(None, None, None).revised({}, values, ("--swap", "--set"))
+    system = load_system().revised({}, set_values(settings), ("--swap", "--set"))
     found = _from_log(system, log, groups) if log else _from_times(system, times, groups, workers)
     if out:
         write_text(out / "values.toml", report.values_toml(found))
         write_text(out / "residuals.csv", report.residuals_csv(found))
-        write_text(out / "identification.json", json.dumps(report.as_json(found), indent=2) + "\n")
-    click.echo(json.dumps(report.as_json(found)) if as_json else report.text(found))
+        write_json(out / "identification.json", report.as_json(found))
+    show(as_json, report.as_json(found), report.text(found))
     return 0
 
 

@@ -1,8 +1,6 @@
 """The command proxy."""
 
-import json
 import math
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,7 +17,7 @@ from ...hil.protocol import link_signature
 from ...interface.interface import Interface, Value, Variable
 from ...interface.read import read_interface
 from ...interface.units import BASE
-from ..frame import json_option
+from ..frame import PATH, bind_python_option, json_option, show
 
 if TYPE_CHECKING:
     from grasp_fmus.proxy_build import Original
@@ -28,8 +26,8 @@ KINDS: Mapping[str, type[Value]] = {"Real": float, "Integer": int, "Boolean": bo
 
 
 @click.command()
-@click.argument("fmu", type=click.Path(path_type=Path))
-@click.option("-o", "--out", type=click.Path(path_type=Path), help="The proxy to write, an .fmu.")
+@click.argument("fmu", type=PATH)
+@click.option("-o", "--out", type=PATH, help="The proxy to write, an .fmu.")
 @click.option("--host", default=DEFAULTS.host, show_default=True, help="Where its peer is.")
 @click.option("--port", type=click.IntRange(1, 65535), default=DEFAULTS.port, show_default=True)
 @click.option(
@@ -39,16 +37,8 @@ KINDS: Mapping[str, type[Value]] = {"Real": float, "Integer": int, "Boolean": bo
     show_default=True,
     help="Longest wait per step in s.",
 )
-@click.option(
-    "--bind-python",
-    is_flag=False,
-    flag_value=sys.executable,
-    metavar="[PYTHON]",
-    help="For hosts that are not Python: bind to libpython.",
-)
-@click.option(
-    "--c-header", type=click.Path(path_type=Path), help="Write the peer's side as a C99 header."
-)
+@bind_python_option()
+@click.option("--c-header", type=PATH, help="Write the peer's side as a C99 header.")
 @json_option
 def proxy(
     fmu: Path,
@@ -74,8 +64,6 @@ def proxy(
     from grasp_fmus.proxy_build import build_proxy
 
     _check_paths(fmu, out, c_header)
-    if bind_python == "":
-        raise InputError("--bind-python '': must be a Python program, or left out")
     interface = read_interface(fmu)
     signature, notes = link_signature(interface)
     report: dict[str, object] = {"notes": notes}
@@ -90,15 +78,14 @@ def proxy(
             starts = {v.name: _start(interface.by_name[v.name]) for v in signature.request}
             known = {name: start for name, start in starts.items() if start is not None}
             said = {v.name: v.description or "" for v in interface.variables}
-            text = header(interface.identifier, signature, known, said)
-            write_text(c_header, text)
+            write_text(c_header, header(interface.identifier, signature, known, said))
             lines.append(f"{c_header}: written")
             report["c_header"] = str(c_header)
     except ValueError as error:
         raise InputError(f"proxy: {error}") from error
     for note in notes:
         click.echo(note, err=True)
-    click.echo(json.dumps(report) if as_json else "\n".join(lines))
+    show(as_json, report, "\n".join(lines))
     return 0
 
 

@@ -1,29 +1,36 @@
 """The command qualify."""
 
-import json
 from pathlib import Path
 from typing import Any
 
 import click
 
-from ...files import check_folder, write_text
+from ...files import write_json, write_text
 from ...qualification import verdict
 from ...qualification.bands import read_bands
 from ...qualification.qualify import Qualification
 from ...qualification.qualify import qualify as run_qualification
-from ...report.plot import new_figure
 from ...report.qualification import draw_qualification
 from ...system.parts import ISOLATIONS, Isolation
-from ..frame import NEGATIVE, chosen_metrics, json_option, metrics_option, pair
-from ..options import SystemOptions, system_options, taken
+from ..frame import (
+    NEGATIVE,
+    PATH,
+    check_outputs,
+    chosen_metrics,
+    json_option,
+    metrics_option,
+    pair,
+    show,
+)
+from ..options import chosen_system, set_values, system_options
 
 
 @click.command()
-@click.argument("candidate", type=click.Path(path_type=Path))
+@click.argument("candidate", type=PATH)
 @click.option("--as", "component", required=True, metavar="COMPONENT", help="Whose place it takes.")
-@click.option("--system", type=click.Path(path_type=Path), help="Default: the built-in grasp.")
+@click.option("--system", type=PATH, help="Default: the built-in grasp.")
 @system_options
-@click.option("--bands", type=click.Path(path_type=Path), help="TOML; default: derived.")
+@click.option("--bands", type=PATH, help="TOML; default: derived.")
 @click.option("--rename", "renames", multiple=True, metavar="VARIABLE=CANDIDATES_VARIABLE")
 @click.option(
     "--isolation",
@@ -35,7 +42,7 @@ from ..options import SystemOptions, system_options, taken
 @metrics_option
 @click.option(
     "--out",
-    type=click.Path(path_type=Path),
+    type=PATH,
     help="Folder for qualification.json, qualification.png and bands_used.toml.",
 )
 @json_option
@@ -58,16 +65,13 @@ def qualify(
     \b
     Example: grasp-cosim qualify vendor_plant.fmu --as plant --out qualification
     """
-    if out:
-        check_folder(out)
-        new_figure(1.0, 1.0)  # tells that matplotlib is missing before the runs, not after
-    options = taken(SystemOptions, given)
+    check_outputs(out, plot=bool(out))
     found = run_qualification(
-        options.load(),
+        chosen_system(given),
         component,
         candidate,
         rename=dict(pair("--rename", text, "VARIABLE=CANDIDATES_VARIABLE") for text in renames),
-        values=options.values,
+        values=set_values(given["settings"]),
         bands=read_bands(bands) if bands else None,
         isolation=isolation,
         progress=True,
@@ -75,14 +79,14 @@ def qualify(
     )
     if out:
         _write(found, out)
-    click.echo(json.dumps(verdict.as_json(found)) if as_json else verdict.as_text(found))
+    show(as_json, verdict.as_json(found), verdict.as_text(found))
     return 0 if found.qualified else NEGATIVE
 
 
 def _write(found: Qualification, out: Path) -> None:
     """What there is: without a run there is no band and no figure, not even an earlier one."""
     figure, bands = out / "qualification.png", out / "bands_used.toml"
-    write_text(out / "qualification.json", json.dumps(verdict.as_json(found), indent=2) + "\n")
+    write_json(out / "qualification.json", verdict.as_json(found))
     if found.signals:
         write_text(bands, verdict.as_bands(found))
         draw_qualification(found, figure)

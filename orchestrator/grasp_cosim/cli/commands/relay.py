@@ -1,13 +1,12 @@
 """The command relay."""
 
 import csv
-import json
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import click
 
@@ -17,13 +16,11 @@ from ...hil.network import DIRECTIONS, Conditions, Network, Outage, check_time
 from ...hil.relay import Relay
 from ...hil.traffic import Entry, Log
 from ...system.parts import NANOSECONDS
-from ..frame import INTERRUPTED, fail, json_option
+from ..frame import INTERRUPTED, PATH, Command, fail, json_option, show
 from ..signals import ended_by_signals
 
-F = TypeVar("F", bound=Callable[..., Any])
 
-
-def _number(name: str, unit: str, text: str, default: float = 0.0) -> Callable[[F], F]:
+def _number(name: str, unit: str, text: str, default: float = 0.0) -> Command:
     """An option that is a number in a unit: s, or P for a probability."""
     return click.option(
         f"--{name}",
@@ -63,7 +60,7 @@ def _number(name: str, unit: str, text: str, default: float = 0.0) -> Callable[[
     help="Datagrams under way at most; more are dropped.",
 )
 @click.option("--duration", type=float, metavar="S", help="Default: until Ctrl-C.")
-@click.option("--log", type=click.Path(path_type=Path), help="CSV with the fate of each datagram.")
+@click.option("--log", type=PATH, help="CSV with the fate of each datagram.")
 @json_option
 def relay(
     peer: str,
@@ -98,7 +95,7 @@ def relay(
         with ended_by_signals(relay.stop) as came:
             _say(relay)
             relay.run(end)
-        click.echo(_json(relay, seed) if as_json else _table(relay))
+        show(as_json, _report(relay, seed), _table(relay))
     if came and duration is not None:
         return fail(f"interrupted before --duration {duration!r} was over", INTERRUPTED)
     return 0
@@ -123,7 +120,6 @@ def _outage(given: str) -> Outage:
 
 @contextmanager
 def _written(path: Path | None) -> Iterator[Log | None]:
-    """A log into a CSV file; none where path is None."""
     if path is None:
         yield None
         return
@@ -140,10 +136,11 @@ def _say(relay: Relay) -> None:
     click.echo(f"relaying {text(relay.address)} -> {text(relay.peer)}", err=True)
 
 
-def _json(relay: Relay, seed: int) -> str:
-    counts = {d: {**asdict(c), "dropped": c.dropped} for d, c in relay.counters.items()}
-    ends = {"listening": text(relay.address), "to": text(relay.peer), "seed": seed}
-    return json.dumps({**ends, **counts})
+def _report(relay: Relay, seed: int) -> Mapping[str, Any]:
+    counts: dict[str, Any] = {
+        d: {**asdict(c), "dropped": c.dropped} for d, c in relay.counters.items()
+    }
+    return {"listening": text(relay.address), "to": text(relay.peer), "seed": seed} | counts
 
 
 def _table(relay: Relay) -> str:

@@ -1,6 +1,5 @@
 """The command report."""
 
-import json
 from pathlib import Path
 
 import click
@@ -9,13 +8,13 @@ from ...errors import InputError
 from ...files import check_folder
 from ...recording.load import load_run
 from ...report.page import write_page
-from ...report.timing import draw_timing
-from ..frame import json_option
+from ...report.timing import draw_result
+from ..frame import PATH, json_option, show
 
 
 @click.command()
-@click.argument("run", type=click.Path(path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path), help="The page. Default: RUN/report.html")
+@click.argument("run", type=PATH)
+@click.option("--out", type=PATH, help="The page. Default: RUN/report.html")
 @json_option
 def report(run: Path, out: Path | None, as_json: bool) -> int:
     """Make a page of RUN, a folder that `run --out` wrote: traces, metrics, connections, settings.
@@ -32,21 +31,12 @@ def report(run: Path, out: Path | None, as_json: bool) -> int:
     check_folder(page.parent)
     scene = recorded.drawing.scene(recorded)
     write_page(recorded, run.resolve().name, page, scene=scene)
-    picture = page.parent / f"{recorded.drawing.stem}.png"
-    pictures = []
+    drawn: list[str] = []
     try:
-        recorded.plot(picture)
-        pictures.append(picture)
-        if recorded.timing:
-            draw_timing(recorded.timing, float(recorded.time[-1]), page.parent / "timing.png")
-            pictures.append(page.parent / "timing.png")
+        drawn += map(str, draw_result(recorded, page.parent))
     except InputError as error:
         click.echo(f"no picture: {error}", err=True)
-    if as_json:
-        written = {"page": str(page), "bytes": page.stat().st_size}
-        click.echo(json.dumps({**written, "pictures": [str(p) for p in pictures]}))
-    else:
-        click.echo(f"{page}: {page.stat().st_size / 1e6:.1f} MB")
-        for path in pictures:
-            click.echo(path)
+    size = page.stat().st_size
+    written = {"page": str(page), "bytes": size, "pictures": drawn}
+    show(as_json, written, "\n".join([f"{page}: {size / 1e6:.1f} MB", *drawn]))
     return 0

@@ -1,81 +1,37 @@
 """The command run."""
 
-import json
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import click
 
 from ...errors import InputError, SimulationError
-from ...files import check_folder
 from ...master.engine import ENGINES, Engine
 from ...master.simulation import MOST, simulate
-from ...realtime.options import Realtime
 from ...recording.mdf import check_mdf
 from ...recording.result import Result
-from ...report.plot import new_figure
-from ...report.timing import draw_timing
-from ...system.description import System
-from ..frame import INTERRUPTED, chosen_metrics, fail, json_option, metrics_option, pair
-from ..options import SystemOptions, system_options, taken
+from ...report.timing import draw_result
+from ..frame import (
+    INTERRUPTED,
+    PATH,
+    check_outputs,
+    chosen_metrics,
+    fail,
+    json_option,
+    metrics_option,
+    pair,
+    show,
+)
+from ..options import chosen_system, set_values, system_options
 from ..realtime import chosen_realtime, realtime_options, timing_lines
-from ..step_study import StepStudyOptions, step_study_options
-
-
-@dataclass(frozen=True, slots=True)
-class Outputs:
-    """What is written of a run: its folder, a picture, an MDF file."""
-
-    out: Path | None
-    plot: bool
-    mdf: bool
-
-    def check(self) -> None:
-        """InputError where something could not be written, before the run and not after."""
-        if self.mdf and not self.out:
-            raise InputError("--mdf: must come with --out, the folder for signals.mf4")
-        if self.mdf:
-            check_mdf()
-        if self.plot:
-            new_figure(1.0, 1.0)
-        if self.out or self.plot:
-            check_folder(self.out or Path())
-
-    def write(self, result: Result) -> None:
-        """Write a result."""
-        if self.out:
-            result.to_csv(self.out / "signals.csv")
-            result.to_json(self.out / "run.json")
-        if self.out and self.mdf:
-            result.to_mdf(self.out / "signals.mf4")
-        if self.plot:
-            self._draw(result, self.out or Path())
-
-    def _draw(self, result: Result, folder: Path) -> None:
-        """The grasp, or all signals where it is none, and the timing if it was paced."""
-        picture = folder / f"{result.drawing.stem}.png"
-        result.plot(picture)
-        click.echo(f"drew {picture}", err=True)
-        if result.timing:
-            draw_timing(result.timing, float(result.time[-1]), folder / "timing.png")
-            click.echo(f"drew {folder / 'timing.png'}", err=True)
-
-
-@dataclass(frozen=True, slots=True)
-class Running:
-    """How a run is made: what is recorded, by which engine, which metrics."""
-
-    every: int
-    engine: Engine
-    metric_files: tuple[Path, ...]
+from ..step_study import check_step_study, step_study_options, study_step
 
 
 @click.command()
-@click.argument("system", required=False, type=click.Path(path_type=Path))
+@click.argument("system", required=False, type=PATH)
 @system_options
 @click.option("--swap", "swaps", multiple=True, metavar="COMPONENT=FMU")
-@click.option("--out", type=click.Path(path_type=Path), help="Folder for signals.csv and run.json.")
+@click.option("--out", type=PATH, help="Folder for signals.csv and run.json.")
 @click.option(
     "--plot",
     is_flag=True,
@@ -90,55 +46,62 @@ class Running:
 @step_study_options
 @realtime_options
 @json_option
-def run(swaps: tuple[str, ...], as_json: bool, **given: Any) -> int:
+def run(
+    swaps: tuple[str, ...],
+    mdf: bool,
+    every: int,
+    engine: Engine,
+    metric_files: tuple[Path, ...],
+    as_json: bool,
+    **given: Any,
+) -> int:
     """Run SYSTEM, a .toml or .ssp file; by default the built-in grasp.
 
     \b
     Example: grasp-cosim run --case 1 --set plant.initial_object_position=0.02 --out results --plot
     In real time: grasp-cosim run --realtime --step 1e-3 --priority 80 --cpu 1 --out results
     """
-    outputs, question = taken(Outputs, given), taken(StepStudyOptions, given)
-    paced = chosen_realtime(given)
-    question.check(paced is not None)
-    options = taken(SystemOptions, given)
+    paced, out = chosen_realtime(given), given["out"]
+    check_step_study(given, paced is not None)
     fmus = dict(pair("--swap", text, "COMPONENT=FMU") for text in swaps)
-    system = options.load().revised(fmus, options.values, ("--swap", "--set"))
-    running = taken(Running, given)
-    if question.step_study:
-        metrics = chosen_metrics(running.metric_files)
-        return question.run(system, metrics, outputs.out, outputs.plot, as_json)
-    outputs.check()
-    return _run(system, running, outputs, paced, as_json)
-
-
-def _run(
-    system: System, running: Running, outputs: Outputs, paced: Realtime | None, as_json: bool
-) -> int:
-    """Simulate, write and print what came of it; the exit code."""
-    metrics = chosen_metrics(running.metric_files)
+    values = set_values(given["settings"])
+    system = chosen_system(given).revised(fmus, values, ("--swap", "--set"))
+    metrics = chosen_metrics(metric_files)
+    if given["step_study"]:
+        return study_step(system, metrics, given, as_json)
+    if mdf and not out:
+        raise InputError("--mdf: must come with --out, the folder for signals.mf4")
+    if mdf:
+        check_mdf()
+    check_outputs(out, given["plot"])
     try:
         result = simulate(
-            system,
-            progress=True,
-            every=running.every,
-            engine=running.engine,
-            realtime=paced,
-            metrics=metrics,
+            system, progress=True, every=every, engine=engine, realtime=paced, metrics=metrics
         )
     except SimulationError as error:
         if error.result:
-            outputs.write(error.result)
-            if outputs.out:
-                click.echo(f"kept what was recorded, in {outputs.out}", err=True)
+            _write(error.result, out, given["plot"], mdf)
+            if out:
+                click.echo(f"kept what was recorded, in {out}", err=True)
         raise
-    outputs.write(result)
+    _write(result, out, given["plot"], mdf)
     for line in result.log[len(system.notes) :]:
         click.echo(line, err=True)
-    click.echo(json.dumps(_as_json(result)) if as_json else _summary(result))
+    show(as_json, _as_json(result), _summary(result))
     if not result.complete:
         message = f"interrupted at t = {result.time[-1]:.6g} s; kept what was recorded"
         return fail(message, INTERRUPTED)
     return 0
+
+
+def _write(result: Result, out: Path | None, plot: bool, mdf: bool) -> None:
+    if out:
+        result.to_csv(out / "signals.csv")
+        result.to_json(out / "run.json")
+    if out and mdf:
+        result.to_mdf(out / "signals.mf4")
+    for picture in draw_result(result, out or Path()) if plot else ():
+        click.echo(f"drew {picture}", err=True)
 
 
 def _as_json(result: Result) -> dict[str, Any]:

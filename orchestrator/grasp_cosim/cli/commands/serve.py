@@ -1,6 +1,5 @@
 """The command serve."""
 
-import json
 from pathlib import Path
 
 import click
@@ -12,12 +11,12 @@ from ...hil.served import ServedFmu, Service
 from ...hil.server import DEFAULT_ADDRESS, Server
 from ...interface.read import read_interface
 from ...system.description import in_nanoseconds
-from ..frame import INTERRUPTED, NEGATIVE, fail, json_option, pair
+from ..frame import INTERRUPTED, NEGATIVE, PATH, fail, json_option, pair, show
 from ..signals import ended_by_signals
 
 
 @click.command()
-@click.argument("fmu", type=click.Path(path_type=Path))
+@click.argument("fmu", type=PATH)
 @click.option("--host", default=DEFAULT_ADDRESS[0], show_default=True, help="Address to listen at.")
 @click.option(
     "--port", type=click.IntRange(0, 65535), default=DEFAULT_ADDRESS[1], show_default=True
@@ -33,7 +32,7 @@ from ..signals import ended_by_signals
     metavar="INPUT=VALUE",
     help="Of an input after a silence; default: its start value.",
 )
-@click.option("--key-file", type=click.Path(path_type=Path), help="A key shared with the proxy.")
+@click.option("--key-file", type=PATH, help="A key shared with the proxy.")
 @click.option("--sessions", type=click.IntRange(1), help="End after so many sessions.")
 @click.option("--duration", type=float, help="End after so many s.")
 @json_option
@@ -80,11 +79,8 @@ def serve(
         with ended_by_signals(server.stop) as came:
             server.serve(sessions, end)
         counters = served.counters()
-    if as_json:
-        click.echo(json.dumps({"listening": at, **counters}))
-    else:
-        came_in = ", ".join(f"{name} {count}" for name, count in counters.items() if count)
-        click.echo(came_in or "nothing came")
+    came_in = ", ".join(f"{name} {count}" for name, count in counters.items() if count)
+    show(as_json, {"listening": at, **counters}, came_in or "nothing came")
     if came and (sessions or duration):
         return fail("interrupted before --sessions or --duration ended it", INTERRUPTED)
     if sessions and counters["sessions"] < sessions:

@@ -1,19 +1,16 @@
 """The command ssp."""
 
-import json
 from pathlib import Path
 
 import click
 
 from ...files import check_folder
-from ..frame import json_option, load_system
+from ..frame import PATH, json_option, load_system, show
 
 
 @click.command()
-@click.argument("system", required=False, type=click.Path(path_type=Path))
-@click.option(
-    "-o", "--out", type=click.Path(path_type=Path), required=True, help="The archive to write."
-)
+@click.argument("system", required=False, type=PATH)
+@click.option("-o", "--out", type=PATH, required=True, help="The archive to write.")
 @click.option("--step", type=float, help="Communication step in s, for an .ssp that names none.")
 @click.option("--stop", type=float, help="Stop time in s.")
 @json_option
@@ -30,17 +27,15 @@ def ssp(
     chosen = load_system(system, step, stop).with_experiment(step, stop)
     check_folder(out.parent)
     written = write_ssp(chosen, out)
-    if as_json:
-        report = {
-            "ssp": str(out),
-            "entries": list(written.entries),
-            "components": [c.name for c in chosen.components],
-            "connections": len(chosen.connections),
-            "notes": [*chosen.notes, *written.notes],
-        }
-        click.echo(json.dumps(report))
-    else:
-        click.echo("\n    ".join((f"{out}: written", *written.entries)))
+    report = {
+        "ssp": str(out),
+        "entries": list(written.entries),
+        "components": [c.name for c in chosen.components],
+        "connections": len(chosen.connections),
+        "notes": [*chosen.notes, *written.notes],
+    }
+    show(as_json, report, "\n    ".join((f"{out}: written", *written.entries)))
+    if not as_json:
         for note in written.notes:
             click.echo(note, err=True)
     return 0

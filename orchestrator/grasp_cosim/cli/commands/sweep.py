@@ -1,13 +1,10 @@
 """The command sweep."""
 
-import json
 from pathlib import Path
 
 import click
 
 from ...errors import InputError
-from ...files import check_folder
-from ...report.plot import new_figure
 from ...report.sweep import draw_sweep
 from ...sweep.read import read_study, study_file
 from ...sweep.sensitivity import Sensitivity
@@ -19,22 +16,21 @@ from ...sweep.table import STATISTICS
 from ..frame import (
     INTERRUPTED,
     NEGATIVE,
+    PATH,
+    check_outputs,
     chosen_metrics,
     fail,
     json_option,
     load_system,
     metrics_option,
+    show,
     with_preset,
 )
 
 
 @click.command()
 @click.argument("study")
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path),
-    help="Folder of the runs; by default the study's name, here.",
-)
+@click.option("--out", type=PATH, help="Folder of the runs; by default the study's name, here.")
 @click.option(
     "--workers", type=click.IntRange(1), help="Processes; by default one for each processor."
 )
@@ -62,17 +58,10 @@ def sweep(
         raise InputError("--workers: must not come with --scheduler, whose workers there are")
     path = _file(study)
     folder = out or Path(path.stem)
-    check_folder(folder)
-    chosen = read_study(
-        path,
-        lambda system: load_system(system, None, None),
-        with_preset,
-        chosen_metrics(metric_files),
-    )
+    chosen = read_study(path, load_system, with_preset, chosen_metrics(metric_files))
     if plot and chosen.pictures == Pictures():
         raise InputError(f"--plot: {path.name} has no [figures]; must say what to draw")
-    if plot:
-        new_figure(1.0, 1.0)  # says at once if matplotlib is missing
+    check_outputs(folder, plot)
     try:
         done = run_study(chosen, folder, workers, scheduler, progress=True)
     except KeyboardInterrupt:
@@ -81,7 +70,7 @@ def sweep(
     drawn = draw_sweep(done, folder) if plot else []
     for picture in drawn:
         click.echo(f"drew {picture}", err=True)
-    click.echo(json.dumps(done.as_json()) if as_json else _as_text(done))
+    show(as_json, done.as_json(), _as_text(done))
     return NEGATIVE if done.failed == chosen.runs else 0
 
 

@@ -19,8 +19,8 @@ from ...system.description import System
 from ..closing import close
 from ..metrics import FINGERS
 from ..presets import CASES, with_case
-from ..published.tables import Row, Setting, published_rows
-from .fit import Fit, Parameter, Vector, check_scipy, fit
+from ..published.tables import Setting, published_rows
+from .fit import Fit, Parameter, Vector, fit
 from .parameters import RATIO
 
 STEP, STOP = 1e-3, 10.0
@@ -31,7 +31,6 @@ OPTIONAL = ("alpha_1", "alpha_2")
 """Of a table of contact times."""
 
 Times = Sequence[float]
-Values = dict[str, float]
 
 
 class Grasp(NamedTuple):
@@ -62,7 +61,13 @@ def published_contacts() -> list[Contact]:
 
     White on both sides is the row of x_m = 0.03 m once more, so it is left out.
     """
-    return [_contact(row) for row in published_rows("experiment") if row.finger and _counts(row)]
+    found = []
+    for table, condition, setting, case, finger, published in published_rows("experiment"):
+        position = table == "position"
+        if finger and (position or (setting.equal_colours and setting.alpha_1 != 1.0)):
+            label = f"x_m = {condition} m" if position else str(condition)
+            found.append(Contact(label, setting, case, finger, published))
+    return found
 
 
 def read_contacts(path: Path) -> list[Contact]:
@@ -100,7 +105,6 @@ def identify_from_times(
 
     progress counts the grasps on standard error if that is a terminal.
     """
-    check_scipy()
     system = system.with_experiment(STEP, STOP)
     with progress_bar("grasps", None, progress) as bar, Crew(workers) as crew:
 
@@ -136,10 +140,9 @@ def scatter(contacts: Sequence[Contact]) -> float | None:
     It is the pure error of an analysis of the lack of fit: what no model can explain. None where no
     grasp was repeated.
     """
-    equal: dict[tuple[float, float, int, int], list[float]] = {}
+    equal: dict[tuple[Grasp, int], list[float]] = {}
     for c in contacts:
-        ratio = c.setting.alpha_2 / c.setting.alpha_1
-        equal.setdefault((c.setting.x_m, ratio, c.case, c.finger), []).append(c.time)
+        equal.setdefault((_grasp(c, (), np.empty(0)), c.finger), []).append(c.time)
     repeated = [np.array(times) for times in equal.values() if len(times) > 1]
     if not repeated:
         return None
@@ -166,22 +169,10 @@ def contact_times(job: tuple[System, Grasp]) -> Times:
     return [STOP if t is None else float(t) for t in result.metrics["time_to_contact"]]
 
 
-def _counts(row: Row) -> bool:
-    if row.table == "position":
-        return True
-    return row.setting.equal_colours and row.setting.alpha_1 != 1.0
-
-
-def _contact(row: Row) -> Contact:
-    where = f"x_m = {row.condition} m" if row.table == "position" else str(row.condition)
-    finger = row.finger or FINGERS[0]
-    return Contact(where, row.setting, row.case, finger, row.published)
-
-
 def _read(place: str, names: Sequence[str], line: Sequence[str]) -> Contact:
     if len(line) != len(names):
         raise InputError(f"{place}: {len(line)} entries; must be {len(names)}, as many as columns")
-    numbers: Values = {}
+    numbers: dict[str, float] = {}
     for name, text in zip(names, line, strict=True):
         try:
             numbers[name] = float(text)
@@ -189,7 +180,6 @@ def _read(place: str, names: Sequence[str], line: Sequence[str]) -> Contact:
             raise InputError(f"{place}: {name} = {text!r}: must be a number") from None
         if not np.isfinite(numbers[name]):
             raise InputError(f"{place}: {name} = {text}: must be a finite number")
-    case, finger = numbers["case"], numbers["finger"]
     for name, valid in (("case", CASES), ("finger", FINGERS)):
         if numbers[name] not in valid:
             raise InputError(
@@ -201,6 +191,6 @@ def _read(place: str, names: Sequence[str], line: Sequence[str]) -> Contact:
             f"{place}: time = {numbers['time']:g} s, alpha = {choices(alphas)}: the time must be "
             f"greater than 0 and less than {STOP:g}, alpha_1 and alpha_2 greater than 0"
         )
-    label = f"x_m = {numbers['x_m']:g} m"
-    setting = Setting(numbers["x_m"], alphas[0], alphas[1])
-    return Contact(label, setting, int(case), int(finger), numbers["time"])
+    setting = Setting(numbers["x_m"], *alphas)
+    label = f"x_m = {setting.x_m:g} m"
+    return Contact(label, setting, int(numbers["case"]), int(numbers["finger"]), numbers["time"])

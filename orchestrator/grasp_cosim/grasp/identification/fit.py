@@ -75,18 +75,13 @@ class Fit:
         return float(np.sqrt(np.mean(self.residuals**2)))
 
 
-def check_scipy() -> None:
-    """InputError without scipy."""
-    extra_module("scipy", "it fits the parameters", "identify")
-
-
 def fit(residuals: Residuals, parameters: Sequence[Parameter], place: str) -> Fit:
     """The parameters that make the sum of the squared residuals least; place names the data.
 
-    InputError where there are no more residuals than parameters or one is not finite,
-    SimulationError where the fit does not come to rest.
+    InputError without scipy, or where there are no more residuals than parameters or one is not
+    finite, SimulationError where the fit does not come to rest.
     """
-    check_scipy()
+    extra_module("scipy", "it fits the parameters", "identify")
     from scipy.optimize import least_squares
 
     low, high = (np.array([p[i] for p in parameters]) for i in (3, 4))

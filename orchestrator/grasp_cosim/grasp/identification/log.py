@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...errors import InputError, choices
-from ...recording.load import Log
+from ...metrics.metric import Signals
 from ...system.description import System
 from ..metrics import FINGERS
 from .fit import Fit, Parameter, Vector, fit
@@ -51,7 +51,7 @@ class Windows(NamedTuple):
 
 
 def identify_from_log(
-    system: System, log: Log, parameters: Sequence[Parameter], place: str
+    system: System, log: Signals, parameters: Sequence[Parameter], place: str
 ) -> tuple[list[Windows], Fit]:
     """Fit friction to a log; what is not fitted is as in the system, whose masses count.
 
@@ -69,7 +69,7 @@ def identify_from_log(
     return windows, fit(lambda points: [at(x) for x in points], parameters, place)
 
 
-def _windows(system: System, log: Log, finger: int, place: str) -> Windows:
+def _windows(system: System, log: Signals, finger: int, place: str) -> Windows:
     mass = system.start(f"plant.finger_mass[{finger}]")
     step = _step(log.time, place)
     size = int(WINDOW / step + 1e-6) + 1
@@ -110,10 +110,10 @@ def _residuals(system: System, values: Mapping[str, float], w: Windows) -> Vecto
     return np.asarray(w.unexplained + w.way * friction.mean(axis=1))
 
 
-def _signal(log: Log, name: str, place: str) -> Vector:
-    if name not in log.signals:
-        raise InputError(f"{place}: no signal {name!r}; it has {choices(log.signals)}")
-    signal = log.signals[name]
+def _signal(log: Signals, name: str, place: str) -> Vector:
+    if name not in log:
+        raise InputError(f"{place}: no signal {name!r}; it has {choices(log)}")
+    signal = log[name]
     wrong = np.flatnonzero(~np.isfinite(signal))
     if len(wrong):
         first = wrong[0]
@@ -125,7 +125,6 @@ def _signal(log: Log, name: str, place: str) -> Vector:
 
 
 def _step(time: Vector, place: str) -> float:
-    """The median step in s."""
     if len(time) < 2:
         raise InputError(f"{place}: {len(time)} samples; must be at least two")
     if not (np.diff(time) > 0.0).all() or not np.isfinite(time).all():

@@ -1,11 +1,10 @@
 """What was identified: for a terminal, as JSON, as values for a system, as a table of residuals."""
 
-import csv
-import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ..published.report import table_csv
 from .fit import Estimate, Fit
 
 ASSUMPTIONS = (
@@ -33,7 +32,7 @@ def as_json(found: Identification) -> dict[str, Any]:
     """The object of `identify --json`."""
     return {
         "data": found.data,
-        "parameters": [_parameter(e) for e in found.fit.estimates],
+        "parameters": [e._asdict() for e in found.fit.estimates],
         "assumptions": ASSUMPTIONS,
         "rms": found.fit.rms,
         "scatter": found.scatter,
@@ -45,10 +44,11 @@ def as_json(found: Identification) -> dict[str, Any]:
 
 def text(found: Identification) -> str:
     """The parameters, the root mean square, and the residuals unless they are many."""
-    lines = [f"{found.data}; {ASSUMPTIONS}", *(_line(e) for e in found.fit.estimates)]
-    lines.append(
-        f"residuals: root mean square {found.fit.rms:.4g} {found.unit} over {len(found.rows)}"
-    )
+    lines = [
+        f"{found.data}; {ASSUMPTIONS}",
+        *(f"  {e.name:32s}{e.value:10.4g} {_about(e)}" for e in found.fit.estimates),
+        f"residuals: root mean square {found.fit.rms:.4g} {found.unit} over {len(found.rows)}",
+    ]
     if found.scatter is not None:
         lines.append(
             f"equal conditions scatter by {found.scatter:.3g} {found.unit}, which no fit explains"
@@ -66,21 +66,14 @@ def values_toml(found: Identification) -> str:
     lines = [
         f"# {found.data}: root mean square of the residuals {found.fit.rms:.4g} {found.unit}",
         "[values]",
-    ]
-    lines += [
-        f'"{e.name}" = {float(f"{e.value:.6g}")!r}  # {_about(e)}' for e in found.fit.estimates
+        *(f'"{e.name}" = {float(f"{e.value:.6g}")!r}  # {_about(e)}' for e in found.fit.estimates),
     ]
     return "\n".join(lines) + "\n"
 
 
 def residuals_csv(found: Identification) -> str:
     """A line per residual."""
-    out = io.StringIO()
-    rows = _rows(found)
-    writer = csv.DictWriter(out, list(rows[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return out.getvalue()
+    return table_csv(_rows(found))
 
 
 def _rows(found: Identification) -> list[dict[str, Any]]:
@@ -88,15 +81,6 @@ def _rows(found: Identification) -> list[dict[str, Any]]:
         {**row, "residual": float(r)}
         for row, r in zip(found.rows, found.fit.residuals, strict=True)
     ]
-
-
-def _parameter(e: Estimate) -> dict[str, Any]:
-    interval = list(e.interval) if e.interval else None
-    return {**e._asdict(), "interval": interval}
-
-
-def _line(e: Estimate) -> str:
-    return f"  {e.name:32s}{e.value:10.4g} {_about(e)}"
 
 
 def _about(e: Estimate) -> str:

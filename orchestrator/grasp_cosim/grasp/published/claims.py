@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from ...system.description import System
 from ..metrics import IMPACT_WINDOW
-from .grasps import Run, Runs, balances, off_centre, settled_force
+from .grasps import Runs, balances, off_centre, settled_force
 from .tables import REFLECTANCE_X_M, Row, Source
 
 TIME_BAND = 0.10
@@ -48,27 +48,24 @@ def check_claims(source: Source, evidence: Evidence) -> list[dict[str, Any]]:
     return [{"text": text, "holds": bool(holds)} for text, holds in found]
 
 
-def times_are_near(e: Evidence) -> Claim:
-    """Each contact time is near the published one."""
-    worst = max(abs(r["difference"]) for r in e.rows if r["finger"])
+def _times_are_near(e: Evidence) -> Claim:
+    return _near("contact time", TIME_BAND, [r for r in e.rows if r["finger"]])
+
+
+def _differences_are_near(e: Evidence) -> Claim:
+    return _near("time difference", DIFFERENCE_BAND, [r for r in e.rows if not r["finger"]])
+
+
+def _near(what: str, band: float, rows: Sequence[Mapping[str, Any]]) -> Claim:
+    worst = max(abs(r["difference"]) for r in rows)
     return (
-        f"Each contact time is within {TIME_BAND:.2f} s of the published one "
-        f"(largest deviation {worst:.3f} s).",
-        worst <= TIME_BAND,
+        f"Each {what} is within {band:.2f} s of the published one (largest deviation {worst:.3f} "
+        "s).",
+        worst <= band,
     )
 
 
-def differences_are_near(e: Evidence) -> Claim:
-    """Each time difference is near the published one."""
-    worst = max(abs(r["difference"]) for r in e.rows if not r["finger"])
-    return (
-        f"Each time difference is within {DIFFERENCE_BAND:.2f} s of the published one "
-        f"(largest deviation {worst:.3f} s).",
-        worst <= DIFFERENCE_BAND,
-    )
-
-
-def touching_together(e: Evidence) -> Claim:
+def _touching_together(e: Evidence) -> Claim:
     """Layer 3 brings the contacts closer together."""
     return (
         "Simultaneous contact: wherever the object is off centre, the fingers touch closer "
@@ -77,7 +74,7 @@ def touching_together(e: Evidence) -> Claim:
     )
 
 
-def balancing(e: Evidence) -> Claim:
+def _balancing(e: Evidence) -> Claim:
     """Layer 3 delays the nearer finger and hastens the farther one."""
     return (
         "Off centre, Case 2 makes the nearer finger touch later and the farther one earlier.",
@@ -85,7 +82,7 @@ def balancing(e: Evidence) -> Claim:
     )
 
 
-def soft_impact(e: Evidence) -> Claim:
+def _soft_impact(e: Evidence) -> Claim:
     """Layer 2 takes the speed out of the contact."""
     soft = max(max(r.metrics["impact_velocity"]) for r in e.runs.values() if r.case > 0)
     hard = min(min(r.metrics["impact_velocity"]) for r in e.runs.values() if r.case == 0)
@@ -96,7 +93,7 @@ def soft_impact(e: Evidence) -> Claim:
     )
 
 
-def controlled_force(e: Evidence) -> Claim:
+def _controlled_force(e: Evidence) -> Claim:
     """Layer 1 sets the force."""
     settled = settled_force(e.system)
     worst = max(
@@ -109,8 +106,7 @@ def controlled_force(e: Evidence) -> Claim:
     )
 
 
-def target_converges(e: Evidence) -> Claim:
-    """The target passes the centre of the object and comes back to it."""
+def _target_converges(e: Evidence) -> Claim:
     case_2 = [e.runs[s, 2] for s in off_centre(e.runs)]
     return (
         "In Case 2 the target overshoots the centre of the object (by "
@@ -119,8 +115,7 @@ def target_converges(e: Evidence) -> Claim:
     )
 
 
-def bench_times_are_near(e: Evidence) -> Claim:
-    """The contact times to which friction was fitted are near the published ones."""
+def _bench_times_are_near(e: Evidence) -> Claim:
     rms = e.rms["contact_times"]
     return (
         f"The contact times of the position rows and of equal colours are within {RMS_BAND:.2f} s "
@@ -129,8 +124,7 @@ def bench_times_are_near(e: Evidence) -> Claim:
     )
 
 
-def bench_touching_together(e: Evidence) -> Claim:
-    """Layer 3 brings the contacts closer together, on the bench."""
+def _bench_touching_together(e: Evidence) -> Claim:
     settings = sorted({setting for setting, _ in e.runs})
     closer = [s for s in settings if e.runs[s, 2].apart < e.runs[s, 1].apart]
     return (
@@ -140,8 +134,7 @@ def bench_touching_together(e: Evidence) -> Claim:
     )
 
 
-def bench_balancing(e: Evidence) -> Claim:
-    """Layer 3 delays the nearer finger and hastens the farther one, on the bench."""
+def _bench_balancing(e: Evidence) -> Claim:
     settings = off_centre(e.runs)
     balanced = [s for s in settings if balances(e.runs, s)]
     return (
@@ -151,12 +144,12 @@ def bench_balancing(e: Evidence) -> Claim:
     )
 
 
-def independent_of_colour(e: Evidence) -> Claim:
-    """Equal colours, whichever, give equal contact times."""
+def _independent_of_colour(e: Evidence) -> Claim:
+    equal = [s for s, case in e.runs if s.x_m == REFLECTANCE_X_M and s.equal_colours and case == 1]
     worst = max(
         (max(times) - min(times)) * len(times) / sum(times)
         for case in (1, 2)
-        for times in zip(*(r.times for r in _coloured(e.runs, case)), strict=True)
+        for times in zip(*(e.runs[s, case].times for s in equal), strict=True)
     )
     return (
         "The contact times hardly depend on the colour where it is the same on both sides: each "
@@ -165,8 +158,7 @@ def independent_of_colour(e: Evidence) -> Claim:
     )
 
 
-def mixed_colours(e: Evidence) -> Claim:
-    """Brown and white are touched nearly together."""
+def _mixed_colours(e: Evidence) -> Claim:
     mixed = [s for s, case in e.runs if case == 2 and not s.equal_colours]
     apart = [e.runs[s, 2].apart for s in mixed]
     most = max(r.published for r in e.published if r.case == 2 and r.finger is None)
@@ -178,8 +170,7 @@ def mixed_colours(e: Evidence) -> Claim:
     )
 
 
-def bench_soft_impact(e: Evidence) -> Claim:
-    """Layer 2 takes the force out of the contact, on the bench."""
+def _bench_soft_impact(e: Evidence) -> Claim:
     settled = settled_force(e.system)
     soft = max(max(r.touch_forces) for r in e.runs.values() if r.case > 0)
     hard = min(min(r.touch_forces) for r in e.runs.values() if r.case == 0)
@@ -191,8 +182,7 @@ def bench_soft_impact(e: Evidence) -> Claim:
     )
 
 
-def bench_target_converges(e: Evidence) -> Claim:
-    """The target passes the centre of the object and comes back to it, on the bench."""
+def _bench_target_converges(e: Evidence) -> Claim:
     case_2 = [e.runs[s, 2] for s in off_centre(e.runs) if s.equal_colours]
     least = min(r.overshoot for r in case_2)
     rest = max(r.off_target for r in case_2)
@@ -204,32 +194,23 @@ def bench_target_converges(e: Evidence) -> Claim:
     )
 
 
-def _coloured(runs: Runs, case: int) -> list[Run]:
-    """The grasps where the table of colours has equal ones."""
-    return [
-        r
-        for (s, c), r in runs.items()
-        if c == case and s.x_m == REFLECTANCE_X_M and s.equal_colours
-    ]
-
-
 CLAIMS: Mapping[Source, Sequence[Callable[[Evidence], Claim]]] = {
     "simulation": (
-        times_are_near,
-        differences_are_near,
-        touching_together,
-        balancing,
-        soft_impact,
-        controlled_force,
-        target_converges,
+        _times_are_near,
+        _differences_are_near,
+        _touching_together,
+        _balancing,
+        _soft_impact,
+        _controlled_force,
+        _target_converges,
     ),
     "experiment": (
-        bench_times_are_near,
-        bench_touching_together,
-        bench_balancing,
-        independent_of_colour,
-        mixed_colours,
-        bench_soft_impact,
-        bench_target_converges,
+        _bench_times_are_near,
+        _bench_touching_together,
+        _bench_balancing,
+        _independent_of_colour,
+        _mixed_colours,
+        _bench_soft_impact,
+        _bench_target_converges,
     ),
 }

@@ -6,19 +6,18 @@ each published one, their deviations, the claims, pictures and a report. What di
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ...files import write_text
+from ...files import write_json, write_text
 from ...parallel import run_all
 from ...report.plot import new_figure, save
 from ...system.description import System
 from ..closing import close
-from ..pictures import draw_colour_times, draw_contact_forces, draw_contact_times, draw_targets
+from ..pictures import draw_contact_forces, draw_contact_times, draw_targets
 from ..presets import CASES, with_case
 from .claims import Evidence, check_claims
 from .grasps import Run, Runs, as_run
@@ -43,7 +42,6 @@ class Evaluation:
     shown: float
     deviations: Deviations
     at_sensor_contact: bool
-    draw_times: Callable[[Sequence[Mapping[str, Any]], Path], None]
     page: Callable[[Mapping[str, Any], System], str]
 
 
@@ -77,9 +75,10 @@ def evaluate(
         ],
     }
     _draw_signals(runs, how.shown, out)
-    how.draw_times(rows, out / "contact_times.png")
-    write_text(out / "evaluation.csv", table_csv(rows))
-    write_text(out / "evaluation.json", json.dumps(report, indent=2) + "\n")
+    _draw_times(rows, out / "contact_times.png")
+    named = [{**r, "finger": r["finger"] or "difference"} for r in rows]
+    write_text(out / "evaluation.csv", table_csv(named))
+    write_json(out / "evaluation.json", report)
     write_text(out / "report.md", how.page(report, system))
     return report
 
@@ -102,14 +101,11 @@ def _compared(row: Row, runs: Runs, at_sensor_contact: bool) -> dict[str, Any]:
     run = runs[row.setting, row.case]
     simulated = run.apart if row.finger is None else run.times[row.finger - 1]
     found = {
-        "table": row.table,
-        "condition": row.condition,
-        "case": row.case,
-        "finger": row.finger,
-        "published": row.published,
+        **row._asdict(),
         "simulated": simulated,
         "difference": simulated - row.published,
     }
+    del found["setting"]
     if at_sensor_contact:
         first, second = run.times_at_sensor_contact
         ours = abs(second - first) if row.finger is None else (first, second)[row.finger - 1]
@@ -118,15 +114,14 @@ def _compared(row: Row, runs: Runs, at_sensor_contact: bool) -> dict[str, Any]:
     return found
 
 
-def root_mean_square(values: Sequence[float]) -> float:
-    """Root mean square of at least one number."""
+def _rms(values: Sequence[float]) -> float:
     return math.sqrt(sum(v * v for v in values) / len(values))
 
 
 def simulation_rms(published: Sequence[Row], rows: Sequence[Mapping[str, Any]]) -> dict[str, float]:
     """Root mean square of the differences in s, contact times and time differences apart."""
     return {
-        f"{what}{suffix}": root_mean_square([r[key] for r in chosen])
+        f"{what}{suffix}": _rms([r[key] for r in chosen])
         for what, chosen in (
             ("contact_times", [r for r in rows if r["finger"]]),
             ("time_differences", [r for r in rows if not r["finger"]]),
@@ -143,15 +138,14 @@ def bench_rms(published: Sequence[Row], rows: Sequence[Mapping[str, Any]]) -> di
     """
     groups: dict[str, list[float]] = {}
     for row, ours in zip(published, rows, strict=True):
-        names = ["time_differences"]
+        name = "time_differences"
         if row.finger is not None:
             alike = "positions" if row.table == "position" else "equal_colours"
-            names = [alike if row.setting.equal_colours else "mixed_colours"]
-        if names[0] in ("positions", "equal_colours") and row.condition != "white/white":
-            names.append("contact_times")
-        for name in names:
-            groups.setdefault(name, []).append(ours["difference"])
-    return {name: root_mean_square(values) for name, values in sorted(groups.items())}
+            name = alike if row.setting.equal_colours else "mixed_colours"
+        groups.setdefault(name, []).append(ours["difference"])
+        if name in ("positions", "equal_colours") and row.condition != "white/white":
+            groups.setdefault("contact_times", []).append(ours["difference"])
+    return {name: _rms(values) for name, values in sorted(groups.items())}
 
 
 def _draw_signals(runs: Runs, until: float, out: Path) -> None:
@@ -159,42 +153,35 @@ def _draw_signals(runs: Runs, until: float, out: Path) -> None:
     shown = {r.case: r.result for r in runs.values() if r.result}
     pair = [(shown[1], "--", "Case 1"), (shown[2], "-", "Case 2")]
     where = f"object at {1e3 * REFLECTANCE_X_M:.0f} mm"
-    forces = new_figure(7.2, 6.4)
+    forces, targets = new_figure(7.2, 6.4), new_figure(7.2, 4.0)
     top, bottom = forces.subplots(2, 1, sharex=True)
+    axes = targets.subplots()
     draw_contact_forces(top, pair)
     draw_contact_forces(bottom, [(shown[0], "-", "Case 0")])
-    bottom.set_xlabel("time in s")
-    bottom.set_xlim(0.0, until)
-    top.set_title(f"Contact forces, {where}", fontsize=10)
-    save(forces, out / "contact_forces.png")
-    targets = new_figure(7.2, 4.0)
-    axes = targets.subplots()
     draw_targets(axes, pair)
-    axes.set_xlabel("time in s")
-    axes.set_xlim(0.0, until)
+    top.set_title(f"Contact forces, {where}", fontsize=10)
     axes.set_title(f"Target position, {where}", fontsize=10)
+    for lowest in (bottom, axes):
+        lowest.set_xlabel("time in s")
+        lowest.set_xlim(0.0, until)
+    save(forces, out / "contact_forces.png")
     save(targets, out / "target_position.png")
 
 
-def _draw_position_times(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
-    figure = new_figure(9.0, 4.0)
-    for axes, case in zip(figure.subplots(1, 2, sharey=True), (1, 2), strict=True):
-        draw_contact_times(axes, rows, case)
-    save(figure, path)
-
-
-def _draw_all_times(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
-    figure = new_figure(11.0, 8.0)
-    axes = figure.subplots(2, 2, sharey="row")
-    for column, case in enumerate((1, 2)):
-        draw_contact_times(axes[0, column], [r for r in rows if r["table"] == "position"], case)
-        draw_colour_times(axes[1, column], [r for r in rows if r["table"] == "reflectance"], case)
+def _draw_times(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
+    """The contact times of Cases 1 and 2 side by side, a row of axes for each table."""
+    tables = list(dict.fromkeys(r["table"] for r in rows))
+    figure = new_figure(9.0, 4.0) if len(tables) == 1 else new_figure(11.0, 8.0)
+    axes = figure.subplots(len(tables), 2, sharey="row", squeeze=False)
+    for table, pair in zip(tables, axes, strict=True):
+        for case, one in enumerate(pair, start=1):
+            draw_contact_times(one, [r for r in rows if r["table"] == table], case)
     save(figure, path)
 
 
 SOURCES: Mapping[Source, Evaluation] = {
     # The slowest contact is at 2.7 s, and the layers settle with a time constant of 0.2 s.
-    "simulation": Evaluation(4.5, None, 3.0, simulation_rms, True, _draw_position_times, markdown),
+    "simulation": Evaluation(4.5, None, 3.0, simulation_rms, True, markdown),
     # Twice the slowest published contact; a grasp goes on for 1.5 s once both fingers touch.
-    "experiment": Evaluation(10.0, 1.5, 5.0, bench_rms, False, _draw_all_times, bench_markdown),
+    "experiment": Evaluation(10.0, 1.5, 5.0, bench_rms, False, bench_markdown),
 }

@@ -8,13 +8,19 @@ from typing import Any
 from ...system.description import System
 from ...system.parts import NANOSECONDS
 
+FIGURES = """## Figures
+
+![Contact forces](contact_forces.png)
+
+![Target position](target_position.png)"""
+
 
 def table_csv(rows: Sequence[Mapping[str, Any]]) -> str:
-    """The rows as CSV; `finger` is 1, 2 or `difference`."""
+    """The rows, of one form, as CSV."""
     text = io.StringIO()
     writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
     writer.writeheader()
-    writer.writerows({**r, "finger": r["finger"] or "difference"} for r in rows)
+    writer.writerows(rows)
     return text.getvalue()
 
 
@@ -44,17 +50,9 @@ The object is named by its position in m.
 
 ![Contact times over the object position](contact_times.png)
 
-## Figures
-
-![Contact forces](contact_forces.png)
-
-![Target position](target_position.png)
-
-## Claims
+{FIGURES}
 
 {_claim_list(report["claims"])}
-
-## Every grasp
 
 {_run_table(report["runs"])}
 """
@@ -84,8 +82,6 @@ on both sides is the row of 0.03 m once more and counts once there.
 
 ![Contact times over object position and by colour](contact_times.png)
 
-## Claims
-
 {_claim_list(report["claims"])}
 
 ## By the position of the object, in m
@@ -96,13 +92,7 @@ on both sides is the row of 0.03 m once more and counts once there.
 
 {_table(colour)}
 
-## Figures
-
-![Contact forces](contact_forces.png)
-
-![Target position](target_position.png)
-
-## Every grasp
+{FIGURES}
 
 {_run_table(report["runs"])}
 """
@@ -129,17 +119,18 @@ def _table(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _condition(row: Mapping[str, Any]) -> str:
-    """The position in m, or what else the setting is called by."""
     condition = row["condition"]
     return f"{condition:.2f}" if isinstance(condition, float) else str(condition)
 
 
 def _claim_list(claims: Sequence[Mapping[str, Any]]) -> str:
-    return "\n".join(f"- **{'holds' if c['holds'] else 'FAILS'}**: {c['text']}" for c in claims)
+    lines = (f"- **{'holds' if c['holds'] else 'FAILS'}**: {c['text']}" for c in claims)
+    return "\n".join(["## Claims\n", *lines])
 
 
 def _run_table(runs: Sequence[Mapping[str, Any]]) -> str:
     lines = [
+        "## Every grasp\n",
         "| object | case | contact times, s | approach speed, mm/s | peak force, N "
         "| settled force, N | target at the end, m |",
         "|---|---|---|---|---|---|---|",

@@ -11,6 +11,8 @@ from ..metrics import FINGERS
 Source = Literal["simulation", "experiment"]
 """Where published figures are from."""
 
+Table = Literal["position", "reflectance"]
+
 REFLECTANCE_X_M = 0.03
 """m; where the object stands in the table of colours, and in the figures."""
 
@@ -41,7 +43,7 @@ class Row(NamedTuple):
     condition is the position of the object in m, or the colours like "brown/white".
     """
 
-    table: Literal["position", "reflectance"]
+    table: Table
     condition: float | str
     setting: Setting
     case: int
@@ -54,28 +56,19 @@ def published_rows(source: Source) -> list[Row]:
 
     A row per finger, and one for the difference.
     """
-    return [*_positions(source), *(_colours() if source == "experiment" else ())]
-
-
-def _positions(source: Source) -> Iterator[Row]:
+    rows: list[Row] = []
     for line in _lines("table_position.csv"):
         if line["source"] == source:
             x_m = float(line["x_m"])
-            yield from _rows("position", x_m, Setting(x_m), line)
-
-
-def _colours() -> Iterator[Row]:
-    for line in _lines("table_reflectance.csv"):
+            rows += _rows("position", x_m, Setting(x_m), line)
+    for line in _lines("table_reflectance.csv") if source == "experiment" else ():
         setting = Setting(REFLECTANCE_X_M, float(line["alpha_1"]), float(line["alpha_2"]))
-        colours = f"{line['color_1']}/{line['color_2']}"
-        yield from _rows("reflectance", colours, setting, line)
+        rows += _rows("reflectance", f"{line['color_1']}/{line['color_2']}", setting, line)
+    return rows
 
 
 def _rows(
-    table: Literal["position", "reflectance"],
-    condition: float | str,
-    setting: Setting,
-    line: dict[str, str],
+    table: Table, condition: float | str, setting: Setting, line: dict[str, str]
 ) -> Iterator[Row]:
     for case in (1, 2):
         for finger in FINGERS:
