@@ -5,15 +5,10 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 
 from ..system.faults import FAULTS, INITIAL, Draws
-from ..system.parts import Fault, Port
+from ..system.parts import Fault, Port, first_step
 
 FaultFunction = Callable[[float, int], float]
 """Changes a value passed at a step number."""
-
-
-def first_step(time_ns: int, step_ns: int) -> int:
-    """Return the number of the first communication point at or after a time."""
-    return -(-time_ns // step_ns)
 
 
 class Window:
