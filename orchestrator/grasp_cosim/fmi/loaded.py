@@ -165,12 +165,7 @@ class LoadedInstance(ABC):
     def get(self, variables: Sequence[Variable]) -> list[Value]:
         """The values of the variables now, one by one. For use outside the loop."""
         with self._failures():
-            return [
-                _OF_KIND[v.kind](
-                    getattr(self._slave, f"get{self._suffix(v.type)}")([v.reference])[0]
-                )
-                for v in variables
-            ]
+            return [self._get(variable) for variable in variables]
 
     def set(self, variables: Sequence[Variable], values: Sequence[Value]) -> None:
         """Set inputs or tunable parameters. For use outside the loop."""
@@ -200,6 +195,10 @@ class LoadedInstance(ABC):
     def _suffix(self, fmi_type: str) -> str:
         """The end of the names of the functions that set and get an FMI type."""
         return self.ENUMERATION if fmi_type == "Enumeration" else fmi_type
+
+    def _get(self, variable: Variable) -> Value:
+        getter = getattr(self._slave, f"get{self._suffix(variable.type)}")
+        return _OF_KIND[variable.kind](getter([variable.reference])[0])
 
     def _set(self, variable: Variable, value: Value) -> None:
         setter = getattr(self._slave, f"set{self._suffix(variable.type)}")

@@ -193,7 +193,7 @@ class Planner:
                 continue
             first = self.slots[Port(name, taken[0].name)]
             data: npt.NDArray[Any] = self.values[first : first + len(taken)]
-            element = np.dtype(dtype(instance.interface.version, fmi_type))
+            element = dtype(instance.interface.version, fmi_type)
             casts = (len(self.made.casts), len(self.made.casts) + len(taken))
             if element != np.float64:
                 data = np.zeros(len(taken), element)
