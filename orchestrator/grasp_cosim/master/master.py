@@ -1,10 +1,6 @@
 """The fixed-step master: initialise, then run the loop in chunks and hand its rows on.
 
-In the sequential scheme (Gauss-Seidel) a component steps with what the components before it have
-just put out, which adds no delay beyond sample and hold. In the Jacobi scheme all components step
-with the values of the last communication point. A component with a longer step of its own steps at
-the end of that step: what it puts out is never from the future. Time is an integer number of
-nanoseconds.
+The schemes, components with a longer step and time are in the README of the orchestrator.
 """
 
 import time
@@ -21,7 +17,7 @@ from ..system.description import System
 from ..system.parts import NANOSECONDS, Port
 from . import loop
 from .engine import Engine, make_loop
-from .initialisation import Propagation, order_ports
+from .initialisation import Propagation
 from .plan import Planner, slots_of
 from .rejection import finish_step
 from .scenario import Scenario
@@ -67,8 +63,7 @@ class Master:
             instances,
             self.slots,
             self.values,
-            self.scenario.fault_functions,
-            self.scenario.before_step if system.events or system.faults else None,
+            self.scenario,
             pacer,
         ).plan()
         self._pacer = pacer
@@ -82,8 +77,7 @@ class Master:
         stop = self.system.stop_ns / NANOSECONDS
         for component, instance in zip(self.system.components, self.instances, strict=True):
             instance.enter_initialization(component.values, stop)
-        order = order_ports(self.system, self.instances)
-        propagation = Propagation(self.system, self.instances, order, self.scenario.fault_functions)
+        propagation = Propagation(self.system, self.instances, self.scenario.fault_functions)
         try:
             self.log += propagation.run()
         except SimulationError as error:
@@ -186,7 +180,8 @@ class Master:
             raise SimulationError(_too_long(*self._longest(step, operation)))
         if status == loop.RAISED:
             raise self.plan.raised.pop()
-        instance = self.instances[self.plan.owners[call]]
+        instance = self.plan.owners[call]
+        assert instance is not None  # noqa: S101 - the master's own calls return no bad status
         begin = (step + 1 - period) * self.system.step_ns / NANOSECONDS
         if kind != loop.STEP or status not in (DISCARD, EARLY):
             raise instance.failure(status, begin)
