@@ -1,9 +1,7 @@
 """The two engines: the loop as plain Python, and the same loop compiled.
 
-Which one "auto" takes is known before the run. Compiled code saves time with each call of a step
-that has a native form, and costs time once in a process, to import numba and to load the loop. So a
-process runs the loop in plain Python until what it could have saved, with the run to come, exceeds
-that. A run in real time is always compiled: it loads before its schedule begins.
+Which one "auto" takes is known before the run: a process runs the loop in plain Python until what
+compiled code could have saved, with the run to come, exceeds its time to load.
 """
 
 from collections.abc import Callable, Sequence
@@ -86,11 +84,10 @@ def _interpreted(plan: Plan) -> Loop:
 
 def _compiled(plan: Plan) -> Loop:
     compiled = compiled_loop()
-    program = loop.Program(*_arrays(plan.operations, [np.int64] * 5))
-    connections = loop.Connections(
-        *_arrays(plan.connections, [np.int64, np.int64, np.float64, np.float64])
-    )
-    casts = loop.Casts(*_arrays(plan.casts, [np.int64] * 3))
+    whole, real = np.int64, np.float64
+    program = loop.Program(*_arrays(plan.operations, [whole] * 5))
+    connections = loop.Connections(*_arrays(plan.connections, [whole, whole, real, real]))
+    casts = loop.Casts(*_arrays(plan.casts, [whole] * 3))
     calls = Calls(plan.calls)
     buffers = buffer_table(plan.buffers)
 

@@ -21,9 +21,6 @@ from ..system.parts import NANOSECONDS, Connection, Port
 from .loop import CALL, COPY, LOAD, LOAD_LONG, RAISED, SCALE, STEP, STORE
 from .scenario import Scenario
 
-NUMBERS = ("Real", "Integer", "Boolean")
-"""The kinds of variables that have a slot in the vector."""
-
 Operation = tuple[int, int, int, int, int]
 """Kind, first and last of its range, period and phase."""
 
@@ -223,6 +220,6 @@ def _by_type(instance: Instance, causality: str) -> list[tuple[str, list[Variabl
     """The scalar numbers of a causality, by FMI type, those of float64 first."""
     found: dict[str, list[Variable]] = {}
     for v in instance.interface.of(causality):
-        if v.kind in NUMBERS and not v.shape:
+        if v.supported and v.kind != "String":
             found.setdefault(v.type, []).append(v)
     return sorted(found.items(), key=lambda item: item[0] not in ("Real", "Float64"))
