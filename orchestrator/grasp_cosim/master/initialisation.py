@@ -176,7 +176,6 @@ class Propagation:
             self.values[port] = value
 
     def _arriving(self, connection: Connection) -> Value:
-        """The value that a connection hands over."""
         value = self.values[connection.source]
         if self._kind(connection.target) == "String":
             return value

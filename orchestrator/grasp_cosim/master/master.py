@@ -58,14 +58,8 @@ class Master:
             pacer.bind(self.values[len(self.slots) :], self._hand_on_until)
         self.scenario = Scenario(system, instances, self.slots, self.values)
         self._receive = receive
-        self.plan = Planner(
-            system,
-            instances,
-            self.slots,
-            self.values,
-            self.scenario,
-            pacer,
-        ).plan()
+        planner = Planner(system, instances, self.slots, self.values, self.scenario, pacer)
+        self.plan = planner.plan()
         self._pacer = pacer
         self._loop = make_loop(self.plan, engine, None if pacer else self.total_steps)
         self._rows = np.empty((CHUNK, len(self.values)))
@@ -134,16 +128,15 @@ class Master:
             self._pacer.record(steps, times, lambda: self._receive(steps, rows))
 
     def _waiting(self) -> npt.NDArray[np.float64]:
-        """The rows that were not handed on yet."""
         return self._rows[self._handed_on - self._base : self.steps_done - self._base]
 
     def _enough(self) -> bool:
         """Return True if the rows are many, have waited long or include the last one."""
-        if self.steps_done == self.total_steps:
-            return True
-        if self._pacer is None and len(self._waiting()) >= ENOUGH:  # a pacer has its own occasions
-            return True
-        return time.monotonic() - self._handed_on_at > LONG
+        return (
+            self.steps_done == self.total_steps
+            or (self._pacer is None and len(self._waiting()) >= ENOUGH)  # a pacer has its occasions
+            or time.monotonic() - self._handed_on_at > LONG
+        )
 
     def _chunk(self, stop: int) -> None:
         """Run the loop until stop; hand the rows on where there is no room left, or it fails."""
@@ -158,7 +151,6 @@ class Master:
             self.hand_on()
 
     def _run(self, stop: int) -> None:
-        """Run the loop until stop, and make good for steps that were rejected."""
         step, operation = self.steps_done, 0
         try:
             while step < stop:

@@ -300,7 +300,6 @@ def _check_count(name: str, count: object) -> None:
 
 
 def _drive(session: Session, progress: bool) -> None:
-    """Step to the end, or until Ctrl-C."""
     total = session.system.stop_ns / NANOSECONDS
     with (
         interrupts(session.halt),

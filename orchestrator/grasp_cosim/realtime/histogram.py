@@ -119,5 +119,4 @@ class Histograms:
 
 
 def _longest(number: int) -> int:
-    """The longest time in the bin of that number, in ns."""
     return math.ceil(lower_edge(number + 1)) - 1

@@ -16,8 +16,6 @@ from .structure import Structure
 
 
 class _End(NamedTuple):
-    """An end of a connection."""
-
     port: Port
     interface: Interface
     variable: Variable

@@ -119,7 +119,6 @@ def _condition(place: str, text: Any) -> Condition | None:
 
 
 def _number(text: str) -> float | None:
-    """The value that a condition compares with."""
     if text in ("true", "false"):
         return text == "true"
     try:
