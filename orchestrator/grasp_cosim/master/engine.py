@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from ..checks import choice
 from . import loop
-from .compiled import Calls, buffer_table, compiled_loop
+from .compiled import buffer_table, call_table, compiled_loop
 from .plan import Plan
 
 Engine = Literal["auto", "python", "compiled"]
@@ -88,12 +88,12 @@ def _compiled(plan: Plan) -> Loop:
     program = loop.Program(*_arrays(plan.operations, [whole] * 5))
     connections = loop.Connections(*_arrays(plan.connections, [whole, whole, real, real]))
     casts = loop.Casts(*_arrays(plan.casts, [whole] * 3))
-    calls = Calls(plan.calls)
+    calls = call_table(plan.calls)
     buffers = buffer_table(plan.buffers)
 
     def run(rows: Any, operation: int, start: int, stop: int, step_ns: int) -> tuple[int, int, int]:
         return compiled(
-            program, connections, casts, calls.table, buffers, plan.values, plan.clock,
+            program, connections, casts, calls[0], buffers, plan.values, plan.clock,
             rows.reshape(-1), operation, start, stop, step_ns,
         )  # fmt: skip
 

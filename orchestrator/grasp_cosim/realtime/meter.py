@@ -159,7 +159,8 @@ class Meter:
     def _judge(self, steps: Steps, rows: Table, after: Table) -> None:
         """Take steps, given what came after each of them."""
         recorded = self._recorded(steps)
-        parts = self._parts(rows)
+        segments = np.diff(rows[:, BEGIN:], axis=1)
+        parts = np.add.reduceat(segments[:, self._order], self._firsts, axis=1)
         start, whole = rows[:, BEGIN] - rows[:, DUE], rows[:, -1] - rows[:, BEGIN]
         between = after[:, ARRIVED] - rows[:, -1] - recorded
         times = np.column_stack((whole, start, parts, between))
@@ -185,11 +186,6 @@ class Meter:
             np.add.at(spent, after - first, took)
             self._recording.add(took[:, np.newaxis], after)
         return spent
-
-    def _parts(self, rows: Table) -> Table:
-        """The times of the components and of the exchange, a row per step."""
-        segments = np.diff(rows[:, BEGIN:], axis=1)
-        return np.add.reduceat(segments[:, self._order], self._firsts, axis=1)
 
     def _happened(self, steps: Steps) -> npt.NDArray[np.bool_] | None:
         """Return the parts that ran, a row per step; None if all did, as slow components do not."""
