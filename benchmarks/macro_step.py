@@ -50,7 +50,7 @@ def parts() -> None:
         steps = {first for kind, first, *_ in plan.operations if kind == STEP}
         calls = []
         for i, (call, owner) in enumerate(zip(plan.calls, plan.owners, strict=True)):
-            name = "exchange" if owner is None else system.components[owner].name
+            name = "exchange" if owner is None else owner.name
             calls.append(
                 Call(_timed(call.python, f"{name} {'step' if i in steps else 'values'}", spent))
             )

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from fmi.instances import Bound, interrupted_after, real, running
 from grasp_cosim import InputError, SimulationError, System, simulate
-from grasp_cosim.fmi import child, process
+from grasp_cosim.fmi import process
 from grasp_cosim.fmi.instance import OK
 from support.native_fmus import TYPES, build, needs_gcc
 
@@ -105,7 +105,7 @@ def test_a_crash_ends_the_run_with_the_recording_kept(
 
 @versions
 def test_a_hang_is_bounded(tmp_path: Path, version: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(child, "TIMEOUT", 0.5)
+    monkeypatch.setattr(process, "TIMEOUT", 0.5)
     with running(tmp_path, version, "process", {"hang_at": 0.25}) as part:
         bound = Bound(part, 0.2)
         assert bound.step() == OK
@@ -216,7 +216,7 @@ from grasp_cosim.system.parts import Component
 part = load(Component("part", Path({str(fmu)!r}), {{}}, isolation="process"))
 part.enter_initialization({{"hang_at": 0.1}}, 1.0)
 part.exit_initialization()
-print(part._child._process.pid, flush=True)
+print(part._process.pid, flush=True)
 part.stepper(np.zeros(2), 0.2).python()
 """
     with subprocess.Popen(

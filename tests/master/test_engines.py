@@ -192,7 +192,7 @@ def native(count: int) -> list[Call]:
 
 def plan(calls: list[Call], period: int = 1) -> Plan:
     operations = [(loop.CALL, i, i + 1, period, 0) for i in range(len(calls))]
-    return Plan(np.zeros(1), np.zeros(2), {}, operations, calls=calls, owners=[0] * len(calls))
+    return Plan(np.zeros(1), np.zeros(2), operations, calls=calls)
 
 
 @pytest.fixture

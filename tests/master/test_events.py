@@ -95,7 +95,7 @@ class Rig:
             system,
             cast(list[Instance], list(self.mocks.values())),
             {Port("a", "y"): 0, Port("a", "on"): 1},
-            memoryview(self.values),  # type: ignore[arg-type]  # numpy's stubs for 3.11
+            self.values,
         )
 
     def run(self, steps: int, y: Sequence[float] = ()) -> list[str]:

@@ -35,8 +35,7 @@ def numba(engine: Engine) -> None:
 
 def plan(values: Any, operations: Any, **parts: Any) -> Plan:
     lists = {name: list(part) for name, part in parts.items()}
-    owners = [0] * len(lists.get("calls", ()))
-    return Plan(np.array(values, float), np.zeros(2), {}, list(operations), **lists, owners=owners)
+    return Plan(np.array(values, float), np.zeros(2), list(operations), **lists)
 
 
 def run(made: Plan, engine: Engine, steps: int, operation: int = 0) -> tuple[Any, Any]:

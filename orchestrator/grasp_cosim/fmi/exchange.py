@@ -46,7 +46,7 @@ class Exchange:
 
         Both processes add the same variables in the same order and get the same room.
         """
-        element = np.dtype(dtype(interface.version, variables[0].type))
+        element = dtype(interface.version, variables[0].type)
         pending = self._view(np.bool_, 1, self._used)
         data = self._view(element, len(variables), self._used + 8)
         self._used += 8 + 8 * len(variables)

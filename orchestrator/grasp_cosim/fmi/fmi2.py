@@ -23,17 +23,14 @@ from fmpy.logging import addLoggerProxy
 
 from ..interface.interface import Value
 from .instance import STEP_2, TRANSFER_2, Call, Native
-from .loaded import KEPT, LOGGER, LoadedInstance
+from .loaded import KEPT, LoadedInstance, keep_message
 
 _messages: defaultdict[str, deque[str]] = defaultdict(lambda: deque(maxlen=KEPT))
 """Messages that FMUs logged, by instance. FMPy's logger proxy is one per process, so is this."""
 
 
 def _log(_: Any, instance: bytes | None, status: int, category: Any, message: bytes | None) -> None:
-    if status > 0:
-        text = (message or b"").decode(errors="replace")
-        LOGGER.info(" ".join(text.split()))
-        _messages[(instance or b"").decode(errors="replace")].append(text)
+    keep_message(_messages[(instance or b"").decode(errors="replace")], status, message)
 
 
 _callbacks = fmi2CallbackFunctions()
@@ -48,6 +45,7 @@ class FmuInstance(LoadedInstance):
 
     PREFIX = "fmi2"
     SHAPE = TRANSFER_2
+    ENUMERATION = "Integer"
 
     def _instantiate(self, folder: Path) -> FMU2Slave:
         slave = FMU2Slave(
@@ -68,14 +66,9 @@ class FmuInstance(LoadedInstance):
         self._slave.setupExperiment(startTime=start, stopTime=stop)
         self._slave.enterInitializationMode()
 
-    def _suffix(self, fmi_type: str) -> str:
-        return "Integer" if fmi_type == "Enumeration" else fmi_type
-
     def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
         """The call that advances by step seconds from the time in clock[0]."""
-        self._clock = clock if self._clock is None else self._clock
-        box = ctypes.c_double.from_buffer(clock)  # type: ignore[arg-type]  # numpy's 3.11 stubs
-        bound, address = self._function("DoStep", box, ctypes.c_double(step), ctypes.c_int(1))
+        bound, address = self._stepping(clock, step, ctypes.c_int(1))
         return Call(bound, Native(STEP_2, address, self._slave.component, step=step))
 
     def _wants_the_end(self) -> bool:

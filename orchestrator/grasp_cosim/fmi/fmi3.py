@@ -17,7 +17,7 @@ from fmpy.fmi3 import FMU3Slave
 
 from ..interface.interface import Interface, Value
 from .instance import EARLY, STEP_3, TRANSFER_3, WARNING, Call, Native
-from .loaded import KEPT, LOGGER, LoadedInstance
+from .loaded import KEPT, LoadedInstance, keep_message
 
 TERMINATE, SHORT = 1, 2
 """Places in the flags of a step, after that of an event."""
@@ -36,6 +36,7 @@ class Fmi3Instance(LoadedInstance):
 
     PREFIX = "fmi3"
     SHAPE = TRANSFER_3
+    ENUMERATION = "Int64"
 
     def __init__(self, name: str, interface: Interface) -> None:
         """Extract and instantiate; InputError where the FMU does not load."""
@@ -60,10 +61,7 @@ class Fmi3Instance(LoadedInstance):
         return slave
 
     def _log(self, _: Any, status: int, category: Any, message: bytes | None) -> None:
-        if status > 0:
-            text = (message or b"").decode(errors="replace")
-            LOGGER.info(" ".join(text.split()))
-            self._said.append(text)
+        keep_message(self._said, status, message)
 
     def _read_log(self) -> list[str]:
         said = list(self._said)
@@ -72,32 +70,21 @@ class Fmi3Instance(LoadedInstance):
 
     def _start(self, values: Mapping[str, Value], stop: float | None, start: float) -> None:
         variables = {self.interface.by_name[name]: value for name, value in values.items()}
-        structural = {v: x for v, x in variables.items() if v.causality == "structuralParameter"}
+        structural = [v for v in variables if v.causality == "structuralParameter"]
         if structural:
             self._slave.enterConfigurationMode()
-            for variable, value in structural.items():
-                self._set(variable, value)
+            for variable in structural:
+                self._set(variable, variables.pop(variable))
             self._slave.exitConfigurationMode()
         for variable, value in variables.items():
-            if variable not in structural:
-                self._set(variable, value)
+            self._set(variable, value)
         self._slave.enterInitializationMode(startTime=start, stopTime=stop)
-
-    def _suffix(self, fmi_type: str) -> str:
-        return "Int64" if fmi_type == "Enumeration" else fmi_type
 
     def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
         """The call that advances by step seconds from the time in clock[0]; EARLY is a status."""
-        self._clock = clock if self._clock is None else self._clock
         flags, last = self._flags.ctypes.data, self._last.ctypes.data
-        bound, address = self._function(
-            "DoStep",
-            ctypes.c_double.from_buffer(clock),  # type: ignore[arg-type]  # numpy's stubs for 3.11
-            ctypes.c_double(step),
-            ctypes.c_bool(True),
-            *(ctypes.c_void_p(flags + place) for place in range(3)),
-            ctypes.c_void_p(last),
-        )
+        places = (ctypes.c_void_p(place) for place in (flags, flags + 1, flags + 2, last))
+        bound, address = self._stepping(clock, step, ctypes.c_bool(True), *places)
         said = memoryview(self._flags)  # type: ignore[arg-type]
 
         def advance() -> int:

@@ -86,7 +86,7 @@ class Instance(Protocol):
     def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:
         """The call that passes data to inputs ("set") or fetches outputs into it ("get").
 
-        The variables are all of one FMI type; data has the type of DTYPES and their order.
+        The variables are all of one FMI type; data has that of dtype() and their order.
         """
 
     def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
@@ -102,28 +102,13 @@ class Instance(Protocol):
         """End and free the instance as far as FMI permits after what it returned."""
 
 
-DTYPES: Mapping[str, npt.DTypeLike] = {
-    "Real": np.float64,
-    "Float64": np.float64,
-    "Float32": np.float32,
-    "Integer": np.int32,
-    "Boolean": np.int32,  # of FMI 2.0; that of 3.0 has one byte, see dtype()
-    "Int8": np.int8,
-    "UInt8": np.uint8,
-    "Int16": np.int16,
-    "UInt16": np.uint16,
-    "Int32": np.int32,
-    "UInt32": np.uint32,
-    "Int64": np.int64,
-    "UInt64": np.uint64,
-}
-"""FMI types to element types. An Enumeration is an Integer in FMI 2.0, an Int64 in 3.0."""
+def dtype(version: str, fmi_type: str) -> np.dtype[Any]:
+    """The element type of an FMI type in a version; KeyError or TypeError for one not of numbers.
 
-
-def dtype(version: str, fmi_type: str) -> npt.DTypeLike:
-    """The element type of an FMI type in a version; KeyError for String, Binary and Clock."""
-    if fmi_type == "Boolean" and version.startswith("3"):
-        return np.bool_
-    if fmi_type == "Enumeration":
-        return np.int64 if version.startswith("3") else np.int32
-    return DTYPES[fmi_type]
+    An Enumeration is an Integer in FMI 2.0, an Int64 in 3.0.
+    """
+    if version.startswith("3"):
+        own = {"Boolean": "bool", "Enumeration": "int64"}
+        return np.dtype(own.get(fmi_type, fmi_type.lower()))
+    whole = dict.fromkeys(("Integer", "Boolean", "Enumeration"), "int32")
+    return np.dtype({"Real": "float64", **whole}[fmi_type])

@@ -65,6 +65,9 @@ class LoadedInstance(ABC):
     SHAPE: ClassVar[int]
     """The shape of those that set and get: TRANSFER_2, or TRANSFER_3 with the count at the end."""
 
+    ENUMERATION: ClassVar[str]
+    """The type as which an Enumeration is set and got."""
+
     def __init__(self, name: str, interface: Interface) -> None:
         """Extract and instantiate; InputError where the FMU does not load."""
         self.name = name
@@ -94,10 +97,6 @@ class LoadedInstance(ABC):
     @abstractmethod
     def _start(self, values: Mapping[str, Value], stop: float | None, start: float) -> None:
         """Set the values and enter initialisation mode."""
-
-    @abstractmethod
-    def _suffix(self, fmi_type: str) -> str:
-        """The end of the names of the functions that set and get an FMI type."""
 
     @abstractmethod
     def _wants_the_end(self) -> bool:
@@ -193,6 +192,10 @@ class LoadedInstance(ABC):
         instance, first = self._slave.component, ctypes.addressof(references)
         return Call(bound, Native(self.SHAPE, address, instance, first, count, place))
 
+    def _suffix(self, fmi_type: str) -> str:
+        """The end of the names of the functions that set and get an FMI type."""
+        return self.ENUMERATION if fmi_type == "Enumeration" else fmi_type
+
     def _get(self, variable: Variable) -> Value:
         getter = getattr(self._slave, f"get{self._suffix(variable.type)}")
         return _OF_KIND[variable.kind](getter([variable.reference])[0])
@@ -234,6 +237,14 @@ class LoadedInstance(ABC):
         bound = partial(function, ctypes.c_void_p(self._slave.component), *arguments)
         return bound, ctypes.cast(function, ctypes.c_void_p).value or 0
 
+    def _stepping(
+        self, clock: npt.NDArray[np.float64], step: float, *arguments: Any
+    ) -> tuple[Callable[[], int], int]:
+        """The function DoStep from the time in clock[0], as of _function()."""
+        self._clock = clock if self._clock is None else self._clock
+        time = ctypes.c_double.from_buffer(clock)  # type: ignore[arg-type]  # numpy's 3.11 stubs
+        return self._function("DoStep", time, ctypes.c_double(step), *arguments)
+
     @contextmanager
     def _refusals(self) -> Iterator[None]:
         """Turns a failed call of the life cycle into an InputError."""
@@ -267,6 +278,14 @@ class LoadedInstance(ABC):
         said = [own.sub("", text, count=1) for text in (*self._unread, *self._read_log())]
         self._unread.clear()
         return [text for text in said if not _PYTHONFMU_PREFIX.match(text)] or said
+
+
+def keep_message(kept: deque[str], status: int, message: bytes | None) -> None:
+    """Keep a message that an FMU logged, unless its status is OK, and log it here."""
+    if status > OK:
+        text = (message or b"").decode(errors="replace")
+        LOGGER.info(" ".join(text.split()))
+        kept.append(text)
 
 
 def _used_here(member: str) -> bool:

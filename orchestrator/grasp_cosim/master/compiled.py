@@ -55,21 +55,21 @@ class BufferTable(NamedTuple):
     address: npt.NDArray[np.int64]
 
 
-class Calls:
-    """The table of some calls; those without a native form are called back in Python."""
+def call_table(calls: Sequence[Call]) -> tuple[Native, list[Any]]:
+    """Return the calls as columns, each field of the Native an array; and what must outlive them.
 
-    def __init__(self, calls: Sequence[Call]) -> None:
-        self._callbacks: list[Any] = []
-        natives = [call.native or self._python(call.python) for call in calls]
-        self.table = Native._make(
-            np.array([call[i] for call in natives], np.float64 if name == "step" else np.int64)
-            for i, name in enumerate(Native._fields)
-        )
-        """The calls as columns: each field of a Native is an array."""
-
-    def _python(self, function: Callable[[], int]) -> Native:
-        self._callbacks.append(ctypes.PYFUNCTYPE(ctypes.c_int)(function))
-        return Native(PYTHON, ctypes.cast(self._callbacks[-1], ctypes.c_void_p).value or 0, 0)
+    Those without a native form are called back in Python.
+    """
+    callbacks = [ctypes.PYFUNCTYPE(ctypes.c_int)(call.python) for call in calls]
+    natives = [
+        call.native or Native(PYTHON, ctypes.cast(callback, ctypes.c_void_p).value or 0, 0)
+        for call, callback in zip(calls, callbacks, strict=True)
+    ]
+    table = Native._make(
+        np.array([call[i] for call in natives], np.float64 if name == "step" else np.int64)
+        for i, name in enumerate(Native._fields)
+    )
+    return table, callbacks
 
 
 def buffer_table(buffers: Sequence[npt.NDArray[Any]]) -> BufferTable:

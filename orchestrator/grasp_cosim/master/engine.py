@@ -1,9 +1,7 @@
 """The two engines: the loop as plain Python, and the same loop compiled.
 
-Which one "auto" takes is known before the run. Compiled code saves time with each call of a step
-that has a native form, and costs time once in a process, to import numba and to load the loop. So a
-process runs the loop in plain Python until what it could have saved, with the run to come, exceeds
-that. A run in real time is always compiled: it loads before its schedule begins.
+Which one "auto" takes is known before the run: a process runs the loop in plain Python until what
+compiled code could have saved, with the run to come, exceeds its time to load.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,7 +13,7 @@ import numpy.typing as npt
 
 from ..checks import choice
 from . import loop
-from .compiled import Calls, buffer_table, compiled_loop
+from .compiled import buffer_table, call_table, compiled_loop
 from .plan import Plan
 
 Engine = Literal["auto", "python", "compiled"]
@@ -86,17 +84,16 @@ def _interpreted(plan: Plan) -> Loop:
 
 def _compiled(plan: Plan) -> Loop:
     compiled = compiled_loop()
-    program = loop.Program(*_arrays(plan.operations, [np.int64] * 5))
-    connections = loop.Connections(
-        *_arrays(plan.connections, [np.int64, np.int64, np.float64, np.float64])
-    )
-    casts = loop.Casts(*_arrays(plan.casts, [np.int64] * 3))
-    calls = Calls(plan.calls)
+    whole, real = np.int64, np.float64
+    program = loop.Program(*_arrays(plan.operations, [whole] * 5))
+    connections = loop.Connections(*_arrays(plan.connections, [whole, whole, real, real]))
+    casts = loop.Casts(*_arrays(plan.casts, [whole] * 3))
+    calls = call_table(plan.calls)
     buffers = buffer_table(plan.buffers)
 
     def run(rows: Any, operation: int, start: int, stop: int, step_ns: int) -> tuple[int, int, int]:
         return compiled(
-            program, connections, casts, calls.table, buffers, plan.values, plan.clock,
+            program, connections, casts, calls[0], buffers, plan.values, plan.clock,
             rows.reshape(-1), operation, start, stop, step_ns,
         )  # fmt: skip
 

@@ -3,17 +3,13 @@
 import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 from ..system.faults import FAULTS, INITIAL, Draws
-from ..system.parts import Fault, Port
+from ..system.parts import Fault, Port, first_step
 
 FaultFunction = Callable[[float, int], float]
 """Changes a value passed at a step number."""
-
-
-def first_step(time_ns: int, step_ns: int) -> int:
-    """Return the number of the first communication point at or after a time."""
-    return -(-time_ns // step_ns)
 
 
 class Window:
@@ -71,7 +67,7 @@ def fault_functions(windows: Sequence[Window], step_ns: int) -> Mapping[Port, Fa
         key = (fault.target, fault.kind)
         chains.setdefault(fault.target, []).append(_function(window, kinds[key], step_ns))
         kinds[key] += 1
-    return {target: _in_turn(chain) for target, chain in chains.items()}
+    return {target: partial(_in_turn, chain) for target, chain in chains.items()}
 
 
 def _function(window: Window, count: int, step_ns: int) -> FaultFunction:
@@ -81,13 +77,7 @@ def _function(window: Window, count: int, step_ns: int) -> FaultFunction:
     return lambda value, step: act(value, step, window.acts(step))
 
 
-def _in_turn(functions: Sequence[FaultFunction]) -> FaultFunction:
-    if len(functions) == 1:
-        return functions[0]
-
-    def act(value: float, step: int) -> float:
-        for function in functions:
-            value = function(value, step)
-        return value
-
-    return act
+def _in_turn(functions: Sequence[FaultFunction], value: float, step: int) -> float:
+    for function in functions:
+        value = function(value, step)
+    return value

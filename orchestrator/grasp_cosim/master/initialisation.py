@@ -5,8 +5,8 @@ it is entered by, and the values of the inputs that were cut are found by Newton
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -24,17 +24,21 @@ Floats = npt.NDArray[np.float64]
 DIFFERENCE = 1e-7
 """Relative change of an input for the derivatives of Newton's method."""
 
+ADVICE = (
+    "must have a component without direct feedthrough in it, or [initialisation] "
+    'loops = "iterate" with a tolerance that can be reached'
+)
 
-@dataclass(frozen=True, slots=True)
-class Order:
+
+class Order(NamedTuple):
     """The ports in an order in which each is known when it is needed.
 
     cuts are the inputs at which loops were cut, loops the paths of port names, first = last.
     """
 
-    ports: tuple[Port, ...]
-    cuts: tuple[Port, ...]
-    loops: tuple[tuple[Port, ...], ...]
+    ports: Sequence[Port]
+    cuts: Sequence[Port]
+    loops: Sequence[Sequence[Port]]
 
 
 def order_ports(system: System, instances: Sequence[Instance]) -> Order:
@@ -49,16 +53,14 @@ def order_ports(system: System, instances: Sequence[Instance]) -> Order:
     loops: list[tuple[Port, ...]] = []
     while True:
         try:
-            ports = tuple(TopologicalSorter(graph).static_order())
+            return Order(tuple(TopologicalSorter(graph).static_order()), cuts, loops)
         except CycleError as error:
-            path = tuple(error.args[1])
+            path = error.args[1]
             entry = next(port for port in path if port in inputs)
             at = path.index(entry)
             loops.append((*path[at:-1], *path[: at + 1]))
             cuts.append(entry)
             graph[entry] = []
-        else:
-            return Order(ports, tuple(cuts), tuple(loops))
 
 
 def _graph(system: System, instances: Sequence[Instance]) -> dict[Port, list[Port]]:
@@ -67,10 +69,8 @@ def _graph(system: System, instances: Sequence[Instance]) -> dict[Port, list[Por
     graph: dict[Port, list[Port]] = {}
     for instance in instances:
         inputs = [v.name for v in instance.interface.of("input")]
-        for name in inputs:
-            port = Port(instance.name, name)
-            if port in sources:
-                graph[port] = [sources[port]]
+        connected = [p for name in inputs if (p := Port(instance.name, name)) in sources]
+        graph |= {port: [sources[port]] for port in connected}
         for v in instance.interface.of("output"):
             declared = v.dependencies if v.initial_dependencies is None else v.initial_dependencies
             needed = inputs if declared is None else declared
@@ -80,17 +80,16 @@ def _graph(system: System, instances: Sequence[Instance]) -> dict[Port, list[Por
 
 
 class Propagation:
-    """Passes values on between instances in initialisation mode, in a given order."""
+    """Passes values on between instances in initialisation mode, in the order of order_ports()."""
 
     def __init__(
         self,
         system: System,
         instances: Sequence[Instance],
-        order: Order,
         faults: Mapping[Port, Callable[[float, int], float]],
     ) -> None:
         self.system = system
-        self.order = order
+        self.order = order_ports(system, instances)
         self.values: dict[Port, Value] = {}
         self._instances = {instance.name: instance for instance in instances}
         self._connections = {connection.target: connection for connection in system.connections}
@@ -104,7 +103,7 @@ class Propagation:
         """
         order, choice = self.order, self.system.initialisation
         if order.loops and choice.loops == "refuse":
-            raise InputError(f"{_described(self.system, order.loops)}; {_advice()}")
+            raise InputError(f"{_described(self.system, order.loops)}; {ADVICE}")
         if not order.cuts:
             self._pass_on({})
             return self._check_dependencies()
@@ -112,12 +111,16 @@ class Propagation:
             if self._kind(port) != "Real":
                 raise InputError(
                     f"{_described(self.system, order.loops)}, and {port} is {self._kind(port)}: "
-                    f"only loops of Real values can be iterated; {_advice()}"
+                    f"only loops of Real values can be iterated; {ADVICE}"
                 )
         count, residual = self._solve(choice)
+        # Other values may solve a loop that its start values solve: that they were kept is said.
+        solution = f"solved in {count} iteration{'' if count == 1 else 's'}"
+        if not count:
+            solution = "its start values solve it and are kept"
         lines = [
-            f"{_described(self.system, [path])}: {_solution(count)}, to a "
-            f"relative residual of {residual:.1e}"
+            f"{_described(self.system, [path])}: {solution}, to a relative residual of "
+            f"{residual:.1e}"
             for path in order.loops
         ]
         return lines + self._check_dependencies()
@@ -125,8 +128,9 @@ class Propagation:
     def _solve(self, choice: Initialisation) -> tuple[int, float]:
         """Newton's method for the inputs that were cut; iterations and relative residual."""
         cuts = self.order.cuts
-        x = np.array([self._start(port) for port in cuts])
-        nominal = np.array([self._variable(port).nominal for port in cuts])
+        at = [(self._instances[port.component], self._variable(port)) for port in cuts]
+        x = np.array([float(instance.get([variable])[0]) for instance, variable in at])
+        nominal = np.array([variable.nominal for _, variable in at])
         for count in range(1, choice.iterations + 1):
             g = self._evaluate(x)
             residual = float(np.max(np.abs(g - x) / np.maximum(nominal, np.abs(g))))
@@ -141,7 +145,7 @@ class Propagation:
                 break
         raise InputError(
             f"{_described(self.system, self.order.loops)}: does not converge to a relative "
-            f"residual of {choice.tolerance:g} in {choice.iterations} iterations; {_advice()}"
+            f"residual of {choice.tolerance:g} in {choice.iterations} iterations; {ADVICE}"
         )
 
     def _slope(self, x: Floats, g: Floats, nominal: Floats) -> Floats:
@@ -161,19 +165,17 @@ class Propagation:
 
     def _pass_on(self, given: Mapping[Port, Value]) -> None:
         for port in self.order.ports:
-            instance = self._instances[port.component]
-            variable = instance.interface.by_name[port.variable]
+            instance, variable = self._instances[port.component], self._variable(port)
             if port in self._connections:
                 value = given[port] if port in given else self._arriving(self._connections[port])
                 instance.set([variable], [value])
-            elif variable.kind in ("Real", "Integer", "Boolean", "String") and not variable.shape:
+            elif variable.supported:
                 value = instance.get([variable])[0]
             else:
                 continue
             self.values[port] = value
 
     def _arriving(self, connection: Connection) -> Value:
-        """The value that a connection hands over."""
         value = self.values[connection.source]
         if self._kind(connection.target) == "String":
             return value
@@ -207,7 +209,7 @@ class Propagation:
             found.append(moved[0])  # the others may follow from it
         raise InputError(
             f"{self.system.name}: the values at t = 0 do not settle, a loop through "
-            f"{choices(dict.fromkeys(found))} that the FMUs' dependencies do not show; {_advice()}"
+            f"{choices(dict.fromkeys(found))} that the FMUs' dependencies do not show; {ADVICE}"
         )
 
     def _variable(self, port: Port) -> Variable:
@@ -216,24 +218,7 @@ class Propagation:
     def _kind(self, port: Port) -> str:
         return self._variable(port).kind
 
-    def _start(self, port: Port) -> float:
-        return float(self._instances[port.component].get([self._variable(port)])[0])
-
-
-def _solution(iterations: int) -> str:
-    """Other values may solve a loop that its start values solve: that they were kept is said."""
-    if not iterations:
-        return "its start values solve it and are kept"
-    return f"solved in {iterations} iteration{'' if iterations == 1 else 's'}"
-
 
 def _described(system: System, loops: Sequence[Sequence[Port]]) -> str:
     paths = "; ".join(" -> ".join(map(str, path)) for path in loops)
     return f"{system.name}: algebraic loop at t = 0: {paths}"
-
-
-def _advice() -> str:
-    return (
-        "must have a component without direct feedthrough in it, or [initialisation] "
-        'loops = "iterate" with a tolerance that can be reached'
-    )

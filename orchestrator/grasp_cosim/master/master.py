@@ -1,10 +1,6 @@
 """The fixed-step master: initialise, then run the loop in chunks and hand its rows on.
 
-In the sequential scheme (Gauss-Seidel) a component steps with what the components before it have
-just put out, which adds no delay beyond sample and hold. In the Jacobi scheme all components step
-with the values of the last communication point. A component with a longer step of its own steps at
-the end of that step: what it puts out is never from the future. Time is an integer number of
-nanoseconds.
+The schemes, components with a longer step and time are in the README of the orchestrator.
 """
 
 import time
@@ -21,7 +17,7 @@ from ..system.description import System
 from ..system.parts import NANOSECONDS, Port
 from . import loop
 from .engine import Engine, make_loop
-from .initialisation import Propagation, order_ports
+from .initialisation import Propagation
 from .plan import Planner, slots_of
 from .rejection import finish_step
 from .scenario import Scenario
@@ -62,15 +58,8 @@ class Master:
             pacer.bind(self.values[len(self.slots) :], self._hand_on_until)
         self.scenario = Scenario(system, instances, self.slots, self.values)
         self._receive = receive
-        self.plan = Planner(
-            system,
-            instances,
-            self.slots,
-            self.values,
-            self.scenario.fault_functions,
-            self.scenario.before_step if system.events or system.faults else None,
-            pacer,
-        ).plan()
+        planner = Planner(system, instances, self.slots, self.values, self.scenario, pacer)
+        self.plan = planner.plan()
         self._pacer = pacer
         self._loop = make_loop(self.plan, engine, None if pacer else self.total_steps)
         self._rows = np.empty((CHUNK, len(self.values)))
@@ -82,8 +71,7 @@ class Master:
         stop = self.system.stop_ns / NANOSECONDS
         for component, instance in zip(self.system.components, self.instances, strict=True):
             instance.enter_initialization(component.values, stop)
-        order = order_ports(self.system, self.instances)
-        propagation = Propagation(self.system, self.instances, order, self.scenario.fault_functions)
+        propagation = Propagation(self.system, self.instances, self.scenario.fault_functions)
         try:
             self.log += propagation.run()
         except SimulationError as error:
@@ -140,16 +128,15 @@ class Master:
             self._pacer.record(steps, times, lambda: self._receive(steps, rows))
 
     def _waiting(self) -> npt.NDArray[np.float64]:
-        """The rows that were not handed on yet."""
         return self._rows[self._handed_on - self._base : self.steps_done - self._base]
 
     def _enough(self) -> bool:
         """Return True if the rows are many, have waited long or include the last one."""
-        if self.steps_done == self.total_steps:
-            return True
-        if self._pacer is None and len(self._waiting()) >= ENOUGH:  # a pacer has its own occasions
-            return True
-        return time.monotonic() - self._handed_on_at > LONG
+        return (
+            self.steps_done == self.total_steps
+            or (self._pacer is None and len(self._waiting()) >= ENOUGH)  # a pacer has its occasions
+            or time.monotonic() - self._handed_on_at > LONG
+        )
 
     def _chunk(self, stop: int) -> None:
         """Run the loop until stop; hand the rows on where there is no room left, or it fails."""
@@ -164,7 +151,6 @@ class Master:
             self.hand_on()
 
     def _run(self, stop: int) -> None:
-        """Run the loop until stop, and make good for steps that were rejected."""
         step, operation = self.steps_done, 0
         try:
             while step < stop:
@@ -186,7 +172,8 @@ class Master:
             raise SimulationError(_too_long(*self._longest(step, operation)))
         if status == loop.RAISED:
             raise self.plan.raised.pop()
-        instance = self.instances[self.plan.owners[call]]
+        instance = self.plan.owners[call]
+        assert instance is not None  # noqa: S101 - the master's own calls return no bad status
         begin = (step + 1 - period) * self.system.step_ns / NANOSECONDS
         if kind != loop.STEP or status not in (DISCARD, EARLY):
             raise instance.failure(status, begin)

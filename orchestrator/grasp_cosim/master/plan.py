@@ -18,11 +18,8 @@ from ..realtime.pacer import Pacer
 from ..system.checks import transforms
 from ..system.description import System
 from ..system.parts import NANOSECONDS, Connection, Port
-from .faults import FaultFunction
 from .loop import CALL, COPY, LOAD, LOAD_LONG, RAISED, SCALE, STEP, STORE
-
-NUMBERS = ("Real", "Integer", "Boolean")
-"""The kinds of variables that have a slot in the vector."""
+from .scenario import Scenario
 
 Operation = tuple[int, int, int, int, int]
 """Kind, first and last of its range, period and phase."""
@@ -32,21 +29,19 @@ Operation = tuple[int, int, int, int, int]
 class Plan:
     """Everything the loop works on.
 
-    slots gives the place of each output and connected input in values. operations refer to
-    connections (source, target, factor, offset), casts (buffer, index, slot) and calls. clock is
-    the loop's.
+    operations refer to connections (source, target, factor, offset), casts (buffer, index, slot)
+    and calls. clock is the loop's.
     """
 
     values: npt.NDArray[np.float64]
     clock: npt.NDArray[np.float64]
-    slots: Mapping[Port, int]
     operations: list[Operation] = field(default_factory=list)
     connections: list[tuple[int, int, float, float]] = field(default_factory=list)
     casts: list[tuple[int, int, int]] = field(default_factory=list)
     buffers: list[npt.NDArray[Any]] = field(default_factory=list)
     calls: list[Call] = field(default_factory=list)
-    owners: list[int] = field(default_factory=list)
-    """By call, the index of the component that it is made to; -1 for a call of the master's own."""
+    owners: list[Instance | None] = field(default_factory=list)
+    """By call, the instance that it is made to; None for a call of the master's own."""
     raised: list[BaseException] = field(default_factory=list)
     """Errors of the Python calls that returned RAISED: they must not pass through compiled code."""
 
@@ -74,34 +69,30 @@ class Planner:
         instances: Sequence[Instance],
         slots: Mapping[Port, int],
         values: npt.NDArray[np.float64],
-        faults: Mapping[Port, FaultFunction],
-        before_step: Callable[[int], None] | None,
+        scenario: Scenario,
         pacer: Pacer | None = None,
     ) -> None:
         """Over the given vector of values; slots are those of slots_of().
 
-        faults act on connections, by target. before_step is called at the start of each macro step
-        with its number, after the pacer of a run in real time.
+        The scenario is asked at the start of each macro step, after the pacer of a run in real
+        time.
         """
         self.system = system
         self.instances = {instance.name: instance for instance in instances}
         self.slots = slots
-        self.values = values
-        self.view: Any = memoryview(values)  # type: ignore[arg-type]  # numpy's stubs for 3.11
-        self.faults = faults
-        self.before_step = before_step
+        self.scenario = scenario
         self.pacer = pacer
         self.stamps = 0
         self.transforms = transforms(system)
-        self.made = Plan(values, np.zeros(2), slots)
+        self.made = Plan(values, np.zeros(2))
 
     def plan(self) -> Plan:
         """The program of a macro step in the scheme of the system, and what it works on."""
         if self.pacer is not None:
             self._python(self.pacer, 1, 0)
-        if self.before_step is not None:
-            self._python(self.before_step, 1, 0)
-        names = [component.name for component in self.system.components]
+        if self.system.events or self.system.faults:
+            self._python(self.scenario.before_step, 1, 0)
+        names = list(self.instances)
         if self.system.scheme == "sequential":
             for name in names:
                 last = self.system.period(name) - 1
@@ -125,11 +116,7 @@ class Planner:
     def _move(self, name: str, phase: int) -> None:
         """The connections that end at a component, then their faults."""
         period = self.system.period(name)
-        connections = [
-            connection
-            for connection in self.system.connections
-            if connection.target.component == name
-        ]
+        connections = [c for c in self.system.connections if c.target.component == name]
         numbers = [connection for connection in connections if connection.target in self.slots]
         for kind in (COPY, SCALE):
             first = len(self.made.connections)
@@ -140,7 +127,7 @@ class Planner:
                     self.made.connections.append((*ends, *transform))
             self._operation(kind, first, len(self.made.connections), period, phase)
         for connection in connections:
-            if connection.target in self.faults:
+            if connection.target in self.scenario.fault_functions:
                 self._fault(connection.target, period, phase)
             if connection.target not in self.slots:
                 self._text(connection, period, phase)
@@ -152,7 +139,8 @@ class Planner:
             self.stamps += 1
 
     def _fault(self, target: Port, period: int, phase: int) -> None:
-        fault, slot, view = self.faults[target], self.slots[target], self.view
+        fault, slot = self.scenario.fault_functions[target], self.slots[target]
+        view: Any = memoryview(self.made.values)  # type: ignore[arg-type]  # numpy's 3.11 stubs
 
         def act(step: int) -> None:
             view[slot] = fault(view[slot], step)
@@ -160,9 +148,8 @@ class Planner:
         self._python(act, period, phase)
 
     def _text(self, connection: Connection, period: int, phase: int) -> None:
-        source, target = (
-            self.instances[port.component] for port in (connection.source, connection.target)
-        )
+        ports = connection.source, connection.target
+        source, target = (self.instances[port.component] for port in ports)
         put_out = source.interface.by_name[connection.source.variable]
         taken_in = target.interface.by_name[connection.target.variable]
         self._python(lambda _: target.set([taken_in], source.get([put_out])), period, phase)
@@ -180,8 +167,8 @@ class Planner:
         """Advance a component and fetch its outputs, at the end of its own step."""
         period = self.system.period(name)
         step = period * self.system.step_ns / NANOSECONDS
-        call = self.instances[name].stepper(self.made.clock, step)
-        self._call(STEP, call, name, period, period - 1)
+        instance = self.instances[name]
+        self._call(STEP, instance.stepper(self.made.clock, step), instance, period, period - 1)
         self._transfer(name, "output", period - 1)
 
     def _transfer(self, name: str, causality: str, phase: int) -> None:
@@ -191,28 +178,28 @@ class Planner:
             taken = [v for v in variables if Port(name, v.name) in self.slots]
             if not taken:
                 continue
-            first = self.slots[Port(name, taken[0].name)]
-            data: npt.NDArray[Any] = self.values[first : first + len(taken)]
-            element = np.dtype(dtype(instance.interface.version, fmi_type))
-            casts = (len(self.made.casts), len(self.made.casts) + len(taken))
-            if element != np.float64:
-                data = np.zeros(len(taken), element)
+            first, count = self.slots[Port(name, taken[0].name)], len(taken)
+            data: npt.NDArray[Any] = self.made.values[first : first + count]
+            element = dtype(instance.interface.version, fmi_type)
+            cast = element != np.float64
+            casts = (len(self.made.casts), len(self.made.casts) + count)
+            if cast:
+                data = np.zeros(count, element)
                 buffer = len(self.made.buffers)
-                self.made.casts.extend((buffer, i, first + i) for i in range(len(taken)))
+                self.made.casts.extend((buffer, i, first + i) for i in range(count))
                 self.made.buffers.append(data)
-            if element != np.float64 and causality == "input":
+            if cast and causality == "input":
                 self._operation(STORE, *casts, period, phase)
             action = "set" if causality == "input" else "get"
-            self._call(CALL, instance.transfer(action, taken, data), name, period, phase)
-            if element != np.float64 and causality == "output":
+            self._call(CALL, instance.transfer(action, taken, data), instance, period, phase)
+            if cast and causality == "output":
                 long = element.kind in "iu" and element.itemsize == 8
                 self._operation(LOAD_LONG if long else LOAD, *casts, period, phase)
 
-    def _call(self, kind: int, call: Call, name: str | None, period: int, phase: int) -> None:
+    def _call(self, kind: int, call: Call, owner: Instance | None, period: int, phase: int) -> None:
         self._operation(kind, len(self.made.calls), len(self.made.calls) + 1, period, phase)
         self.made.calls.append(call if call.native else Call(self._guarded(call.python)))
-        names = [component.name for component in self.system.components]
-        self.made.owners.append(-1 if name is None else names.index(name))
+        self.made.owners.append(owner)
 
     def _guarded(self, function: Callable[[], int]) -> Callable[[], int]:
         def call() -> int:
@@ -233,6 +220,6 @@ def _by_type(instance: Instance, causality: str) -> list[tuple[str, list[Variabl
     """The scalar numbers of a causality, by FMI type, those of float64 first."""
     found: dict[str, list[Variable]] = {}
     for v in instance.interface.of(causality):
-        if v.kind in NUMBERS and not v.shape:
+        if v.supported and v.kind != "String":
             found.setdefault(v.type, []).append(v)
     return sorted(found.items(), key=lambda item: item[0] not in ("Real", "Float64"))

@@ -1,16 +1,18 @@
-"""Events at run time: what happens at which communication point. Meaning: system/scenario.py."""
+"""Events at run time: what happens at which communication point."""
 
 import math
 import operator
 from collections.abc import Callable, Mapping, Sequence
-from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
 
 from ..fmi.instance import Instance
 from ..interface.interface import Value, Variable
 from ..system.description import System
-from ..system.parts import NANOSECONDS, Condition, Event, Port, literal
+from ..system.parts import Condition, Event, Port, first_step, literal, seconds
 from ..system.scenario_checks import check_setting
-from .faults import FaultFunction, Window, fault_functions, first_step
+from .faults import Window, fault_functions
 
 _COMPARE: Mapping[str, Callable[[float, float], bool]] = {
     "<": operator.lt,
@@ -22,13 +24,6 @@ _COMPARE: Mapping[str, Callable[[float, float], bool]] = {
 }
 
 
-class Values(Protocol):
-    """The vector of values: an array or a memory view of float64."""
-
-    def __getitem__(self, slot: int, /) -> float:
-        """The value at a place."""
-
-
 class Scenario:
     """The events and faults of one run.
 
@@ -36,20 +31,16 @@ class Scenario:
     have faults, by target: see faults.py.
     """
 
-    log: list[str]
-    fault_functions: Mapping[Port, FaultFunction]
-
     def __init__(
         self,
         system: System,
         instances: Sequence[Instance],
         slots: Mapping[Port, int],
-        values: Values,
+        values: npt.NDArray[np.float64],
     ) -> None:
         """Values holds the outputs of now whenever a method is called, at the places in slots."""
-        self.log = []
+        self.log: list[str] = []
         self._system, self._instances = system, instances
-        self._step_ns = system.step_ns
         self._slots, self._values = slots, values
         self._events = [
             _PendingEvent(f"events[{i}]", event, system, instances)
@@ -112,8 +103,7 @@ class Scenario:
         return events + faults
 
     def _note(self, step: int, lines: Sequence[str]) -> None:
-        moment = f"t = {step * self._step_ns / NANOSECONDS:.9g} s: "
-        self.log += [moment + line for line in lines]
+        self.log += [f"t = {seconds(step * self._system.step_ns)}: {line}" for line in lines]
 
     def _holds(self, condition: Condition | None) -> bool:
         if condition is None:
@@ -155,4 +145,4 @@ class _PendingEvent:
         """Return why it has not happened."""
         if self.event.when is not None:
             return f"{self.event.when} never held"
-        return f"no step began at or after t = {(self.event.at_ns or 0) / NANOSECONDS:.9g} s"
+        return f"no step began at or after t = {seconds(self.event.at_ns or 0)}"

@@ -12,7 +12,6 @@ from types import FrameType
 from tqdm import tqdm
 
 from ..errors import InputError, SimulationError, choices
-from ..fmi.instance import Instance
 from ..fmi.load import load
 from ..interface.interface import Value
 from ..metrics.metric import Metric, registered
@@ -26,7 +25,7 @@ from ..recording.proxies import proxy_lines
 from ..recording.result import Result
 from ..system.checks import remarks
 from ..system.description import System
-from ..system.parts import NANOSECONDS, Component, Port
+from ..system.parts import NANOSECONDS, Port
 from ..system.settings import settings
 from .engine import Engine
 from .master import Master
@@ -42,11 +41,18 @@ LOOK = 0.1
 
 
 class Session:
-    """A run that its user advances. A context manager: leaving it ends and frees the FMUs."""
+    """A run that its user advances. A context manager: leaving it ends and frees the FMUs.
+
+    In real time its schedule begins with the first step.
+    """
 
     def __init__(
         self,
         system: System,
+        *,
+        step: float | None = None,
+        stop: float | None = None,
+        scheme: str | None = None,
         every: int = 1,
         listeners: Sequence[Listener] = (),
         engine: Engine = "auto",
@@ -54,6 +60,7 @@ class Session:
         metrics: Sequence[Metric] = (),
     ) -> None:
         """Load and initialise; see simulate() for the arguments and errors."""
+        system = system.with_experiment(step, stop, scheme)
         _check_count("every", every)
         registered(metrics)  # tells of two with one name before the run, not after
         self._metrics = tuple(metrics)
@@ -69,7 +76,10 @@ class Session:
         self._stack = ExitStack()
         try:
             with _interruptible():
-                instances = [self._loaded(component) for component in system.components]
+                instances = []
+                for component in system.components:
+                    instances.append(load(component))
+                    self._stack.callback(instances[-1].close)
                 self._master = Master(
                     system, instances, lambda *rows: self._dispatch(*rows), engine, self.pacer
                 )
@@ -77,7 +87,8 @@ class Session:
                     system, self._master.slots, (self._memory, *listeners), every
                 )
                 self._stack.callback(self._end)
-                self._initialise()
+                with self._failures():  # where the row of t = 0 is not finite
+                    self._master.initialise()
             if realtime and self.pacer:
                 granted = privileges(realtime, self.pacer.sleeps)
                 self._privileges = self._stack.enter_context(granted)
@@ -88,13 +99,14 @@ class Session:
             self._stack.close()
             raise
 
-    def _initialise(self) -> None:
-        """SimulationError, with the row of t = 0 as its result, where that is not finite."""
+    @contextmanager
+    def _failures(self) -> Iterator[None]:
+        """A SimulationError breaks the session, and gets what was recorded as its result."""
         try:
-            self._master.initialise()
+            yield
         except SimulationError as error:
             self._failed = True
-            error.result = self.result()
+            error.result = error.result or self.result()
             raise
 
     def _end(self) -> None:
@@ -106,11 +118,6 @@ class Session:
             raise
         finally:
             self._dispatch.end(self.complete)
-
-    def _loaded(self, component: Component) -> Instance:
-        instance = load(component)
-        self._stack.callback(instance.close)
-        return instance
 
     def __enter__(self) -> "Session":
         return self
@@ -125,12 +132,8 @@ class Session:
         SimulationError, with the result, where a listener fails at its end.
         """
         self._closed = True
-        try:
+        with self._failures():
             self._stack.close()
-        except SimulationError as error:
-            self._failed = True
-            error.result = error.result or self.result()
-            raise
 
     @property
     def time(self) -> float:
@@ -165,13 +168,12 @@ class Session:
             state = "closed" if self._closed else "broken off by a failure or an interruption"
             raise InputError(f"{self.system.name}: the session is {state}; must be a new one")
         try:
-            yield
+            with self._failures():
+                yield
         except InputError:  # which was found before any FMU was called
             raise
-        except BaseException as error:
+        except BaseException:
             self._failed = True
-            if isinstance(error, SimulationError):
-                error.result = self.result()
             raise
 
     def __getitem__(self, name: str) -> float:
@@ -272,30 +274,21 @@ class Simulate:
         InputError where an FMU does not load or refuses its parameters; SimulationError, with what
         was recorded as its result, where one fails on the way.
         """
-        system = system.with_experiment(step, stop, scheme)
-        with Session(system, every, listeners, engine, realtime, metrics) as session:
+        with Session(
+            system,
+            step=step,
+            stop=stop,
+            scheme=scheme,
+            every=every,
+            listeners=listeners,
+            engine=engine,
+            realtime=realtime,
+            metrics=metrics,
+        ) as session:
             _drive(session, progress)
             return session.result()
 
-    @staticmethod
-    def session(
-        system: System,
-        *,
-        step: float | None = None,
-        stop: float | None = None,
-        scheme: str | None = None,
-        every: int = 1,
-        listeners: Sequence[Listener] = (),
-        engine: Engine = "auto",
-        realtime: Realtime | None = None,
-        metrics: Sequence[Metric] = (),
-    ) -> Session:
-        """A run that its user advances, for `with`; the arguments are those of simulate().
-
-        In real time its schedule begins with the first step.
-        """
-        system = system.with_experiment(step, stop, scheme)
-        return Session(system, every, listeners, engine, realtime, metrics)
+    session = Session
 
 
 simulate = Simulate()
@@ -307,7 +300,6 @@ def _check_count(name: str, count: object) -> None:
 
 
 def _drive(session: Session, progress: bool) -> None:
-    """Step to the end, or until Ctrl-C."""
     total = session.system.stop_ns / NANOSECONDS
     with (
         interrupts(session.halt),

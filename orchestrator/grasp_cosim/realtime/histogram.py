@@ -5,10 +5,12 @@ values wide: they are the exponents of float64 numbers with the first 7 bits of 
 """
 
 import math
-from typing import NamedTuple
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
+
+from .timing import Spread
 
 BITS = 7
 """An octave has 2**BITS bins."""
@@ -39,19 +41,6 @@ def lower_edge(number: int) -> float:
         return 0.0
     octave, place = divmod(number - 1, 1 << BITS)
     return math.ldexp(1.0 + place * RESOLUTION, octave)
-
-
-class Spread(NamedTuple):
-    """Statistics of a histogram, in ns; `worst` is exact and was at step `worst_at`.
-
-    The others are the longest times of the bins that they fall into: too long by at most 1/128.
-    """
-
-    median: int
-    p99: int
-    p999: int
-    worst: int
-    worst_at: int
 
 
 class Histograms:
@@ -85,22 +74,24 @@ class Histograms:
             self._worst_at[i] = steps[times[:, i].argmax()]
 
     def medians(self) -> npt.NDArray[np.int64]:
-        """The medians of all histograms in ns, as in a Spread; 0 where one is empty."""
+        """The medians of all histograms in ns, as in spread(); 0 where one is empty."""
         behind = self._counts[:, : self._used].cumsum(axis=1)
         ranks = (behind[:, -1:] + 1) // 2
         return np.array([_longest(int(i)) for i in (behind >= ranks).argmax(axis=1)])
 
     def spread(self, i: int) -> Spread | None:
-        """Return the statistics of histogram `i`, None while it is empty."""
+        """Return the statistics of histogram `i` in ns, None while it is empty.
+
+        The worst is exact, and `worst_at` its step number. The others are the longest times of the
+        bins that they fall into: too long by at most 1/128.
+        """
         worst = int(self._worst[i])
         if worst < 0:
             return None
         behind = self._counts[i, : self._used].cumsum()
-        median, p99, p999 = (
-            min(_longest(int(behind.searchsorted(_rank(per_mille, int(behind[-1]))))), worst)
-            for per_mille in (500, 990, 999)
-        )
-        return Spread(median, p99, p999, worst, int(self._worst_at[i]))
+        ranks = (-(-int(behind[-1]) * per_mille // 1000) for per_mille in (500, 990, 999))
+        times = (min(_longest(int(behind.searchsorted(rank))), worst) for rank in ranks)
+        return Spread._make((*times, worst, int(self._worst_at[i])))
 
     def worst(self, i: int) -> int:
         """The longest time of histogram i in ns; 0 while it is empty."""
@@ -112,13 +103,11 @@ class Histograms:
         Eight bins make one bar; empty bars side by side are one, those at the ends are left out.
         """
         counts = self._counts[i]
-        bars = [(0.0, 1.0, int(counts[0]))] + [
-            (lower_edge(1 + (j << COARSE)), lower_edge(1 + ((j + 1) << COARSE)), int(count))
-            for j, count in enumerate(counts[1:].reshape(-1, 1 << COARSE).sum(axis=1))
-        ]
+        bars = [int(counts[0]), *counts[1:].reshape(-1, 1 << COARSE).sum(axis=1).tolist()]
+        limits = [0.0, *(lower_edge(i) for i in range(1, BINS + 1, 1 << COARSE))]
         edges: list[float] = []
         heights: list[int] = []
-        for begin, end, count in bars:
+        for (begin, end), count in zip(pairwise(limits), bars, strict=True):
             if not count:
                 continue
             if not edges or edges[-1] != begin:
@@ -130,10 +119,4 @@ class Histograms:
 
 
 def _longest(number: int) -> int:
-    """The longest time in the bin of that number, in ns."""
     return math.ceil(lower_edge(number + 1)) - 1
-
-
-def _rank(per_mille: int, count: int) -> int:
-    """Return the number of values up to the quantile."""
-    return -(-count * per_mille // 1000)

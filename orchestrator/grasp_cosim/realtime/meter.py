@@ -16,7 +16,6 @@ from ..errors import InputError
 from ..system.description import System
 from ..system.parts import NANOSECONDS
 from .histogram import Histograms
-from .histogram import Spread as SpreadNs
 from .options import Realtime
 from .timing import Histogram, Overrun, Spread, Timing
 
@@ -124,13 +123,13 @@ class Meter:
     def timing(self, granted: Sequence[str], refused: Sequence[str]) -> Timing:
         """Return the timing so far, with the answers of the operating system."""
         spreads, histograms = {}, {}
-        inside = enumerate((STEP, START, *self._names, BETWEEN))
-        for name, found, i in (
-            *((name, self._inside, i) for i, name in inside),
-            (RECORDING, self._recording, 0),
-        ):
+        inside = (STEP, START, *self._names, BETWEEN)
+        for name in (*inside, RECORDING):
+            recording = name == RECORDING
+            found, i = (self._recording, 0) if recording else (self._inside, inside.index(name))
             if spread := found.spread(i):
-                spreads[name] = self._seconds(spread)
+                times = (t / NANOSECONDS for t in spread[:4])
+                spreads[name] = Spread._make((*times, self._time(int(spread.worst_at))))
                 edges, counts = found.bars(i)
                 histograms[name] = Histogram(tuple(e / NANOSECONDS for e in edges), tuple(counts))
         return Timing(
@@ -148,10 +147,6 @@ class Meter:
             histograms=histograms,
         )
 
-    def _seconds(self, spread: SpreadNs) -> Spread:
-        median, p99, p999, worst = (t / NANOSECONDS for t in spread[:4])
-        return Spread(median, p99, p999, worst, self._time(spread.worst_at))
-
     def _time(self, step: int) -> float:
         return step * self._system.step_ns / NANOSECONDS
 
@@ -164,7 +159,8 @@ class Meter:
     def _judge(self, steps: Steps, rows: Table, after: Table) -> None:
         """Take steps, given what came after each of them."""
         recorded = self._recorded(steps)
-        parts = self._parts(rows)
+        segments = np.diff(rows[:, BEGIN:], axis=1)
+        parts = np.add.reduceat(segments[:, self._order], self._firsts, axis=1)
         start, whole = rows[:, BEGIN] - rows[:, DUE], rows[:, -1] - rows[:, BEGIN]
         between = after[:, ARRIVED] - rows[:, -1] - recorded
         times = np.column_stack((whole, start, parts, between))
@@ -191,11 +187,6 @@ class Meter:
             self._recording.add(took[:, np.newaxis], after)
         return spent
 
-    def _parts(self, rows: Table) -> Table:
-        """The times of the components and of the exchange, a row per step."""
-        segments = np.diff(rows[:, BEGIN:], axis=1)
-        return np.add.reduceat(segments[:, self._order], self._firsts, axis=1)
-
     def _happened(self, steps: Steps) -> npt.NDArray[np.bool_] | None:
         """Return the parts that ran, a row per step; None if all did, as slow components do not."""
         periods = self._periods
@@ -215,15 +206,9 @@ class Meter:
         self._culprits.update(names[i] for i in worst.tolist())
         for i in range(min(len(steps), LISTED - len(self._listed))):
             step, culprit = int(steps[i]), int(worst[i])
-            self._listed.append(
-                Overrun(
-                    step,
-                    self._time(step),
-                    float(late[i]) / NANOSECONDS,
-                    names[culprit],
-                    float(suspects[i, culprit]) / NANOSECONDS,
-                )
-            )
+            late_by, took = (float(t) / NANOSECONDS for t in (late[i], suspects[i, culprit]))
+            overrun = Overrun(step, self._time(step), late_by, names[culprit], took)
+            self._listed.append(overrun)
 
     def _find_usual(self) -> Table:
         """Return the usual times of the suspects in ns: the medians over all steps.
@@ -233,6 +218,6 @@ class Meter:
         """
         step, start, *parts = self._inside.medians()
         if step > self._period:
-            return np.array([0.0, np.inf, *(0.0 for _ in parts), 0.0])
+            return np.array([0.0, np.inf, *np.zeros(len(parts) + 1)])
         slow = self._periods[2:] > 1  # such a one takes no time in most steps
         return np.array([start, 0.0, *np.where(slow, 0.0, parts), 0.0])

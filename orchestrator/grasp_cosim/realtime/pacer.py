@@ -177,7 +177,6 @@ class Pacer:
         self._recording = self._now() - start
 
     def _measure(self) -> None:
-        """Hand the times that wait on to the meter."""
         if self._pending is not None:
             start = self._now()
             self.meter.add(*self._pending)
@@ -185,7 +184,6 @@ class Pacer:
             self._measuring = self._now() - start
 
     def _settle(self) -> None:
-        """Hand all times on to the meter."""
         self._measure()
         if self._end is not None:
             self.meter.end(*self._end)
@@ -226,7 +224,6 @@ class Pacer:
         return arrived, late
 
     def _due(self, step: int) -> int:
-        """When a step begins by the schedule, in ns."""
         numerator, denominator = self._period
         return self._base + (step - (self._base_step or 0)) * numerator // denominator
 

@@ -8,6 +8,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 from ..errors import choices
@@ -38,14 +39,12 @@ def privileges(realtime: Realtime, sleeps: bool = True) -> Iterator[Privileges]:
         thread = threading.get_native_id()
         wanted: list[tuple[str, Callable[[], Callable[[], object]], str]] = []
         if realtime.cpu is not None:
-            cpu = realtime.cpu
-            wanted.append((f"CPU {cpu}", lambda: _pin(thread, cpu), _cpus()))
+            wanted.append((f"CPU {realtime.cpu}", partial(_pin, thread, realtime.cpu), _cpus()))
         if realtime.lock_memory:
             wanted.append(("memory locked", _lock, LOCKING))
         if realtime.priority is not None:
-            priority = realtime.priority
-            name = f"SCHED_FIFO, priority {priority}"
-            wanted.append((name, lambda: _schedule(thread, priority), SCHEDULING))
+            name = f"SCHED_FIFO, priority {realtime.priority}"
+            wanted.append((name, partial(_schedule, thread, realtime.priority), SCHEDULING))
         for name, ask, remedy in wanted:
             try:
                 stack.callback(ask())
@@ -97,21 +96,18 @@ def _cpus() -> str:
 
 
 def _schedule(thread: int, priority: int) -> Callable[[], object]:
-    """Ask for the priority; what puts back how it was."""
     policy, parameter = os.sched_getscheduler(thread), os.sched_getparam(thread)
     os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(priority))
     return lambda: os.sched_setscheduler(thread, policy, parameter)
 
 
 def _pin(thread: int, cpu: int) -> Callable[[], object]:
-    """Stay on a CPU; what puts back how it was."""
     before = os.sched_getaffinity(thread)
     os.sched_setaffinity(thread, {cpu})
     return lambda: os.sched_setaffinity(thread, before)
 
 
 def _lock() -> Callable[[], object]:
-    """Lock the memory; what unlocks it."""
     if sys.platform != "linux":  # whose flags these are
         raise AttributeError("mlockall")
     libc = ctypes.CDLL(None, use_errno=True)

@@ -82,7 +82,7 @@ class Timing:
                 name: dict(zip(SPREAD_KEYS, part, strict=True)) for name, part in self.parts.items()
             },
             "histograms": {
-                name: {"edges": list(h.edges), "counts": list(h.counts)}
+                name: {key: list(values) for key, values in h._asdict().items()}
                 for name, h in self.histograms.items()
             },
         }

@@ -82,7 +82,6 @@ class Dispatcher:
 
 
 def _outputs(system: System, slots: Mapping[Port, int]) -> dict[Port, Signal]:
-    """The outputs that are numbers, in the order of components and declarations."""
     return {
         port: Signal(str(port), v.unit, v.kind, v.description or "")
         for component in system.components

@@ -1,53 +1,30 @@
 """Energy of a sampled exchange of force and position: what sample and hold creates or loses.
 
-A force acts on a component, its position goes back to whatever puts out the force: a power bond. In
-continuous time the work that the force does on the component is the work that its source gives
-away. Co-simulated, they differ: the component moves under a force that is held over its step, and
-the source puts out forces for positions that it saw at the communication points. The difference
-belongs to neither; the exchange has created it:
-
     E_k = sum of F_held (x_k - x_k-1)  -  sum of 1/2 (F_k + F_k-1) (s_k - s_k-1)
 
 F_held is the input of the component after its step, x its position, F the output of the source and
 s the position the source has received. Positive: energy was created, and the loop is that much less
-damped than its equations; negative: lost. For a sampled spring on a mass E_k is exactly the drift
-of kinetic and spring energy, the latter at the position that the spring has seen; each step adds
-1/2 k (x_k - x_k-1)^2 where the force is held from the start of the step.
-
-The first sum is exact, as the force is constant while the component moves: Stramigioli, Secchi, van
-der Schaft, Fantuzzi, Sampled data systems passivity and discrete port-Hamiltonian systems, IEEE
-Trans. Robotics 21(4), 2005; it is what a passivity observer adds up (Hannaford, Ryu, Time-domain
-passivity control of haptic interfaces, IEEE Trans. Robotics and Automation 18(1), 2002). That
-sample and hold feeds energy into a passive loop: Colgate, Schenkel, Passivity of a class of
-sampled-data systems, J. Robotic Systems 14(1), 1997. The difference of the two works over a power
-bond as the measure of the coupling error: the residual energy of Sadjina, Kyllingstad, Skjong,
-Pedersen, Energy conservation and power bonds in co-simulations, Engineering with Computers 33,
-2017. The sign here is that of energy added to the system.
-
-Limits. The second sum is a trapezoid: exact for a force linear in the position, else in error by
-the second order of the step, as for damping, where the exchange itself is of the first order. What
-the source does with a force before it puts it out (filters, delays of its own) is its own affair.
-A source that receives the position by way of another component, or not at all, is taken to have
-seen it at the same moment: the delay on that way is then not counted. A fault on one of the
-connections is part of the exchange, and what it adds is counted.
+damped than its equations; negative: lost. The reasons, the sources and the limits are in the README
+of the orchestrator.
 """
 
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
 
 from ..interface.interface import Interface, Variable
 from ..system.description import System
-from ..system.parts import Component, Connection, Port
+from ..system.parts import Component, Port
 from .listener import Signal
 
 Floats = npt.NDArray[np.float64]
 
-FORCE = {"N": (1, 1, -2, 0, 0, 0, 0, 0)}
-POSITION = {"m": (0, 1, 0, 0, 0, 0, 0, 0)}
+FORCE = ("N", (1, 1, -2, 0, 0, 0, 0, 0))
+POSITION = ("m", (0, 1, 0, 0, 0, 0, 0, 0))
 """The SI unit of a quantity and its exponents in the order of units.BASE."""
 
 IDENTITY = (1.0, 0.0)
@@ -100,10 +77,10 @@ def bonds(system: System) -> tuple[Bond, ...]:
 
 
 def _bond(system: System, component: Component, force: Variable) -> Bond | None:
-    """The bond of an input, None where it has none."""
     match = re.fullmatch(r"force(?:\[(\d+)\])?", force.name)
-    connection = _connection_to(system, Port(component.name, force.name))
-    if not match or not connection:
+    target = Port(component.name, force.name)
+    sources = {connection.target: connection.source for connection in system.connections}
+    if not match or target not in sources:
         return None
     interface = component.interface
     position = interface.by_name.get(force.name.replace("force", "position"))
@@ -113,38 +90,26 @@ def _bond(system: System, component: Component, force: Variable) -> Bond | None:
     factors = _in_si(interface, force, FORCE), _in_si(interface, position, POSITION)
     if None in factors:
         return None
-    place = Port(component.name, position.name)
-    source = system.component(connection.source.component, str(connection.source))
+    source, moved = sources[target], Port(component.name, position.name)
+    inputs = system.component(source.component, str(source)).interface.of("input")
+    receiving = (Port(source.component, v.name) for v in inputs)
     return Bond(
         component.name,
         int(match[1]) if match[1] else None,
-        connection.target,
-        connection.source,
-        place,
-        _seen(system, place, source),
-        system.period(source.name),
+        target,
+        source,
+        moved,
+        next((port for port in receiving if sources.get(port) == moved), None),
+        system.period(source.component),
         float(np.prod(factors)),  # type: ignore[arg-type]  # no None is left in it
     )
 
 
-def _connection_to(system: System, target: Port) -> Connection | None:
-    return next(
-        (connection for connection in system.connections if connection.target == target), None
-    )
-
-
-def _seen(system: System, position: Port, source: Component) -> Port | None:
-    """The first input of the source's component that is connected to the position."""
-    inputs = (Port(source.name, v.name) for v in source.interface.of("input"))
-    connections = (_connection_to(system, port) for port in inputs)
-    return next((w.target for w in connections if w and w.source == position), None)
-
-
 def _in_si(
-    interface: Interface, variable: Variable, quantity: Mapping[str, tuple[int, ...]]
+    interface: Interface, variable: Variable, quantity: tuple[str, tuple[int, ...]]
 ) -> float | None:
     """The SI value of one unit of a Real variable; None where it is not of that quantity."""
-    ((name, exponents),) = quantity.items()
+    name, exponents = quantity
     if variable.kind != "Real" or variable.shape or variable.unit is None:
         return None
     unit = interface.units.get(variable.unit)
@@ -164,7 +129,7 @@ class ExchangeEnergy:
         self,
         bonds: Sequence[Bond],
         column: Mapping[Port, int],
-        transforms: Mapping[Port, tuple[float, float]] | None = None,
+        transforms: Mapping[Port, tuple[float, float]] = MappingProxyType({}),
     ) -> None:
         """The column of a port is the place of that output or connected input in a row.
 
@@ -176,7 +141,7 @@ class ExchangeEnergy:
         self._ledgers = [
             (
                 [i for i, bond in enumerate(bonds) if bond.period == period],
-                _Ledger([b for b in bonds if b.period == period], column, transforms or {}),
+                _Ledger([b for b in bonds if b.period == period], column, transforms),
             )
             for period in dict.fromkeys(bond.period for bond in bonds)
         ]
@@ -226,8 +191,11 @@ class _Ledger:
         _add_last(earned, held[1:] * (position[1:] - position[:-1]))
         # A source with a step of its own answers for what it saw at the ends of that step.
         ends = slice(-first % self._period, None, self._period)
-        force = np.concatenate((self._answered[0], self._forces(rows[ends])))
-        seen = np.concatenate((self._answered[1], self._positions(rows[ends])))
+        factor, offset = self._of_force
+        forces = factor * rows[ends, self._source] + offset
+        force = np.concatenate((self._answered[0], forces))
+        factor, offset = self._of_seen
+        seen = np.concatenate((self._answered[1], (rows[ends, self._seen] - offset) / factor))
         _add_last(earned[ends], -0.5 * (force[1:] + force[:-1]) * (seen[1:] - seen[:-1]))
         self._moved = held[-1:], position[-1:]
         self._answered = force[-1:], seen[-1:]
@@ -235,18 +203,6 @@ class _Ledger:
         total = np.cumsum(np.concatenate((self._total, self._scale * earned)), axis=0)
         self._total = total[-1:]
         return total[1:]
-
-    def _forces(self, rows: Floats) -> Floats:
-        """Return the outputs of the sources, in the units of the held forces."""
-        factor, offset = self._of_force
-        forces: Floats = factor * rows[:, self._source] + offset
-        return forces
-
-    def _positions(self, rows: Floats) -> Floats:
-        """Return the positions that the sources have seen, in the units of the positions."""
-        factor, offset = self._of_seen
-        positions: Floats = (rows[:, self._seen] - offset) / factor
-        return positions
 
 
 def _add_last(sums: Floats, changes: Floats) -> None:

@@ -3,14 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
+from ..checks import choice, known, number, whole
 from ..errors import InputError, choices
-from ..interface.interface import SUPPORTED, Value, Variable, limits
+from ..interface.interface import SUPPORTED, Interface, Variable, limits
 from ..interface.units import conversion
-from .parts import LOOPS, NANOSECONDS, Component, Connection, Port
+from .parts import LOOPS, Component, Connection, Port, seconds
 from .structure import Structure
+
+
+class _End(NamedTuple):
+    port: Port
+    interface: Interface
+    variable: Variable
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        return limits(self.variable.type, self.interface.version)
 
 
 def check_components(system: Structure) -> None:
@@ -33,50 +45,43 @@ def check_items(was: Component, now: Component, variables: Sequence[str], place:
     """InputError where a value that a component keeps stands for another item in its new FMU."""
     before, after = was.interface.by_name, now.interface.by_name
     for name in variables:
+        value = now.values[name]
         items = [v[name].items if name in v else {} for v in (before, after)]
-        label, meant = (_label(known, now.values[name]) for known in items)
+        label, meant = (next((k for k, n in i.items() if n == value), None) for i in items)
         if all(items) and label != meant:
             raise InputError(
-                f"{place}: {name} = {now.values[name]!r} is {label} in {was.fmu.name} and "
+                f"{place}: {name} = {value!r} is {label} in {was.fmu.name} and "
                 f"{meant or 'nothing'} in {now.fmu.name}; must be set anew, as one of "
                 f"{choices(items[1])}"
             )
 
 
-def _label(items: Mapping[str, int], value: Value) -> str | None:
-    return next((name for name, number in items.items() if number == value), None)
-
-
 def check_connections(system: Structure) -> None:
     """InputError at the first connection or input that is not as it must be."""
-    sources: dict[Port, Connection] = {}
+    sources: dict[Port, Port] = {}
     for connection in system.connections:
-        place = _place(system, connection)
+        place, source, target = _place(system, connection), connection.source, connection.target
         connection_transform(system, connection)
-        if (
-            connection.target.variable
-            in system.component(connection.target.component, place).values
-        ):
+        if target.variable in system.component(target.component, place).values:
             raise InputError(
-                f"{place}: {connection.target} has two sources, the connection and a value; "
-                "must have one"
+                f"{place}: {target} has two sources, the connection and a value; must have one"
             )
-        if connection.target in sources:
+        if target in sources:
             raise InputError(
-                f"{place}: {connection.target} has two sources, "
-                f"{sources[connection.target].source} and {connection.source}; must have one"
+                f"{place}: {target} has two sources, {sources[target]} and {source}; must have one"
             )
-        sources[connection.target] = connection
-    outputs = [
-        str(Port(c.name, v.name)) for c in system.components for v in c.interface.of("output")
-    ]
+        sources[target] = source
     missing = [
-        Port(component.name, variable.name)
+        port
         for component in system.components
-        for variable in component.interface.of("input")
-        if variable.supported and variable.name not in component.values
+        for v in component.interface.of("input")
+        if v.supported and v.name not in component.values
+        if (port := Port(component.name, v.name)) not in sources
     ]
-    if missing := [port for port in missing if port not in sources]:
+    if missing:
+        outputs = [
+            Port(c.name, v.name) for c in system.components for v in c.interface.of("output")
+        ]
         plural = len(missing) > 1
         raise InputError(
             f"{system.name}: input{'s' * plural} {choices(missing)} {'have' if plural else 'has'} "
@@ -92,23 +97,19 @@ def connection_transform(system: Structure, connection: Connection) -> tuple[flo
     where an end does not exist, and where values cannot be passed from one end to the other.
     """
     place = _place(system, connection)
-    source, target = (_end(system, connection, causality) for causality in ("output", "input"))
-    _check_types(system, connection, source, target)
+    source, target = _ends(system, connection)
+    _check_types(place, source, target)
     if connection.factor is not None or connection.offset is not None:
-        return _declared(place, connection, target)
-    if source.unit is None or target.unit is None or source.unit == target.unit:
+        return _declared(place, connection, target.variable)
+    given, taken = source.variable.unit, target.variable.unit
+    if given is None or taken is None or given == taken:
         return 1.0, 0.0
-    units = [
-        system.component(port.component, place).interface.units.get(v.unit or "")
-        for port, v in ((connection.source, source), (connection.target, target))
-    ]
-    ends = (
-        f"{place}: {connection.source} is in {source.unit} and {connection.target} in {target.unit}"
-    )
+    ends = f"{place}: {source.port} is in {given} and {target.port} in {taken}"
     advice = (
-        f'{{ from = "{connection.source}", to = "{connection.target}", factor = ... }} '
-        f"gives the factor from {source.unit} to {target.unit}"
+        f'{{ from = "{source.port}", to = "{target.port}", factor = ... }} '
+        f"gives the factor from {given} to {taken}"
     )
+    units = source.interface.units.get(given), target.interface.units.get(taken)
     if units[0] is None or units[1] is None:
         raise InputError(f"{ends}, which their FMUs do not define in SI units; {advice}")
     found = conversion(units[0], units[1])
@@ -117,12 +118,12 @@ def connection_transform(system: Structure, connection: Connection) -> tuple[flo
             f"{ends}, which cannot be converted; must be the same quantity, or {advice}"
         )
     factor, offset = found
-    if offset and source.relative != target.relative:
+    if offset and source.variable.relative != target.variable.relative:
         raise InputError(
             f"{ends}, and only one of them is a difference (relativeQuantity); must be both, or "
             f"{advice}"
         )
-    return factor, 0.0 if target.relative else offset
+    return factor, 0.0 if target.variable.relative else offset
 
 
 def transforms(system: Structure) -> dict[Port, tuple[float, float]]:
@@ -140,19 +141,15 @@ def remarks(system: Structure) -> tuple[str, ...]:
     """
     lines = []
     for connection in system.connections:
-        source, target = (_end(system, connection, causality) for causality in ("output", "input"))
-        arrow = str(connection)
+        ends = _ends(system, connection)
+        source, target = (end.variable for end in ends)
         if target.type == "Float32" and source.type in ("Real", "Float64"):
-            lines.append(f"{arrow}: from {source.type} to Float32, rounded to 7 digits")
+            lines.append(f"{connection}: from {source.type} to Float32, rounded to 7 digits")
         if target.kind == "Real" and connection.factor is None and connection.offset is None:
-            missing = [
-                str(port)
-                for port, v in ((connection.source, source), (connection.target, target))
-                if v.unit is None
-            ]
+            missing = [end.port for end in ends if end.variable.unit is None]
             if len(missing) == 1:
                 unit = source.unit or target.unit
-                lines.append(f"{arrow}: {missing[0]} has no unit, taken to be in {unit}")
+                lines.append(f"{connection}: {missing[0]} has no unit, taken to be in {unit}")
     for component in system.components:
         for variable in component.interface.of("input", "output"):
             if not variable.supported:
@@ -166,61 +163,44 @@ def _place(system: Structure, connection: Connection) -> str:
     return f"{system.name}: connections[{system.connections.index(connection)}] '{connection}'"
 
 
-def _end(system: Structure, connection: Connection, causality: str) -> Variable:
-    """The variable at the end of a connection that has the causality."""
+def _ends(system: Structure, connection: Connection) -> tuple[_End, _End]:
+    """Source and target of a connection; InputError where one does not exist."""
     place = _place(system, connection)
-    port = connection.source if causality == "output" else connection.target
-    interface = system.component(port.component, place).interface
-    valid = [v.name for v in interface.of(causality)]
-    if port.variable not in valid:
-        raise InputError(
-            f"{place}: {port.component} has no {causality} {port.variable!r}; "
-            f"valid: {choices(valid)}"
-        )
-    return interface.by_name[port.variable]
+
+    def end(port: Port, causality: str) -> _End:
+        interface = system.component(port.component, place).interface
+        valid = [v.name for v in interface.of(causality)]
+        known(f"{place}: {port.component} has no {causality}", port.variable, valid)
+        return _End(port, interface, interface.by_name[port.variable])
+
+    return end(connection.source, "output"), end(connection.target, "input")
 
 
-def _check_types(
-    system: Structure, connection: Connection, source: Variable, target: Variable
-) -> None:
+def _check_types(place: str, source: _End, target: _End) -> None:
     """InputError where the target's type does not hold what the source puts out."""
-    place = _place(system, connection)
-    for port, variable in ((connection.source, source), (connection.target, target)):
+    for port, _, variable in (source, target):
         if not variable.supported:
             raise InputError(
                 f"{place}: {port} is of type {variable.nature}, which is not supported; "
                 f"must be {choices(SUPPORTED)}, no array"
             )
-    types = (
-        f"{place}: {connection.source} is {source.type} and {connection.target} is {target.type}"
-    )
-    if (source.kind, target.kind) == ("Integer", "Real"):
-        if target.type == "Float32" and not _holds_singles(system, connection, source):
+    given, taken = source.variable, target.variable
+    types = f"{place}: {source.port} is {given.type} and {target.port} is {taken.type}"
+    low, high = target.limits
+    least, most = source.limits
+    if (given.kind, taken.kind) == ("Integer", "Real"):
+        if taken.type == "Float32" and not -(2**24) <= least <= most <= 2**24:
             raise InputError(f"{types}, which does not hold all its values; must be Float64")
-    elif source.kind != target.kind:
+    elif given.kind != taken.kind:
         raise InputError(
             f"{types}; must be both Real, both Integer, both Boolean or both String, "
             "or from Integer to Real"
         )
-    elif source.kind == "Integer":
-        low, high = _limits(system, connection.target, target)
-        least, most = _limits(system, connection.source, source)
-        if not low <= least <= most <= high:
-            raise InputError(
-                f"{types}, which does not hold all its values; must be a type that holds "
-                f"{least} to {most}"
-            )
-
-
-def _limits(system: Structure, port: Port, variable: Variable) -> tuple[float, float]:
-    version = system.component(port.component, str(port)).interface.version
-    return limits(variable.type, version)
-
-
-def _holds_singles(system: Structure, connection: Connection, source: Variable) -> bool:
-    """Whether a Float32 holds every value of an integer exactly."""
-    low, high = _limits(system, connection.source, source)
-    return -(2**24) <= low <= high <= 2**24
+    elif given.kind == "Integer" and not low <= least <= most <= high:
+        raise InputError(
+            f"{types}, which does not hold all its values; must be a type that holds "
+            f"{least} to {most}"
+        )
 
 
 def _declared(place: str, connection: Connection, target: Variable) -> tuple[float, float]:
@@ -228,8 +208,7 @@ def _declared(place: str, connection: Connection, target: Variable) -> tuple[flo
     offset = 0.0 if connection.offset is None else float(connection.offset)
     if not factor or not math.isfinite(factor):
         raise InputError(f"{place}: factor = {factor!r}: must be a finite number other than 0")
-    if not math.isfinite(offset):
-        raise InputError(f"{place}: offset = {offset!r}: must be a finite number")
+    number(f"{place}: offset", offset)
     if target.kind != "Real" and (factor, offset) != (1.0, 0.0):
         raise InputError(
             f"{place}: factor = {factor!r}, offset = {offset!r}: {connection.target} is "
@@ -240,41 +219,35 @@ def _declared(place: str, connection: Connection, target: Variable) -> tuple[flo
 
 def check_steps(system: Structure) -> None:
     """InputError where a step does not divide what it must."""
-    step, stop = system.step_ns / NANOSECONDS, system.stop_ns / NANOSECONDS
-    if system.stop_ns % system.step_ns:
-        count = max(1, round(system.stop_ns / system.step_ns))
+    step, stop = system.step_ns, system.stop_ns
+
+    def nearest(time: int) -> str:
+        return seconds(max(1, round(time / step)) * step)
+
+    if stop % step:
         raise InputError(
-            f"step = {step:.9g} s does not divide stop = {stop:.9g} s; "
-            f"stop could be {count * system.step_ns / NANOSECONDS:.9g} s"
+            f"step = {seconds(step)} does not divide stop = {seconds(stop)}; "
+            f"stop could be {nearest(stop)}"
         )
     for component in system.components:
-        own = component.step_ns
-        if own is not None and own % system.step_ns:
-            count = max(1, round(own / system.step_ns))
+        own = step if component.step_ns is None else component.step_ns
+        place = f"{system.name}: {component.name}: step = {seconds(own)}"
+        if own % step:
             raise InputError(
-                f"{system.name}: {component.name}: step = {own / NANOSECONDS:.9g} s is no whole "
-                f"multiple of the base step {step:.9g} s; "
-                f"could be {count * system.step_ns / NANOSECONDS:.9g} s"
+                f"{place} is no whole multiple of the base step {seconds(step)}; "
+                f"could be {nearest(own)}"
             )
-        if own is not None and system.stop_ns % own:
+        if stop % own:
             raise InputError(
-                f"{system.name}: {component.name}: step = {own / NANOSECONDS:.9g} s does not "
-                f"divide stop = {stop:.9g} s; must end with a whole step"
+                f"{place} does not divide stop = {seconds(stop)}; must end with a whole step"
             )
 
 
 def check_initialisation(system: Structure) -> None:
     """InputError where an option of the initialisation is not as it must be."""
     place, chosen = f"{system.name}: [initialisation]", system.initialisation
-    if chosen.loops not in LOOPS:
-        raise InputError(f"{place}: loops = {chosen.loops!r}: must be one of {choices(LOOPS)}")
-    number = isinstance(chosen.tolerance, float | int) and not isinstance(chosen.tolerance, bool)
-    if not number or not 0.0 < chosen.tolerance < 1.0:
-        raise InputError(
-            f"{place}: tolerance = {chosen.tolerance!r}: must be a number between 0 and 1"
-        )
-    whole = isinstance(chosen.iterations, int) and not isinstance(chosen.iterations, bool)
-    if not whole or chosen.iterations < 1:
-        raise InputError(
-            f"{place}: iterations = {chosen.iterations!r}: must be a whole number, at least 1"
-        )
+    choice(f"{place}: loops", chosen.loops, LOOPS)
+    below = math.nextafter(1.0, 0.0)
+    must = "a number between 0 and 1"
+    number(f"{place}: tolerance", chosen.tolerance, 0.0, below, above=True, must=must)
+    whole(f"{place}: iterations", chosen.iterations, 1, must="a whole number, at least 1")

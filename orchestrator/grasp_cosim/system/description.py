@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import extensions
+from ..checks import choice, is_number, number
 from ..errors import InputError, choices
 from ..interface.interface import Value
 from .checks import (
@@ -129,24 +130,17 @@ def in_nanoseconds(place: str, seconds: Any, zero: bool = False) -> int:
 
     With zero, it may be 0.
     """
-    if isinstance(seconds, bool) or not isinstance(seconds, float | int):
+    if not is_number(seconds):
         raise InputError(f"{place} = {seconds!r} s: must be a number")
-    if zero and seconds == 0.0:
-        return 0
-    if zero and not 0.0 < seconds <= LONGEST:
-        raise InputError(f"{place} = {seconds!r} s: must be a number from 0 to {LONGEST:g}")
-    if not 0.0 < seconds <= LONGEST:
-        raise InputError(
-            f"{place} = {seconds!r} s: must be a number greater than 0, at most {LONGEST:g}"
-        )
-    nanoseconds = round(seconds * NANOSECONDS)
-    if not nanoseconds or abs(nanoseconds / NANOSECONDS - seconds) > 1e-12 * seconds:
+    span = f"from 0 to {LONGEST:g}" if zero else f"greater than 0, at most {LONGEST:g}"
+    must = f"a number {span}"
+    time = number(place, seconds, 0.0, LONGEST, above=not zero, must=must, unit="s")
+    nanoseconds = round(time * NANOSECONDS)
+    if abs(nanoseconds / NANOSECONDS - time) > 1e-12 * time:
         raise InputError(f"{place} = {seconds!r} s: must be a whole number of nanoseconds")
     return nanoseconds
 
 
 def as_scheme(place: str, name: Any) -> Scheme:
     """The scheme of that name; InputError where there is none."""
-    if name not in SCHEMES:
-        raise InputError(f"{place} = {name!r}: must be one of {choices(SCHEMES)}")
-    return name  # type: ignore[no-any-return]
+    return choice(place, name, SCHEMES)  # type: ignore[no-any-return]

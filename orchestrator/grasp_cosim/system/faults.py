@@ -23,7 +23,7 @@ from typing import Any
 
 from ..checks import number
 from ..errors import InputError
-from .parts import NANOSECONDS, Fault
+from .parts import NANOSECONDS, Fault, seconds
 
 INITIAL = -1
 """The step number of the exchanges in initialisation mode."""
@@ -146,7 +146,7 @@ def _check_delay(place: str, given: Parameters, step_ns: int) -> None:
     if abs(count * step_ns - time * NANOSECONDS) > 1e-12 * time * NANOSECONDS:
         raise InputError(
             f"{place}: time = {time:.9g} s: must be a whole number of steps of "
-            f"{step_ns / NANOSECONDS:.9g} s; could be {max(1, count) * step_ns / NANOSECONDS:.9g} s"
+            f"{seconds(step_ns)}; could be {seconds(max(1, count) * step_ns)}"
         )
 
 

@@ -19,6 +19,16 @@ LOOPS: tuple[str, ...] = get_args(Loops)
 NANOSECONDS = 1_000_000_000
 
 
+def seconds(nanoseconds: int) -> str:
+    """A time in s as messages have it."""
+    return f"{nanoseconds / NANOSECONDS:.9g} s"
+
+
+def first_step(time_ns: int, step_ns: int) -> int:
+    """Return the number of the first communication point at or after a time."""
+    return -(-time_ns // step_ns)
+
+
 def literal(value: Value) -> str:
     """A value as the system file writes it."""
     if isinstance(value, bool):

@@ -1,40 +1,7 @@
-"""Events and faults as entries of the system file, and back.
-
-    [[events]]
-    at = 0.5                                          # s
-    set = { "sensor_1.reflectance" = 0.6 }
-
-    [[events]]
-    when = "plant.gap[1] < 0.01"                      # once, where it holds for the first time
-    set = { "sensor_1.reflectance" = 0.4, "sensor_2.reflectance" = 0.4 }
-
-    [[faults]]
-    connection = "sensor_1.intensity -> controller.intensity[1]"    # or its target alone
-    kind = "noise"
-    standard_deviation = 0.002
-    from = 0.5                                        # s, 0 where it is left out
-    until = 1.0                                       # s, the end where it is left out
-    when = "plant.contact[2] == true"                 # may be left out
-    seed = 1                                          # 0 where it is left out
-
-An event sets tunable parameters, and inputs without a connection, at a communication point: the
-first one at or after its time, or the first one where its condition holds. Of components with a
-step of their own only their own points count. It acts on the step that begins there.
-
-A fault acts on the values that its connection passes in the steps that begin at from <= t < until;
-one from 0 acts in the initialisation too. With a condition it begins at the first communication
-point in that window where the condition holds, and stays. It gets values as the input would, with
-units converted; of several faults on a connection, each gets what the one before it in the file has
-made.
-
-The kinds with their parameters are in the table FAULTS of faults.py. Integer and Boolean
-connections can be stuck, lose values and delay them. Dropout and noise are random: whether a value
-is lost, or the number added, follows from seed, connection, and step number alone. So it is the
-same in every engine, and neither a window nor another fault shifts it.
-"""
+"""Events and faults as entries of the system file, and back: see the README of the orchestrator."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from ..checks import as_table, check_keys
@@ -48,10 +15,7 @@ _CONDITION = re.compile(r"(.+?\S)\s*(<=|>=|==|!=|<|>)\s*([^<>=!\s]+)")
 
 def read_events(place: str, entries: Any) -> tuple[Event, ...]:
     """The events of a list of entries; a System checks them. InputError where one is malformed."""
-    return tuple(
-        _event(f"{place}: events[{i}]", entry)
-        for i, entry in enumerate(_entries(place, "events", entries))
-    )
+    return tuple(_event(at, entry) for at, entry in _entries(place, "events", entries))
 
 
 def read_faults(place: str, entries: Any, connections: Sequence[Connection]) -> tuple[Fault, ...]:
@@ -59,10 +23,7 @@ def read_faults(place: str, entries: Any, connections: Sequence[Connection]) -> 
 
     InputError where one is malformed.
     """
-    return tuple(
-        _fault(f"{place}: faults[{i}]", entry, connections)
-        for i, entry in enumerate(_entries(place, "faults", entries))
-    )
+    return tuple(_fault(at, entry, connections) for at, entry in _entries(place, "faults", entries))
 
 
 def event_entry(event: Event) -> dict[str, Any]:
@@ -88,14 +49,16 @@ def fault_entry(fault: Fault) -> dict[str, Any]:
     return entry
 
 
-def _entries(place: str, key: str, entries: Any) -> list[Any]:
+def _entries(place: str, key: str, entries: Any) -> Iterator[tuple[str, dict[str, Any]]]:
+    """The tables of a list, each with its place."""
     if not isinstance(entries, list):
         raise InputError(f"{place}: {key} = {entries!r}: must be a list of tables, [[{key}]]")
-    return entries
+    for i, entry in enumerate(entries):
+        at = f"{place}: {key}[{i}]"
+        yield at, as_table(at, entry)
 
 
-def _event(place: str, entry: Any) -> Event:
-    entry = as_table(place, entry)
+def _event(place: str, entry: dict[str, Any]) -> Event:
     check_keys(place, entry, {"at", "when", "set"})
     values = as_table(f"{place}: set", entry.get("set"))
     for name, value in values.items():
@@ -112,9 +75,8 @@ def _event(place: str, entry: Any) -> Event:
     )
 
 
-def _fault(place: str, entry: Any, connections: Sequence[Connection]) -> Fault:
-    entry = as_table(place, entry)
-    kind = entry.get("kind")
+def _fault(place: str, entry: dict[str, Any], connections: Sequence[Connection]) -> Fault:
+    kind: Any = entry.get("kind")
     until = entry.get("until")
     common = {"connection", "kind", "from", "until", "when", *(["seed"] if kind in RANDOM else [])}
     return Fault(
@@ -137,9 +99,7 @@ def _target(place: str, text: Any, connections: Sequence[Connection]) -> Port:
             "'component.input' alone"
         )
     ends = [_port(place, part) for part in parts]
-    if len(ends) == 2 and not any(
-        [connection.source, connection.target] == ends for connection in connections
-    ):
+    if len(ends) == 2 and ends not in [[c.source, c.target] for c in connections]:
         valid = choices(connections)
         raise InputError(f"{place}: connection = {text!r}: no such connection; valid: {valid}")
     return ends[-1]
@@ -159,7 +119,6 @@ def _condition(place: str, text: Any) -> Condition | None:
 
 
 def _number(text: str) -> float | None:
-    """The value that a condition compares with."""
     if text in ("true", "false"):
         return text == "true"
     try:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from ..checks import choice, whole
+from ..checks import choice, known, whole
 from ..errors import InputError, choices
 from ..interface.interface import Interface, Value
 from .faults import FAULTS
-from .parts import NANOSECONDS, RELATIONS, Condition, Event, Fault, Port
+from .parts import RELATIONS, Condition, Event, Fault, Port, first_step, seconds
 from .structure import Structure
 
 
@@ -67,12 +67,9 @@ def check_setting(system: Structure, port: Port, value: Value, place: str) -> No
 def _check_condition(system: Structure, condition: Condition, place: str) -> None:
     interface = system.component(condition.port.component, place).interface
     valid = [v.name for v in interface.of("output") if v.supported and v.kind != "String"]
-    if condition.port.variable not in valid:
-        raise InputError(
-            f"{place}: {condition.port.component} has no numeric output "
-            f"{condition.port.variable!r}; valid: {choices(valid)}"
-        )
-    kind = interface.by_name[condition.port.variable].kind
+    component, variable = condition.port.component, condition.port.variable
+    known(f"{place}: {component} has no numeric output", variable, valid)
+    kind = interface.by_name[variable].kind
     relations = {"Real": RELATIONS[:4], "Boolean": RELATIONS[4:]}.get(kind, RELATIONS)
     if condition.relation not in relations:
         raise InputError(
@@ -102,7 +99,12 @@ def _check_fault(system: Structure, fault: Fault, place: str) -> None:
             f"must be one of {choices(possible)}"
         )
     _check_parameters(fault, interface, place)
-    _check_window(system, fault, place)
+    step, start, end = system.step_ns, fault.start_ns, fault.end_ns
+    if end is not None and first_step(start, step) >= first_step(end, step):
+        raise InputError(
+            f"{place}: from {seconds(start)} until {seconds(end)}: must hold a communication "
+            f"point, a multiple of {seconds(step)}"
+        )
     FAULTS[fault.kind].check(place, fault.parameters, system.step_ns)
     if fault.when is not None:
         _check_condition(system, fault.when, f"{place}: when = '{fault.when}'")
@@ -123,13 +125,3 @@ def _check_parameters(fault: Fault, interface: Interface, place: str) -> None:
             valid.check(f"{place}: {name}", fault.parameters.get(name))
         elif valid is None and name in fault.parameters:
             interface.parse(f"{place}: {name}", fault.target.variable, fault.parameters[name])
-
-
-def _check_window(system: Structure, fault: Fault, place: str) -> None:
-    step = system.step_ns
-    if fault.end_ns is not None and -(-fault.start_ns // step) >= -(-fault.end_ns // step):
-        raise InputError(
-            f"{place}: from {fault.start_ns / NANOSECONDS:.9g} s until "
-            f"{fault.end_ns / NANOSECONDS:.9g} s: must hold a communication point, "
-            f"a multiple of {step / NANOSECONDS:.9g} s"
-        )

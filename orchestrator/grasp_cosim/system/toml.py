@@ -1,47 +1,15 @@
-"""The system description: components, connections and the experiment, from one TOML file.
-
-    connections = ["plant.gap[1] -> sensor_1.gap", ...]   # before the first table, as TOML wants it
-
-    [experiment]
-    step = 1e-4                     # s, communication step
-    stop = 3.0                      # s
-    scheme = "sequential"           # or "jacobi"
-
-    [components.plant]              # the order of the components is the order of execution
-    fmu = "GripperPlant.fmu"        # relative to the TOML file
-    values = { object_width = 0.07 }
-    step = 5e-4                     # s, where it differs: a whole multiple of the experiment's step
-    rename = { "gap[1]" = "Gap1" }  # the system's name = the FMU's, where they differ
-    isolation = "process"           # in a process of its own; or "none"
-
-A connection that scales is a table: { from = "a.x", to = "b.y", factor = 1000.0, offset = 0.0 }.
-Without factor and offset, units that differ are converted.
-
-    [initialisation]                # may be left out, as each of its entries
-    loops = "iterate"               # what to do with an algebraic loop at t = 0; or "refuse"
-    tolerance = 1e-10               # relative, of the iteration
-    iterations = 50                 # at most
-
-    [roles]                         # who plays which part, where the names do not say it
-    plant = "gripper"
-
-    [presets.bench]                 # values under a name, for run --preset bench
-    "sensor_1.noise.enabled" = true
-
-Every input has exactly one source: a connection or a value. [[events]] and [[faults]]: see
-scenario.py.
-"""
+"""The system file: a system in TOML. Its entries are in the README of the orchestrator."""
 
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..checks import as_table, check_keys, check_values, toml_table
-from ..errors import InputError, choices
+from ..checks import as_table, check_keys, check_values, choice, is_number, text, toml_table
+from ..errors import InputError
 from ..interface.interface import Value
 from ..interface.read import read_interface
 from .description import System, as_scheme, in_nanoseconds
-from .parts import ISOLATIONS, Component, Connection, Initialisation, Isolation, Port
+from .parts import ISOLATIONS, Component, Connection, Initialisation, Port
 from .scenario import read_events, read_faults
 
 KEYS = (
@@ -53,19 +21,21 @@ KEYS = (
 
 def read_toml(path: Path, fmus: Path | None = None) -> System:
     """The system of a TOML file; fmus is where its FMUs are, by default beside the file."""
-    return _from_table(path.name, toml_table(path, "system file"), fmus or path.parent)
-
-
-def _from_table(place: str, table: dict[str, Any], folder: Path) -> System:
+    place, folder = path.name, fmus or path.parent
+    table = toml_table(path, "system file")
     check_keys(place, table, KEYS)
-    experiment = as_table(f"{place}: [experiment]", table.get("experiment"))
+
+    def part(name: str, default: Any = None) -> dict[str, Any]:
+        return as_table(f"{place}: [{name}]", table.get(name, default))
+
+    experiment = part("experiment")
     check_keys(f"{place}: [experiment]", experiment, {"step", "stop", "scheme"})
-    components = as_table(f"{place}: [components]", table.get("components"))
-    texts = table.get("connections", [])
-    if not isinstance(texts, list):
-        raise InputError(f"{place}: connections = {texts!r}: must be a list of 'output -> input'")
+    components = part("components")
+    entries = table.get("connections", [])
+    if not isinstance(entries, list):
+        raise InputError(f"{place}: connections = {entries!r}: must be a list of 'output -> input'")
     connections = tuple(
-        _connection(f"{place}: connections[{i}]", text) for i, text in enumerate(texts)
+        _connection(f"{place}: connections[{i}]", entry) for i, entry in enumerate(entries)
     )
     return System(
         place,
@@ -76,52 +46,44 @@ def _from_table(place: str, table: dict[str, Any], folder: Path) -> System:
         as_scheme(f"{place}: experiment.scheme", experiment.get("scheme", "sequential")),
         read_events(place, table.get("events", [])),
         read_faults(place, table.get("faults", []), connections),
-        read_initialisation(f"{place}: [initialisation]", table.get("initialisation", {})),
-        roles=_roles(f"{place}: [roles]", table.get("roles", {})),
-        presets=read_presets(f"{place}: [presets]", table.get("presets", {})),
+        _initialisation(f"{place}: [initialisation]", part("initialisation", {})),
+        roles={
+            role: text(f"{place}: [roles]: {role}", name, "the name of a component")
+            for role, name in part("roles", {}).items()
+        },
+        presets={
+            name: _values(f"{place}: [presets.{name}]", values)
+            for name, values in part("presets", {}).items()
+        },
     )
 
 
-def _roles(place: str, table: Any) -> dict[str, str]:
-    roles = as_table(place, table)
-    for role, name in roles.items():
-        if not isinstance(name, str):
-            raise InputError(f"{place}: {role} = {name!r}: must be the name of a component")
-    return roles
-
-
-def read_presets(place: str, table: Any) -> dict[str, dict[str, Value]]:
-    """The presets of a table of tables; what the values may be is checked where one is used."""
-    presets = as_table(place, table)
-    for name, values in presets.items():
-        check_values(f"{place[:-1]}.{name}]", as_table(f"{place[:-1]}.{name}]", values))
-    return presets
-
-
-def read_initialisation(place: str, table: Any) -> Initialisation:
-    """The options of the initialisation; a System checks their values."""
-    table = as_table(place, table)
+def _initialisation(place: str, table: dict[str, Any]) -> Initialisation:
     check_keys(place, table, Initialisation.__slots__)
     return Initialisation(**table)
+
+
+def _values(place: str, table: Any) -> dict[str, Value]:
+    """A table of values; if they fit their variables is checked where it is used."""
+    values = as_table(place, table)
+    check_values(place, values)
+    return values
 
 
 def _component(place: str, name: str, entry: Any, folder: Path) -> Component:
     place = f"{place}: [components.{name}]"
     entry = as_table(place, entry)
     check_keys(place, entry, {"fmu", "values", "step", "rename", "isolation"})
-    fmu = entry.get("fmu")
-    if not isinstance(fmu, str):
-        raise InputError(f"{place}: fmu = {fmu!r}: must be the path of an FMU, as a string")
-    values = as_table(f"{place}: values", entry.get("values", {}))
-    check_values(f"{place}: values", values)
+    fmu = folder / text(f"{place}: fmu", entry.get("fmu"), "the path of an FMU, as a string")
+    values = _values(f"{place}: values", entry.get("values", {}))
     own = entry.get("step")
     component = Component(
         name,
-        folder / fmu,
+        fmu,
         {},
-        _rename(f"{place}: rename", folder / fmu, entry.get("rename", {})),
+        _rename(f"{place}: rename", fmu, entry.get("rename", {})),
         None if own is None else in_nanoseconds(f"{place}: step", own),
-        _isolation(f"{place}: isolation", entry.get("isolation", "none")),
+        choice(f"{place}: isolation", entry.get("isolation", "none"), ISOLATIONS),
     )
     parsed = {k: component.interface.parse(f"{place}: values", k, v) for k, v in values.items()}
     return replace(component, values=parsed)
@@ -131,16 +93,9 @@ def _rename(place: str, fmu: Path, table: Any) -> dict[str, str]:
     """The table of names, each of which the FMU knows."""
     names = as_table(place, table)
     for new, own in names.items():
-        if not isinstance(own, str):
-            raise InputError(f"{place}: {new!r} = {own!r}: must be a variable of the FMU, a string")
+        text(f"{place}: {new!r}", own, "a variable of the FMU, a string")
     read_interface(fmu).renamed(names, place)
     return names
-
-
-def _isolation(place: str, name: Any) -> Isolation:
-    if name not in ISOLATIONS:
-        raise InputError(f"{place} = {name!r}: must be one of {choices(ISOLATIONS)}")
-    return name  # type: ignore[no-any-return]
 
 
 def _connection(place: str, entry: Any) -> Connection:
@@ -152,14 +107,13 @@ def _connection(place: str, entry: Any) -> Connection:
         return Connection(ports[0], ports[1])
     check_keys(place, entry, {"from", "to", "factor", "offset"})
     for key in ("factor", "offset"):
-        number = entry.get(key, 0.0)
-        if isinstance(number, bool) or not isinstance(number, float | int):
-            raise InputError(f"{place}: {key} = {number!r}: must be a number")
+        if not is_number(entry.get(key, 0.0)):
+            raise InputError(f"{place}: {key} = {entry[key]!r}: must be a number")
     source, target = (_port(f"{place}: {key}", entry.get(key)) for key in ("from", "to"))
     return Connection(source, target, entry.get("factor"), entry.get("offset"))
 
 
-def _port(place: str, text: Any) -> Port:
-    if not isinstance(text, str) or "." not in text:
-        raise InputError(f"{place} = {text!r}: must be 'component.variable'")
-    return Port(*text.split(".", 1))
+def _port(place: str, name: Any) -> Port:
+    if not isinstance(name, str) or "." not in name:
+        raise InputError(f"{place} = {name!r}: must be 'component.variable'")
+    return Port(*name.split(".", 1))
