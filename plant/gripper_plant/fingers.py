@@ -9,16 +9,14 @@ from functools import cached_property
 from math import copysign
 from typing import Annotated, NamedTuple, TypeAlias
 
-from block_variables import Input, Output, Parameter, check
+from block_variables import Group, Input, Output, Parameter, check
 
 from . import friction as finger_friction
-
-Pair = tuple[float, float]
-"""A value per finger: right, left."""
+from .friction import Pair as Pair
 
 
 @dataclass(frozen=True, slots=True)
-class Actuator:
+class Actuator(Group, name="actuator"):
     """Parameters; a value outside its declared range raises ValueError."""
 
     force_limit: Annotated[
@@ -27,9 +25,6 @@ class Actuator:
             "largest force of the actuator, either way; 0 is no limit", unit="N", low=0.0, high=1e6
         ),
     ] = (0.0, 0.0)
-
-    def __post_init__(self) -> None:
-        check(self, "actuator")
 
 
 class Side(NamedTuple):

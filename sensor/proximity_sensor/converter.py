@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from math import floor, ldexp
 from typing import Annotated
 
-from block_variables import Parameter, check
+from block_variables import Group, Parameter
 
 
 @dataclass(frozen=True, slots=True)
-class Params:
+class Params(Group, name="adc"):
     """Parameters; a value outside its declared range raises ValueError.
 
     16 bits over 20 V are usual for controllers like the paper's.
@@ -25,7 +25,7 @@ class Params:
     ] = (-10.0, 10.0)
 
     def __post_init__(self) -> None:
-        check(self, "adc")
+        Group.__post_init__(self)
         low, high = self.range
         if not low < high:
             raise ValueError(f"adc.range = {low!r}, {high!r} V: the second must be above the first")

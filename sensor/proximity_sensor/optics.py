@@ -55,10 +55,6 @@ class Inputs(NamedTuple):
     ] = 0.1
 
 
-class State(NamedTuple):
-    """The optics have no memory."""
-
-
 class Outputs(NamedTuple):
     """What the sensor delivers."""
 
@@ -67,17 +63,7 @@ class Outputs(NamedTuple):
     ]
 
 
-def initial_state(p: Params, u: Inputs) -> State:
-    """Nothing to remember."""
-    return State()
-
-
-def step(p: Params, x: State, u: Inputs, h: float) -> State:
-    """Nothing changes by itself in h seconds."""
-    return x
-
-
-def outputs(p: Params, x: State, u: Inputs) -> Outputs:
+def outputs(p: Params, u: Inputs) -> Outputs:
     """Eq. (9). The spacer keeps the object off the element: a gap below zero reads as zero."""
     l = 0.0 if u.gap < 0.0 else u.gap
     return Outputs(p.gain * p.alpha / (l + p.offset_distance) ** p.diffusion_exponent)
