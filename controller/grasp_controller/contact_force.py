@@ -10,10 +10,10 @@ from .impedance import Motion
 
 @dataclass(frozen=True, slots=True)
 class Params(Group, name="contact_force"):
-    """Parameters; a value outside its declared range raises ValueError.
+    """The paper's gains.
 
-    The paper's gains. D_i = 2·sqrt(K_i·m_j) is critical damping of a finger of 0.5 kg; K_i·W/2 is
-    the grasp, 3.43 N on an object of 70 mm.
+    D_i = 2·sqrt(K_i·m_j) is critical damping of a finger of 0.5 kg; K_i·W/2 is the grasp, 3.43 N on
+    an object of 70 mm.
     """
 
     damping: Annotated[

@@ -20,12 +20,11 @@ Motions = tuple[Motion, Motion]
 
 @dataclass(frozen=True, slots=True)
 class Params(Group, name="impact_reduction"):
-    """Parameters; a value outside its declared range raises ValueError.
+    """The paper's gains.
 
-    The paper's gains. D_a1 = 2·sqrt(K_a1·M_a1) is critical damping, at 5 rad/s. By Eq. (9) f_p is
-    that of a damper D_pj·n/(l + l_0), 138 N.s/m at the surface, where K_a1·W/2 = 0.9 N pulls: so a
-    finger arrives with 6 mm/s. The floor is far below all in reach: a white surface gives 1 uV from
-    0.9 km.
+    D_a1 = 2·sqrt(K_a1·M_a1) is critical damping, at 5 rad/s. By Eq. (9) f_p is that of a damper
+    D_pj·n/(l + l_0), 138 N.s/m at the surface, where K_a1·W/2 = 0.9 N pulls: so a finger arrives
+    with 6 mm/s. The floor is far below all in reach: a white surface gives 1 uV from 0.9 km.
     """
 
     enabled: Annotated[

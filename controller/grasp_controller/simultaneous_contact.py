@@ -15,10 +15,10 @@ from .impedance import Motion
 
 @dataclass(frozen=True, slots=True)
 class Params(Group, name="simultaneous_contact"):
-    """Parameters; a value outside its declared range raises ValueError.
+    """The paper's gains.
 
-    The paper's gains. D_a2 = 2·sqrt(K_a2·M_a2) is critical damping, at 6 rad/s. K_s·tanh(1)/K_a2 =
-    63 mm is the furthest that the target can stay from the middle of the fingers.
+    D_a2 = 2·sqrt(K_a2·M_a2) is critical damping, at 6 rad/s. K_s·tanh(1)/K_a2 = 63 mm is the
+    furthest that the target can stay from the middle of the fingers.
     """
 
     enabled: Annotated[

@@ -55,7 +55,10 @@ class Output:
 
 
 class Group:
-    """Base of parameters that a block holds under the field `name`; checks them when made."""
+    """Base of parameters that a block holds under the field `name`.
+
+    A value outside its declared range raises ValueError, as it does in the block's own.
+    """
 
     __slots__ = ()
     _group = ""

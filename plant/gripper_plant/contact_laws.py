@@ -26,10 +26,7 @@ SETTLED = 1e-11
 
 @dataclass(frozen=True, slots=True)
 class KelvinVoigt(Group, name="kelvin_voigt"):
-    """Parameters; a value outside its declared range raises ValueError.
-
-    By default a side of a paper cup: 1 N/mm, damped by a fifth of critical under 0.5 kg.
-    """
+    """By default a side of a paper cup: 1 N/mm, damped by a fifth of critical under 0.5 kg."""
 
     stiffness: Annotated[
         float, Parameter("k, stiffness of the surface", unit="N/m", low=1e-3, high=1e7)
@@ -41,10 +38,7 @@ class KelvinVoigt(Group, name="kelvin_voigt"):
 
 @dataclass(frozen=True, slots=True)
 class HuntCrossley(Group, name="hunt_crossley"):
-    """Parameters; a value outside its declared range raises ValueError.
-
-    n = 1.5 is Hertz's, a sphere on a plane. By default 3.1 N are 2.9 mm deep, as in the paper cup.
-    """
+    """By default 3.1 N are 2.9 mm deep, as in the paper cup; n = 1.5 is Hertz's, for a sphere."""
 
     enabled: Annotated[bool, Parameter("Hunt-Crossley contact; off, Kelvin-Voigt")] = False
     stiffness: Annotated[

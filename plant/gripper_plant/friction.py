@@ -21,11 +21,7 @@ NONE: Law = (0.0, 0.0, 0.0, 1.0)
 
 @dataclass(frozen=True, slots=True)
 class Params(Group, name="friction"):
-    """Parameters; a value outside its declared range raises ValueError.
-
-    The paper's simulation has none, so none is the default. v_s has no source; it matters where F_S
-    > F_C.
-    """
+    """None, as in the paper's simulation. v_s has no source; it matters where F_S > F_C."""
 
     coulomb: Annotated[
         Pair, Parameter("F_Cj, Coulomb friction of the finger", unit="N", low=0.0, high=1e3)

@@ -11,7 +11,7 @@ from block_variables import Group, Parameter
 
 @dataclass(frozen=True, slots=True)
 class Params(Group, name="ambient"):
-    """Parameters; a value outside its declared range raises ValueError."""
+    """The offset, and what becomes of it."""
 
     enabled: Annotated[bool, Parameter("offset by ambient light, and its compensation")] = False
     offset: Annotated[

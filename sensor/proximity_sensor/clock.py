@@ -16,10 +16,7 @@ TOLERANCE = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Params(Group, name="sampling"):
-    """Parameters; a value outside its declared range raises ValueError.
-
-    10 kHz is the sampling rate of the paper's bench, Sec. IV.B.
-    """
+    """10 kHz is the sampling rate of the paper's bench, Sec. IV.B."""
 
     rate: Annotated[
         float, Parameter("sampling rate, where a stage is on", unit="Hz", low=1.0, high=1e6)

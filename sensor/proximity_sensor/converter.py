@@ -12,10 +12,7 @@ from block_variables import Group, Parameter
 
 @dataclass(frozen=True, slots=True)
 class Params(Group, name="adc"):
-    """Parameters; a value outside its declared range raises ValueError.
-
-    16 bits over 20 V are usual for controllers like the paper's.
-    """
+    """16 bits over 20 V are usual for controllers like the paper's."""
 
     enabled: Annotated[bool, Parameter("conversion to digital values")] = False
     bits: Annotated[int, Parameter("resolution", low=1, high=32)] = 16

@@ -11,10 +11,7 @@ from . import mrg32k3a
 
 @dataclass(frozen=True, slots=True)
 class Params(Group, name="noise"):
-    """Parameters; a value outside its declared range raises ValueError.
-
-    5 mV is what R^2 = 0.9992 of the paper's fit leaves, over gaps from 0 to 0.1 m.
-    """
+    """5 mV is what R^2 = 0.9992 of the paper's fit leaves, over gaps from 0 to 0.1 m."""
 
     enabled: Annotated[bool, Parameter("noise of the raw voltage")] = False
     standard_deviation: Annotated[

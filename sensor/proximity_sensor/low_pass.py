@@ -24,10 +24,7 @@ Memory = tuple[float, float, float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Params(Group, name="filter"):
-    """Parameters; a value outside its declared range raises ValueError.
-
-    500 Hz is the cutoff of the paper's bench, Sec. IV.B.
-    """
+    """500 Hz is the cutoff of the paper's bench, Sec. IV.B."""
 
     enabled: Annotated[bool, Parameter("low-pass filter, Butterworth of 5th order")] = False
     cutoff: Annotated[

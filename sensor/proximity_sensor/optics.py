@@ -11,10 +11,7 @@ from block_variables import Input, Output, Parameter, check
 
 @dataclass(frozen=True, slots=True)
 class Params:
-    """Parameters; a value outside its declared range raises ValueError.
-
-    K and n are the paper's fit to the white surface, R^2 = 0.9992; l_0 is by design of the sensor.
-    """
+    """K and n are the paper's fit to the white surface, R^2 = 0.9992; l_0 is by design."""
 
     reflectance: Annotated[
         float,

@@ -9,10 +9,7 @@ from block_variables import Group, Parameter
 
 @dataclass(frozen=True, slots=True)
 class Params(Group, name="pattern"):
-    """Parameters; a value outside its declared range raises ValueError.
-
-    The ratio is that of the paper's black paper to the white one; the lengths have no source.
-    """
+    """The ratio is that of the paper's black paper to the white one; the lengths have no source."""
 
     enabled: Annotated[bool, Parameter("the surface is striped along the approach")] = False
     ratio: Annotated[
