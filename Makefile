@@ -34,7 +34,7 @@ check: .venv/dev
 	$(BIN)/python -m pytest -q tests/test_import_rules.py
 
 bench: .venv/dev
-	$(BIN)/python benchmarks/macro_step.py
+	$(BIN)/python -m benchmarks.macro_step
 	$(BIN)/python -m benchmarks.scaling
 	$(BIN)/python -m benchmarks.masters
 

@@ -1,6 +1,6 @@
 """What the FMUs' macro step costs against that of an earlier revision, in one run.
 
-    .venv/bin/python benchmarks/against_revision.py 0b702d1
+    python -m benchmarks.against_revision 0b702d1
 
 Builds the FMUs of both revisions and runs them alternately, in short chunks, behind today's master,
 compiled where numba is installed.

@@ -4,7 +4,6 @@ Prints the real-time factor of whole runs with both engines, and where a macro s
 plain Python. The machine's noise is shown, not averaged away.
 """
 
-import statistics
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -19,6 +18,8 @@ from grasp_cosim.master.engine import Engine, has_numba, make_loop
 from grasp_cosim.master.loop import STEP
 from grasp_cosim.master.master import Master
 
+from benchmarks.harness import spread
+
 RUNS = 7
 STEPS = 50
 ROUNDS = 400
@@ -28,11 +29,11 @@ def whole_runs(engine: Engine) -> None:
     """Real-time factor of complete runs, recording included, loading not."""
     system = grasp_system()
     simulate(system, stop=0.01, engine=engine)  # compiles the loop
-    runs = [simulate(system, engine=engine).metrics for _ in range(RUNS)]
-    factors = sorted(run["real_time_factor"] for run in runs)
+    factors = [simulate(system, engine=engine).metrics["real_time_factor"] for _ in range(RUNS)]
+    worst, median, best = spread(factors)
     print(
-        f"3 s at 10 kHz, {engine}, {RUNS} runs: {factors[-1]:.2f} times real time at best, "
-        f"{statistics.median(factors):.2f} median, {factors[0]:.2f} at worst"
+        f"3 s at 10 kHz, {engine}, {RUNS} runs: {best:.2f} times real time at best, "
+        f"{median:.2f} median, {worst:.2f} at worst"
     )
 
 

@@ -7,8 +7,6 @@ tolerated, and one step, which waits as long.
 """
 
 import random
-import statistics
-import subprocess
 import sys
 import tempfile
 import time
@@ -19,6 +17,8 @@ from grasp_cosim import System, cli, simulate
 from grasp_cosim.grasp.system import grasp_system
 from grasp_cosim.interface.interface import Value
 
+from benchmarks.harness import Program, by_turns, spread
+
 STEPS = 2000
 ROUNDS = 5
 KILLS = 200
@@ -26,34 +26,12 @@ TOLERATED, TIMEOUT = 3, 0.02
 PEERS = Path(__file__).parent.parent / "tests/hil/peers.py"
 
 
-class Peers:
-    """Processes that serve an FMU in lockstep."""
+def peers(system: System, name: str) -> Program:
+    """A program that starts processes which serve a component in lockstep, and kills them.
 
-    def __init__(self, fmu: Path) -> None:
-        self._process = subprocess.Popen(
-            [sys.executable, str(PEERS), str(fmu)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-
-    def say(self, line: str) -> str:
-        """A line to the program that starts and kills them; its answer."""
-        stdin, stdout = self._process.stdin, self._process.stdout
-        if stdin is None or stdout is None:
-            raise RuntimeError("no pipe")
-        stdin.write(f"{line}\n")
-        stdin.flush()
-        return stdout.readline()
-
-    def start(self) -> tuple[int, int]:
-        """Process id and port of a new one."""
-        child, port = self.say("start").split()
-        return int(child), int(port)
-
-    def close(self) -> None:
-        """End them all."""
-        self._process.communicate()
+    It ends them all when it ends itself.
+    """
+    return Program(sys.executable, str(PEERS), str(system.component(name, name).fmu))
 
 
 def proxied(system: System, name: str, folder: Path) -> System:
@@ -68,23 +46,23 @@ def proxied(system: System, name: str, folder: Path) -> System:
 
 def cost(system: System, folder: Path) -> None:
     """Print what a step costs with the plant here and there."""
-    peers = Peers(system.component("plant", "plant").fmu)
-    child, port = peers.start()
-    there = proxied(system, "plant", folder).with_values({"plant.proxy.port": port})
-    found: dict[str, list[float]] = {"direct": [], "behind a proxy": []}
-    for _ in range(ROUNDS):
-        for name, each in (("direct", system), ("behind a proxy", there)):
-            result = simulate(each, step=1e-3, stop=STEPS * 1e-3)
-            found[name].append(1e6 * result.wall_time / STEPS)
-    peers.say(f"end {child}")
-    peers.close()
+
+    def run(system: System) -> float:
+        return 1e6 * simulate(system, step=1e-3, stop=STEPS * 1e-3).wall_time / STEPS
+
+    with peers(system, "plant") as program:
+        port = int(program.ask("start").split()[1])
+        there = proxied(system, "plant", folder).with_values({"plant.proxy.port": port})
+        found = by_turns(
+            {"direct": lambda: run(system), "behind a proxy": lambda: run(there)}, ROUNDS
+        )
     for name, times in found.items():
-        print(f"macro step, plant {name}: {min(times):.1f} us best, {statistics.median(times):.1f}")
+        best, median, _ = spread(times)
+        print(f"macro step, plant {name}: {best:.1f} us best, {median:.1f}")
 
 
 def kills(system: System, folder: Path) -> None:
     """Print how long it takes from the death of the peer to the failsafe values."""
-    peers = Peers(system.component("controller", "controller").fmu)
     whole = proxied(system, "controller", folder).with_experiment(step=1e-3, stop=0.5)
     part = whole.component("controller", "controller")
     values: dict[str, Value] = {
@@ -92,28 +70,26 @@ def kills(system: System, folder: Path) -> None:
     }
     part = replace(part, values={**part.values, **values, "proxy.timeout": TIMEOUT})
     alone = replace(whole, components=(part,), connections=())
+    alone = alone.with_values({"controller.proxy.on_loss": "failsafe"})
     took = []
-    for seed in range(KILLS):
-        child, port = peers.start()
-        chosen: dict[str, Value] = {
-            "controller.proxy.port": port,
-            "controller.proxy.on_loss": "failsafe",
-        }
-        with simulate.session(alone.with_values(chosen)) as session:
-            moment = time.perf_counter() + random.Random(seed).uniform(0.0, 0.02)  # noqa: S311
-            while time.perf_counter() < moment:
-                session.step()
-            peers.say(f"end {child}")
-            start = time.perf_counter()
-            while session["controller.proxy.state"] != 3 and session.step():
-                pass
-            took.append(time.perf_counter() - start)
-    peers.close()
+    with peers(system, "controller") as program:
+        for seed in range(KILLS):
+            child, port = map(int, program.ask("start").split())
+            served = alone.with_values({"controller.proxy.port": port})
+            with simulate.session(served) as session:
+                moment = time.perf_counter() + random.Random(seed).uniform(0.0, 0.02)  # noqa: S311
+                while time.perf_counter() < moment:
+                    session.step()
+                program.ask(f"end {child}")
+                start = time.perf_counter()
+                while session["controller.proxy.state"] != 3 and session.step():
+                    pass
+                took.append(1e3 * (time.perf_counter() - start))
     declared = TIMEOUT * TOLERATED + TIMEOUT
-    took.sort()
+    _, median, worst = spread(took)
     print(
-        f"{KILLS} peers killed: failsafe after {1e3 * took[len(took) // 2]:.1f} ms (median), "
-        f"{1e3 * took[-1]:.1f} ms (worst), declared {1e3 * declared:.0f} ms: "
+        f"{KILLS} peers killed: failsafe after {median:.1f} ms (median), "
+        f"{worst:.1f} ms (worst), declared {1e3 * declared:.0f} ms: "
         f"{TOLERATED} misses of {1e3 * TIMEOUT:.0f} ms and a step that waits as long, beside what "
         "the steps compute"
     )

@@ -12,7 +12,6 @@ import argparse
 import time
 from itertools import pairwise
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -22,7 +21,6 @@ from grasp_cosim.grasp.system import grasp_system
 from grasp_cosim.realtime.meter import BEGIN, DUE
 from grasp_cosim.realtime.pacer import Pacer
 from grasp_cosim.realtime.privileges import privileges
-from grasp_cosim.realtime.timing import Timing
 
 GAPS = (100_000, 1_000_000, 10_000_000)
 """ns: gaps longer than each of these are counted."""
@@ -34,15 +32,8 @@ SHORT = 10_000
 """ns: gaps up to this are looks at the clock."""
 
 
-class Gaps(NamedTuple):
-    """The longer gaps of a spin loop in ns, and how long it ran."""
-
-    gaps: list[int]
-    ran: int
-
-
-def spin(seconds: float) -> Gaps:
-    """Look at the clock for so long, and remember the gaps.
+def spin(seconds: float) -> tuple[list[int], int]:
+    """Look at the clock for so long; the longer gaps, and how long it ran, in ns.
 
     In between it sleeps, which does not count: the kernel takes 50 ms of each second from a thread
     of a real-time priority that runs all the time.
@@ -58,7 +49,7 @@ def spin(seconds: float) -> Gaps:
             last = t
         ran += last - start
         time.sleep(NAP)
-    return Gaps(gaps, ran)
+    return gaps, ran
 
 
 def wait(system: System, realtime: Realtime) -> npt.NDArray[np.float64]:
@@ -85,7 +76,7 @@ def measure(seconds: float, rate: int, realtime: Realtime) -> None:
     simulate(system, stop=10 / rate)  # compiles the loop
     marks = [stolen()]
     with privileges(realtime):
-        gaps = spin(seconds)
+        gaps, ran = spin(seconds)
         marks.append(stolen())
         late = wait(system, realtime)
         marks.append(stolen())
@@ -95,23 +86,15 @@ def measure(seconds: float, rate: int, realtime: Realtime) -> None:
     print(f"\n== {rate} Hz for {seconds:g} s; granted: {', '.join(timing.granted) or 'nothing'}")
     for line in timing.refused:
         print(line)
-    _print_machine(gaps, late, [b - a for a, b in pairwise(marks)])
-    _print_run(timing)
-
-
-def _print_machine(gaps: Gaps, late: npt.NDArray[np.float64], steal: list[float]) -> None:
     counts = ", ".join(
-        f"{sum(gap > limit for gap in gaps.gaps)} over {limit / 1e6:g} ms" for limit in GAPS
+        f"{sum(gap > limit for gap in gaps)} over {limit / 1e6:g} ms" for limit in GAPS
     )
-    worst, lost = max(gaps.gaps, default=0) / 1e6, sum(gaps.gaps) / gaps.ran
+    worst, lost = max(gaps, default=0) / 1e6, sum(gaps) / ran
     print(f"machine, spin loop:  gaps {counts}; worst {worst:.3f} ms; {lost:.2%} of the time lost")
     quantiles = np.quantile(late, (0.5, 0.99, 0.999, 1.0)) / 1e3
     print("machine, waiting:    start late by", _row(quantiles))
-    for name, stolen_time in zip(("spin loop", "waiting", "run"), steal, strict=True):
-        print(f"steal during {name}: {stolen_time:.2f} s of CPU")
-
-
-def _print_run(timing: Timing) -> None:
+    for name, (before, after) in zip(("spin loop", "waiting", "run"), pairwise(marks), strict=True):
+        print(f"steal during {name}: {after - before:.2f} s of CPU")
     for name, part in timing.parts.items():
         print(f"run, {name:14s}", _row(1e6 * np.array(part[:4])), f"at t = {part.worst_at:.4f} s")
     for line in timing_lines(timing):

@@ -8,7 +8,6 @@ runs, so that other work on the machine disturbs less.
 """
 
 import resource
-import tempfile
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -16,9 +15,8 @@ from pathlib import Path
 from grasp_cosim import System, simulate
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.system.parts import Connection, Port
-from grasp_fmus.build import build
 
-from benchmarks.native_fmus import build_native
+from benchmarks.harness import built_fmus, head, row
 
 INSTANCES = (2, 4, 8, 16, 32, 64)
 LENGTHS = (1_000, 2_000, 4_000, 8_000)
@@ -61,31 +59,28 @@ def growth(folder: Path, kind: str) -> None:
     """Print the cost per step against the number of steps, and of instances."""
     four = star(folder, 4)
     per_step(four, 10)  # compiles the loop
-    print(f"\n| {kind}, 4 instances: steps | us per step |\n|---|---|")
+    head(f"{kind}, 4 instances: steps", "us per step")
     for steps in LENGTHS:
-        print(f"| {steps} | {per_step(four, steps):.2f} |")
-    print(f"\n| {kind}: instances | us per step | us per step and instance |\n|---|---|---|")
+        row(steps, f"{per_step(four, steps):.2f}")
+    head(f"{kind}: instances", "us per step", "us per step and instance")
     for n in INSTANCES:
         cost = per_step(star(folder, n), LENGTHS[0])
-        print(f"| {n} | {cost:.2f} | {cost / n:.3f} |")
+        row(n, f"{cost:.2f}", f"{cost / n:.3f}")
 
 
 def memory(folder: Path) -> None:
     """Print the most memory this process ever had, after runs of growing length."""
     system = star(folder, 4)
-    print(f"\n| steps, one in {EVERY} recorded | peak memory, MB |\n|---|---|")
+    head(f"steps, one in {EVERY} recorded", "peak memory, MB")
     for steps in MEMORY_LENGTHS:
         simulate(system, step=STEP, stop=steps * STEP, every=EVERY)
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss  # in kB on Linux
-        print(f"| {steps} | {peak / 1024:.1f} |")
+        row(steps, f"{peak / 1024:.1f}")
 
 
 def main() -> None:
     """Build the FMUs and measure."""
-    with tempfile.TemporaryDirectory(prefix="grasp_bench_") as name:
-        python, native = Path(name, "python"), Path(name, "native")
-        build(python)
-        build_native(python, native)
+    with built_fmus() as (python, native):
         growth(python, "Python FMUs")
         growth(native, "native FMUs")
         memory(native)

@@ -20,6 +20,8 @@ from grasp_cosim.sweep.study import Parameter, Study
 from grasp_cosim.sweep.sweep import Sweep, sweep
 from grasp_fmus.build import build
 
+from benchmarks.harness import head, row
+
 POSITION = Parameter("position", ("plant.initial_object_position",), Uniform(-0.04, 0.04))
 RATIO = Parameter(
     "ratio", ("sensor_1.reflectance",), Uniform(0.8, 1.25), ratio_to="sensor_2.reflectance"
@@ -64,9 +66,8 @@ def main() -> None:
         build(Path(name, "fmus"))
         system = with_case(System.load(SYSTEM, Path(name, "fmus")), 2)
         system = system.with_experiment(step=given.step)
-        print(f"{given.runs} grasps a round, step {given.step:g} s, {os.cpu_count()} processors\n")
-        print("| round | 1 worker, s | 2 workers, s | times as fast | plain arithmetic | load |")
-        print("|---|---|---|---|---|---|", flush=True)
+        print(f"{given.runs} grasps a round, step {given.step:g} s, {os.cpu_count()} processors")
+        head("round", "1 worker, s", "2 workers, s", "times as fast", "plain arithmetic", "load")
         before = machine()
         for k in range(given.rounds):
             study = Study("bench", system, (POSITION, RATIO), Design("random", given.runs, k))
@@ -81,11 +82,8 @@ def main() -> None:
             ratios.append(one / two)
             given_by_machine.append(0.5 * (before + after))
             before = after
-            print(
-                f"| {k + 1} | {one:.1f} | {two:.1f} | {one / two:.2f} "
-                f"| {given_by_machine[-1]:.2f} | {load:.2f} |",
-                flush=True,
-            )
+            times = f"{one:.1f}", f"{two:.1f}", f"{one / two:.2f}"
+            row(k + 1, *times, f"{given_by_machine[-1]:.2f}", f"{load:.2f}")
     print(
         f"\nmedian: {statistics.median(ratios):.2f} times; "
         f"plain arithmetic: {statistics.median(given_by_machine):.2f} times; "

@@ -46,17 +46,10 @@ class Master(NamedTuple):
     """plant.position[1] as reached, in m."""
 
 
-def variables(folder: Path) -> dict[str, list[Any]]:
-    """The outputs of each component, as FMPy reads them."""
-    fmpy = importlib.import_module("fmpy")
-    return {
-        name: [
-            v
-            for v in fmpy.read_model_description(folder / f"{fmu}.fmu").modelVariables
-            if v.causality == "output"
-        ]
-        for name, fmu in COMPONENTS.items()
-    }
+def descriptions(folder: Path) -> dict[str, list[Any]]:
+    """The variables of each component, as FMPy reads them."""
+    read = importlib.import_module("fmpy").read_model_description
+    return {name: read(folder / f"{fmu}.fmu").modelVariables for name, fmu in COMPONENTS.items()}
 
 
 def ours(folder: Path, engine: str) -> Master:
@@ -83,7 +76,12 @@ def ecospy(folder: Path) -> Master:
         structure.make_real_connection(f"{source}::{output}", f"{target}::{given}")
     simulation = ecos.EcosSimulation(structure=structure, step_size=STEP)
     table = os.path.join(tempfile.mkdtemp(dir=os.environ["TMPDIR"]), "ecospy.csv")  # noqa: PTH118
-    names = [f"{name}::{v.name}" for name, outputs in variables(folder).items() for v in outputs]
+    names = [
+        f"{name}::{v.name}"
+        for name, variables in descriptions(folder).items()
+        for v in variables
+        if v.causality == "output"
+    ]
     simulation.add_csv_writer(table, identifiers=names)
     if not simulation.init():
         raise RuntimeError(ecos.EcosLib.get_last_error())
@@ -92,34 +90,33 @@ def ecospy(folder: Path) -> Master:
 
 def libcosimpy(folder: Path) -> Master:
     """libcosimpy; every real output by its time series observer, in memory. It has no Booleans."""
-    logging = importlib.import_module("libcosimpy.CosimLogging")
+    logging, enums, executions, observers, slaves = (
+        importlib.import_module(f"libcosimpy.Cosim{name}")
+        for name in ("Logging", "Enums", "Execution", "Observer", "Slave")
+    )
     logging.log_output_level(logging.CosimLogLevel.WARNING)
-    part = {
-        name: getattr(importlib.import_module(f"libcosimpy.{name}"), name)
-        for name in ("CosimExecution", "CosimObserver")
+    execution = executions.CosimExecution.from_step_size(round(STEP * 1e9))
+    described = descriptions(folder)
+    index = {
+        name: execution.add_local_slave(slaves.CosimLocalSlave(str(folder / f"{fmu}.fmu"), name))
+        for name, fmu in COMPONENTS.items()
     }
-    slave = importlib.import_module("libcosimpy.CosimSlave").CosimLocalSlave
-    real = importlib.import_module("libcosimpy.CosimEnums").CosimVariableType.REAL
-    read = importlib.import_module("fmpy").read_model_description
-    execution = part["CosimExecution"].from_step_size(round(STEP * 1e9))
-    files = {name: str(folder / f"{fmu}.fmu") for name, fmu in COMPONENTS.items()}
-    index = {name: execution.add_local_slave(slave(file, name)) for name, file in files.items()}
     references = {
-        name: {v.name: v.valueReference for v in read(file).modelVariables}
-        for name, file in files.items()
+        name: {v.name: v.valueReference for v in variables} for name, variables in described.items()
     }
     for source, output, target, given in CONNECTIONS:
         execution.connect_real_variables(
             *(index[source], references[source][output]),
             *(index[target], references[target][given]),
         )
-    observer = part["CosimObserver"].create_time_series()
+    observer = observers.CosimObserver.create_time_series()
     execution.add_observer(observer)
-    for name, outputs in variables(folder).items():
-        for v in outputs:
-            if v.type == "Real":
+    real = enums.CosimVariableType.REAL
+    for name, variables in described.items():
+        for v in variables:
+            if v.causality == "output" and v.type == "Real":
                 observer.start_time_series(index[name], v.valueReference, real)
-    last = part["CosimObserver"].create_last_value()
+    last = observers.CosimObserver.create_last_value()
     watched = references["plant"]["position[1]"]
 
     def position() -> float:
@@ -151,35 +148,29 @@ def cofmupy(folder: Path) -> Master:
 
     wrappers.read_model_description = without_boolean_outputs
     coordinator = importlib.import_module("cofmupy").Coordinator()
-    starts = {
-        name: {
-            v.name: float(v.start)
-            for v in read(str(folder / f"{fmu}.fmu")).modelVariables
-            if v.causality == "input"
+    fmus = [
+        {
+            "id": name,
+            "path": str(folder / f"{COMPONENTS[name]}.fmu"),
+            "name": name,
+            "initialization": {v.name: float(v.start) for v in variables if v.causality == "input"},
         }
-        for name, fmu in COMPONENTS.items()
-    }
+        for name, variables in descriptions(folder).items()
+    ]
+    connections = [
+        {
+            "source": {"id": source, "variable": output},
+            "target": {"id": target, "variable": given},
+        }
+        for source, output, target, given in CONNECTIONS
+    ]
     coordinator.start(
         {
             "root": "",
             "cosim_method": "jacobi",
             "iterative": False,
-            "fmus": [
-                {
-                    "id": name,
-                    "path": str(folder / f"{fmu}.fmu"),
-                    "name": name,
-                    "initialization": starts[name],
-                }
-                for name, fmu in COMPONENTS.items()
-            ],
-            "connections": [
-                {
-                    "source": {"id": source, "variable": output},
-                    "target": {"id": target, "variable": given},
-                }
-                for source, output, target, given in CONNECTIONS
-            ],
+            "fmus": fmus,
+            "connections": connections,
         }
     )
 
@@ -206,8 +197,6 @@ def main() -> None:
     if sys.argv[3:]:
         os.sched_setaffinity(0, {int(sys.argv[3])})
     master = MASTERS[sys.argv[1]](Path(sys.argv[2]))
-    master.advance(1)
-    print("ready", file=answers)
     for line in sys.stdin:
         if not line.strip():
             print(master.position(), file=answers)

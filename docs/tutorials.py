@@ -12,6 +12,7 @@ import shlex
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import redirect_stdout
+from functools import cache
 from io import StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -35,91 +36,66 @@ Do = Callable[[str], Result]
 """What a command line recorded."""
 
 _TABLE = re.compile(r"```console\n\$ ((?:(?!```).)*)\n```\n\n((?:\|[^\n]*\n)+)", re.DOTALL)
-_CASES = {"0": ("-.", GREY), "1": ("--", RED), "2": ("-", BLUE)}
-_STYLES = ("-", "--", "-.", ":")
 
 
 # Pages
 
 
-def commands(page: str) -> list[dict[str, str]]:
-    """For each table of a page the command of each row, by the value in its first column."""
-    found = []
-    for command, table in _TABLE.findall(page):
-        head, _, *rows = map(_cells, table.splitlines())
-        line = command.replace("\\\n", " ")
-        values = [row[0].strip("`") for row in rows]
-        found.append({value: re.sub(rf"\b{head[0]}\b", value, line) for value in values})
-    return found
-
-
-def filled(page: str, do: Do) -> str:
-    """The text of a page with the cells of its tables as the runs give them."""
-    tables = iter(commands(page))
+def worked_out(page: str, do: Do) -> tuple[str, list[Runs]]:
+    """The text of a page with the cells of its tables as the runs give them, and those runs."""
+    tables: list[Runs] = []
 
     def fill(match: re.Match[str]) -> str:
-        lines = match[2].splitlines()
-        heads = _cells(lines[0])
-        for i, line in enumerate(next(tables).values(), start=2):
-            values = [COLUMNS[head](do(line)) for head in heads[1:]]
-            lines[i] = f"| {' | '.join([_cells(lines[i])[0], *values])} |"
-        return f"```console\n$ {match[1]}\n```\n\n" + "\n".join(lines) + "\n"
+        command, table = match.groups()
+        head, rule, *rows = table.splitlines()
+        word, *heads = _cells(head)
+        firsts = [_cells(row)[0] for row in rows]
+        line = command.replace("\\\n", " ")
+        runs = {v: do(re.sub(rf"\b{word}\b", v, line)) for v in (f.strip("`") for f in firsts)}
+        tables.append(runs)
+        filled = [
+            f"| {' | '.join([first, *(_cell(heading, run) for heading in heads)])} |"
+            for first, run in zip(firsts, runs.values(), strict=True)
+        ]
+        return "\n".join(["```console", f"$ {command}", "```", "", head, rule, *filled, ""])
 
-    return _TABLE.sub(fill, page)
-
-
-def tables_of(page: str, do: Do) -> list[Runs]:
-    """The runs of each table of a page."""
-    return [{value: do(line) for value, line in table.items()} for table in commands(page)]
+    return _TABLE.sub(fill, page), tables
 
 
 def _cells(line: str) -> list[str]:
     return [cell.strip() for cell in line.strip().strip("|").split("|")]
 
 
-class Recorder:
-    """Does each command line once, in the current folder, and keeps what it recorded."""
+def recorder(folder: Path) -> Do:
+    """Do each line "grasp-cosim run ..." once, in the current folder; SystemExit where it fails."""
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-        self._runs: dict[str, Result] = {}
+    @cache
+    def run(*words: str) -> Result:
+        out = folder / str(run.cache_info().misses)
+        with redirect_stdout(StringIO()):
+            code = cli.main([*words[1:], "--out", str(out)])
+        if code:
+            raise SystemExit(f"{shlex.join(words)}: exit code {code}")
+        return load_run(out)
 
-    def __call__(self, line: str) -> Result:
-        """The run of a line "grasp-cosim run ..."; SystemExit where it fails."""
-        words = shlex.split(line)
-        key = shlex.join(words)
-        if key not in self._runs:
-            out = self._folder / str(len(self._runs))
-            with redirect_stdout(StringIO()):
-                code = cli.main([*words[1:], "--out", str(out)])
-            if code:
-                raise SystemExit(f"{key}: exit code {code}")
-            self._runs[key] = load_run(out)
-        return self._runs[key]
+    return lambda line: run(*shlex.split(line))
 
 
 # Columns
 
 
-def _pair(key: str, factor: float, digits: int) -> Callable[[Result], str]:
-    return lambda run: " / ".join(_number(v, factor, digits) for v in run.metrics[key])
+def _cell(heading: str, run: Result) -> str:
+    quantity, factor, digits = COLUMNS[heading]
+    found = run.metrics[quantity] if isinstance(quantity, str) else quantity(run)
+    each = found if isinstance(found, list | tuple) else [found]
+    return " / ".join(_text(value, factor, digits) for value in each)
 
 
-def _single(key: str, factor: float, digits: int) -> Callable[[Result], str]:
-    return lambda run: _number(run.metrics[key], factor, digits)
-
-
-def _number(value: float | None, factor: float, digits: int) -> str:
+def _text(value: float | bool | None, factor: float, digits: int) -> str:
     """A rounded number without a sign where it is 0; none: it never was, or cannot be told."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
     return "none" if value is None else f"{round(factor * value, digits) + 0.0:.{digits}f}"
-
-
-def _largest(name: str, factor: float, digits: int) -> Callable[[Result], str]:
-    return lambda run: _number(float(np.abs(run.signals[name]).max()), factor, digits)
-
-
-def _at_the_end(name: str) -> Callable[[Result], str]:
-    return lambda run: "yes" if run.signals[name][-1] else "no"
 
 
 def value(run: Result, name: str, otherwise: float) -> float:
@@ -140,11 +116,6 @@ def drift(run: Result) -> float:
     end = float(run.time[-1])
     x = np.interp([end - 0.5, end], run.time, run.signals["plant.object_position"])
     return float(x[1] - x[0]) / 0.5
-
-
-def gap_left(run: Result) -> float:
-    """The gap of finger 1 at the end, m."""
-    return float(run.signals["plant.gap[1]"][-1])
 
 
 def gap_by_equation_9(run: Result) -> float:
@@ -179,30 +150,34 @@ def gap_by_equation_7(run: Result) -> float:
     return max(0.0, value(run, "plant.friction.coulomb[1]", 0.0) / stiffness - 0.035)
 
 
-COLUMNS: Mapping[str, Callable[[Result], str]] = {
-    "contacts, s": _pair("time_to_contact", 1.0, 3),
-    "apart, s": _single("time_difference", 1.0, 3),
-    "impacts, mm/s": _pair("impact_velocity", 1e3, 1),
-    "peak forces, N": _pair("peak_contact_force", 1.0, 2),
-    "steady forces, N": _pair("steady_contact_force", 1.0, 2),
-    "target at the end, mm": _single("target_position", 1e3, 1),
-    "object shifted, mm": _single("object_shift", 1e3, 2),
-    "tilt, °": _largest("plant.tilt", math.degrees(1.0), 2),
-    "toppled": _at_the_end("plant.toppled"),
-    "squeeze, mm": _largest("plant.squeeze", 1e3, 2),
-    "damaged": _at_the_end("plant.damaged"),
-    "gap of the other then, mm": lambda run: _number(gap_behind(run), 1e3, 2),
-    "drift at the end, mm/s": lambda run: _number(drift(run), 1e3, 1),
-    "gap left, mm": lambda run: _number(abs(gap_left(run)), 1e3, 1),
-    "Eq. (9), mm": lambda run: _number(gap_by_equation_9(run), 1e3, 2),
-    "formula, mm/s": lambda run: _number(drift_by_equation_3(run), 1e3, 1),
-    "blind below, mm": lambda run: _number(blind_by_equation_9(run), 1e3, 1),
-    "formula, mm": lambda run: _number(gap_by_equation_7(run), 1e3, 1),
+COLUMNS: Mapping[str, tuple[str | Callable[[Result], float], float, int]] = {
+    "contacts, s": ("time_to_contact", 1.0, 3),
+    "apart, s": ("time_difference", 1.0, 3),
+    "impacts, mm/s": ("impact_velocity", 1e3, 1),
+    "peak forces, N": ("peak_contact_force", 1.0, 2),
+    "steady forces, N": ("steady_contact_force", 1.0, 2),
+    "target at the end, mm": ("target_position", 1e3, 1),
+    "object shifted, mm": ("object_shift", 1e3, 2),
+    "tilt, °": ("object_tilt", math.degrees(1.0), 2),
+    "toppled": ("toppled", 1.0, 0),
+    "squeeze, mm": ("squeeze", 1e3, 2),
+    "damaged": ("damaged", 1.0, 0),
+    "gap of the other then, mm": (gap_behind, 1e3, 2),
+    "drift at the end, mm/s": (drift, 1e3, 1),
+    "gap left, mm": (lambda run: abs(run.signals["plant.gap[1]"][-1]), 1e3, 1),
+    "Eq. (9), mm": (gap_by_equation_9, 1e3, 2),
+    "formula, mm/s": (drift_by_equation_3, 1e3, 1),
+    "blind below, mm": (blind_by_equation_9, 1e3, 1),
+    "formula, mm": (gap_by_equation_7, 1e3, 1),
 }
-"""What the headings of the tables mean."""
+"""What the headings of the tables mean: a metric or a function of a run, its factor, the digits."""
 
 
 # Pictures
+
+_CASES = {"Case 0": ("-.", GREY), "Case 1": ("--", RED), "Case 2": ("-", BLUE)}
+_LAYERS = {"0": "force alone", "1": "+ impact reduction", "2": "+ simultaneous contact"}
+_STYLES = ("-", "--", "-.", ":")
 
 
 def draw_layers(tables: Sequence[Runs], folder: Path) -> None:
@@ -230,29 +205,29 @@ def draw_layers(tables: Sequence[Runs], folder: Path) -> None:
 
     figure = new_figure(9.0, 3.4)
     left, middle, right = figure.subplots(1, 3)
-    _over_time(left, box, "plant.object_position", 1e3)
-    finish(left, "position of the box in mm")
-    _over_time(middle, tall, "plant.tilt", math.degrees(1.0))
+    _over_time(left, box, "plant.object_position", 1e3, "Case {}")
+    _label(left, "time in s", "position of the box in mm", "light box")
+    _over_time(middle, tall, "plant.tilt", math.degrees(1.0), "Case {}")
     middle.axhline(-math.degrees(math.atan2(0.07, 0.1)), color="black", ls=":", label="balance")
-    finish(middle, "tilt of the box in °")
-    _over_time(right, cup, "plant.squeeze", 1e3)
+    _label(middle, "time in s", "tilt of the box in °", "tall box, rough floor")
+    _over_time(right, cup, "plant.squeeze", 1e3, "Case {}")
     right.axhline(8.0, color="black", ls=":", label="damaged above")
-    finish(right, "squeeze of the cup in mm")
-    for axes, title in zip(
-        (left, middle, right), ("light box", "tall box, rough floor", "soft cup"), strict=True
-    ):
-        axes.set_title(title, fontsize=10)
-        axes.set_xlabel("time in s")
+    _label(right, "time in s", "squeeze of the cup in mm", "soft cup")
     save(figure, folder / "objects.png")
 
 
-_LAYERS = {"0": "force alone", "1": "+ impact reduction", "2": "+ simultaneous contact"}
+def _over_time(axes: Any, runs: Runs, name: str, factor: float, label: str) -> None:
+    """A signal of all runs; the label has {} in the place of the value in the first column."""
+    for plain, (value, run) in zip(_STYLES, runs.items(), strict=False):
+        named = label.format(value)
+        style, colour = _CASES.get(named, (plain, BLUE))
+        axes.plot(run.time, factor * run.signals[name], style, color=colour, label=named)
 
 
-def _over_time(axes: Any, runs: Runs, name: str, factor: float) -> None:
-    for case, run in runs.items():
-        style, colour = _CASES[case]
-        axes.plot(run.time, factor * run.signals[name], style, color=colour, label=f"Case {case}")
+def _label(axes: Any, x: str, y: str, title: str = "", *, legend: bool = True) -> None:
+    axes.set_xlabel(x)
+    axes.set_title(title, fontsize=10)
+    finish(axes, y, legend)
 
 
 def draw_limits(tables: Sequence[Runs], folder: Path) -> None:
@@ -266,15 +241,17 @@ def draw_limits(tables: Sequence[Runs], folder: Path) -> None:
     curve = np.geomspace(0.5, 2.0, 101)
     top_left.plot(curve, [1e3 * gap_at_equal_intensity(r) for r in curve], color=GREY)
     top_left.legend(["simulated", "Eq. (9), equal intensities"], fontsize=8)
-    top_left.set_xlabel("reflectance of the right face / left face")
-    finish(top_left, "gap of the second finger\nat the first contact in mm", legend=False)
-    top_left.set_title("unequal reflectances, fixed object", fontsize=10)
-    for style, (mass, run) in zip(_STYLES, carried.items(), strict=False):
-        x = 1e3 * run.signals["plant.object_position"]
-        top_right.plot(run.time, x, style, color=BLUE, label=f"{float(mass):g} kg")
-    top_right.set_xlabel("time in s")
-    finish(top_right, "position of the object in mm")
-    top_right.set_title("reflectances 0.86 / 1, free object", fontsize=10)
+    _label(
+        top_left,
+        "reflectance of the right face / left face",
+        "gap of the second finger\nat the first contact in mm",
+        "unequal reflectances, fixed object",
+        legend=False,
+    )
+    _over_time(top_right, carried, "plant.object_position", 1e3, "{} kg")
+    _label(
+        top_right, "time in s", "position of the object in mm", "reflectances 0.86 / 1, free object"
+    )
     for style, (volts, run) in zip(_STYLES, converter.items(), strict=False):
         speed = 1e3 * CLOSING[1] * run.signals["plant.velocity[1]"]
         free = ~run.signals["plant.contact[1]"].astype(bool) & (speed > 0.0)
@@ -283,17 +260,16 @@ def draw_limits(tables: Sequence[Runs], folder: Path) -> None:
         bottom_left.plot(gap, speed[free], style, color=BLUE, label=f"converter up to {volts} V")
     bottom_left.set_xlim(20.0, 0.0)
     bottom_left.set_ylim(0.0, 80.0)
-    bottom_left.set_xlabel("gap of finger 1 in mm")
-    finish(bottom_left, "closing speed in mm/s")
-    bottom_left.set_title("sensor saturated near the surface", fontsize=10)
-    for style, (force, run) in zip(_STYLES, friction.items(), strict=False):
-        gap = 1e3 * run.signals["plant.gap[1]"]
-        bottom_right.plot(run.time, gap, style, color=BLUE, label=f"{force} N")
+    _label(
+        bottom_left,
+        "gap of finger 1 in mm",
+        "closing speed in mm/s",
+        "sensor saturated near the surface",
+    )
+    _over_time(bottom_right, friction, "plant.gap[1]", 1e3, "{} N")
     bottom_right.set_ylim(-1.0, 30.0)
     bottom_right.set_xlim(0.0, 8.0)
-    bottom_right.set_xlabel("time in s")
-    finish(bottom_right, "gap of finger 1 in mm")
-    bottom_right.set_title("Coulomb friction of the fingers", fontsize=10)
+    _label(bottom_right, "time in s", "gap of finger 1 in mm", "Coulomb friction of the fingers")
     save(figure, folder / "limits.png")
 
 
@@ -307,9 +283,8 @@ def draw_your_plant(tables: Sequence[Runs], folder: Path) -> None:
     cases = _plain(tables[0])
     figure = new_figure(7.2, 3.2)
     axes = figure.subplots()
-    _over_time(axes, cases, "plant.object_position", 1e3)
-    axes.set_xlabel("time in s")
-    finish(axes, "position of the object in mm")
+    _over_time(axes, cases, "plant.object_position", 1e3, "Case {}")
+    _label(axes, "time in s", "position of the object in mm")
     save(figure, folder / "your_plant.png")
 
 
@@ -325,12 +300,12 @@ def main() -> None:
     if code := cli.main(["build", str(HERE / "spring_plant.py")]):
         sys.exit(code)
     with TemporaryDirectory() as folder:
-        recorder = Recorder(Path(folder))
+        do = recorder(Path(folder))
         for name, draw in PAGES.items():
             page = HERE / f"{name}.md"
-            text = filled(page.read_text("utf-8"), recorder)
+            text, tables = worked_out(page.read_text("utf-8"), do)
             write_text(page, text)
-            draw(tables_of(text, recorder), HERE)
+            draw(tables, HERE)
 
 
 if __name__ == "__main__":

@@ -1,24 +1,19 @@
-"""Layer 1, contact force control: an impedance between the finger and its virtual object.
-
-    u_j = -D_i·(x_j' - x_vj1') - K_i·(x_j - x_vj1)                                      Eq. (7)
-
-At rest on an object of width W the fingers press with K_i·W/2.
-"""
+"""Layer 1, contact force control: an impedance from finger to virtual object, Eq. (7)."""
 
 from dataclasses import dataclass
 from typing import Annotated
 
-from block_variables import Parameter, check
+from block_variables import Group, Parameter
 
 from .impedance import Motion
 
 
 @dataclass(frozen=True, slots=True)
-class Params:
-    """Parameters; a value outside its declared range raises ValueError.
+class Params(Group, name="contact_force"):
+    """The paper's gains.
 
-    The paper's gains. D_i = 2·sqrt(K_i·m_j) is critical damping of a finger of 0.5 kg; K_i·W/2 is
-    the grasp, 3.43 N on an object of 70 mm.
+    D_i = 2·sqrt(K_i·m_j) is critical damping of a finger of 0.5 kg; K_i·W/2 is the grasp, 3.43 N on
+    an object of 70 mm.
     """
 
     damping: Annotated[
@@ -27,9 +22,6 @@ class Params:
     stiffness: Annotated[
         float, Parameter("K_i, stiffness of the impedance", unit="N/m", low=0.0, high=1e6)
     ] = 98.0
-
-    def __post_init__(self) -> None:
-        check(self, "contact_force")
 
 
 def force(p: Params, x: float, x_dot: float, x_v1: Motion) -> float:

@@ -1,15 +1,12 @@
 """Layer 2, impact reduction: the nearer the surface, the more the approach is slowed down.
 
-    f_pj = D_pj·xi_j' / xi_j                                                            Eq. (5)
-    M_a1·(x_vj1'' - x_v2'') + D_a1·(x_vj1' - x_v2') + K_a1·(x_vj1 - x_v2) = f_pj        Eq. (6)
-
-Each finger has a virtual object of its own; both follow the target of layer 3.
+Each finger has a virtual object of its own, Eq. (5) and (6); both follow the target of layer 3.
 """
 
 from dataclasses import dataclass
 from typing import Annotated
 
-from block_variables import Parameter, check
+from block_variables import Group, Parameter
 
 from . import impedance
 from .impedance import Motion
@@ -22,13 +19,12 @@ Motions = tuple[Motion, Motion]
 
 
 @dataclass(frozen=True, slots=True)
-class Params:
-    """Parameters; a value outside its declared range raises ValueError.
+class Params(Group, name="impact_reduction"):
+    """The paper's gains.
 
-    The paper's gains. D_a1 = 2·sqrt(K_a1·M_a1) is critical damping, at 5 rad/s. By Eq. (9) f_p is
-    that of a damper D_pj·n/(l + l_0), 138 N.s/m at the surface, where K_a1·W/2 = 0.9 N pulls: so a
-    finger arrives with 6 mm/s. The floor is far below all in reach: a white surface gives 1 uV from
-    0.9 km.
+    D_a1 = 2·sqrt(K_a1·M_a1) is critical damping, at 5 rad/s. By Eq. (9) f_p is that of a damper
+    D_pj·n/(l + l_0), 138 N.s/m at the surface, where K_a1·W/2 = 0.9 N pulls: so a finger arrives
+    with 6 mm/s. The floor is far below all in reach: a white surface gives 1 uV from 0.9 km.
     """
 
     enabled: Annotated[
@@ -48,9 +44,6 @@ class Params:
         float,
         Parameter("intensity below which the sensor sees nothing", unit="V", low=1e-12, high=1e3),
     ] = 1e-6
-
-    def __post_init__(self) -> None:
-        check(self, "impact_reduction")
 
 
 def virtual_forces(p: Params, xi: Pair, xi_before: Pair, h: float) -> Pair:

@@ -2,8 +2,7 @@
 
     sensors -> layer 3, target x_v2 -> layer 2, virtual objects x_vj1 -> layer 1, forces u_j
 
-Case 2 of the paper is all three layers, Case 1 layer 3 off, Case 0 layers 3 and 2 off.
-Card: controller/README.md
+Cases and equations: controller/README.md
 """
 
 from dataclasses import dataclass
@@ -14,10 +13,8 @@ from block_variables import Input, Output
 from . import contact_force as layer_1
 from . import impact_reduction as layer_2
 from . import simultaneous_contact as layer_3
+from .impact_reduction import Pair as Pair
 from .impedance import Motion
-
-Pair = tuple[float, float]
-"""A value per finger: right, left."""
 
 
 @dataclass(frozen=True, slots=True)

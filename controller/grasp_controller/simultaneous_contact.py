@@ -1,28 +1,24 @@
 """Layer 3, simultaneous contact: moves the target to where both fingers arrive together.
 
-    f_s = K_s·tanh((xi_1 - xi_2) / (xi_1 + xi_2))                                       Eq. (2)
-    M_a2·(x_v2'' - x_d'') + D_a2·(x_v2' - x_d') + K_a2·(x_v2 - x_d) = f_s               Eq. (3)
-    x_d = (x_1 + x_2) / 2,   x_d' = x_d'' = 0                                           Eq. (4)
-
-The target starts at x_d and at rest.
+Eq. (2) to (4); the target starts at the middle of the fingers, x_d, and at rest.
 """
 
 from dataclasses import dataclass
 from math import tanh
 from typing import Annotated
 
-from block_variables import Parameter, check
+from block_variables import Group, Parameter
 
 from . import impedance
 from .impedance import Motion
 
 
 @dataclass(frozen=True, slots=True)
-class Params:
-    """Parameters; a value outside its declared range raises ValueError.
+class Params(Group, name="simultaneous_contact"):
+    """The paper's gains.
 
-    The paper's gains. D_a2 = 2·sqrt(K_a2·M_a2) is critical damping, at 6 rad/s. K_s·tanh(1)/K_a2 =
-    63 mm is the furthest that the target can stay from the middle of the fingers.
+    D_a2 = 2·sqrt(K_a2·M_a2) is critical damping, at 6 rad/s. K_s·tanh(1)/K_a2 = 63 mm is the
+    furthest that the target can stay from the middle of the fingers.
     """
 
     enabled: Annotated[
@@ -38,9 +34,6 @@ class Params:
     gain: Annotated[
         float, Parameter("K_s, gain of the virtual force", unit="N", low=-1e3, high=1e3)
     ] = 3.0
-
-    def __post_init__(self) -> None:
-        check(self, "simultaneous_contact")
 
 
 def virtual_force(p: Params, xi: tuple[float, float]) -> float:

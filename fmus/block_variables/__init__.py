@@ -9,7 +9,7 @@ from functools import cache
 from math import inf, isfinite
 from typing import Any, get_type_hints
 
-__all__ = ["Input", "Output", "Parameter", "check", "check_value"]
+__all__ = ["Group", "Input", "Output", "Parameter", "check", "check_value"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +52,23 @@ class Output:
     nominal: float | None = None
     depends_on: Collection[str] | None = None
     depends_initially_on: Collection[str] | None = None
+
+
+class Group:
+    """Base of parameters that a block holds under the field `name`.
+
+    A value outside its declared range raises ValueError, as it does in the block's own.
+    """
+
+    __slots__ = ()
+    _group = ""
+
+    def __init_subclass__(cls, name: str = "") -> None:
+        if name:  # a dataclass with slots is made once more, without it
+            cls._group = name
+
+    def __post_init__(self) -> None:
+        check(self, self._group)
 
 
 def check(params: Any, group: str = "") -> None:

@@ -1,16 +1,7 @@
 """An upright box on a floor, pushed from both sides: it slides, tilts about an edge, falls back.
 
-A plane rigid box of mass m, width 2b and height 2a, uniform, r^2 = a^2 + b^2. Flat, it slides with
-Coulomb friction mu·m·g. Tilted by theta > 0 it stands on its right edge, at p, with its centre
-X = b·cos(theta) - a·sin(theta) short of the edge and Z = b·sin(theta) + a·cos(theta) above it:
-
-    m·p'' + m·Z·theta'' + m·X·theta'^2 = F + F_f          |F_f| <= mu·N
-    m·Z·p'' + 4/3·m·r^2·theta'' + m·g·X = Q
-    N = m·(g + X·theta'' - Z·theta'^2) + F·tan(theta)
-
-The pushes are those of smooth fingertips at the height h, square to the faces: F is the sum of
-their horizontal parts, Q their moment about the edge. The mirrored box tilts to the left.
-Card: plant/README.md
+theta > 0 is a tilt over the right edge; the mirrored box tilts to the left. Equations of motion,
+their symbols and their limits: plant/README.md.
 """
 
 from dataclasses import dataclass

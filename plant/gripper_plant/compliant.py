@@ -21,10 +21,7 @@ ITERATIONS = 8
 
 @dataclass(frozen=True)
 class Params(fingers.Params):
-    """Parameters; a value outside its declared range raises ValueError.
-
-    A paper cup: the grasp of 3.1 N takes 6 mm of it, and 10 mm are too much.
-    """
+    """A paper cup: the grasp of 3.1 N takes 6 mm of it, and 10 mm are too much."""
 
     kelvin_voigt: KelvinVoigt = KelvinVoigt()
     hunt_crossley: HuntCrossley = HuntCrossley()
@@ -77,7 +74,7 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     right, left = p.sides
     law = contact_laws.law(p.kelvin_voigt, p.hunt_crossley)
     s_2, v_2, u_2, f_2, damaged = -x_2, -v_2, -u_2, -f_2, x.damaged
-    n = substeps.count(_rate(p, x, u, h), h)
+    n = substeps.count(_rate(p, law, x, u, h), h)
     for _ in range(n):
         x_1, v_1, f_1 = _press(right, law, x_1, v_1, u_1, h / n, f_1)
         s_2, v_2, f_2 = _press(left, law, s_2, v_2, u_2, h / n, f_2)
@@ -121,16 +118,13 @@ def _press(
     return after, rate, contact_force
 
 
-def _rate(p: Params, x: State, u: Inputs, h: float) -> float:
+def _rate(p: Params, law: contact_laws.Law, x: State, u: Inputs, h: float) -> float:
     """The fastest that either finger can do within h seconds, 1/s."""
-    m = min(p.finger_mass)
-    law = contact_laws.law(p.kelvin_voigt, p.hunt_crossley)
     right, left = p.sides
-    reach_1, reach_2 = fingers.reach(p, x.velocity, u, h)
-    x_1, x_2 = x.position
-    deepest = max(right.surface - x_1 + reach_1, x_2 + left.surface + reach_2)
-    surface = contact_laws.rate(law, deepest, m)
-    return max(surface, friction.rate(right.friction, m), friction.rate(left.friction, m))
+    faces = right.surface, -left.surface
+    deepest = fingers.deepest(p, x.position, x.velocity, faces, u, h)
+    surface = contact_laws.rate(law, deepest, min(p.finger_mass))
+    return max(surface, p.friction_rate)
 
 
 def _squeeze(gap_1: float, gap_2: float) -> float:

@@ -1,16 +1,7 @@
 """One finger against a rigid surface: unilateral contact, Baumgarte stabilised.
 
-Everything is counted in the direction in which the finger opens. With the gap g = s - surface
-(g > 0 free, g <= 0 touching) the finger obeys
-
-    m·g'' = f + f_c,     f_c >= 0                                              Eq. (1)
-
-where f is the actuator's force and f_c the contact's. While the finger touches, f_c is what makes
-the constraint g = 0 hold in Baumgarte's stabilised form
-
-    g'' + 2·alpha·g' + beta^2·g = 0
-
-and never less than zero: the object pushes, it does not hold. Card: plant/README.md
+Everything is counted in the direction in which the finger opens, the gap g = s - surface:
+m·g'' = f + f_c, with the actuator's force f and the contact's f_c >= 0. Card: plant/README.md
 """
 
 from math import inf, sqrt

@@ -1,12 +1,7 @@
 """What a surface that gives does to a finger: Kelvin-Voigt or Hunt-Crossley, never a pull.
 
-With the depth delta to which the finger has sunk in,
-
-    f_c = max(0, k·delta + c·delta')                                        Kelvin-Voigt
-    f_c = max(0, k·delta^n·(1 + lambda·delta'))                             Hunt-Crossley
-
-and zero where delta <= 0. Over a sub-step the force is held at a mean for which the work of the
-spring is exactly what it stores. Card: plant/README.md
+Both are f_c = max(0, k·delta^n·(1 + lambda·delta') + c·delta') at the depth delta > 0, with
+lambda = 0 or c = 0. Card: plant/README.md
 """
 
 from dataclasses import dataclass
@@ -14,7 +9,7 @@ from math import pow as power
 from math import sqrt
 from typing import Annotated
 
-from block_variables import Parameter, check
+from block_variables import Group, Parameter
 
 Law = tuple[float, float, float, float]
 """k in N/m^n, n, c in N.s/m, lambda in s/m."""
@@ -30,11 +25,8 @@ SETTLED = 1e-11
 
 
 @dataclass(frozen=True, slots=True)
-class KelvinVoigt:
-    """Parameters; a value outside its declared range raises ValueError.
-
-    By default a side of a paper cup: 1 N/mm, damped by a fifth of critical under 0.5 kg.
-    """
+class KelvinVoigt(Group, name="kelvin_voigt"):
+    """By default a side of a paper cup: 1 N/mm, damped by a fifth of critical under 0.5 kg."""
 
     stiffness: Annotated[
         float, Parameter("k, stiffness of the surface", unit="N/m", low=1e-3, high=1e7)
@@ -43,16 +35,10 @@ class KelvinVoigt:
         float, Parameter("c, damping of the surface", unit="N.s/m", low=0.0, high=1e5)
     ] = 10.0
 
-    def __post_init__(self) -> None:
-        check(self, "kelvin_voigt")
-
 
 @dataclass(frozen=True, slots=True)
-class HuntCrossley:
-    """Parameters; a value outside its declared range raises ValueError.
-
-    n = 1.5 is Hertz's, a sphere on a plane. By default 3.1 N are 2.9 mm deep, as in the paper cup.
-    """
+class HuntCrossley(Group, name="hunt_crossley"):
+    """By default 3.1 N are 2.9 mm deep, as in the paper cup; n = 1.5 is Hertz's, for a sphere."""
 
     enabled: Annotated[bool, Parameter("Hunt-Crossley contact; off, Kelvin-Voigt")] = False
     stiffness: Annotated[
@@ -64,9 +50,6 @@ class HuntCrossley:
     damping: Annotated[
         float, Parameter("lambda, damping relative to the force", unit="s/m", low=0.0, high=1e3)
     ] = 1.0
-
-    def __post_init__(self) -> None:
-        check(self, "hunt_crossley")
 
 
 def law(kelvin_voigt: KelvinVoigt, hunt_crossley: HuntCrossley) -> Law:

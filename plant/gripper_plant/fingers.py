@@ -9,17 +9,15 @@ from functools import cached_property
 from math import copysign
 from typing import Annotated, NamedTuple, TypeAlias
 
-from block_variables import Input, Output, Parameter, check
+from block_variables import Group, Input, Output, Parameter, check
 
 from . import friction as finger_friction
-
-Pair = tuple[float, float]
-"""A value per finger: right, left."""
+from .friction import Pair as Pair
 
 
 @dataclass(frozen=True, slots=True)
-class Actuator:
-    """Parameters; a value outside its declared range raises ValueError."""
+class Actuator(Group, name="actuator"):
+    """What the actuators can do."""
 
     force_limit: Annotated[
         Pair,
@@ -27,9 +25,6 @@ class Actuator:
             "largest force of the actuator, either way; 0 is no limit", unit="N", low=0.0, high=1e6
         ),
     ] = (0.0, 0.0)
-
-    def __post_init__(self) -> None:
-        check(self, "actuator")
 
 
 class Side(NamedTuple):
@@ -88,6 +83,13 @@ class Params:
         rub_1, rub_2 = finger_friction.laws(self.friction)
         return Side(half + x_m, m_1, rub_1), Side(half - x_m, m_2, rub_2)
 
+    @cached_property
+    def friction_rate(self) -> float:
+        """How fast friction slows down the lighter finger, 1/s."""
+        m = min(self.finger_mass)
+        (_, _, rub_1), (_, _, rub_2) = self.sides
+        return max(finger_friction.rate(rub_1, m), finger_friction.rate(rub_2, m))
+
 
 Force: TypeAlias = Annotated[
     Pair, Input("u_j, actuator force on the finger", unit="N", nominal=1.0)
@@ -135,12 +137,14 @@ def forces(p: Actuator, u: Inputs) -> Pair:
     return _limited(u_1, most_1), _limited(u_2, most_2)
 
 
-def reach(p: Params, velocity: Pair, u: Inputs, h: float) -> Pair:
-    """How far the fingers can get within h seconds, without what holds them back, m."""
-    m_1, m_2 = p.finger_mass
-    v_1, v_2 = velocity
+def deepest(p: Params, position: Pair, velocity: Pair, faces: Pair, u: Inputs, h: float) -> float:
+    """How deep a finger can get into its face, m, within h seconds, without what holds it back."""
+    (x_1, x_2), (v_1, v_2) = position, velocity
+    (m_1, m_2), (right, left) = p.finger_mass, faces
     u_1, u_2 = forces(p.actuator, u)
-    return h * (abs(v_1) + 0.5 * h * abs(u_1) / m_1), h * (abs(v_2) + 0.5 * h * abs(u_2) / m_2)
+    reach_1 = h * (abs(v_1) + 0.5 * h * abs(u_1) / m_1)
+    reach_2 = h * (abs(v_2) + 0.5 * h * abs(u_2) / m_2)
+    return max(right - x_1 + reach_1, x_2 - left + reach_2)
 
 
 def _limited(u: float, most: float) -> float:

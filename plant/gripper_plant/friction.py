@@ -1,16 +1,10 @@
-"""A body that slides or sticks: Coulomb, viscous and Stribeck friction.
-
-    m·x'' = f - sgn(x')·F(|x'|)        F(v) = F_C + (F_S - F_C)·exp(-(v/v_s)^2) + B·v
-
-At rest friction takes up any force up to F_S, and the velocity is exactly zero.
-Card: plant/README.md
-"""
+"""A body that slides or sticks: Coulomb, viscous and Stribeck friction. Card: plant/README.md."""
 
 from dataclasses import dataclass
 from math import copysign, exp
 from typing import Annotated
 
-from block_variables import Parameter, check
+from block_variables import Group, Parameter
 
 Pair = tuple[float, float]
 """A value per finger: right, left."""
@@ -26,12 +20,8 @@ NONE: Law = (0.0, 0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Params:
-    """Parameters; a value outside its declared range raises ValueError.
-
-    The paper's simulation has none, so none is the default. v_s has no source; it matters where F_S
-    > F_C.
-    """
+class Params(Group, name="friction"):
+    """None, as in the paper's simulation. v_s has no source; it matters where F_S > F_C."""
 
     coulomb: Annotated[
         Pair, Parameter("F_Cj, Coulomb friction of the finger", unit="N", low=0.0, high=1e3)
@@ -57,9 +47,6 @@ class Params:
             high=1e3,
         ),
     ] = 0.01
-
-    def __post_init__(self) -> None:
-        check(self, "friction")
 
 
 def laws(p: Params) -> tuple[Law, Law]:

@@ -21,11 +21,7 @@ ITERATIONS = 16
 
 @dataclass(frozen=True)
 class Params(standing.Params):
-    """Parameters; a value outside its declared range raises ValueError.
-
-    Walls ten times as stiff as those of the paper cup in compliant.py: here it is the box that
-    moves.
-    """
+    """Walls ten times as stiff as those of the paper cup in compliant.py: the box moves instead."""
 
     kelvin_voigt: KelvinVoigt = KelvinVoigt(stiffness=10000.0, damping=20.0)
     hunt_crossley: HuntCrossley = HuntCrossley(stiffness=200000.0)
@@ -50,7 +46,7 @@ def initial_state(p: Params, u: Inputs) -> State:
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
     """Advance fingers and box by h seconds (h > 0), the forces held."""
     q, law = standing.shape(p), contact_laws.law(p.kelvin_voigt, p.hunt_crossley)
-    n = substeps.count(_rate(p, q, x, u, h), h)
+    n = substeps.count(_rate(p, q, law, x, u, h), h)
     forces = fingers.forces(p.actuator, u)
     for _ in range(n):
         x = _substep(p, q, law, x, forces, h / n)
@@ -98,15 +94,10 @@ def _substep(p: Params, q: Shape, law: contact_laws.Law, x: State, forces: Pair,
     return State((s_1, -s_2), (w_1, 0.0 - w_2), (f_1, 0.0 - f_2), box, toppled)
 
 
-def _rate(p: Params, q: Shape, x: State, u: Inputs, h: float) -> float:
+def _rate(p: Params, q: Shape, law: contact_laws.Law, x: State, u: Inputs, h: float) -> float:
     """The fastest that a finger and the box can do within h seconds, 1/s."""
-    finger = min(p.finger_mass)
-    (_, _, rub_1), (_, _, rub_2) = p.sides
-    law = contact_laws.law(p.kelvin_voigt, p.hunt_crossley)
-    both = 1.0 / (1.0 / finger + 2.0 / p.object_mass)
-    right, left = standing.faces(q, x.box)
-    reach_1, reach_2 = fingers.reach(p, x.velocity, u, h)
+    both = 1.0 / (1.0 / min(p.finger_mass) + 2.0 / p.object_mass)
     shift = h * (abs(x.box.v) + q.h * abs(x.box.w))
-    deepest = shift + max(right - x.position[0] + reach_1, x.position[1] - left + reach_2)
-    surface = contact_laws.rate(law, deepest, both)
-    return max(surface, friction.rate(rub_1, finger), friction.rate(rub_2, finger))
+    faces = standing.faces(q, x.box)
+    deepest = shift + fingers.deepest(p, x.position, x.velocity, faces, u, h)
+    return max(contact_laws.rate(law, deepest, both), p.friction_rate)

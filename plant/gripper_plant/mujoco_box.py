@@ -1,8 +1,7 @@
 """Two-finger parallel gripper and a box, computed by MuJoCo: a contact that is none of ours.
 
-The box is fixed, as in rigid.py, or stands free on a floor, as in movable.py. Signs as in
-fingers.py; tilt > 0 is over the right edge. mujoco is imported when the first state is made, so
-that all else works without it. Card: plant/README.md
+mujoco is imported when the first state is made, so that all else works without it.
+Card: plant/README.md
 """
 
 from collections.abc import Callable
@@ -40,10 +39,7 @@ Coordinates = tuple[float, float, float, float, float]
 
 @dataclass(frozen=True)
 class Params(standing.Params):
-    """Parameters; a value outside its declared range raises ValueError.
-
-    T = 5 ms is alpha = beta = 200 1/s of rigid.py, and fifty timesteps long.
-    """
+    """T = 5 ms is alpha = beta = 200 1/s of rigid.py, and fifty timesteps long."""
 
     object_fixed: Annotated[
         bool, Parameter("the object is fixed; off, it stands free on a floor")
@@ -162,7 +158,6 @@ def mjcf(p: Params) -> str:
 
     Only what is paired touches: fingertips and box without friction, box and floor with it.
     """
-    m_1, m_2 = p.finger_mass
     b, a, m, mu, h = _shape(p)
     r = p.fingertip_radius
     turning = m * (a * a + b * b) / 3.0
@@ -178,9 +173,8 @@ def mjcf(p: Params) -> str:
         {rubbing}/>
       <geom name="finger {j}" type="sphere" pos="{side * r!r} 0 0" size="{r!r}"/>
     </body>"""
-        for j, side, mass, viscous, coulomb in (
-            (1, 1.0, m_1, p.friction.viscous[0], p.friction.coulomb[0]),
-            (2, -1.0, m_2, p.friction.viscous[1], p.friction.coulomb[1]),
+        for j, side, mass, viscous, coulomb in zip(
+            (1, 2), (1.0, -1.0), p.finger_mass, p.friction.viscous, p.friction.coulomb, strict=True
         )
     )
     moving = f"""
@@ -279,13 +273,5 @@ def _simulator(p: Params) -> Simulator:
         raise ImportError(reason) from error
     model = mujoco.MjModel.from_xml_string(mjcf(p))
     data = mujoco.MjData(model)
-    return Simulator(
-        mujoco.mj_step,
-        model,
-        data,
-        data.qpos,
-        data.qvel,
-        data.qacc_warmstart,
-        data.qfrc_applied,
-        data.qfrc_constraint,
-    )
+    arrays = data.qpos, data.qvel, data.qacc_warmstart, data.qfrc_applied, data.qfrc_constraint
+    return Simulator(mujoco.mj_step, model, data, *arrays)

@@ -16,10 +16,9 @@ from .fingers import Pair as Pair
 
 @dataclass(frozen=True)
 class Params(fingers.Params):
-    """Parameters; a value outside its declared range raises ValueError.
+    """Critical damping, alpha = beta: the paper names Baumgarte's method but no rates.
 
-    The paper names Baumgarte's method but no rates. alpha = beta is critical damping; at 200 1/s a
-    finger that arrives with 6 mm/s sinks in by 11 um and is back within some 20 ms.
+    At 200 1/s a finger that arrives with 6 mm/s sinks in by 11 um and is back within some 20 ms.
     """
 
     baumgarte_alpha: Annotated[

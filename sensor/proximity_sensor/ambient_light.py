@@ -1,20 +1,17 @@
-"""Ambient light: the raw voltage has an offset, which may drift after its calibration.
+"""Ambient light: the raw voltage has an offset, c = 0.35 V as in the paper's fit, Sec. IV.A.
 
-    c(t) = c + drift·t,   c = 0.35 V as in the paper's fit, Sec. IV.A
-
-The compensation at the end of the chain takes off the calibrated value c, not the drift. The run
-begins with the calibration.
+It may drift after the calibration, with which the run begins. Card: sensor/README.md
 """
 
 from dataclasses import dataclass
 from typing import Annotated
 
-from block_variables import Parameter, check
+from block_variables import Group, Parameter
 
 
 @dataclass(frozen=True, slots=True)
-class Params:
-    """Parameters; a value outside its declared range raises ValueError."""
+class Params(Group, name="ambient"):
+    """The offset, and what becomes of it."""
 
     enabled: Annotated[bool, Parameter("offset by ambient light, and its compensation")] = False
     offset: Annotated[
@@ -24,9 +21,6 @@ class Params:
         float,
         Parameter("rate of the offset after the calibration", unit="V/s", low=-10.0, high=10.0),
     ] = 0.0
-
-    def __post_init__(self) -> None:
-        check(self, "ambient")
 
 
 def voltage(p: Params, t: float) -> float:

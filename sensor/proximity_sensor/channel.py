@@ -2,10 +2,7 @@
 
     optics (Eq. 9, stripes) -> + ambient offset -> + noise -> ADC -> low-pass -> median -> - offset
 
-With a stage of the electronics on, the channel samples at its own rate and holds the last result.
-It sees the gap as an FMU does, held from one communication point to the next; a sample that falls
-on a communication point sees the gap of that point. Without, the output is that of the optics, bit
-for bit. Card: sensor/README.md
+When it samples, and which gap it sees then: sensor/README.md.
 """
 
 from dataclasses import dataclass
@@ -30,9 +27,6 @@ from .optics import outputs as seen
 
 Inputs = optics.Inputs
 Outputs = optics.Outputs
-
-NOTHING = optics.State()
-"""The optics have no memory."""
 
 GIVEN_WITH_CUSTOM_ONLY = optics.Params().reflectance
 """The reflectance beside a surface that is chosen by name, which has its own."""
@@ -138,7 +132,7 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     """Of the sample that is due now, which sees the gap u, or else of the last one."""
     if p.plain:
-        return seen(p, NOTHING, u)
+        return seen(p, u)
     light = _light(p, u)
     if not p.sampled:
         return Outputs(light)
@@ -151,7 +145,7 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
 
 def _light(p: Params, u: Inputs) -> float:
     """The intensity xi in V, of a striped surface if it is one."""
-    xi = seen(p, NOTHING, u).intensity
+    xi = seen(p, u).intensity
     if not p.pattern.enabled:
         return xi
     return xi * stripes.factor(p.pattern, 0.0 if u.gap < 0.0 else u.gap)

@@ -1,33 +1,26 @@
 """The sampling instants: k / rate after the start, k = 0, 1, 2, ..., whatever the steps are.
 
-A sample at the end of a step belongs to the next one, whose inputs it sees. The time to the next
-instant is counted in periods, so that nothing adds up over a run but the rounding of the steps: a
-millionth of a period is room for ten thousand million of them.
+The time to the next one is counted in periods, so that nothing adds up over a run but the rounding
+of the steps: a millionth of a period is room for ten thousand million of them.
 """
 
 from dataclasses import dataclass
 from math import ceil
 from typing import Annotated
 
-from block_variables import Parameter, check
+from block_variables import Group, Parameter
 
 TOLERANCE = 1e-6
 """How near, in periods, an instant counts as reached; a nanosecond at 1 kHz."""
 
 
 @dataclass(frozen=True, slots=True)
-class Params:
-    """Parameters; a value outside its declared range raises ValueError.
-
-    10 kHz is the sampling rate of the paper's bench, Sec. IV.B.
-    """
+class Params(Group, name="sampling"):
+    """10 kHz is the sampling rate of the paper's bench, Sec. IV.B."""
 
     rate: Annotated[
         float, Parameter("sampling rate, where a stage is on", unit="Hz", low=1.0, high=1e6)
     ] = 10_000.0
-
-    def __post_init__(self) -> None:
-        check(self, "sampling")
 
 
 def due(wait: float) -> bool:

@@ -7,15 +7,12 @@ from dataclasses import dataclass
 from math import floor, ldexp
 from typing import Annotated
 
-from block_variables import Parameter, check
+from block_variables import Group, Parameter
 
 
 @dataclass(frozen=True, slots=True)
-class Params:
-    """Parameters; a value outside its declared range raises ValueError.
-
-    16 bits over 20 V are usual for controllers like the paper's.
-    """
+class Params(Group, name="adc"):
+    """16 bits over 20 V are usual for controllers like the paper's."""
 
     enabled: Annotated[bool, Parameter("conversion to digital values")] = False
     bits: Annotated[int, Parameter("resolution", low=1, high=32)] = 16
@@ -25,7 +22,7 @@ class Params:
     ] = (-10.0, 10.0)
 
     def __post_init__(self) -> None:
-        check(self, "adc")
+        Group.__post_init__(self)
         low, high = self.range
         if not low < high:
             raise ValueError(f"adc.range = {low!r}, {high!r} V: the second must be above the first")

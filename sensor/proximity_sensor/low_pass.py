@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from math import cos, pi, tan
 from typing import Annotated
 
-from block_variables import Parameter, check
+from block_variables import Group, Parameter
 
 Section = tuple[float, float, float]
 """b_0, a_1, a_2 of b_0·(1 + 2/z + 1/z^2) / (1 + a_1/z + a_2/z^2)."""
@@ -23,11 +23,8 @@ Memory = tuple[float, float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Params:
-    """Parameters; a value outside its declared range raises ValueError.
-
-    500 Hz is the cutoff of the paper's bench, Sec. IV.B.
-    """
+class Params(Group, name="filter"):
+    """500 Hz is the cutoff of the paper's bench, Sec. IV.B."""
 
     enabled: Annotated[bool, Parameter("low-pass filter, Butterworth of 5th order")] = False
     cutoff: Annotated[
@@ -36,9 +33,6 @@ class Params:
             "-3 dB, below half the sampling rate where enabled", unit="Hz", low=1e-3, high=5e5
         ),
     ] = 500.0
-
-    def __post_init__(self) -> None:
-        check(self, "filter")
 
 
 def coefficients(cutoff: float, rate: float) -> Coefficients:

@@ -69,16 +69,12 @@ def stream(number: float) -> State:
 
 def _square(a: Matrix, m: float) -> Matrix:
     r_1, r_2, r_3 = a
-    c_1, c_2, c_3 = (
-        _image(a, (r_1[0], r_2[0], r_3[0]), m),
-        _image(a, (r_1[1], r_2[1], r_3[1]), m),
-        _image(a, (r_1[2], r_2[2], r_3[2]), m),
+    columns = (
+        (r_1[0], r_2[0], r_3[0]),
+        (r_1[1], r_2[1], r_3[1]),
+        (r_1[2], r_2[2], r_3[2]),
     )
-    return (
-        (c_1[0], c_2[0], c_3[0]),
-        (c_1[1], c_2[1], c_3[1]),
-        (c_1[2], c_2[2], c_3[2]),
-    )
+    return _image(columns, r_1, m), _image(columns, r_2, m), _image(columns, r_3, m)
 
 
 def _image(a: Matrix, v: Vector, m: float) -> Vector:

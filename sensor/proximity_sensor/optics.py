@@ -11,10 +11,7 @@ from block_variables import Input, Output, Parameter, check
 
 @dataclass(frozen=True, slots=True)
 class Params:
-    """Parameters; a value outside its declared range raises ValueError.
-
-    K and n are the paper's fit to the white surface, R^2 = 0.9992; l_0 is by design of the sensor.
-    """
+    """K and n are the paper's fit to the white surface, R^2 = 0.9992; l_0 is by design."""
 
     reflectance: Annotated[
         float,
@@ -55,10 +52,6 @@ class Inputs(NamedTuple):
     ] = 0.1
 
 
-class State(NamedTuple):
-    """The optics have no memory."""
-
-
 class Outputs(NamedTuple):
     """What the sensor delivers."""
 
@@ -67,17 +60,7 @@ class Outputs(NamedTuple):
     ]
 
 
-def initial_state(p: Params, u: Inputs) -> State:
-    """Nothing to remember."""
-    return State()
-
-
-def step(p: Params, x: State, u: Inputs, h: float) -> State:
-    """Nothing changes by itself in h seconds."""
-    return x
-
-
-def outputs(p: Params, x: State, u: Inputs) -> Outputs:
+def outputs(p: Params, u: Inputs) -> Outputs:
     """Eq. (9). The spacer keeps the object off the element: a gap below zero reads as zero."""
     l = 0.0 if u.gap < 0.0 else u.gap
     return Outputs(p.gain * p.alpha / (l + p.offset_distance) ** p.diffusion_exponent)

@@ -1,23 +1,15 @@
-"""A striped surface: the reflectance changes along the approach.
-
-Stripes of half a period each, by turns with the reflectance alpha and with ratio·alpha. At the gap
-equal to phase the sensor looks at the middle of a stripe of alpha; from one to the next the
-reflectance changes linearly over the length edge, since the spot of light is no point.
-"""
+"""A striped surface: the reflectance changes along the approach. Card: sensor/README.md."""
 
 from dataclasses import dataclass
 from math import floor
 from typing import Annotated
 
-from block_variables import Parameter, check
+from block_variables import Group, Parameter
 
 
 @dataclass(frozen=True, slots=True)
-class Params:
-    """Parameters; a value outside its declared range raises ValueError.
-
-    The ratio is that of the paper's black paper to the white one; the lengths have no source.
-    """
+class Params(Group, name="pattern"):
+    """The ratio is that of the paper's black paper to the white one; the lengths have no source."""
 
     enabled: Annotated[bool, Parameter("the surface is striped along the approach")] = False
     ratio: Annotated[
@@ -36,9 +28,6 @@ class Params:
         float,
         Parameter("length over which stripes blend, a spot of light", unit="m", low=1e-9, high=1.0),
     ] = 0.002
-
-    def __post_init__(self) -> None:
-        check(self, "pattern")
 
 
 def factor(p: Params, l: float) -> float:

@@ -57,9 +57,9 @@ def checked(name: str, checkout: Path) -> tuple[list[Any], Any]:
     """
     image = pytest.importorskip("matplotlib.image")
     tutorials = load_tutorials()
-    do = tutorials.Recorder(checkout / "recorded")
-    assert tutorials.filled(page(name), do) == page(name), "run: docs/tutorials.py"
-    tables = tutorials.tables_of(page(name), do)
+    do = tutorials.recorder(checkout / "recorded")
+    text, tables = tutorials.worked_out(page(name), do)
+    assert text == page(name), "run: docs/tutorials.py"
     drawn = checkout / "drawn"
     drawn.mkdir()
     tutorials.PAGES[name](tables, drawn)

@@ -5,7 +5,7 @@ from math import inf, nan
 from typing import Annotated, Any
 
 import pytest
-from block_variables import Input, Output, Parameter, check, check_value
+from block_variables import Group, Input, Output, Parameter, check, check_value
 
 
 @dataclass(frozen=True)
@@ -17,6 +17,16 @@ class Inner:
 
     def __post_init__(self) -> None:
         check(self, "inner")
+
+
+@dataclass(frozen=True, slots=True)
+class Slotted(Group, name="slotted"):
+    share: Annotated[float, Parameter("a share", low=0.0, high=1.0)] = 0.5
+
+
+@dataclass(frozen=True)
+class Open(Group, name="open"):
+    share: Annotated[float, Parameter("a share", low=0.0, high=1.0)] = 0.5
 
 
 @dataclass(frozen=True)
@@ -40,6 +50,8 @@ class More(Params):
     ("kind", "values", "said"),
     [
         (Inner, {"rate": (0.0, 3.5)}, "inner.rate = 3.5 1/s: must be from -2 to 3 1/s"),
+        (Slotted, {"share": 2.0}, "slotted.share = 2.0: must be from 0 to 1"),
+        (Open, {"share": nan}, "open.share = nan: must be from 0 to 1"),
         (Params, {"bits": 10}, "bits = 10: must be from 1 to 9"),
         (Params, {"offset": 1.5}, "offset = 1.5 m: must be from -inf to 1 m"),
         (Params, {"offset": -inf}, "offset = -inf m: must be from -inf to 1 m"),

@@ -71,9 +71,9 @@ class Grasp:
 
 def seen(sensors: tuple[optics.Params, optics.Params], gap: Pair) -> Pair:
     p_1, p_2 = sensors
-    x, (l_1, l_2) = optics.State(), gap
-    xi_1 = optics.outputs(p_1, x, optics.Inputs(l_1)).intensity
-    return xi_1, optics.outputs(p_2, x, optics.Inputs(l_2)).intensity
+    l_1, l_2 = gap
+    xi_1 = optics.outputs(p_1, optics.Inputs(l_1)).intensity
+    return xi_1, optics.outputs(p_2, optics.Inputs(l_2)).intensity
 
 
 def around(x_m: float, width: float = 0.07) -> rigid.Params:

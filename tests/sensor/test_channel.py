@@ -97,7 +97,7 @@ def test_off_it_is_the_optics(eye: optics.Params, gap: float, before: float) -> 
     p = Params(eye.reflectance, eye.gain, eye.diffusion_exponent, eye.offset_distance)
     x = channel.initial_state(p, Inputs(before))
     assert channel.step(p, x, Inputs(before), 1e-3) is x
-    assert channel.outputs(p, x, Inputs(gap)) == optics.outputs(eye, optics.State(), Inputs(gap))
+    assert channel.outputs(p, x, Inputs(gap)) == optics.outputs(eye, Inputs(gap))
 
 
 def test_parameters_of_a_stage_that_is_off_do_nothing() -> None:

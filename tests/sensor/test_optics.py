@@ -5,8 +5,8 @@ from math import exp, isnan, log, nan
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from proximity_sensor import optics
-from proximity_sensor.optics import Inputs, Params, State
+from proximity_sensor import channel, optics
+from proximity_sensor.optics import Inputs, Params
 from support.declared import Parameter, parameters
 from support.examples import examples
 
@@ -26,7 +26,7 @@ SENSORS = st.builds(
 
 
 def intensity(p: Params, gap: float) -> float:
-    return optics.outputs(p, State(), Inputs(gap)).intensity
+    return optics.outputs(p, Inputs(gap)).intensity
 
 
 @QUICK
@@ -82,9 +82,10 @@ def test_a_gap_that_is_no_number_is_not_taken_for_contact() -> None:
 
 
 def test_the_optics_have_no_memory() -> None:
-    x = optics.initial_state(Params(), Inputs(0.1))
-    x = optics.step(Params(), x, Inputs(0.001), 1e-3)
-    assert optics.outputs(Params(), x, Inputs(0.1)).intensity == intensity(Params(), 0.1)
+    p = channel.Params()
+    x = channel.initial_state(p, Inputs(0.1))
+    x = channel.step(p, x, Inputs(0.001), 1e-3)
+    assert channel.outputs(p, x, Inputs(0.1)).intensity == intensity(Params(), 0.1)
 
 
 @pytest.mark.parametrize("parameter", PARAMETERS, ids=lambda p: p.name)

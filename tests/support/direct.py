@@ -60,10 +60,9 @@ def _sense(sensors: Sensors, y: rigid.Outputs) -> tuple[optics.Outputs, optics.O
     """The optics have no memory, so their outputs are all there is to them."""
     p_1, p_2 = sensors
     gap_1, gap_2 = y.gap
-    nothing = optics.State()
     return (
-        optics.outputs(p_1, nothing, optics.Inputs(gap_1)),
-        optics.outputs(p_2, nothing, optics.Inputs(gap_2)),
+        optics.outputs(p_1, optics.Inputs(gap_1)),
+        optics.outputs(p_2, optics.Inputs(gap_2)),
     )
 
 
