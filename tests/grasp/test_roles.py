@@ -23,7 +23,9 @@ from grasp_cosim.recording.result import UNITS
 from hypothesis import given
 from hypothesis import strategies as st
 
-LOST = ('no metrics of the grasp: no component is the plant; name it under [roles]: plant = "..."',)
+LOST = (
+    'no metrics of the grasp: no component is the plant; name it under [roles]: plant = "gripper"',
+)
 NAMES = {"plant": "gripper", "sensor_1": "right", "sensor_2": "left", "controller": "brain"}
 
 

@@ -78,8 +78,9 @@ def test_a_component_plays_the_role_of_its_name_where_no_other_does() -> None:
     [
         ("plant.force", {}, "plant lacks force"),
         ("arm.force", {"arm": "plant"}, "plant lacks force"),
-        ("arm.gap", {}, 'no component is the arm; name it under [roles]: arm = "..."'),
-        ("plan.gap", {}, 'no component is the plan; name it under [roles]: plan = "..."'),
+        ("arm.mass", {}, 'no component is the arm; name it under [roles]: arm = "..."'),
+        ("arm.gap", {}, 'no component is the arm; name it under [roles]: arm = "plant"'),
+        ("plan.gap", {}, 'no component is the plan; name it under [roles]: plan = "plant"'),
     ],
 )
 def test_a_signal_that_is_not_there_is_missed_with_the_reason(
@@ -206,6 +207,36 @@ def test_a_signal_that_a_grasp_lacks_is_said_once(without: str, reason: str) -> 
         "no metrics of the grasp: no component is the controller; name it under [roles]: "
         'controller = "..."',
     )
+
+
+def test_a_grasp_whose_components_have_other_names_is_told_of_the_roles() -> None:
+    run = grasp_signals()
+    names = {"plant": "gripper", "controller": "law"}
+    other = {
+        f"{names[component]}.{variable}": column
+        for (component, _, variable), column in ((n.partition("."), run[n]) for n in run)
+    }
+    line = "no metrics of the grasp: no component is the {}; name it under [roles]: {}"
+    missing = measure(Signals(run.time, other), METRICS).missing
+    assert missing == (line.format("controller", 'controller = "law"'),)
+    missing = measure(Signals(run.time, other, {"controller": "law"}), METRICS).missing
+    assert missing == (line.format("plant", 'plant = "gripper"'),)
+    roles = {"controller": "law", "plant": "gripper"}
+    assert measure(Signals(run.time, other, roles), METRICS) == measure(run, METRICS)
+
+
+def test_a_metric_without_a_description_has_the_first_line_of_its_docstring() -> None:
+    def documented(run: Signals) -> float:
+        """Half the gap.
+
+        And more.
+        """
+        return float(run["plant.gap"][0]) / 2
+
+    assert metric("half")(documented).description == "Half the gap."
+    assert metric("half", description="said")(documented).description == "said"
+    assert metric("half")(lambda run: 0.0).description == ""
+    assert all(m.description for m in METRICS)
 
 
 def test_a_system_that_plays_no_role_of_a_group_is_not_told_of_it() -> None:

@@ -7,6 +7,7 @@ To add one, write a function under @of_grasp or @of_fingers. It gets signals by 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import wraps
 from math import copysign, degrees
 from typing import Any, NamedTuple
 
@@ -71,9 +72,11 @@ def of_fingers(
     """Make a function of signals and finger a metric with a value per finger, [right, left]."""
 
     def enter(function: Callable[[Signals, int], Value]) -> Callable[[Signals, int], Value]:
-        of_grasp(name, unit, entries=ENTRIES, **more)(
-            lambda signals: [function(signals, j) for j in FINGERS]
-        )
+        @of_grasp(name, unit, entries=ENTRIES, **more)
+        @wraps(function)
+        def per_finger(signals: Signals) -> list[Value]:
+            return [function(signals, j) for j in FINGERS]
+
         return function
 
     return enter
@@ -182,20 +185,21 @@ def object_shift(signals: Signals) -> float:
     return float(np.abs(position - position[0]).max())
 
 
-def _of_object(name: str, unit: str | None, output: str, label: str) -> None:
+def _of_object(name: str, unit: str | None, output: str, label: str, description: str) -> None:
     """A metric of plants with an output of that name: its largest value, or if it was ever true."""
     key = f"plant.{output}"
+    how = {"label": label, "description": description, "optional": True}
 
-    @of_grasp(name, unit, label=label, needs=(*NEEDS, key), optional=True)
+    @of_grasp(name, unit, needs=(*NEEDS, key), **how)
     def largest(signals: Signals) -> float | bool:
         found = np.abs(signals[key]).max()
         return bool(found) if unit is None else float(found)
 
 
-_of_object("object_tilt", "rad", "tilt", "object tilt")
-_of_object("toppled", None, "toppled", "object toppled")
-_of_object("squeeze", "m", "squeeze", "object squeezed by")
-_of_object("damaged", None, "damaged", "object damaged")
+_of_object("object_tilt", "rad", "tilt", "object tilt", "Largest tilt of the object, either way.")
+_of_object("toppled", None, "toppled", "object toppled", "True if the object fell over.")
+_of_object("squeeze", "m", "squeeze", "object squeezed by", "Largest loss of width of the object.")
+_of_object("damaged", None, "damaged", "object damaged", "True if the object was squeezed too far.")
 
 METRICS = tuple(_found)
 """The metrics of a grasp, in the order in which they are shown."""

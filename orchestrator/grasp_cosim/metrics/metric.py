@@ -150,13 +150,19 @@ def _registered(name: str) -> Metric:
 def metric(name: str, **more: Any) -> Callable[[Function], Metric]:
     """Make a Metric of the function below; `more` are the other fields of a Metric by keyword.
 
-    InputError where `name` is no identifier, so that it can be a column and a key, or RESERVED.
+    Without a `description` it is the first line of the function's docstring. InputError where
+    `name` is no identifier, so that it can be a column and a key, or RESERVED.
     """
     if not name.isidentifier():
         raise InputError(f"metric {name!r}: must be a name of letters, digits and _")
     if name in RESERVED:
         raise InputError(f"metric {name!r}: every run has this beside; must have another name")
-    return lambda function: Metric(name, function, **more)
+
+    def made(function: Function) -> Metric:
+        first, *_ = (function.__doc__ or "").strip().splitlines() or [""]
+        return Metric(name, function, **{"description": first, **more})
+
+    return made
 
 
 @dataclass(frozen=True, slots=True)
@@ -227,8 +233,9 @@ def measure(signals: Signals, metrics: Iterable[Metric]) -> Measured:
     """The values of `metrics` in their order, and a line for each that cannot be had.
 
     A line like "no metrics of the grasp: plant lacks contact[1]". A group none of whose roles is
-    played by a component is not of this system, which is no news. A function that fails, or that
-    returns something else than a Metric may have, is a line like "metric 'own': ValueError: ...".
+    played by a component, or could be, is not of this system, which is no news. A function that
+    fails, or that returns something else than a Metric may have, is a line like
+    "metric 'own': ValueError: ...".
     """
     there, missing = available(metrics, signals.by_name, signals.roles)
     values: dict[str, Any] = {}
@@ -262,13 +269,15 @@ def available(
 
 def lacking(needs: Iterable[str], names: Collection[str], roles: Mapping[str, str]) -> str | None:
     """Why signals of these `names` do not have all that is needed; None where they do."""
+    needs = tuple(needs)
     for need in needs:
         if resolved(need, roles) in names:
             continue
         role, _, variable = need.partition(".")
         component = roles.get(role, role)
         if not _plays(component, names):
-            return f'no component is the {role}; name it under [roles]: {role} = "..."'
+            able = next(iter(_able(role, needs, names)), "...")
+            return f'no component is the {role}; name it under [roles]: {role} = "{able}"'
         return f"{component} lacks {variable}"
     return None
 
@@ -284,9 +293,17 @@ def _plays(component: str, names: Iterable[str]) -> bool:
 
 
 def _unknown(needs: Iterable[str], names: Collection[str], roles: Mapping[str, str]) -> bool:
-    """True if no component plays any role of what is needed."""
-    played = {roles.get(role, role) for role in (need.partition(".")[0] for need in needs)}
-    return not any(_plays(component, names) for component in played)
+    """True if no component plays any role of what is needed, and none could play one of them."""
+    needed = {need.partition(".")[0] for need in needs}
+    played = any(_plays(roles.get(role, role), names) for role in needed)
+    return not played and not all(_able(role, needs, names) for role in needed)
+
+
+def _able(role: str, needs: Iterable[str], names: Collection[str]) -> list[str]:
+    """The components that have all that is needed of a role, sorted."""
+    wanted = [need.removeprefix(f"{role}.") for need in needs if need.startswith(f"{role}.")]
+    components = sorted({name.partition(".")[0] for name in names})
+    return [c for c in components if all(f"{c}.{variable}" in names for variable in wanted)]
 
 
 def _plain(m: Metric, found: Any) -> Any:

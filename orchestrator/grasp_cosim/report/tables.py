@@ -62,7 +62,8 @@ def _metric(title: str, values: Sequence[Any], metric: Metric, columns: int) -> 
     one = f' class="both" colspan="{max(columns, 1)}"'
     how = one if len(values) == 1 else ' class="n"'
     cells = "".join(f"<td{how}>{escape(_scaled(v, metric.factor))}</td>" for v in values)
-    return f"<td>{escape(title)}</td>{cells}<td>{escape(metric.display_unit)}</td>"
+    note = f' title="{escape(metric.description)}"' if metric.description else ""
+    return f"<td{note}>{escape(title)}</td>{cells}<td>{escape(metric.display_unit)}</td>"
 
 
 def _scaled(value: Any, factor: float) -> str:
