@@ -46,6 +46,7 @@ def test_the_bytes_are_those_of_any_number_of_workers(tmp_path: Path) -> None:
         assert len(row["error"].splitlines()) == 1
     assert one.failed == 3
     assert one.as_json()["first_error"] == rows[1]["error"]
+    assert one.as_json()["units"] == {"a.x": study.variable("a.x").unit, "a.steps": None}
     bound = json.loads(table.schema.metadata[b"grasp_cosim"])
     assert bound == {"study": "study.toml", **study.identity}
 

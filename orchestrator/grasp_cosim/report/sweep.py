@@ -64,7 +64,7 @@ def _draw_map(sweep: Sweep, wanted: Map, path: Path) -> None:
             _plain_ticks(axes.yaxis)
         if wanted.limit is not None and _crosses(cells[2], wanted.limit):
             axes.contour(*cells, levels=[wanted.limit], colors=RED, linewidths=1.5)
-            unit = _unit(sweep.study, wanted.of) or ""
+            unit = sweep.study.unit(wanted.of) or ""
             label = f"{_title(sweep.study, wanted.of)} = {wanted.limit:g} {unit}".rstrip()
             axes.plot([], [], color=RED, label=label)
     else:
@@ -198,7 +198,7 @@ def _runs(count: int) -> str:
 
 def _label(study: Study, name: str) -> str:
     """A parameter or metric with its unit."""
-    unit, title = _unit(study, name), _title(study, name)
+    unit, title = study.unit(name), _title(study, name)
     return f"{title} in {unit}" if unit and unit != "1" else title
 
 
@@ -206,16 +206,6 @@ def _title(study: Study, name: str) -> str:
     metric = study.metric_of(name)
     known = metric is not None and name in metric.columns
     return _plain(metric.column_title(name) if metric and known else name)
-
-
-def _unit(study: Study, name: str) -> str | None:
-    for p in study.parameters:
-        if p.name == name:
-            return None if p.ratio_to is not None else study.variable(p.variables[0]).unit
-    if name in study.outputs:
-        return study.variable(name).unit
-    metric = study.metric_of(name)
-    return metric.unit if metric else None
 
 
 def _plain(name: str) -> str:

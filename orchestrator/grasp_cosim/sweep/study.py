@@ -252,6 +252,17 @@ class Study:
             return found
         return None
 
+    def unit(self, column: str) -> str | None:
+        """The unit of a parameter, metric or output; "1" for a share, None where it has none."""
+        parameter = next((p for p in self.parameters if p.name == column), None)
+        if parameter is not None:
+            own = self.variable(parameter.variables[0]).unit
+            return own if parameter.ratio_to is None else "1"
+        if column in self.outputs:
+            return self.variable(column).unit
+        metric = self.metric_of(column)
+        return metric.unit if metric else None
+
     @property
     def _declared(self) -> list[str]:
         """All outputs."""

@@ -65,6 +65,7 @@ class Sweep:
             "failed": self.failed,
             "first_error": next((o.error for o in self.outcomes if o.error is not None), None),
             "metrics": self.table.summary(),
+            "units": {n: self.study.unit(n) for n in self.table.metrics},
             "sensitivity": [asdict(s) for s in self.sensitivities],
         }
 

@@ -109,6 +109,15 @@ def test_every_published_figure_has_its_row(report: dict[str, Any]) -> None:
 
 
 @pytest.mark.slow
+def test_every_number_has_a_unit(report: dict[str, Any]) -> None:
+    units = report["units"]
+    named = [*report["rows"], *report["runs"]]
+    assert {name for entry in named for name in entry} - {"table", "finger", "case"} <= set(units)
+    assert (units["rms"], units["simulated"], units["condition"]) == ("s", "s", "m")
+    assert (units["time_to_contact"], units["peak_contact_force"]) == ("s", "N")
+
+
+@pytest.mark.slow
 def test_everything_is_written(report: dict[str, Any], out: Path) -> None:
     pictures = {"contact_forces.png", "target_position.png", "contact_times.png"}
     names = {path.name for path in out.iterdir()}

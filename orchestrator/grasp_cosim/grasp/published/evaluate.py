@@ -73,6 +73,7 @@ def evaluate(
             }
             for r in runs.values()
         ],
+        "units": _units(rows, next(iter(runs.values()))),
     }
     _draw_signals(runs, how.shown, out)
     _draw_times(rows, out / "contact_times.png")
@@ -81,6 +82,13 @@ def evaluate(
     write_json(out / "evaluation.json", report)
     write_text(out / "report.md", how.page(report, system))
     return report
+
+
+def _units(rows: Sequence[Mapping[str, Any]], run: Run) -> dict[str, str | None]:
+    """The unit of each entry of rows, rms and runs; a condition that is a number is a position."""
+    times = [name for name, value in rows[0].items() if isinstance(value, float)]
+    own = {name: unit for name, unit in run.units.items() if name not in BOOKKEEPING}
+    return {**dict.fromkeys([*times, "rms"], "s"), "condition": "m", **own}
 
 
 def _run(job: tuple[System, Setting, int, Source]) -> Run:
