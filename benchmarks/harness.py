@@ -1,4 +1,4 @@
-"""What the benchmarks share: the FMUs, programs that answer, measuring by turns, and tables.
+"""Shared by the benchmarks: the FMUs, programs that answer, measuring by turns, and tables.
 
 A native FMU has the whole model description of one of ours, so that its ports, units and values are
 the same, and another binary: see native/lag.c. It needs gcc; the headers of FMI are those that FMPy

@@ -133,7 +133,7 @@ def step(p: Params, s: State, u: Inputs, h: float) -> State:
 
 
 def outputs(p: Params, s: State, u: Inputs) -> Outputs:
-    """What the sensors see."""
+    """The outputs, as the sensors see them."""
     gap_1, gap_2 = _gaps(p, s)
     return Outputs(
         s.position,
@@ -163,7 +163,7 @@ def _gaps(p: Params, s: State) -> Pair:
 
 
 def _push(p: Params, gap: float, rate: float) -> float:
-    """What a face does to a fingertip at a gap in m that grows by rate in m/s, N."""
+    """Force of a face on a fingertip at a gap in m that grows by rate in m/s, in N."""
     return max(0.0, -p.face_stiffness * gap - p.face_damping * rate) if gap < 0.0 else 0.0
 
 

@@ -84,7 +84,7 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
 
 
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:
-    """What the sensors see; no input reaches an output without a step."""
+    """The outputs, as the sensors see them; no input reaches an output without a step."""
     x_1, x_2 = x.position
     (right, _, _), (left, _, _) = p.sides
     gap_1, gap_2 = x_1 - right, -x_2 - left

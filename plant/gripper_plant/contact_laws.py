@@ -69,7 +69,7 @@ def rate(law: Law, deepest: float, m: float) -> float:
 
 
 def energy(law: Law, depth: float) -> float:
-    """What is stored at a depth in m, J; none above the surface."""
+    """Energy stored at a depth in m, in J; none above the surface."""
     k, n, _, _ = law
     return k * power(depth, n + 1.0) / (n + 1.0) if depth > 0.0 else 0.0
 
@@ -92,5 +92,5 @@ def mean_force(law: Law, before: float, after: float, d: float) -> float:
 
 
 def settled(found: float, before: float) -> bool:
-    """Whether an iteration need not go on from one contact force in N to the next."""
+    """True if an iteration need not go on from one contact force in N to the next."""
     return abs(found - before) <= SETTLED * found

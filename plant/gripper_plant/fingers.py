@@ -17,7 +17,7 @@ from .friction import Pair as Pair
 
 @dataclass(frozen=True, slots=True)
 class Actuator(Group, name="actuator"):
-    """What the actuators can do."""
+    """Limits of the actuators."""
 
     force_limit: Annotated[
         Pair,
@@ -127,7 +127,7 @@ Contact: TypeAlias = Annotated[
 ObjectPosition: TypeAlias = Annotated[
     float, Output("centre of the object", unit="m", nominal=0.1, depends_on=set())
 ]
-"""What every plant puts out, in this order."""
+"""The outputs of every plant, in this order."""
 
 
 def forces(p: Actuator, u: Inputs) -> Pair:

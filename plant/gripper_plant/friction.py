@@ -59,7 +59,7 @@ def laws(p: Params) -> tuple[Law, Law]:
 
 
 def acts(law: Law) -> bool:
-    """Whether there is any friction."""
+    """True if there is any friction."""
     _, static, viscous, _ = law
     return static > 0.0 or viscous > 0.0
 

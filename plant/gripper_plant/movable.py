@@ -54,7 +54,7 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
 
 
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:
-    """What the sensors see; no input reaches an output without a step."""
+    """The outputs, as the sensors see them; no input reaches an output without a step."""
     x_1, x_2 = x.position
     q = standing.shape(p)
     right, left = standing.faces(q, x.box)

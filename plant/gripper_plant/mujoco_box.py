@@ -137,7 +137,7 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
 
 
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:
-    """What the sensors see; no input reaches an output without a step."""
+    """The outputs, as the sensors see them; no input reaches an output without a step."""
     x_1, x_2, middle, _, tilt = x.q
     radius = p.fingertip_radius
     gap_1, gap_2 = _distance(p, x.q, x_1 + radius), _distance(p, x.q, x_2 - radius)
@@ -227,7 +227,7 @@ def _timesteps(p: Params, x: State, forces: Pair, h: float) -> int:
 
 
 def _contact_forces(p: Params, s: Simulator) -> Pair:
-    """What the box does to the fingers in N: all constraints' forces but that of friction."""
+    """Forces of the box on the fingers in N: all constraints' forces but that of friction."""
     f_1, f_2 = s.constraint_force[:2].tolist()
     c_1, c_2 = p.friction.coulomb
     if c_1 > 0.0 or c_2 > 0.0:

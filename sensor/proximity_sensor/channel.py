@@ -73,13 +73,13 @@ class Params(optics.Params):
 
     @cached_property
     def sampled(self) -> bool:
-        """Whether a stage of the electronics is on."""
+        """True if a stage of the electronics is on."""
         stages = (self.ambient, self.noise, self.adc, self.filter, self.median)
         return any(stage.enabled for stage in stages)
 
     @cached_property
     def plain(self) -> bool:
-        """Whether there is nothing but Eq. (9)."""
+        """True if there is nothing but Eq. (9)."""
         return not (self.sampled or self.pattern.enabled)
 
     @cached_property
@@ -89,7 +89,7 @@ class Params(optics.Params):
 
 
 class Chain(NamedTuple):
-    """What the electronics remember from sample to sample."""
+    """Memory of the electronics, from sample to sample."""
 
     number: float
     """That of the next sample, counted from the start."""

@@ -24,7 +24,7 @@ class Params(Group, name="sampling"):
 
 
 def due(wait: float) -> bool:
-    """Whether the next instant, wait periods away, is now."""
+    """True if the next instant, wait periods away, is now."""
     return wait <= TOLERANCE
 
 

@@ -44,7 +44,7 @@ class Params:
 
 
 class Inputs(NamedTuple):
-    """What the sensor looks at."""
+    """Inputs: the surface before the sensor."""
 
     gap: Annotated[
         float,
@@ -53,7 +53,7 @@ class Inputs(NamedTuple):
 
 
 class Outputs(NamedTuple):
-    """What the sensor delivers."""
+    """Outputs of the sensor."""
 
     intensity: Annotated[
         float, Output("xi, offset-compensated output", unit="V", nominal=0.1, depends_on={"gap"})

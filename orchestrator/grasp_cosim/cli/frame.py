@@ -1,4 +1,4 @@
-"""What the commands share: exit codes, options, errors as one line."""
+"""Shared by the commands: exit codes, options, errors as one line."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ class Convergence:
     remark: str
 
     def within(self, i: int, tolerance: float) -> bool:
-        """Whether the result with step i is that near to the limit, with its uncertainty."""
+        """True if the result with step i is that near to the limit, with its uncertainty."""
         error = self.errors[i]
         if error is None or self.uncertainty is None:
             return False

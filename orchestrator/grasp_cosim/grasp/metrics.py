@@ -33,7 +33,7 @@ PLANT_OUTPUTS = (
         for j in FINGERS
     ),
 )
-"""What every gripper plant puts out."""
+"""The outputs of every gripper plant."""
 
 NEEDS = ("controller.target_position", *PLANT_OUTPUTS)
 """The signals of a grasp."""

@@ -1,4 +1,4 @@
-"""Whether this machine loads an FMU: what would crash a host, found before, each with its fix."""
+"""Finds out if this machine loads an FMU: what would crash a host, before it does, and the fix."""
 
 import os
 import re
@@ -55,7 +55,7 @@ _REPEATED = re.compile(r"^\[FATAL\] .*\nfailed, for the reason logged before\n",
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What one check found; fix is a command or an instruction to copy."""
+    """A finding of one check; fix is a command or an instruction to copy."""
 
     check: str
     status: Status
@@ -204,9 +204,9 @@ class Unpacked:
     guid: str
     binary: Path
     linked: str
-    """What the dynamic linker says of the binary outside of Python; empty where it cannot tell."""
+    """Words of the dynamic linker on the binary outside of Python; empty if it cannot tell."""
     python: bool
-    """Whether pythonfmu made it, in any version."""
+    """True if pythonfmu made it, in any version."""
 
 
 def unpack(fmu: Path, folder: Path) -> Unpacked:
@@ -246,7 +246,7 @@ def description(fmu: Unpacked) -> Verdict:
 
 
 def binary(fmu: Unpacked) -> Verdict:
-    """Whether there is a binary for this system and processor."""
+    """Check that there is a binary for this system and processor."""
     wanted, its = fmu.binary.relative_to(fmu.folder).as_posix(), _processor(fmu.binary)
     if its == HERE:
         return "ok", f"{wanted}, {its}", None
@@ -262,7 +262,7 @@ def binary(fmu: Unpacked) -> Verdict:
 
 
 def host(fmu: Unpacked) -> Verdict | None:
-    """Whether the binary of a Python FMU finds libpython in a host that is not Python."""
+    """Check that the binary of a Python FMU finds libpython in a host that is not Python."""
     bound = re.search(r"(libpython\S+) => (not found|\S+)", fmu.linked)
     path = find_libpython()
     if bound and bound[2] != "not found":
@@ -284,7 +284,7 @@ def host(fmu: Unpacked) -> Verdict | None:
 
 
 def libraries(fmu: Unpacked) -> Verdict | None:
-    """Whether the dynamic linker finds what the binary needs besides libpython."""
+    """Check that the dynamic linker finds what the binary needs besides libpython."""
     if not re.search("=>|statically linked", fmu.linked):
         return None
     missing = re.findall(r"(\S+) => not found", fmu.linked)
@@ -305,7 +305,7 @@ def libraries(fmu: Unpacked) -> Verdict | None:
 
 
 def script(fmu: Unpacked) -> Verdict | None:
-    """Whether the script is there, parses here with what it imports, and has what it imports."""
+    """Check that the script is there, parses here, and has what it imports, which parses too."""
     if not fmu.python:
         return None
     resources, fix = fmu.folder / "resources", "build it again with pythonfmu"
@@ -326,7 +326,7 @@ def script(fmu: Unpacked) -> Verdict | None:
 
 
 def modules(fmu: Unpacked) -> Verdict | None:
-    """Whether a packed module shares its name, for all Python FMUs of a host share sys.modules."""
+    """Check module names, for all Python FMUs of a host share sys.modules."""
     if not fmu.python:
         return None
     files = [*fmu.folder.glob("resources/*.py"), *fmu.folder.glob("resources/*/__init__.py")]
@@ -370,5 +370,5 @@ CHECKS: dict[str, Callable[[Unpacked], Verdict | None]] = {
 
 
 def _spec(name: str) -> ModuleSpec | None:
-    """What this Python would import under a name; sys.modules may hold what it did before."""
+    """File this Python would import under a name; sys.modules may hold an earlier one."""
     return next(filter(None, (f.find_spec(name, None) for f in sys.meta_path)), None)

@@ -1,4 +1,4 @@
-"""What any FMU says about itself: FMI 1.0, 2.0 or 3.0, from whichever tool."""
+"""The self-description of any FMU: FMI 1.0, 2.0 or 3.0, from whichever tool."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -18,7 +18,7 @@ WIDEST = 32
 
 
 def inspect_fmu(path: Path) -> dict[str, Any]:
-    """What the FMU at path declares, ready for JSON; InputError where there is no FMU.
+    """Return the declarations of the FMU at path, ready for JSON; InputError where there is no FMU.
 
     `dependencies` is null where an output declares none, which means all inputs in FMI.
     """

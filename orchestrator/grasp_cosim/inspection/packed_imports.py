@@ -1,4 +1,4 @@
-"""What the script of a Python FMU imports, found without running it."""
+"""The imports of the script of a Python FMU, found without running it."""
 
 import ast
 import warnings
@@ -8,7 +8,7 @@ from pathlib import Path
 
 
 def imports(resources: Path, script: str) -> tuple[set[str], list[str]]:
-    """What a script imports at once from outside of the FMU, and what in the FMU does not parse.
+    """Imports of a script at once from outside of the FMU, and files in it that do not parse.
 
     An import that is allowed to fail, under try or if or in a function, does not count.
     """
@@ -37,7 +37,7 @@ def imports(resources: Path, script: str) -> tuple[set[str], list[str]]:
 
 
 def _imported(tree: ast.Module | ast.ClassDef, package: str) -> Iterator[str]:
-    """What is imported without a condition, including names that may be modules of a package."""
+    """Imports without a condition, including names that may be modules of a package."""
     for node in tree.body:
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)

@@ -1,4 +1,4 @@
-"""What an FMU declares: its variables, units and capabilities."""
+"""The interface that an FMU declares: its variables, units and capabilities."""
 
 import math
 from collections.abc import Mapping

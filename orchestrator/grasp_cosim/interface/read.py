@@ -67,7 +67,7 @@ def _for_master(path: Path, modified: int) -> Interface:
 
 
 def describe(path: Path) -> Interface:
-    """What the FMU at `path` declares, whether a master takes it or not.
+    """Return the interface that the FMU at `path` declares, whether a master takes it or not.
 
     InputError where there is no FMU, or what it declares makes no sense.
     """

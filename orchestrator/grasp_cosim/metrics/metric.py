@@ -307,7 +307,7 @@ def _able(role: str, needs: Iterable[str], names: Collection[str]) -> list[str]:
 
 
 def _plain(m: Metric, found: Any) -> Any:
-    """What the function of a metric returned, with Python's own numbers, in a list."""
+    """Return the value of a metric with Python's own numbers, in a list."""
     plain = found.tolist() if isinstance(found, np.ndarray | np.generic) else found
     several = isinstance(plain, list | tuple)
     values = [v.item() if isinstance(v, np.generic) else v for v in (plain if several else [plain])]

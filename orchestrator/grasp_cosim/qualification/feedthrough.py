@@ -84,5 +84,5 @@ def _inputs(interface: Interface) -> list[str]:
 
 
 def _needs(variable: Variable, interface: Interface) -> Sequence[str]:
-    """What an output depends on directly: all inputs where that is not declared."""
+    """Inputs that an output depends on directly: all where that is not declared."""
     return _inputs(interface) if variable.dependencies is None else variable.dependencies

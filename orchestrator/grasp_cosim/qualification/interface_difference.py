@@ -62,7 +62,7 @@ class Difference:
 
 @dataclass(frozen=True, slots=True)
 class Use:
-    """What a system does with the variables of a component, by the system's names.
+    """The use that a system makes of the variables of a component, by the system's names.
 
     values are what the original is given. stated are variables for which the system states other
     numbers in the unit of the original: in events, conditions, faults and factors of connections.
@@ -83,7 +83,7 @@ class Use:
 
 
 def use_of(system: System, name: str) -> Use:
-    """What the system does with the component of that name."""
+    """Return the use that the system makes of the component of that name."""
     component = system.component(name, system.name)
     ends = [(port, c) for c in system.connections for port in (c.source, c.target)]
     scaled = [port for port, c in ends if (c.factor, c.offset) != (None, None)]

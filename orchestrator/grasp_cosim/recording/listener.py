@@ -1,4 +1,4 @@
-"""What listens to a run: blocks of rows, one row per recorded communication point."""
+"""Listeners to a run: they get blocks of rows, one row per recorded communication point."""
 
 from __future__ import annotations
 

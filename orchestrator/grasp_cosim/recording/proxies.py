@@ -1,4 +1,4 @@
-"""What became of the proxies of a run, from the diagnostics that they put out at every step."""
+"""The proxies of a run, from the diagnostics that they put out at every step."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -33,7 +33,7 @@ def proxy_figures(time: Times, signals: Signals) -> dict[str, dict[str, Any]]:
 
 
 def proxy_lines(time: Times, signals: Signals, step: float) -> list[str]:
-    """What is worth knowing about the proxies, a line each; step is the run's, in s."""
+    """Remarks on the proxies, a line each; step is the run's, in s."""
     lines = []
     for name, figures in proxy_figures(time, signals).items():
         steps = round(float(time[-1]) / step)  # of which not each need be recorded

@@ -1,4 +1,4 @@
-"""What a run leaves behind: every output at every communication point, as plain data."""
+"""The result of a run: every output at every communication point, as plain data."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field, fields
@@ -29,7 +29,7 @@ UNITS: Mapping[str, str | None] = {
     "wall_time": "s", "real_time_factor": "1", "steps": "1", "scheme": None, "step": "s",
     "stop": "s", "complete": None,
 }  # fmt: skip
-"""What is told of every run beside its metrics, and the units."""
+"""Figures of every run beside its metrics, and their units."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +59,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     rejections: Mapping[str, Rejection] = field(default_factory=dict)
     """By component; only those that rejected steps."""
     log: tuple[str, ...] = ()
-    """What is worth knowing about the run, a line each."""
+    """Remarks on the run, a line each."""
     timing: Timing | None = None
     """How it kept to the clock; None where it was not paced."""
     more_metrics: tuple[Metric, ...] = ()

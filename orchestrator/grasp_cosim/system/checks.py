@@ -1,4 +1,4 @@
-"""What must hold of a system before it is run: every input has one source, every port exists."""
+"""Checks of a system before it is run: every input has one source, every port exists."""
 
 from __future__ import annotations
 
@@ -135,7 +135,7 @@ def transforms(system: Structure) -> dict[Port, tuple[float, float]]:
 
 
 def remarks(system: Structure) -> tuple[str, ...]:
-    """What a user should know of a system that is valid, a line each.
+    """Return remarks on a system that is valid, a line each.
 
     Values that lose digits, units that cannot be compared, variables that are left alone.
     """

@@ -1,4 +1,4 @@
-"""What a run was asked to do, as plain data for run.json and for the header of an MDF file."""
+"""The settings of a run, as plain data for run.json and for the header of an MDF file."""
 
 from dataclasses import asdict
 from typing import Any

@@ -1,4 +1,4 @@
-"""What a system is made of, as its checks and its readers see it."""
+"""The parts of a system, as its checks and its readers see it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""What can be identified, by the names of the command's option --fit."""
+"""The parameters that can be identified, by the names of the command's option --fit."""
 
 from collections.abc import Sequence
 

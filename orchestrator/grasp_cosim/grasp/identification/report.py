@@ -1,4 +1,4 @@
-"""What was identified: for a terminal, as JSON, as values for a system, as a table of residuals."""
+"""An identification for a terminal, as JSON, as values for a system, as a table of residuals."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

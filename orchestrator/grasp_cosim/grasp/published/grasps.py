@@ -56,7 +56,7 @@ Runs = dict[tuple[Setting, int], Run]
 
 
 def as_run(result: Result, setting: Setting, case: int) -> Run:
-    """What an evaluation keeps of a grasp; InputError where a finger does not touch."""
+    """Part of a grasp that an evaluation keeps; InputError where a finger does not touch."""
     moments = [time_at_gap(result.by_role, j, SENSOR_CONTACT) for j in FINGERS]
     first, second = moments
     if first is None or second is None or None in result.metrics["time_to_contact"]:
@@ -83,7 +83,7 @@ def off_centre(runs: Runs) -> list[Setting]:
 
 
 def balances(runs: Runs, setting: Setting) -> bool:
-    """Whether Case 2 makes the nearer finger, the first, later and the farther one earlier."""
+    """True if Case 2 makes the nearer finger, the first, later and the farther one earlier."""
     (near_1, far_1), (near_2, far_2) = (runs[setting, case].times for case in (1, 2))
     return near_2 > near_1 and far_2 < far_1
 
