@@ -12,7 +12,9 @@ from typing import Any, get_type_hints
 __all__ = ["Group", "Input", "Output", "Parameter", "check", "check_value"]
 
 
-@dataclass(frozen=True, slots=True)
+# Without eq: `typing` keeps each Annotated[...] by its arguments, for all copies of this module
+# that are packed into the FMUs of one host, and asks equal ones for `==`.
+@dataclass(frozen=True, slots=True, eq=False)
 class Parameter:
     """A parameter, valid from `low` to `high`; `tunable` if it may change at run time.
 
@@ -27,7 +29,7 @@ class Parameter:
     tunable: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Input:
     """An input; `nominal` is the size that a real one usually has."""
 
@@ -37,7 +39,7 @@ class Input:
     nominal: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Output:
     """An output; `depends_on` are the inputs that reach it without a step (direct feedthrough).
 
