@@ -178,7 +178,7 @@ def test_a_file_that_nothing_imports_changes_nothing(build: Build) -> None:
 
 def test_variables_that_follow_move_up(build: Build) -> None:
     """The value reference is part of the interface: a host may have it written down."""
-    text = '    """What the sensor looks at."""\n'
+    text = '    """Inputs: the surface before the sensor."""\n'
     added = f'{text}\n    tilt: Annotated[float, Input("tilt", unit="1", nominal=0.1)] = 0.0\n'
     build()
     lines = build((OPTICS, text, added)).changes
