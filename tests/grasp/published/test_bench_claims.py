@@ -46,7 +46,7 @@ def _run(setting: Setting, case: int, times: list[float]) -> Run:
         "target_position": setting.x_m,
     }
     touch = (20.0, 40.0) if case == 0 else (2.0, 1.0)
-    return Run(setting, case, metrics, {}, (0.0, 0.0), 0.005, touch, None)
+    return Run(setting, case, metrics, (0.0, 0.0), 0.005, touch, None)
 
 
 def changed(runs: Runs, setting: Setting, case: int, **metrics: Any) -> Runs:

@@ -57,7 +57,7 @@ def _run(setting: Setting, case: int, times: list[float]) -> Run:
         "target_position": setting.x_m,
     }
     first, second = (t - earlier for t, earlier in zip(times, EARLIER, strict=True))
-    return Run(setting, case, metrics, {}, (first, second), 0.005, (2.0, 2.0), None)
+    return Run(setting, case, metrics, (first, second), 0.005, (2.0, 2.0), None)
 
 
 @pytest.fixture

@@ -13,7 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from ...files import write_json, write_text
+from ...metrics.metric import registered
 from ...parallel import run_all
+from ...recording.result import UNITS
 from ...report.plot import new_figure, save
 from ...system.description import System
 from ..closing import close
@@ -87,7 +89,8 @@ def evaluate(
 def _units(rows: Sequence[Mapping[str, Any]], run: Run) -> dict[str, str | None]:
     """The unit of each entry of rows, rms and runs; a condition that is a number is a position."""
     times = [name for name, value in rows[0].items() if isinstance(value, float)]
-    own = {name: unit for name, unit in run.units.items() if name not in BOOKKEEPING}
+    known = {**{m.name: m.unit for m in registered()}, **UNITS}
+    own = {n: known[n] for n in run.metrics if n in known and n not in BOOKKEEPING}
     return {**dict.fromkeys([*times, "rms"], "s"), "condition": "m", **own}
 
 

@@ -23,8 +23,6 @@ class Run:
     setting: Setting
     case: int
     metrics: dict[str, Any]
-    units: dict[str, str | None]
-    """Of the metrics."""
     times_at_sensor_contact: tuple[float, float]
     overshoot: float
     """m by which the target passes the centre of the object, seen from the start."""
@@ -67,8 +65,7 @@ def as_run(result: Result, setting: Setting, case: int) -> Run:
     beyond = float(np.max((target - setting.x_m) * math.copysign(1.0, setting.x_m)))
     shown = result if setting == Setting(REFLECTANCE_X_M) else None
     right, left = (_touch_force(result, j) for j in FINGERS)
-    metrics, units = dict(result.metrics), result.metric_units
-    return Run(setting, case, metrics, units, (first, second), beyond, (right, left), shown)
+    return Run(setting, case, dict(result.metrics), (first, second), beyond, (right, left), shown)
 
 
 def _touch_force(result: Result, finger: int) -> float:
