@@ -31,8 +31,10 @@ UnpackIn = Callable[[str], Path]
 Altered = Callable[[str, str, str, str], Path]
 
 
-settings.register_profile("usual", deadline=None, derandomize=True)
-settings.register_profile("explore", deadline=None, max_examples=1000, print_blob=True)
+settings.register_profile("usual", deadline=None, derandomize=True, max_examples=100)
+settings.register_profile(
+    "explore", deadline=None, derandomize=False, max_examples=1000, print_blob=True
+)  # a profile inherits what it leaves out, and where CI is set hypothesis derandomizes
 settings.load_profile("usual")  # unless --hypothesis-profile names the other: make explore
 
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
