@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -12,17 +12,36 @@ import numpy.typing as npt
 from ..system.parts import NANOSECONDS
 
 
+class Texts(dict[str, int]):
+    """The texts that a String has had so far, each with its number; rows hold the numbers."""
+
+    def __missing__(self, text: str) -> int:
+        return self.setdefault(text, len(self))
+
+    def numbers(self, column: npt.NDArray[Any]) -> list[int]:
+        """The numbers of the texts in a column, of those that are new, too."""
+        return [self[text] for text in column]
+
+    def column(self, numbers: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
+        """The texts of these numbers, as an array of str objects."""
+        listed = np.array([*self, None], object)  # the last lest there be none
+        texts: npt.NDArray[Any] = listed[numbers.astype(np.intp)]
+        return texts
+
+
 @dataclass(frozen=True, slots=True)
 class Signal:
     """A recorded column: name like plant.gap[1], unit (None without one), kind, description.
 
-    The kind is Real, Integer or Boolean.
+    The kind is Real, Integer, Boolean or String. Rows have numbers in place of a String's texts,
+    those of `texts`, which grows while the run goes on.
     """
 
     name: str
     unit: str | None
     kind: str
     description: str = ""
+    texts: Texts = field(default_factory=Texts, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +77,7 @@ class Listener(Protocol):
     def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
         """Rows as (len(steps), len(signals)); step k is at t = k * experiment.step_ns.
 
-        Booleans are 0.0 or 1.0. The arrays are reused: copy what is kept.
+        Booleans are 0.0 or 1.0, for Strings see Signal. The arrays are reused: copy what is kept.
         """
 
     def end(self, complete: bool) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 from xml.etree import ElementTree
 
 import numpy as np
@@ -19,7 +19,7 @@ from .listener import Experiment, Signal, times
 if TYPE_CHECKING:
     import asammdf
 
-TYPES = {"Real": np.float64, "Integer": np.int64, "Boolean": np.uint8}
+TYPES = {"Real": np.float64, "Integer": np.int64, "Boolean": np.uint8, "String": np.uint32}
 """The element type of a channel by its signal's kind."""
 
 TRANSPOSED_DEFLATE: Final = 2
@@ -32,7 +32,8 @@ PIECE = 8192
 class MdfListener:
     """Writes time and signals as one channel group, with units and descriptions.
 
-    The header has the settings of the run: all of them as JSON in its comment, and the main
+    A String is recorded as the numbers of its texts, which its channel has as a conversion, so that
+    readers show them. The header has the settings of the run: all of them as JSON in its comment, and the main
     ones as properties, with "complete" besides. asammdf keeps the rows in a compressed temporary
     file beside path; the file at path is made from it when the run ends, in whatever way. There is
     no file where nothing was recorded.
@@ -49,7 +50,7 @@ class MdfListener:
 
         if not signals:
             raise InputError(f"{self._path}: nothing to record; must be a system with outputs")
-        self._experiment = experiment
+        self._experiment, self._signals = experiment, signals
         self._types = [TYPES[s.kind] for s in signals]
         self._steps, self._rows = np.empty(PIECE, np.int64), np.empty((PIECE, len(signals)))
         self._filled = 0
@@ -79,12 +80,24 @@ class MdfListener:
             self._flush()
             if self._mdf.groups[0].channel_group.cycles_nr:
                 self._mdf.header.comment = _comment(self._experiment, complete)
+                self._convert_texts()
                 with in_one_piece(self._path) as part, part.open("wb+") as file:
                     self._mdf.save(file, compression=TRANSPOSED_DEFLATE)
         except OSError as error:
             raise SimulationError(unwritable(self._path, error)) from error
         finally:
             self._mdf.close()
+
+    def _convert_texts(self) -> None:
+        from asammdf.blocks.conversion_utils import from_dict
+
+        channels: Any = self._mdf.groups[0].channels[1:]  # the first is time
+        for channel, signal in zip(channels, self._signals, strict=True):
+            if signal.kind == "String":
+                table: dict[str, Any] = {}
+                for text, number in signal.texts.items():
+                    table |= {f"val_{number}": number, f"text_{number}": text}
+                channel.conversion = from_dict(table)
 
     def _flush(self) -> None:
         rows = self._rows[: self._filled].T

@@ -19,7 +19,7 @@ from .listener import Experiment, Listener, Signal
 from .mdf import MdfListener
 from .proxies import proxy_figures
 
-KINDS = {"f": "Real", "i": "Integer", "b": "Boolean"}
+KINDS = {"f": "Real", "i": "Integer", "b": "Boolean", "O": "String"}
 """The kind of a signal by the kind of its column's element type."""
 
 PIECE = 8192
@@ -95,6 +95,11 @@ class Result(Mapping[str, npt.NDArray[Any]]):
         return measure(self.by_role, registered(self.more_metrics))
 
     @property
+    def numbers(self) -> dict[str, npt.NDArray[Any]]:
+        """The signals that are numbers or Booleans: all but Strings."""
+        return {name: column for name, column in self.items() if column.dtype != object}
+
+    @property
     def metrics(self) -> Mapping[str, Any]:
         """The metrics by name, then the figures of UNITS, then those of any proxies.
 
@@ -146,7 +151,10 @@ class Result(Mapping[str, npt.NDArray[Any]]):
             **self._figures,
             **self.settings,
             "units": dict(self.units),
-            "types": {name: str(column.dtype) for name, column in self.signals.items()},
+            "types": {
+                name: "str" if column.dtype == object else str(column.dtype)
+                for name, column in self.signals.items()
+            },
             "descriptions": dict(self.descriptions),
             "metric_units": self.metric_units,
             "missing_metrics": list(self.measured.missing),
@@ -189,8 +197,9 @@ class Result(Mapping[str, npt.NDArray[Any]]):
                 piece = slice(first, first + PIECE)
                 steps = self._steps[piece]
                 rows = np.empty((len(steps), len(signals)))
-                for i, column in enumerate(self.signals.values()):
-                    rows[:, i] = column[piece]
+                for i, (signal, column) in enumerate(zip(signals, self.values(), strict=True)):
+                    part = column[piece]
+                    rows[:, i] = signal.texts.numbers(part) if signal.kind == "String" else part
                 listener.block(steps, rows)
         finally:
             listener.end(self.complete)
