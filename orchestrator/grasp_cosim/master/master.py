@@ -85,7 +85,7 @@ class Master:
         for port, slot in self.slots.items():
             value = propagation.values[port]
             if port in self.texts:
-                value = self.texts[port][str(value)]
+                value = self.texts[port].number(str(value))
             if isinstance(value, int) and abs(value) >= loop.EXACT:
                 raise InputError(_too_long(port, value, 0))
             self.values[slot] = float(value)

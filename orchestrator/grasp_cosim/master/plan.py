@@ -153,11 +153,15 @@ class Planner:
         self._python(act, period, phase)
 
     def _text(self, connection: Connection, period: int, phase: int) -> None:
-        ports = connection.source, connection.target
-        source, target = (self.instances[port.component] for port in ports)
-        put_out = source.interface.by_name[connection.source.variable]
+        target = self.instances[connection.target.component]
         taken_in = target.interface.by_name[connection.target.variable]
-        self._python(lambda _: target.set([taken_in], source.get([put_out])), period, phase)
+        texts, slot = self.texts[connection.source], self.slots[connection.source]
+        view: Any = memoryview(self.made.values)  # type: ignore[arg-type]
+
+        def pass_on(_: int) -> None:
+            target.set([taken_in], [texts.listed[int(view[slot])]])
+
+        self._python(pass_on, period, phase)
 
     def _fetch_texts(self, name: str, phase: int) -> None:
         """Fetch the String outputs of a component, if it has any."""
@@ -167,7 +171,7 @@ class Planner:
 
         def fetch(_: int) -> None:
             for port, text in zip(ports, instance.get(variables), strict=True):
-                view[self.slots[port]] = self.texts[port][str(text)]
+                view[self.slots[port]] = self.texts[port].number(str(text))
 
         if ports:
             self._python(fetch, self.system.period(name), phase)

@@ -192,7 +192,7 @@ class Session:
         if port not in slots:
             raise InputError(f"{name!r}: no such signal; valid: {choices(slots)}")
         value = float(self._master.values[slots[port]])
-        return [*texts[port]][int(value)] if port in texts else value
+        return texts[port].listed[int(value)] if port in texts else value
 
     def set(self, name: str, value: Value) -> None:
         """Set a tunable parameter or an input without a connection, from now on.

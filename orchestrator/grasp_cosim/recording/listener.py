@@ -12,21 +12,23 @@ import numpy.typing as npt
 from ..system.parts import NANOSECONDS
 
 
-class Texts(dict[str, int]):
-    """The texts that a String has had so far, each with its number; rows hold the numbers."""
+class Texts:
+    """The texts that a String has had so far, each once; rows hold their numbers in this list."""
 
-    def __missing__(self, text: str) -> int:
-        return self.setdefault(text, len(self))
+    def __init__(self) -> None:
+        self.listed: list[str] = []
+        self._numbers: dict[str, int] = {}
 
-    def numbers(self, column: npt.NDArray[Any]) -> list[int]:
-        """The numbers of the texts in a column, of those that are new, too."""
-        return [self[text] for text in column]
+    def number(self, text: str) -> int:
+        """The number of a text, which is listed if it is new."""
+        found = self._numbers.setdefault(text, len(self.listed))
+        if found == len(self.listed):
+            self.listed.append(text)
+        return found
 
     def column(self, numbers: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
         """The texts of these numbers, as an array of str objects."""
-        listed = np.array([*self, None], object)  # the last lest there be none
-        texts: npt.NDArray[Any] = listed[numbers.astype(np.intp)]
-        return texts
+        return np.array([self.listed[int(number)] for number in numbers], object)
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,10 +33,10 @@ class MdfListener:
     """Writes time and signals as one channel group, with units and descriptions.
 
     A String is recorded as the numbers of its texts, which its channel has as a conversion, so that
-    readers show them. The header has the settings of the run: all of them as JSON in its comment, and the main
-    ones as properties, with "complete" besides. asammdf keeps the rows in a compressed temporary
-    file beside path; the file at path is made from it when the run ends, in whatever way. There is
-    no file where nothing was recorded.
+    readers show them. The header has the settings of the run: all of them as JSON in its comment,
+    and the main ones as properties, with "complete" besides. asammdf keeps the rows in a compressed
+    temporary file beside path; the file at path is made from it when the run ends, in whatever way.
+    There is no file where nothing was recorded.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -95,7 +95,7 @@ class MdfListener:
         for channel, signal in zip(channels, self._signals, strict=True):
             if signal.kind == "String":
                 table: dict[str, Any] = {}
-                for text, number in signal.texts.items():
+                for number, text in enumerate(signal.texts.listed):
                     table |= {f"val_{number}": number, f"text_{number}": text}
                 channel.conversion = from_dict(table)
 

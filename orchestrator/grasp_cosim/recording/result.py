@@ -199,7 +199,8 @@ class Result(Mapping[str, npt.NDArray[Any]]):
                 rows = np.empty((len(steps), len(signals)))
                 for i, (signal, column) in enumerate(zip(signals, self.values(), strict=True)):
                     part = column[piece]
-                    rows[:, i] = signal.texts.numbers(part) if signal.kind == "String" else part
+                    text = signal.kind == "String"
+                    rows[:, i] = [*map(signal.texts.number, part)] if text else part
                 listener.block(steps, rows)
         finally:
             listener.end(self.complete)

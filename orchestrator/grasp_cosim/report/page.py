@@ -134,7 +134,7 @@ def _state(result: Result, shown: Shown, scene: Scene | None) -> dict[str, Any]:
 
 def _drawn(column: npt.NDArray[Any]) -> npt.NDArray[Any]:
     """A column as it is drawn: of a String the numbers of its texts, in the order they came."""
-    return np.array(Texts().numbers(column)) if column.dtype == object else column
+    return np.array([*map(Texts().number, column)]) if column.dtype == object else column
 
 
 def _text(name: str) -> str:

@@ -14,11 +14,6 @@ from ..interface.units import conversion
 from .parts import LOOPS, Component, Connection, Port, seconds
 from .structure import Structure
 
-NOTHING_RECORDED = (
-    f"nothing is recorded; must have an output that is {choices(SUPPORTED)}, no array"
-)
-"""Of a system whose outputs, if there are any, a run cannot record."""
-
 
 class _End(NamedTuple):
     port: Port
@@ -162,7 +157,10 @@ def remarks(system: Structure) -> tuple[str, ...]:
                 left = "keeps its start value" if variable.causality == "input" else "not recorded"
                 lines.append(f"{port} is of type {variable.nature}: {left}")
     if not system.recorded:
-        lines.append(f"{system.name}: {NOTHING_RECORDED}")
+        lines.append(
+            f"{system.name}: nothing is recorded; must have an output that is a Real, Integer, "
+            "Boolean or String, no array"
+        )
     return tuple(lines)
 
 
