@@ -26,8 +26,9 @@ class CsvListener:
     as plain.to_cell() makes them.
     """
 
-    def __init__(self, path: str | Path) -> None:
-        self._path = Path(path)
+    def __init__(self, path: str | Path, said: str | Path | None = None) -> None:
+        """`said` is the name in messages, if it is another."""
+        self._path, self._said = Path(path), Path(said or path)
 
     def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
         """Write the line of names; InputError where the file cannot be written."""
@@ -43,7 +44,7 @@ class CsvListener:
                 self._finish = stack.pop_all()
                 self._empty = True
         except OSError as error:
-            raise InputError(unwritable(self._path, error)) from error
+            raise InputError(unwritable(self._said, error)) from error
 
     def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
         """Append the rows; SimulationError where that fails, the lines until then are whole."""
@@ -60,7 +61,7 @@ class CsvListener:
                 self._append("\n".join(map(",".join, zip(*texts, strict=True))) + "\n")
                 self._empty = False
         except OSError as error:
-            raise SimulationError(unwritable(self._path, error)) from error
+            raise SimulationError(unwritable(self._said, error)) from error
 
     def end(self, complete: bool) -> None:
         """Give the file its name; SimulationError where that fails."""
@@ -69,7 +70,7 @@ class CsvListener:
                 if self._empty:
                     raise _NothingRecordedError
         except OSError as error:
-            raise SimulationError(unwritable(self._path, error)) from error
+            raise SimulationError(unwritable(self._said, error)) from error
 
     def _append(self, text: str) -> None:
         """Write all of the text, or none of it and raise OSError."""

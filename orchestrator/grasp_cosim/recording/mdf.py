@@ -39,17 +39,17 @@ class MdfListener:
     There is no file where nothing was recorded.
     """
 
-    def __init__(self, path: str | Path) -> None:
-        """InputError without asammdf."""
+    def __init__(self, path: str | Path, said: str | Path | None = None) -> None:
+        """`said` is the name in messages, if it is another. InputError without asammdf."""
         check_mdf()
-        self._path = Path(path)
+        self._path, self._said = Path(path), Path(said or path)
 
     def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
         """Describe the channels; InputError where there are none or the folder is not writable."""
         from asammdf import MDF
 
         if not signals:
-            raise InputError(f"{self._path}: nothing to record; must be a system with outputs")
+            raise InputError(f"{self._said}: nothing to record; must be a system with outputs")
         self._experiment, self._signals = experiment, signals
         self._types = [TYPES[s.kind] for s in signals]
         self._steps, self._rows = np.empty(PIECE, np.int64), np.empty((PIECE, len(signals)))
@@ -60,7 +60,7 @@ class MdfListener:
             # the first version with compressed blocks; every tool of today reads it
             self._mdf = MDF(version="4.10", temporary_folder=str(folder))
         except OSError as error:
-            raise InputError(unwritable(self._path, error)) from error
+            raise InputError(unwritable(self._said, error)) from error
         self._mdf.append([_channel(s) for s in signals], comment="", common_timebase=True)
 
     def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
@@ -84,7 +84,7 @@ class MdfListener:
                 with in_one_piece(self._path) as part, part.open("wb+") as file:
                     self._mdf.save(file, compression=TRANSPOSED_DEFLATE)
         except OSError as error:
-            raise SimulationError(unwritable(self._path, error)) from error
+            raise SimulationError(unwritable(self._said, error)) from error
         finally:
             self._mdf.close()
 
@@ -106,7 +106,7 @@ class MdfListener:
         try:
             self._mdf.extend(0, [(samples, None) for samples in (time, *channels)])
         except OSError as error:
-            raise SimulationError(unwritable(self._path, error)) from error
+            raise SimulationError(unwritable(self._said, error)) from error
         self._filled = 0
 
 

@@ -133,12 +133,12 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     def to_csv(self, path: str | Path) -> None:
         """Write time and signals with full precision, a line per communication point."""
         with in_one_piece(Path(path)) as part:
-            self._play(CsvListener(part))
+            self._play(CsvListener(part, path))
 
     def to_mdf(self, path: str | Path) -> None:
         """Write an ASAM MDF 4 file with the units and the settings; InputError without asammdf."""
         with in_one_piece(Path(path)) as part:
-            self._play(MdfListener(part))
+            self._play(MdfListener(part, path))
 
     def to_json(self, path: str | Path) -> None:
         """Write the metrics and the settings that led to them, then what is known by signal
