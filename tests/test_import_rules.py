@@ -163,7 +163,7 @@ def test_the_declaration_of_variables_imports_the_standard_library_only() -> Non
 # ------------------------------------------------------------------ rooms of the orchestrator
 
 FLOORS = (
-    ("errors", "checks", "files", "parallel", "extensions"),
+    ("early", "errors", "plain", "checks", "files", "parallel", "extensions"),
     ("interface",),
     ("system",),
     ("fmi",),

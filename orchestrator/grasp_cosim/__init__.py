@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from importlib import import_module
 from importlib.util import find_spec
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from . import extensions
 from .errors import InputError, SimulationError
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from .grasp.system import grasp_system
     from .master.simulation import simulate
     from .metrics.metric import Metric, metric

@@ -5,9 +5,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+    from pathlib import Path
 
 readers: dict[str, Callable[[Path, Path | None, float | None, float | None], Any]] = {}
 """Readers of system files by suffix: `path`, folder of the FMUs, step and stop in s to a System."""

@@ -53,8 +53,8 @@ def in_one_piece(path: Path) -> Iterator[Path]:
     try:
         yield part
         part.replace(path)
-    except OSError as error:  # a write that fails does not say where
-        if error.errno is None or error.filename:
+    except OSError as error:  # a write that fails does not say where, or where it is for now
+        if error.errno is None or error.filename not in (None, part, str(part)):
             raise
         raise OSError(error.errno, os.strerror(error.errno), str(path)) from error
     finally:

@@ -164,7 +164,9 @@ class Run:
     def __init__(self, system: System, mocks: Sequence[Mock], engine: Engine = "python") -> None:
         self.memory = MemoryListener()
         self.master = Master(system, mocks, lambda *rows: self.dispatch(*rows), engine)
-        self.dispatch = Dispatcher(system, self.master.slots, [self.memory])
+        self.dispatch = Dispatcher(
+            system, self.master.slots, [self.memory], texts=self.master.texts
+        )
 
     def to_the_end(self) -> dict[str, list[float]]:
         self.master.initialise()

@@ -1,7 +1,7 @@
 """From a command line to an exit code."""
 
 import errno
-import os
+import signal
 import sys
 from typing import NoReturn
 
@@ -10,28 +10,25 @@ import click
 from ..errors import InputError, SimulationError
 from .frame import FAILED, INTERRUPTED, WRONG, fail
 from .group import cli
+from .streams import OutputError, harmless_streams, keep_output_for_us
 
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EIO)
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 """Errors of a disk, not of the input."""
 
 
 def entry() -> NoReturn:
-    """The command grasp-cosim."""
-    _keep_output_for_us()
-    code = main(sys.argv[1:])
+    """The command grasp-cosim, see __main__.py."""
+    try:
+        keep_output_for_us()
+        code = main(sys.argv[1:])
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # what is left is short, and nothing is lost
+    except KeyboardInterrupt:
+        code = fail("interrupted", INTERRUPTED)
     try:
         sys.stdout.close()
     except OSError as error:
-        code = fail(f"standard output: {error.strerror}", FAILED)
+        code = code or fail(str(OutputError(error)), FAILED)
     sys.exit(code)
-
-
-def _keep_output_for_us() -> None:
-    """What the binary of an FMU prints goes to standard error: with --json, we alone may print."""
-    sys.stdout.flush()
-    ours = os.dup(1)
-    os.dup2(2, 1)
-    sys.stdout = os.fdopen(ours, "w", encoding=sys.stdout.encoding, errors=sys.stdout.errors)
 
 
 def main(arguments: list[str]) -> int:
@@ -39,7 +36,11 @@ def main(arguments: list[str]) -> int:
 
     An error is one line on standard error, without a traceback unless --debug is given.
     """
-    debug = "--debug" in arguments
+    with harmless_streams():
+        return _main(arguments, "--debug" in arguments)
+
+
+def _main(arguments: list[str], debug: bool) -> int:
     try:
         return int(cli.main(arguments, "grasp-cosim", standalone_mode=False) or 0)
     except click.exceptions.NoArgsIsHelpError as error:
@@ -52,9 +53,18 @@ def main(arguments: list[str]) -> int:
     except OSError as error:
         text = f"{error.filename}: {error.strerror}" if error.filename else str(error)
         return fail(text, FAILED if error.errno in FULL else WRONG, debug)
-    except SimulationError as error:
+    except (SimulationError, OutputError) as error:
         return fail(str(error), FAILED, debug)
     except (KeyboardInterrupt, click.Abort):
         return fail("interrupted", INTERRUPTED)
     except Exception as error:
+        if _interrupted(error):
+            return fail("interrupted", INTERRUPTED)
         return fail(f"{type(error).__name__}: {error} (--debug shows where)", FAILED, debug)
+
+
+def _interrupted(error: BaseException | None) -> bool:
+    """True if something made this error of Ctrl-C, such as a module that was being imported."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None

@@ -14,6 +14,7 @@ import click
 
 from ..errors import InputError
 from ..files import check_folder
+from ..plain import on_one_line
 
 if TYPE_CHECKING:
     from ..metrics.metric import Metric
@@ -114,12 +115,12 @@ def check_outputs(out: Path | None, plot: bool) -> None:
 
 def show(as_json: bool, report: Any, text: str) -> None:
     """Print a report as one JSON object, or the text for people."""
-    click.echo(json.dumps(report) if as_json else text)
+    click.echo(json.dumps(report).replace("\x7f", "\\u007f") if as_json else text)
 
 
 def fail(message: str, code: int, debug: bool = False) -> int:
     """Print the message as one line on standard error; return the exit code."""
     if debug:
         traceback.print_exc()
-    click.echo(f"grasp-cosim: {message}", err=True)
+    click.echo(f"grasp-cosim: {on_one_line(message)}", err=True)
     return code

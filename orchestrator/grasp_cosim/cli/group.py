@@ -6,6 +6,8 @@ from importlib.util import find_spec
 
 import click
 
+from ..early import begin
+
 OF_THE_GRASP = {"evaluate", "identify"}
 """The commands that there are with the room grasp/ only."""
 
@@ -35,3 +37,4 @@ def cli(debug: bool) -> None:
 
     grasp-cosim COMMAND --help shows the options of a command and an example.
     """
+    begin()

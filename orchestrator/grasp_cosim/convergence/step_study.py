@@ -246,13 +246,9 @@ def ask(
     several units, or the tolerance is missing or not positive.
     """
     check_portable(metrics)
-    units = {
-        f"{c.name}.{v.name}": v.unit
-        for c in system.components
-        for v in c.interface.of("output")
-        if v.supported and v.kind != "String"
-    }
-    known, reasons = available(registered(metrics), units, system.roles)
+    recorded = {str(port): v for port, v in system.recorded.items()}
+    units = {name: v.unit for name, v in recorded.items() if v.is_number}
+    known, reasons = available(registered(metrics), recorded, system.roles)
     by_name = {m.name: m for m in known if m.unit is not None}
     names = list(of) or [m.name for m in known if m.primary]
     if not names:

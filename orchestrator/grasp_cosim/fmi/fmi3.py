@@ -7,7 +7,7 @@ left alone.
 
 import ctypes
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,15 @@ class _Slave(FMU3Slave):  # type: ignore[misc]  # FMPy has no types
     def __dir__(self) -> Iterable[str]:
         """FMPy loads the functions by these names; it raises where one is missing."""
         return [n for n in super().__dir__() if n[:4] != "fmi3" or hasattr(self.dll, n)]
+
+    def getString(self, references: Sequence[int]) -> list[bytes | None]:
+        """As they are: FMPy's raises at what is no UTF-8, and at NULL."""
+        count = len(references)
+        texts = (ctypes.c_char_p * count)()
+        self.fmi3GetString(
+            self.component, (ctypes.c_uint * count)(*references), count, texts, count
+        )
+        return list(texts)
 
 
 class Fmi3Instance(LoadedInstance):

@@ -42,8 +42,12 @@ _OF_KIND: Mapping[str, Callable[[Any], Value]] = {
     "Real": float,
     "Integer": int,
     "Boolean": bool,
-    "String": lambda value: value.decode(errors="replace") if isinstance(value, bytes) else value,
+    "String": lambda value: value if isinstance(value, str) else _decoded(value),
 }
+
+
+def _decoded(text: bytes | None) -> str:
+    return (text or b"").decode(errors="replace")
 
 
 _OF_THIS_MACHINE = tuple(f"binaries/{name}/" for name in (fmpy.platform, fmpy.platform_tuple))

@@ -148,6 +148,11 @@ class Variable:
         return self.kind in SUPPORTED and not self.shape
 
     @property
+    def is_number(self) -> bool:
+        """True if it is supported, and a Real, an Integer or a Boolean."""
+        return self.supported and self.kind != "String"
+
+    @property
     def nature(self) -> str:
         """Its type in words, as of what is not supported: array of Float64, Binary, Clock."""
         return f"array of {self.type}" if self.shape else self.type

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from ..errors import InputError, SimulationError
 from ..fmi.instance import DISCARD, EARLY, Instance
 from ..realtime.pacer import HaltError, OverrunError, Pacer
+from ..recording.listener import Texts
 from ..recording.result import Rejection
 from ..system.description import System
 from ..system.parts import NANOSECONDS, Port
@@ -53,13 +54,16 @@ class Master:
         self.rejections: dict[str, Rejection] = {}
         self.log: list[str] = []
         self.slots = slots_of(system, instances)
+        strings = (port for port, v in system.recorded.items() if v.kind == "String")
+        self.texts = {port: Texts() for port in strings}
         self.values = np.zeros(len(self.slots) + (pacer.width if pacer else 0))
         if pacer:
             pacer.bind(self.values[len(self.slots) :], self._hand_on_until)
         self.scenario = Scenario(system, instances, self.slots, self.values)
         self._receive = receive
-        planner = Planner(system, instances, self.slots, self.values, self.scenario, pacer)
-        self.plan = planner.plan()
+        self.plan = Planner(
+            system, instances, self.slots, self.values, self.scenario, self.texts, pacer
+        ).plan()
         self._pacer = pacer
         self._loop = make_loop(self.plan, engine, None if pacer else self.total_steps)
         self._rows = np.empty((CHUNK, len(self.values)))
@@ -80,6 +84,8 @@ class Master:
             instance.exit_initialization()
         for port, slot in self.slots.items():
             value = propagation.values[port]
+            if port in self.texts:
+                value = self.texts[port].number(str(value))
             if isinstance(value, int) and abs(value) >= loop.EXACT:
                 raise InputError(_too_long(port, value, 0))
             self.values[slot] = float(value)

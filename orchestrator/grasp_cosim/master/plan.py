@@ -2,7 +2,8 @@
 
 In the vector the outputs come first, then the inputs that have a connection. The Real values of a
 component stand together, so that one FMI call moves them all; values of another type have a
-buffer of their type beside the vector. Strings are no numbers: a connection between them is a call.
+buffer of their type beside the vector. Of a String output the vector has, at its end, the number of
+its text in a table of those seen so far; a connection between Strings is a call.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -15,6 +16,7 @@ import numpy.typing as npt
 from ..fmi.instance import Call, Instance, dtype
 from ..interface.interface import Variable
 from ..realtime.pacer import Pacer
+from ..recording.listener import Texts
 from ..system.checks import transforms
 from ..system.description import System
 from ..system.parts import NANOSECONDS, Connection, Port
@@ -47,7 +49,7 @@ class Plan:
 
 
 def slots_of(system: System, instances: Sequence[Instance]) -> dict[Port, int]:
-    """The place of each output and each connected input that is a number."""
+    """The place of each output, and of each connected input that is a number; Strings come last."""
     connected = {connection.target for connection in system.connections}
     ports = [
         Port(instance.name, v.name)
@@ -57,6 +59,7 @@ def slots_of(system: System, instances: Sequence[Instance]) -> dict[Port, int]:
         for v in variables
         if causality == "output" or Port(instance.name, v.name) in connected
     ]
+    ports += [port for port, v in system.recorded.items() if v.kind == "String"]
     return {port: slot for slot, port in enumerate(ports)}
 
 
@@ -70,9 +73,10 @@ class Planner:
         slots: Mapping[Port, int],
         values: npt.NDArray[np.float64],
         scenario: Scenario,
+        texts: Mapping[Port, Texts],
         pacer: Pacer | None = None,
     ) -> None:
-        """Over the given vector of values; slots are those of slots_of().
+        """Over the given vector of values; slots are those of slots_of(), texts by String output.
 
         The scenario is asked at the start of each macro step, after the pacer of a run in real
         time.
@@ -81,6 +85,7 @@ class Planner:
         self.instances = {instance.name: instance for instance in instances}
         self.slots = slots
         self.scenario = scenario
+        self.texts = texts
         self.pacer = pacer
         self.stamps = 0
         self.transforms = transforms(system)
@@ -148,11 +153,28 @@ class Planner:
         self._python(act, period, phase)
 
     def _text(self, connection: Connection, period: int, phase: int) -> None:
-        ports = connection.source, connection.target
-        source, target = (self.instances[port.component] for port in ports)
-        put_out = source.interface.by_name[connection.source.variable]
+        target = self.instances[connection.target.component]
         taken_in = target.interface.by_name[connection.target.variable]
-        self._python(lambda _: target.set([taken_in], source.get([put_out])), period, phase)
+        texts, slot = self.texts[connection.source], self.slots[connection.source]
+        view: Any = memoryview(self.made.values)  # type: ignore[arg-type]
+
+        def pass_on(_: int) -> None:
+            target.set([taken_in], [texts.listed[int(view[slot])]])
+
+        self._python(pass_on, period, phase)
+
+    def _fetch_texts(self, name: str, phase: int) -> None:
+        """Fetch the String outputs of a component, if it has any."""
+        instance, view = self.instances[name], memoryview(self.made.values)  # type: ignore[arg-type]
+        ports = [port for port in self.texts if port.component == name]
+        variables = [instance.interface.by_name[port.variable] for port in ports]
+
+        def fetch(_: int) -> None:
+            for port, text in zip(ports, instance.get(variables), strict=True):
+                view[self.slots[port]] = self.texts[port].number(str(text))
+
+        if ports:
+            self._python(fetch, self.system.period(name), phase)
 
     def _python(self, function: Callable[[int], None], period: int, phase: int) -> None:
         clock = memoryview(self.made.clock)  # type: ignore[arg-type]
@@ -170,6 +192,7 @@ class Planner:
         instance = self.instances[name]
         self._call(STEP, instance.stepper(self.made.clock, step), instance, period, period - 1)
         self._transfer(name, "output", period - 1)
+        self._fetch_texts(name, period - 1)
 
     def _transfer(self, name: str, causality: str, phase: int) -> None:
         """Pass all connected inputs, or fetch all outputs, a call per FMI type."""
@@ -220,6 +243,6 @@ def _by_type(instance: Instance, causality: str) -> list[tuple[str, list[Variabl
     """The scalar numbers of a causality, by FMI type, those of float64 first."""
     found: dict[str, list[Variable]] = {}
     for v in instance.interface.of(causality):
-        if v.supported and v.kind != "String":
+        if v.is_number:
             found.setdefault(v.type, []).append(v)
     return sorted(found.items(), key=lambda item: item[0] not in ("Real", "Float64"))

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from numbers import Integral
 from types import FrameType
+from typing import Any
 
 from tqdm import tqdm
 
@@ -84,7 +85,11 @@ class Session:
                     system, instances, lambda *rows: self._dispatch(*rows), engine, self.pacer
                 )
                 self._dispatch = Dispatcher(
-                    system, self._master.slots, (self._memory, *listeners), every
+                    system,
+                    self._master.slots,
+                    (self._memory, *listeners),
+                    every,
+                    self._master.texts,
                 )
                 self._stack.callback(self._end)
                 with self._failures():  # where the row of t = 0 is not finite
@@ -176,16 +181,18 @@ class Session:
             self._failed = True
             raise
 
-    def __getitem__(self, name: str) -> float:
+    def __getitem__(self, name: str) -> Any:
         """The value now of an output or a connected input, by a name like 'plant.gap[1]'.
 
-        Booleans are 0.0 or 1.0. InputError where there is no such signal.
+        A float, of a Boolean 0.0 or 1.0; of a String its text. InputError where there is no such
+        signal; connected inputs that are Strings are none.
         """
-        slots = self._master.slots
+        slots, texts = self._master.slots, self._master.texts
         port = Port(*name.split(".", 1)) if "." in name else None
         if port not in slots:
             raise InputError(f"{name!r}: no such signal; valid: {choices(slots)}")
-        return float(self._master.values[slots[port]])
+        value = float(self._master.values[slots[port]])
+        return texts[port].listed[int(value)] if port in texts else value
 
     def set(self, name: str, value: Value) -> None:
         """Set a tunable parameter or an input without a connection, from now on.

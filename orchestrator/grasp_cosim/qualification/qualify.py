@@ -153,7 +153,7 @@ def qualify(
         failure,
         tuple(numerics),
         (original.curves, theirs),
-        tuple(line for line in result.log if line not in reference.log) if result else (),
+        _remarks(reference, result) if result else (),
     )
 
 
@@ -193,8 +193,15 @@ def _variants(system: System) -> Iterator[tuple[str, System]]:
             yield f"scheme {scheme}", system.with_experiment(scheme=scheme)
 
 
+def _remarks(reference: Result, result: Result) -> tuple[str, ...]:
+    """What the candidate's run said that the original's did not, and what is not compared."""
+    texts = [name for name in reference if name not in reference.numbers]
+    said = [line for line in result.log if line not in reference.log]
+    return (*said, *(f"{name} is a String: not compared" for name in texts))
+
+
 def _curves(result: Result) -> dict[str, Curve]:
-    return {name: curve(result.time, values) for name, values in result.items()}
+    return {name: curve(result.time, values) for name, values in result.numbers.items()}
 
 
 def _converted(curves: Curves, swap: Swap) -> dict[str, Curve]:

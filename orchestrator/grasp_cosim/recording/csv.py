@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from ..errors import InputError, SimulationError
 from ..files import in_one_piece, unwritable
+from ..plain import to_cell
 from .listener import Experiment, Signal, times
 
 PIECE = 1024
@@ -21,26 +22,29 @@ class CsvListener:
 
     The file has a temporary name beside path until the run ends, in whatever way: what was
     recorded is kept, in whole lines. There is no file where nothing was. A Real is the shortest
-    text that reads back as the same number, a Boolean is 0 or 1.
+    text that reads back as the same number, a Boolean is 0 or 1, names and Strings are quoted texts
+    as plain.to_cell() makes them.
     """
 
-    def __init__(self, path: str | Path) -> None:
-        self._path = Path(path)
+    def __init__(self, path: str | Path, said: str | Path | None = None) -> None:
+        """`said` is the name in messages, if it is another."""
+        self._path, self._said = Path(path), Path(said or path)
 
     def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
         """Write the line of names; InputError where the file cannot be written."""
         self._step_ns = experiment.step_ns
-        self._whole = [i for i, s in enumerate(signals, 1) if s.kind != "Real"]
-        names = ("time", *(s.name.replace('"', '""') for s in signals))
+        self._whole = [i for i, s in enumerate(signals, 1) if s.kind in ("Integer", "Boolean")]
+        self._texts = {i: s.texts for i, s in enumerate(signals, 1) if s.kind == "String"}
+        names = ("time", *(s.name for s in signals))
         try:
             with ExitStack() as stack:
                 part = stack.enter_context(in_one_piece(self._path))
                 self._file = stack.enter_context(FileIO(part, "w"))
-                self._append(",".join(f'"{name}"' for name in names) + "\n")
+                self._append(",".join(map(_quoted, names)) + "\n")
                 self._finish = stack.pop_all()
                 self._empty = True
         except OSError as error:
-            raise InputError(unwritable(self._path, error)) from error
+            raise InputError(unwritable(self._said, error)) from error
 
     def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
         """Append the rows; SimulationError where that fails, the lines until then are whole."""
@@ -51,11 +55,13 @@ class CsvListener:
                 columns = [time.tolist(), *rows[piece].T.tolist()]
                 for i in self._whole:
                     columns[i] = [*map(int, columns[i])]
-                texts = (map(repr, column) for column in columns)
+                texts = [map(repr, column) for column in columns]
+                for i, own in self._texts.items():
+                    texts[i] = map(_quoted, own.column(rows[piece, i - 1]))
                 self._append("\n".join(map(",".join, zip(*texts, strict=True))) + "\n")
                 self._empty = False
         except OSError as error:
-            raise SimulationError(unwritable(self._path, error)) from error
+            raise SimulationError(unwritable(self._said, error)) from error
 
     def end(self, complete: bool) -> None:
         """Give the file its name; SimulationError where that fails."""
@@ -64,7 +70,7 @@ class CsvListener:
                 if self._empty:
                     raise _NothingRecordedError
         except OSError as error:
-            raise SimulationError(unwritable(self._path, error)) from error
+            raise SimulationError(unwritable(self._said, error)) from error
 
     def _append(self, text: str) -> None:
         """Write all of the text, or none of it and raise OSError."""
@@ -76,6 +82,10 @@ class CsvListener:
         except OSError:
             self._file.truncate(written)
             raise
+
+
+def _quoted(text: str) -> str:
+    return '"{}"'.format(to_cell(text).replace('"', '""'))
 
 
 class _NothingRecordedError(Exception):

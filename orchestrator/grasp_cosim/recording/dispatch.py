@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
+from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +13,7 @@ from ..system.description import System
 from ..system.parts import Port
 from ..system.settings import settings
 from .energy import ExchangeEnergy, bonds
-from .listener import Experiment, Listener, Signal
+from .listener import Experiment, Listener, Signal, Texts
 
 
 class Dispatcher:
@@ -28,13 +29,18 @@ class Dispatcher:
         slots: Mapping[Port, int],
         listeners: Sequence[Listener],
         every: int = 1,
+        texts: Mapping[Port, Texts] = MappingProxyType({}),
     ) -> None:
+        """Slots are the columns of the rows, texts those of Strings, which are numbers there."""
         self._listeners = tuple(listeners)
         self._every = every
-        self._outputs = _outputs(system, slots)
-        self._columns = np.array([slots[port] for port in self._outputs], np.intp)
+        self._columns = np.array([slots[port] for port in system.recorded], np.intp)
+        outputs = [
+            Signal(str(port), v.unit, v.kind, v.description or "", texts.get(port, Texts()))
+            for port, v in system.recorded.items()
+        ]
         self._energy = ExchangeEnergy(bonds(system), slots, transforms(system))
-        self.signals = (*self._outputs.values(), *self._energy.signals)
+        self.signals = (*outputs, *self._energy.signals)
         self._pending: tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]] | None = None
         experiment = Experiment.of(settings(system))
         with ExitStack() as begun:
@@ -79,12 +85,3 @@ class Dispatcher:
     def _hand_on(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
         for listener in self._listeners:
             listener.block(steps, rows)
-
-
-def _outputs(system: System, slots: Mapping[Port, int]) -> dict[Port, Signal]:
-    return {
-        port: Signal(str(port), v.unit, v.kind, v.description or "")
-        for component in system.components
-        for v in component.interface.of("output")
-        if (port := Port(component.name, v.name)) in slots
-    }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -12,17 +12,38 @@ import numpy.typing as npt
 from ..system.parts import NANOSECONDS
 
 
+class Texts:
+    """The texts that a String has had so far, each once; rows hold their numbers in this list."""
+
+    def __init__(self) -> None:
+        self.listed: list[str] = []
+        self._numbers: dict[str, int] = {}
+
+    def number(self, text: str) -> int:
+        """The number of a text, which is listed if it is new."""
+        found = self._numbers.setdefault(text, len(self.listed))
+        if found == len(self.listed):
+            self.listed.append(text)
+        return found
+
+    def column(self, numbers: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
+        """The texts of these numbers, as an array of str objects."""
+        return np.array([self.listed[int(number)] for number in numbers], object)
+
+
 @dataclass(frozen=True, slots=True)
 class Signal:
     """A recorded column: name like plant.gap[1], unit (None without one), kind, description.
 
-    The kind is Real, Integer or Boolean.
+    The kind is Real, Integer, Boolean or String. Rows have numbers in place of a String's texts,
+    those of `texts`, which grows while the run goes on.
     """
 
     name: str
     unit: str | None
     kind: str
     description: str = ""
+    texts: Texts = field(default_factory=Texts, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +79,7 @@ class Listener(Protocol):
     def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
         """Rows as (len(steps), len(signals)); step k is at t = k * experiment.step_ns.
 
-        Booleans are 0.0 or 1.0. The arrays are reused: copy what is kept.
+        Booleans are 0.0 or 1.0, for Strings see Signal. The arrays are reused: copy what is kept.
         """
 
     def end(self, complete: bool) -> None:

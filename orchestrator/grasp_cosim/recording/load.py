@@ -4,7 +4,7 @@ import csv
 import json
 import logging
 import os
-from collections.abc import Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ import numpy.typing as npt
 from ..checks import choice
 from ..errors import InputError, choices
 from ..metrics.metric import Metric, Signals, registered
+from ..plain import from_cell
 from ..realtime.timing import Timing
 from .mdf import check_mdf
 from .result import UNITS, Rejection, Result
@@ -40,8 +41,9 @@ MORE_KEYS: Mapping[str, Any] = {
 }  # fmt: skip
 """Entries that may be there."""
 
-TYPES = ("float64", "int32", "int64", "bool")
-"""The element types of recorded columns."""
+TEXT = "str"
+TYPES = ("float64", "int32", "int64", "bool", TEXT)
+"""The element types of recorded columns, the last that of Strings."""
 
 FORMS = {str: "a string", NUMBER: "a number", bool: "true or false", list: "a list"}
 """Types of entries in words; the others are JSON objects."""
@@ -56,20 +58,20 @@ def load_run(folder: str | Path) -> Result:
     folder = Path(folder)
     path = folder / SETTINGS
     written = _settings(path)
-    names, table = _table(folder / SIGNALS)
     units, types = written["units"], written.get("types", {})
-    if list(units) != names:
+    time, columns = _table(folder / SIGNALS, {n for n, kind in types.items() if kind == TEXT})
+    if list(units) != list(columns):
         raise InputError(
             f"{path}: units are those of {choices(units)}; "
-            f"must be those of the columns of {SIGNALS}: {choices(names)}"
+            f"must be those of the columns of {SIGNALS}: {choices(columns)}"
         )
     realtime = written.get("realtime")
     return Result(
         settings={key: written[key] for key in (*SETTING_KEYS, "roles") if key in written},
-        time=table[:, 0],
+        time=time,
         signals={
             name: _typed(f"{path}: type of {name}", column, types.get(name, "float64"))
-            for name, column in zip(names, table[:, 1:].T, strict=True)
+            for name, column in columns.items()
         },
         units=units,
         wall_time=written["wall_time"],
@@ -105,7 +107,7 @@ def _constant(value: Any, _: Signals) -> Any:
 
 
 def load_log(path: Path) -> Signals:
-    """The signals of a file, all float64: CSV with the column "time" and names, or ASAM MDF (.mf4).
+    """The numbers in a file, all float64: CSV with the column "time" and names, or ASAM MDF (.mf4).
 
     InputError where it is missing, damaged or of another kind, or where asammdf is not installed.
     """
@@ -115,8 +117,8 @@ def load_log(path: Path) -> Signals:
         return _mdf(path)
     if path.suffix.lower() != ".csv":
         raise InputError(f"{path}: must be a .csv or .mf4 file")
-    names, table = _table(path)
-    return Signals(table[:, 0], dict(zip(names, table[:, 1:].T, strict=True)))
+    time, columns = _table(path)
+    return Signals(time, {n: column for n, column in columns.items() if column.dtype != object})
 
 
 def _mdf(path: Path) -> Signals:
@@ -172,22 +174,68 @@ def _unreadable(path: Path, error: OSError) -> InputError:
     )
 
 
-def _table(path: Path) -> tuple[list[str], npt.NDArray[np.float64]]:
-    """The names of the signals and the values: a row per point, time in the first column."""
+def _table(
+    path: Path, texts: Collection[str] | None = None
+) -> tuple[npt.NDArray[np.float64], dict[str, npt.NDArray[Any]]]:
+    """The time, and the other columns by name: objects where they are texts, else float64.
+
+    `texts` are the names of those, by default of all that begin with something else than a number.
+    """
     names = _header(path)
     try:
+        texts = _not_numbers(path, names) if texts is None else texts
+        columns = _texts(path, names, texts) if texts else {}
+        places = [0, *(i for i, name in enumerate(names, 1) if name not in columns)]
+        some: dict[str, Any] = {"usecols": places, "quotechar": '"'} if columns else {}
         table = np.loadtxt(
-            path, delimiter=",", skiprows=1, comments=None, ndmin=2, encoding="utf-8"
+            path, delimiter=",", skiprows=1, comments=None, ndmin=2, encoding="utf-8", **some
         )
-    except ValueError as error:  # also where it is no UTF-8
+    except (ValueError, csv.Error) as error:  # also where it is no UTF-8
         raise InputError(f"{path}: is damaged: {str(error).splitlines()[0]}") from error
-    if table.shape[1] != len(names) + 1:
+    if table.shape[1] != len(places):
         raise InputError(
             f"{path}: is damaged: {table.shape[1]} values in a row, {len(names) + 1} names"
         )
     if not (np.diff(table[:, 0], prepend=-np.inf) > 0.0).all():
         raise InputError(f"{path}: is damaged: the time must grow from row to row")
-    return names, table
+    columns |= {names[i - 1]: table[:, k] for k, i in enumerate(places[1:], 1)}
+    return table[:, 0], {name: columns[name] for name in names}
+
+
+def _texts(
+    path: Path, names: Sequence[str], wanted: Collection[str]
+) -> dict[str, npt.NDArray[Any]]:
+    """The columns of these names that are texts; ValueError where a row has not all values."""
+    places = {i: name for i, name in enumerate(names, 1) if name in wanted}
+    cells: dict[str, list[str]] = {name: [] for name in places.values()}
+    for row in _rows(path):
+        if len(row) != len(names) + 1:
+            raise ValueError(f"{len(row)} values in a row, {len(names) + 1} names")
+        for i, name in places.items():
+            cells[name].append(from_cell(row[i]))
+    return {name: np.array(column, object) for name, column in cells.items()}
+
+
+def _not_numbers(path: Path, names: Sequence[str]) -> set[str]:
+    """The names of the columns that begin with something else than a number."""
+    first = next(_rows(path), [])[1:]
+    return {name for name, cell in zip(names, first, strict=False) if not _is_number(cell)}
+
+
+def _rows(path: Path) -> Iterator[list[str]]:
+    """The rows after the names."""
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = csv.reader(file, strict=True)
+        next(rows)
+        yield from rows
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
 
 
 def _header(path: Path) -> list[str]:
@@ -200,7 +248,8 @@ def _header(path: Path) -> list[str]:
     except OSError as error:
         raise _unreadable(path, error) from error
     try:
-        time, *names = next(csv.reader([first.decode("utf-8")], strict=True), []) or ["nothing"]
+        cells = next(csv.reader([first.decode("utf-8")], strict=True), [])
+        time, *names = [from_cell(cell) for cell in cells] or ["nothing"]
     except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: is damaged: the first line names no columns") from error
     if time != "time":
@@ -212,9 +261,10 @@ def _header(path: Path) -> list[str]:
     return names
 
 
-def _typed(place: str, column: npt.NDArray[np.float64], name: Any) -> npt.NDArray[Any]:
+def _typed(place: str, column: npt.NDArray[Any], name: Any) -> npt.NDArray[Any]:
     """The column with the element type of that name; InputError where its values have another."""
-    choice(place, name, TYPES)
+    if choice(place, name, TYPES) == TEXT:
+        return column
     with np.errstate(invalid="ignore"):
         typed = column.astype(name)
     if not np.array_equal(typed, column, equal_nan=name == "float64"):

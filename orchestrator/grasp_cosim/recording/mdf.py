@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 from xml.etree import ElementTree
 
 import numpy as np
@@ -19,7 +19,7 @@ from .listener import Experiment, Signal, times
 if TYPE_CHECKING:
     import asammdf
 
-TYPES = {"Real": np.float64, "Integer": np.int64, "Boolean": np.uint8}
+TYPES = {"Real": np.float64, "Integer": np.int64, "Boolean": np.uint8, "String": np.uint32}
 """The element type of a channel by its signal's kind."""
 
 TRANSPOSED_DEFLATE: Final = 2
@@ -32,24 +32,25 @@ PIECE = 8192
 class MdfListener:
     """Writes time and signals as one channel group, with units and descriptions.
 
-    The header has the settings of the run: all of them as JSON in its comment, and the main
-    ones as properties, with "complete" besides. asammdf keeps the rows in a compressed temporary
-    file beside path; the file at path is made from it when the run ends, in whatever way. There is
-    no file where nothing was recorded.
+    A String is recorded as the numbers of its texts, which its channel has as a conversion, so that
+    readers show them. The header has the settings of the run: all of them as JSON in its comment,
+    and the main ones as properties, with "complete" besides. asammdf keeps the rows in a compressed
+    temporary file beside path; the file at path is made from it when the run ends, in whatever way.
+    There is no file where nothing was recorded.
     """
 
-    def __init__(self, path: str | Path) -> None:
-        """InputError without asammdf."""
+    def __init__(self, path: str | Path, said: str | Path | None = None) -> None:
+        """`said` is the name in messages, if it is another. InputError without asammdf."""
         check_mdf()
-        self._path = Path(path)
+        self._path, self._said = Path(path), Path(said or path)
 
     def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
         """Describe the channels; InputError where there are none or the folder is not writable."""
         from asammdf import MDF
 
         if not signals:
-            raise InputError(f"{self._path}: nothing to record; must be a system with outputs")
-        self._experiment = experiment
+            raise InputError(f"{self._said}: nothing to record; must be a system with outputs")
+        self._experiment, self._signals = experiment, signals
         self._types = [TYPES[s.kind] for s in signals]
         self._steps, self._rows = np.empty(PIECE, np.int64), np.empty((PIECE, len(signals)))
         self._filled = 0
@@ -59,7 +60,7 @@ class MdfListener:
             # the first version with compressed blocks; every tool of today reads it
             self._mdf = MDF(version="4.10", temporary_folder=str(folder))
         except OSError as error:
-            raise InputError(unwritable(self._path, error)) from error
+            raise InputError(unwritable(self._said, error)) from error
         self._mdf.append([_channel(s) for s in signals], comment="", common_timebase=True)
 
     def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
@@ -79,12 +80,24 @@ class MdfListener:
             self._flush()
             if self._mdf.groups[0].channel_group.cycles_nr:
                 self._mdf.header.comment = _comment(self._experiment, complete)
+                self._convert_texts()
                 with in_one_piece(self._path) as part, part.open("wb+") as file:
                     self._mdf.save(file, compression=TRANSPOSED_DEFLATE)
         except OSError as error:
-            raise SimulationError(unwritable(self._path, error)) from error
+            raise SimulationError(unwritable(self._said, error)) from error
         finally:
             self._mdf.close()
+
+    def _convert_texts(self) -> None:
+        from asammdf.blocks.conversion_utils import from_dict
+
+        channels: Any = self._mdf.groups[0].channels[1:]  # the first is time
+        for channel, signal in zip(channels, self._signals, strict=True):
+            if signal.kind == "String":
+                table: dict[str, Any] = {}
+                for number, text in enumerate(signal.texts.listed):
+                    table |= {f"val_{number}": number, f"text_{number}": text}
+                channel.conversion = from_dict(table)
 
     def _flush(self) -> None:
         rows = self._rows[: self._filled].T
@@ -93,7 +106,7 @@ class MdfListener:
         try:
             self._mdf.extend(0, [(samples, None) for samples in (time, *channels)])
         except OSError as error:
-            raise SimulationError(unwritable(self._path, error)) from error
+            raise SimulationError(unwritable(self._said, error)) from error
         self._filled = 0
 
 

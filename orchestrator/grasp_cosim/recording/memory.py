@@ -10,7 +10,7 @@ from ..errors import InputError, SimulationError
 from .listener import Experiment, Signal, times
 
 TYPES = {"Real": np.float64, "Integer": np.int64, "Boolean": np.bool_}
-"""The element type of a column by its signal's kind."""
+"""The element type of a column of numbers by its signal's kind."""
 
 
 class MemoryListener:
@@ -64,11 +64,14 @@ class MemoryListener:
     def signals(self) -> dict[str, npt.NDArray[Any]]:
         """The recorded columns by name, so far. Rows that come later do not change them.
 
-        Real ones are views. An Integer is exact up to 2**53, as the rows are float64.
+        Real ones are views, Strings arrays of str objects. An Integer is exact up to 2**53, as the
+        rows are float64.
         """
         rows = self._table[: self._rows].T
         return {
-            s.name: column.astype(TYPES[s.kind], copy=False)
+            s.name: s.texts.column(column)
+            if s.kind == "String"
+            else column.astype(TYPES[s.kind], copy=False)
             for s, column in zip(self._signals, rows, strict=True)
         }
 

@@ -19,7 +19,7 @@ from .listener import Experiment, Listener, Signal
 from .mdf import MdfListener
 from .proxies import proxy_figures
 
-KINDS = {"f": "Real", "i": "Integer", "b": "Boolean"}
+KINDS = {"f": "Real", "i": "Integer", "b": "Boolean", "O": "String"}
 """The kind of a signal by the kind of its column's element type."""
 
 PIECE = 8192
@@ -95,6 +95,11 @@ class Result(Mapping[str, npt.NDArray[Any]]):
         return measure(self.by_role, registered(self.more_metrics))
 
     @property
+    def numbers(self) -> dict[str, npt.NDArray[Any]]:
+        """The signals that are numbers or Booleans: all but Strings."""
+        return {name: column for name, column in self.items() if column.dtype != object}
+
+    @property
     def metrics(self) -> Mapping[str, Any]:
         """The metrics by name, then the figures of UNITS, then those of any proxies.
 
@@ -128,12 +133,12 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     def to_csv(self, path: str | Path) -> None:
         """Write time and signals with full precision, a line per communication point."""
         with in_one_piece(Path(path)) as part:
-            self._play(CsvListener(part))
+            self._play(CsvListener(part, path))
 
     def to_mdf(self, path: str | Path) -> None:
         """Write an ASAM MDF 4 file with the units and the settings; InputError without asammdf."""
         with in_one_piece(Path(path)) as part:
-            self._play(MdfListener(part))
+            self._play(MdfListener(part, path))
 
     def to_json(self, path: str | Path) -> None:
         """Write the metrics and the settings that led to them, then what is known by signal
@@ -146,7 +151,10 @@ class Result(Mapping[str, npt.NDArray[Any]]):
             **self._figures,
             **self.settings,
             "units": dict(self.units),
-            "types": {name: str(column.dtype) for name, column in self.signals.items()},
+            "types": {
+                name: "str" if column.dtype == object else str(column.dtype)
+                for name, column in self.signals.items()
+            },
             "descriptions": dict(self.descriptions),
             "metric_units": self.metric_units,
             "missing_metrics": list(self.measured.missing),
@@ -189,8 +197,10 @@ class Result(Mapping[str, npt.NDArray[Any]]):
                 piece = slice(first, first + PIECE)
                 steps = self._steps[piece]
                 rows = np.empty((len(steps), len(signals)))
-                for i, column in enumerate(self.signals.values()):
-                    rows[:, i] = column[piece]
+                for i, (signal, column) in enumerate(zip(signals, self.values(), strict=True)):
+                    part = column[piece]
+                    text = signal.kind == "String"
+                    rows[:, i] = [*map(signal.texts.number, part)] if text else part
                 listener.block(steps, rows)
         finally:
             listener.end(self.complete)

@@ -20,7 +20,11 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
 from ..files import write_text
+from ..recording.listener import Texts
 from ..recording.result import Result
 from .diagram import Link, diagram_svg
 from .embed import LIMIT, Shown, fit, packed
@@ -77,7 +81,7 @@ def write_page(
 
 def page_html(result: Result, title: str, *, scene: Scene | None = None, limit: int = LIMIT) -> str:
     """Return the page as text, see write_page."""
-    shown = fit(result.time, result.signals, limit)
+    shown = fit(result.time, {name: _drawn(column) for name, column in result.items()}, limit)
     timing = result.timing
     sections = {
         "scene": (scene.title, scene.html) if scene else None,
@@ -117,6 +121,7 @@ def _state(result: Result, shown: Shown, scene: Scene | None) -> dict[str, Any]:
                 "steps": values.dtype.kind != "f",
                 "text": result.descriptions.get(name, ""),
                 "id": f"signal{k}",
+                "texts": list(dict.fromkeys(values)) if values.dtype == object else None,
             }
             for k, (name, values) in enumerate(result.signals.items())
         ],
@@ -125,6 +130,11 @@ def _state(result: Result, shown: Shown, scene: Scene | None) -> dict[str, Any]:
         "marks": [{"t": t, "color": color} for t, color in marks],
         "scene": scene.state if scene else None,
     }
+
+
+def _drawn(column: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """A column as it is drawn: of a String the numbers of its texts, in the order they came."""
+    return np.array([*map(Texts().number, column)]) if column.dtype == object else column
 
 
 def _text(name: str) -> str:

@@ -31,17 +31,17 @@ MOST_NAMED = 12
 
 
 def plot_signals(run: Result, path: Path) -> None:
-    """Draw all signals of any run over time as a PNG, those of the same unit together.
+    """Draw all signals of any run but Strings over time, as a PNG, those of the same unit together.
 
     InputError without matplotlib, or where there are no signals.
     """
-    units = list(dict.fromkeys(run.units[name] or "" for name in run.signals))
+    units = list(dict.fromkeys(run.units[name] or "" for name in run.numbers))
     if not units:
-        raise InputError(f"{path}: nothing to draw; must be a result with signals")
+        raise InputError(f"{path}: nothing to draw; must be a result with signals that are numbers")
     figure = new_figure(9.0, 1.2 + 2.2 * len(units))
     rows = figure.subplots(len(units), 1, sharex=True, squeeze=False)[:, 0]
     for axes, unit in zip(rows, units, strict=True):
-        names = [name for name in run.signals if (run.units[name] or "") == unit]
+        names = [name for name in run.numbers if (run.units[name] or "") == unit]
         for name in names:
             axes.plot(run.time, run.signals[name], linewidth=1.0, label=name)
         finish(axes, f"in {unit}" if unit else "no unit", len(names) <= MOST_NAMED)

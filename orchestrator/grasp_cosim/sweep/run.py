@@ -45,7 +45,7 @@ def run_job(task: Task, job: Job) -> Outcome:
         if not result.complete:
             raise KeyboardInterrupt
         metrics = {name: m for name, m in result.metrics.items() if name not in UNITS}
-        last = {name: result[name][-1].item() for name in task.outputs}
+        last = {name: result[name][-1:].tolist()[0] for name in task.outputs}
         return Outcome(job.index, dict(_flat("", {**metrics, **last})))
     except (InputError, SimulationError) as error:
         return Outcome(job.index, {}, str(error))

@@ -265,10 +265,8 @@ class Study:
 
     @property
     def _declared(self) -> list[str]:
-        """All outputs."""
-        return [
-            f"{c.name}.{v.name}" for c in self.system.components for v in c.interface.of("output")
-        ]
+        """All outputs that a run records."""
+        return [str(port) for port in self.system.recorded]
 
     def _check_outputs(self) -> None:
         declared = self._declared

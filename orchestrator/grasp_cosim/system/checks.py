@@ -156,6 +156,11 @@ def remarks(system: Structure) -> tuple[str, ...]:
                 port = Port(component.name, variable.name)
                 left = "keeps its start value" if variable.causality == "input" else "not recorded"
                 lines.append(f"{port} is of type {variable.nature}: {left}")
+    if not system.recorded:
+        lines.append(
+            f"{system.name}: nothing is recorded; must have an output that is a Real, Integer, "
+            "Boolean or String, no array"
+        )
     return tuple(lines)
 
 

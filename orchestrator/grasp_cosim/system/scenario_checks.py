@@ -66,7 +66,7 @@ def check_setting(system: Structure, port: Port, value: Value, place: str) -> No
 
 def _check_condition(system: Structure, condition: Condition, place: str) -> None:
     interface = system.component(condition.port.component, place).interface
-    valid = [v.name for v in interface.of("output") if v.supported and v.kind != "String"]
+    valid = [v.name for v in interface.of("output") if v.is_number]
     component, variable = condition.port.component, condition.port.variable
     known(f"{place}: {component} has no numeric output", variable, valid)
     kind = interface.by_name[variable].kind

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 from ..errors import InputError, choices
-from ..interface.interface import Value
-from .parts import Component, Connection, Event, Fault, Initialisation
+from ..interface.interface import Value, Variable
+from .parts import Component, Connection, Event, Fault, Initialisation, Port
 
 Scheme = Literal["sequential", "jacobi"]
 SCHEMES: tuple[str, ...] = get_args(Scheme)
@@ -39,6 +39,16 @@ class Structure:
     def total_steps(self) -> int:
         """The number of communication steps from 0 to the stop time."""
         return self.stop_ns // self.step_ns
+
+    @property
+    def recorded(self) -> dict[Port, Variable]:
+        """The outputs that a run records, in the order of the system: no arrays, no binaries."""
+        return {
+            Port(component.name, v.name): v
+            for component in self.components
+            for v in component.interface.of("output")
+            if v.supported
+        }
 
     def period(self, name: str) -> int:
         """The own step of the component of that name, in communication steps of the system."""

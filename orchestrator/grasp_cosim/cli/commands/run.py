@@ -13,6 +13,7 @@ from ...recording.result import Result
 from ...report.timing import draw_result
 from ..frame import (
     INTERRUPTED,
+    NEGATIVE,
     PATH,
     check_outputs,
     chosen_metrics,
@@ -91,16 +92,19 @@ def run(
     if not result.complete:
         message = f"interrupted at t = {result.time[-1]:.6g} s; kept what was recorded"
         return fail(message, INTERRUPTED)
-    return 0
+    return 0 if result.signals else NEGATIVE  # as the log says
 
 
 def _write(result: Result, out: Path | None, plot: bool, mdf: bool) -> None:
     if out:
-        result.to_csv(out / "signals.csv")
         result.to_json(out / "run.json")
+    if not result.signals:
+        return
+    if out:
+        result.to_csv(out / "signals.csv")
     if out and mdf:
         result.to_mdf(out / "signals.mf4")
-    for picture in draw_result(result, out or Path()) if plot else ():
+    for picture in draw_result(result, out or Path()) if plot and result.numbers else ():
         click.echo(f"drew {picture}", err=True)
 
 

@@ -89,7 +89,7 @@ function valueAt(time, series, t) {
 class Recording {
   constructor(page) {
     this.rows = page.rows;
-    this.signals = page.signals; // each: name, unit, steps, text, id
+    this.signals = page.signals; // each: name, unit, steps, text, id, texts
     this.byName = new Map(page.signals.map((signal) => [signal.name, signal]));
     this.loaded = new Map();
   }

@@ -123,7 +123,8 @@ class Panel {
     const t = hover === null ? cursor : hover;
     this.series.forEach((one, i) => {
       const value = valueAt(time, one, t);
-      this.readings[i].textContent = one.steps ? `${value}` : `${text(value * factor)} ${unit}`;
+      this.readings[i].textContent = one.texts ? one.texts[value]
+        : one.steps ? `${value}` : `${text(value * factor)} ${unit}`;
     });
   }
 

@@ -1,0 +1,97 @@
+"""What is printed: harmless to a terminal, and an output that fails is an error of one line."""
+
+import os
+import sys
+from codecs import lookup
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from typing import Any
+
+from ..plain import printable
+
+OUTPUT = "standard output"
+
+
+class OutputError(Exception):
+    """Standard output cannot be written. The message is one line."""
+
+    def __init__(self, error: OSError) -> None:
+        super().__init__(f"{OUTPUT}: {error.strerror}")
+
+
+class _Harmless:
+    """A stream that writes text as printable() makes it."""
+
+    def __init__(self, stream: Any) -> None:
+        self._stream = stream
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+    def write(self, text: str) -> int:
+        """Write the text. A carriage return at its beginning stays: so a progress bar begins."""
+        start = text[: text.startswith("\r")]
+        with self._failures():
+            self._stream.write(start + printable(text[len(start) :]))
+        return len(text)
+
+    def flush(self) -> None:
+        """Write what waits."""
+        with self._failures():
+            self._stream.flush()
+
+    @contextmanager
+    def _failures(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:  # as an OSError, click would make an exit code of its own of it
+            raise OutputError(error) from error
+
+
+class _Silent(_Harmless):
+    """The same for standard error: where it fails, there is nobody to tell."""
+
+    @contextmanager
+    def _failures(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), self._stream.fileno())
+
+
+@contextmanager
+def harmless_streams() -> Iterator[None]:
+    """Whatever is printed goes through printable(); OutputError where it cannot be written."""
+    out: Any = _Harmless(sys.stdout)
+    err: Any = _Silent(sys.stderr)
+    with redirect_stdout(out), redirect_stderr(err):
+        yield
+
+
+def keep_output_for_us() -> None:
+    """What the binary of an FMU prints goes to standard error: with --json, we alone may print.
+
+    In the place of a standard file that is closed comes one that cannot be written. Else the next
+    file that is opened would get its number, and what an FMU prints.
+    """
+    for descriptor in range(3):
+        try:
+            os.fstat(descriptor)
+        except OSError:
+            os.open(os.devnull, os.O_RDONLY)
+    ours = os.dup(1)
+    os.dup2(2, 1)
+    sys.stdout = _opened(ours, sys.stdout)
+    sys.stderr = _opened(os.dup(2), sys.stderr)
+
+
+def _opened(descriptor: int, like: Any) -> Any:
+    """A text stream with the encoding of another, which is None where that was closed.
+
+    In place of ASCII it is UTF-8, as click has it, too.
+    """
+    plain = like is None or lookup(like.encoding).name == "ascii"
+    encoding = "utf-8" if plain else like.encoding
+    errors = "backslashreplace" if plain else like.errors
+    line = like is not None and like.line_buffering
+    return os.fdopen(descriptor, "w", 1 if line else -1, encoding=encoding, errors=errors)

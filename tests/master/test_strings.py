@@ -1,0 +1,179 @@
+"""String outputs are recorded like any other: in both engines, from any FMU, read back the same."""
+
+import re
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from grasp_cosim import Result, System, load_run, simulate
+from grasp_cosim.cli import main
+from grasp_cosim.master.engine import Engine
+from grasp_cosim.report.page import page_html
+from grasp_cosim.sweep.run import Job, Task, run_job
+from support.mocks import Mock, Run, make_system
+from support.native_fmus import TYPES, build, needs_gcc
+
+ENGINES: tuple[Engine, ...] = ("python", "compiled")
+STARTS = {"Boolean": "false", "String": "'at rest'", "Enumeration": "1"}
+TEXTS = ("=1+1", 'a "b", c\r\n\\n', "\x1b[31mred\u202e", "", "ü\u2028", "@x", "1.5", "nan")
+"""What a String may be changed to, one at each step."""
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_text_that_changes_at_every_own_step(tmp_path: Path, engine: Engine) -> None:
+    if engine == "compiled":
+        pytest.importorskip("numba")
+    mock = Mock(tmp_path, "a", lambda u, t: f"t = {t:g}", "String")  # type: ignore[arg-type, return-value]
+    run = Run(make_system([mock], [], own={"a": 200_000_000}), [mock], engine)
+    first, second = "t = 0", "t = 0.2"
+    texts: object = {"a.y": [first, first, second, second, "t = 0.4"]}
+    assert run.to_the_end() == texts
+
+
+def changing(folder: Path, version: str, isolation: str, scheme: str = "sequential") -> System:
+    """Two FMUs, from one of which a String goes to the other; it is another at every 0.1 s."""
+    fmu = build(folder, version=version)
+    system = ""
+    for name, without in (("a", ""), ("b", "String")):
+        inputs = [t for t in TYPES[version] if t != without]
+        values = ", ".join(f"u_{t} = {STARTS.get(t, '0')}" for t in inputs)
+        system += (
+            f'[components.{name}]\nfmu = "{fmu.name}"\nisolation = "{isolation}"\n'
+            f"values = {{ {values} }}\n"
+        )
+    for k, text in enumerate(TEXTS):
+        escaped = "".join(f"\\U{ord(c):08x}" for c in text)
+        system += f'[[events]]\nat = {0.1 * k:.1f}\nset = {{ "a.u_String" = "{escaped}" }}\n'
+    path = folder / "changing.toml"
+    path.write_text(
+        'connections = ["a.y_String -> b.u_String"]\n[experiment]\nstep = 0.1\n'
+        f'stop = {0.1 * len(TEXTS):.1f}\nscheme = "{scheme}"\n{system}',
+        "utf-8",
+    )
+    return System.load(path)
+
+
+@needs_gcc
+@pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
+@pytest.mark.parametrize(
+    ("version", "isolation"), [("2.0", "none"), ("3.0", "none"), ("3.0", "process")]
+)
+def test_native_fmus_and_what_is_read_back(
+    tmp_path: Path, version: str, isolation: str, scheme: str
+) -> None:
+    pytest.importorskip("numba")
+    system = changing(tmp_path, version, isolation, scheme)
+    for engine in ENGINES:
+        result = simulate(system, engine=engine)
+        result.to_csv(tmp_path / engine / "signals.csv")
+        result.to_json(tmp_path / engine / "run.json")
+        late = ["at rest"] * (scheme == "jacobi")
+        assert result["a.y_String"].tolist() == ["at rest", *TEXTS]
+        assert result["b.y_String"].tolist() == ["at rest", *late, *TEXTS][: len(result.time)]
+        back = load_run(tmp_path / engine)
+        assert list(back) == list(result)
+        for name in result:
+            assert back[name].dtype == result[name].dtype
+            assert back[name].tolist() == result[name].tolist()
+    one, two = ((tmp_path / engine / "signals.csv").read_bytes() for engine in ENGINES)
+    assert one == two
+    assert len(one.splitlines()) == 2 + len(TEXTS)
+
+
+@needs_gcc
+def test_nothing_that_takes_a_result_stumbles_over_a_text(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    system = changing(tmp_path, "2.0", "none")
+    result = simulate(system)
+    assert '"texts": ["at rest", "=1+1"' in page_html(result, "texts")
+    result.plot(tmp_path / "signals.png")
+    assert "a.y_String" not in result.numbers
+    assert "a.x" in result.numbers
+    outcome = run_job(Task(system, ("a.y_String", "a.x")), Job(0, {}))
+    assert (outcome.error, outcome.metrics["a.y_String"]) == (None, "nan")
+
+
+@needs_gcc
+def test_a_session_has_the_text_of_now(tmp_path: Path) -> None:
+    with simulate.session(changing(tmp_path, "3.0", "none")) as session:
+        assert session["b.y_String"] == "at rest"
+        assert session.step()
+        assert session["b.y_String"] == TEXTS[0]
+
+
+@needs_gcc
+def test_mdf_has_the_texts(tmp_path: Path) -> None:
+    asammdf = pytest.importorskip("asammdf")
+    result = simulate(changing(tmp_path, "3.0", "none"))
+    result.to_mdf(tmp_path / "signals.mf4")
+    with asammdf.MDF(tmp_path / "signals.mf4") as mdf:
+        samples = mdf.get("a.y_String").samples
+        numbers = mdf.get("a.x").samples
+    # asammdf leaves out the end of a text that is a line break
+    assert [s.decode().rstrip() for s in samples[:3]] == ["at rest", TEXTS[0], TEXTS[1]]
+    assert numbers.tobytes() == result["a.x"].tobytes()
+
+
+@needs_gcc
+def test_null_and_bytes_that_are_no_text(tmp_path: Path) -> None:
+    from grasp_cosim.fmi.loaded import _OF_KIND
+
+    assert [_OF_KIND["String"](v) for v in (None, b"\xff", "x")] == ["", "\ufffd", "x"]
+
+
+def without_scalars(fmu: Path) -> None:
+    """Leaves an FMI 3.0 FMU the outputs that cannot be recorded."""
+    with zipfile.ZipFile(fmu) as archive:
+        files = {name: archive.read(name) for name in archive.namelist()}
+    xml = files["modelDescription.xml"].decode()
+    kept = ("y_array", "y_clock", "time")
+    xml = re.sub(
+        r'<(\w+) name="(\w+)"[^>]*?(?:/>|>.*?</\1>)',
+        lambda m: m[0] if m[2] in kept or 'causality="parameter"' in m[0] else "",
+        xml[: (end := xml.index("</ModelVariables>"))].partition("<ModelVariables>")[2],
+    )
+    whole = files["modelDescription.xml"].decode()
+    head, tail = whole.partition("<ModelVariables>")[0], whole[end:]
+    tail = re.sub(r'<\w+ valueReference="(?!15[12]")\d+"[^>]*/>', "", tail)
+    files["modelDescription.xml"] = f"{head}<ModelVariables>{xml}{tail}".encode()
+    with zipfile.ZipFile(fmu, "w") as archive:
+        for name, data in files.items():
+            archive.writestr(name, data)
+
+
+@pytest.fixture
+def unrecordable(tmp_path: Path) -> Path:
+    without_scalars(build(tmp_path, "arrays"))
+    path = tmp_path / "arrays.toml"
+    path.write_text(
+        '[experiment]\nstep = 0.01\nstop = 0.1\n[components.a]\nfmu = "arrays.fmu"\n', "utf-8"
+    )
+    return path
+
+
+@needs_gcc
+def test_a_run_that_records_nothing_is_no_success(
+    unrecordable: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert main(["run", str(unrecordable), "--out", str(out), "--json", "--plot", "--mdf"]) == 1
+    said = capfd.readouterr()
+    assert '"steps": 10,' in said.out
+    lines = [line for line in said.err.splitlines() if "record" in line]
+    assert lines == [
+        "a.y_array is of type array of Float64: not recorded",
+        "a.y_clock is of type Clock: not recorded",
+        "arrays.toml: nothing is recorded; must have an output that is a Real, Integer, Boolean "
+        "or String, no array",
+    ]
+    assert [path.name for path in out.iterdir()] == ["run.json"]
+    assert "nothing is recorded" in (out / "run.json").read_text("utf-8")
+
+
+@needs_gcc
+def test_a_result_of_nothing_says_so(unrecordable: Path) -> None:
+    result: Result = simulate(System.load(unrecordable))
+    assert dict(result) == {}
+    assert np.array_equal(result.time, np.arange(11) * 0.01)
+    assert "nothing is recorded" in result.log[-1]
