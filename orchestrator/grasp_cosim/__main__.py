@@ -4,11 +4,11 @@ It is the first one where Python looks for modules, and where it looked for the 
 `python -P -m grasp_cosim` does not. Nothing else is imported from there.
 """
 
-import os
 import sys
+from pathlib import Path
 
 if __name__ == "__main__":
-    if not sys.flags.safe_path and sys.path[0] == os.getcwd():
+    if not sys.flags.safe_path and sys.path[0] == str(Path.cwd()):
         del sys.path[0]
     from .cli import entry
 

@@ -24,9 +24,8 @@ def poison(folder: Path, names: set[str]) -> Path:
     """A folder of modules, each of which notes that it was imported, and fails."""
     folder.mkdir()
     for name in filter(str.isidentifier, names):
-        (folder / f"{name}.py").write_text(
-            f"open({str(folder / MARK)!r}, 'a').write({name!r} + ' ')\nraise ImportError({name!r})\n"
-        )
+        noted = f"open({str(folder / MARK)!r}, 'a').write({name!r} + ' ')"
+        (folder / f"{name}.py").write_text(f"{noted}\nraise ImportError({name!r})\n")
     return folder
 
 

@@ -8,6 +8,7 @@ from typing import NoReturn
 import click
 
 from ..errors import InputError, SimulationError
+from .crash import explain_crashes
 from .frame import FAILED, INTERRUPTED, WRONG, fail
 from .group import cli
 
@@ -18,6 +19,7 @@ FULL = (errno.ENOSPC, errno.EDQUOT, errno.EIO)
 def entry() -> NoReturn:
     """The command grasp-cosim."""
     _keep_output_for_us()
+    explain_crashes("--debug" in sys.argv)
     code = main(sys.argv[1:])
     try:
         sys.stdout.close()
