@@ -1,5 +1,12 @@
-"""The command grasp-cosim, also as `python -m grasp_cosim`."""
+"""The command grasp-cosim, also as `python -m grasp_cosim`.
 
+Python starts the latter in the current folder. That is then the first one where Python looks for
+modules, and where it looked for the first few already: `python -P -m grasp_cosim` does not. Nothing
+else is imported from there.
+"""
+
+import os
+import sys
 from typing import NoReturn
 
 from .early import leave_at_once
@@ -14,4 +21,6 @@ def entry() -> NoReturn:
 
 
 if __name__ == "__main__":
+    if not sys.flags.safe_path and sys.path[0] == os.getcwd():  # noqa: PTH109 - importing pathlib looks there
+        del sys.path[0]
     entry()

@@ -2,13 +2,14 @@
 
 The processes are new ones: a fork of one that has loaded FMUs would share their state. Each has one
 pipe to us. One that dies takes its own job with it and no other: a new one takes its place. Where
-we die, the pipes end, and the processes with them.
+we die, the pipes end, and the processes with them. Where we stand, the current folder, they import
+nothing from.
 """
 
 import os
 import signal
-from collections.abc import Callable, Generator, Iterable, Sequence
-from contextlib import closing, suppress
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from contextlib import closing, contextmanager, suppress
 from functools import partial
 from itertools import islice
 from multiprocessing import get_context
@@ -22,6 +23,8 @@ from .errors import SimulationError
 
 Job = TypeVar("Job")
 Run = TypeVar("Run")
+
+_SAFE_PATH = "PYTHONSAFEPATH"
 
 PATIENCE = 5.0
 """s; a process that has not ended so long after it was to is killed."""
@@ -139,7 +142,8 @@ class _Worker:
         self._process: BaseProcess = context.Process(target=_work, args=(theirs,))
         blocked = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])  # Ctrl-C is for us
         try:
-            self._process.start()
+            with _safe_path():
+                self._process.start()
         finally:
             theirs.close()
             signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
@@ -186,6 +190,23 @@ class _Worker:
         if code < 0:
             return f"ended by signal {-code}, {signal.strsignal(-code)}"
         return f"ended with exit code {code}"
+
+
+@contextmanager
+def _safe_path() -> Iterator[None]:
+    """Have processes that are started meanwhile import nothing from the current folder.
+
+    multiprocessing starts them with `python -c`, which looks there first.
+    """
+    before = os.environ.get(_SAFE_PATH)
+    os.environ[_SAFE_PATH] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[_SAFE_PATH]
+        else:
+            os.environ[_SAFE_PATH] = before
 
 
 def _work(pipe: Connection) -> None:

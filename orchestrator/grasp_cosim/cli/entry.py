@@ -8,6 +8,7 @@ from typing import NoReturn
 import click
 
 from ..errors import InputError, SimulationError
+from .crash import explain_crashes
 from .frame import FAILED, INTERRUPTED, WRONG, fail
 from .group import cli
 from .streams import OutputError, harmless_streams, keep_output_for_us
@@ -20,6 +21,7 @@ def entry() -> NoReturn:
     """The command grasp-cosim, see __main__.py."""
     try:
         keep_output_for_us()
+        explain_crashes("--debug" in sys.argv)
         code = main(sys.argv[1:])
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # what is left is short, and nothing is lost
     except KeyboardInterrupt:

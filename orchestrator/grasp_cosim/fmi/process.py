@@ -72,7 +72,7 @@ class ProcessInstance:
         ends = (theirs.fileno(), memory.fileno(), reading)
         path = os.pathsep.join(filter(None, sys.path))
         self._process = subprocess.Popen(  # noqa: S603
-            [sys.executable, "-m", "grasp_cosim.fmi.worker", *map(str, ends)],
+            [sys.executable, "-P", "-m", "grasp_cosim.fmi.worker", *map(str, ends)],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,

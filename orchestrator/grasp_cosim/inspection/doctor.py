@@ -345,7 +345,7 @@ def trial(fmu: Unpacked, timeout: float = 60.0) -> Verdict:
     if not fmu.kind.startswith(RUNS) or _processor(fmu.binary) != HERE:
         return "warning", "not loaded: of another kind than this master, or without a binary", None
     started = time.monotonic()
-    arguments = ["-u", "-c", _TRIAL, str(fmu.folder), fmu.guid, fmu.binary.stem]
+    arguments = ["-P", "-u", "-c", _TRIAL, str(fmu.folder), fmu.guid, fmu.binary.stem]
     code, said = _run(sys.executable, *arguments, timeout=timeout, cwd=fmu.folder)
     said = said.replace(f"{fmu.folder}/", "").replace("Failed to instantiate model\n", "")
     said = _REPEATED.sub("", said)

@@ -16,7 +16,7 @@ from .checks import (
     check_items,
     check_steps,
 )
-from .parts import NANOSECONDS
+from .parts import NANOSECONDS, Isolation
 from .scenario_checks import check_scenario
 from .structure import SCHEMES, Scheme, Structure
 
@@ -109,6 +109,13 @@ class System(Structure):
             place = f"{self.name}: [presets.{name}]"
             system = system.revised({}, self.presets[name], (place, place))
         return system
+
+    def with_isolation(self, isolation: Isolation | None) -> "System":
+        """A copy with all components in processes of their own, or in this one; None: as it is."""
+        if isolation is None:
+            return self
+        components = tuple(replace(c, isolation=isolation) for c in self.components)
+        return replace(self, components=components)
 
     def with_experiment(
         self,

@@ -11,6 +11,7 @@ from ...master.simulation import MOST, simulate
 from ...recording.mdf import check_mdf
 from ...recording.result import Result
 from ...report.timing import draw_result
+from ...system.parts import ISOLATIONS
 from ..frame import (
     INTERRUPTED,
     NEGATIVE,
@@ -42,6 +43,11 @@ from ..step_study import check_step_study, step_study_options, study_step
 @click.option(
     "--every", type=click.IntRange(1, MOST), default=1, help="Record each N-th step only."
 )
+@click.option(
+    "--isolation",
+    type=click.Choice(ISOLATIONS),
+    help="Where all FMUs run: each in a process of its own, or none. Default: as SYSTEM says.",
+)
 @click.option("--engine", type=click.Choice(ENGINES), default="auto", show_default=True)
 @metrics_option
 @step_study_options
@@ -66,7 +72,8 @@ def run(
     check_step_study(given, paced is not None)
     fmus = dict(pair("--swap", text, "COMPONENT=FMU") for text in swaps)
     values = set_values(given["settings"])
-    system = chosen_system(given).revised(fmus, values, ("--swap", "--set"))
+    system = chosen_system(given).with_isolation(given["isolation"])
+    system = system.revised(fmus, values, ("--swap", "--set"))
     metrics = chosen_metrics(metric_files)
     if given["step_study"]:
         return study_step(system, metrics, given, as_json)

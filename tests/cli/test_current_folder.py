@@ -1,0 +1,113 @@
+"""Modules in the current folder, which may be that of a stranger, are not run."""
+
+import subprocess
+import sys
+from importlib.metadata import packages_distributions
+from pathlib import Path
+
+import pytest
+from grasp_cosim.grasp.presets import SYSTEM
+
+MARK = "imported.txt"
+STUDY = """outputs = ["plant.gap[1]"]
+stop = 0.002
+system = "grasp.toml"
+[design]
+kind = "grid"
+[[parameters]]
+variables = ["plant.object_width"]
+values = [0.06, 0.07]
+"""
+
+
+def poison(folder: Path, names: set[str]) -> Path:
+    """A folder of modules, each of which notes that it was imported, and fails."""
+    folder.mkdir()
+    for name in filter(str.isidentifier, names):
+        noted = f"open({str(folder / MARK)!r}, 'a').write({name!r} + ' ')"
+        (folder / f"{name}.py").write_text(f"{noted}\nraise ImportError({name!r})\n")
+    return folder
+
+
+@pytest.fixture
+def everything(tmp_path: Path) -> Path:
+    """All that Python and its packages have, under false colours."""
+    ours = {"sitecustomize", "usercustomize"}
+    return poison(
+        tmp_path / "strange", {*sys.stdlib_module_names, *packages_distributions(), *ours}
+    )
+
+
+@pytest.fixture
+def system(fmus: Path, tmp_path: Path) -> Path:
+    """The grasp as a file."""
+    path = tmp_path / "grasp.toml"
+    path.write_text(SYSTEM.read_text("utf-8").replace('fmu = "', f'fmu = "{fmus}/'), "utf-8")
+    return path
+
+
+def not_imported(folder: Path, command: list[str], *arguments: str) -> str:
+    """What a command that stands in the folder says; it imports nothing from there."""
+    done = subprocess.run(
+        [sys.executable, *command, *arguments],
+        cwd=folder, capture_output=True, text=True, timeout=300, check=False,
+    )  # fmt: skip
+    imported = folder / MARK
+    assert not imported.exists(), imported.read_text()
+    assert done.returncode in (0, 1), done.stderr
+    return done.stdout
+
+
+@pytest.fixture
+def installed(tmp_path: Path) -> list[str]:
+    """As the installed command starts: its own folder is the first to look into."""
+    (tmp_path / "bin").mkdir()
+    program = tmp_path / "bin" / "grasp-cosim.py"
+    program.write_text(
+        "from grasp_cosim.cli import entry\nif __name__ == '__main__':\n    entry()\n"
+    )
+    return [str(program)]
+
+
+def test_a_component_in_a_process(installed: list[str], everything: Path, system: Path) -> None:
+    text = system.read_text("utf-8")
+    system.write_text(text.replace("[components.plant]", '[components.plant]\nisolation="process"'))
+    not_imported(everything, installed, "run", str(system), "--stop", "0.001")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "line",
+    [
+        "run {SYSTEM} --stop 0.001",
+        "run {SYSTEM} --stop 0.0064 --step-study",
+        "qualify {FMUS}/GripperPlant.fmu --as plant --system {SYSTEM} --stop 0.001",
+        "doctor {FMUS}/GripperPlant.fmu",
+        "inspect {FMUS}/GripperPlant.fmu",
+        "sweep {STUDY} --out {OUT} --workers 2",
+        "ssp {SYSTEM} -o {OUT}.ssp",
+        "build {BLOCK} --out {OUT}",
+        "proxy {FMUS}/GripperPlant.fmu -o {OUT}.fmu",
+    ],
+)
+def test_a_command(
+    line: str, installed: list[str], everything: Path, system: Path, fmus: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "study.toml").write_text(STUDY, "utf-8")
+    block = Path(__file__).parents[2] / "docs" / "spring_plant.py"
+    places = {
+        "SYSTEM": system, "FMUS": fmus, "STUDY": tmp_path / "study.toml", "BLOCK": block,
+        "OUT": tmp_path / "out",
+    }  # fmt: skip
+    not_imported(everything, installed, *(word.format(**places) for word in line.split()))
+
+
+@pytest.mark.parametrize("arguments", [("--stop", "0.001"), ("--stop", "0.0064", "--step-study")])
+def test_python_m_imports_what_it_needs_to_find_us_alone(
+    arguments: tuple[str, ...], tmp_path: Path, system: Path
+) -> None:
+    text = system.read_text("utf-8")
+    system.write_text(text.replace("[components.plant]", '[components.plant]\nisolation="process"'))
+    names = {"numpy", "socket", "click", "fmpy", "lxml", "ctypes", "tomllib", "multiprocessing"}
+    folder = poison(tmp_path / "strange", names)
+    not_imported(folder, ["-m", "grasp_cosim"], "run", str(system), *arguments)
