@@ -5,15 +5,20 @@ Card: plant/README.md
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated, NamedTuple
 
 from block_variables import Output, Parameter
 
-from . import contact_laws, fingers, friction, substeps
+from . import contact_laws, fingers, friction
+from . import substeps as own
 from .contact_laws import HuntCrossley, KelvinVoigt
 from .fingers import Inputs as Inputs
 from .fingers import Pair as Pair
 from .fingers import Side
+
+MOST_SUBSTEPS = own.MOST
+"""In a communication step; a longer one is discarded."""
 
 ITERATIONS = 8
 """To find the contact force: each leaves 1/19 of the error, or less."""
@@ -28,6 +33,17 @@ class Params(fingers.Params):
     squeeze_limit: Annotated[
         float, Parameter("squeeze above which the object is damaged", unit="m", low=0.0, high=10.0)
     ] = 0.01
+
+    @cached_property
+    def law(self) -> contact_laws.Law:
+        """The contact law that is chosen."""
+        return contact_laws.law(self.kelvin_voigt, self.hunt_crossley)
+
+    @cached_property
+    def fastest(self) -> float:
+        """The rate that sub-steps resolve where a finger is as deep as can be, 1/s."""
+        deep = contact_laws.rate(self.law, contact_laws.DEEPEST, min(self.finger_mass))
+        return max(deep, self.friction_rate)
 
 
 class State(NamedTuple):
@@ -65,6 +81,12 @@ def initial_state(p: Params, u: Inputs) -> State:
     return State(p.initial_position, (0.0, 0.0), (0.0, 0.0), False)
 
 
+def substeps(p: Params, x: State, u: Inputs, h: float) -> float:
+    """At most so many sub-steps are in h seconds."""
+    most = own.needed(p.fastest, h)
+    return most if most <= MOST_SUBSTEPS else own.needed(_rate(p, x, u, h), h)
+
+
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
     """Advance both fingers by h seconds (h > 0), the forces held; each in its opening direction."""
     x_1, x_2 = x.position
@@ -72,12 +94,11 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     f_1, f_2 = x.contact_force
     u_1, u_2 = fingers.forces(p.actuator, u)
     right, left = p.sides
-    law = contact_laws.law(p.kelvin_voigt, p.hunt_crossley)
     s_2, v_2, u_2, f_2, damaged = -x_2, -v_2, -u_2, -f_2, x.damaged
-    n = substeps.count(_rate(p, law, x, u, h), h)
+    n = own.count(_rate(p, x, u, h), h)
     for _ in range(n):
-        x_1, v_1, f_1 = _press(right, law, x_1, v_1, u_1, h / n, f_1)
-        s_2, v_2, f_2 = _press(left, law, s_2, v_2, u_2, h / n, f_2)
+        x_1, v_1, f_1 = _press(right, p.law, x_1, v_1, u_1, h / n, f_1)
+        s_2, v_2, f_2 = _press(left, p.law, s_2, v_2, u_2, h / n, f_2)
         squeeze = _squeeze(x_1 - right.surface, s_2 - left.surface)
         damaged = damaged or squeeze > p.squeeze_limit
     return State((x_1, -s_2), (v_1, 0.0 - v_2), (f_1, 0.0 - f_2), damaged)
@@ -118,12 +139,12 @@ def _press(
     return after, rate, contact_force
 
 
-def _rate(p: Params, law: contact_laws.Law, x: State, u: Inputs, h: float) -> float:
+def _rate(p: Params, x: State, u: Inputs, h: float) -> float:
     """The fastest that either finger can do within h seconds, 1/s."""
     right, left = p.sides
     faces = right.surface, -left.surface
     deepest = fingers.deepest(p, x.position, x.velocity, faces, u, h)
-    surface = contact_laws.rate(law, deepest, min(p.finger_mass))
+    surface = contact_laws.rate(p.law, deepest, min(p.finger_mass))
     return max(surface, p.friction_rate)
 
 

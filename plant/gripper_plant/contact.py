@@ -26,10 +26,15 @@ ITERATIONS = 8
 """To find the contact force beside friction: each leaves 1/19 of the error, or less."""
 
 
+def fastest(rates: Rates) -> float:
+    """The rate that sub-steps must resolve in contact, 1/s."""
+    alpha, beta = rates
+    return max(2.0 * alpha, beta)
+
+
 def substeps(rates: Rates, h: float) -> int:
     """Number of equal sub-steps that resolve the contact within h seconds."""
-    alpha, beta = rates
-    return own.count(max(2.0 * alpha, beta), h)
+    return own.count(fastest(rates), h)
 
 
 def time_to_contact(gap: float, rate: float, acceleration: float) -> float:
@@ -75,9 +80,8 @@ def advance(side: Side, rates: Rates, s: float, v: float, f: float, h: float) ->
 def _advance_rubbing(side: Side, rates: Rates, s: float, v: float, f: float, h: float) -> Finger:
     """advance() of a finger with friction, which acts beside the contact force."""
     surface, m, rub = side
-    alpha, beta = rates
     contact_force = 0.0
-    n = own.count(max(2.0 * alpha, beta, friction.rate(rub, m)), h)
+    n = own.count(max(fastest(rates), friction.rate(rub, m)), h)
     d = h / n
     for _ in range(n):
         after, rate = friction.move(s, v, m, f, rub, d)

@@ -5,10 +5,12 @@ tilt > 0 is over the right edge. Card: plant/README.md
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 from . import box as standing
-from . import contact_laws, fingers, friction, substeps
+from . import contact_laws, fingers, friction
+from . import substeps as own
 from .box import Box, Pushes, Shape
 from .box import Outputs as Outputs
 from .contact_laws import HuntCrossley, KelvinVoigt
@@ -19,12 +21,32 @@ ITERATIONS = 16
 """To find the contact forces: each leaves 1/19 of the error, or less; 1/5 where the box tilts."""
 
 
+MOST_SUBSTEPS = 2_000
+"""In a communication step: fewer than of the other plants, as each takes longer."""
+
+
 @dataclass(frozen=True)
 class Params(standing.Params):
     """Walls ten times as stiff as those of the paper cup in compliant.py: the box moves instead."""
 
     kelvin_voigt: KelvinVoigt = KelvinVoigt(stiffness=10000.0, damping=20.0)
     hunt_crossley: HuntCrossley = HuntCrossley(stiffness=200000.0)
+
+    @cached_property
+    def law(self) -> contact_laws.Law:
+        """The contact law that is chosen."""
+        return contact_laws.law(self.kelvin_voigt, self.hunt_crossley)
+
+    @cached_property
+    def lightest(self) -> float:
+        """The mass with which a finger and the box move against each other, at least, kg."""
+        return 1.0 / (1.0 / min(self.finger_mass) + 2.0 / self.object_mass)
+
+    @cached_property
+    def fastest(self) -> float:
+        """The rate that sub-steps resolve where a finger is as deep as can be, 1/s."""
+        deep = contact_laws.rate(self.law, contact_laws.DEEPEST, self.lightest)
+        return max(deep, self.friction_rate)
 
 
 class State(NamedTuple):
@@ -43,13 +65,19 @@ def initial_state(p: Params, u: Inputs) -> State:
     return State(p.initial_position, (0.0, 0.0), (0.0, 0.0), box, False)
 
 
+def substeps(p: Params, x: State, u: Inputs, h: float) -> float:
+    """At most so many sub-steps are in h seconds."""
+    most = own.needed(p.fastest, h)
+    return most if most <= MOST_SUBSTEPS else own.needed(_rate(p, standing.shape(p), x, u, h), h)
+
+
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
     """Advance fingers and box by h seconds (h > 0), the forces held."""
-    q, law = standing.shape(p), contact_laws.law(p.kelvin_voigt, p.hunt_crossley)
-    n = substeps.count(_rate(p, q, law, x, u, h), h)
+    q = standing.shape(p)
+    n = own.count(_rate(p, q, x, u, h), h)
     forces = fingers.forces(p.actuator, u)
     for _ in range(n):
-        x = _substep(p, q, law, x, forces, h / n)
+        x = _substep(p, q, x, forces, h / n)
     return x
 
 
@@ -70,7 +98,7 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     )
 
 
-def _substep(p: Params, q: Shape, law: contact_laws.Law, x: State, forces: Pair, d: float) -> State:
+def _substep(p: Params, q: Shape, x: State, forces: Pair, d: float) -> State:
     """D seconds with the contact forces held; they and the ways under them found by iteration."""
     (_, m_1, rub_1), (_, m_2, rub_2) = p.sides
     x_1, x_2 = x.position
@@ -83,8 +111,8 @@ def _substep(p: Params, q: Shape, law: contact_laws.Law, x: State, forces: Pair,
         s_2, w_2 = friction.move(-x_2, -v_2, m_2, f_2 - u_2, rub_2, d)
         box = x.box if x.toppled else standing.advance(q, x.box, Pushes(f_2, f_1), d)
         to_right, to_left = standing.faces(q, box)
-        found_1 = contact_laws.mean_force(law, right - x_1, to_right - s_1, d)
-        found_2 = contact_laws.mean_force(law, x_2 - left, -s_2 - to_left, d)
+        found_1 = contact_laws.mean_force(p.law, right - x_1, to_right - s_1, d)
+        found_2 = contact_laws.mean_force(p.law, x_2 - left, -s_2 - to_left, d)
         if contact_laws.settled(found_1, f_1) and contact_laws.settled(found_2, f_2):
             break
         f_1, f_2 = found_1, found_2
@@ -94,10 +122,9 @@ def _substep(p: Params, q: Shape, law: contact_laws.Law, x: State, forces: Pair,
     return State((s_1, -s_2), (w_1, 0.0 - w_2), (f_1, 0.0 - f_2), box, toppled)
 
 
-def _rate(p: Params, q: Shape, law: contact_laws.Law, x: State, u: Inputs, h: float) -> float:
+def _rate(p: Params, q: Shape, x: State, u: Inputs, h: float) -> float:
     """The fastest that a finger and the box can do within h seconds, 1/s."""
-    both = 1.0 / (1.0 / min(p.finger_mass) + 2.0 / p.object_mass)
     shift = h * (abs(x.box.v) + q.h * abs(x.box.w))
     faces = standing.faces(q, x.box)
     deepest = shift + fingers.deepest(p, x.position, x.velocity, faces, u, h)
-    return max(contact_laws.rate(law, deepest, both), p.friction_rate)
+    return max(contact_laws.rate(p.law, deepest, p.lightest), p.friction_rate)

@@ -14,19 +14,20 @@ from block_variables import Parameter
 
 from . import box as standing
 from . import fingers
+from . import substeps as own
 from .box import Outputs as Outputs
 from .box import Shape
 from .fingers import Inputs as Inputs
 from .fingers import Pair as Pair
+
+MOST_SUBSTEPS = own.MOST
+"""In a communication step; a longer one is discarded."""
 
 IMPEDANCE = 0.9999
 """MuJoCo's d of every constraint: the share of a force that it answers before it gives."""
 
 THINNEST = 1e-9
 """m; half the width that a box without one has in MuJoCo."""
-
-MOST_TIMESTEPS = 100_000
-"""In a communication step."""
 
 MISSING = (
     "mujoco is not installed, it computes this plant; "
@@ -103,6 +104,11 @@ def initial_state(p: Params, u: Inputs) -> State:
     q = (x_1, x_2, p.initial_object_position, 0.5 * p.object_height, 0.0)
     none = (0.0, 0.0, 0.0, 0.0, 0.0)
     return State(q, none, none, (0.0, 0.0), False)
+
+
+def substeps(p: Params, x: State, u: Inputs, h: float) -> float:
+    """So many timesteps are in h seconds."""
+    return h / p.timestep
 
 
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
@@ -209,12 +215,7 @@ def mjcf(p: Params) -> str:
 
 def _timesteps(p: Params, x: State, forces: Pair, h: float) -> int:
     """How many timesteps within h seconds; none of them takes a finger past where it touches."""
-    wanted = h / p.timestep
-    if wanted > MOST_TIMESTEPS:
-        raise ArithmeticError(
-            f"{wanted:g} timesteps of MuJoCo of {p.timestep:g} s: must be at most {MOST_TIMESTEPS}"
-        )
-    n = max(1, ceil(wanted - 1e-9))
+    n = max(1, ceil(h / p.timestep - 1e-9))
     radius = p.fingertip_radius
     for j, (v, u, m) in enumerate(zip(x.v[:2], forces, p.finger_mass, strict=True), 1):
         way = (abs(v) + h * abs(u) / m) * h / n

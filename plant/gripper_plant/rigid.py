@@ -10,8 +10,12 @@ from typing import Annotated, NamedTuple
 from block_variables import Parameter
 
 from . import contact, fingers
+from . import substeps as own
 from .fingers import Inputs as Inputs
 from .fingers import Pair as Pair
+
+MOST_SUBSTEPS = own.MOST
+"""In a communication step; a longer one is discarded."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +41,11 @@ class Params(fingers.Params):
         """Those of the contact."""
         return contact.Rates(self.baumgarte_alpha, self.baumgarte_beta)
 
+    @cached_property
+    def fastest(self) -> float:
+        """The rate that sub-steps resolve, 1/s."""
+        return max(contact.fastest(self.rates), self.friction_rate)
+
 
 class State(NamedTuple):
     """Fingertip positions in m, velocities in m/s and contact forces in N."""
@@ -60,6 +69,11 @@ class Outputs(NamedTuple):
 def initial_state(p: Params, u: Inputs) -> State:
     """Both fingers at rest at their initial positions, free of the object."""
     return State(p.initial_position, (0.0, 0.0), (0.0, 0.0))
+
+
+def substeps(p: Params, x: State, u: Inputs, h: float) -> float:
+    """At most so many sub-steps are in h seconds."""
+    return own.needed(p.fastest, h)
 
 
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
