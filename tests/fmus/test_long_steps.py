@@ -11,7 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.fmi2 import DISCARD, OK, Instance
 
-ELECTRONICS: dict[str, float] = {"noise.enabled": True, "filter.enabled": True, "median.enabled": True}
+ELECTRONICS: dict[str, float] = {
+    "noise.enabled": True,
+    "filter.enabled": True,
+    "median.enabled": True,
+}
 CLOSED = {"initial_position[1]": 0.0651, "initial_position[2]": -0.0051}
 STARTS: dict[str, dict[str, float]] = {
     "GripperPlant": CLOSED,

@@ -37,7 +37,11 @@ WRONG = [
         "[experment]",
         "unknown entry 'experment'; valid: components, connections, events, experiment, faults, ",
     ),
-    ("step = 1e-4", "stepp = 1e-4", r"\[experiment\]: unknown entry 'stepp'; valid: scheme, step"),
+    (
+        "step = 1e-4",
+        "stepp = 1e-4",
+        r"\[experiment\]: unknown entry 'stepp'; valid: diverging, scheme, step",
+    ),
     ("step = 1e-4", "step = 0", r"experiment.step = 0 s: must be a number greater than 0"),
     ("step = 1e-4", "step = nan", "must be a number greater than 0"),
     ("step = 1e-4", "step = 'fast'", "experiment.step = 'fast' s: must be a number"),

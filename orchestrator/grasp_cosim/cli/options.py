@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from ..system.description import System
-from ..system.structure import SCHEMES
+from ..system.structure import DIVERGING, SCHEMES
 from .frame import load_system, pair, together, with_preset
 
 set_option = click.option("--set", "settings", multiple=True, metavar="COMPONENT.VARIABLE=VALUE")
@@ -21,6 +21,11 @@ system_options = together(
     click.option("--step", type=float, help="Communication step in s."),
     click.option("--stop", type=float, help="Stop time in s."),
     click.option("--scheme", type=click.Choice(SCHEMES)),
+    click.option(
+        "--diverging",
+        type=click.Choice(DIVERGING),
+        help="Where a signal runs away: stop (default) or continue.",
+    ),
 )
 """How the system of a command, in its `system`, is changed."""
 
@@ -40,4 +45,4 @@ def chosen_system(given: Mapping[str, Any]) -> System:
     names = [*given["presets"], *(["bench"] if given["bench"] else [])]
     for name in [*names, *([] if case is None else [f"case_{case}"])]:
         system = with_preset(system, name)
-    return system.with_experiment(step, stop, given["scheme"])
+    return system.with_experiment(step, stop, given["scheme"], given["diverging"])

@@ -4,7 +4,7 @@ import logging
 import signal
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from numbers import Integral
 from types import FrameType
@@ -59,9 +59,11 @@ class Session:
         engine: Engine = "auto",
         realtime: Realtime | None = None,
         metrics: Sequence[Metric] = (),
+        diverging: str | None = None,
+        note: Callable[[str], None] | None = None,
     ) -> None:
         """Load and initialise; see simulate() for the arguments and errors."""
-        system = system.with_experiment(step, stop, scheme)
+        system = system.with_experiment(step, stop, scheme, diverging)
         _check_count("every", every)
         registered(metrics)  # tells of two with one name before the run, not after
         self._metrics = tuple(metrics)
@@ -70,11 +72,14 @@ class Session:
         self._wall_time = 0.0
         self._failed = False
         self._closed = False
+        self._note = note
+        self._noted = len(system.notes)  # known to who has read it
         self.halt = threading.Event()
         """Set, it ends the waiting of a run in real time, at a communication point."""
         self.pacer = Pacer(system, realtime, self.halt.is_set) if realtime else None
         self._privileges = Privileges()
         self._stack = ExitStack()
+        self._tell((*system.notes, *remarks(system)))
         try:
             with _interruptible():
                 instances = []
@@ -94,6 +99,7 @@ class Session:
                 self._stack.callback(self._end)
                 with self._failures():  # where the row of t = 0 is not finite
                     self._master.initialise()
+            self._tell(self._early())
             if realtime and self.pacer:
                 granted = privileges(realtime, self.pacer.sleeps)
                 self._privileges = self._stack.enter_context(granted)
@@ -136,6 +142,8 @@ class Session:
 
         SimulationError, with the result, where a listener fails at its end.
         """
+        if self._note and not self._closed:
+            self._tell(self._log())
         self._closed = True
         with self._failures():
             self._stack.close()
@@ -233,6 +241,17 @@ class Session:
             more_metrics=self._metrics,
         )
 
+    def _tell(self, log: Sequence[str]) -> None:
+        """Hand on the lines of the log that are new; `log` is all of it so far."""
+        if self._note is not None:
+            for line in log[self._noted :]:
+                self._note(line)
+        self._noted = len(log)
+
+    def _early(self) -> tuple[str, ...]:
+        """The lines of the log that are known before the first step."""
+        return *self.system.notes, *remarks(self.system), *self._master.log
+
     def _log(self) -> tuple[str, ...]:
         master = self._master
         rejected = (
@@ -242,9 +261,8 @@ class Session:
         pending = master.scenario.pending() if self.complete else ()
         memory, step = self._memory, self.system.step_ns / NANOSECONDS
         return (
-            *self.system.notes,
-            *remarks(self.system),
-            *master.log,
+            *self._early(),
+            *self._dispatch.log,
             *master.scenario.log,
             *rejected,
             *pending,
@@ -268,6 +286,8 @@ class Simulate:
         engine: Engine = "auto",
         realtime: Realtime | None = None,
         metrics: Sequence[Metric] = (),
+        diverging: str | None = None,
+        note: Callable[[str], None] | None = None,
     ) -> Result:
         """Run a system to its stop time and return every output at every communication point.
 
@@ -276,10 +296,13 @@ class Simulate:
         the last. listeners get what is kept while it is recorded. engine is "python", "compiled"
         (needs numba) or "auto", compiled where that pays; the results have the same bits.
         realtime paces the run by the clock: the result has a timing, and the same bits. metrics are
-        worked out beside those that every result is asked for.
+        worked out beside those that every result is asked for. diverging, "stop" or "continue",
+        replaces that of the system. note gets the lines of the log but for system.notes: what is
+        known of the system and of t = 0 before the first step, the others at the end, also after a
+        failure.
         Ctrl-C ends the run early: the result is what was recorded, with complete = False.
         InputError where an FMU does not load or refuses its parameters; SimulationError, with what
-        was recorded as its result, where one fails on the way.
+        was recorded as its result, where one fails on the way, or a signal runs away.
         """
         with Session(
             system,
@@ -291,6 +314,8 @@ class Simulate:
             engine=engine,
             realtime=realtime,
             metrics=metrics,
+            diverging=diverging,
+            note=note,
         ) as session:
             _drive(session, progress)
             return session.result()

@@ -12,6 +12,7 @@ from ..system.checks import transforms
 from ..system.description import System
 from ..system.parts import Port
 from ..system.settings import settings
+from .divergence import Divergence
 from .energy import ExchangeEnergy, bonds
 from .listener import Experiment, Listener, Signal, Texts
 
@@ -35,12 +36,16 @@ class Dispatcher:
         self._listeners = tuple(listeners)
         self._every = every
         self._columns = np.array([slots[port] for port in system.recorded], np.intp)
-        outputs = [
-            Signal(str(port), v.unit, v.kind, v.description or "", texts.get(port, Texts()))
+        outputs = {
+            port: Signal(str(port), v.unit, v.kind, v.description or "", texts.get(port, Texts()))
             for port, v in system.recorded.items()
-        ]
+        }
+        self._divergence = Divergence(system, outputs)
+        self._goes_on = system.diverging == "continue"
+        self.log: list[str] = []
+        """What ran away in a run that went on."""
         self._energy = ExchangeEnergy(bonds(system), slots, transforms(system))
-        self.signals = (*outputs, *self._energy.signals)
+        self.signals = (*outputs.values(), *self._energy.signals)
         self._pending: tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]] | None = None
         experiment = Experiment.of(settings(system))
         with ExitStack() as begun:
@@ -50,13 +55,13 @@ class Dispatcher:
             begun.pop_all()  # whoever has begun is ended here only where the next one fails
 
     def __call__(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
-        """Hand rows on; SimulationError at the first value not finite, which is the last kept."""
+        """Hand rows on; SimulationError at the first value that is not finite or has run away.
+
+        Its row is the last that is kept.
+        """
         outputs = rows[:, self._columns]
-        finite = np.isfinite(outputs)
-        good = bool(finite.all())
-        if not good:
-            bad = int(finite.all(axis=1).argmin())
-            steps, rows, outputs = steps[: bad + 1], rows[: bad + 1], outputs[: bad + 1]
+        count, wrong = self._check(steps, outputs)
+        steps, rows, outputs = steps[:count], rows[:count], outputs[:count]
         columns = np.concatenate((outputs, self._energy(rows)), axis=1)
         wanted = steps % self._every == 0
         self._pending = None
@@ -64,10 +69,25 @@ class Dispatcher:
             self._hand_on(steps[wanted], columns[wanted])
         if not wanted[-1]:
             self._pending = steps[-1:].copy(), columns[-1:].copy()
-        if not good:
-            i = int(finite[bad].argmin())
-            name, value = self.signals[i].name, outputs[bad, i]
-            raise SimulationError(f"{name} = {value} at step {steps[bad]}: must be finite")
+        if wrong:
+            raise SimulationError(wrong)
+
+    def _check(
+        self, steps: npt.NDArray[np.int64], outputs: npt.NDArray[np.float64]
+    ) -> tuple[int, str]:
+        """The number of rows to keep, and what is wrong in the last of them, if anything is."""
+        finite = np.isfinite(outputs)
+        good = len(steps) if finite.all() else int(finite.all(axis=1).argmin())
+        runaway = self._divergence(steps[:good], outputs[:good])
+        if runaway and not self._goes_on:
+            return runaway.row + 1, f'{runaway.text}; or let it go on: diverging = "continue"'
+        if runaway:
+            self.log.append(f"{runaway.text}; the run went on")
+        if good == len(steps):
+            return good, ""
+        i = int(finite[good].argmin())
+        name, value = self.signals[i].name, outputs[good, i]
+        return good + 1, f"{name} = {value} at step {steps[good]}: must be finite"
 
     def flush(self) -> None:
         """Hand the last row on, where decimation has left it out."""

@@ -17,7 +17,7 @@ from ..errors import InputError, choices
 from ..interface.interface import Value
 from ..system.description import System
 from ..system.parts import Event, Fault, Initialisation, Isolation, Port
-from ..system.structure import Scheme
+from ..system.structure import Diverging, Scheme
 from .document import add
 
 TYPE = "grasp-cosim"
@@ -39,7 +39,7 @@ class Beside:
 
 @dataclass(frozen=True, slots=True)
 class Extras:
-    """The attributes of a system that SSP has no form for; earlier archives lack the last two."""
+    """The attributes of a system that SSP has no form for; earlier archives lack the last three."""
 
     step_ns: int
     scheme: Scheme
@@ -49,6 +49,7 @@ class Extras:
     faults: tuple[Fault, ...]
     roles: Mapping[str, str] = field(default_factory=dict)
     presets: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
+    diverging: Diverging = "stop"
 
 
 def no_extras(components: Iterable[str]) -> Extras:

@@ -66,6 +66,7 @@ def read_ssp(path: FilePath, step: float | None = None, stop: float | None = Non
         (*_unused(archive, root), *_renamed(names), *notes),
         extras.roles,
         extras.presets,
+        extras.diverging,
     )
 
 

@@ -18,7 +18,7 @@ from .checks import (
 )
 from .parts import NANOSECONDS, Isolation
 from .scenario_checks import check_scenario
-from .structure import SCHEMES, Scheme, Structure
+from .structure import DIVERGING, SCHEMES, Diverging, Scheme, Structure
 
 LONGEST = 1e9
 """s; a time in nanoseconds then fits into 64 bits."""
@@ -122,13 +122,18 @@ class System(Structure):
         step: float | None = None,
         stop: float | None = None,
         scheme: str | None = None,
+        diverging: str | None = None,
     ) -> "System":
-        """A copy with another communication step or stop time in seconds, or another scheme."""
+        """A copy with another communication step or stop time in seconds, or another scheme.
+
+        Or that does something else where a signal runs away.
+        """
         return replace(
             self,
             step_ns=self.step_ns if step is None else in_nanoseconds("step", step),
             stop_ns=self.stop_ns if stop is None else in_nanoseconds("stop", stop),
             scheme=self.scheme if scheme is None else as_scheme("scheme", scheme),
+            diverging=self.diverging if diverging is None else as_diverging("diverging", diverging),
         )
 
 
@@ -151,3 +156,8 @@ def in_nanoseconds(place: str, seconds: Any, zero: bool = False) -> int:
 def as_scheme(place: str, name: Any) -> Scheme:
     """The scheme of that name; InputError where there is none."""
     return choice(place, name, SCHEMES)  # type: ignore[no-any-return]
+
+
+def as_diverging(place: str, name: Any) -> Diverging:
+    """What a run does where a signal runs away; InputError where there is no such thing."""
+    return choice(place, name, DIVERGING)  # type: ignore[no-any-return]

@@ -18,6 +18,7 @@ def settings(system: System) -> dict[str, Any]:
         "scheme": system.scheme,
         "step": system.step_ns / NANOSECONDS,
         "stop": system.stop_ns / NANOSECONDS,
+        **({"diverging": system.diverging} if system.diverging != "stop" else {}),
         "initialisation": asdict(system.initialisation),
         "components": {
             component.name: {

@@ -10,6 +10,9 @@ from .parts import Component, Connection, Event, Fault, Initialisation, Port
 
 Scheme = Literal["sequential", "jacobi"]
 SCHEMES: tuple[str, ...] = get_args(Scheme)
+Diverging = Literal["stop", "continue"]
+DIVERGING: tuple[str, ...] = get_args(Diverging)
+"""What a run does where a signal runs away."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,6 +23,7 @@ class Structure:
     step of each component. notes are what its reader decided or did not use, one line each. roles
     name the component that plays a role, such as plant; where they do not, the component of that
     name plays it. presets are values under a name, like {"bench": {"sensor_1.noise.seed": 1}}.
+    diverging is what a run does where a signal runs away.
     """
 
     name: str
@@ -34,6 +38,7 @@ class Structure:
     notes: tuple[str, ...] = field(default=(), compare=False)
     roles: Mapping[str, str] = field(default_factory=dict)
     presets: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
+    diverging: Diverging = "stop"
 
     @property
     def total_steps(self) -> int:

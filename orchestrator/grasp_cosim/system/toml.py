@@ -8,7 +8,7 @@ from ..checks import as_table, check_keys, check_values, choice, is_number, text
 from ..errors import InputError
 from ..interface.interface import Value
 from ..interface.read import read_interface
-from .description import System, as_scheme, in_nanoseconds
+from .description import System, as_diverging, as_scheme, in_nanoseconds
 from .parts import ISOLATIONS, Component, Connection, Initialisation, Port
 from .scenario import read_events, read_faults
 
@@ -29,7 +29,7 @@ def read_toml(path: Path, fmus: Path | None = None) -> System:
         return as_table(f"{place}: [{name}]", table.get(name, default))
 
     experiment = part("experiment")
-    check_keys(f"{place}: [experiment]", experiment, {"step", "stop", "scheme"})
+    check_keys(f"{place}: [experiment]", experiment, {"step", "stop", "scheme", "diverging"})
     components = part("components")
     entries = table.get("connections", [])
     if not isinstance(entries, list):
@@ -55,6 +55,9 @@ def read_toml(path: Path, fmus: Path | None = None) -> System:
             name: _values(f"{place}: [presets.{name}]", values)
             for name, values in part("presets", {}).items()
         },
+        diverging=as_diverging(
+            f"{place}: experiment.diverging", experiment.get("diverging", "stop")
+        ),
     )
 
 

@@ -1,5 +1,6 @@
 """The command run."""
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -84,7 +85,13 @@ def run(
     check_outputs(out, given["plot"])
     try:
         result = simulate(
-            system, progress=True, every=every, engine=engine, realtime=paced, metrics=metrics
+            system,
+            progress=True,
+            every=every,
+            engine=engine,
+            realtime=paced,
+            metrics=metrics,
+            note=partial(click.echo, err=True),
         )
     except SimulationError as error:
         if error.result:
@@ -93,8 +100,6 @@ def run(
                 click.echo(f"kept what was recorded, in {out}", err=True)
         raise
     _write(result, out, given["plot"], mdf)
-    for line in result.log[len(system.notes) :]:
-        click.echo(line, err=True)
     show(as_json, _as_json(result), _summary(result))
     if not result.complete:
         message = f"interrupted at t = {result.time[-1]:.6g} s; kept what was recorded"
