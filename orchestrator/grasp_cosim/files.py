@@ -1,5 +1,6 @@
 """Files that are written in one piece, and folders that can be written to."""
 
+import errno
 import json
 import os
 import tempfile
@@ -9,6 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from .errors import InputError
+
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+"""Errors of a disk, not of the input."""
 
 FMU_FOLDER = Path("fmus/build")
 """Where the FMUs of this project are built, below the current folder."""

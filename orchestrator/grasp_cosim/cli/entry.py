@@ -1,6 +1,5 @@
 """From a command line to an exit code."""
 
-import errno
 import signal
 import sys
 from typing import NoReturn
@@ -8,13 +7,11 @@ from typing import NoReturn
 import click
 
 from ..errors import InputError, SimulationError
+from ..files import FULL
 from .crash import explain_crashes
 from .frame import FAILED, INTERRUPTED, WRONG, fail
 from .group import cli
 from .streams import OutputError, harmless_streams, keep_output_for_us
-
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
-"""Errors of a disk, not of the input."""
 
 
 def entry() -> NoReturn:

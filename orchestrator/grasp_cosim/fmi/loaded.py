@@ -27,6 +27,7 @@ import numpy.typing as npt
 from fmpy.fmi1 import FMICallException
 
 from ..errors import InputError, SimulationError
+from ..files import FULL
 from ..interface.interface import Interface, Value, Variable
 from .instance import DISCARD, EARLY, ERROR, FATAL, OK, STATUS, TRANSFER_3, Call, Native
 
@@ -118,6 +119,11 @@ class LoadedInstance(ABC):
         try:
             fmpy.extract(self.interface.path, folder, _used_here)
         except Exception as error:  # FMPy and zipfile raise whatever they like
+            if isinstance(error, OSError) and error.errno in FULL:
+                raise InputError(
+                    f"{self.name}: {self.interface.path} cannot be extracted to {folder}: "
+                    f"{error.strerror}; must have room there, or TMPDIR must be another folder"
+                ) from error
             raise InputError(f"{self.name}: {self.interface.path} is damaged: {error}") from error
         self._python = (self._resources / "slavemodule.txt").exists()
         plain = str(folder).replace(" ", "")

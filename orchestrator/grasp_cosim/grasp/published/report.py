@@ -5,6 +5,7 @@ import io
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ...plain import to_cell
 from ...system.description import System
 from ...system.parts import NANOSECONDS
 
@@ -16,11 +17,11 @@ FIGURES = """## Figures
 
 
 def table_csv(rows: Sequence[Mapping[str, Any]]) -> str:
-    """The rows, of one form, as CSV."""
+    """The rows, of one form, as CSV; no cell is a formula, see plain.to_cell()."""
     text = io.StringIO()
-    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
+    writer = csv.writer(text, lineterminator="\n")
+    table = [list(rows[0]), *(list(row.values()) for row in rows)]
+    writer.writerows([to_cell(cell) for cell in row] for row in table)
     return text.getvalue()
 
 

@@ -1,0 +1,110 @@
+"""Standard files that are closed, full or gone, Ctrl-C before a command begins: one line each."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from grasp_cosim.cli import main
+
+PROGRAM = (sys.executable, "-m", "grasp_cosim")
+SCRIPT = (sys.executable, "-c", "from grasp_cosim.__main__ import entry; entry()")
+
+
+def shell(line: str, **more: str) -> tuple[int, str]:
+    """Exit code and standard error of the command in a line for sh, where $C is grasp-cosim."""
+    done = subprocess.run(
+        ["bash", "-c", line], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+        env={**os.environ, "C": " ".join(PROGRAM), **more}, check=False, timeout=120,
+    )  # fmt: skip
+    return done.returncode, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("$C --version >&-", "Bad file descriptor"),
+        ("$C --version >&- <&-", "Bad file descriptor"),
+        ("$C --version > /dev/full", "No space left on device"),
+        ("$C --help | true; exit ${PIPESTATUS[0]}", "Broken pipe"),
+    ],
+)
+def test_standard_output_that_cannot_be_written(line: str, said: str) -> None:
+    assert shell(line.replace("| true", "| (exec <&-; sleep 2)")) == (
+        3,
+        f"grasp-cosim: standard output: {said}\n",
+    )
+
+
+@pytest.mark.parametrize("where", ["2>&-", "2> /dev/full", ">&- 2>&-", "<&- >&- 2>&-"])
+def test_standard_error_that_cannot_be_written(where: str) -> None:
+    assert shell(f"$C inspect nothing.fmu {where}") == (2, "")
+
+
+def test_a_file_of_the_run_is_not_taken_for_standard_output(tmp_path: Path) -> None:
+    grasp = "$C run --stop 0.001 --step 1e-3 --out"
+    code, said = shell(f"{grasp} {tmp_path / 'a'} && {grasp} {tmp_path / 'b'} >&- <&-")
+    assert (code, said.count("standard output: Bad file descriptor")) == (3, 1)
+    one, two = ((tmp_path / name / "signals.csv").read_bytes() for name in "ab")
+    assert one == two
+
+
+@pytest.mark.parametrize("program", [PROGRAM, SCRIPT])
+@pytest.mark.parametrize("module", ["click", "tqdm"])
+def test_interrupt_during_the_imports(
+    tmp_path: Path, program: tuple[str, ...], module: str
+) -> None:
+    """click comes with the command line, tqdm with the command."""
+    (tmp_path / f"{module}.py").write_text(
+        "import os, signal, time\nos.kill(os.getpid(), signal.SIGINT)\ntime.sleep(60)\n"
+    )
+    done = subprocess.run(
+        [*program, "run"], env={**os.environ, "PYTHONPATH": str(tmp_path)}, timeout=50,
+        capture_output=True, text=True, check=False,
+        preexec_fn=_hear_interrupts,
+    )  # fmt: skip
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "grasp-cosim: interrupted\n")
+
+
+def _hear_interrupts() -> None:
+    import signal
+
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def test_an_import_that_makes_an_error_of_an_interrupt(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def broken(path: Path) -> None:
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt:
+            raise ImportError("half imported")  # noqa: B904 - so do modules in C
+
+    monkeypatch.setattr("grasp_cosim.cli.commands.inspect.inspect_fmu", broken)
+    assert main(["inspect", "x.fmu"]) == 130
+    assert capsys.readouterr().err == "grasp-cosim: interrupted\n"
+
+
+HOSTILE = "n\x1b]0;owned\x07\x1b[2J\r\u202eümf\x9b31m"
+
+
+def test_no_escape_sequence_reaches_the_terminal(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    assert main(["inspect", HOSTILE]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("grasp-cosim: n\\x1b]0;owned\\x07")
+    assert not set(said) & set("\x1b\x07\r\u202e\x9b")
+    assert said.count("\n") == 1
+
+
+def test_a_line_feed_does_not_make_a_second_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["inspect", "two\nlines.fmu"]) == 2
+    assert capsys.readouterr().err == "grasp-cosim: two\\nlines.fmu: no such FMU file\n"
+
+
+def test_ascii_is_no_way_around(tmp_path: Path) -> None:
+    code, said = shell("$C inspect $'a\\x1b]0;b\\xc3\\xbc'", PYTHONIOENCODING="ascii")
+    assert (code, "\x1b" in said, "\\x1b]0;b" in said) == (2, False, True)

@@ -1,0 +1,88 @@
+"""What the page says of commands: which run the code of an FMU, and which only read it."""
+
+import os
+import subprocess
+import zipfile
+from pathlib import Path
+
+import fmpy
+import pytest
+from grasp_cosim.cli import main
+from support.native_fmus import TYPES, build, needs_gcc
+
+PAGE = (Path(__file__).parents[2] / "docs/what_an_fmu_may_do.md").read_text("utf-8")
+STARTS = {"Boolean": "false", "String": "''", "Enumeration": "1"}
+TELL_TALE = """
+#include <stdio.h>
+#include <unistd.h>
+__attribute__((constructor)) static void loaded(void) {
+    FILE *file = fopen("LOG", "a");
+    fprintf(file, "%d\\n", (int)getpid());
+    fclose(file);
+}
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A system with an FMU that leaves the number of each process that loads it in the file log."""
+    monkeypatch.chdir(tmp_path)
+    fmu = build(tmp_path, "a", "2.0")
+    with zipfile.ZipFile(fmu) as archive:
+        files = {name: archive.read(name) for name in archive.namelist()}
+    binary = next(name for name in files if name.startswith("binaries/") and name[-1] != "/")
+    (tmp_path / "tell.c").write_text(TELL_TALE.replace("LOG", str(tmp_path / "log")))
+    source = Path(__file__).parents[1] / "fmi/native/fmi2.c"
+    headers = Path(fmpy.__file__).parent / "c-code"
+    command = ["gcc", "-shared", "-fPIC", f"-I{headers}", str(source), "tell.c", "-o", "all.so"]
+    subprocess.run(command, check=True)
+    files[binary] = (tmp_path / "all.so").read_bytes()
+    with zipfile.ZipFile(fmu, "w") as archive:
+        for name, data in files.items():
+            archive.writestr(name, data)
+    values = ", ".join(f"u_{t} = {STARTS.get(t, '0')}" for t in TYPES["2.0"])
+    (tmp_path / "system.toml").write_text(
+        '[experiment]\nstep = 0.05\nstop = 0.1\n[components.a]\nfmu = "a.fmu"\n'
+        f"values = {{ {values} }}\n"
+    )
+    return tmp_path
+
+
+def loaded(folder: Path, *arguments: str) -> set[int]:
+    """The processes that load the FMU in a command."""
+    log = folder / "log"
+    log.unlink(missing_ok=True)
+    assert main(list(arguments)) in (0, 1)
+    return {int(line) for line in log.read_text().split()} if log.exists() else set()
+
+
+@needs_gcc
+def test_what_only_reads(folder: Path) -> None:
+    assert "| `inspect`, `ssp`, `proxy`, `report` |" in PAGE
+    assert loaded(folder, "run", "system.toml", "--out", "results") == {os.getpid()}
+    assert not loaded(folder, "inspect", "a.fmu")
+    assert not loaded(folder, "ssp", "system.toml", "-o", "system.ssp")
+    assert not loaded(folder, "ssp", "system.ssp", "-o", "again.ssp")
+    assert not loaded(folder, "proxy", "a.fmu", "-o", "proxy.fmu")
+    assert not loaded(folder, "report", "results")
+
+
+@needs_gcc
+def test_what_loads_it_in_another_process(folder: Path) -> None:
+    assert "| `doctor FMU` |" in PAGE
+    assert loaded(folder, "doctor", "a.fmu") - {os.getpid()}
+    assert os.getpid() not in loaded(folder, "doctor", "a.fmu")
+    isolated = loaded(folder, "run", "system.toml", "--isolation", "process")
+    assert len(isolated - {os.getpid()}) == len(isolated) == 1
+
+
+@needs_gcc
+def test_a_study_may_name_python(folder: Path) -> None:
+    assert 'with an entry `metrics = "FILE.py"` it names Python that is run' in PAGE
+    (folder / "own.py").write_text('open("ran", "w").close()\n')
+    (folder / "study.toml").write_text(
+        'system = "system.toml"\noutputs = ["a.x"]\nmetrics = "own.py"\n[design]\nkind = "grid"\n'
+        '[[parameters]]\nname = "gain"\nvariables = ["a.gain"]\nvalues = [1.0]\n'
+    )
+    assert main(["sweep", "study.toml", "--out", "sweep"]) == 2  # it has no metric
+    assert (folder / "ran").exists()
