@@ -44,7 +44,7 @@ def main(arguments: list[str]) -> int:
 
 def _main(arguments: list[str], debug: bool) -> int:
     try:
-        return int(cli.main(arguments, "grasp-cosim", standalone_mode=False) or 0)
+        return int(cli.main(arguments, "grasp-cosim", standalone_mode=False, obj=arguments) or 0)
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.ctx.get_help(), err=True)
         return WRONG

@@ -96,6 +96,8 @@ class Session:
                     every,
                     self._master.texts,
                 )
+                if self.pacer:
+                    self.pacer.spare = self._dispatch.spare
                 self._stack.callback(self._end)
                 with self._failures():  # where the row of t = 0 is not finite
                     self._master.initialise()
@@ -167,12 +169,14 @@ class Session:
         after an interruption such as Ctrl-C, the FMUs are not at one time: InputError.
         """
         _check_count("steps", steps)
-        start = time.perf_counter()
+        start, took = time.perf_counter(), self._dispatch.took
         try:
             with self._in_use():
                 return self._master.advance(int(steps)) > 0
         finally:
             self._wall_time += time.perf_counter() - start
+            if not self.pacer:  # which has time for the listeners
+                self._wall_time -= self._dispatch.took - took
 
     @contextmanager
     def _in_use(self) -> Iterator[None]:
