@@ -7,9 +7,10 @@ from typing import NoReturn
 
 import click
 
+from .. import interruption
 from ..errors import InputError, SimulationError
 from .crash import explain_crashes
-from .frame import FAILED, INTERRUPTED, WRONG, fail
+from .frame import FAILED, INTERRUPTED, TERMINATED, WRONG, fail
 from .group import cli
 from .streams import OutputError, harmless_streams, keep_output_for_us
 
@@ -26,6 +27,10 @@ def entry() -> NoReturn:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # what is left is short, and nothing is lost
     except KeyboardInterrupt:
         code = fail("interrupted", INTERRUPTED)
+    if interruption.came() == signal.SIGTERM:
+        code = TERMINATED
+    elif interruption.came() and code in (WRONG, FAILED):  # what an FMU made of it
+        code = INTERRUPTED
     try:
         sys.stdout.close()
     except OSError as error:
