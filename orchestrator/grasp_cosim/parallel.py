@@ -44,12 +44,21 @@ def progress_bar(what: str, total: int | None, progress: bool, initial: int = 0)
     return tqdm(total=total, initial=initial, desc=what, unit="run", disable=disable)
 
 
+Keep = Callable[[int, Run], None]
+"""Gets the index of a job and its result as soon as it is there."""
+
+
 def run_all(
-    run: Callable[[Job], Run], jobs: Sequence[Job], workers: int, progress: bool, what: str
+    run: Callable[[Job], Run],
+    jobs: Sequence[Job],
+    workers: int,
+    progress: bool,
+    what: str,
+    keep: Keep[Run] = lambda *_: None,
 ) -> list[Run]:
     """Return the results of Crew.map; `progress` shows a bar labelled `what`."""
     with progress_bar(what, len(jobs), progress) as bar, Crew(workers) as crew:
-        return crew.map(run, jobs, bar)
+        return crew.map(run, jobs, bar, keep)
 
 
 class Crew:
@@ -66,7 +75,13 @@ class Crew:
         """End the processes."""
         _end(self._idle)
 
-    def map(self, run: Callable[[Job], Run], jobs: Iterable[Job], bar: "tqdm[Any]") -> list[Run]:
+    def map(
+        self,
+        run: Callable[[Job], Run],
+        jobs: Iterable[Job],
+        bar: "tqdm[Any]",
+        keep: Keep[Run] = lambda *_: None,
+    ) -> list[Run]:
         """Return the results of run(job), in the order of the jobs; `bar` counts them.
 
         `run` is a function of a module. What it raises is raised, and ends the other jobs;
@@ -80,6 +95,7 @@ class Crew:
                 if isinstance(result, _Raised):
                     raise result.error
                 found[index] = result
+                keep(index, result)
                 bar.update()
         return [found[index] for index in sorted(found)]
 
