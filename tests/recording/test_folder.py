@@ -71,7 +71,7 @@ def test_it_can_be_read_while_the_run_goes_on(run: RunFolder, tmp_path: Path, to
     data = (tmp_path / "signals.csv").read_bytes()
     (tmp_path / "signals.csv").write_bytes(data[: len(data) - torn])
     settings = json.loads((tmp_path / "run.json").read_text())
-    missing = {"components": {}, "connections": [], "events": [], "faults": []}
+    missing: dict[str, object] = {"components": {}, "connections": [], "events": [], "faults": []}
     (tmp_path / "run.json").write_text(json.dumps({**missing, "initialisation": {}, **settings}))
     read = load_run(tmp_path)
     whole = 50 if not torn else 49
