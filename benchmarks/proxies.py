@@ -48,7 +48,7 @@ def cost(system: System, folder: Path) -> None:
     """Print what a step costs with the plant here and there."""
 
     def run(system: System) -> float:
-        return 1e6 * simulate(system, step=1e-3, stop=STEPS * 1e-3).wall_time / STEPS
+        return 1e6 * (simulate(system, step=1e-3, stop=STEPS * 1e-3).wall_time or 0.0) / STEPS
 
     with peers(system, "plant") as program:
         port = int(program.ask("start").split()[1])

@@ -163,7 +163,17 @@ def test_the_declaration_of_variables_imports_the_standard_library_only() -> Non
 # ------------------------------------------------------------------ rooms of the orchestrator
 
 FLOORS = (
-    ("early", "errors", "plain", "checks", "files", "parallel", "extensions"),
+    (
+        "early",
+        "errors",
+        "plain",
+        "checks",
+        "files",
+        "scratch",
+        "interruption",
+        "parallel",
+        "extensions",
+    ),
     ("interface",),
     ("system",),
     ("fmi",),

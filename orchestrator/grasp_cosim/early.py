@@ -6,17 +6,22 @@ Imports next to nothing, as it comes before all else.
 import os
 import signal
 
+_is_command = False
+
 
 def leave_at_once() -> None:
-    """Have Ctrl-C end the process, unless the process ignores it."""
+    """Have Ctrl-C end the process, which is a command, unless the process ignores it."""
+    global _is_command
+    _is_command = True
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, _leave)
 
 
-def begin() -> None:
-    """From here on Ctrl-C is a KeyboardInterrupt again."""
+def begin() -> bool:
+    """From here on Ctrl-C is a KeyboardInterrupt again; True if this process is a command."""
     if signal.getsignal(signal.SIGINT) is _leave:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+    return _is_command
 
 
 def _leave(*_: object) -> None:

@@ -8,6 +8,7 @@ nothing from.
 
 import os
 import signal
+import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from functools import partial
@@ -19,6 +20,7 @@ from typing import Any, NamedTuple, Self, TypeVar
 
 from tqdm import tqdm
 
+from . import interruption
 from .errors import SimulationError
 
 Job = TypeVar("Job")
@@ -26,8 +28,8 @@ Run = TypeVar("Run")
 
 _SAFE_PATH = "PYTHONSAFEPATH"
 
-PATIENCE = 5.0
-"""s; a process that has not ended so long after it was to is killed."""
+PATIENCE = 1.0
+"""s; processes that have not ended so long after they were to are killed."""
 
 
 class Lost(NamedTuple):
@@ -42,12 +44,21 @@ def progress_bar(what: str, total: int | None, progress: bool, initial: int = 0)
     return tqdm(total=total, initial=initial, desc=what, unit="run", disable=disable)
 
 
+Keep = Callable[[int, Run], None]
+"""Gets the index of a job and its result as soon as it is there."""
+
+
 def run_all(
-    run: Callable[[Job], Run], jobs: Sequence[Job], workers: int, progress: bool, what: str
+    run: Callable[[Job], Run],
+    jobs: Sequence[Job],
+    workers: int,
+    progress: bool,
+    what: str,
+    keep: Keep[Run] = lambda *_: None,
 ) -> list[Run]:
     """Return the results of Crew.map; `progress` shows a bar labelled `what`."""
     with progress_bar(what, len(jobs), progress) as bar, Crew(workers) as crew:
-        return crew.map(run, jobs, bar)
+        return crew.map(run, jobs, bar, keep)
 
 
 class Crew:
@@ -62,10 +73,15 @@ class Crew:
 
     def __exit__(self, *_: object) -> None:
         """End the processes."""
-        for worker in self._idle:
-            worker.end()
+        _end(self._idle)
 
-    def map(self, run: Callable[[Job], Run], jobs: Iterable[Job], bar: "tqdm[Any]") -> list[Run]:
+    def map(
+        self,
+        run: Callable[[Job], Run],
+        jobs: Iterable[Job],
+        bar: "tqdm[Any]",
+        keep: Keep[Run] = lambda *_: None,
+    ) -> list[Run]:
         """Return the results of run(job), in the order of the jobs; `bar` counts them.
 
         `run` is a function of a module. What it raises is raised, and ends the other jobs;
@@ -79,6 +95,7 @@ class Crew:
                 if isinstance(result, _Raised):
                     raise result.error
                 found[index] = result
+                keep(index, result)
                 bar.update()
         return [found[index] for index in sorted(found)]
 
@@ -109,15 +126,14 @@ class Crew:
                     result = worker.received()
                     job = busy.pop(worker)
                     if isinstance(result, Lost):
-                        worker.end()
+                        _end([worker])
                     else:
                         self._idle.append(worker)
                     for following in islice(left, 1):
                         give(following)
                     yield job, result
         finally:
-            for worker in busy:
-                worker.end()
+            _end(busy)
 
 
 class _Raised(NamedTuple):
@@ -140,13 +156,17 @@ class _Worker:
         self.pipe, theirs = context.Pipe()
         self._started = False
         self._process: BaseProcess = context.Process(target=_work, args=(theirs,))
-        blocked = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])  # Ctrl-C is for us
+        blocked = signal.pthread_sigmask(signal.SIG_BLOCK, interruption.SIGNALS)  # are for us
         try:
             with _safe_path():
                 self._process.start()
         finally:
             theirs.close()
-            signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+            try:
+                signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+            except BaseException:  # of a signal that came meanwhile
+                _end([self])
+                raise
 
     def give(self, run: Callable[[Job], Any], job: Job) -> None:
         """Have it do a job; where it has died meanwhile, received() says so."""
@@ -170,12 +190,17 @@ class _Worker:
         except (EOFError, OSError):
             return Lost(self._end())
 
-    def end(self) -> None:
-        """End the process; a run it is at ends early, which frees its FMUs."""
+    def stop(self) -> None:
+        """Ask the process to end; a run it is at ends early, which frees its FMUs."""
         self.pipe.close()
-        if self._process.is_alive() and self._process.pid:
+        if self._started and self._process.is_alive() and self._process.pid:
             os.kill(self._process.pid, signal.SIGINT)
-        self._process.join(PATIENCE)
+        elif self._process.pid:
+            self._process.kill()
+
+    def end(self, deadline: float) -> None:
+        """Wait for the end of a stopped process, until a time of the monotonic clock; kill it."""
+        self._process.join(max(deadline - time.monotonic(), 0.0))
         if self._process.is_alive():
             self._process.kill()
             self._process.join()
@@ -209,11 +234,21 @@ def _safe_path() -> Iterator[None]:
             os.environ[_SAFE_PATH] = before
 
 
+def _end(workers: Iterable[_Worker]) -> None:
+    """End processes, all at once."""
+    ended = list(workers)
+    for worker in ended:
+        worker.stop()
+    deadline = time.monotonic() + PATIENCE
+    for worker in ended:
+        worker.end(deadline)
+
+
 def _work(pipe: Connection) -> None:
     """The life of a process: say that it has started, then a job after the other."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a run collects it itself, and ends early
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
     with suppress(EOFError, OSError, KeyboardInterrupt):
+        interruption.worker()
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, interruption.SIGNALS)
         pipe.send(None)
         while True:
             run, job = pipe.recv()

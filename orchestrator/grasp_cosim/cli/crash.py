@@ -12,6 +12,7 @@ import signal
 from pathlib import Path
 from typing import Any
 
+from ..scratch import PREFIX
 from .frame import FAILED
 
 SIGNALS = {s.value: s.name for s in signal.Signals} if os.name == "posix" else {}
@@ -21,9 +22,6 @@ LONGEST = 5
 
 DEEPEST = 256
 """Frames of the stack that are searched for the FMU."""
-
-FOLDER = "grasp_fmu_"
-"""Begins the name of the folder where an FMU is unpacked: see fmi/loaded.py."""
 
 ADVICE = (
     "run has --isolation process, and a system file isolation = 'process': a crash is then that of "
@@ -75,6 +73,6 @@ def _binary(libc: Any) -> str:
     for frame in frames[: libc.backtrace(frames, DEEPEST)]:
         if libc.dladdr(ctypes.c_void_p(frame), ctypes.byref(symbol)) and symbol.file:
             path = Path(os.fsdecode(symbol.file))
-            if any(part.startswith(FOLDER) for part in path.parts):
+            if any(part.startswith(PREFIX) for part in path.parts):
                 return f"{path.name}, the binary of an FMU,"
     return "the process"

@@ -6,10 +6,11 @@ from typing import NoReturn
 
 import click
 
+from .. import interruption
 from ..errors import InputError, SimulationError
 from ..files import FULL
 from .crash import explain_crashes
-from .frame import FAILED, INTERRUPTED, WRONG, fail
+from .frame import FAILED, INTERRUPTED, TERMINATED, WRONG, fail
 from .group import cli
 from .streams import OutputError, harmless_streams, keep_output_for_us
 
@@ -23,6 +24,10 @@ def entry() -> NoReturn:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # what is left is short, and nothing is lost
     except KeyboardInterrupt:
         code = fail("interrupted", INTERRUPTED)
+    if interruption.came() == signal.SIGTERM:
+        code = TERMINATED
+    elif interruption.came() and code in (WRONG, FAILED):  # what an FMU made of it
+        code = INTERRUPTED
     try:
         sys.stdout.close()
     except OSError as error:
@@ -41,7 +46,7 @@ def main(arguments: list[str]) -> int:
 
 def _main(arguments: list[str], debug: bool) -> int:
     try:
-        return int(cli.main(arguments, "grasp-cosim", standalone_mode=False) or 0)
+        return int(cli.main(arguments, "grasp-cosim", standalone_mode=False, obj=arguments) or 0)
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.ctx.get_help(), err=True)
         return WRONG

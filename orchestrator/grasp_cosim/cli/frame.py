@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from ..metrics.metric import Metric
     from ..system.description import System
 
-NEGATIVE, WRONG, FAILED, INTERRUPTED = 1, 2, 3, 130
-"""Exit codes beside 0: result negative, input wrong, failure on the way, Ctrl-C."""
+NEGATIVE, WRONG, FAILED, INTERRUPTED, TERMINATED = 1, 2, 3, 130, 143
+"""Exit codes beside 0: result negative, input wrong, failure on the way, Ctrl-C, SIGTERM."""
 
 Command = Callable[..., Any]
 

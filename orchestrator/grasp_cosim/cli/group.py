@@ -3,10 +3,13 @@
 from importlib import import_module
 from importlib.resources import files
 from importlib.util import find_spec
+from tempfile import gettempdir
 
 import click
 
+from .. import interruption
 from ..early import begin
+from ..scratch import sweep
 
 OF_THE_GRASP = {"evaluate", "identify"}
 """The commands that there are with the room grasp/ only."""
@@ -37,4 +40,6 @@ def cli(debug: bool) -> None:
 
     grasp-cosim COMMAND --help shows the options of a command and an example.
     """
-    begin()
+    if begin():
+        interruption.command()
+    sweep(gettempdir())

@@ -1,9 +1,9 @@
 """Ctrl-C and SIGTERM as the way to end a command that runs until then."""
 
-import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from types import FrameType
+
+from .. import interruption
 
 
 @contextmanager
@@ -11,14 +11,9 @@ def ended_by_signals(end: Callable[[], None]) -> Iterator[list[int]]:
     """SIGINT and SIGTERM call end, in the main thread; yields the list of those that came."""
     came: list[int] = []
 
-    def remember(number: int, _: FrameType | None) -> None:
+    def remember(number: int, _: object) -> None:
         came.append(number)
         end()
 
-    numbers = (signal.SIGINT, signal.SIGTERM)
-    previous = {number: signal.signal(number, remember) for number in numbers}
-    try:
+    with interruption.handled(remember, *interruption.SIGNALS):
         yield came
-    finally:
-        for number, handler in previous.items():
-            signal.signal(number, handler)

@@ -10,7 +10,6 @@ import logging
 import os
 import re
 import sys
-import tempfile
 import warnings
 from abc import ABC, abstractmethod
 from collections import deque
@@ -29,6 +28,7 @@ from fmpy.fmi1 import FMICallException
 from ..errors import InputError, SimulationError
 from ..files import FULL
 from ..interface.interface import Interface, Value, Variable
+from ..scratch import ScratchFolder
 from .instance import DISCARD, EARLY, ERROR, FATAL, OK, STATUS, TRANSFER_3, Call, Native
 
 _PYTHON_FUNCTION = ctypes.PYFUNCTYPE(ctypes.c_int)
@@ -83,7 +83,7 @@ class LoadedInstance(ABC):
         self._clock: npt.NDArray[np.float64] | None = None
         self._unread: deque[str] = deque(maxlen=KEPT)
         self._read_log()  # forgets what an earlier instance of this name said
-        self._folder = tempfile.TemporaryDirectory(prefix="grasp_fmu_")
+        self._folder = ScratchFolder()
         self._resources = Path(self._folder.name, "resources")
         try:
             self._slave = self._load(Path(self._folder.name))

@@ -24,6 +24,7 @@ import numpy.typing as npt
 
 from ..errors import InputError, SimulationError
 from ..interface.interface import Interface, Value, Variable
+from ..scratch import ScratchFolder
 from .exchange import ANSWER, CALL, FETCH, LOGGED, SIZE, STEP, Exchange
 from .instance import EARLY, WARNING, Call
 
@@ -61,7 +62,7 @@ class ProcessInstance:
         self._stack = ExitStack()
         self._lost: SimulationError | None = None
         self._printed: deque[str] = deque(maxlen=LINES)
-        folder = self._stack.enter_context(tempfile.TemporaryDirectory(prefix="grasp_process_"))
+        folder = self._stack.enter_context(ScratchFolder()).name
         memory = self._stack.enter_context(tempfile.TemporaryFile())  # noqa: SIM115
         memory.truncate(SIZE)
         self._exchange = Exchange(memory.fileno())

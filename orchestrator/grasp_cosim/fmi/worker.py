@@ -5,8 +5,10 @@ that is closed when the master's process ends, whereupon this one ends, too.
 """
 
 import faulthandler
+import fcntl
 import logging
 import os
+import signal
 import sys
 import threading
 import warnings
@@ -14,6 +16,7 @@ from contextlib import suppress
 from multiprocessing.connection import Connection
 from typing import Any
 
+from .. import interruption
 from ..errors import InputError, SimulationError
 from .exchange import ANSWER, CALL, LOGGED, STEP, Exchange
 from .instance import EARLY, WARNING, Call, Instance
@@ -122,6 +125,8 @@ def _as_answer(error: Exception) -> Answer:
 
 def _end_with(lifeline: int) -> None:
     """End this process, whatever its FMU is doing, as soon as the master's has ended."""
+    fcntl.fcntl(lifeline, fcntl.F_SETOWN, os.getpid())
+    fcntl.fcntl(lifeline, fcntl.F_SETFL, os.O_ASYNC)  # SIGIO ends it while an FMU keeps the GIL
     os.read(lifeline, 1)
     os._exit(1)
 
@@ -129,6 +134,8 @@ def _end_with(lifeline: int) -> None:
 def main(connection: int, memory: int, lifeline: int) -> None:
     """Serve until the instance is closed."""
     faulthandler.enable()
+    for number in interruption.SIGNALS:  # are for the master
+        signal.signal(number, signal.SIG_IGN)
     logging.basicConfig(format=f"{LOGGED}%(message)s", level=logging.INFO)
     threading.Thread(target=_end_with, args=(lifeline,), daemon=True).start()
     with suppress(EOFError):  # where the master wants no more of it

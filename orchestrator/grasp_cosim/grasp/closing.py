@@ -1,6 +1,7 @@
 """A grasp that is run no longer than it takes."""
 
-from ..master.simulation import interrupts, simulate
+from ..interruption import interrupts
+from ..master.simulation import simulate
 from ..metrics.metric import resolved
 from ..recording.result import Result
 from ..system.description import System

@@ -20,6 +20,7 @@ import fmpy
 from ..errors import choices
 from ..interface.document import unreadable
 from ..interface.read import describe
+from ..scratch import ScratchFolder
 from .packed_imports import imports
 
 Status = Literal["ok", "warning", "problem"]
@@ -70,8 +71,8 @@ def examine(fmu: Path | None) -> list[Finding]:
     """
     if fmu is None:
         return list(_machine(python=True))
-    with tempfile.TemporaryDirectory(prefix="grasp_doctor_") as folder:
-        unpacked = unpack(fmu, Path(folder))
+    with ScratchFolder() as scratch:
+        unpacked = unpack(fmu, Path(scratch.name))
         verdicts = {name: check(unpacked) for name, check in CHECKS.items()}
         found = [Finding(name, *verdict) for name, verdict in verdicts.items() if verdict]
         return [*_machine(unpacked.python), *found]

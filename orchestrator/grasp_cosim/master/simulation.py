@@ -1,13 +1,11 @@
 """Runs a system: to its end with simulate(), or step by step with simulate.session()."""
 
 import logging
-import signal
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from numbers import Integral
-from types import FrameType
 from typing import Any
 
 from tqdm import tqdm
@@ -15,6 +13,7 @@ from tqdm import tqdm
 from ..errors import InputError, SimulationError, choices
 from ..fmi.load import load
 from ..interface.interface import Value
+from ..interruption import interruptible, interrupts
 from ..metrics.metric import Metric, registered
 from ..realtime.options import Realtime
 from ..realtime.pacer import Pacer
@@ -81,7 +80,7 @@ class Session:
         self._stack = ExitStack()
         self._tell((*system.notes, *remarks(system)))
         try:
-            with _interruptible():
+            with interruptible():
                 instances = []
                 for component in system.components:
                     instances.append(load(component))
@@ -96,6 +95,8 @@ class Session:
                     every,
                     self._master.texts,
                 )
+                if self.pacer:
+                    self.pacer.spare = self._dispatch.spare
                 self._stack.callback(self._end)
                 with self._failures():  # where the row of t = 0 is not finite
                     self._master.initialise()
@@ -167,12 +168,14 @@ class Session:
         after an interruption such as Ctrl-C, the FMUs are not at one time: InputError.
         """
         _check_count("steps", steps)
-        start = time.perf_counter()
+        start, took = time.perf_counter(), self._dispatch.took
         try:
             with self._in_use():
                 return self._master.advance(int(steps)) > 0
         finally:
             self._wall_time += time.perf_counter() - start
+            if not self.pacer:  # which has time for the listeners
+                self._wall_time -= self._dispatch.took - took
 
     @contextmanager
     def _in_use(self) -> Iterator[None]:
@@ -181,7 +184,7 @@ class Session:
             state = "closed" if self._closed else "broken off by a failure or an interruption"
             raise InputError(f"{self.system.name}: the session is {state}; must be a new one")
         try:
-            with self._failures():
+            with interruptible(), self._failures():
                 yield
         except InputError:  # which was found before any FMU was called
             raise
@@ -353,49 +356,3 @@ def _drive(session: Session, progress: bool) -> None:
             start = now
         if session.pacer:
             bar.set_postfix_str(session.pacer.live(settled=True))
-
-
-@contextmanager
-def _interruptible() -> Iterator[None]:
-    """Ctrl-C is a KeyboardInterrupt here even where a Python FMU makes an error of its own of it.
-
-    So it is while a proxy waits for its peer.
-    """
-    default = signal.default_int_handler
-    here = threading.current_thread() is threading.main_thread()
-    if not here or signal.getsignal(signal.SIGINT) is not default:
-        yield
-        return
-    came = threading.Event()
-
-    def interrupt(number: int, frame: FrameType | None) -> None:
-        came.set()
-        default(number, frame)
-
-    signal.signal(signal.SIGINT, interrupt)
-    try:
-        yield
-    except (InputError, SimulationError) as error:
-        if came.is_set():
-            raise KeyboardInterrupt from error
-        raise
-    finally:
-        signal.signal(signal.SIGINT, default)
-
-
-@contextmanager
-def interrupts(interrupted: threading.Event) -> Iterator[None]:
-    """Collects Ctrl-C instead of raising it, which could happen inside a Python FMU."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-
-    def remember(*_: object) -> None:
-        interrupted.set()
-        signal.signal(signal.SIGINT, previous)  # a second Ctrl-C does not wait
-
-    previous = signal.signal(signal.SIGINT, remember)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, previous)

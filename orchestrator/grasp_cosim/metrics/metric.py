@@ -35,10 +35,10 @@ Function = Callable[["Signals"], Value | Sequence[Value]]
 
 
 RESERVED = frozenset((
-    "complete", "components", "connections", "descriptions", "diverging", "error",
-    "events", "faults", "index", "initialisation", "log", "metric_units", "missing_metrics",
-    "proxies", "real_time_factor", "realtime", "rejections", "roles", "scheme", "step", "steps",
-    "stop", "system", "types", "units", "wall_time",
+    "command", "complete", "components", "connections", "date", "descriptions", "diverging",
+    "error", "events", "faults", "fmus", "index", "initialisation", "log", "metric_units",
+    "missing_metrics", "proxies", "real_time_factor", "realtime", "rejections", "roles", "scheme",
+    "step", "steps", "stop", "system", "types", "units", "versions", "wall_time",
 ))  # fmt: skip
 """Names beside metrics in run.json and in the table of a sweep."""
 

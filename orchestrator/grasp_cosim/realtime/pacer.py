@@ -84,6 +84,8 @@ class Pacer:
         self._pending: tuple[Steps, Table] | None = None
         self._taken = 0
         self._hand_on: Callable[[int], None] = lambda _: None
+        self.spare: Callable[[float], bool] | None = None
+        """Does something that may wait within so many ns; False if there is nothing to do."""
         self._measuring = self._recording = 0
         self._head: Any = memoryview(bytearray(8 * HEAD)).cast("d")
         self._keep: list[Any] = []
@@ -195,14 +197,19 @@ class Pacer:
         It is expected to take half as long again as it did the last time.
         """
         waiting = step - self._taken
-        if self._base_step is None or (self._pending is None and waiting < SOME):
+        idle = self._pending is None and waiting < SOME
+        if self._base_step is None or (idle and self.spare is None):
             return
         spare = self._due(step) - (self._now() - self._origin)
         if self._pending is not None:
             if 2 * spare > 3 * self._measuring or waiting > AFTER:
                 self._timed(step - 1, self._measure)
-        elif 2 * spare > 3 * self._recording:
+        elif not idle and 2 * spare > 3 * self._recording:
             self._hand_on(step)
+        elif self.spare is not None:
+            start = self._now()
+            if self.spare(2 * spare / 3):
+                self.meter.recorded(step - 1, self._now() - start)
 
     def _timed(self, step: int, action: Callable[[], None]) -> None:
         """Do it, and count the time that takes as recording after that step."""

@@ -1,7 +1,7 @@
 """Writes a run as CSV while it goes on, in the form of the FMI cross-check."""
 
 from collections.abc import Sequence
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, nullcontext, suppress
 from io import FileIO
 from pathlib import Path
 
@@ -23,12 +23,16 @@ class CsvListener:
     The file has a temporary name beside path until the run ends, in whatever way: what was
     recorded is kept, in whole lines. There is no file where nothing was. A Real is the shortest
     text that reads back as the same number, a Boolean is 0 or 1, names and Strings are quoted texts
-    as plain.to_cell() makes them.
+    as plain.to_cell() makes them. In place, the file has its name from the start: whoever wants
+    that sees to it that it gets rows.
     """
 
-    def __init__(self, path: str | Path, said: str | Path | None = None) -> None:
+    def __init__(
+        self, path: str | Path, said: str | Path | None = None, in_place: bool = False
+    ) -> None:
         """`said` is the name in messages, if it is another."""
         self._path, self._said = Path(path), Path(said or path)
+        self._in_place = in_place
 
     def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
         """Write the line of names; InputError where the file cannot be written."""
@@ -38,7 +42,8 @@ class CsvListener:
         names = ("time", *(s.name for s in signals))
         try:
             with ExitStack() as stack:
-                part = stack.enter_context(in_one_piece(self._path))
+                named = nullcontext(self._path) if self._in_place else in_one_piece(self._path)
+                part = stack.enter_context(named)
                 self._file = stack.enter_context(FileIO(part, "w"))
                 self._append(",".join(map(_quoted, names)) + "\n")
                 self._finish = stack.pop_all()

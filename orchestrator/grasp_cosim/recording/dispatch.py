@@ -1,5 +1,6 @@
 """From the rows of the master's loop to the listeners: checked, extended, decimated."""
 
+import time
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from types import MappingProxyType
@@ -14,7 +15,7 @@ from ..system.parts import Port
 from ..system.settings import settings
 from .divergence import Divergence
 from .energy import ExchangeEnergy, bonds
-from .listener import Experiment, Listener, Signal, Texts
+from .listener import Experiment, Leisurely, Listener, Signal, Texts
 
 
 class Dispatcher:
@@ -34,6 +35,9 @@ class Dispatcher:
     ) -> None:
         """Slots are the columns of the rows, texts those of Strings, which are numbers there."""
         self._listeners = tuple(listeners)
+        self._leisurely = [one for one in listeners if isinstance(one, Leisurely)]
+        self.took = 0.0
+        """s that the listeners took for their blocks."""
         self._every = every
         self._columns = np.array([slots[port] for port in system.recorded], np.intp)
         outputs = {
@@ -95,6 +99,10 @@ class Dispatcher:
         if pending is not None:
             self._hand_on(*pending)
 
+    def spare(self, ns: float) -> bool:
+        """Give a listener that puts work off so many ns for it; False if none had any to do."""
+        return any(listener.spare(ns) for listener in self._leisurely)
+
     def end(self, complete: bool) -> None:
         """Hand the last row on and end the listeners, each of them even where another fails."""
         with ExitStack() as stack:
@@ -103,5 +111,7 @@ class Dispatcher:
             self.flush()
 
     def _hand_on(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
+        start = time.perf_counter()
         for listener in self._listeners:
             listener.block(steps, rows)
+        self.took += time.perf_counter() - start

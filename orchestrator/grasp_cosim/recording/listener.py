@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -84,6 +84,14 @@ class Listener(Protocol):
 
     def end(self, complete: bool) -> None:
         """Called once after the last row, also after a failure (complete is then False)."""
+
+
+@runtime_checkable
+class Leisurely(Listener, Protocol):
+    """A listener that puts work off, in a run that is paced by the clock, until there is time."""
+
+    def spare(self, ns: float) -> bool:
+        """Do as much as takes about so many ns; False if there was nothing, or nothing so short."""
 
 
 def times(steps: npt.NDArray[np.int64], step_ns: int) -> npt.NDArray[np.float64]:

@@ -6,6 +6,7 @@ import logging
 import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ SIGNALS, SETTINGS = "signals.csv", "run.json"
 """The files of a run's folder."""
 
 NUMBER = (int, float)
+MAYBE = (int, float, type(None))
 
 SETTING_KEYS: Mapping[str, Any] = {
     "system": str, "scheme": str, "step": NUMBER, "stop": NUMBER, "initialisation": dict,
@@ -32,12 +34,15 @@ SETTING_KEYS: Mapping[str, Any] = {
 """Entries of run.json that say how the run was made, and of which types they are."""
 
 OUTCOME_KEYS: Mapping[str, Any] = {
-    "wall_time": NUMBER, "complete": bool, "log": list, "rejections": dict, "units": dict,
+    "wall_time": MAYBE, "complete": bool, "log": list, "rejections": dict, "units": dict,
 }  # fmt: skip
 """Entries that say what came of it, besides metrics."""
 
+ORIGIN_KEYS: Mapping[str, Any] = {"date": str, "versions": dict, "fmus": dict, "command": list}
+"""Entries that say when the run was made, and with what."""
+
 MORE_KEYS: Mapping[str, Any] = {
-    "roles": dict, "types": dict, "descriptions": dict, "metric_units": dict,
+    "roles": dict, "types": dict, "descriptions": dict, "metric_units": dict, **ORIGIN_KEYS,
 }  # fmt: skip
 """Entries that may be there."""
 
@@ -45,12 +50,15 @@ TEXT = "str"
 TYPES = ("float64", "int32", "int64", "bool", TEXT)
 """The element types of recorded columns, the last that of Strings."""
 
-FORMS = {str: "a string", NUMBER: "a number", bool: "true or false", list: "a list"}
+FORMS = {
+    str: "a string", NUMBER: "a number", MAYBE: "a number or null", bool: "true or false",
+    list: "a list",
+}  # fmt: skip
 """Types of entries in words; the others are JSON objects."""
 
 
 def load_run(folder: str | Path) -> Result:
-    """The result in a folder that `run --out` wrote.
+    """The result in a folder that `run --out` wrote, or is writing: then as far as it got.
 
     Metrics are worked out anew from the signals; those of a user's file are as they were recorded.
     InputError where a file is missing or damaged, or the two files are not of the same run.
@@ -59,7 +67,9 @@ def load_run(folder: str | Path) -> Result:
     path = folder / SETTINGS
     written = _settings(path)
     units, types = written["units"], written.get("types", {})
-    time, columns = _table(folder / SIGNALS, {n for n, kind in types.items() if kind == TEXT})
+    unfinished = not written["complete"] and written["wall_time"] is None
+    texts = {n for n, kind in types.items() if kind == TEXT}
+    time, columns = _table(folder / SIGNALS, texts, unfinished)
     if list(units) != list(columns):
         raise InputError(
             f"{path}: units are those of {choices(units)}; "
@@ -81,6 +91,7 @@ def load_run(folder: str | Path) -> Result:
         log=tuple(written["log"]),
         timing=None if realtime is None else Timing.from_dict(f"{path}: realtime", realtime),
         more_metrics=_as_recorded(written),
+        origin={key: written[key] for key in ORIGIN_KEYS if key in written},
     )
 
 
@@ -162,7 +173,8 @@ def _settings(path: Path) -> dict[str, Any]:
                 f"{path}: no entry {key!r}; must be as `grasp-cosim run --out` writes it"
             )
         wrong = not isinstance(settings.get(key), kind)
-        if key in settings and (wrong or (kind is NUMBER and isinstance(settings[key], bool))):
+        a_number = kind in (NUMBER, MAYBE)
+        if key in settings and (wrong or (a_number and isinstance(settings[key], bool))):
             form = FORMS.get(kind, "a JSON object")
             raise InputError(f"{path}: {key} = {settings[key]!r}; must be {form}")
     return settings
@@ -175,20 +187,29 @@ def _unreadable(path: Path, error: OSError) -> InputError:
 
 
 def _table(
-    path: Path, texts: Collection[str] | None = None
+    path: Path, texts: Collection[str] | None = None, torn: bool = False
 ) -> tuple[npt.NDArray[np.float64], dict[str, npt.NDArray[Any]]]:
     """The time, and the other columns by name: objects where they are texts, else float64.
 
     `texts` are the names of those, by default of all that begin with something else than a number.
+    A last row that is `torn` does not count.
     """
-    names = _header(path)
+    names = _header(path, torn)
+    count = path.read_bytes().count(b"\n") - 1 if torn else None
     try:
         texts = _not_numbers(path, names) if texts is None else texts
-        columns = _texts(path, names, texts) if texts else {}
+        columns = _texts(path, names, texts, count) if texts else {}
         places = [0, *(i for i, name in enumerate(names, 1) if name not in columns)]
         some: dict[str, Any] = {"usecols": places, "quotechar": '"'} if columns else {}
         table = np.loadtxt(
-            path, delimiter=",", skiprows=1, comments=None, ndmin=2, encoding="utf-8", **some
+            path,
+            delimiter=",",
+            skiprows=1,
+            comments=None,
+            ndmin=2,
+            encoding="utf-8",
+            max_rows=count,
+            **some,
         )
     except (ValueError, csv.Error) as error:  # also where it is no UTF-8
         raise InputError(f"{path}: is damaged: {str(error).splitlines()[0]}") from error
@@ -203,12 +224,12 @@ def _table(
 
 
 def _texts(
-    path: Path, names: Sequence[str], wanted: Collection[str]
+    path: Path, names: Sequence[str], wanted: Collection[str], count: int | None
 ) -> dict[str, npt.NDArray[Any]]:
     """The columns of these names that are texts; ValueError where a row has not all values."""
     places = {i: name for i, name in enumerate(names, 1) if name in wanted}
     cells: dict[str, list[str]] = {name: [] for name in places.values()}
-    for row in _rows(path):
+    for row in islice(_rows(path), count):
         if len(row) != len(names) + 1:
             raise ValueError(f"{len(row)} values in a row, {len(names) + 1} names")
         for i, name in places.items():
@@ -238,13 +259,18 @@ def _is_number(cell: str) -> bool:
     return True
 
 
-def _header(path: Path) -> list[str]:
-    """The names of the columns after time; InputError where no whole row follows them."""
+def _header(path: Path, torn: bool) -> list[str]:
+    """The names of the columns after time; InputError where no whole row follows them.
+
+    Where the last one may be `torn`, another one must be before it.
+    """
     try:
         with path.open("rb") as file:
             first = file.readline()
             file.seek(max(len(first), file.seek(0, os.SEEK_END) - 1))
             end = file.read()
+            file.seek(len(first))
+            end = b"\n" if torn and file.readline().endswith(b"\n") else end
     except OSError as error:
         raise _unreadable(path, error) from error
     try:

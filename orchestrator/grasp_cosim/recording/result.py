@@ -52,7 +52,8 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     time: npt.NDArray[np.float64]
     signals: Mapping[str, npt.NDArray[Any]]
     units: Mapping[str, str | None]
-    wall_time: float
+    wall_time: float | None
+    """s that it took, files that were written meanwhile not counted; None where it did not end."""
     complete: bool
     """False where the run was interrupted or an FMU failed."""
     descriptions: Mapping[str, str] = field(default_factory=dict)
@@ -64,6 +65,8 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     """How it kept to the clock; None where it was not paced."""
     more_metrics: tuple[Metric, ...] = ()
     """Metrics that were asked for beside those that every result is asked for."""
+    origin: Mapping[str, Any] = field(default_factory=dict)
+    """The date, versions and command of a run with a folder: see recording.folder."""
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
         return self.signals[name]
@@ -111,12 +114,13 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     @cached_property
     def _figures(self) -> Mapping[str, Any]:
         """The metrics without those that fail."""
-        simulated = float(self.time[-1])
+        simulated, wall_time = float(self.time[-1]), self.wall_time
+        factor = simulated / wall_time if wall_time else wall_time
         proxies = proxy_figures(self.time, self.signals)
         return {
             **self.measured.values,
-            "wall_time": self.wall_time,
-            "real_time_factor": simulated / self.wall_time if self.wall_time else 0.0,
+            "wall_time": wall_time,
+            "real_time_factor": factor,
             "steps": int(self._steps[-1]),
             "scheme": self.settings["scheme"],
             "step": self.settings["step"],
@@ -143,7 +147,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     def to_json(self, path: str | Path) -> None:
         """Write the metrics and the settings that led to them, then what is known by signal
         (units, types, descriptions), the units of the metrics, the log, the rejections by
-        component, and, as "realtime", the timing of a paced run.
+        component, as "realtime" the timing of a paced run, and its origin.
 
         A metric that fails is a line among the missing ones: the rest of the run is kept.
         """
@@ -161,6 +165,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
             "log": list(self.log),
             "rejections": {name: asdict(r) for name, r in self.rejections.items()},
             **({"realtime": self.timing.as_dict()} if self.timing else {}),
+            **self.origin,
         }
         write_json(Path(path), report)
 

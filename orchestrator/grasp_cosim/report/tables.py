@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import shlex
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from html import escape
 from typing import Any
@@ -21,12 +22,20 @@ _UNITS = {"step": "s", "stop": "s", "wall_time": "s"}
 
 def summary(run: Mapping[str, Any]) -> str:
     """One line on the run."""
+    unfinished = run["wall_time"] is None
     text = escape(
         f"{number(run['stop'])} s in {count(run['steps'])} steps of "
-        f"{number(1e3 * run['step'])} ms, {run['scheme']}, "
-        f"{number(run['real_time_factor'], 3)} times as fast as real time"
+        f"{number(1e3 * run['step'])} ms, {run['scheme']}"
+        + (
+            ""
+            if unfinished
+            else f", {number(run['real_time_factor'], 3)} times as fast as real time"
+        )
     )
-    if not run["complete"]:
+    if unfinished:
+        end = number(run["steps"] * run["step"])
+        text += f' <span class="warn">unfinished: to t = {end} s</span>'
+    elif not run["complete"]:
         text += ' <span class="warn">not complete: interrupted, or failed on the way</span>'
     return text
 
@@ -91,6 +100,7 @@ def settings_html(result: Result) -> str:
         f"<td>{escape(number(run[key]))} {_UNITS.get(key, '')}</td>"
         for key in EXPERIMENT
     ]
+    experiment += [f"<td>{key}</td><td>{escape(text)}</td>" for key, text in _origin(result.origin)]
     lists = [
         bullets("Events", map(entries, run["events"]), "No events."),
         bullets("Faults on connections", map(entries, run["faults"]), "No faults."),
@@ -106,6 +116,16 @@ def settings_html(result: Result) -> str:
         f'<div class="two"><section><h3>Experiment</h3>{table("", experiment)}</section>'
         f"{''.join(lists)}</div>"
     )
+
+
+def _origin(origin: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """When and with what the run was made, as far as that is known."""
+    if "date" in origin:
+        yield "date", str(origin["date"])
+    if "versions" in origin:
+        yield "versions", ", ".join(f"{name} {v}" for name, v in origin["versions"].items())
+    if origin.get("command"):
+        yield "command", shlex.join(map(str, origin["command"]))
 
 
 def table(heads: str, rows: Iterable[str]) -> str:

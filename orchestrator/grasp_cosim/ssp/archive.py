@@ -6,12 +6,8 @@ of their content, under their own last name: no path in an archive can lead out 
 an archive read twice is extracted once.
 """
 
-import atexit
 import hashlib
-import os
 import posixpath
-import shutil
-import tempfile
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -22,6 +18,7 @@ from urllib.parse import unquote, urlsplit
 
 from ..errors import InputError, choices
 from ..files import in_one_piece
+from ..scratch import ScratchFolder
 
 STRUCTURE = "SystemStructure.ssd"
 RESOURCES = "resources/"
@@ -72,7 +69,7 @@ class Archive:
     def extract(self, entry: str) -> Path:
         """The entry as a file, until the process ends."""
         data = self.read(entry)
-        path = _folder() / hashlib.sha256(data).hexdigest() / posixpath.basename(entry)
+        path = Path(_folder().name) / hashlib.sha256(data).hexdigest() / posixpath.basename(entry)
         with _extracting:
             if not path.exists():
                 with in_one_piece(path) as part:
@@ -91,13 +88,6 @@ def write_archive(path: Path, entries: Mapping[str, bytes]) -> None:
 
 
 @cache
-def _folder() -> Path:
-    """The folder of this process; a forked one does not remove its parent's."""
-    folder, owner = Path(tempfile.mkdtemp(prefix="grasp-cosim-ssp-")), os.getpid()
-
-    def remove() -> None:
-        if os.getpid() == owner:
-            shutil.rmtree(folder, ignore_errors=True)
-
-    atexit.register(remove)
-    return folder
+def _folder() -> ScratchFolder:
+    """The folder of this process."""
+    return ScratchFolder()

@@ -5,7 +5,6 @@ The FMUs travel with the task: the cluster needs no folder of ours.
 
 from __future__ import annotations
 
-import tempfile
 import threading
 from collections.abc import Generator, Iterable
 from dataclasses import dataclass, replace
@@ -15,6 +14,7 @@ from typing import Any
 
 from ..checks import extra_module
 from ..errors import InputError, SimulationError
+from ..scratch import ScratchFolder
 from .run import Job, Outcome, Task, run_job
 from .study import hash_of
 
@@ -90,7 +90,7 @@ def _said(error: BaseException) -> str:
     return (str(error).splitlines() or [type(error).__name__])[0]
 
 
-_unpacked: dict[str, tempfile.TemporaryDirectory[str]] = {}
+_unpacked: dict[str, ScratchFolder] = {}
 """The folders of FMUs that this process has unpacked, by the key of their shipment."""
 
 _one_at_a_time = threading.Lock()
@@ -107,7 +107,7 @@ def unpacked(shipment: Shipment) -> Task:
     """The task with FMUs in a folder of this process, which goes with it."""
     components = shipment.task.system.components
     known = _unpacked.get(shipment.key)
-    folder = known or tempfile.TemporaryDirectory(prefix="grasp_sweep_")
+    folder = known or ScratchFolder()
     paths = [Path(folder.name, str(i), c.fmu.name) for i, c in enumerate(components)]
     if not known:
         for path, content in zip(paths, shipment.contents, strict=True):

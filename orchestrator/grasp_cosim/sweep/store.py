@@ -1,12 +1,14 @@
-"""The folder of a study: what it is of, and a part per finished run, each written in one piece."""
+"""A folder of finished runs: what they are of, and a part for each, written in one piece."""
 
 import fcntl
 import json
 import os
-from collections.abc import Iterator
+import shutil
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from ..checks import is_whole
 from ..errors import InputError, SimulationError
@@ -21,8 +23,8 @@ FORMAT = 1
 
 
 @dataclass(frozen=True, slots=True)
-class Store:
-    """The finished runs of one study in a folder."""
+class Parts:
+    """What is finished of a larger work in a folder, a part each, bound to what the work is."""
 
     folder: Path
 
@@ -41,14 +43,13 @@ class Store:
         finally:
             os.close(descriptor)
 
-    def open(self, study: Study) -> dict[int, Outcome]:
-        """Bind the folder to the study, if it is new; the outcomes that it has, by index.
+    def bind(self, identity: Mapping[str, str]) -> Iterator[Path]:
+        """Bind the folder to a work, if it is new; the files of the parts that it has, in order.
 
-        For who has it locked. InputError where it belongs to another study, or to other FMUs, or
-        has what is no run of it.
+        For who has it locked. InputError where it belongs to another work, or to other FMUs.
         """
         path, parts = self.folder / STUDY, self.folder / PARTS
-        bound = {"format": FORMAT, **study.identity}
+        bound = {"format": FORMAT, **identity}
         if path.exists():
             self._check(path, bound)
         elif parts.exists():
@@ -58,18 +59,26 @@ class Store:
         parts.mkdir(exist_ok=True)
         for torn in (*parts.glob("*.json.*.part"), *self.folder.glob(f"{STUDY}.*.part")):
             torn.unlink()
-        found = (_read(part, study.runs) for part in sorted(parts.glob("*.json")))
-        return {outcome.index: outcome for outcome in found}
+        return iter(sorted(parts.glob("*.json")))
 
-    def keep(self, outcome: Outcome) -> None:
-        """Write a part: from then on, the run is finished. SimulationError where that fails."""
-        path = self.folder / PARTS / _name(outcome.index)
+    def write(self, index: int, content: Any) -> None:
+        """Write a part: from then on, it is finished. SimulationError where that fails."""
+        path = self.part(index)
         try:
-            write_text(path, json.dumps(asdict(outcome)) + "\n")
+            write_text(path, json.dumps(content) + "\n")
         except OSError as error:
             raise SimulationError(
                 f"{path}: {error.strerror}; {self.kept()} runs are kept, the same command goes on"
             ) from error
+
+    def clear(self) -> None:
+        """Remove all parts, and what they are bound to. For who has it locked."""
+        shutil.rmtree(self.folder / PARTS, ignore_errors=True)
+        (self.folder / STUDY).unlink(missing_ok=True)
+
+    def part(self, index: int) -> Path:
+        """The file of a part."""
+        return self.folder / PARTS / _name(index)
 
     def kept(self) -> int:
         """The number of finished runs."""
@@ -102,6 +111,22 @@ class Store:
         raise InputError(
             f"{self.folder}: has the runs of {what}; --out must be another folder, or empty"
         )
+
+
+class Store(Parts):
+    """The finished runs of one study in a folder."""
+
+    def open(self, study: Study) -> dict[int, Outcome]:
+        """Bind the folder to the study, if it is new; the outcomes that it has, by index.
+
+        For who has it locked. InputError as of bind(), or where it has what is no run of the study.
+        """
+        found = (_read(part, study.runs) for part in self.bind(study.identity))
+        return {outcome.index: outcome for outcome in found}
+
+    def keep(self, outcome: Outcome) -> None:
+        """Write the part of a finished run; SimulationError where that fails."""
+        self.write(outcome.index, asdict(outcome))
 
 
 def _name(index: int) -> str:

@@ -10,8 +10,10 @@ import click
 from ...files import check_folder
 from ...grasp.presets import with_preset
 from ...grasp.published.evaluate import evaluate as run_evaluation
+from ...grasp.published.store import FOLDER
 from ...grasp.published.tables import Source
-from ..frame import NEGATIVE, PATH, json_option, load_system, show
+from ...sweep.store import Parts
+from ..frame import INTERRUPTED, NEGATIVE, PATH, fail, json_option, load_system, show
 
 
 @click.command()
@@ -22,15 +24,22 @@ from ..frame import NEGATIVE, PATH, json_option, load_system, show
 def evaluate(bench: bool, out: Path, workers: int, as_json: bool) -> int:
     """Run the published simulation table and figures and compare; --bench: the experiments.
 
+    Finished grasps are kept until all are done: the same command goes on where it was ended.
+
     \b
     Example: grasp-cosim evaluate --out results
     """
     check_folder(out)
     system = load_system()
     source: Source = "experiment" if bench else "simulation"
-    report = run_evaluation(
-        with_preset(system, "bench") if bench else system, out, workers, True, source
-    )
+    try:
+        report = run_evaluation(
+            with_preset(system, "bench") if bench else system, out, workers, True, source
+        )
+    except KeyboardInterrupt:
+        kept = Parts(out / FOLDER).kept()
+        goes_on = f"; {kept} grasps are kept in {out / FOLDER}, the same command goes on"
+        return fail(f"interrupted{goes_on if kept else ''}", INTERRUPTED)
     holds = all(claim["holds"] for claim in report["claims"])
     show(as_json, report, _verdict(report, out))
     return 0 if holds else NEGATIVE

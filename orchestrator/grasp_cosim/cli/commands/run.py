@@ -1,5 +1,6 @@
 """The command run."""
 
+from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ import click
 from ...errors import InputError, SimulationError
 from ...master.engine import ENGINES, Engine
 from ...master.simulation import MOST, simulate
+from ...recording.folder import RunFolder
 from ...recording.mdf import check_mdf
 from ...recording.result import Result
 from ...report.timing import draw_result
@@ -83,23 +85,26 @@ def run(
     if mdf:
         check_mdf()
     check_outputs(out, given["plot"])
-    try:
-        result = simulate(
-            system,
-            progress=True,
-            every=every,
-            engine=engine,
-            realtime=paced,
-            metrics=metrics,
-            note=partial(click.echo, err=True),
-        )
-    except SimulationError as error:
-        if error.result:
-            _write(error.result, out, given["plot"], mdf)
-            if out:
-                click.echo(f"kept what was recorded, in {out}", err=True)
-        raise
-    _write(result, out, given["plot"], mdf)
+    command = ("grasp-cosim", *click.get_current_context().find_root().obj)
+    with RunFolder(out, system, command, paced is not None) if out else nullcontext() as folder:
+        try:
+            result = simulate(
+                system,
+                progress=True,
+                every=every,
+                listeners=[folder] if folder else (),
+                engine=engine,
+                realtime=paced,
+                metrics=metrics,
+                note=partial(click.echo, err=True),
+            )
+        except SimulationError as error:
+            if error.result:
+                _write(error.result, folder, out, given["plot"], mdf)
+                if out:
+                    click.echo(f"kept what was recorded, in {out}", err=True)
+            raise
+        _write(result, folder, out, given["plot"], mdf)
     show(as_json, _as_json(result), _summary(result))
     if not result.complete:
         message = f"interrupted at t = {result.time[-1]:.6g} s; kept what was recorded"
@@ -107,13 +112,13 @@ def run(
     return 0 if result.signals else NEGATIVE  # as the log says
 
 
-def _write(result: Result, out: Path | None, plot: bool, mdf: bool) -> None:
-    if out:
-        result.to_json(out / "run.json")
+def _write(
+    result: Result, folder: RunFolder | None, out: Path | None, plot: bool, mdf: bool
+) -> None:
+    if folder:
+        folder.finish(result)
     if not result.signals:
         return
-    if out:
-        result.to_csv(out / "signals.csv")
     if out and mdf:
         result.to_mdf(out / "signals.mf4")
     for picture in draw_result(result, out or Path()) if plot and result.numbers else ():

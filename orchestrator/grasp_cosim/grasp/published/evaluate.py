@@ -17,6 +17,7 @@ from ...metrics.metric import registered
 from ...parallel import run_all
 from ...recording.result import UNITS
 from ...report.plot import new_figure, save
+from ...sweep.store import Parts
 from ...system.description import System
 from ..closing import close
 from ..pictures import draw_contact_forces, draw_contact_times, draw_targets
@@ -24,9 +25,15 @@ from ..presets import CASES, with_case
 from .claims import Evidence, check_claims
 from .grasps import Run, Runs, as_run
 from .report import bench_markdown, markdown, table_csv
-from .tables import REFLECTANCE_X_M, Row, Setting, Source, published_rows
+from .store import FOLDER, Grasps, Job
+from .tables import REFLECTANCE_X_M, Row, Source, published_rows
 
 Deviations = Callable[[Sequence[Row], Sequence[Mapping[str, Any]]], dict[str, float]]
+
+WRITTEN = (
+    "report.md", "evaluation.json", "evaluation.csv", "contact_times.png", "target_position.png",
+    "contact_forces.png",
+)  # fmt: skip
 
 BOOKKEEPING = ("wall_time", "real_time_factor")
 """What differs from one repetition of a grasp to the next."""
@@ -53,37 +60,62 @@ def evaluate(
     """Run Cases 0, 1 and 2 in all published settings of a source and write everything to `out`.
 
     Writes contact_forces.png, target_position.png, contact_times.png, evaluation.csv,
-    evaluation.json and report.md. Returns what evaluation.json holds. InputError without
-    matplotlib, KeyboardInterrupt at Ctrl-C.
+    evaluation.json and report.md. Returns what evaluation.json holds. A finished grasp is in a
+    folder there until all are: after a kill the same call goes on.
+
+    InputError without matplotlib or where another process is at it, KeyboardInterrupt at Ctrl-C.
     """
     new_figure(1.0, 1.0)  # says at once if matplotlib is missing
     how, published = SOURCES[source], published_rows(source)
     settings = sorted({row.setting for row in published})
     jobs = [(system, setting, case, source) for setting in settings for case in CASES]
-    runs = {(r.setting, r.case): r for r in run_all(_run, jobs, workers, progress, "grasps")}
-    rows = [_compared(row, runs, how.at_sensor_contact) for row in published]
-    rms = how.deviations(published, rows)
-    report = {
-        "rows": rows,
-        "rms": rms,
-        "claims": check_claims(source, Evidence(runs, published, rows, rms, system)),
-        "runs": [
-            {
-                "condition": r.setting.x_m if source == "simulation" else r.setting.label,
-                "case": r.case,
-                **{k: v for k, v in r.metrics.items() if k not in BOOKKEEPING},
-            }
-            for r in runs.values()
-        ],
-        "units": _units(rows, next(iter(runs.values()))),
-    }
-    _draw_signals(runs, how.shown, out)
-    _draw_times(rows, out / "contact_times.png")
-    named = [{**r, "finger": r["finger"] or "difference"} for r in rows]
-    write_text(out / "evaluation.csv", table_csv(named))
-    write_json(out / "evaluation.json", report)
-    write_text(out / "report.md", how.page(report, system))
+    grasps = Grasps(Parts(out / FOLDER), jobs)
+    with grasps.parts.locked():
+        try:
+            runs = {(r.setting, r.case): r for r in _all(grasps, workers, progress)}
+        except KeyboardInterrupt:
+            if not grasps.parts.kept():
+                grasps.remove()
+            raise
+        rows = [_compared(row, runs, how.at_sensor_contact) for row in published]
+        rms = how.deviations(published, rows)
+        report = {
+            "rows": rows,
+            "rms": rms,
+            "claims": check_claims(source, Evidence(runs, published, rows, rms, system)),
+            "runs": [
+                {
+                    "condition": r.setting.x_m if source == "simulation" else r.setting.label,
+                    "case": r.case,
+                    **{k: v for k, v in r.metrics.items() if k not in BOOKKEEPING},
+                }
+                for r in runs.values()
+            ],
+            "units": _units(rows, next(iter(runs.values()))),
+        }
+        for name in WRITTEN:  # nothing of another evaluation is ever beside this one
+            (out / name).unlink(missing_ok=True)
+        _draw_signals(runs, how.shown, out)
+        _draw_times(rows, out / "contact_times.png")
+        named = [{**r, "finger": r["finger"] or "difference"} for r in rows]
+        write_text(out / "evaluation.csv", table_csv(named))
+        write_json(out / "evaluation.json", report)
+        write_text(out / "report.md", how.page(report, system))
+        grasps.remove()
     return report
+
+
+def _all(grasps: Grasps, workers: int, progress: bool) -> list[Run]:
+    """The grasps, of which those that are finished are not done again, in the order of the jobs."""
+    done = grasps.open()
+    left = [i for i in range(len(grasps.jobs)) if i not in done]
+
+    def keep(index: int, run: Run) -> None:
+        grasps.keep(left[index], run)
+
+    new = run_all(_run, [grasps.jobs[i] for i in left], workers, progress, "grasps", keep)
+    done.update(zip(left, new, strict=True))
+    return [done[i] for i in sorted(done)]
 
 
 def _units(rows: Sequence[Mapping[str, Any]], run: Run) -> dict[str, str | None]:
@@ -94,7 +126,7 @@ def _units(rows: Sequence[Mapping[str, Any]], run: Run) -> dict[str, str | None]
     return {**dict.fromkeys([*times, "rms"], "s"), "condition": "m", **own}
 
 
-def _run(job: tuple[System, Setting, int, Source]) -> Run:
+def _run(job: Job) -> Run:
     """One grasp; the reflectances of a setting are shares of those of the system."""
     system, setting, case, source = job
     values = {

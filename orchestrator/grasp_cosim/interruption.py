@@ -1,0 +1,147 @@
+"""Ctrl-C and SIGTERM: the first ends in good order what goes on, the second ends it at once.
+
+SIGTERM, with which systemd and Docker stop a command, does there what Ctrl-C does. A handler of
+Python's does not run while an FMU hangs in C code; so the kernel is told to take each of these
+signals once for us, and after that by its default action, which is to end the process.
+"""
+
+import ctypes
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+_came: list[int] = []
+"""The signals that came since command()."""
+
+_afterwards: signal.Handlers | None = None
+"""What becomes of further signals in a process that is there for one end; None in any other."""
+
+Handler = Callable[[int, FrameType | None], None]
+
+
+def command() -> None:
+    """Have SIGTERM do what Ctrl-C does from now on, in a process that is there for one command."""
+    global _afterwards
+    _afterwards = signal.SIG_DFL
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # not ignored, as after `&`
+        handle(signal.SIGINT, _interrupt)
+    handle(signal.SIGTERM, _terminate)
+
+
+def worker() -> None:
+    """Have Ctrl-C end this process once, and nothing else: whoever started it will kill it."""
+    global _afterwards
+    _afterwards = signal.SIG_IGN
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    handle(signal.SIGINT, _interrupt)
+
+
+def came() -> int | None:
+    """The first signal that this command got; None before that."""
+    return _came[0] if _came else None
+
+
+def handle(number: int, handler: Handler) -> None:
+    """Have a handler take a signal, once; the second one ends the process, or does nothing."""
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+    try:
+        signal.signal(number, handler)
+        libc = ctypes.CDLL(None)
+        if _afterwards is not signal.SIG_IGN and hasattr(
+            libc, "sysv_signal"
+        ):  # glibc; it leaves Python's own handler, but for one time
+            set_once = libc.sysv_signal
+            set_once.argtypes, set_once.restype = (ctypes.c_int, ctypes.c_void_p), ctypes.c_void_p
+            set_once(number, set_once(number, None))
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    _note(number)
+    signal.default_int_handler(number, frame)
+
+
+def _terminate(number: int, frame: FrameType | None) -> None:
+    handler = signal.getsignal(signal.SIGINT)
+    _note(number)
+    (handler if callable(handler) else signal.default_int_handler)(number, frame)
+
+
+def _note(number: int) -> None:
+    _came.append(number)
+    for each in SIGNALS:
+        signal.signal(each, _afterwards)
+
+
+@contextmanager
+def handled(handler: Handler, *numbers: int) -> Iterator[None]:
+    """A handler of these signals in this context; in a command it gets one of them, once."""
+
+    def take(number: int, frame: FrameType | None) -> None:
+        if _afterwards is not None:
+            _note(number)
+        handler(number, frame)
+
+    previous = {number: signal.getsignal(number) for number in numbers}
+    for number in numbers:
+        handle(number, take)
+    try:
+        yield
+    finally:
+        for number, before in previous.items():
+            if _came:
+                signal.signal(number, _afterwards)
+            elif before in (_interrupt, _terminate):
+                handle(number, before)
+            else:
+                signal.signal(number, before)
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """Ctrl-C is a KeyboardInterrupt here even where an FMU makes an error of its own of it.
+
+    A Python FMU does, or one that is a proxy and waits for its peer.
+    """
+    usual = (signal.default_int_handler, _interrupt)
+    here = threading.current_thread() is threading.main_thread()
+    if not here or signal.getsignal(signal.SIGINT) not in usual:
+        yield
+        return
+    taken: list[int] = []
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        taken.append(number)
+        signal.default_int_handler(number, frame)
+
+    with handled(interrupt, signal.SIGINT):
+        try:
+            yield
+        except Exception as error:
+            if taken:
+                raise KeyboardInterrupt from error
+            raise
+    if taken:  # an FMU has swallowed it
+        raise KeyboardInterrupt
+
+
+@contextmanager
+def interrupts(interrupted: threading.Event) -> Iterator[None]:
+    """Collects Ctrl-C instead of raising it, which could happen inside a Python FMU."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    previous = signal.getsignal(signal.SIGINT)
+
+    def remember(*_: object) -> None:
+        interrupted.set()
+        if _afterwards is None:
+            signal.signal(signal.SIGINT, previous)  # a second Ctrl-C does not wait
+
+    with handled(remember, signal.SIGINT):
+        yield

@@ -1,0 +1,183 @@
+"""The folder of a run, on disk while it runs: signals.csv row by row, and run.json beside it."""
+
+import fcntl
+import os
+import platform
+import time
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import replace
+from datetime import datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from .. import extensions
+from ..errors import InputError
+from ..files import unwritable, write_json
+from ..system.description import System
+from .csv import CsvListener
+from .listener import Experiment, Signal
+from .load import SETTINGS, SIGNALS, TEXT
+from .memory import TYPES
+from .result import Result
+
+DRAWN = ("report.html", "timing.png", "signals.mf4")
+"""What else may be made of a run in its folder, beside its picture."""
+
+FIRST_GUESS = 20e3
+"""ns that it takes to write a row."""
+
+SHARE = 0.03
+"""The share of the time in which rows are written even where there is none to spare."""
+
+
+class RunFolder:
+    """A listener that writes a run into a folder, and takes the place of an older run there.
+
+    It does so with the first row, so that a run which does not come so far leaves the older one as
+    it was. From then on the folder has the rows until now and a run.json with "complete": false,
+    until finish(). At no moment there are files of two runs. Its context keeps other runs out of
+    the folder from the first row on.
+    """
+
+    def __init__(
+        self, folder: Path, system: System, command: Sequence[str] = (), paced: bool = False
+    ) -> None:
+        """`command` led to the run; if it is `paced`, rows are written in spare() time only."""
+        self._folder, self._paced = folder, paced
+        self._origin = origin(system, command)
+        self._csv = CsvListener(folder / SIGNALS, in_place=True)
+        self._begun, self._broken = False, False
+        self._waiting: deque[tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]] = deque()
+        self._row_ns, self._at_last_ns = FIRST_GUESS, 0.0
+        self._lock: int | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Let others into the folder."""
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
+
+    def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
+        """Nothing is written yet."""
+        self._experiment, self._signals = experiment, tuple(signals)
+
+    def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
+        """Take the rows; InputError where the folder is not for us, SimulationError if it fails."""
+        if not self._begun:
+            self._take_the_folder(steps, rows)
+        elif self._paced:
+            self._waiting.append((steps.copy(), rows.copy()))
+        else:
+            self._write(steps, rows)
+
+    def spare(self, ns: float) -> bool:
+        """Write rows that wait, as many as take about so many ns, and one at last."""
+        start = time.perf_counter_ns()
+        count = max(int(ns / self._row_ns), int(start > self._at_last_ns))
+        if not self._waiting or count < 1:
+            return False
+        steps, rows = self._waiting.popleft()
+        if count < len(steps):
+            self._waiting.appendleft((steps[count:], rows[count:]))
+        done = min(count, len(steps))
+        self._write(steps[:done], rows[:done])
+        end = time.perf_counter_ns()
+        # one that was held up by something else does not count for much
+        self._row_ns = min(1.5 * self._row_ns, (end - start) / done)
+        self._at_last_ns = end + (end - start) / SHARE
+        return True
+
+    def end(self, complete: bool) -> None:
+        """Write the rows that still wait, and close signals.csv."""
+        if self._begun:
+            try:
+                while self._waiting and not self._broken:
+                    self._write(*self._waiting.popleft())
+            finally:
+                self._csv.end(complete)
+
+    def finish(self, result: Result) -> None:
+        """Write the run.json of a result that ended, in whatever way; not if rows are missing."""
+        if self._begun and not self._broken:
+            replace(result, origin=self._origin).to_json(self._folder / SETTINGS)
+
+    def _write(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
+        self._broken = True
+        self._csv.block(steps, rows)
+        self._broken = False
+
+    def _take_the_folder(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
+        """Remove the older run, its data last, and begin ours; a kill leaves one of them or none.
+
+        Without run.json there is no run in the folder.
+        """
+        settings, signals = self._folder / SETTINGS, self._folder / SIGNALS
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            self._keep_others_out()
+            if settings.is_file() and signals.is_file():
+                for name in (*DRAWN, *(f"{d.stem}.png" for d in extensions.drawings)):
+                    (self._folder / name).unlink(missing_ok=True)
+            settings.unlink(missing_ok=True)
+            signals.unlink(missing_ok=True)
+            self._csv.begin(self._experiment, self._signals)
+            self._begun = True
+            self._write(steps, rows)
+            write_json(settings, self._unfinished())
+        except OSError as error:
+            raise InputError(unwritable(Path(error.filename or self._folder), error)) from error
+
+    def _keep_others_out(self) -> None:
+        """Lock the folder, for as long as this process lives; InputError where another one has."""
+        self._lock = os.open(self._folder, os.O_RDONLY | os.O_CLOEXEC)
+        try:
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise InputError(
+                f"{self._folder}: another process records a run in it; must end first, or --out be "
+                "another folder"
+            ) from error
+        except OSError:  # a file system without locks
+            pass
+
+    def _unfinished(self) -> dict[str, Any]:
+        """The run.json of a run that goes on: see Result.to_json()."""
+        return {
+            "wall_time": None,
+            "complete": False,
+            **self._experiment.settings,
+            "units": {s.name: s.unit for s in self._signals},
+            "types": {
+                s.name: str(np.dtype(TYPES[s.kind])) if s.kind in TYPES else TEXT
+                for s in self._signals
+            },
+            "descriptions": {s.name: s.description for s in self._signals},
+            "metric_units": {},
+            "missing_metrics": [],
+            "log": [],
+            "rejections": {},
+            **self._origin,
+        }
+
+
+def origin(system: System, command: Sequence[str]) -> dict[str, Any]:
+    """The date now, the versions of what makes the run, which FMUs those are, and the command."""
+    return {
+        "date": datetime.now().astimezone().isoformat(timespec="seconds"),
+        "versions": {
+            "python": platform.python_version(),
+            **{name: version(name) for name in ("grasp-cosim", "numpy", "fmpy")},
+        },
+        "fmus": {
+            c.name: {"guid": c.interface.guid, "tool": c.interface.tool} for c in system.components
+        },
+        "command": list(command),
+    }

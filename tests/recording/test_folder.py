@@ -1,0 +1,187 @@
+"""The folder of a run while it goes on: never a mixture, whole lines, the same file in the end."""
+
+import json
+import os
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+from grasp_cosim import InputError, Realtime, SimulationError, System, simulate
+from grasp_cosim.recording.folder import RunFolder
+from grasp_cosim.recording.load import load_run
+from recording.rows import EXPERIMENT, SIGNALS, full_disk, rows
+
+STOP = 0.05
+
+DRAWN = ("grasp.png", "timing.png", "report.html", "signals.mf4")
+
+
+@pytest.fixture
+def run(grasp: System, tmp_path: Path) -> Iterator[RunFolder]:
+    with RunFolder(tmp_path, grasp, ["grasp-cosim", "run"]) as folder:
+        yield folder
+
+
+def test_it_ends_as_a_result_writes_it(grasp: System, tmp_path: Path) -> None:
+    with RunFolder(tmp_path / "on", grasp) as folder:
+        result = simulate(grasp, stop=STOP, listeners=[folder])
+        folder.finish(result)
+    result.to_csv(tmp_path / "signals.csv")
+    result.to_json(tmp_path / "run.json")
+    on, after = ((p / "signals.csv").read_bytes() for p in (tmp_path / "on", tmp_path))
+    assert on == after
+    written, plain = (json.loads((p / "run.json").read_text()) for p in (tmp_path / "on", tmp_path))
+    assert {*written} - {*plain} == {"date", "versions", "fmus", "command"}
+    assert {key: written[key] for key in plain} == plain
+
+
+def test_a_paced_run_writes_the_same(grasp: System, tmp_path: Path) -> None:
+    system = grasp.with_experiment(step=1e-3, stop=0.3)
+    with RunFolder(tmp_path / "paced", system, paced=True) as folder:
+        result = simulate(system, realtime=Realtime(), listeners=[folder])
+        folder.finish(result)
+    result.to_csv(tmp_path / "signals.csv")
+    paced = (tmp_path / "paced/signals.csv").read_bytes()
+    assert paced == (tmp_path / "signals.csv").read_bytes()
+
+
+def test_what_waits_is_written_in_spare_time(grasp: System, tmp_path: Path) -> None:
+    table = rows(100)
+    with RunFolder(tmp_path, grasp, paced=True) as folder:
+        folder.begin(EXPERIMENT, SIGNALS)
+        folder.block(np.arange(1), table[:1])
+        folder.block(np.arange(1, 100), table[1:])
+        lines = (tmp_path / "signals.csv").read_text().splitlines()
+        assert len(lines) == 2
+        while folder.spare(1e5):
+            pass
+        lines = (tmp_path / "signals.csv").read_text().splitlines()
+        assert len(lines) == 101
+        folder.end(complete=False)
+
+
+@pytest.mark.parametrize("torn", [0, 1, 7, 40])
+def test_it_can_be_read_while_the_run_goes_on(run: RunFolder, tmp_path: Path, torn: int) -> None:
+    """Also where a kill came while a line was written."""
+    table = rows(50)
+    run.begin(EXPERIMENT, SIGNALS)
+    run.block(np.arange(50), table)
+    data = (tmp_path / "signals.csv").read_bytes()
+    (tmp_path / "signals.csv").write_bytes(data[: len(data) - torn])
+    settings = json.loads((tmp_path / "run.json").read_text())
+    missing: dict[str, object] = {"components": {}, "connections": [], "events": [], "faults": []}
+    (tmp_path / "run.json").write_text(json.dumps({**missing, "initialisation": {}, **settings}))
+    read = load_run(tmp_path)
+    whole = 50 if not torn else 49
+    assert (read.complete, read.wall_time, len(read.time)) == (False, None, whole)
+    assert read["a.x[1]"].tolist() == table[:whole, 0].tolist()
+    assert read["a.on"].dtype == np.bool_
+    assert read.metrics["real_time_factor"] is None
+    assert read.origin["command"] == ["grasp-cosim", "run"]
+    run.end(complete=False)
+
+
+def test_without_a_row_the_older_run_stays(run: RunFolder, tmp_path: Path) -> None:
+    for name in ("run.json", "signals.csv", *DRAWN):
+        (tmp_path / name).write_text("older")
+    run.begin(EXPERIMENT, SIGNALS)
+    run.end(complete=False)
+    assert {p.read_text() for p in tmp_path.iterdir()} == {"older"}
+
+
+def test_no_picture_of_another_run_stays(run: RunFolder, tmp_path: Path) -> None:
+    theirs = ("notes.txt", "photo.png", "evaluation.json")
+    for name in ("run.json", "signals.csv", *DRAWN, *theirs):
+        (tmp_path / name).write_text("older")
+    run.begin(EXPERIMENT, SIGNALS)
+    run.block(np.arange(1), rows(1))
+    run.end(complete=False)
+    assert sorted(p.name for p in tmp_path.iterdir()) == sorted(
+        ["run.json", "signals.csv", *theirs]
+    )
+
+
+def test_what_is_not_of_a_run_is_not_removed(run: RunFolder, tmp_path: Path) -> None:
+    (tmp_path / "report.html").write_text("theirs")
+    run.begin(EXPERIMENT, SIGNALS)
+    run.block(np.arange(1), rows(1))
+    run.end(complete=False)
+    assert (tmp_path / "report.html").read_text() == "theirs"
+
+
+class Killed(BaseException):
+    """Stands for a kill between two changes of the folder."""
+
+
+@pytest.mark.parametrize("moment", range(12))
+def test_a_kill_at_no_moment_leaves_a_mixture(
+    run: RunFolder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, moment: int
+) -> None:
+    """The older run with what there is of it, ours, or no run at all: nothing without run.json."""
+    for name in ("run.json", "signals.csv", *DRAWN):
+        (tmp_path / name).write_text("older")
+    left = moment
+
+    def counted(change: str) -> None:
+        real = getattr(Path, change)
+
+        def changed(self: Path, *arguments: object, **options: object) -> object:
+            nonlocal left
+            if left == 0:
+                raise Killed
+            left -= 1
+            return real(self, *arguments, **options)
+
+        monkeypatch.setattr(Path, change, changed)
+
+    for change in ("unlink", "replace"):
+        counted(change)
+    run.begin(EXPERIMENT, SIGNALS)
+    with suppress(Killed):
+        run.block(np.arange(1), rows(1))
+    monkeypatch.undo()
+    run.end(complete=False)
+    there = {p.name for p in tmp_path.iterdir() if not p.name.endswith(".part")}
+    if "run.json" in there:
+        older = (tmp_path / "run.json").read_text() == "older"
+        assert ((tmp_path / "signals.csv").read_text() == "older") == older
+        assert older or not there & {*DRAWN}
+    else:
+        assert not there & {*DRAWN}
+
+
+def test_two_runs_do_not_share_a_folder(run: RunFolder, grasp: System, tmp_path: Path) -> None:
+    run.begin(EXPERIMENT, SIGNALS)
+    run.block(np.arange(2), rows(2))
+    with RunFolder(tmp_path, grasp) as second:
+        second.begin(EXPERIMENT, SIGNALS)
+        with pytest.raises(InputError, match="another process records a run in it; must end"):
+            second.block(np.arange(2), rows(2))
+        second.end(complete=False)
+    run.end(complete=True)
+    assert len((tmp_path / "signals.csv").read_text().splitlines()) == 3
+
+
+def test_rows_that_are_not_there_are_not_told_of(
+    grasp: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A full disk: run.json stays the one of a run that did not end."""
+    result = simulate(grasp, stop=STOP)
+    with RunFolder(tmp_path, grasp) as folder:
+        folder.begin(EXPERIMENT, SIGNALS)
+        folder.block(np.arange(1), rows(1))
+        with full_disk(size=10_000), pytest.raises(SimulationError):
+            folder.block(np.arange(1, 1000), rows(999))
+        folder.end(complete=False)
+        folder.finish(result)
+    assert json.loads((tmp_path / "run.json").read_text())["wall_time"] is None
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_a_folder_that_cannot_be_written_is_one_line(run: RunFolder, tmp_path: Path) -> None:
+    tmp_path.chmod(0o555)
+    run.begin(EXPERIMENT, SIGNALS)
+    with pytest.raises(InputError, match="cannot be written: Permission denied"):
+        run.block(np.arange(1), rows(1))
