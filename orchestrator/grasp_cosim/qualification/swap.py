@@ -10,9 +10,10 @@ from ..checks import known
 from ..errors import InputError
 from ..interface.interface import Interface, Value
 from ..interface.read import describe
-from ..interface.units import IDENTITY, Conversion
+from ..interface.units import IDENTITY, Conversion, conversion
 from ..system.description import System
 from ..system.parts import Isolation
+from ..system.readings import readings
 from .feedthrough import feedthrough_differences
 from .interface_difference import SEVERITIES, Difference, interface_differences, use_of
 
@@ -46,12 +47,15 @@ def prepare_swap(
     rename: Mapping[str, str],
     values: Mapping[str, Value],
     isolation: Isolation,
+    units: Mapping[str, str] | None = None,
 ) -> Swap:
     """The swap that qualify() describes; InputError where its arguments are wrong."""
     place = system.component(component, f"--as {component}")
-    interfaces = {c.name: describe(c.fmu).renamed(c.rename) for c in system.components}
+    interfaces = {
+        c.name: describe(c.fmu).renamed(c.rename).in_units(c.units) for c in system.components
+    }
     ours = interfaces[component]
-    theirs = describe(candidate).renamed(rename, "--rename")
+    theirs = describe(candidate).renamed(rename, "--rename").in_units(units or {}, "--units")
     for new, name in rename.items():
         known(f"--rename: {new!r} = {name!r}: the original has no variable", new, ours.by_name)
     extra = {f"{component}.{name}": name for name in theirs.by_name if name not in ours.by_name}
@@ -69,7 +73,14 @@ def prepare_swap(
         for name, value in own.items():
             text = f"--set {component}.{name}"
             converted[name] = theirs.parse(text, name, value, text=True)
-        place = replace(place, fmu=candidate, rename=rename, values=converted, isolation=isolation)
+        place = replace(
+            place,
+            fmu=candidate,
+            rename=rename,
+            values=converted,
+            isolation=isolation,
+            units=units or {},
+        )
         components = tuple(place if c.name == component else c for c in system.components)
         try:
             swapped = replace(system, components=components)
@@ -85,13 +96,24 @@ def prepare_swap(
             f"{component}.{v.name}": theirs.conversion(v.name, ours)
             for v in ours.of("output")
             if v.name in theirs.by_name
-        },
+        }
+        | (_between(swapped, system) if swapped else {}),
         {
             f"{name}.{v.name}": v.magnitude if isinstance(v.magnitude, float) else None
             for name, interface in interfaces.items()
             for v in interface.of("output")
         },
     )
+
+
+def _between(source: System, target: System) -> dict[str, Conversion | None]:
+    """The conversions of outputs whose units both systems tell, even if only by connections."""
+    ends = readings(source), readings(target)
+    return {
+        str(port): conversion(start, end)
+        for port in ends[0].keys() & ends[1].keys()
+        if (start := ends[0][port].unit) and (end := ends[1][port].unit)
+    }
 
 
 def _converted(values: Mapping[str, Value], ours: Interface, theirs: Interface) -> dict[str, Value]:

@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..checks import choice
+from ..checks import choice, is_number
 from ..errors import InputError, choices
+from ..interface.units import Conversion, known_unit
 from ..metrics.metric import Metric, Signals, registered
 from ..plain import from_cell
 from ..realtime.timing import Timing
@@ -37,7 +38,7 @@ OUTCOME_KEYS: Mapping[str, Any] = {
 """Entries that say what came of it, besides metrics."""
 
 MORE_KEYS: Mapping[str, Any] = {
-    "roles": dict, "types": dict, "descriptions": dict, "metric_units": dict,
+    "roles": dict, "types": dict, "descriptions": dict, "metric_units": dict, "to_si": dict,
 }  # fmt: skip
 """Entries that may be there."""
 
@@ -81,6 +82,7 @@ def load_run(folder: str | Path) -> Result:
         log=tuple(written["log"]),
         timing=None if realtime is None else Timing.from_dict(f"{path}: realtime", realtime),
         more_metrics=_as_recorded(written),
+        to_si=_to_si(f"{path}: to_si", written),
     )
 
 
@@ -90,6 +92,20 @@ def _rejections(place: str, found: Mapping[str, Any]) -> dict[str, Rejection]:
     except (KeyError, TypeError, ValueError) as error:
         said = f"{type(error).__name__}: {error}"
         raise InputError(f"{place}: is damaged ({said}); must have count and first each") from error
+
+
+def _to_si(place: str, written: Mapping[str, Any]) -> dict[str, Conversion | None]:
+    """The conversions to SI; of an earlier run.json by the names of its units."""
+    if "to_si" not in written:
+        named = {n: known_unit(unit or "") for n, unit in written["units"].items()}
+        return {n: Conversion(u.factor, u.offset) for n, u in named.items() if u and not u.si}
+    found: dict[str, Conversion | None] = {}
+    for name, entry in written["to_si"].items():
+        numbers = [entry.get(key) for key in Conversion._fields] if isinstance(entry, dict) else []
+        if entry is not None and not (numbers and all(map(is_number, numbers))):
+            raise InputError(f"{place}: {name} = {entry!r}; must be null, or factor and offset")
+        found[name] = Conversion(*map(float, numbers)) if numbers else None  # type: ignore[arg-type]
+    return found
 
 
 def _as_recorded(written: Mapping[str, Any]) -> tuple[Metric, ...]:
