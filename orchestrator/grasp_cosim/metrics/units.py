@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 from ..errors import InputError
 from ..interface.units import Conversion, known_unit
-from ..system.parts import Port
 from ..system.readings import Reading, naming, readings
 from ..system.structure import Structure
 from .metric import Metric, available, resolved

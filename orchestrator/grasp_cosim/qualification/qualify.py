@@ -122,11 +122,11 @@ def qualify(
     """Compare a candidate FMU with that of a component, as declared and in the closed loop.
 
     rename maps the system's names to the candidate's, units variables of the candidate to the names
-    of their units, where it declares none or a wrong one. values like {'plant.object_width': 0.06} are
-    set in both systems, in the unit of the original, or in the one that has such a variable. bands
-    are derived where they are not given. The candidate runs in a process of its own, which a crash
-    does not leave, unless isolation says otherwise. metrics are compared beside those that every
-    result is asked for. InputError where the input is wrong or the original refuses,
+    of their units, where it declares none or a wrong one. values like {'plant.object_width': 0.06}
+    are set in both systems, in the unit of the original, or in the one that has such a variable.
+    bands are derived where they are not given. The candidate runs in a process of its own, which a
+    crash does not leave, unless isolation says otherwise. metrics are compared beside those that
+    every result is asked for. InputError where the input is wrong or the original refuses,
     SimulationError where the original fails, KeyboardInterrupt at Ctrl-C.
     """
     bands = bands or Bands()

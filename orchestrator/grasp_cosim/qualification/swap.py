@@ -8,12 +8,13 @@ from pathlib import Path
 
 from ..checks import known
 from ..errors import InputError
-from ..interface.interface import Interface, Value
+from ..interface.interface import Value
 from ..interface.read import describe
-from ..interface.units import IDENTITY, Conversion, conversion
+from ..interface.units import Conversion, conversion
 from ..system.description import System
 from ..system.parts import Isolation
 from ..system.readings import readings
+from ..system.swap import converted
 from .feedthrough import feedthrough_differences
 from .interface_difference import SEVERITIES, Difference, interface_differences, use_of
 
@@ -69,15 +70,15 @@ def prepare_swap(
     ]
     swapped = None
     if not any(d.severity == "blocks" for d in differences):
-        converted = _converted(use.values, ours, theirs)
+        given = converted(use.values, ours, theirs)
         for name, value in own.items():
             text = f"--set {component}.{name}"
-            converted[name] = theirs.parse(text, name, value, text=True)
+            given[name] = theirs.parse(text, name, value, text=True)
         place = replace(
             place,
             fmu=candidate,
             rename=rename,
-            values=converted,
+            values=given,
             isolation=isolation,
             units=units or {},
         )
@@ -114,14 +115,3 @@ def _between(source: System, target: System) -> dict[str, Conversion | None]:
         for port in ends[0].keys() & ends[1].keys()
         if (start := ends[0][port].unit) and (end := ends[1][port].unit)
     }
-
-
-def _converted(values: Mapping[str, Value], ours: Interface, theirs: Interface) -> dict[str, Value]:
-    """The original's values in the candidate's units."""
-    result: dict[str, Value] = {}
-    for name, value in values.items():
-        change = ours.conversion(name, theirs)
-        if change and change != IDENTITY and theirs.by_name[name].kind == "Real":
-            value = change(float(value))
-        result[name] = value
-    return result

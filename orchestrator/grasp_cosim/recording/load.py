@@ -5,6 +5,7 @@ import json
 import logging
 import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -97,8 +98,7 @@ def _rejections(place: str, found: Mapping[str, Any]) -> dict[str, Rejection]:
 def _to_si(place: str, written: Mapping[str, Any]) -> dict[str, Conversion | None]:
     """The conversions to SI; of an earlier run.json by the names of its units."""
     if "to_si" not in written:
-        named = {n: known_unit(unit or "") for n, unit in written["units"].items()}
-        return {n: Conversion(u.factor, u.offset) for n, u in named.items() if u and not u.si}
+        return dict(_known(written["units"]))
     found: dict[str, Conversion | None] = {}
     for name, entry in written["to_si"].items():
         numbers = [entry.get(key) for key in Conversion._fields] if isinstance(entry, dict) else []
@@ -106,6 +106,12 @@ def _to_si(place: str, written: Mapping[str, Any]) -> dict[str, Conversion | Non
             raise InputError(f"{place}: {name} = {entry!r}; must be null, or factor and offset")
         found[name] = Conversion(*map(float, numbers)) if numbers else None  # type: ignore[arg-type]
     return found
+
+
+def _known(units: Mapping[str, Any]) -> dict[str, Conversion]:
+    """The conversions to SI of signals whose units are known by their names, and not of SI."""
+    known = {name: known_unit(str(unit or "")) for name, unit in units.items()}
+    return {n: Conversion(u.factor, u.offset) for n, u in known.items() if u and not u.si}
 
 
 def _as_recorded(written: Mapping[str, Any]) -> tuple[Metric, ...]:
@@ -125,16 +131,23 @@ def _constant(value: Any, _: Signals) -> Any:
 def load_log(path: Path) -> Signals:
     """The numbers in a file, all float64: CSV with the column "time" and names, or ASAM MDF (.mf4).
 
-    InputError where it is missing, damaged or of another kind, or where asammdf is not installed.
+    They come in SI units where the run.json of the run beside it tells of others, or the channels
+    of an MDF do; else they are taken to be in SI. InputError where it is missing, damaged or of
+    another kind, or where asammdf is not installed.
     """
     if not path.is_file():
         raise InputError(f"{path}: no such log; must be a .csv or .mf4 file")
     if path.suffix.lower() == ".mf4":
-        return _mdf(path)
-    if path.suffix.lower() != ".csv":
+        log = _mdf(path)
+    elif path.suffix.lower() == ".csv":
+        time, columns = _table(path)
+        log = Signals(time, {n: c for n, c in columns.items() if c.dtype != object})
+    else:
         raise InputError(f"{path}: must be a .csv or .mf4 file")
-    time, columns = _table(path)
-    return Signals(time, {n: column for n, column in columns.items() if column.dtype != object})
+    beside = path.with_name(SETTINGS)
+    if path.stem != Path(SIGNALS).stem or not beside.is_file():
+        return log
+    return replace(log, to_si=_to_si(f"{beside}: to_si", _settings(beside)))
 
 
 def _mdf(path: Path) -> Signals:
@@ -157,7 +170,7 @@ def _mdf(path: Path) -> Signals:
         for c in channels
         if c.samples.shape == time.shape and c.samples.dtype.kind in "fiub"
     }
-    return Signals(time, signals)
+    return Signals(time, signals, to_si=_known({c.name: c.unit for c in channels}))
 
 
 def _settings(path: Path) -> dict[str, Any]:

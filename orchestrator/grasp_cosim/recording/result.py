@@ -46,7 +46,8 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     """Recorded signals by name, like result["plant.gap[1]"], on result.time in s.
 
     It is the same whether it was just run or read back from a folder. Every signal has the shape
-    of `time`, (rows,), and is in its unit in `units`, that of its FMU. `settings` are those of system.settings, as in run.json.
+    of `time`, (rows,), and is in its unit in `units`, that of its FMU. `settings` are those of
+    system.settings, as in run.json.
     """
 
     settings: Mapping[str, Any]
@@ -145,8 +146,8 @@ class Result(Mapping[str, npt.NDArray[Any]]):
 
     def to_json(self, path: str | Path) -> None:
         """Write the metrics and the settings that led to them, then what is known by signal
-        (units, their conversions to SI, types, descriptions), the units of the metrics, the log, the rejections by
-        component, and, as "realtime", the timing of a paced run.
+        (units, conversions to SI, types, descriptions), the units of the metrics, the log, the
+        rejections by component, and, as "realtime", the timing of a paced run.
 
         A metric that fails is a line among the missing ones: the rest of the run is kept.
         """

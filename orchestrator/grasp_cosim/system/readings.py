@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from ..errors import InputError, choices
-from ..interface.interface import Interface, Variable
+from ..interface.interface import SETTABLE, Interface, Variable
 from ..interface.units import IDENTITY, Conversion, Unit, conversion
 from .parts import Connection, Port
 from .structure import Structure
@@ -77,6 +77,29 @@ def between(system: Structure, place: str, source: Port, target: Port) -> Conver
             "converted; must be of one quantity"
         )
     return found
+
+
+def parameter_in_si(system: Structure, place: str, port: Port) -> Conversion:
+    """The conversion of a parameter to SI base units, the identity without a unit.
+
+    InputError where its unit is not defined, or where it has none while its component has others
+    that are not of SI.
+    """
+    interface = system.component(port.component, place).interface
+    variable = interface.by_name.get(port.variable)
+    unit = unit_of(interface, variable) if variable else None
+    if unit:
+        return Conversion(unit.factor, unit.offset)
+    if variable and variable.kind == "Real":
+        units = {v.unit: unit_of(interface, v) for v in interface.of(*SETTABLE, "output")}
+        other = next((name for name, u in units.items() if u and not u.si), None)
+        if variable.unit or other:
+            reason = f"is in {variable.unit!r}" if variable.unit else f"has no unit, others {other}"
+            raise InputError(
+                f"{place}: {port} {reason}: cannot be told in SI units; must be named: "
+                f"{naming(port.component, [port.variable])}"
+            )
+    return IDENTITY
 
 
 def naming(component: str, variables: Iterable[str]) -> str:
