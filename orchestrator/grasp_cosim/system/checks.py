@@ -108,7 +108,7 @@ def connection_transform(system: Structure, connection: Connection) -> tuple[flo
     ends = f"{place}: {source.port} is in {given} and {target.port} in {taken}"
     advice = (
         f'{{ from = "{source.port}", to = "{target.port}", factor = ... }} '
-        f"gives the factor from {given} to {taken}"
+        f"gives the factor from {given} to {taken}, and a component's units correct a wrong one"
     )
     units = source.interface.unit(source.variable), target.interface.unit(target.variable)
     if units[0] is None or units[1] is None:
