@@ -21,7 +21,7 @@ from grasp_cosim.recording.load import load_log
 from grasp_cosim.recording.result import UNITS
 from support.milli import milli_plant
 
-FAST = {"step": 1e-3, "stop": 3.0}
+STEP, STOP = 1e-3, 3.0
 VALUES = (
     "{ object_width = 0.07, initial_object_position = 0.03 }",
     "{ object_width = 70.0, initial_object_position = 30.0 }",
@@ -79,7 +79,7 @@ def written(path: Path, fmus: Path, plant: Path, more: str = "", factors: bool =
 
 @pytest.fixture(scope="module")
 def original(grasp: System) -> Result:
-    return simulate(grasp, metrics=[closest], **FAST)
+    return simulate(grasp, metrics=[closest], step=STEP, stop=STOP)
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +90,7 @@ def defined(fmus: Path, plants: Path, tmp_path_factory: pytest.TempPathFactory) 
 
 @pytest.fixture(scope="module")
 def result(defined: System) -> Result:
-    return simulate(defined, metrics=[closest], **FAST)
+    return simulate(defined, metrics=[closest], step=STEP, stop=STOP)
 
 
 def check(found: Mapping[str, Any], expected: Mapping[str, Any]) -> None:
@@ -137,7 +137,7 @@ def test_a_plant_whose_units_are_names_or_named_in_the_file(
     more = f"units = {{ {ENTRY} }}" if named else ""
     plant = plants / kind / "MilliPlant.fmu"
     system = System.load(written(tmp_path / "mm.toml", fmus, plant, more, factors))
-    found = simulate(system, metrics=[closest], **FAST)
+    found = simulate(system, metrics=[closest], step=STEP, stop=STOP)
     check(found.metrics, original.metrics)
     for j in (1, 2):
         name = f"plant.exchange_energy[{j}]"
@@ -176,7 +176,7 @@ def test_the_scene_gets_what_it_draws_in_si(result: Result, original: Result) ->
 def test_the_plant_may_take_the_place_of_the_original(
     grasp: System, plants: Path, original: Result
 ) -> None:
-    fast = grasp.with_experiment(**FAST)
+    fast = grasp.with_experiment(STEP, STOP)
     plant = plants / "defined/MilliPlant.fmu"
     check(simulate(fast.swap("plant", plant), metrics=[closest]).metrics, original.metrics)
     found = qualify(fast, "plant", plant, isolation="none")
@@ -192,7 +192,7 @@ def test_the_plant_may_take_the_place_of_the_original(
 def test_the_original_may_take_the_place_of_the_plant(
     defined: System, fmus: Path, original: Result
 ) -> None:
-    fast = defined.with_experiment(**FAST)
+    fast = defined.with_experiment(STEP, STOP)
     swapped = fast.swap("plant", fmus / "GripperPlant.fmu")
     check(simulate(swapped, metrics=[closest]).metrics, original.metrics)
     assert qualify(fast, "plant", fmus / "GripperPlant.fmu", isolation="none").qualified
