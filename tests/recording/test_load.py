@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from grasp_cosim import InputError, System, simulate
-from grasp_cosim.recording.load import load_run
+from grasp_cosim.recording.load import load_log, load_run
 
 CSV = '"time","a.x","a.on"\n0.0,1.5,1\n0.1,2.5e-300,0\n'
 RUN = {
@@ -129,3 +129,49 @@ def test_damaged_settings_are_refused_in_one_line(
     assert message.startswith(f"{tmp_path / 'run.json'}: ")
     assert reason in message
     assert "\n" not in message
+
+
+# ------------------------------------------------------------------------- units
+
+
+def in_unit(path: Path, unit: str | None, **more: object) -> Path:
+    return folder(path, settings={**JSON, "units": {"a.x": unit, "a.on": None}, **more})
+
+
+def test_metrics_get_si_as_run_json_says_and_signals_stay_as_recorded(tmp_path: Path) -> None:
+    entry = {"a.x": {"factor": 0.5, "offset": 1.0}}
+    run = load_run(in_unit(tmp_path, "mm", to_si=entry))
+    assert run.by_role["a.x"][0] == 0.5 * 1.5 + 1.0
+    assert run["a.x"][0] == 1.5
+    assert run.units["a.x"] == "mm"
+    assert load_run(in_unit(tmp_path, "mm", to_si={})).by_role["a.x"][0] == 1.5
+
+
+@pytest.mark.parametrize(
+    ("unit", "si"), [("mm", 1.5e-3), ("m", 1.5), ("degC", 274.65), ("cubit", 1.5), (None, 1.5)]
+)
+def test_an_earlier_run_has_the_units_that_are_known_by_name(
+    tmp_path: Path, unit: str | None, si: float
+) -> None:
+    run = load_run(in_unit(tmp_path, unit))
+    assert run.by_role["a.x"][0] == pytest.approx(si, rel=1e-15)
+
+
+def test_a_unit_in_doubt_stays_in_doubt(tmp_path: Path) -> None:
+    run = load_run(in_unit(tmp_path, None, to_si={"a.x": None}))
+    with pytest.raises(InputError, match=r"^the unit of a\.x is in doubt"):
+        run.by_role["a.x"]
+
+
+@pytest.mark.parametrize("entry", [1.0, {}, {"factor": 1.0}, {"factor": "1", "offset": 0.0}])
+def test_a_damaged_conversion_is_one_line(tmp_path: Path, entry: object) -> None:
+    with pytest.raises(InputError, match=r"run\.json: to_si: a\.x = .*; must be null, or factor a"):
+        load_run(in_unit(tmp_path, "mm", to_si={"a.x": entry}))
+
+
+def test_a_log_comes_in_si_where_the_run_beside_it_tells(tmp_path: Path) -> None:
+    in_unit(tmp_path, "mm", to_si={"a.x": {"factor": 1e-3, "offset": 0.0}})
+    assert load_log(tmp_path / "signals.csv")["a.x"][0] == 1.5e-3
+    other = tmp_path / "measured.csv"
+    other.write_text(CSV, "utf-8")
+    assert load_log(other)["a.x"][0] == 1.5

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim import InputError, System
+from grasp_cosim.system.checks import transforms
 from grasp_cosim.system.parts import Connection, Port
 from ssp.hand_made import archive, component, connect, fmu, linear, structure, system
 
@@ -67,9 +68,9 @@ def test_units_with_an_offset(tmp_path: Path) -> None:
 
 def test_units_that_only_the_archive_names_are_converted(tmp_path: Path) -> None:
     elements = component("a", "output y Real m") + component("b", "input u Real mm")
-    top = system("top", elements, connect("a/y", "b/u"))
-    (connection,) = connections(tmp_path, top, PLAIN_GIVES, PLAIN_TAKES)
-    assert connection == Connection(*A_TO_B, 1000.0, 0.0)
+    top = structure(system("top", elements, connect("a/y", "b/u")))
+    loaded = System.load(archive(tmp_path, top, {"a": PLAIN_GIVES, "b": PLAIN_TAKES}))
+    assert transforms(loaded) == {A_TO_B[1]: (1000.0, 0.0)}
 
 
 def test_units_of_different_quantities_are_refused(tmp_path: Path) -> None:
@@ -211,14 +212,41 @@ def test_an_integer_goes_to_a_real_and_may_be_transformed_there(tmp_path: Path) 
     assert connections(tmp_path, top, **ends) == (Connection(*A_TO_B, 0.5, 0.0),)
 
 
+CUBITS = fmu("output Real y - cubit")
+"""It does not define that unit, and nothing else does."""
+
+
 def test_units_that_no_one_defines_are_refused(tmp_path: Path) -> None:
-    a = fmu("output Real y - m").replace(b'<BaseUnit m="1"/>', b"")
     with pytest.raises(InputError, match="which their FMUs do not define in SI units"):
-        one(tmp_path, a=a)
+        one(tmp_path, a=CUBITS)
 
 
 def test_units_that_the_archive_defines_in_place_of_the_fmu(tmp_path: Path) -> None:
-    a = fmu("output Real y - m").replace(b'<BaseUnit m="1"/>', b"")
     elements = component("a", "output y Real m") + component("b", "input u Real")
-    (connection,) = connections(tmp_path, system("top", elements, connect("a/y", "b/u")), a)
+    (connection,) = connections(tmp_path, system("top", elements, connect("a/y", "b/u")), CUBITS)
     assert connection == Connection(*A_TO_B, 1000.0, 0.0)
+
+
+def test_a_unit_that_is_known_by_its_name_needs_no_definition(tmp_path: Path) -> None:
+    a = fmu("output Real y - m").replace(b'<BaseUnit m="1"/>', b"")
+    assert one(tmp_path, a=a) == Connection(*A_TO_B)
+
+
+def test_a_connector_names_the_unit_that_an_fmu_lacks(tmp_path: Path) -> None:
+    elements = component("a", "output y Real mm") + component("b", "input u Real")
+    drawn = system("top", elements, connect("a/y", "b/u"))
+    files = {"a": PLAIN_GIVES, "b": fmu("input Real u 0.5 m")}
+    loaded = System.load(archive(tmp_path, structure(drawn), files))
+    assert loaded.component("a", "").units == {"y": "mm"}
+    assert loaded.connections == (Connection(*A_TO_B),)
+    assert transforms(loaded) == {A_TO_B[1]: (1e-3, 0.0)}
+
+
+def test_a_connector_in_a_unit_of_the_archive_alone_is_a_factor(tmp_path: Path) -> None:
+    elements = component("a", "output y Real mm") + component("b", "input u Real")
+    drawn = structure(system("top", elements, connect("a/y", "b/u")))
+    drawn = drawn.replace('factor="0.001"', 'factor="0.002"')  # other millimetres
+    files = {"a": PLAIN_GIVES, "b": fmu("input Real u 0.5 m")}
+    loaded = System.load(archive(tmp_path, drawn, files))
+    assert loaded.component("a", "").units == {}
+    assert loaded.connections == (Connection(*A_TO_B, 0.002, 0.0),)

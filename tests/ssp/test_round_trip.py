@@ -12,6 +12,7 @@ from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.interface.interface import Value
 from grasp_cosim.ssp.document import parse
 from grasp_cosim.ssp.write import SET, write_ssp
+from grasp_cosim.system.checks import transforms
 from grasp_cosim.system.parts import (
     Component,
     Condition,
@@ -51,6 +52,23 @@ def test_the_grasp_runs_the_same_to_the_bit(grasp: System, tmp_path: Path) -> No
     assert np.array_equal(again.time, ours.time)
     for name in ours:
         assert again[name].tobytes() == ours[name].tobytes(), name
+
+
+def test_units_that_the_system_names_come_back(grasp: System, tmp_path: Path) -> None:
+    """One that the FMU declares otherwise too, and under the system's name of a variable."""
+    plant, *others = grasp.components
+    renamed = {"centre": "object_position"}
+    units = {"centre": "mm", "gap[1]": "cm"}
+    named = replace(grasp, components=(replace(plant, rename=renamed, units=units), *others))
+    again = round_trip(named, tmp_path)
+    assert again.components == named.components
+    assert transforms(again)[Port("sensor_1", "gap")] == (0.01, 0.0)
+    with zipfile.ZipFile(tmp_path / "again.ssp") as file:
+        ssd = file.read("SystemStructure.ssd").decode()
+    for name, unit in (("object_position", "mm"), ("gap[1]", "cm"), ("gap[2]", "m")):
+        head = f'<ssd:Connector name="{name}" kind="output">'
+        assert ssd.partition(head)[2].strip().startswith(f'<ssc:Real unit="{unit}"/>')
+    assert '<ssc:Unit name="cm">' in ssd
 
 
 def test_what_ssp_has_no_form_for_comes_back(grasp: System, tmp_path: Path) -> None:

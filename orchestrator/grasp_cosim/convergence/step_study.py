@@ -10,6 +10,7 @@ from ..checks import number
 from ..errors import InputError, SimulationError, choices
 from ..master.simulation import simulate
 from ..metrics.metric import Metric, available, check_portable, measure, registered
+from ..metrics.units import in_si
 from ..parallel import run_all
 from ..system.description import System
 from ..system.parts import NANOSECONDS
@@ -246,6 +247,7 @@ def ask(
     several units, or the tolerance is missing or not positive.
     """
     check_portable(metrics)
+    in_si(system, registered(metrics))
     recorded = {str(port): v for port, v in system.recorded.items()}
     units = {name: v.unit for name, v in recorded.items() if v.is_number}
     known, reasons = available(registered(metrics), recorded, system.roles)

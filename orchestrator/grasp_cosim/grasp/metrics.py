@@ -1,12 +1,12 @@
 """Metrics of a grasp, from the recorded signals of a gripper plant and its controller.
 
 To add one, write a function under @of_grasp or @of_fingers. It gets signals by role: "plant" and
-"controller" are the components that play these roles. Units are SI.
+"controller" are the components that play these roles. Values are in SI units.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import wraps
 from math import copysign, degrees
 from typing import Any, NamedTuple
@@ -25,18 +25,24 @@ ENTRIES = ("finger 1", "finger 2")
 CLOSING = {1: -1.0, 2: 1.0}
 """Direction in which a finger closes."""
 
-PLANT_OUTPUTS = (
-    "plant.object_position",
-    *(
-        f"plant.{name}[{j}]"
-        for name in ("position", "velocity", "gap", "contact_force", "contact")
+PLANT_OUTPUTS: Mapping[str, str | None] = {
+    "plant.object_position": "m",
+    **{
+        f"plant.{name}[{j}]": unit
+        for name, unit in {
+            "position": "m",
+            "velocity": "m/s",
+            "gap": "m",
+            "contact_force": "N",
+            "contact": None,
+        }.items()
         for j in FINGERS
-    ),
-)
-"""The outputs of every gripper plant."""
+    },
+}
+"""The outputs of every gripper plant, and their units."""
 
-NEEDS = ("controller.target_position", *PLANT_OUTPUTS)
-"""The signals of a grasp."""
+NEEDS: Mapping[str, str | None] = {"controller.target_position": "m", **PLANT_OUTPUTS}
+"""The signals of a grasp, and their units."""
 
 IMPACT_WINDOW = 0.02
 """s from first contact; an impact is over by then, the grasp presses within a second."""
@@ -190,7 +196,7 @@ def _of_object(name: str, unit: str | None, output: str, label: str, description
     key = f"plant.{output}"
     how = {"label": label, "description": description, "optional": True}
 
-    @of_grasp(name, unit, needs=(*NEEDS, key), **how)
+    @of_grasp(name, unit, needs={**NEEDS, key: unit}, **how)
     def largest(signals: Signals) -> float | bool:
         found = np.abs(signals[key]).max()
         return bool(found) if unit is None else float(found)

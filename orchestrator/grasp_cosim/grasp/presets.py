@@ -1,4 +1,4 @@
-"""The cases and the bench of the paper, as presets of any system that has a grasp.
+"""The cases and the bench of the paper, as presets of any system that has a grasp; SI values.
 
 A system file may define presets of these names itself; where it does not, those of the built-in
 grasp are used, its components found by their roles.
@@ -7,12 +7,17 @@ grasp are used, its components found by their roles.
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+from ..interface.interface import Value
+from ..interface.units import IDENTITY
 from ..metrics.metric import resolved
 from ..system.description import System
+from ..system.parts import Port
+from ..system.readings import parameter_in_si
 
 SYSTEM = Path(__file__).parent / "grasp.toml"
 """The built-in system: the published grasp."""
@@ -36,9 +41,33 @@ def with_preset(system: System, name: str) -> System:
     """
     if name in system.presets or name not in built_in_presets():
         return system.with_presets(name)
-    values = {resolved(key, system.roles): v for key, v in built_in_presets()[name].items()}
-    place = f"[presets.{name}] of {SYSTEM.name}:"
-    return system.revised({}, values, (place, place))
+    return with_si_values(system, built_in_presets()[name], f"[presets.{name}] of {SYSTEM.name}:")
+
+
+def with_si_values(system: System, values: Mapping[str, Value], place: str) -> System:
+    """The system with start values by role, like plant.object_width, numbers in SI units.
+
+    They are converted where a component has another unit; InputError, naming the place, where that
+    is in doubt or there is no such variable.
+    """
+    given: dict[str, Value] = {}
+    for key, value in values.items():
+        port = _port(system, key)
+        to_si = parameter_in_si(system, f"{place} {port}", port)
+        given[str(port)] = (
+            value if to_si == IDENTITY else (float(value) - to_si.offset) / to_si.factor
+        )
+    return system.revised({}, given, (place, place))
+
+
+def start_in_si(system: System, key: str) -> float:
+    """The number, in SI units, that a variable by role, like plant.object_width, starts with."""
+    port = _port(system, key)
+    return parameter_in_si(system, system.name, port)(system.start(str(port)))
+
+
+def _port(system: System, key: str) -> Port:
+    return Port(*resolved(key, system.roles).split(".", 1))
 
 
 @cache

@@ -10,6 +10,7 @@ from string import Template
 
 import numpy as np
 
+from ..interface.units import known_unit
 from ..metrics.metric import resolved
 from ..recording.result import Result
 from ..report.page import Scene, Zoom
@@ -44,7 +45,13 @@ def grasp_scene(result: Result) -> Scene | None:
         html=_html(named, contacts),
         style=_text("grasp.css"),
         scripts=_text("grasp.js"),
-        state={**named, "target": target, "signals": [*used, target], "contacts": contacts},
+        state={
+            **named,
+            "target": target,
+            "signals": [*used, target],
+            "toSi": {n: c._asdict() for n in (*used, target) if (c := result.to_si.get(n))},
+            "contacts": contacts,
+        },
         shown=[*shown, target],
         colors=_colors(result),
         marks=[(c["t"], f"--finger{c['finger']}") for c in contacts],
@@ -67,12 +74,15 @@ def _signals(result: Result) -> dict[str, dict[int, str]]:
 
 def _actuators(result: Result) -> dict[int, str]:
     """The recorded signal that is the force on each finger as it is, where there is one."""
+    newton = known_unit("N")
     forces = {resolved(f"plant.force[{j}]", result.roles): j for j in FINGERS}
     return {
         forces[c["to"]]: c["from"]
         for c in result.settings["connections"]
         if c["to"] in forces
-        and result.units.get(c["from"]) == "N"
+        and (unit := known_unit(result.units.get(c["from"]) or ""))
+        and newton
+        and unit.measures(newton)
         and c["factor"] in (None, 1.0)
         and not c["offset"]
     }

@@ -10,7 +10,7 @@ from typing import Literal, get_args
 
 from ..checks import known
 from ..errors import InputError, choices
-from .units import IDENTITY, Conversion, Unit, conversion
+from .units import IDENTITY, Conversion, Unit, conversion, known_unit
 
 Value = float | int | bool | str
 Kind = Literal["Real", "Integer", "Boolean", "String", "Binary", "Clock"]
@@ -207,8 +207,9 @@ class Interface:
         return None if step is None else float(step)
 
     def unit(self, variable: Variable) -> Unit | None:
-        """The unit that is declared for a variable, if it is defined, too."""
-        return self.units.get(variable.unit or "")
+        """The unit that is declared for a variable, if it is defined, or known by its name."""
+        name = variable.unit or ""
+        return self.units.get(name) or known_unit(name)
 
     def of(self, *causalities: str) -> list[Variable]:
         """The variables of the given causalities, in the order of declaration."""
@@ -219,10 +220,10 @@ class Interface:
 
         A unit that is not declared is taken as the other one.
         """
-        source, target = self.by_name[name].unit, other.by_name[name].unit
-        if source is None or target is None or source == target:
+        source, target = self.by_name[name], other.by_name[name]
+        if source.unit is None or target.unit is None or source.unit == target.unit:
             return IDENTITY
-        start, end = self.units.get(source), other.units.get(target)
+        start, end = self.unit(source), other.unit(target)
         return conversion(start, end) if start and end else None
 
     def renamed(self, rename: Mapping[str, str], place: str = "rename") -> "Interface":
@@ -262,6 +263,36 @@ class Interface:
             for v in self.variables
         )
         return replace(self, variables=tuple(variables))
+
+    def in_units(self, units: Mapping[str, str], place: str = "units") -> "Interface":
+        """The same with other units: `units` maps a variable to the name of its unit.
+
+        That is one of the FMU's own definitions, or else a known one. place says where the table
+        comes from. InputError where there is no such variable, or no such unit.
+        """
+        if not units:
+            return self
+        defined = dict(self.units)
+        for name, unit in units.items():
+            entry = f"{place}: {name!r} = {unit!r}"
+            known(f"{entry}: {self.path.name} has no variable", name, self.by_name)
+            if self.by_name[name].kind != "Real":
+                raise InputError(
+                    f"{entry}: is of type {self.by_name[name].nature}; must be a Real, as only "
+                    "these have units"
+                )
+            found = defined.get(unit) or known_unit(unit)
+            if found is None:
+                raise InputError(
+                    f"{entry}: no unit that {self.path.name} defines, or that is known; must be "
+                    "like 'mm', 'm/s', 'N.s/m', 'deg', 'degC', '1'"
+                )
+            defined[unit] = found
+        variables = (
+            replace(v, unit=units[v.name], display_unit=None) if v.name in units else v
+            for v in self.variables
+        )
+        return replace(self, variables=tuple(variables), units=defined)
 
     def parse(self, place: str, name: str, value: Value, text: bool = False) -> Value:
         """The value for input or parameter name, checked against type, range and finiteness.

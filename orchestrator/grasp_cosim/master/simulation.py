@@ -15,6 +15,7 @@ from ..fmi.load import load
 from ..interface.interface import Value
 from ..interruption import interruptible, interrupts
 from ..metrics.metric import Metric, registered
+from ..metrics.units import in_si
 from ..realtime.options import Realtime
 from ..realtime.pacer import Pacer
 from ..realtime.privileges import Privileges, privileges
@@ -64,7 +65,7 @@ class Session:
         """Load and initialise; see simulate() for the arguments and errors."""
         system = system.with_experiment(step, stop, scheme, diverging)
         _check_count("every", every)
-        registered(metrics)  # tells of two with one name before the run, not after
+        self._in_si = in_si(system, registered(metrics))  # refuses before the run, not after
         self._metrics = tuple(metrics)
         self.system = system
         self._memory = MemoryListener(every)
@@ -242,6 +243,7 @@ class Session:
             log=self._log(),
             timing=self.pacer.timing(asked.granted, asked.refused) if self.pacer else None,
             more_metrics=self._metrics,
+            to_si=self._in_si.conversions,
         )
 
     def _tell(self, log: Sequence[str]) -> None:
@@ -253,7 +255,12 @@ class Session:
 
     def _early(self) -> tuple[str, ...]:
         """The lines of the log that are known before the first step."""
-        return *self.system.notes, *remarks(self.system), *self._master.log
+        return (
+            *self.system.notes,
+            *remarks(self.system),
+            *self._in_si.notes,
+            *self._master.log,
+        )
 
     def _log(self) -> tuple[str, ...]:
         master = self._master

@@ -8,7 +8,8 @@
         ...
         return t_90 - t_10
 
-`run` is a Signals: names begin with a role or a component. The function returns a number, True or
+`run` is a Signals: names begin with a role or a component, and values are in SI base units,
+whatever the FMUs have them in. The function returns a number, True or
 False, None where the moment never comes, or a list of these, one per finger for instance.
 """
 
@@ -29,6 +30,7 @@ import numpy.typing as npt
 
 from .. import extensions
 from ..errors import InputError, choices
+from ..interface.units import Conversion
 
 Value = float | bool | None
 Function = Callable[["Signals"], Value | Sequence[Value]]
@@ -38,7 +40,7 @@ RESERVED = frozenset((
     "command", "complete", "components", "connections", "date", "descriptions", "diverging",
     "error", "events", "faults", "fmus", "index", "initialisation", "log", "metric_units",
     "missing_metrics", "proxies", "real_time_factor", "realtime", "rejections", "roles", "scheme",
-    "step", "steps", "stop", "system", "types", "units", "versions", "wall_time",
+    "step", "steps", "stop", "system", "to_si", "types", "units", "versions", "wall_time",
 ))  # fmt: skip
 """Names beside metrics in run.json and in the table of a sweep."""
 
@@ -54,20 +56,37 @@ class MissingSignalError(KeyError):
 class Signals(Mapping[str, npt.NDArray[Any]]):
     """Recorded signals by names like plant.gap[1], where plant is a role or a component.
 
-    `time` in s and every signal have the shape (rows,). `roles` maps a role to the component that
-    plays it; a component of a role's name plays it where `roles` does not say otherwise.
+    `time` in s and every signal have the shape (rows,). They come in SI base units, by_name has
+    them as recorded. `roles` maps a role to the component that plays it; a component of a role's
+    name plays it where `roles` does not say otherwise. `to_si` are the conversions of those that
+    are not recorded in SI, None where the unit is in doubt.
     """
 
     time: npt.NDArray[np.float64]
     by_name: Mapping[str, npt.NDArray[Any]]
     roles: Mapping[str, str] = field(default_factory=dict)
+    to_si: Mapping[str, Conversion | None] = field(default_factory=dict)
+    _converted: dict[str, npt.NDArray[Any]] = field(default_factory=dict, init=False, repr=False)
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
-        """The signal; MissingSignalError where it was not recorded."""
+        """The signal; MissingSignalError where it was not recorded, InputError where its unit is in
+        doubt.
+        """
         reason = lacking((name,), self.by_name, self.roles)
         if reason:
             raise MissingSignalError(reason)
-        return self.by_name[resolved(name, self.roles)]
+        own = resolved(name, self.roles)
+        if own not in self.to_si:
+            return self.by_name[own]
+        if own not in self._converted:
+            conversion = self.to_si[own]
+            if conversion is None:
+                raise InputError(
+                    f"the unit of {own} is in doubt, as it has none and its connections scale it; "
+                    f"must be named in the system file, under units"
+                )
+            self._converted[own] = conversion(self.by_name[own])
+        return self._converted[own]
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.by_name)
@@ -76,14 +95,16 @@ class Signals(Mapping[str, npt.NDArray[Any]]):
         return len(self.by_name)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Metric:
     """A function of recorded signals and how its value is named and shown.
 
     `unit` is that of the value ("1" for a share, None for true or false); in tables the value is
     shown times `factor` in `shown_unit`. `entries` name its values where it has several, like
     ("finger 1", "finger 2").
-    `needs` are the signals without which there is no value. Metrics of one `group` are there
+    `needs` are the signals without which there is no value; a mapping gives the SI unit in which
+    each is expected as well, or None, so that a signal of another quantity, or in a unit that is in
+    doubt, is refused before a run. Metrics of one `group` are there
     together or not at all, and why not is said once; an `optional` one is then left out in silence.
     A `primary` one is what a study of the step size asks for where nothing else is named.
     """
@@ -96,7 +117,7 @@ class Metric:
     factor: float = 1.0
     shown_unit: str | None = None
     entries: tuple[str, ...] = ()
-    needs: tuple[str, ...] = ()
+    needs: Collection[str] = ()
     group: str = ""
     optional: bool = False
     primary: bool = False
@@ -120,6 +141,11 @@ class Metric:
         if not self.entries:
             return (self.name,)
         return tuple(f"{self.name}[{i}]" for i in range(1, len(self.entries) + 1))
+
+    @property
+    def expects(self) -> Mapping[str, str | None]:
+        """The units that it expects of signals, by name."""
+        return self.needs if isinstance(self.needs, Mapping) else {}
 
     def column_title(self, column: str) -> str:
         """The title of one of its columns: "time to contact, finger 1"."""

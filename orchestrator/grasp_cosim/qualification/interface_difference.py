@@ -19,6 +19,7 @@ from ..interface.interface import SETTABLE, Interface, Value, Variable, as_float
 from ..interface.units import IDENTITY, Conversion
 from ..system.description import System
 from ..system.parts import NANOSECONDS, Port
+from ..system.swap import stated
 
 Severity = Literal["blocks", "warns", "notes"]
 SEVERITIES: tuple[Severity, ...] = ("blocks", "warns", "notes")
@@ -86,12 +87,7 @@ def use_of(system: System, name: str) -> Use:
     """Return the use that the system makes of the component of that name."""
     component = system.component(name, system.name)
     ends = [(port, c) for c in system.connections for port in (c.source, c.target)]
-    scaled = [port for port, c in ends if (c.factor, c.offset) != (None, None)]
-    faulty = {fault.target for fault in system.faults}
-    through = [port for port, c in ends if c.target in faulty]
     tuned = [port for event in system.events for port in event.set]
-    conditions = [*(e.when for e in system.events), *(f.when for f in system.faults)]
-    asked = [condition.port for condition in conditions if condition]
 
     def own(ports: Sequence[Port]) -> frozenset[str]:
         return frozenset(p.variable for p in ports if p.component == name)
@@ -100,7 +96,7 @@ def use_of(system: System, name: str) -> Use:
         name,
         own([port for port, _ in ends]),
         component.values,
-        own([*scaled, *through, *tuned, *asked]),
+        stated(system, name),
         own(tuned),
         (component.step_ns or system.step_ns) / NANOSECONDS,
         system.initialisation.loops,

@@ -15,9 +15,10 @@ import numpy as np
 
 from ..errors import InputError, SimulationError
 from ..interface.interface import Value
-from ..interface.units import IDENTITY
+from ..interface.units import IDENTITY, Conversion
 from ..master.simulation import simulate
 from ..metrics.metric import Metric, Signals, measure, registered
+from ..metrics.units import in_si
 from ..recording.result import Result
 from ..system.description import System
 from ..system.parts import NANOSECONDS, Isolation
@@ -111,6 +112,7 @@ def qualify(
     candidate: str | Path,
     *,
     rename: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
     values: Mapping[str, Value] | None = None,
     bands: Bands | None = None,
     isolation: Isolation = "process",
@@ -119,20 +121,25 @@ def qualify(
 ) -> Qualification:
     """Compare a candidate FMU with that of a component, as declared and in the closed loop.
 
-    rename maps the system's names to the candidate's. values like {'plant.object_width': 0.06} are
-    set in both systems, in the unit of the original, or in the one that has such a variable. bands
-    are derived where they are not given. The candidate runs in a process of its own, which a crash
-    does not leave, unless isolation says otherwise. metrics are compared beside those that every
-    result is asked for. InputError where the input is wrong or the original refuses,
+    rename maps the system's names to the candidate's, units variables of the candidate to the names
+    of their units, where it declares none or a wrong one. values like {'plant.object_width': 0.06}
+    are set in both systems, in the unit of the original, or in the one that has such a variable.
+    bands are derived where they are not given. The candidate runs in a process of its own, which a
+    crash does not leave, unless isolation says otherwise. metrics are compared beside those that
+    every result is asked for. InputError where the input is wrong or the original refuses,
     SimulationError where the original fails, KeyboardInterrupt at Ctrl-C.
     """
     bands = bands or Bands()
-    swap = prepare_swap(system, component, Path(candidate), rename or {}, values or {}, isolation)
+    swap = prepare_swap(
+        system, component, Path(candidate), rename or {}, values or {}, isolation, units
+    )
     if swap.swapped is None:
         return Qualification(swap)
     asked = registered(metrics)
+    more = _conversions_of_candidate(swap.swapped, asked)
     reference = _run(swap.system, progress)
-    original = _Original(swap, _curves(reference), reference.units, asked)
+    to_si = {n: c for n, c in more.items() if n not in reference} | dict(reference.to_si)
+    original = _Original(swap, _curves(reference), reference.units, asked, to_si)
     signals, singles = original.entries(bands)
     result, failure = None, None
     try:
@@ -155,6 +162,16 @@ def qualify(
         (original.curves, theirs),
         _remarks(reference, result) if result else (),
     )
+
+
+def _conversions_of_candidate(
+    swapped: System, metrics: Sequence[Metric]
+) -> Mapping[str, Conversion | None]:
+    """The conversions to SI of the system with the candidate; InputError where that is in doubt."""
+    try:
+        return in_si(swapped, metrics).conversions
+    except InputError as error:
+        raise InputError(f"{error}; of the candidate: --units 'VARIABLE=UNIT'") from error
 
 
 def _run(system: System, progress: bool) -> Result:
@@ -221,6 +238,7 @@ class _Original:
     curves: Curves
     units: Mapping[str, str | None]
     asked: tuple[Metric, ...]
+    to_si: Mapping[str, Conversion | None]
 
     def entries(self, bands: Bands) -> tuple[Entries, Entries]:
         """Each signal and each metric with its entry; InputError where an entry is for nothing."""
@@ -289,7 +307,7 @@ class _Original:
             return {}
         time = next(iter(curves.values())).time
         roles = self.swap.system.roles
-        signals = Signals(time, {n: c.values for n, c in curves.items()}, roles)
+        signals = Signals(time, {n: c.values for n, c in curves.items()}, roles, self.to_si)
         found = measure(signals, self.asked).flat()
         return {name: None if v is None else float(v) for name, v in found.items()}
 

@@ -8,11 +8,13 @@ from pathlib import Path
 
 from ..checks import known
 from ..errors import InputError
-from ..interface.interface import Interface, Value
+from ..interface.interface import Value
 from ..interface.read import describe
-from ..interface.units import IDENTITY, Conversion
+from ..interface.units import Conversion, conversion
 from ..system.description import System
 from ..system.parts import Isolation
+from ..system.readings import readings
+from ..system.swap import converted
 from .feedthrough import feedthrough_differences
 from .interface_difference import SEVERITIES, Difference, interface_differences, use_of
 
@@ -46,12 +48,15 @@ def prepare_swap(
     rename: Mapping[str, str],
     values: Mapping[str, Value],
     isolation: Isolation,
+    units: Mapping[str, str] | None = None,
 ) -> Swap:
     """The swap that qualify() describes; InputError where its arguments are wrong."""
     place = system.component(component, f"--as {component}")
-    interfaces = {c.name: describe(c.fmu).renamed(c.rename) for c in system.components}
+    interfaces = {
+        c.name: describe(c.fmu).renamed(c.rename).in_units(c.units) for c in system.components
+    }
     ours = interfaces[component]
-    theirs = describe(candidate).renamed(rename, "--rename")
+    theirs = describe(candidate).renamed(rename, "--rename").in_units(units or {}, "--units")
     for new, name in rename.items():
         known(f"--rename: {new!r} = {name!r}: the original has no variable", new, ours.by_name)
     extra = {f"{component}.{name}": name for name in theirs.by_name if name not in ours.by_name}
@@ -65,11 +70,18 @@ def prepare_swap(
     ]
     swapped = None
     if not any(d.severity == "blocks" for d in differences):
-        converted = _converted(use.values, ours, theirs)
+        given = converted(use.values, ours, theirs)
         for name, value in own.items():
             text = f"--set {component}.{name}"
-            converted[name] = theirs.parse(text, name, value, text=True)
-        place = replace(place, fmu=candidate, rename=rename, values=converted, isolation=isolation)
+            given[name] = theirs.parse(text, name, value, text=True)
+        place = replace(
+            place,
+            fmu=candidate,
+            rename=rename,
+            values=given,
+            isolation=isolation,
+            units=units or {},
+        )
         components = tuple(place if c.name == component else c for c in system.components)
         try:
             swapped = replace(system, components=components)
@@ -85,7 +97,8 @@ def prepare_swap(
             f"{component}.{v.name}": theirs.conversion(v.name, ours)
             for v in ours.of("output")
             if v.name in theirs.by_name
-        },
+        }
+        | (_between(swapped, system) if swapped else {}),
         {
             f"{name}.{v.name}": v.magnitude if isinstance(v.magnitude, float) else None
             for name, interface in interfaces.items()
@@ -94,12 +107,11 @@ def prepare_swap(
     )
 
 
-def _converted(values: Mapping[str, Value], ours: Interface, theirs: Interface) -> dict[str, Value]:
-    """The original's values in the candidate's units."""
-    result: dict[str, Value] = {}
-    for name, value in values.items():
-        change = ours.conversion(name, theirs)
-        if change and change != IDENTITY and theirs.by_name[name].kind == "Real":
-            value = change(float(value))
-        result[name] = value
-    return result
+def _between(source: System, target: System) -> dict[str, Conversion | None]:
+    """The conversions of outputs whose units both systems tell, even if only by connections."""
+    ends = readings(source), readings(target)
+    return {
+        str(port): conversion(start, end)
+        for port in ends[0].keys() & ends[1].keys()
+        if (start := ends[0][port].unit) and (end := ends[1][port].unit)
+    }

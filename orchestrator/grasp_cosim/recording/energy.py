@@ -17,15 +17,12 @@ import numpy as np
 import numpy.typing as npt
 
 from ..interface.interface import Interface, Variable
+from ..interface.units import known_unit
 from ..system.description import System
 from ..system.parts import Component, Port
 from .listener import Signal
 
 Floats = npt.NDArray[np.float64]
-
-FORCE = ("N", (1, 1, -2, 0, 0, 0, 0, 0))
-POSITION = ("m", (0, 1, 0, 0, 0, 0, 0, 0))
-"""The SI unit of a quantity and its exponents in the order of units.BASE."""
 
 IDENTITY = (1.0, 0.0)
 
@@ -87,7 +84,7 @@ def _bond(system: System, component: Component, force: Variable) -> Bond | None:
     taken = force.name.replace("force", "exchange_energy") in interface.by_name
     if not position or position.causality != "output" or taken:
         return None
-    factors = _in_si(interface, force, FORCE), _in_si(interface, position, POSITION)
+    factors = _in_si(interface, force, "N"), _in_si(interface, position, "m")
     if None in factors:
         return None
     source, moved = sources[target], Port(component.name, position.name)
@@ -105,17 +102,11 @@ def _bond(system: System, component: Component, force: Variable) -> Bond | None:
     )
 
 
-def _in_si(
-    interface: Interface, variable: Variable, quantity: tuple[str, tuple[int, ...]]
-) -> float | None:
-    """The SI value of one unit of a Real variable; None where it is not of that quantity."""
-    name, exponents = quantity
-    if variable.kind != "Real" or variable.shape or variable.unit is None:
-        return None
-    unit = interface.units.get(variable.unit)
-    if unit is None:
-        return 1.0 if variable.unit == name else None
-    return unit.factor if unit.exponents == exponents else None
+def _in_si(interface: Interface, variable: Variable, quantity: str) -> float | None:
+    """The SI value of one unit of a Real variable; None where it is no unit of that quantity."""
+    unit, wanted = interface.unit(variable), known_unit(quantity)
+    fits = variable.kind == "Real" and not variable.shape
+    return unit.factor if fits and unit and wanted and unit.measures(wanted) else None
 
 
 class ExchangeEnergy:

@@ -18,12 +18,13 @@ import numpy.typing as npt
 from .. import extensions
 from ..errors import InputError
 from ..files import unwritable, write_json
+from ..metrics.units import in_si
 from ..system.description import System
 from .csv import CsvListener
 from .listener import Experiment, Signal
 from .load import SETTINGS, SIGNALS, TEXT
 from .memory import TYPES
-from .result import Result
+from .result import Result, conversions_entry
 
 DRAWN = ("report.html", "timing.png", "signals.mf4")
 """What else may be made of a run in its folder, beside its picture."""
@@ -50,6 +51,7 @@ class RunFolder:
         """`command` led to the run; if it is `paced`, rows are written in spare() time only."""
         self._folder, self._paced = folder, paced
         self._origin = origin(system, command)
+        self._to_si = in_si(system, ()).conversions
         self._csv = CsvListener(folder / SIGNALS, in_place=True)
         self._begun, self._broken = False, False
         self._waiting: deque[tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]] = deque()
@@ -155,6 +157,7 @@ class RunFolder:
             "complete": False,
             **self._experiment.settings,
             "units": {s.name: s.unit for s in self._signals},
+            "to_si": conversions_entry(self._to_si),
             "types": {
                 s.name: str(np.dtype(TYPES[s.kind])) if s.kind in TYPES else TEXT
                 for s in self._signals

@@ -5,6 +5,7 @@ import json
 import logging
 import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import islice
 from pathlib import Path
@@ -13,8 +14,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..checks import choice
+from ..checks import choice, is_number
 from ..errors import InputError, choices
+from ..interface.units import Conversion, known_unit
 from ..metrics.metric import Metric, Signals, registered
 from ..plain import from_cell
 from ..realtime.timing import Timing
@@ -42,7 +44,8 @@ ORIGIN_KEYS: Mapping[str, Any] = {"date": str, "versions": dict, "fmus": dict, "
 """Entries that say when the run was made, and with what."""
 
 MORE_KEYS: Mapping[str, Any] = {
-    "roles": dict, "types": dict, "descriptions": dict, "metric_units": dict, **ORIGIN_KEYS,
+    "roles": dict, "types": dict, "descriptions": dict, "metric_units": dict, "to_si": dict,
+    **ORIGIN_KEYS,
 }  # fmt: skip
 """Entries that may be there."""
 
@@ -92,6 +95,7 @@ def load_run(folder: str | Path) -> Result:
         timing=None if realtime is None else Timing.from_dict(f"{path}: realtime", realtime),
         more_metrics=_as_recorded(written),
         origin={key: written[key] for key in ORIGIN_KEYS if key in written},
+        to_si=_to_si(f"{path}: to_si", written),
     )
 
 
@@ -101,6 +105,25 @@ def _rejections(place: str, found: Mapping[str, Any]) -> dict[str, Rejection]:
     except (KeyError, TypeError, ValueError) as error:
         said = f"{type(error).__name__}: {error}"
         raise InputError(f"{place}: is damaged ({said}); must have count and first each") from error
+
+
+def _to_si(place: str, written: Mapping[str, Any]) -> dict[str, Conversion | None]:
+    """The conversions to SI; of an earlier run.json by the names of its units."""
+    if "to_si" not in written:
+        return dict(_known(written["units"]))
+    found: dict[str, Conversion | None] = {}
+    for name, entry in written["to_si"].items():
+        numbers = [entry.get(key) for key in Conversion._fields] if isinstance(entry, dict) else []
+        if entry is not None and not (numbers and all(map(is_number, numbers))):
+            raise InputError(f"{place}: {name} = {entry!r}; must be null, or factor and offset")
+        found[name] = Conversion(*map(float, numbers)) if numbers else None  # type: ignore[arg-type]
+    return found
+
+
+def _known(units: Mapping[str, Any]) -> dict[str, Conversion]:
+    """The conversions to SI of signals whose units are known by their names, and not of SI."""
+    known = {name: known_unit(str(unit or "")) for name, unit in units.items()}
+    return {n: Conversion(u.factor, u.offset) for n, u in known.items() if u and not u.si}
 
 
 def _as_recorded(written: Mapping[str, Any]) -> tuple[Metric, ...]:
@@ -120,16 +143,23 @@ def _constant(value: Any, _: Signals) -> Any:
 def load_log(path: Path) -> Signals:
     """The numbers in a file, all float64: CSV with the column "time" and names, or ASAM MDF (.mf4).
 
-    InputError where it is missing, damaged or of another kind, or where asammdf is not installed.
+    They come in SI units where the run.json of the run beside it tells of others, or the channels
+    of an MDF do; else they are taken to be in SI. InputError where it is missing, damaged or of
+    another kind, or where asammdf is not installed.
     """
     if not path.is_file():
         raise InputError(f"{path}: no such log; must be a .csv or .mf4 file")
     if path.suffix.lower() == ".mf4":
-        return _mdf(path)
-    if path.suffix.lower() != ".csv":
+        log = _mdf(path)
+    elif path.suffix.lower() == ".csv":
+        time, columns = _table(path)
+        log = Signals(time, {n: c for n, c in columns.items() if c.dtype != object})
+    else:
         raise InputError(f"{path}: must be a .csv or .mf4 file")
-    time, columns = _table(path)
-    return Signals(time, {n: column for n, column in columns.items() if column.dtype != object})
+    beside = path.with_name(SETTINGS)
+    if path.stem != Path(SIGNALS).stem or not beside.is_file():
+        return log
+    return replace(log, to_si=_to_si(f"{beside}: to_si", _settings(beside)))
 
 
 def _mdf(path: Path) -> Signals:
@@ -152,7 +182,7 @@ def _mdf(path: Path) -> Signals:
         for c in channels
         if c.samples.shape == time.shape and c.samples.dtype.kind in "fiub"
     }
-    return Signals(time, signals)
+    return Signals(time, signals, to_si=_known({c.name: c.unit for c in channels}))
 
 
 def _settings(path: Path) -> dict[str, Any]:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from .. import extensions
 from ..files import in_one_piece, write_json
+from ..interface.units import Conversion
 from ..metrics.metric import Measured, Metric, Signals, measure, registered
 from ..realtime.timing import Timing
 from ..system.parts import NANOSECONDS
@@ -45,7 +46,8 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     """Recorded signals by name, like result["plant.gap[1]"], on result.time in s.
 
     It is the same whether it was just run or read back from a folder. Every signal has the shape
-    of `time`, (rows,). `settings` are those of system.settings, as in run.json.
+    of `time`, (rows,), and is in its unit in `units`, that of its FMU. `settings` are those of
+    system.settings, as in run.json.
     """
 
     settings: Mapping[str, Any]
@@ -67,6 +69,8 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     """Metrics that were asked for beside those that every result is asked for."""
     origin: Mapping[str, Any] = field(default_factory=dict)
     """The date, versions and command of a run with a folder: see recording.folder."""
+    to_si: Mapping[str, Conversion | None] = field(default_factory=dict)
+    """The conversions to SI base units of signals in others; None where the unit is in doubt."""
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
         return self.signals[name]
@@ -89,8 +93,8 @@ class Result(Mapping[str, npt.NDArray[Any]]):
 
     @cached_property
     def by_role(self) -> Signals:
-        """The signals by names that may begin with a role, as metrics take them."""
-        return Signals(self.time, self.signals, self.roles)
+        """The signals as metrics take them: names may begin with a role, values are in SI units."""
+        return Signals(self.time, self.signals, self.roles, self.to_si)
 
     @cached_property
     def measured(self) -> Measured:
@@ -146,8 +150,8 @@ class Result(Mapping[str, npt.NDArray[Any]]):
 
     def to_json(self, path: str | Path) -> None:
         """Write the metrics and the settings that led to them, then what is known by signal
-        (units, types, descriptions), the units of the metrics, the log, the rejections by
-        component, as "realtime" the timing of a paced run, and its origin.
+        (units, conversions to SI, types, descriptions), the units of the metrics, the log, the
+        rejections by component, as "realtime" the timing of a paced run, and its origin.
 
         A metric that fails is a line among the missing ones: the rest of the run is kept.
         """
@@ -155,6 +159,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
             **self._figures,
             **self.settings,
             "units": dict(self.units),
+            "to_si": conversions_entry(self.to_si),
             "types": {
                 name: "str" if column.dtype == object else str(column.dtype)
                 for name, column in self.signals.items()
@@ -209,3 +214,8 @@ class Result(Mapping[str, npt.NDArray[Any]]):
                 listener.block(steps, rows)
         finally:
             listener.end(self.complete)
+
+
+def conversions_entry(to_si: Mapping[str, Conversion | None]) -> dict[str, Any]:
+    """The conversions of a result to SI base units as run.json has them."""
+    return {name: c and c._asdict() for name, c in to_si.items()}

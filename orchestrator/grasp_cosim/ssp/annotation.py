@@ -1,8 +1,9 @@
 """The annotation of an archive with all that SSP 1.0 has no form for, so that our run is the same.
 
-The communication step, the scheme, the components' own steps, processes and renamed variables, the
-initialisation, events, faults, roles and presets. Where it is, the elements are in the order of
-execution. Its content is JSON: the dataclasses of the system as objects, a port as a string.
+The communication step, the scheme, the components' own steps, processes, renamed variables and
+units, the initialisation, events, faults, roles and presets. Where it is, the elements are in the
+order of execution. Its content is JSON: the dataclasses of the system as objects, a port as a
+string.
 """
 
 import json
@@ -26,11 +27,12 @@ _TAG = "{grasp-cosim:system}System"
 
 @dataclass(frozen=True, slots=True)
 class Beside:
-    """The attributes of a component that SSP has no form for."""
+    """The attributes of a component that SSP has no form for; earlier archives lack the last."""
 
     rename: Mapping[str, str]
     step_ns: int | None
     isolation: Isolation
+    units: Mapping[str, str] = field(default_factory=dict)
 
     def new(self, own: str) -> str:
         """Return the system's name of a variable of the FMU."""
@@ -61,7 +63,10 @@ def no_extras(components: Iterable[str]) -> Extras:
 def extras_of(system: System) -> Extras:
     """The extras of a system."""
     shared = {f.name: getattr(system, f.name) for f in fields(Extras)}
-    beside = {c.name: Beside(dict(c.rename), c.step_ns, c.isolation) for c in system.components}
+    beside = {
+        c.name: Beside(dict(c.rename), c.step_ns, c.isolation, dict(c.units))
+        for c in system.components
+    }
     return Extras(**{**shared, "components": beside})
 
 

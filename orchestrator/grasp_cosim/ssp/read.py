@@ -14,16 +14,17 @@ from typing import Any
 from ..errors import InputError, choices
 from ..interface.interface import Value
 from ..interface.read import read_interface
+from ..interface.units import known_unit
 from ..system.description import System, in_nanoseconds
 from ..system.parts import NANOSECONDS, Component, Connection, Port
-from .annotation import TYPE, Extras, no_extras, read_extras
+from .annotation import TYPE, Beside, Extras, no_extras, read_extras
 from .archive import STRUCTURE, Archive
 from .document import at, child, children, parse, qualified
 from .network import Carried, Network, Part
 from .order import flow_order
 from .parameters import read_settings
 from .tree import Element, Hop, Path, read_system
-from .units import read_units
+from .units import read_units, same
 
 
 def read_ssp(path: FilePath, step: float | None = None, stop: float | None = None) -> System:
@@ -36,17 +37,24 @@ def read_ssp(path: FilePath, step: float | None = None, stop: float | None = Non
     parts = {e.path: _part(archive, e, e.source) for e in top.within() if e.source is not None}
     if not parts:
         raise InputError(f"{top.place}: system {top.name!r} has no components; must have some")
-    network = Network({e.path: e for e in top.within() if e.source is None}, parts)
     names = _names(file, parts)
     annotated = _annotated(file, root, names.values())
     extras = annotated or no_extras(names.values())
+    named = {at: _units(part, extras.components[names[at]]) for at, part in parts.items()}
+    parts = {
+        at: replace(part, interface=part.interface.in_units(named[at], f"{file}: {names[at]}"))
+        for at, part in parts.items()
+    }
+    network = Network({e.path: e for e in top.within() if e.source is None}, parts)
     connections = tuple(_connections(network, names, extras))
     values, notes = read_settings(archive, file, network, units)
     given = []
     for at_path, part in parts.items():
         beside = extras.components[names[at_path]]
         own = {beside.new(name): value for name, value in values.get(at_path, {}).items()}
-        given.append(Component(names[at_path], part.interface.path, own, **asdict(beside)))
+        in_units = {beside.new(name): unit for name, unit in named[at_path].items()}
+        more = asdict(beside) | {"units": in_units}
+        given.append(Component(names[at_path], part.interface.path, own, **more))
     components = tuple(_keep_starts(file, given, connections, notes))
     if annotated is None:
         components = flow_order(components, connections)
@@ -79,6 +87,23 @@ def _part(archive: Archive, element: Element, source: str) -> Part:
         reason = str(error).removeprefix(f"{path}: ")
         raise InputError(f"{place}: {source}: {reason}") from error
     return Part(element, interface)
+
+
+def _units(part: Part, beside: Beside) -> dict[str, str]:
+    """The units that are named for variables: by our annotation, or by connectors where the FMU
+    declares none, by the FMU's names.
+    """
+    variables = part.interface.by_name
+    connectors = {
+        c.name: c.unit
+        for c in part.element.connectors.values()
+        if c.unit and (v := variables.get(c.name)) and v.kind == "Real" and v.unit is None
+    }
+    meant = {n: (unit, known_unit(unit.name)) for n, unit in connectors.items()}
+    return {
+        **{n: unit.name for n, (unit, known) in meant.items() if known and same(unit, known)},
+        **{beside.rename.get(name, name): unit for name, unit in beside.units.items()},
+    }
 
 
 def _annotated(file: str, root: Any, names: Collection[str]) -> Extras | None:

@@ -164,7 +164,8 @@ def _connected(component: Component) -> list[Variable]:
 
     A parameter needs none to be set; libcosim refuses one whose type, an enumeration, it ignores.
     """
-    variables = read_interface(component.fmu).of(*_CAUSALITIES)
+    own = {component.rename.get(name, name): unit for name, unit in component.units.items()}
+    variables = read_interface(component.fmu).in_units(own).of(*_CAUSALITIES)
     return [v for v in variables if v.supported and not (v.items and v.causality == "parameter")]
 
 

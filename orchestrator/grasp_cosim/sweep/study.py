@@ -13,8 +13,12 @@ import numpy as np
 from ..checks import known
 from ..errors import InputError, choices
 from ..interface.interface import Value, Variable
+from ..interface.units import IDENTITY, Conversion
 from ..metrics.metric import Metric, available, check_portable, registered
+from ..metrics.units import in_si
 from ..system.description import System
+from ..system.parts import Port
+from ..system.readings import between
 from ..system.settings import settings
 from .design import MOST, Design, Points
 from .distributions import Distribution
@@ -27,7 +31,8 @@ PROXIES = "proxies."
 class Parameter:
     """A number that varies: it sets all variables, each like 'plant.object_width'.
 
-    With ratio_to, another variable, it sets them to that many times its value.
+    It is in the unit of the first of them. With ratio_to, another variable, it sets them to that
+    many times its value. What has another unit gets it converted.
     """
 
     name: str
@@ -76,6 +81,7 @@ class Study:
         if not self.parameters:
             raise InputError(f"{self.name}: no [[parameters]]; must be at least one")
         check_portable(self.metrics)
+        in_si(self.system, registered(self.metrics))
         self._check_names()
         self._check_outputs()
         for name in self.seeds:
@@ -83,6 +89,9 @@ class Study:
             if kind != "Integer":
                 said = f"{self.name}: seeds: {name} is of type {kind}"
                 raise InputError(f"{said}; must be an Integer")
+        for parameter in self.parameters:
+            for name in (*parameter.variables, *filter(None, [parameter.ratio_to])):
+                self.variable(name)
         for parameter in self._references_first:
             self._check_values(parameter)
         self._check_pictures()
@@ -189,8 +198,32 @@ class Study:
                 reference = values.get(p.ratio_to)
                 base = self.system.start(p.ratio_to) if reference is None else reference
                 value = float(value) * float(base)
-            values.update(dict.fromkeys(p.variables, value))
+            values.update({name: self._meant(p, name, value) for name in p.variables})
         return values
+
+    def _meant(self, parameter: Parameter, name: str, value: Value) -> Value:
+        """The value of a parameter in the unit of one of its variables."""
+        change = self._changes[parameter.name][name]
+        return value if change == IDENTITY else change(float(value))
+
+    @cached_property
+    def _changes(self) -> dict[str, dict[str, Conversion]]:
+        """By parameter and variable, the conversion from the unit in which the parameter is.
+
+        That is the unit of its first variable, or of the one that its ratio refers to.
+        """
+        return {
+            p.name: {
+                name: between(
+                    self.system,
+                    f"{self.name}: {p.name}",
+                    Port(*(p.ratio_to or p.variables[0]).split(".", 1)),
+                    Port(*name.split(".", 1)),
+                )
+                for name in p.variables
+            }
+            for p in self.parameters
+        }
 
     def _check_names(self) -> None:
         names = [p.name for p in self.parameters]
@@ -290,7 +323,7 @@ class Study:
             for name in parameter.variables:
                 component, _, variable = name.partition(".")
                 interface = self.system.component(component, self.name).interface
-                interface.parse(place, variable, value)
+                interface.parse(place, variable, self._meant(parameter, name, value))
 
     def _extremes(self, parameter: Parameter, place: str) -> Iterator[Value]:
         """Values of the variables that must be valid for all to be."""

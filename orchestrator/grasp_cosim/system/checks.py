@@ -10,6 +10,7 @@ from typing import NamedTuple
 from ..checks import choice, known, number, whole
 from ..errors import InputError, choices
 from ..interface.interface import SUPPORTED, Interface, Variable, limits
+from ..interface.read import read_interface
 from ..interface.units import conversion
 from .parts import LOOPS, Component, Connection, Port, seconds
 from .structure import Structure
@@ -107,9 +108,9 @@ def connection_transform(system: Structure, connection: Connection) -> tuple[flo
     ends = f"{place}: {source.port} is in {given} and {target.port} in {taken}"
     advice = (
         f'{{ from = "{source.port}", to = "{target.port}", factor = ... }} '
-        f"gives the factor from {given} to {taken}"
+        f"gives the factor from {given} to {taken}, and a component's units correct a wrong one"
     )
-    units = source.interface.units.get(given), target.interface.units.get(taken)
+    units = source.interface.unit(source.variable), target.interface.unit(target.variable)
     if units[0] is None or units[1] is None:
         raise InputError(f"{ends}, which their FMUs do not define in SI units; {advice}")
     found = conversion(units[0], units[1])
@@ -137,9 +138,18 @@ def transforms(system: Structure) -> dict[Port, tuple[float, float]]:
 def remarks(system: Structure) -> tuple[str, ...]:
     """Return remarks on a system that is valid, a line each.
 
-    Values that lose digits, units that cannot be compared, variables that are left alone.
+    Units other than the declared ones, values that lose digits, units that cannot be compared,
+    variables that are left alone.
     """
     lines = []
+    for component in system.components:
+        declared = read_interface(component.fmu).renamed(component.rename).by_name
+        lines += [
+            f"{Port(component.name, name)} is declared in {declared[name].unit}, but named in "
+            f"{unit}: taken to be in that"
+            for name, unit in component.units.items()
+            if declared[name].unit not in (None, unit)
+        ]
     for connection in system.connections:
         ends = _ends(system, connection)
         source, target = (end.variable for end in ends)

@@ -19,6 +19,7 @@ from .checks import (
 from .parts import NANOSECONDS, Isolation
 from .scenario_checks import check_scenario
 from .structure import DIVERGING, SCHEMES, Diverging, Scheme, Structure
+from .swap import with_fmu
 
 LONGEST = 1e9
 """s; a time in nanoseconds then fits into 64 bits."""
@@ -72,7 +73,10 @@ class System(Structure):
         return self.revised({}, values, ("swap", "with_values"))
 
     def swap(self, component: str, fmu: str | Path) -> "System":
-        """A copy with the FMU of one component replaced by another with the same variables."""
+        """A copy with the FMU of one component replaced by another with the same variables.
+
+        Its values are converted where that has them in other units.
+        """
         return self.revised({component: fmu}, {}, ("swap", "with_values"))
 
     def revised(
@@ -84,7 +88,9 @@ class System(Structure):
         """A copy with FMUs replaced, then values changed; places name the two, for messages."""
         components = {c.name: c for c in self.components}
         for name, fmu in fmus.items():
-            components[name] = replace(self.component(name, f"{places[0]} {name}"), fmu=Path(fmu))
+            place = f"{places[0]} {name}"
+            anew = [key.partition(".")[2] for key in values if key.partition(".")[0] == name]
+            components[name] = with_fmu(self, self.component(name, place), Path(fmu), anew, place)
         for key, value in values.items():
             name, _, variable = key.partition(".")
             place = f"{places[1]} {key}"

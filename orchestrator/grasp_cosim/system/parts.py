@@ -43,7 +43,8 @@ class Component:
     values differ from the FMU's own start values, by the system's names. rename maps the system's
     name of a variable to the FMU's, where they differ. step_ns is the component's own communication
     step in nanoseconds, None for the system's. With isolation "process" it runs in a process of its
-    own.
+    own. units name the units of variables that the FMU declares without one, or wrongly, by the
+    system's names.
     """
 
     name: str
@@ -52,11 +53,13 @@ class Component:
     rename: Mapping[str, str] = field(default_factory=dict)
     step_ns: int | None = None
     isolation: Isolation = "none"
+    units: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def interface(self) -> Interface:
-        """The declared interface of the FMU, under the system's names."""
-        return read_interface(self.fmu).renamed(self.rename, f"{self.name}: rename")
+        """The declared interface of the FMU, under the system's names and with its units."""
+        declared = read_interface(self.fmu).renamed(self.rename, f"{self.name}: rename")
+        return declared.in_units(self.units, f"{self.name}: units")
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,6 +27,7 @@ def settings(system: System) -> dict[str, Any]:
                 "step": None if component.step_ns is None else component.step_ns / NANOSECONDS,
                 "isolation": component.isolation,
                 "rename": dict(component.rename),
+                "units": dict(component.units),
             }
             for component in system.components
         },

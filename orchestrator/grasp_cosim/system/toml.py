@@ -76,28 +76,32 @@ def _values(place: str, table: Any) -> dict[str, Value]:
 def _component(place: str, name: str, entry: Any, folder: Path) -> Component:
     place = f"{place}: [components.{name}]"
     entry = as_table(place, entry)
-    check_keys(place, entry, {"fmu", "values", "step", "rename", "isolation"})
+    check_keys(place, entry, {"fmu", "values", "step", "rename", "units", "isolation"})
     fmu = folder / text(f"{place}: fmu", entry.get("fmu"), "the path of an FMU, as a string")
     values = _values(f"{place}: values", entry.get("values", {}))
     own = entry.get("step")
+    rename = _names(f"{place}: rename", entry.get("rename", {}), "a variable of the FMU, a string")
+    units = _names(f"{place}: units", entry.get("units", {}), "the name of a unit, like 'mm'")
+    renamed = read_interface(fmu).renamed(rename, f"{place}: rename")
+    renamed.in_units(units, f"{place}: units")
     component = Component(
         name,
         fmu,
         {},
-        _rename(f"{place}: rename", fmu, entry.get("rename", {})),
+        rename,
         None if own is None else in_nanoseconds(f"{place}: step", own),
         choice(f"{place}: isolation", entry.get("isolation", "none"), ISOLATIONS),
+        units,
     )
     parsed = {k: component.interface.parse(f"{place}: values", k, v) for k, v in values.items()}
     return replace(component, values=parsed)
 
 
-def _rename(place: str, fmu: Path, table: Any) -> dict[str, str]:
-    """The table of names, each of which the FMU knows."""
+def _names(place: str, table: Any, must: str) -> dict[str, str]:
+    """A table of strings."""
     names = as_table(place, table)
-    for new, own in names.items():
-        text(f"{place}: {new!r}", own, "a variable of the FMU, a string")
-    read_interface(fmu).renamed(names, place)
+    for key, name in names.items():
+        text(f"{place}: {key!r}", name, must)
     return names
 
 

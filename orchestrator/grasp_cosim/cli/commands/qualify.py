@@ -33,6 +33,13 @@ from ..options import chosen_system, set_values, system_options
 @click.option("--bands", type=PATH, help="TOML; default: derived.")
 @click.option("--rename", "renames", multiple=True, metavar="VARIABLE=CANDIDATES_VARIABLE")
 @click.option(
+    "--units",
+    "named",
+    multiple=True,
+    metavar="VARIABLE=UNIT",
+    help="Of the candidate, where it declares none or a wrong one.",
+)
+@click.option(
     "--isolation",
     type=click.Choice(ISOLATIONS),
     default="process",
@@ -51,6 +58,7 @@ def qualify(
     component: str,
     bands: Path | None,
     renames: tuple[str, ...],
+    named: tuple[str, ...],
     isolation: Isolation,
     metric_files: tuple[Path, ...],
     out: Path | None,
@@ -71,6 +79,7 @@ def qualify(
         component,
         candidate,
         rename=dict(pair("--rename", text, "VARIABLE=CANDIDATES_VARIABLE") for text in renames),
+        units=dict(pair("--units", text, "VARIABLE=UNIT") for text in named),
         values=set_values(given["settings"]),
         bands=read_bands(bands) if bands else None,
         isolation=isolation,

@@ -18,7 +18,7 @@ from ...parallel import Crew, progress_bar
 from ...system.description import System
 from ..closing import close
 from ..metrics import FINGERS
-from ..presets import CASES, with_case
+from ..presets import CASES, start_in_si, with_case, with_si_values
 from ..published.tables import Setting, published_rows
 from .fit import Fit, Parameter, Vector, fit
 from .parameters import RATIO
@@ -159,10 +159,11 @@ def contact_times(job: tuple[System, Grasp]) -> Times:
     """When the fingers touch in a grasp with a system, in s; at STOP where one does not."""
     system, grasp = job
     values = dict(grasp.parameters)
-    own = values.get(RATIO, system.start(RATIO))
+    own = values.get(RATIO, start_in_si(system, RATIO))
     values |= {"plant.initial_object_position": grasp.x_m, RATIO: own * grasp.ratio}
     try:
-        result = close(with_case(system, grasp.case).with_values(values), after=0.0)
+        chosen = with_si_values(with_case(system, grasp.case), values, "identify:")
+        result = close(chosen, after=0.0)
     except (InputError, SimulationError) as error:
         error.args = (f"x_m = {grasp.x_m:g} m, Case {grasp.case}: {error}",)
         raise

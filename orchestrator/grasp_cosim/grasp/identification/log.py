@@ -19,6 +19,7 @@ from ...errors import InputError, choices
 from ...metrics.metric import Signals
 from ...system.description import System
 from ..metrics import FINGERS
+from ..presets import start_in_si
 from .fit import Fit, Parameter, Vector, fit
 from .parameters import FRICTION
 
@@ -70,7 +71,7 @@ def identify_from_log(
 
 
 def _windows(system: System, log: Signals, finger: int, place: str) -> Windows:
-    mass = system.start(f"plant.finger_mass[{finger}]")
+    mass = start_in_si(system, f"plant.finger_mass[{finger}]")
     step = _step(log.time, place)
     size = int(WINDOW / step + 1e-6) + 1
 
@@ -100,7 +101,7 @@ def _windows(system: System, log: Signals, finger: int, place: str) -> Windows:
 def _residuals(system: System, values: Mapping[str, float], w: Windows) -> Vector:
     def of(name: str) -> float:
         key = FRICTION + name
-        return values[key] if key in values else system.start(key)
+        return values[key] if key in values else start_in_si(system, key)
 
     j = f"[{w.finger}]"
     coulomb, v_s = of(f"coulomb{j}"), of("stribeck_velocity")

@@ -10,12 +10,12 @@ const SIDE = { 1: 1, 2: -1 }; // where the finger is, seen from the object
 class Grasp {
   constructor(recording, plan, series) {
     this.recording = recording;
-    this.plan = plan; // names of signals, contacts: [{t, finger}]
+    this.plan = plan; // names of signals, contacts: [{t, finger}], toSi
     this.series = series; // by name
     this.canvas = document.getElementById("fingers");
     const reach = (name) => {
       const top = series.get(name).levels.at(-1);
-      return [Math.min(...top.low), Math.max(...top.high)];
+      return [Math.min(...top.low), Math.max(...top.high)].map((value) => this.inSi(name, value));
     };
     const ends = [...reach(plan.position[1]), ...reach(plan.position[2])];
     [this.low, this.high] = [Math.min(...ends), Math.max(...ends)];
@@ -23,8 +23,13 @@ class Grasp {
       ...Object.values(plan.contact_force)].flatMap((name) => reach(name).map(Math.abs)));
   }
 
+  inSi(name, value) { // it may be recorded in another unit
+    const { factor, offset } = this.plan.toSi[name] ?? { factor: 1, offset: 0 };
+    return factor * value + offset;
+  }
+
   at(name, t) {
-    return valueAt(this.recording.time, this.series.get(name), t);
+    return this.inSi(name, valueAt(this.recording.time, this.series.get(name), t));
   }
 
   // speed: simulated seconds per second at a contact, by which a glow lasts a while for the eye.
@@ -177,7 +182,8 @@ class Grasp {
 
   readings(t) {
     for (const cell of document.querySelectorAll("#readings output")) {
-      const series = this.series.get(cell.dataset.signal), value = this.at(series.name, t);
+      const series = this.series.get(cell.dataset.signal);
+      const value = valueAt(this.recording.time, series, t);
       const top = series.levels.at(-1); // of the whole run, so that the unit stays the same
       const { factor, unit } = scaled(
         series.unit, Math.max(...top.high.map(Math.abs), ...top.low.map(Math.abs)));

@@ -21,7 +21,7 @@ from ...sweep.store import Parts
 from ...system.description import System
 from ..closing import close
 from ..pictures import draw_contact_forces, draw_contact_times, draw_targets
-from ..presets import CASES, with_case
+from ..presets import CASES, start_in_si, with_case, with_si_values
 from .claims import Evidence, check_claims
 from .grasps import Run, Runs, as_run
 from .report import bench_markdown, markdown, table_csv
@@ -131,11 +131,12 @@ def _run(job: Job) -> Run:
     system, setting, case, source = job
     values = {
         "plant.initial_object_position": setting.x_m,
-        "sensor_1.reflectance": setting.alpha_1 * system.start("sensor_1.reflectance"),
-        "sensor_2.reflectance": setting.alpha_2 * system.start("sensor_2.reflectance"),
+        "sensor_1.reflectance": setting.alpha_1 * start_in_si(system, "sensor_1.reflectance"),
+        "sensor_2.reflectance": setting.alpha_2 * start_in_si(system, "sensor_2.reflectance"),
     }
     how = SOURCES[source]
-    chosen = with_case(system, case).with_values(values).with_experiment(stop=how.stop)
+    chosen = with_si_values(with_case(system, case), values, "evaluate:")
+    chosen = chosen.with_experiment(stop=how.stop)
     return as_run(close(chosen, how.after), setting, case)
 
 

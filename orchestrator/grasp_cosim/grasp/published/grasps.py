@@ -10,6 +10,7 @@ from ...errors import InputError
 from ...recording.result import Result
 from ...system.description import System
 from ..metrics import FINGERS, IMPACT_WINDOW, time_at_gap
+from ..presets import start_in_si
 from .tables import REFLECTANCE_X_M, Setting
 
 SENSOR_CONTACT = 0.37e-3
@@ -87,5 +88,5 @@ def balances(runs: Runs, setting: Setting) -> bool:
 
 def settled_force(system: System) -> float:
     """K_i·W/2 in N, with which a finger presses in the end where friction does not hold it."""
-    stiffness = system.start("controller.contact_force.stiffness")
-    return 0.5 * stiffness * system.start("plant.object_width")
+    stiffness = start_in_si(system, "controller.contact_force.stiffness")
+    return 0.5 * stiffness * start_in_si(system, "plant.object_width")

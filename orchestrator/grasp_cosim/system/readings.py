@@ -1,0 +1,165 @@
+"""The units in which the values of a system are meant, as far as it tells them, and doubts of them.
+
+A variable is in the unit that the `units` of its component name, or else in the one that its FMU
+declares. An output without one is in the unit of the inputs that take its values as they are.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+from ..errors import InputError, choices
+from ..interface.interface import SETTABLE, Interface, Variable
+from ..interface.units import IDENTITY, Conversion, Unit, conversion
+from .parts import Connection, Port
+from .structure import Structure
+
+SAME = 1e-9
+"""Relative; factors this close are one, written with fewer digits."""
+
+
+class Reading(NamedTuple):
+    """The unit of an output, None where nothing tells it; doubt is why it may be another one.
+
+    contested says that what takes its values has a unit: then it is in doubt for everyone, and not
+    only for those who expect one.
+    """
+
+    unit: Unit | None
+    doubt: str = ""
+    contested: bool = False
+
+    @property
+    def conversion(self) -> Conversion | None:
+        """The conversion to SI base units; None where it is in these, or not known."""
+        unit = self.unit
+        return None if unit is None or unit.si else Conversion(unit.factor, unit.offset)
+
+
+def readings(system: Structure) -> dict[Port, Reading]:
+    """The reading of each Real or Integer output."""
+    interfaces = {c.name: c.interface for c in system.components}
+    taken: dict[Port, list[_Taken]] = {}
+    for connection in system.connections:
+        interface = interfaces[connection.target.component]
+        unit = unit_of(interface, interface.by_name[connection.target.variable])
+        taken.setdefault(connection.source, []).append(_Taken(connection, unit))
+    return {
+        port: _reading(interfaces[c.name], v, v.name in c.units, taken.get(port, ()))
+        for c in system.components
+        for v in interfaces[c.name].of("output")
+        if v.supported and v.kind in ("Real", "Integer") and (port := Port(c.name, v.name))
+    }
+
+
+def unit_of(interface: Interface, variable: Variable) -> Unit | None:
+    """The unit that a variable has, without its offset where that is a difference."""
+    unit = interface.unit(variable)
+    return unit.without_offset if unit and variable.relative else unit
+
+
+def between(system: Structure, place: str, source: Port, target: Port) -> Conversion:
+    """The conversion of a number for one variable into that for another, in the units they have.
+
+    Without a unit, it is taken as the other one. InputError where there is no way.
+    """
+    ends = [system.component(p.component, place).interface for p in (source, target)]
+    start, end = (i.by_name[p.variable] for i, p in zip(ends, (source, target), strict=True))
+    units = unit_of(ends[0], start), unit_of(ends[1], end)
+    if start.unit is None or end.unit is None or (start.unit == end.unit and None in units):
+        return IDENTITY
+    found = conversion(units[0], units[1]) if units[0] and units[1] else None
+    if found is None:
+        raise InputError(
+            f"{place}: {source} is in {start.unit} and {target} in {end.unit}, which cannot be "
+            "converted; must be of one quantity"
+        )
+    return found
+
+
+def parameter_in_si(system: Structure, place: str, port: Port) -> Conversion:
+    """The conversion of a parameter to SI base units, the identity without a unit.
+
+    InputError where its unit is not defined, or where it has none while its component has others
+    that are not of SI.
+    """
+    interface = system.component(port.component, place).interface
+    variable = interface.by_name.get(port.variable)
+    unit = unit_of(interface, variable) if variable else None
+    if unit:
+        return Conversion(unit.factor, unit.offset)
+    if variable and variable.kind == "Real":
+        units = {v.unit: unit_of(interface, v) for v in interface.of(*SETTABLE, "output")}
+        other = next((name for name, u in units.items() if u and not u.si), None)
+        if variable.unit or other:
+            reason = f"is in {variable.unit!r}" if variable.unit else f"has no unit, others {other}"
+            raise InputError(
+                f"{place}: {port} {reason}: cannot be told in SI units; must be named: "
+                f"{naming(port.component, [port.variable])}"
+            )
+    return IDENTITY
+
+
+def naming(component: str, variables: Iterable[str]) -> str:
+    """The entry of a system file in which the units of variables are to be named."""
+    entries = ", ".join(f'"{name}" = "..."' for name in variables)
+    return f"[components.{component}] units = {{ {entries} }}"
+
+
+class _Taken(NamedTuple):
+    """A connection from an output, and the unit of the input it leads to."""
+
+    connection: Connection
+    unit: Unit | None
+
+    @property
+    def factor(self) -> float:
+        return 1.0 if self.connection.factor is None else float(self.connection.factor)
+
+    @property
+    def scales(self) -> bool:
+        """True if it makes another number of a value, beyond its sign."""
+        return abs(self.factor) != 1.0 or bool(self.connection.offset)
+
+
+def _reading(
+    interface: Interface, variable: Variable, named: bool, taken: Sequence[_Taken]
+) -> Reading:
+    unit = unit_of(interface, variable)
+    if variable.unit is None:
+        return _by_its_inputs(taken)
+    if unit is None:
+        return Reading(None, f"is in {variable.unit!r}, which its FMU does not define in SI units")
+    return Reading(unit, "" if named else _contradiction(unit, taken))
+
+
+def _contradiction(unit: Unit, taken: Iterable[_Taken]) -> str:
+    """Why a declared unit may be wrong: a factor to the same quantity that it does not explain."""
+    for t in taken:
+        given = (t.connection.factor, t.connection.offset) != (None, None)
+        expected = conversion(unit, t.unit) if given and t.unit else None
+        if expected and not math.isclose(abs(t.factor), abs(expected.factor), rel_tol=SAME):
+            return (
+                f"is declared in {unit.name}, but its connection to {t.connection.target} has "
+                f"factor = {t.factor:g} where the units give {expected.factor:g}"
+            )
+    return ""
+
+
+def _by_its_inputs(taken: Sequence[_Taken]) -> Reading:
+    """The reading of an output without a unit."""
+    for t in taken:
+        if t.scales:
+            return Reading(
+                None,
+                f"has no unit, and its connection to {t.connection.target} has "
+                f"factor = {t.factor:g}, offset = {t.connection.offset or 0.0:g}",
+                t.unit is not None,
+            )
+    told = {(t.unit.exponents, t.unit.factor, t.unit.offset): t for t in taken if t.unit}
+    if len(told) > 1:
+        ends = choices(f"{t.connection.target} in {t.unit.name}" for t in told.values() if t.unit)
+        return Reading(None, f"has no unit, and goes to {ends}", True)
+    return Reading(next((t.unit for t in told.values()), None))

@@ -1,0 +1,279 @@
+"""A plant of another vendor in mm, mm/s and mN has the metrics of the one in SI."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import MadeOnce, Run
+from grasp_cosim import InputError, Result, System, load_run, simulate
+from grasp_cosim.grasp.identification.log import identify_from_log
+from grasp_cosim.grasp.identification.parameters import chosen
+from grasp_cosim.grasp.presets import SYSTEM, start_in_si, with_case, with_si_values
+from grasp_cosim.grasp.published.grasps import settled_force
+from grasp_cosim.grasp.scene import grasp_scene
+from grasp_cosim.metrics.metric import Signals, metric
+from grasp_cosim.qualification.qualify import qualify
+from grasp_cosim.recording.load import load_log
+from grasp_cosim.recording.result import UNITS
+from support.milli import milli_plant
+
+STEP, STOP = 1e-3, 3.0
+VALUES = (
+    "{ object_width = 0.07, initial_object_position = 0.03 }",
+    "{ object_width = 70.0, initial_object_position = 30.0 }",
+)
+NAMED = {
+    "gap": "mm",
+    "position": "mm",
+    "velocity": "mm/s",
+    "contact_force": "mN",
+    "force": "mN",
+}
+ENTRY = ", ".join(
+    [f'"{name}[{j}]" = "{unit}"' for name, unit in NAMED.items() for j in (1, 2)]
+    + [f'{name} = "mm"' for name in ("object_position", "object_width", "initial_object_position")]
+)
+SCALED = {"position": 1e-3, "velocity": 1e-3, "gap": 1e-3, "force": 1e3}
+
+
+@metric("closest", unit="m")
+def closest(run: Signals) -> float:
+    return float(run["plant.gap[1]"].min())
+
+
+@pytest.fixture(scope="module")
+def plants(made_once: MadeOnce) -> Path:
+    """The plant with its units defined, named only, and without any: KIND/MilliPlant.fmu."""
+
+    def fill(folder: Path) -> None:
+        milli_plant(folder / "defined", "defined")
+        milli_plant(folder / "named", "named")
+        milli_plant(folder / "none", "none")
+
+    return made_once("milli_plants", fill)
+
+
+def written(path: Path, fmus: Path, plant: Path, more: str = "", factors: bool = False) -> Path:
+    """The built-in system with a plant in mm."""
+    text = SYSTEM.read_text("utf-8").replace(*VALUES)
+    text = text.replace('fmu = "GripperPlant.fmu"', f'fmu = "{plant}"\n{more}')
+    for name in ("Sensor", "Controller"):
+        text = text.replace(f'fmu = "Proximity{name}', f'fmu = "{fmus}/Proximity{name}')
+        text = text.replace(f'fmu = "Grasp{name}', f'fmu = "{fmus}/Grasp{name}')
+    if factors:
+        lines = []
+        for line in text.splitlines():
+            ends = line.strip().strip('",').split(" -> ")
+            name = ends[0].partition(".")[2].partition("[")[0]
+            if len(ends) == 2 and name in SCALED:
+                line = f'{{ from = "{ends[0]}", to = "{ends[1]}", factor = {SCALED[name]} }},'
+            lines.append(line)
+        text = "\n".join(lines)
+    path.write_text(text, "utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def original(grasp: System) -> Result:
+    return simulate(grasp, metrics=[closest], step=STEP, stop=STOP)
+
+
+@pytest.fixture(scope="module")
+def defined(fmus: Path, plants: Path, tmp_path_factory: pytest.TempPathFactory) -> System:
+    folder = tmp_path_factory.mktemp("defined")
+    return System.load(written(folder / "mm.toml", fmus, plants / "defined/MilliPlant.fmu"))
+
+
+@pytest.fixture(scope="module")
+def result(defined: System) -> Result:
+    return simulate(defined, metrics=[closest], step=STEP, stop=STOP)
+
+
+def check(found: Mapping[str, Any], expected: Mapping[str, Any]) -> None:
+    """All metrics agree to rounding."""
+    for name, value in expected.items():
+        if name not in UNITS:
+            assert found[name] == pytest.approx(value, rel=1e-9, abs=1e-15), name
+    assert found.keys() == expected.keys()
+
+
+def test_metrics_are_those_in_si(result: Result, original: Result) -> None:
+    assert result.metrics["time_to_contact"][0] is not None
+    check(result.metrics, original.metrics)
+    assert result.metric_units == original.metric_units
+    assert not any("taken to be" in line for line in result.log)
+
+
+def test_signals_and_their_units_stay_as_recorded(result: Result, original: Result) -> None:
+    assert result.units["plant.gap[1]"] == "mm"
+    np.testing.assert_allclose(result["plant.gap[1]"], 1e3 * original["plant.gap[1]"], atol=1e-9)
+    assert result.by_role["plant.gap[1]"] == pytest.approx(original["plant.gap[1]"], abs=1e-12)
+
+
+def test_the_energy_of_the_exchange_is_in_joule(result: Result, original: Result) -> None:
+    for j in (1, 2):
+        name = f"plant.exchange_energy[{j}]"
+        assert result.units[name] == "J"
+        np.testing.assert_allclose(result[name], original[name], rtol=1e-9, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("kind", "named", "factors"),
+    [("named", False, False), ("none", True, False), ("none", True, True)],
+)
+def test_a_plant_whose_units_are_names_or_named_in_the_file(
+    fmus: Path,
+    plants: Path,
+    tmp_path: Path,
+    original: Result,
+    kind: str,
+    named: bool,
+    factors: bool,
+) -> None:
+    more = f"units = {{ {ENTRY} }}" if named else ""
+    plant = plants / kind / "MilliPlant.fmu"
+    system = System.load(written(tmp_path / "mm.toml", fmus, plant, more, factors))
+    found = simulate(system, metrics=[closest], step=STEP, stop=STOP)
+    check(found.metrics, original.metrics)
+    for j in (1, 2):
+        name = f"plant.exchange_energy[{j}]"
+        np.testing.assert_allclose(found[name], original[name], rtol=1e-9, atol=1e-15)
+
+
+def test_a_run_read_back_has_the_same_metrics(
+    result: Result, original: Result, tmp_path: Path
+) -> None:
+    result.to_csv(tmp_path / "signals.csv")
+    result.to_json(tmp_path / "run.json")
+    check(load_run(tmp_path).metrics, original.metrics)
+    table = json.loads((tmp_path / "run.json").read_text("utf-8"))
+    del table["to_si"]  # as earlier versions wrote it
+    (tmp_path / "run.json").write_text(json.dumps(table), "utf-8")
+    check(load_run(tmp_path).metrics, original.metrics)
+
+
+def test_the_scene_gets_what_it_draws_in_si(result: Result, original: Result) -> None:
+    ours, theirs = grasp_scene(original), grasp_scene(result)
+    assert ours is not None
+    assert theirs is not None
+    assert ours.state["toSi"] == {}
+    milli = {"factor": 1e-3, "offset": 0.0}
+    expected = {
+        f"plant.{name}[{j}]": milli
+        for name in ("position", "gap", "velocity", "contact_force")
+        for j in (1, 2)
+    }
+    assert theirs.state["toSi"] == expected
+    assert theirs.state["actuator"] == ours.state["actuator"]
+    for here, there in zip(ours.state["contacts"], theirs.state["contacts"], strict=True):
+        assert there["t"] == pytest.approx(here["t"], rel=1e-9)
+
+
+def test_the_plant_may_take_the_place_of_the_original(
+    grasp: System, plants: Path, original: Result
+) -> None:
+    fast = grasp.with_experiment(STEP, STOP)
+    plant = plants / "defined/MilliPlant.fmu"
+    check(simulate(fast.swap("plant", plant), metrics=[closest]).metrics, original.metrics)
+    found = qualify(fast, "plant", plant, isolation="none")
+    assert found.qualified
+    assert not found.uncompared
+    for compared in found.metrics:
+        assert compared.candidate == pytest.approx(compared.original, rel=1e-9)
+    named = dict(entry.split(" = ") for entry in ENTRY.replace('"', "").split(", "))
+    bare = plants / "none/MilliPlant.fmu"
+    assert qualify(fast, "plant", bare, units=named, isolation="none").qualified
+
+
+def test_the_original_may_take_the_place_of_the_plant(
+    defined: System, fmus: Path, original: Result
+) -> None:
+    fast = defined.with_experiment(STEP, STOP)
+    swapped = fast.swap("plant", fmus / "GripperPlant.fmu")
+    check(simulate(swapped, metrics=[closest]).metrics, original.metrics)
+    assert qualify(fast, "plant", fmus / "GripperPlant.fmu", isolation="none").qualified
+
+
+def test_parameters_are_converted_to_si_and_from_it(defined: System, grasp: System) -> None:
+    assert start_in_si(defined, "plant.object_width") == pytest.approx(0.07, rel=1e-15)
+    assert settled_force(defined) == pytest.approx(settled_force(grasp), rel=1e-15)
+    moved = with_si_values(defined, {"plant.initial_object_position": 0.02}, "test:")
+    assert moved.start("plant.initial_object_position") == pytest.approx(20.0, rel=1e-15)
+    assert with_case(defined, 1).start("plant.object_width") == 70.0
+
+
+def test_a_parameter_without_a_unit_beside_others_in_mm_is_refused(defined: System) -> None:
+    plant = defined.component("plant", "")
+    assert plant.units == {}
+    bare = replace(plant, fmu=plant.fmu.parents[1] / "none/MilliPlant.fmu")
+    others = [c for c in defined.components if c.name != "plant"]
+    system = replace(defined, components=(replace(bare, units={"gap[1]": "mm"}), *others))
+    with pytest.raises(InputError, match=r"plant\.object_width has no unit, others mm: cannot be"):
+        start_in_si(system, "plant.object_width")
+    unitless = replace(defined, components=(bare, *others))
+    assert start_in_si(unitless, "plant.object_width") == 70.0
+
+
+def test_friction_from_a_log_in_mm(
+    result: Result, original: Result, grasp: System, tmp_path: Path
+) -> None:
+    fits = []
+    for name, run in (("si", original), ("mm", result)):
+        run.to_csv(tmp_path / name / "signals.csv")
+        run.to_json(tmp_path / name / "run.json")
+        log = load_log(tmp_path / name / "signals.csv")
+        _, fit = identify_from_log(grasp, log, chosen(("viscous",), ("viscous",), "test"), name)
+        fits.append([e.value for e in fit.estimates])
+    assert fits[1] == pytest.approx(fits[0], rel=1e-6, abs=1e-9)
+
+
+STUDY = """system = "mm.toml"
+step = 1e-3
+stop = 3.0
+[design]
+kind = "grid"
+[[parameters]]
+name = "position"
+variables = ["plant.initial_object_position"]
+values = [30.0]
+"""
+
+
+def test_a_sweep_has_the_metrics_in_si(
+    command: Run, fmus: Path, plants: Path, tmp_path: Path, original: Result
+) -> None:
+    written(tmp_path / "mm.toml", fmus, plants / "defined/MilliPlant.fmu")
+    (tmp_path / "study.toml").write_text(STUDY, "utf-8")
+    code, out, _ = command("sweep", "study.toml", "--json", "--workers", "1")
+    metrics = json.loads(out)["metrics"]
+    assert code == 0
+    expected = original.metrics["impact_velocity"][0]
+    assert metrics["impact_velocity[1]"]["mean"] == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("run", "mm.toml", "--out", "out"),
+        ("run", "mm.toml", "--step-study"),
+        ("sweep", "study.toml", "--out", "out"),
+        ("qualify", "mm.fmu", "--as", "plant", "--system", "mm.toml", "--out", "out"),
+    ],
+)
+def test_factors_without_a_unit_are_refused_before_the_run(
+    command: Run, fmus: Path, plants: Path, tmp_path: Path, arguments: tuple[str, ...]
+) -> None:
+    plant = plants / "none/MilliPlant.fmu"
+    written(tmp_path / "mm.toml", fmus, plant, factors=True)
+    (tmp_path / "mm.fmu").symlink_to(plant)
+    (tmp_path / "study.toml").write_text(STUDY, "utf-8")
+    code, out, err = command(*arguments)
+    assert (code, out) == (2, "")
+    assert err.startswith("grasp-cosim: mm.toml: plant.position[1] has no unit, and its connection")
+    assert '[components.plant] units = { "object_position" = "...", "position[1]" = ' in err
+    assert err.count("\n") == 1
+    assert not list((tmp_path / "out").glob("*"))

@@ -1,0 +1,255 @@
+"""Metrics get signals in SI units, or the system is refused before any FMU is loaded."""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+from grasp_cosim import InputError, System, extensions, metric, simulate
+from grasp_cosim.convergence.step_study import ask
+from grasp_cosim.interface.units import Conversion
+from grasp_cosim.metrics.metric import Metric, Signals, measure
+from grasp_cosim.metrics.units import InSi, in_si
+from grasp_cosim.qualification.qualify import qualify
+from grasp_cosim.sweep.design import Design
+from grasp_cosim.sweep.distributions import Listed
+from grasp_cosim.sweep.study import Parameter, Study
+from hypothesis import given
+from hypothesis import strategies as st
+from qualification.made import write_fmu
+
+OUTPUT = 'causality="output" | Real'
+INPUT = 'causality="input" | Real start="0"'
+ROOM = {"x": OUTPUT, "y": OUTPUT, "p": 'causality="parameter" | Real start="1"'}
+Load = Callable[..., System]
+
+
+@metric("travel", unit="m", needs={"room.x": "m", "room.y": "m"})
+def travel(run: Signals) -> float:
+    """How far x goes."""
+    return float(run["room.x"][-1] - run["room.x"][0])
+
+
+def unit(text: str, name: str, more: str = "") -> str:
+    return text.replace("| Real", f'| Real unit="{name}"{more}')
+
+
+@pytest.fixture
+def load(tmp_path: Path) -> Load:
+    """A room whose outputs x and y go to the inputs a and b of a sink."""
+
+    def system(
+        room: Mapping[str, str] = {},
+        sink: Mapping[str, str] = {},
+        links: Sequence[str] = ('"room.x -> sink.a"', '"room.y -> sink.b"'),
+        units: str = "",
+    ) -> System:
+        write_fmu(tmp_path / "room.fmu", {**ROOM, **room})
+        write_fmu(tmp_path / "sink.fmu", {"a": INPUT, "b": INPUT, "c": INPUT, **sink})
+        values = {v: 0.0 for v in "abc" if not any(f"sink.{v}" in link for link in links)}
+        path = tmp_path / "rooms.toml"
+        path.write_text(
+            f"connections = [{', '.join(links)}]\n[experiment]\nstep = 1e-3\nstop = 0.01\n"
+            f'[components.room]\nfmu = "room.fmu"\nunits = {{ {units} }}\n'
+            f'[components.sink]\nfmu = "sink.fmu"\n'
+            f"values = {{ {', '.join(f'{n} = {v}' for n, v in values.items())} }}\n",
+            "utf-8",
+        )
+        return System.load(path)
+
+    return system
+
+
+def scaled(factor: float, offset: float | None = None, target: str = "a") -> list[str]:
+    more = "" if offset is None else f", offset = {offset}"
+    return [f'{{ from = "room.x", to = "sink.{target}", factor = {factor}{more} }}']
+
+
+MM, M = unit(OUTPUT, "mm"), unit(OUTPUT, "m")
+MM_IN, M_IN = unit(INPUT, "mm"), unit(INPUT, "m")
+MILLI = Conversion(1e-3, 0.0)
+
+
+def found(system: System, *metrics: Metric) -> InSi:
+    return in_si(system, metrics or (travel,))
+
+
+def refusal(system: System, *metrics: Metric) -> str:
+    with pytest.raises(InputError) as caught:
+        found(system, *metrics)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+# ------------------------------------------------------------------------- the unit of a signal
+
+
+def test_a_declared_unit_is_converted(load: Load) -> None:
+    assert found(load({"x": MM, "y": M})) == InSi({"room.x": MILLI}, ())
+
+
+def test_a_named_unit_is_converted(load: Load) -> None:
+    assert found(load({"y": M}, units='x = "mm"')) == InSi({"room.x": MILLI}, ())
+    assert found(load({"x": M, "y": M}, units='x = "mm"')) == InSi({"room.x": MILLI}, ())
+
+
+def test_a_unit_that_is_not_defined_is_known_by_its_name(load: Load) -> None:
+    room = {"x": unit(OUTPUT, "cm"), "y": M}  # made.py defines no cm
+    assert found(load(room)) == InSi({"room.x": Conversion(1e-2, 0.0)}, ())
+
+
+def test_an_input_tells_the_unit_of_what_it_takes_as_it_is(load: Load) -> None:
+    assert found(load({}, {"a": MM_IN, "b": M_IN})).conversions == {"room.x": MILLI}
+    links = [*scaled(-1.0), '"room.y -> sink.b"']
+    assert found(load({}, {"a": MM_IN, "b": M_IN}, links)).conversions == {"room.x": MILLI}
+
+
+def test_without_any_unit_it_is_that_of_si_and_that_is_said(load: Load) -> None:
+    notes = tuple(f"room.{name} has no unit, taken to be in m" for name in "xy")
+    assert found(load()) == InSi({}, notes)
+    assert found(load({"x": M})) == InSi({}, notes[1:])
+
+
+def test_two_inputs_of_different_units_leave_it_in_doubt(load: Load) -> None:
+    links = ['"room.x -> sink.a"', '"room.x -> sink.b"']
+    said = refusal(load({"y": M}, {"a": MM_IN, "b": M_IN}, links))
+    assert "room.x has no unit, and goes to sink.a in mm, sink.b in m; travel must know" in said
+    system = load({"y": M}, {"a": MM_IN, "b": M_IN}, links, 'x = "mm"')
+    assert found(system).conversions == {"room.x": MILLI}
+    same = load({"y": M}, {"a": MM_IN, "b": MM_IN}, links)
+    assert found(same).conversions == {"room.x": MILLI}
+
+
+@pytest.mark.parametrize(("factor", "offset"), [(1e-3, None), (-1e-3, None), (1.0, 0.5), (2.0, 0)])
+@pytest.mark.parametrize("sink", [{}, {"a": M_IN}])
+def test_a_factor_on_what_has_no_unit_is_a_doubt(
+    load: Load, factor: float, offset: float | None, sink: Mapping[str, str]
+) -> None:
+    links = [*scaled(factor, offset), '"room.y -> sink.b"']
+    said = refusal(load({"y": M}, sink, links))
+    assert said.startswith(
+        "rooms.toml: room.x has no unit, and its connection to sink.a has factor"
+    )
+    assert said.endswith('travel must know its unit, one like m: [components.room] units = '
+                         '{ "x" = "..." }')  # fmt: skip
+    named = load({"y": M}, sink, links, 'x = "mm"')
+    assert found(named).conversions == {"room.x": MILLI}
+
+
+@pytest.mark.parametrize(
+    ("declared", "taken", "factor", "holds"),
+    [
+        (M, M_IN, 1e-3, False),
+        (MM, M_IN, 1e-3, True),
+        (MM, M_IN, -1e-3, True),
+        (MM, M_IN, 1.0, False),
+        (M, M_IN, -1.0, True),
+        (M, MM_IN, 1000.0, True),
+        (M, MM_IN, 1e-3, False),
+        (M, unit(INPUT, "N"), 98.0, True),  # a spring: no conversion of lengths
+        (M, INPUT, 1e-3, True),
+    ],
+)
+def test_a_factor_that_the_units_do_not_give_is_a_doubt(
+    load: Load, declared: str, taken: str, factor: float, holds: bool
+) -> None:
+    links = [*scaled(factor), '"room.y -> sink.b"']
+    system = load({"x": declared, "y": M}, {"a": taken}, links)
+    if holds:
+        assert found(system).conversions == ({"room.x": MILLI} if declared == MM else {})
+    else:
+        assert f"but its connection to sink.a has factor = {factor:g} where" in refusal(system)
+        confirmed = load({"x": declared, "y": M}, {"a": taken}, links, 'x = "m"')
+        assert found(confirmed).conversions == {}
+
+
+def test_one_without_a_unit_beside_one_in_another_than_si_is_a_doubt(load: Load) -> None:
+    said = refusal(load({"x": MM}))
+    assert "room.y has no unit, while room.x is in mm; travel must know its unit, one " in said
+    assert found(load({"x": MM}, {"b": M_IN})).conversions == {"room.x": MILLI}  # sink.b tells it
+    assert found(load({"x": M})).conversions == {}
+
+
+def test_a_signal_of_another_quantity_is_refused(load: Load) -> None:
+    assert "rooms.toml: room.x is in N; travel must know" in refusal(
+        load({"x": unit(OUTPUT, "N"), "y": M})
+    )
+    unknown = load({"x": unit(OUTPUT, "cubit"), "y": M})
+    assert "room.x is in 'cubit', which its FMU does not define in SI units" in refusal(unknown)
+
+
+def test_only_what_a_metric_expects_is_asked_for(load: Load) -> None:
+    odd = load({"x": unit(OUTPUT, "N"), "y": unit(OUTPUT, "cubit")})
+    silent = Metric("silent", travel.function, needs=("room.x",))
+    elsewhere = Metric("elsewhere", travel.function, needs={"room.x": "m", "room.z": "m"})
+    assert found(odd, silent, elsewhere) == InSi({}, ())
+    factor = load({}, {"a": M_IN}, [*scaled(1e-3), '"room.y -> sink.b"'])
+    assert found(factor, silent).conversions == {"room.x": None}
+
+
+def test_the_offset_of_a_temperature_does_not_apply_to_a_difference(load: Load) -> None:
+    warm = Metric("warm", travel.function, needs={"room.x": "K", "room.y": "K"})
+    rise = unit(OUTPUT, "degC", ' relativeQuantity="true"')
+    system = load({"x": unit(OUTPUT, "degC"), "y": rise})
+    assert found(system, warm).conversions == {"room.x": Conversion(1.0, 273.15)}
+
+
+def test_an_angle_may_be_a_number(load: Load) -> None:
+    turn = Metric("turn", travel.function, needs={"room.x": "rad", "room.y": "1"})
+    system = load({"x": unit(OUTPUT, "1"), "y": unit(OUTPUT, "rad")})
+    assert found(system, turn) == InSi({}, ())
+
+
+# ------------------------------------------------------------------------- before anything runs
+
+
+def test_every_way_to_run_a_system_refuses_it_first(
+    load: Load, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """These FMUs have no binary: loading one would be another error."""
+    monkeypatch.setattr(extensions, "metrics", [lambda: [travel]])
+    doubtful = load({}, {}, [*scaled(1e-3), '"room.y -> sink.b"'])
+    parameter = Parameter("p", ("room.p",), Listed((1.0, 2.0)))
+    ways: list[Callable[[], object]] = [
+        lambda: simulate(doubtful),
+        lambda: simulate.session(doubtful),
+        lambda: ask(doubtful, ["travel"], 1e-3),
+        lambda: Study("study", doubtful, (parameter,), Design("grid")),
+        lambda: qualify(doubtful, "room", tmp_path / "room.fmu"),
+        lambda: qualify(load({"x": M, "y": M}), "room", other),
+    ]
+    other = write_fmu(tmp_path / "other.fmu", {**ROOM, "x": unit(OUTPUT, "mm")})
+    for way in ways:
+        with pytest.raises(
+            InputError, match=r"must know its unit, one like m: \[components\.room\]"
+        ):
+            way()
+    with pytest.raises(InputError, match=r"of the candidate: --units 'VARIABLE=UNIT'$"):
+        ways[-1]()
+
+
+# ------------------------------------------------------------------------- what a metric sees
+
+TIME = np.array([0.0, 1.0])
+COLUMN = np.array([1.0, 3.0])
+
+
+@given(st.floats(1e-6, 1e6) | st.floats(-1e6, -1e-6), st.floats(-1e3, 1e3))
+def test_signals_come_in_si(factor: float, offset: float) -> None:
+    to_si = {"room.x": Conversion(factor, offset)}
+    run = Signals(TIME, {"room.x": COLUMN, "room.y": COLUMN}, {"hall": "room"}, to_si)
+    assert (run["hall.x"] == factor * COLUMN + offset).all()
+    assert run["hall.x"] is run["room.x"]
+    assert run["room.y"] is COLUMN
+    assert run.by_name["room.x"] is COLUMN
+
+
+def test_a_signal_in_doubt_fails_the_metric_that_asks_for_it() -> None:
+    run = Signals(TIME, {"room.x": COLUMN, "room.y": COLUMN}, {}, {"room.x": None})
+    other = Metric("other", lambda signals: float(signals["room.y"][0]))
+    measured = measure(run, [Metric("travel", travel.function), other])
+    assert dict(measured.values) == {"other": 1.0}
+    assert measured.failures == (
+        "metric 'travel': the unit of room.x is in doubt, as it has none and its connections scale "
+        "it; must be named in the system file, under units",
+    )

@@ -1,0 +1,161 @@
+"""Units that a system file names for variables whose FMU declares none, or a wrong one."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from grasp_cosim import InputError, System
+from grasp_cosim.interface.read import read_interface
+from grasp_cosim.interface.units import Unit
+from grasp_cosim.system.checks import connection_transform, remarks
+from grasp_cosim.system.parts import Condition, Event, Port
+from grasp_cosim.system.settings import settings
+from qualification.made import PLANT, write_fmu
+
+SPRING = {
+    "position": 'causality="input" | Real start="0" unit="m"',
+    "force": 'causality="output" | Real unit="N"',
+}
+BARE = {name: text.replace(' unit="m"', "") for name, text in PLANT.items()}
+"""The plant without units of length."""
+
+
+def load(
+    folder: Path,
+    plant: dict[str, str],
+    more: str = "",
+    link: str = '"plant.gap -> spring.position"',
+) -> System:
+    """A plant and a spring that pushes it; `more` stands under [components.plant]."""
+    write_fmu(folder / "plant.fmu", plant)
+    write_fmu(folder / "spring.fmu", SPRING, {"force": ["position"]})
+    path = folder / "loop.toml"
+    path.write_text(
+        f'connections = [{link}, "spring.force -> plant.force"]\n'
+        "[experiment]\nstep = 1e-3\nstop = 0.01\n"
+        f'[components.plant]\nfmu = "plant.fmu"\nvalues = {{ width = 0.07 }}\n{more}\n'
+        '[components.spring]\nfmu = "spring.fmu"\n',
+        "utf-8",
+    )
+    return System.load(path)
+
+
+def gap_to_position(system: System) -> tuple[float, float]:
+    return connection_transform(system, system.connections[0])
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor"), [("mm", 1e-3), ("m", 1.0), ("km", 1e3), ("um", 1e-6), ("metre", 1.0)]
+)
+def test_a_connection_converts_by_the_named_unit(tmp_path: Path, unit: str, factor: float) -> None:
+    system = load(tmp_path, BARE, f'units = {{ gap = "{unit}" }}')
+    assert gap_to_position(system) == pytest.approx((factor, 0.0), rel=1e-15)
+    assert system.component("plant", "").interface.by_name["gap"].unit == unit
+    assert settings(system)["components"]["plant"]["units"] == {"gap": unit}
+
+
+def test_without_a_name_values_are_passed_as_they_are(tmp_path: Path) -> None:
+    assert gap_to_position(load(tmp_path, BARE)) == (1.0, 0.0)
+
+
+def test_a_definition_of_the_fmu_goes_before_the_known_unit(tmp_path: Path) -> None:
+    interface = read_interface(write_fmu(tmp_path / "plant.fmu", BARE))
+    own = replace(interface, units={"mm": Unit("mm", (0, 1, *[0] * 6), 0.5)})
+    for declares, factor in ((own, 0.5), (interface, 1e-3)):
+        found = declares.in_units({"gap": "mm"})
+        unit = found.unit(found.by_name["gap"])
+        assert unit is not None
+        assert unit.factor == factor
+
+
+def test_a_declared_unit_is_replaced_and_that_is_said(tmp_path: Path) -> None:
+    system = load(tmp_path, dict(PLANT), 'units = { gap = "mm" }')
+    assert gap_to_position(system) == (1e-3, 0.0)
+    said = "plant.gap is declared in m, but named in mm: taken to be in that"
+    assert said in remarks(system)
+    assert remarks(load(tmp_path, dict(PLANT), 'units = { gap = "m" }')) == remarks(
+        load(tmp_path, dict(PLANT))
+    )
+
+
+@pytest.mark.parametrize(
+    ("units", "message"),
+    [
+        ('{ gab = "mm" }', "units: 'gab' = 'mm': plant.fmu has no variable 'gab'; valid: force, g"),
+        ('{ gap = "mmm" }', "units: 'gap' = 'mmm': no unit that plant.fmu defines, or that is kno"),
+        ('{ gap = "" }', "units: 'gap' = '': no unit that plant.fmu defines, or that is known; mu"),
+        ('{ touching = "1" }', "units: 'touching' = '1': is of type Boolean; must be a Real, as o"),
+        ("{ gap = 1 }", "units: 'gap' = 1: must be the name of a unit, like 'mm'"),
+        ('"mm"', "units: 'mm'; must be a table"),
+    ],
+)
+def test_a_name_that_is_wrong_is_one_line(tmp_path: Path, units: str, message: str) -> None:
+    with pytest.raises(InputError) as caught:
+        load(tmp_path, BARE, f"units = {units}")
+    assert str(caught.value).startswith(f"loop.toml: [components.plant]: {message}")
+    assert "\n" not in str(caught.value)
+
+
+def test_keys_are_the_names_of_the_system(tmp_path: Path) -> None:
+    link = '"plant.distance -> spring.position"'
+    more = 'rename = { distance = "gap" }\nunits = { distance = "mm" }'
+    assert gap_to_position(load(tmp_path, BARE, more, link)) == (1e-3, 0.0)
+    with pytest.raises(InputError, match=r"units: 'gap' = 'mm': plant\.fmu has no variable 'gap'"):
+        load(tmp_path, BARE, more.replace('{ distance = "mm"', '{ gap = "mm"'), link)
+
+
+# ------------------------------------------------------------------------- another FMU in its place
+
+
+def in_mm(folder: Path, name: str = "other.fmu") -> Path:
+    plant = {n: text.replace('unit="m"', 'unit="mm"') for n, text in PLANT.items()}
+    plant["width"] = plant["width"].replace('start="0.05"', 'start="50"').replace(' max="1"', "")
+    return write_fmu(folder / name, plant)
+
+
+def test_values_are_converted_for_an_fmu_in_other_units(tmp_path: Path) -> None:
+    system = load(tmp_path, dict(PLANT))
+    swapped = system.swap("plant", in_mm(tmp_path))
+    assert swapped.start("plant.width") == pytest.approx(70.0, rel=1e-15)
+    assert gap_to_position(swapped) == (1e-3, 0.0)
+    again = swapped.swap("plant", tmp_path / "plant.fmu")
+    assert again.start("plant.width") == pytest.approx(0.07, rel=1e-15)
+    revised = system.revised({"plant": in_mm(tmp_path)}, {"plant.width": 60.0}, ("--swap", "--set"))
+    assert revised.start("plant.width") == 60.0
+
+
+def test_a_value_in_a_unit_that_the_other_fmu_lacks_is_refused(tmp_path: Path) -> None:
+    bare = write_fmu(tmp_path / "bare.fmu", BARE)
+    system = load(tmp_path, dict(PLANT))
+    assert system.swap("plant", bare).start("plant.width") == 0.07  # in SI, as without units
+    swapped = system.swap("plant", in_mm(tmp_path))
+    with pytest.raises(
+        InputError, match=r"^swap plant: width has no unit in bare\.fmu, but is set"
+    ):
+        swapped.swap("plant", bare)
+    volts = {
+        **PLANT,
+        "width": 'causality="parameter" variability="fixed" | Real start="1" unit="N"',
+    }
+    with pytest.raises(
+        InputError, match=r"^swap plant: width is in N, which its value in m cannot"
+    ):
+        system.swap("plant", write_fmu(tmp_path / "volts.fmu", volts))
+
+
+def test_a_condition_in_another_unit_is_refused(tmp_path: Path) -> None:
+    system = load(tmp_path, dict(PLANT))
+    event = Event({Port("plant", "mass"): 0.4}, when=Condition(Port("plant", "gap"), "<", 0.01))
+    with pytest.raises(
+        InputError, match=r"^swap plant: gap is in mm, but an event, a fault or the"
+    ):
+        replace(system, events=(event,)).swap("plant", in_mm(tmp_path))
+
+
+def test_a_named_unit_gives_way_to_what_another_fmu_declares(tmp_path: Path) -> None:
+    system = load(tmp_path, BARE, 'units = { gap = "mm" }')
+    same = system.swap("plant", write_fmu(tmp_path / "bare.fmu", BARE))
+    assert gap_to_position(same) == (1e-3, 0.0)
+    declared = system.swap("plant", write_fmu(tmp_path / "si.fmu"))
+    assert gap_to_position(declared) == (1.0, 0.0)
+    assert declared.component("plant", "").units == {}
