@@ -85,6 +85,9 @@ _EDITS = {
     0x3408E: bytes.fromhex(
         "488b7b784885ff0f84e4f8ffffe85003feff4885c00f84d6f8ffff488d2d2e630000e931f8ffff"
     ),
+    # In fmi2DoStep: a step that is discarded is no wish to end the simulation, for
+    # fmi2GetBooleanStatus(fmi2Terminated).
+    0x18CD0: bytes(1),
     # In .rela.dyn, what the catch clauses wait for: for the type info of pythonfmu::fatal_error
     # that of pythonfmu::PyLogger, an abstract class, of which there is no object to throw.
     0x102C4: struct.pack("<I", 0x1E8),

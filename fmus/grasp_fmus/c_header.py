@@ -12,7 +12,8 @@ from pathlib import Path
 from string import Template
 from typing import NamedTuple
 
-from .link.message import HEAD, STRING_SIZE, TAG_SIZE, Codec, Value, check_size
+from .link.message import HEAD, LONGEST_STEP, STRING_SIZE, TAG_SIZE, Codec, Value, check_size
+from .link.peer import TOO_LONG
 from .link.signature import ORDER, Causality, LinkVariable, Signature
 
 TEMPLATE = Path(__file__).with_name("link.h.in")
@@ -101,6 +102,8 @@ def c_header(
         signature_lines="".join(f"        {line},\n" for line in lines),
         packing="\n".join(packing),
         signature_size=text_size,
+        longest_step=LONGEST_STEP,
+        too_long=TOO_LONG,
         inputs_size=inputs.size,
         parameters_size=parameters.size,
         outputs_size=outputs.size,

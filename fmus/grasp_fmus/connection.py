@@ -15,6 +15,9 @@ from .link.message import BUSY, FAILED, LARGEST, UNKNOWN, Value
 REPEAT = 50_000_000
 """ns after which a HELLO or an INITIALISE without an answer is sent again."""
 
+FILL = 1024
+"""Bytes by which a HELLO is longer after an answer that was cut; four times as many the next."""
+
 STALE = 64
 """The most datagrams to take, before a request, of those that came after the last."""
 
@@ -66,9 +69,16 @@ class Connection:
         if self._stage == NEW:
             self._pending = self.client.greet(randbits(64), self._clock())
             self._stage = GREETING
-        if self._stage == GREETING and self._ask(self._pending, deadline, repeat=True):
-            self._stage = WELCOME
-            self.sessions += 1
+        fill = FILL
+        while self._stage == GREETING:
+            if self._ask(self._pending, deadline, repeat=True):
+                self._stage = WELCOME
+                self.sessions += 1
+            elif self.refusal and self.refusal.cut and fill <= LARGEST:
+                self._pending = self.client.greet(randbits(64), self._clock(), fill)
+                fill *= 4
+            else:
+                break
         return self._stage > GREETING
 
     def initialise(self, time: float, values: Sequence[Value], deadline: int) -> bool:

@@ -10,9 +10,9 @@ from weakref import finalize
 
 from .base import INITIALISING, INSTANTIATED, STEPPING, RefusalError, Slave, reported
 from .connection import Connection
-from .host_log import WARNING
+from .host_log import DISCARD, WARNING
 from .link.client import Client
-from .link.message import FAILED, PORT, STRING_SIZE, read_key
+from .link.message import FAILED, LONGEST_STEP, PORT, STRING_SIZE, exposed, read_key
 from .link.signature import LinkVariable, Signature
 from .variable import TYPES, Scalar, Variable
 
@@ -158,8 +158,14 @@ class Fmi2Proxy(Slave):
 
     @reported
     def do_step(self, current_time: float, step_size: float) -> bool:
-        """Send inputs and parameters, wait for the outputs; without them, hold or lose."""
+        """Send inputs and parameters, wait for the outputs; without them, hold or lose.
+
+        Returns False, and does nothing, if the step is longer than a peer takes.
+        """
         self._check_step(current_time, step_size)
+        if step_size > LONGEST_STEP:
+            self._log(DISCARD, f"step of {step_size} s: must be at most {LONGEST_STEP:g} s")
+            return False
         if self._inputs is None:
             self._refresh()
         settings, connection = self._read_settings(), self._connection
@@ -214,7 +220,7 @@ class Fmi2Proxy(Slave):
         if self._connection is not None and self._address == address:
             return self._connection
         self._disconnect()
-        client = Client(self._signature, _key(settings.key_file))
+        client = Client(self._signature, self._key(settings.key_file))
         try:
             connection = Connection(settings.host, settings.port, client, self.clock)
         except (OSError, UnicodeError) as error:
@@ -226,6 +232,20 @@ class Fmi2Proxy(Slave):
             self._give_up(connection, settings)
         self._values[self._diagnostics.start] = self._state = CONNECTED
         return connection
+
+    def _key(self, file: str) -> bytes | None:
+        """Return the shared key in a file, None without a file; RefusalError where it is invalid.
+
+        It is logged where others can read it.
+        """
+        try:
+            key = read_key(Path(file)) if file else None
+            if key and (said := exposed(Path(file))):
+                self._log(WARNING, said)
+        except (OSError, ValueError) as error:
+            reason = getattr(error, "strerror", error)
+            raise RefusalError(f"proxy.key_file = {file!r}: {reason}") from error
+        return key
 
     def _deadline(self, timeout: float) -> int:
         return self.clock() + round(timeout * _NANOSECONDS)
@@ -317,12 +337,3 @@ def _slices(sizes: Sequence[int]) -> list[slice]:
 
 def _peer(settings: Settings) -> str:
     return f"{settings.host}:{settings.port}"
-
-
-def _key(file: str) -> bytes | None:
-    """Return the shared key in a file, None without a file; RefusalError where it is invalid."""
-    try:
-        return read_key(Path(file)) if file else None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", error)
-        raise RefusalError(f"proxy.key_file = {file!r}: {reason}") from error

@@ -28,6 +28,7 @@ from grasp_fmus.link.message import (
     HEAD,
     HELLO,
     INITIALISE,
+    LONGEST_STEP,
     OUTPUTS,
     REFUSE,
     STEP,
@@ -549,6 +550,10 @@ def test_outputs_that_are_none_fail_and_are_named(tmp_path: Path) -> None:
 # Against link/peer.py
 
 
+STEPS = (*(0.1, 1e-3, 1e-9, 0.0, -1.0) * 4, LONGEST_STEP, 1e300)
+"""The last is too long."""
+
+
 class Proxies:
     """Some proxies at one peer, whose requests come in disorder, again, or damaged."""
 
@@ -574,14 +579,22 @@ class Proxies:
         chosen = rng.random()
         if chosen < 0.04 or not s.cookie:
             s.sequence = 0
-            return s.hello()
+            return self._hello(s)
         values = drawn_values(rng)
         values[6] = rng.choice((FAIL, SILENT)) if rng.random() < 0.02 else values[6]
         if chosen < 0.2 or not s.sequence:
             return s.initialise(values, rng.choice((0.0, 2.5)))
         if chosen < 0.21:
             return s.end()
-        return s.step(rng.uniform(-1.0, 1e6), rng.choice((0.1, 1e-3, 1e-9, 0.0, -1.0)), values)
+        return s.step(rng.uniform(-1.0, 1e6), rng.choice(STEPS), values)
+
+    def _hello(self, s: Session) -> bytes:
+        """One of the same interface, longer or not, or of another, of any length."""
+        body, foreign = EVERY_KIND.text.encode() + bytes(self.rng.choice((0, 0, 50))), bytes(16)
+        if self.rng.random() < 0.8:
+            return s.made(HELLO, body, cookie=0, sequence=0)
+        size = self.rng.randrange(len(body))
+        return s.made(HELLO, body[:size], cookie=0, sequence=0, interface=foreign)
 
     def _damaged(self, datagram: bytes) -> bytes:
         rng = self.rng

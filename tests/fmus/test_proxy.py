@@ -263,6 +263,7 @@ def test_a_host_with_more_files_open_than_can_be_watched(monkeypatch: pytest.Mon
 def test_a_shared_key(tmp_path: Path) -> None:
     key = tmp_path / "key"
     key.write_bytes(b"0123456789abcdef\n")
+    key.chmod(0o600)
     with ScriptedPeer(key=b"0123456789abcdef") as peer:
         host = Host(peer.port, peer.clock, key_file=str(key)).initialise()
         host.step()
@@ -273,6 +274,7 @@ def test_a_shared_key(tmp_path: Path) -> None:
 def test_a_peer_without_the_key_is_not_listened_to(tmp_path: Path) -> None:
     key = tmp_path / "key"
     key.write_bytes(b"0123456789abcdef")
+    key.chmod(0o600)
     with connected(key_file="") as (_, peer):
         host = Host(peer.port, Clock(tick=40_000_000), key_file=str(key), connect_timeout=0.1)
         line = refused(host, host.slave.enter_initialization_mode)

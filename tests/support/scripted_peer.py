@@ -221,7 +221,8 @@ def busy(peer: ScriptedPeer, m: Message) -> None:
 
 def other(signature: Signature) -> Act:
     def act(peer: ScriptedPeer, m: Message) -> None:
-        peer.send(peer.pack(m, REFUSE, signature.text.encode(), OTHER_INTERFACE))
+        text, own = signature.text.encode(), signature.hash
+        peer.send(peer.pack(m, REFUSE, text, OTHER_INTERFACE, interface=own))
 
     return act
 

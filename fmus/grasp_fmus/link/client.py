@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from enum import Enum, auto
 
 from . import message
-from .message import Codec, Message, Sealer, Value
-from .signature import Signature
+from .message import HEAD, LARGEST, TAG_SIZE, Codec, Message, Sealer, Value
+from .signature import Signature, hashed
 
 WINDOW = 4096
 """Requests back from the newest of which is known whether they were answered."""
@@ -46,10 +46,14 @@ class Counters:
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """The reason why the peer refused, as a code of REFUSE and in words."""
+    """The reason why the peer refused, as a code of REFUSE and in words.
+
+    `cut`: the variables of the peer did not fit into an answer to so short a HELLO.
+    """
 
     code: int
     text: str
+    cut: bool = False
 
 
 class Client:
@@ -76,13 +80,18 @@ class Client:
 
     # Requests
 
-    def greet(self, session: int, now: int) -> bytes:
-        """Return HELLO, to begin a session of that number: a new one, 64 bits at random."""
+    def greet(self, session: int, now: int, fill: int = 0) -> bytes:
+        """Return HELLO, to begin a session of that number: a new one, 64 bits at random.
+
+        `fill` are bytes by which it is longer, and as much longer an answer may be.
+        """
         self._session, self._cookie = session, 0
         self._sequence = self._first_step = self._newest = self._seen = self._awaited = 0
         self._greeting = True
         self.refusal = None
-        return self._pack(message.HELLO, now, self.signature.text.encode())
+        text = self.signature.text.encode()
+        room = LARGEST - HEAD.size - TAG_SIZE - len(text)
+        return self._pack(message.HELLO, now, text + bytes(min(fill, room)))
 
     def initialise(self, time: float, values: Sequence[Value], now: int) -> bytes:
         """Return INITIALISE with the values of inputs and parameters; `time` in s.
@@ -158,7 +167,8 @@ class Client:
         if not expected or m.cookie != self._cookie or not (self._greeting or self._awaited):
             return self._reject()
         text = m.body.decode(errors="replace")
-        other = self.signature.difference(text) or "unnamed"
+        cut = m.code == message.OTHER_INTERFACE and hashed(m.body) != m.interface
+        other = "unnamed" if cut else self.signature.difference(text) or "unnamed"
         reasons = {
             message.OTHER_INTERFACE: f"the peer has another interface: {other}",
             message.BUSY: "the peer is busy with another proxy",
@@ -167,7 +177,7 @@ class Client:
         }
         if m.code not in reasons:
             return self._reject()
-        self.refusal = Refusal(m.code, reasons[m.code])
+        self.refusal = Refusal(m.code, reasons[m.code], cut)
         return Verdict.REFUSED
 
     def _receive_outputs(self, m: Message, now: int) -> Verdict:

@@ -1,6 +1,8 @@
 """Packs and opens datagrams: a header of 80 bytes, a body, 32 of HMAC-SHA256 if a key is shared."""
 
 import hmac
+import os
+import stat
 import struct
 from collections.abc import Sequence
 from math import isfinite
@@ -25,12 +27,17 @@ LARGEST = 65_507
 PORT = 5501
 """The default UDP port of a peer."""
 
+LONGEST_STEP = 3600.0
+"""s that a STEP may ask for, so that no datagram keeps a bench busy for good."""
+
 STRING_SIZE = 128
 SMALLEST_KEY = 16
 """Bytes of a shared key, at least."""
 
 MALFORMED, FORGED = "malformed", "forged"
 """The faults of a datagram: it is not of this protocol, or its tag is not that of the key."""
+
+_TEXT = frozenset((*b"\t\r\n", *range(0x20, 0x7F)))
 
 _CODES = {"Real": "d", "Integer": "q", "Boolean": "Q", "String": f"{STRING_SIZE}s"}
 
@@ -143,10 +150,24 @@ class Codec:
 
 
 def read_key(path: Path) -> bytes:
-    """Return the key in a file, without line ends around it; ValueError where it is too short."""
-    key = path.read_bytes().strip(b"\r\n")
+    """Return the key in a file; ValueError where it is too short.
+
+    A file of printable ASCII, tabs and line ends is text: line ends around it are not of the key.
+    Of any other, such as random bytes, every byte is.
+    """
+    data = path.read_bytes()
+    is_text = all(byte in _TEXT for byte in data)
+    key = data.strip(b"\r\n") if is_text else data
     Sealer(key)
     return key
+
+
+def exposed(path: Path) -> str:
+    """Say that others on this machine can read a key file, or write it; empty where they cannot."""
+    mode = stat.S_IMODE(path.stat().st_mode)
+    if os.name == "nt" or not mode & 0o077:
+        return ""
+    return f"{path}: others have access to this key, mode {mode:03o}; must be 600: chmod 600 {path}"
 
 
 def check_size(signature: Signature) -> None:

@@ -1,6 +1,8 @@
 """The bench's side of a session: judges requests, keeps the order, counts. No sockets.
 
-The caller does what an Action says and sends what it gets: at most one datagram for each received.
+The caller does what an Action says and sends what it gets: at most one datagram for each received,
+and none that is longer than that while there is no session: who sends in another's name has nothing
+to gain by it.
 """
 
 from collections import OrderedDict
@@ -15,6 +17,9 @@ from .signature import Signature
 
 ALIVE = 1_000_000_000
 """ns since its last request for which a session keeps others away."""
+
+TOO_LONG = f"the step is too long: must be at most {message.LONGEST_STEP:g} s"
+"""The reason why a STEP is not done."""
 
 LARGEST_REASON = 1024
 """Bytes of what a REFUSE says in words."""
@@ -83,7 +88,13 @@ class Peer:
         self._last: Message | None = None
         self._last_answer: bytes | None = None
         self._refused: tuple[int, int, int] | None = None  # the request that failed, for its repeat
+        self._reason = b""  # why it failed
         self._stepping = False
+
+    @property
+    def in_session(self) -> bool:
+        """True from the first INITIALISE of a session to its end."""
+        return self._live is not None
 
     def receive(self, datagram: bytes, now: int) -> Action:
         """Return what to do about a datagram; `now` in ns of a monotonic clock."""
@@ -109,11 +120,10 @@ class Peer:
         """Return the answer to the last request where it cannot be done; end the session."""
         m = self._last
         assert m is not None  # noqa: S101 - there is a request to answer
-        body = reason.encode()[:LARGEST_REASON]
-        self._last_answer = self._pack(m, message.REFUSE, message.FAILED, body)
+        self._reason = reason.encode()[:LARGEST_REASON]
         self._over()
         self._refused = m.session, m.cookie, m.sequence
-        return self._last_answer
+        return self._pack(m, message.REFUSE, message.FAILED, self._reason)
 
     def _drop(self, counter: str) -> Action:
         setattr(self.counters, counter, getattr(self.counters, counter) + 1)
@@ -128,9 +138,9 @@ class Peer:
             return self._drop("malformed")
         if m.interface != self.signature.hash:
             self.counters.foreign += 1
-            text = self.signature.text.encode()
-            return self._pack(m, message.REFUSE, message.OTHER_INTERFACE, text)
-        if m.body != self.signature.text.encode():
+            fits = self.signature.text.encode()[: len(m.body)]
+            return self._pack(m, message.REFUSE, message.OTHER_INTERFACE, fits)
+        if m.body.rstrip(b"\0") != self.signature.text.encode():
             return self._drop("malformed")
         if self._busy(m.session, now):
             self.counters.busy += 1
@@ -164,7 +174,7 @@ class Peer:
         """Make the session of the first INITIALISE the one under way."""
         if m.kind == message.INITIALISE and self._refused == (m.session, m.cookie, m.sequence):
             self.counters.repeated += 1
-            return self._last_answer
+            return self._pack(m, message.REFUSE, message.FAILED, self._reason[: len(m.body)])
         if self._greeted.get(m.session) != m.cookie or m.kind != message.INITIALISE:
             self.counters.foreign += 1
             end = m.kind == message.END
@@ -186,6 +196,8 @@ class Peer:
         # Only what is new counts as heard: who repeats a recorded datagram keeps nobody away
         self._heard = now
         self._last, self._last_answer, self._refused = m, None, None
+        if m.step > message.LONGEST_STEP:
+            return self.failed(TOO_LONG)
         if m.kind == message.STEP:
             self._stepping = True
             self.counters.steps += 1

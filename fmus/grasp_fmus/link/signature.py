@@ -58,7 +58,7 @@ class Signature:
     @cached_property
     def hash(self) -> bytes:
         """The first 16 bytes of the SHA-256 of the text."""
-        return sha256(self.text.encode()).digest()[:HASH_SIZE]
+        return hashed(self.text.encode())
 
     @cached_property
     def request(self) -> tuple[LinkVariable, ...]:
@@ -91,6 +91,11 @@ class Signature:
             found = ["the variables are in another order"]
         more = [f"and {len(found) - NAMED} more"] if len(found) > NAMED else []
         return "; ".join([*found[:NAMED], *more])
+
+
+def hashed(text: bytes) -> bytes:
+    """Return the hash of a signature's text."""
+    return sha256(text).digest()[:HASH_SIZE]
 
 
 def _lines(text: str) -> dict[str, str]:

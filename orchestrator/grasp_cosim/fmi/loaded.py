@@ -82,6 +82,7 @@ class LoadedInstance(ABC):
         self._running = False
         self._clock: npt.NDArray[np.float64] | None = None
         self._unread: deque[str] = deque(maxlen=KEPT)
+        self._said_before = 0  # of these, on longer parts of a step that is divided
         self._read_log()  # forgets what an earlier instance of this name said
         self._folder = ScratchFolder()
         self._resources = Path(self._folder.name, "resources")
@@ -219,6 +220,7 @@ class LoadedInstance(ABC):
 
         SimulationError where the FMU asks for the end of the simulation.
         """
+        self._said_before = len(self._unread)
         if self._wants_the_end():
             raise self.failure(DISCARD, self._time())
         return self._reached()
@@ -233,8 +235,9 @@ class LoadedInstance(ABC):
         else:
             what = f"returned {STATUS[status] if status < len(STATUS) else status}"
         said = self._messages()
+        reason = as_reason(said[self._said_before :] or said)
         error = SimulationError(
-            f"{self.name}: {self.interface.path.name} {what} at t = {time:.9g} s{as_reason(said)}"
+            f"{self.name}: {self.interface.path.name} {what} at t = {time:.9g} s{reason}"
         )
         for text in said:
             error.add_note(text)

@@ -50,14 +50,21 @@ class DrivenFmu:
         else:
             self._set_changed(values)
 
-    def step(self, time: float, step: float, values: Sequence[Value]) -> None:
+    def step(
+        self,
+        time: float,
+        step: float,
+        values: Sequence[Value],
+        over: Callable[[], bool] = lambda: False,
+    ) -> None:
         """Step from `time` over `step`, both in s, with these values.
 
-        What is missing before `time` is made up for first, in steps of the same length.
+        What is missing before `time` is made up for first, in steps of the same length, until
+        `over` says that there is no time left.
         """
         self.begin()
         self.set(values)
-        self._catch_up(time, step)
+        self._catch_up(time, step, over)
         self.advance(time, step)
 
     def begin(self) -> None:
@@ -143,7 +150,7 @@ class DrivenFmu:
         if changed:
             self._required().set([v for v, _ in changed], [new for _, new in changed])
 
-    def _catch_up(self, time: float, step: float) -> None:
+    def _catch_up(self, time: float, step: float, over: Callable[[], bool]) -> None:
         if isclose(time, self.time, rel_tol=1e-12, abs_tol=TOLERANCE):
             return
         missing = (time - self.time) / step
@@ -155,6 +162,11 @@ class DrivenFmu:
         begin = self.time
         whole = int(missing + 0.5) if abs(missing - round(missing)) < 1e-3 else int(missing) + 1
         for k in range(whole):
+            if over():
+                name = self.interface.path.name
+                raise SimulationError(
+                    f"{name}: the end came with {k} of {whole} lost steps made up"
+                )
             at = begin + k * step
             self.advance(at, (time if k == whole - 1 else begin + (k + 1) * step) - at)
 

@@ -33,6 +33,7 @@ class Loop:
         self._due, self._look, self._clock = due, look, clock
         self._lock = threading.Lock()  # handlers work on what other threads may read
         self._stopping = False
+        self._end: int | None = None
         with ExitStack() as stack:
             # select() waits to the microsecond, epoll() and poll() to the millisecond
             self._selector = stack.enter_context(selectors.SelectSelector())
@@ -52,12 +53,13 @@ class Loop:
 
         Whatever a handler raises ends it.
         """
-        end = None if duration_ns is None else self._clock() + duration_ns
-        while not (self._stopping or done()):
-            now = self._clock()
-            if end is not None and now >= end:
-                break
-            self.turn(None if end is None else end - now)
+        self._end = None if duration_ns is None else self._clock() + duration_ns
+        while not (self.over() or done()):
+            self.turn(None if self._end is None else self._end - self._clock())
+
+    def over(self) -> bool:
+        """Return True once `run` has to return: what takes long must not go on then."""
+        return self._stopping or (self._end is not None and self._clock() >= self._end)
 
     def turn(self, wait_ns: int | None) -> None:
         """Wait for a datagram, for what is due, for `stop` or `wait_ns`; then do what there is."""

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 
 from grasp_fmus.link.message import END, INITIALISE
-from grasp_fmus.link.peer import Peer, Request
+from grasp_fmus.link.peer import TOO_LONG, Peer, Request
 
 from ..errors import InputError, SimulationError
 from ..interface.interface import Interface, Value
@@ -87,6 +87,8 @@ class ServedFmu:
         self._heard: int | None = None  # the last request, while the watchdog watches
         self._own_failure = ""
         self._unsaid = dict(DROPPED)
+        self.over: Callable[[], bool] = lambda: False
+        """Says when to give up what takes long; whoever serves sets it."""
 
     def close(self) -> None:
         """End the session under way, and free the FMU."""
@@ -106,6 +108,9 @@ class ServedFmu:
         action = self.peer.receive(datagram, now)
         if not isinstance(action, Request):
             self._say_what_is_dropped(source)
+            if self._in_session and not self.peer.in_session:
+                self.counts.failures += 1
+                self._end(TOO_LONG)
             return action
         if action.kind == END:
             self._end("the proxy ended the session")
@@ -134,7 +139,7 @@ class ServedFmu:
         if request.kind == INITIALISE:
             self._fmu.initialise(request.time, request.values, request.fresh)
         elif self._service.lockstep:
-            self._fmu.step(request.time, request.step, request.values)
+            self._fmu.step(request.time, request.step, request.values, self.over)
         else:
             step_ns = self._own_step(request.step)
             self._heard = now

@@ -25,6 +25,7 @@ class Server(Loop):
         """Bind the port, 0 for any that is free; InputError where that is not possible."""
         self.fmu = fmu
         self._say = say
+        fmu.over = self.over
         try:
             super().__init__(address, fmu.due, fmu.look)
         except InputError:

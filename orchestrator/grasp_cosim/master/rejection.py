@@ -26,7 +26,7 @@ def finish_step(instance: Instance, status: int, begin: float, end: float) -> No
         if reached > clock[0]:
             clock[0] = reached
             length = end - float(clock[0])
-        elif (length := length / 2) < smallest:
+        elif (length := length / 2) < smallest or clock[0] + length == clock[0]:
             raise instance.failure(status, float(clock[0]))
         while clock[0] < end:
             length = min(length, end - float(clock[0]))

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from grasp_fmus.link import message
-from grasp_fmus.link.message import Codec, Message, Sealer, read_key
+from grasp_fmus.link.message import Codec, Message, Sealer, exposed, read_key
 from grasp_fmus.link.signature import LinkVariable, Signature
 from hypothesis import given
 from hypothesis import strategies as st
@@ -148,6 +148,29 @@ def test_a_body_of_another_size_holds_no_values(size: int) -> None:
 def test_a_string_that_does_not_fit_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match=r"d = .*: must have fewer than 128 bytes"):
         Codec(ALL).pack([1.0, 1, True, text])
+
+
+@pytest.mark.parametrize("around", [b"\n", b"\r\n", b" ", b"\t", b"\0", b"\xff"])
+def test_every_byte_of_a_key_that_is_no_text_counts(tmp_path: Path, around: bytes) -> None:
+    for key in (KEY + b"\0" + around, around + b"\xe9" + KEY):
+        (tmp_path / "key").write_bytes(key)
+        assert read_key(tmp_path / "key") == key
+
+
+def test_spaces_of_a_key_that_is_text_count(tmp_path: Path) -> None:
+    (tmp_path / "key").write_bytes(b" a key with spaces \n")
+    assert read_key(tmp_path / "key") == b" a key with spaces "
+
+
+@pytest.mark.parametrize(
+    ("mode", "said"), [(0o600, ""), (0o400, ""), (0o640, "640"), (0o604, "604")]
+)
+def test_a_key_that_others_can_read_is_said_to_be_so(tmp_path: Path, mode: int, said: str) -> None:
+    path = tmp_path / "key"
+    path.write_bytes(KEY)
+    path.chmod(mode)
+    line = f"{path}: others have access to this key, mode {said}; must be 600: chmod 600 {path}"
+    assert exposed(path) == (line if said else "")
 
 
 def test_a_key_is_read_without_the_line_end(tmp_path: Path) -> None:

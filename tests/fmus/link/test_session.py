@@ -4,10 +4,25 @@ from itertools import count
 from typing import Any
 
 import pytest
-from grasp_fmus.link.client import Client, Verdict
-from grasp_fmus.link.message import END, INITIALISE, OUTPUTS, STEP, Message, Sealer, Value
-from grasp_fmus.link.peer import ALIVE, Peer, Request
+from grasp_fmus.link.client import Client, Refusal, Verdict
+from grasp_fmus.link.message import (
+    END,
+    FAILED,
+    HELLO,
+    INITIALISE,
+    LONGEST_STEP,
+    OTHER_INTERFACE,
+    OUTPUTS,
+    STEP,
+    Codec,
+    Message,
+    Sealer,
+    Value,
+)
+from grasp_fmus.link.peer import ALIVE, TOO_LONG, Peer, Request
 from grasp_fmus.link.signature import LinkVariable, Signature
+from hypothesis import given
+from hypothesis import strategies as st
 
 U = LinkVariable("u", "Real", "input", "m")
 P = LinkVariable("p", "Boolean", "parameter")
@@ -142,12 +157,16 @@ def test_an_answer_from_the_future_is_rejected() -> None:
 def test_another_interface_is_refused_and_the_difference_named() -> None:
     bench = Bench(Signature((U, P, Y._replace(unit="mN"))))
     client = Client(SIGNATURE)
-    assert client.receive(bench.answers(client.greet(1, T0)) or b"", T0) is Verdict.REFUSED
-    assert client.refusal is not None
-    assert client.refusal.text == (
-        "the peer has another interface: output y, Real in mN, must be output y, Real in N"
+    assert heard(bench, client, client.greet(1, T0)) is Verdict.REFUSED
+    assert client.refusal == Refusal(
+        OTHER_INTERFACE, "the peer has another interface: unnamed", cut=True
+    )  # the text of the bench is longer than ours by one byte
+    assert heard(bench, client, client.greet(2, T0, fill=1)) is Verdict.REFUSED
+    assert client.refusal == Refusal(
+        OTHER_INTERFACE,
+        "the peer has another interface: output y, Real in mN, must be output y, Real in N",
     )
-    assert bench.peer.counters.foreign == 1
+    assert bench.peer.counters.foreign == 2
 
 
 def test_a_live_session_keeps_others_away_until_it_is_silent() -> None:
@@ -283,3 +302,66 @@ def test_a_recorded_step_sent_again_and_again_keeps_nobody_away() -> None:
     for later in range(0, 3 * ALIVE, ALIVE // 4):
         bench.answers(request, T0 + later)
     begun(bench, session=2, now=T0 + 2 * ALIVE)
+
+
+def test_a_hello_that_is_longer_is_welcome() -> None:
+    bench, client = Bench(), Client(SIGNATURE)
+    assert heard(bench, client, client.greet(1, T0, fill=100)) is Verdict.ANSWERED
+    wrong = Message(HELLO, 0, SIGNATURE.hash, 2, 0, 0, 0.0, 0.0, 0, SIGNATURE.text.encode() + b"x")
+    assert bench.answers(Sealer().pack(wrong)) is None
+    assert bench.peer.counters.malformed == 1
+
+
+@pytest.mark.parametrize("step", [LONGEST_STEP * 1.001, 1e300])
+def test_a_step_that_is_too_long_is_refused_and_not_done(step: float) -> None:
+    bench = Bench()
+    client = begun(bench)
+    assert heard(bench, client, client.step(0.0, step, VALUES, T0)) is Verdict.REFUSED
+    assert client.refusal == Refusal(FAILED, f"the peer failed: {TOO_LONG}")
+    assert not bench.peer.in_session
+    assert bench.peer.counters.steps == 0
+    begun(bench, session=100)
+    assert bench.peer.in_session
+
+
+def test_the_longest_step_is_done() -> None:
+    bench = Bench()
+    client = begun(bench)
+    assert heard(bench, client, client.step(0.0, LONGEST_STEP, VALUES, T0)) is Verdict.ANSWERED
+
+
+ANY_HEAD = st.builds(
+    Message,
+    kind=st.integers(0, 8),
+    code=st.integers(0, 5),
+    interface=st.sampled_from([SIGNATURE.hash, bytes(16)]),
+    session=st.integers(0, 3),
+    cookie=st.integers(0, 3),
+    sequence=st.integers(0, 2),
+    time=st.floats(width=64),
+    step=st.floats(width=64) | st.just(0.0),
+    sent=st.integers(0, 9),
+    body=st.binary(max_size=40)
+    | st.just(SIGNATURE.text.encode())
+    | st.just(SIGNATURE.text.encode() + bytes(9))
+    | st.just(Codec(SIGNATURE.request).pack(VALUES)),
+)
+REASON = "the motor is hot, and so is all that stands beside it"
+
+
+@pytest.mark.parametrize("key", [None, KEY[0]])
+@given(sent=st.lists(st.one_of(ANY_HEAD, ANY_HEAD, st.binary(max_size=200)), max_size=30))
+def test_without_a_session_no_answer_is_longer_than_its_request(
+    key: bytes | None, sent: list[Message | bytes]
+) -> None:
+    """Whatever comes, and from whomever: also where the model fails at every INITIALISE."""
+    peer, sealer = Peer(SIGNATURE, key, count(1).__next__), Sealer(key)
+    for each in sent:
+        request = each if isinstance(each, bytes) else sealer.pack(each)
+        before = peer.in_session
+        action = peer.receive(request, T0)
+        if isinstance(action, Request):
+            if action.kind != END:
+                peer.failed(REASON)
+        elif action is not None and not before:
+            assert len(action) <= len(request)

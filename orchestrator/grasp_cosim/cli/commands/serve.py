@@ -1,8 +1,13 @@
 """The command serve."""
 
+import os
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import click
+from grasp_fmus.link.message import exposed
 
 from ...errors import InputError
 from ...hil.address import is_loopback, text
@@ -11,8 +16,11 @@ from ...hil.served import ServedFmu, Service
 from ...hil.server import DEFAULT_ADDRESS, Server
 from ...interface.read import read_interface
 from ...system.description import in_nanoseconds
-from ..frame import INTERRUPTED, NEGATIVE, PATH, fail, json_option, pair, show
+from ..frame import FAILED, INTERRUPTED, NEGATIVE, PATH, fail, json_option, pair, show
 from ..signals import ended_by_signals
+
+PATIENCE = 2.0
+"""s that a call of the FMU may go on after --duration."""
 
 
 @click.command()
@@ -74,9 +82,11 @@ def serve(
             _say(note)
         at = text(server.address)
         _say(f"serving {fmu.name} at {at}, {'lockstep' if lockstep else 'real time'}")
+        if key_file is not None and (said := exposed(key_file)):
+            _say(said)
         if not is_loopback(server.address) and key_file is None:
             _say(f"{at} can be reached by others, who may take part: --key-file keeps them out")
-        with ended_by_signals(server.stop) as came:
+        with ended_by_signals(server.stop) as came, _ended_after(duration, fmu.name):
             server.serve(sessions, end)
         counters = served.counters()
     came_in = ", ".join(f"{name} {count}" for name, count in counters.items() if count)
@@ -86,6 +96,26 @@ def serve(
     if sessions and counters["sessions"] < sessions:
         return fail(f"{counters['sessions']} of {sessions} sessions in {duration!r} s", NEGATIVE)
     return 0
+
+
+@contextmanager
+def _ended_after(duration: float | None, name: str) -> Iterator[None]:
+    """End the process where the FMU hangs in a call when --duration, in s, is over."""
+
+    def give_up() -> None:
+        fail(f"{name} has not returned from a call {PATIENCE:g} s after --duration", FAILED)
+        os._exit(FAILED)
+
+    if duration is None:
+        yield
+        return
+    timer = threading.Timer(duration + PATIENCE, give_up)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 def _say(text: str) -> None:

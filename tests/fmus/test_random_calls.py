@@ -1,0 +1,70 @@
+"""Whatever a host calls, with whatever: no FMU ends its process, takes long, or keeps memory.
+
+random_calls.py makes the calls, in a process of its own; what a refused call does is in test_fuzz.
+"""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+from grasp_cosim.hil.served import Service
+from support.packages import runnable
+from support.proxies import build_proxy, serving
+from support.slow import slow
+
+CALLER = Path(__file__).with_name("random_calls.py")
+
+LONGEST = 10.0
+"""s that a call may take; it is below 1 s on a machine with nothing else to do."""
+
+GROWTH = 4e6
+"""Bytes by which the process may grow over the second half of ten seeds or more."""
+
+
+def called(folder: Path, seeds: int, calls: int, fmus: Sequence[Path]) -> dict[str, Any]:
+    """What random_calls.py reports."""
+    folder.mkdir()
+    done = subprocess.run(
+        [sys.executable, CALLER, folder, "0", str(seeds), str(calls), *fmus],
+        cwd=folder, env={**os.environ, "PYTHONPATH": str(CALLER.parents[1])},
+        capture_output=True, text=True, timeout=1800,
+    )  # fmt: skip
+    last = folder / "last"
+    assert done.returncode == 0, f"{last.read_text()}\n{done.stderr}"
+    report: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    assert report["longest"][0] < LONGEST, report["longest"]
+    statuses = {name.rpartition(" ")[2] for name in report["calls"]}
+    assert statuses <= {"", "0", "2", "3"}  # neither a warning nor fatal
+    assert min(report["calls"][f"{name} 0"] for name in ("DoStep", "SetReal")) > 0
+    if seeds >= 10:
+        memory = report["memory"]
+        assert memory[-1] - memory[seeds // 2] < GROWTH, memory
+    return report
+
+
+@pytest.mark.parametrize(("seeds", "calls"), [(2, 400), slow(12, 4000)])
+def test_the_fmus_live(fmus: Path, tmp_path: Path, seeds: int, calls: int) -> None:
+    report = called(tmp_path / "host", seeds, calls, runnable(fmus))
+    for name in ("SetFMUstate", "DeSerializeFMUstate"):
+        assert report["calls"][f"{name} 0"] > 0
+        assert report["calls"][f"{name} 3"] > 0
+
+
+@pytest.mark.parametrize(("seeds", "calls"), [(1, 150), slow(10, 500)])
+def test_proxies_live(fmus: Path, tmp_path: Path, seeds: int, calls: int) -> None:
+    """With a peer, and one without."""
+    with ExitStack() as stack:
+        proxies = []
+        for name in ("GripperPlant", "ProximitySensor"):
+            fmu = fmus / f"{name}.fmu"
+            port = stack.enter_context(serving(fmu, Service(lockstep=True))).port_socket
+            proxy = tmp_path / f"{name}Proxy.fmu"
+            proxies.append(build_proxy(fmu, proxy, port.getsockname()[1]))
+        proxies.append(build_proxy(fmus / "GraspController.fmu", tmp_path / "Alone.fmu", 9))
+        called(tmp_path / "host", seeds, calls, proxies)
