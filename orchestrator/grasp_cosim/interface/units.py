@@ -1,5 +1,6 @@
 """Units as FMI and SSP define them, and the conversion from one to another."""
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
@@ -36,8 +37,12 @@ IDENTITY = Conversion(1.0, 0.0)
 
 
 def conversion(source: Unit, target: Unit) -> Conversion | None:
-    """The conversion of values from one unit to another; None where the dimensions differ."""
+    """The conversion of values from one unit to another.
+
+    None where the dimensions differ, or the factor or offset is beyond what a number can be.
+    """
     if source.exponents != target.exponents:
         return None
     factor, offset = source.factor / target.factor, (source.offset - target.offset) / target.factor
-    return Conversion(factor, offset)
+    possible = factor != 0.0 and math.isfinite(factor) and math.isfinite(offset)
+    return Conversion(factor, offset) if possible else None
