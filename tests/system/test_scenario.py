@@ -193,7 +193,7 @@ WRONG_FAULTS = [
     ('"saturation"\nhigh = 0.4', '"dropout"\nprobability = 1.1', "must be a number from 0 to 1"),
     ('"saturation"\nhigh = 0.4', '"quantisation"\nstep = 0', "must be a finite number above 0"),
     ('"saturation"\nhigh = 0.4', '"bias"\nvalue = "x"', "value = 'x': must be a finite number"),
-    ('"saturation"\nhigh = 0.4', '"delay"\ntime = -1e-3', "must be a finite number of at least 0"),
+    ('"saturation"\nhigh = 0.4', '"delay"\ntime = -1e-3', "must be a number from 0 to 1e"),
     (
         '"saturation"\nhigh = 0.4',
         '"delay"\ntime = 1.23e-3',

@@ -8,8 +8,7 @@ from grasp_fmus.link.peer import TOO_LONG, Peer, Request
 
 from ..errors import InputError, SimulationError
 from ..interface.interface import Interface, Value
-from ..system.description import LONGEST
-from ..system.parts import NANOSECONDS
+from ..system.parts import LONGEST, NANOSECONDS
 from .driven import DrivenFmu
 from .protocol import link_signature
 

@@ -6,7 +6,7 @@ its files can yield.
 
 import zipfile
 from pathlib import Path
-from typing import IO, Any, NoReturn
+from typing import Any, NoReturn
 from xml.etree import ElementTree
 from xml.parsers import expat
 
@@ -21,6 +21,8 @@ LARGEST_UNPACKED, MOST_EXPANSION = 500_000_000, 50
 and tables pack 2 to 20 times, a bomb hundreds of times."""
 DEEPEST = 256
 """Elements within each other: the standard needs 6, the annotations of tools some more."""
+MOST_ELEMENTS = 1_000_000
+"""Two or three to a variable."""
 
 
 def read_document(path: Path) -> tuple[ElementTree.Element, tuple[str, ...]]:
@@ -37,17 +39,21 @@ def read_document(path: Path) -> tuple[ElementTree.Element, tuple[str, ...]]:
             description = entries[NAME].file_size
             if description > LARGEST:
                 raise ValueError(f"{NAME} has {description} bytes; must have at most {LARGEST}")
-            total = sum(i.file_size for i in archive.infolist())
-            most = max(LARGEST_UNPACKED, MOST_EXPANSION * path.stat().st_size)
-            if total > most:
-                raise ValueError(f"its files have {total} bytes unpacked; must have at most {most}")
-            with archive.open(NAME) as file:
-                root = _parsed(file)
+            check_size(archive, path)
+            root = _parsed(archive.read(NAME))
         if not root.get("fmiVersion"):
             raise ValueError(f"no fmiVersion in {NAME}")
     except Exception as error:  # zipfile and its decompressors raise whatever they like
         raise unreadable(path, error) from error
     return root, tuple(entries)
+
+
+def check_size(archive: zipfile.ZipFile, path: Path) -> None:
+    """ValueError where the files of the archive at `path` would be too large, unpacked."""
+    total = sum(i.file_size for i in archive.infolist())
+    most = max(LARGEST_UNPACKED, MOST_EXPANSION * path.stat().st_size)
+    if total > most:
+        raise ValueError(f"its files have {total} bytes unpacked; must have at most {most}")
 
 
 def unreadable(path: Path, error: Exception | str) -> InputError:
@@ -56,15 +62,21 @@ def unreadable(path: Path, error: Exception | str) -> InputError:
     return InputError(f"{path}: not a readable FMU: {reason}")
 
 
-def _parsed(file: IO[bytes]) -> ElementTree.Element:
+def _parsed(text: bytes) -> ElementTree.Element:
+    """The root; of all at once, since expat reads a long name anew with each piece."""
     builder = ElementTree.TreeBuilder()
     parser = expat.ParserCreate(None, "}")
     open_: list[str] = []
+    count = 0
 
     def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal count
+        count += 1
         open_.append(tag)
         if len(open_) > DEEPEST:
             raise ValueError(f"{tag} in {NAME} is more than {DEEPEST} elements deep")
+        if count > MOST_ELEMENTS:
+            raise ValueError(f"{NAME} has more than {MOST_ELEMENTS} elements")
         builder.start(tag, attributes)
 
     def end(tag: str) -> None:
@@ -76,5 +88,5 @@ def _parsed(file: IO[bytes]) -> ElementTree.Element:
 
     parser.StartElementHandler, parser.EndElementHandler = start, end
     parser.CharacterDataHandler, parser.StartDoctypeDeclHandler = builder.data, refuse
-    parser.ParseFile(file)
+    parser.Parse(text, True)
     return builder.close()

@@ -17,12 +17,26 @@ from ..errors import InputError
 from ..files import check_fmu_file
 from .capabilities import KINDS, capabilities_of, kinds_of
 from .document import read_document, unreadable
-from .interface import TYPES, TYPES_3, Enumeration, Interface, Variable, kind_of, typed
+from .interface import (
+    SETTABLE,
+    TYPES,
+    TYPES_3,
+    Enumeration,
+    Interface,
+    Variable,
+    kind_of,
+    limits,
+    typed,
+)
 from .units import BASE, Unit
 
 NUMERIC = ("Real", "Integer")
 CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029]")
 """Characters that end a line of a message or table, or move the cursor of a terminal."""
+LONGEST_NAME = 2000
+"""Characters; those of the largest FMUs have some hundreds."""
+MOST_DEPENDENCIES = 5_000_000
+"""In all: of 2,000 outputs on 2,000 inputs, and some."""
 EXPERIMENT = {
     "start_time": "startTime", "stop_time": "stopTime", "tolerance": "tolerance",
     "step_size": "stepSize",
@@ -78,17 +92,20 @@ def describe(path: Path) -> Interface:
             raise ValueError(f"Unsupported FMI version: {version}")
         reader = _Reader(root, version[0])
         variables, units = reader.variables(), reader.units()
+        kinds = kinds_of(root, reader.major)
+        identified = root if reader.major == "1" else next(iter(kinds.values()), root)
+        identifier = identified.get("modelIdentifier", "")
+        with reader.tolerated():
+            _check_identifier(identifier)
         experiment = {} if (e := root.find("DefaultExperiment")) is None else e.attrib
         with reader.tolerated():
             _real("DefaultExperiment: stepSize", experiment.get("stepSize", "0"))
     except ValueError as error:
         raise unreadable(path, error) from error
-    kinds = kinds_of(root, reader.major)
-    identified = root if reader.major == "1" else next(iter(kinds.values()), root)
     return Interface(
         path=path,
         guid=root.get("instantiationToken" if reader.major == "3" else "guid", ""),
-        identifier=identified.get("modelIdentifier", ""),
+        identifier=identifier,
         variables=variables,
         version=version,
         units=units,
@@ -119,15 +136,37 @@ class _Reader:
         if parent is None:
             raise ValueError("no ModelVariables")
         self.elements = [e for e in parent if e.get("name") is not None]
+        for element in self.elements:
+            _printable("variable", _name(element))
         self.references = [
             _whole(f"variable {_name(e)!r}: valueReference", e.get("valueReference"), 2**32 - 1)
             for e in self.elements
         ]
+        self.check_references()
         keys = self.references if major == "3" else range(1, len(self.elements) + 1)
         self.places = dict(zip(keys, self.elements, strict=True))
         types = {n: t for t in root.iterfind("TypeDefinitions/*") if (n := t.get("name"))}
         self.types = types if major == "3" else {n: t[0] for n, t in types.items() if len(t)}
         self.enumerations = {name: self.enumeration(name, t) for name, t in self.types.items()}
+
+    def check_references(self) -> None:
+        """ValueError where two variables of FMI 3.0 have the same: it says what depends on what.
+
+        In FMI 2.0 such are two names of one, and a flaw where both could be set.
+        """
+        seen: dict[tuple[int, str], str] = {}
+        for element, reference in zip(self.elements, self.references, strict=True):
+            key, name = (reference, ""), _name(element)
+            if self.major != "3":
+                if element.get("causality") not in SETTABLE:
+                    continue
+                key = (reference, next((kind_of(e.tag) for e in element if e.tag in TYPES), ""))
+            if key in seen:
+                text = f"{seen[key]!r} and {name!r} have the valueReference {reference} both"
+                if self.major == "3":
+                    raise ValueError(f"variables {text}; must be unique")
+                self.flaws.append(f"variables {text}; one of them at most may be set")
+            seen[key] = name
 
     @contextmanager
     def tolerated(self) -> Iterator[None]:
@@ -204,7 +243,11 @@ class _Reader:
             return _name(found)
 
         found: dict[str, Names] = {}
-        for element in self.root.iterfind(f"ModelStructure/{way}"):
+        entries = self.root.findall(f"ModelStructure/{way}")
+        total = sum(e.get("dependencies", "").count(" ") for e in entries)
+        if total > MOST_DEPENDENCIES:
+            raise ValueError(f"{way}: {total} dependencies; must have at most {MOST_DEPENDENCIES}")
+        for element in entries:
             name, listed = called(f"{group}: {key}", element.get(key)), element.get("dependencies")
             place = f"{group} {name!r}: dependencies"
             found[name] = (
@@ -224,8 +267,8 @@ class _Reader:
         declared = self.types.get(type_name)
         sources = (element, value) if declared is None else (declared, element, value)
         said = {key: text for e in sources for key, text in e.attrib.items() if text}
-        limits = {k: said[k] for k in ("min", "max", "nominal") if k in said and kind in NUMERIC}
-        for key, text in limits.items():
+        bounds = {k: said[k] for k in ("min", "max", "nominal") if k in said and kind in NUMERIC}
+        for key, text in bounds.items():
             with self.tolerated():
                 _real(f"{place}: {key}", text)
         causality, variability = self.nature(element, kind)
@@ -233,6 +276,9 @@ class _Reader:
         start = value.get("start")
         if self.major == "3" and kind in ("String", "Binary"):
             start = starts[0] if starts else None
+        if kind in NUMERIC and start is not None and not element.findall("Dimension"):
+            with self.tolerated():
+                self.check_start(f"{place}: start", value.tag, start)
         initial = {} if self.major == "1" else INITIAL.get(variability, {})
         is_enumeration = value.tag == "Enumeration"
         return Variable(
@@ -242,21 +288,30 @@ class _Reader:
             reference=reference,
             unit=said.get("unit"),
             start=start,
-            minimum=typed(value.tag, limits.get("min")),
-            maximum=typed(value.tag, limits.get("max")),
+            minimum=typed(value.tag, bounds.get("min")),
+            maximum=typed(value.tag, bounds.get("max")),
             type=value.tag,
             variability=variability,
             dependencies=now,
             initial_dependencies=initially,
             shape=tuple(self.size(place, e) for e in element.iterfind("Dimension")),
             description=element.get("description"),
-            magnitude=typed(value.tag, limits.get("nominal")),
+            magnitude=typed(value.tag, bounds.get("nominal")),
             relative=said.get("relativeQuantity") in ("true", "1"),
             enumeration=self.enumerations.get(type_name) if is_enumeration else None,
             initial=element.get("initial") or initial.get(causality),
             display_unit=said.get("displayUnit"),
             starts=starts,
         )
+
+    def check_start(self, place: str, fmi_type: str, text: str) -> None:
+        """ValueError where a start value is no number of its type."""
+        if kind_of(fmi_type) == "Real":
+            _real(place, text)
+            return
+        low, high = limits(fmi_type, self.major)
+        if not low <= _whole(place, text) <= high:
+            raise ValueError(f"{place} = {text}: must be from {low} to {high}, as {fmi_type} is")
 
     def nature(self, element: Element, kind: str) -> tuple[str, str]:
         """Causality and variability; the latter depends on the type where it is not declared."""
@@ -291,12 +346,22 @@ def _unit(name: str, base: Element) -> Unit:
     return Unit(name, exponents, factor, offset)
 
 
+def _check_identifier(identifier: str) -> None:
+    """ValueError where it could not be the name of a file in a folder of the FMU."""
+    if not identifier or CONTROL.search(identifier) or re.search(r"[/\\:]|^\.", identifier):
+        raise ValueError(f"modelIdentifier = {identifier!r}: must be the name of its binary")
+
+
 def _name(element: Element) -> str:
     return element.get("name", "")
 
 
 def _printable(what: str, name: str) -> str:
-    """The name; ValueError where it holds a control character."""
+    """The name; ValueError where it is very long or holds a control character."""
+    if len(name) > LONGEST_NAME:
+        raise ValueError(
+            f"{what} {name[:40]!r}...: {len(name)} characters; must have at most {LONGEST_NAME}"
+        )
     if CONTROL.search(name):
         raise ValueError(f"{what} {name!r}: must have no control characters")
     return name

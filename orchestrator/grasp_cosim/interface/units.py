@@ -53,11 +53,15 @@ IDENTITY = Conversion(1.0, 0.0)
 
 
 def conversion(source: Unit, target: Unit) -> Conversion | None:
-    """The conversion of values from one unit to another; None where the dimensions differ."""
+    """The conversion of values from one unit to another.
+
+    None where the dimensions differ, or the factor or offset is beyond what a number can be.
+    """
     if source.exponents != target.exponents:
         return None
     factor, offset = source.factor / target.factor, (source.offset - target.offset) / target.factor
-    return Conversion(factor, offset)
+    possible = factor != 0.0 and math.isfinite(factor) and math.isfinite(offset)
+    return Conversion(factor, offset) if possible else None
 
 
 PREFIXES = {

@@ -9,7 +9,6 @@ an archive read twice is extracted once.
 import hashlib
 import posixpath
 import zipfile
-import zlib
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
@@ -18,6 +17,7 @@ from urllib.parse import unquote, urlsplit
 
 from ..errors import InputError, choices
 from ..files import in_one_piece
+from ..interface.document import check_size
 from ..scratch import ScratchFolder
 
 STRUCTURE = "SystemStructure.ssd"
@@ -36,9 +36,10 @@ class Archive:
         try:
             with zipfile.ZipFile(path) as file:
                 self.names = tuple(file.namelist())
+                check_size(file, path)
         except FileNotFoundError:
             raise InputError(f"{path}: no such system file") from None
-        except (OSError, zipfile.BadZipFile) as error:
+        except Exception as error:  # zipfile raises whatever it likes
             raise InputError(f"{path}: not readable as an SSP archive: {error}") from error
         self._path = path
         if STRUCTURE not in self.names:
@@ -49,9 +50,9 @@ class Archive:
         try:
             with zipfile.ZipFile(self._path) as file:
                 return file.read(entry)
-        except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, OSError) as error:
-            # RuntimeError: encrypted, or a compression that zipfile does not know
-            raise InputError(f"{self._path}: {entry}: not readable: {error}") from error
+        except Exception as error:  # its decompressors, too
+            reason = " ".join(str(error).split()) or type(error).__name__
+            raise InputError(f"{self._path}: {entry}: not readable: {reason}") from error
 
     def resolve(self, place: str, uri: str) -> str:
         """The entry that a source names, a relative path; InputError where there is none."""

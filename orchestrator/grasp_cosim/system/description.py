@@ -16,13 +16,10 @@ from .checks import (
     check_items,
     check_steps,
 )
-from .parts import NANOSECONDS, Isolation
+from .parts import LONGEST, NANOSECONDS, Isolation
 from .scenario_checks import check_scenario
 from .structure import DIVERGING, SCHEMES, Diverging, Scheme, Structure
 from .swap import with_fmu
-
-LONGEST = 1e9
-"""s; a time in nanoseconds then fits into 64 bits."""
 
 
 @dataclass(frozen=True, slots=True)

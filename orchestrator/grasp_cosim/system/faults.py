@@ -23,7 +23,7 @@ from typing import Any
 
 from ..checks import number
 from ..errors import InputError
-from .parts import NANOSECONDS, Fault, seconds
+from .parts import LONGEST, NANOSECONDS, Fault, seconds
 
 INITIAL = -1
 """The step number of the exchanges in initialisation mode."""
@@ -221,7 +221,7 @@ FAULTS: Mapping[str, FaultKind] = MappingProxyType(
             "the value of `time` ago, at first the first one",
             "time in s, a whole number of steps",
             _delay,
-            {"time": Range(0.0)},
+            {"time": Range(0.0, LONGEST)},
             discrete=True,
             check=_check_delay,
         ),

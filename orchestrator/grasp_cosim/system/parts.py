@@ -17,6 +17,8 @@ RELATIONS: tuple[str, ...] = get_args(Relation)
 Loops = Literal["iterate", "refuse"]
 LOOPS: tuple[str, ...] = get_args(Loops)
 NANOSECONDS = 1_000_000_000
+LONGEST = 1e9
+"""s; a time in nanoseconds then fits into 64 bits."""
 
 
 def seconds(nanoseconds: int) -> str:
