@@ -35,6 +35,9 @@ def write_file(target: Path, data: bytes) -> None:
     if target.is_file() and target.read_bytes() == data:
         return
     target.parent.mkdir(parents=True, exist_ok=True)
+    for left in target.parent.glob(f"{target.name}.*.part"):
+        if not _runs(left.suffixes[-2][1:]):  # a kill has left it
+            left.unlink(missing_ok=True)
     part = target.with_name(f"{target.name}.{os.getpid()}.part")
     try:
         part.write_bytes(data)
@@ -43,6 +46,11 @@ def write_file(target: Path, data: bytes) -> None:
         raise OSError(error.errno, error.strerror, str(target)) from error
     finally:
         part.unlink(missing_ok=True)
+
+
+def _runs(process: str) -> bool:
+    """Return True if there may be a process of this number."""
+    return not Path("/proc/self").exists() or Path("/proc", process).exists()
 
 
 def sources_hash() -> str:

@@ -6,6 +6,7 @@ import os
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from glob import escape
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +64,23 @@ def in_one_piece(path: Path) -> Iterator[Path]:
         raise OSError(error.errno, os.strerror(error.errno), str(path)) from error
     finally:
         part.unlink(missing_ok=True)
+
+
+def remove(folder: Path, *names: str) -> None:
+    """Remove files of these names, as far as there are any, and parts of them: see remove_parts().
+
+    Before several files that belong together are written anew: so there are none of two works.
+    """
+    for name in names:
+        (folder / name).unlink(missing_ok=True)
+    remove_parts(folder, *names)
+
+
+def remove_parts(folder: Path, *names: str) -> None:
+    """Remove what a kill left of the writing of files of these names, which nobody writes now."""
+    for name in names:
+        for part in folder.glob(f"{escape(name)}.*.part"):
+            part.unlink(missing_ok=True)
 
 
 def unwritable(path: Path, error: OSError) -> str:

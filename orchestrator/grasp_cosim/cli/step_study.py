@@ -9,7 +9,7 @@ import click
 
 from ..convergence.step_study import step_study
 from ..errors import InputError
-from ..files import write_json
+from ..files import remove, write_json
 from ..metrics.metric import Metric
 from ..report.step_study import draw_step_study
 from ..system.description import System
@@ -54,6 +54,7 @@ def study_step(
     study = step_study(system, tolerance, workers=workers, progress=True, of=of, metrics=metrics)
     folder = given["out"] or Path()
     if given["out"]:
+        remove(folder, "step_study.json", "step_study.png")
         write_json(folder / "step_study.json", study.as_json())
     if given["plot"]:
         draw_step_study(study, folder / "step_study.png")

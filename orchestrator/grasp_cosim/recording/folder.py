@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from .. import extensions
 from ..errors import InputError
-from ..files import unwritable, write_json
+from ..files import remove, unwritable, write_json
 from ..metrics.units import in_si
 from ..system.description import System
 from .csv import CsvListener
@@ -104,7 +104,8 @@ class RunFolder:
                 while self._waiting and not self._broken:
                     self._write(*self._waiting.popleft())
             finally:
-                self._csv.end(complete)
+                if self._signals:
+                    self._csv.end(complete)
 
     def finish(self, result: Result) -> None:
         """Write the run.json of a result that ended, in whatever way; not if rows are missing."""
@@ -112,6 +113,8 @@ class RunFolder:
             replace(result, origin=self._origin).to_json(self._folder / SETTINGS)
 
     def _write(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
+        if not self._signals:
+            return
         self._broken = True
         self._csv.block(steps, rows)
         self._broken = False
@@ -126,11 +129,10 @@ class RunFolder:
             self._folder.mkdir(parents=True, exist_ok=True)
             self._keep_others_out()
             if settings.is_file() and signals.is_file():
-                for name in (*DRAWN, *(f"{d.stem}.png" for d in extensions.drawings)):
-                    (self._folder / name).unlink(missing_ok=True)
-            settings.unlink(missing_ok=True)
-            signals.unlink(missing_ok=True)
-            self._csv.begin(self._experiment, self._signals)
+                remove(self._folder, *DRAWN, *(f"{d.stem}.png" for d in extensions.drawings))
+            remove(self._folder, SETTINGS, SIGNALS)
+            if self._signals:
+                self._csv.begin(self._experiment, self._signals)
             self._begun = True
             self._write(steps, rows)
             write_json(settings, self._unfinished())

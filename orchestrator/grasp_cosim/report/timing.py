@@ -50,6 +50,9 @@ SHORTEST = 1e-7
 MOST_STEMS = 100
 """With more overruns there are no lines down to the axis: they would be a wall."""
 
+TIMING = "timing.png"
+"""The file of the chart."""
+
 WIDTH = 120
 """So many letters of the title fit into a line."""
 
@@ -95,7 +98,7 @@ def draw_result(result: Result, folder: Path) -> Iterator[Path]:
     result.plot(picture)
     yield picture
     if result.timing:
-        picture = folder / "timing.png"
+        picture = folder / TIMING
         draw_timing(result.timing, float(result.time[-1]), picture)
         yield picture
 

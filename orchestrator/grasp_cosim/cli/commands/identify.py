@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from ...errors import InputError
-from ...files import check_folder, write_json, write_text
+from ...files import check_folder, remove, write_json, write_text
 from ...grasp.identification import report
 from ...grasp.identification.contact_times import (
     identify_from_times,
@@ -61,6 +61,7 @@ def identify(
     system = load_system().revised({}, set_values(settings), ("--swap", "--set"))
     found = _from_log(system, log, groups) if log else _from_times(system, times, groups, workers)
     if out:
+        remove(out, "identification.json", "values.toml", "residuals.csv")
         write_text(out / "values.toml", report.values_toml(found))
         write_text(out / "residuals.csv", report.residuals_csv(found))
         write_json(out / "identification.json", report.as_json(found))

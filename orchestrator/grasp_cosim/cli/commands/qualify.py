@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from ...files import write_json, write_text
+from ...files import remove, write_json, write_text
 from ...qualification import verdict
 from ...qualification.bands import read_bands
 from ...qualification.qualify import Qualification
@@ -95,11 +95,9 @@ def qualify(
 def _write(found: Qualification, out: Path) -> None:
     """What there is: without a run there is no band and no figure, not even an earlier one."""
     figure, bands = out / "qualification.png", out / "bands_used.toml"
+    remove(out, "qualification.json", figure.name, bands.name)
     write_json(out / "qualification.json", verdict.as_json(found))
     if found.signals:
         write_text(bands, verdict.as_bands(found))
         draw_qualification(found, figure)
         click.echo(f"drew {figure}", err=True)
-    else:
-        figure.unlink(missing_ok=True)
-        bands.unlink(missing_ok=True)

@@ -5,10 +5,10 @@ from pathlib import Path
 import click
 
 from ...errors import InputError
-from ...files import check_folder
+from ...files import check_folder, remove_parts
 from ...recording.load import load_run
 from ...report.page import write_page
-from ...report.timing import draw_result
+from ...report.timing import TIMING, draw_result
 from ..frame import PATH, json_option, show
 
 
@@ -29,6 +29,7 @@ def report(run: Path, out: Path | None, as_json: bool) -> int:
     recorded = load_run(run)
     page = out or run / "report.html"
     check_folder(page.parent)
+    remove_parts(page.parent, page.name, f"{recorded.drawing.stem}.png", TIMING)
     scene = recorded.drawing.scene(recorded)
     write_page(recorded, run.resolve().name, page, scene=scene)
     drawn: list[str] = []

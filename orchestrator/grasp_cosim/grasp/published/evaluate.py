@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ...files import write_json, write_text
+from ...files import remove, write_json, write_text
 from ...metrics.metric import registered
 from ...parallel import run_all
 from ...recording.result import UNITS
@@ -93,8 +93,7 @@ def evaluate(
             ],
             "units": _units(rows, next(iter(runs.values()))),
         }
-        for name in WRITTEN:  # nothing of another evaluation is ever beside this one
-            (out / name).unlink(missing_ok=True)
+        remove(out, *WRITTEN)
         _draw_signals(runs, how.shown, out)
         _draw_times(rows, out / "contact_times.png")
         named = [{**r, "finger": r["finger"] or "difference"} for r in rows]
