@@ -15,7 +15,7 @@ SETTINGS = {
 
 @pytest.fixture
 def result() -> Result:
-    time = np.arange(1001) * 0.001
+    time = np.arange(1001, dtype=np.float64) * 0.001
     noise = np.random.default_rng(1).standard_normal(1001)
     return Result(SETTINGS, time, {"a.x": noise}, {"a.x": "m"}, 1.0, True)
 
