@@ -12,6 +12,7 @@ import signal
 from pathlib import Path
 from typing import Any
 
+from ..plain import on_one_line
 from ..scratch import PREFIX
 from .frame import FAILED
 
@@ -54,7 +55,8 @@ def explain_crashes(debug: bool) -> None:
     def end(number: int) -> None:
         signal.alarm(LONGEST)
         try:
-            line = f"grasp-cosim: {_binary(libc)} crashed with {SIGNALS[number]}; {ADVICE}\n"
+            binary = on_one_line(_binary(libc))
+            line = f"grasp-cosim: {binary} crashed with {SIGNALS[number]}; {ADVICE}\n"
             os.write(2, line.encode(errors="replace"))
         finally:
             os._exit(FAILED)

@@ -78,7 +78,7 @@ def load_system(
         return grasp_system()
     system = System.load(path, step=step, stop=stop)
     for note in system.notes:
-        click.echo(note, err=True)
+        say(note)
     return system
 
 
@@ -121,11 +121,16 @@ def show(as_json: bool, report: Any, text: str) -> None:
     click.echo(json.dumps(report).replace("\x7f", "\\u007f") if as_json else text)
 
 
+def say(line: str) -> None:
+    """Print one line on standard error, whatever is in it."""
+    click.echo(on_one_line(line), err=True)
+
+
 def fail(message: str, code: int, debug: bool = False) -> int:
     """Print the message as one line on standard error; return the exit code."""
     if debug:
         traceback.print_exc()
     elif len(message) > LONGEST:
         message = f"{message[: LONGEST // 2]} [...] {message[-LONGEST // 2 :]}"
-    click.echo(f"grasp-cosim: {on_one_line(message)}", err=True)
+    say(f"grasp-cosim: {message}")
     return code

@@ -17,7 +17,7 @@ from ...hil.protocol import link_signature
 from ...interface.interface import Interface, Value, Variable
 from ...interface.read import read_interface
 from ...interface.units import BASE
-from ..frame import PATH, bind_python_option, json_option, show
+from ..frame import PATH, bind_python_option, json_option, say, show
 
 if TYPE_CHECKING:
     from grasp_fmus.proxy_build import Original
@@ -84,7 +84,7 @@ def proxy(
     except ValueError as error:
         raise InputError(f"proxy: {error}") from error
     for note in notes:
-        click.echo(note, err=True)
+        say(note)
     show(as_json, report, "\n".join(lines))
     return 0
 

@@ -11,6 +11,7 @@ from typing import Any
 import click
 
 from ...errors import InputError
+from ...files import FULL
 from ...hil.address import Address, is_loopback, text
 from ...hil.network import DIRECTIONS, Conditions, Network, Outage, check_time
 from ...hil.relay import Relay
@@ -123,10 +124,15 @@ def _written(path: Path | None) -> Iterator[Log | None]:
     if path is None:
         yield None
         return
-    with path.open("w", encoding="utf-8", newline="") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(Entry._fields)
-        yield table.writerow
+    try:
+        with path.open("w", encoding="utf-8", newline="") as file:
+            table = csv.writer(file, lineterminator="\n")
+            table.writerow(Entry._fields)
+            yield table.writerow
+    except OSError as error:  # of a disk it does not say where
+        if error.errno in FULL:
+            raise OSError(error.errno, error.strerror, str(path)) from error
+        raise
 
 
 def _say(relay: Relay) -> None:

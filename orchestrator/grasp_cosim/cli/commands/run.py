@@ -1,7 +1,6 @@
 """The command run."""
 
 from contextlib import nullcontext
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +24,7 @@ from ..frame import (
     json_option,
     metrics_option,
     pair,
+    say,
     show,
 )
 from ..options import chosen_system, set_values, system_options
@@ -96,7 +96,7 @@ def run(
                 engine=engine,
                 realtime=paced,
                 metrics=metrics,
-                note=partial(click.echo, err=True),
+                note=say,
             )
         except SimulationError as error:
             if error.result:

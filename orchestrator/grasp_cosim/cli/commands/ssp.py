@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from ...files import check_folder
-from ..frame import PATH, json_option, load_system, show
+from ..frame import PATH, json_option, load_system, say, show
 
 
 @click.command()
@@ -37,5 +37,5 @@ def ssp(
     show(as_json, report, "\n    ".join((f"{out}: written", *written.entries)))
     if not as_json:
         for note in written.notes:
-            click.echo(note, err=True)
+            say(note)
     return 0
