@@ -105,7 +105,8 @@ class Metric:
     `needs` are the signals without which there is no value; a mapping gives the SI unit in which
     each is expected as well, or None, so that a signal of another quantity, or in a unit that is in
     doubt, is refused before a run. Metrics of one `group` are there
-    together or not at all, and why not is said once; an `optional` one is then left out in silence.
+    together or not at all, and why not is said once; an `optional` one is then left out in silence,
+    as it is where it has no value at all.
     A `primary` one is what a study of the step size asks for where nothing else is named.
     """
 
@@ -268,7 +269,9 @@ def measure(signals: Signals, metrics: Iterable[Metric]) -> Measured:
     failures = []
     for m in there:
         try:
-            values[m.name] = _plain(m, m.function(signals))
+            value = _plain(m, m.function(signals))
+            if not (m.optional and _absent(value)):
+                values[m.name] = value
         except MissingSignalError as error:
             missing.append(f"no {m.name}: {error}")
         except Exception as error:  # a user's function may raise anything
@@ -342,6 +345,10 @@ def _plain(m: Metric, found: Any) -> Any:
     if m.entries and not (several and len(values) == len(m.entries)):
         raise InputError(f"returned {found!r}; must be a value for each of {choices(m.entries)}")
     return values if several else values[0]
+
+
+def _absent(value: Any) -> bool:
+    return all(v is None for v in value) if isinstance(value, list) else value is None
 
 
 def load_metrics(path: Path) -> tuple[Metric, ...]:
