@@ -44,7 +44,7 @@ def test_a_unit_taken_for_granted_is_said_once(command: Run, tmp_path: Path) -> 
 def test_it_is_said_before_a_failure_that_names_the_inputs(command: Run, tmp_path: Path) -> None:
     code, out, err = command("run", two(tmp_path, ", error_at = 0.35"))
     assert (code, out) == (3, "")
-    remark, failure = err.splitlines()
+    remark, *_, failure = err.splitlines()
     assert remark == REMARK
     assert failure.startswith("grasp-cosim: second: second.fmu returned error at t = 0.3 s")
     assert "(inputs: u_Float64 = 45, " in failure

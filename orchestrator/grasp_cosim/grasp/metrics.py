@@ -116,7 +116,7 @@ def _of_free_fingers(name: str, label: str, words: str, pick: Callable[[Floats],
     """A metric that says how far from the object a finger stays that never touches it."""
     description = f"{words} of a finger that never touches; None where it does."
 
-    @of_fingers(name, "m", label=label, description=description, optional=True)
+    @of_fingers(name, "m", label=label, description=description, reason=True)
     def gap(signals: Signals, finger: int) -> float | None:
         touches = first_contact(signals, finger)
         return None if touches else float(pick(signals[f"plant.gap[{finger}]"]))

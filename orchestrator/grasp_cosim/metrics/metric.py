@@ -105,8 +105,9 @@ class Metric:
     `needs` are the signals without which there is no value; a mapping gives the SI unit in which
     each is expected as well, or None, so that a signal of another quantity, or in a unit that is in
     doubt, is refused before a run. Metrics of one `group` are there
-    together or not at all, and why not is said once; an `optional` one is then left out in silence,
-    as it is where it has no value at all.
+    together or not at all, and why not is said once; an `optional` one is then left out in silence.
+    A `reason` says why others have no value: it is left out where it has none itself, and
+    a qualification does not compare it.
     A `primary` one is what a study of the step size asks for where nothing else is named.
     """
 
@@ -121,6 +122,7 @@ class Metric:
     needs: Collection[str] = ()
     group: str = ""
     optional: bool = False
+    reason: bool = False
     primary: bool = False
     origin: tuple[str, str] | None = None
     """Of a metric from a file, the file's name and text: so it travels to other processes."""
@@ -270,7 +272,7 @@ def measure(signals: Signals, metrics: Iterable[Metric]) -> Measured:
     for m in there:
         try:
             value = _plain(m, m.function(signals))
-            if not (m.optional and _absent(value)):
+            if not (m.reason and _absent(value)):
                 values[m.name] = value
         except MissingSignalError as error:
             missing.append(f"no {m.name}: {error}")
