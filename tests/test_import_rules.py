@@ -167,6 +167,7 @@ FLOORS = (
         "early",
         "errors",
         "plain",
+        "numerals",
         "checks",
         "files",
         "scratch",

@@ -85,7 +85,8 @@ def test_in_a_process_of_its_own(tmp_path: Path) -> None:
     *_, line = done.stderr.splitlines()
     assert (
         line
-        == "grasp-cosim: motor: the process of native.fmu ended with signal SIGSEGV at t = 0.5 s"
+        == "grasp-cosim: motor: the process of native.fmu ended with signal SIGSEGV at t = 0.5 s "
+        "(inputs: u_Real = 2, u_Integer = 2, u_Boolean = false, u_Enumeration = 1, u_String = '')"
     )
     assert json.loads((out / "run.json").read_text())["complete"] is False
     assert len((out / "signals.csv").read_text().splitlines()) == 1 + 6

@@ -23,6 +23,8 @@ SPEED, START = 0.3, 0.05001234
 """m/s and m of a finger that flies on to the surface."""
 
 
+OF_FREE_FINGERS = {"remaining_gap", "smallest_gap"}
+
 OF_OBJECT = {
     "object_tilt": "tilt",
     "toppled": "toppled",
@@ -202,6 +204,20 @@ def test_a_finger_that_never_touches() -> None:
     assert metrics["peak_contact_force"] == metrics["steady_contact_force"] == [0.0, 0.0]
 
 
+def test_only_where_a_finger_never_touches_is_there_a_gap_that_remains() -> None:
+    """Finger 1 comes as near as 2 mm and leaves; finger 2 touches."""
+    time, signals = impact(1e-3)
+    near = np.linspace(0.01, 0.002, len(time) // 2)
+    away = np.linspace(0.002, 0.007, len(time) - len(near))
+    never = np.zeros(len(time), bool)
+    free = {"plant.gap[1]": np.concatenate((near, away)), "plant.contact[1]": never}
+    metrics = grasp_metrics(time, signals | free)
+    assert metrics["time_to_contact"][0] is None
+    assert metrics["remaining_gap"] == [pytest.approx(0.007), None]
+    assert metrics["smallest_gap"] == [pytest.approx(0.002), None]
+    assert not OF_FREE_FINGERS & set(grasp_metrics(time, signals))
+
+
 def test_an_impact_that_is_not_recorded_to_its_end_has_no_impulse() -> None:
     assert pressed(lambda _: 2.0, end=0.119)["impact_impulse"] == [None, None]
     assert pressed(lambda _: 2.0, end=0.122)["impact_impulse"] != [None, None]
@@ -359,11 +375,14 @@ def test_the_object_has_the_metrics_that_the_plant_has_outputs_for() -> None:
 def test_every_metric_has_a_unit_and_a_label() -> None:
     time, signals = impact(1e-3)
     signals |= {f"plant.{output}": np.zeros(len(time)) for output in OF_OBJECT.values()}
-    assert list(grasp_metrics(time, signals)) == [m.name for m in METRICS]
+    there = [m.name for m in METRICS if m.name not in OF_FREE_FINGERS]
+    assert list(grasp_metrics(time, signals)) == there
     shown = {m.name: (m.title, m.unit, m.factor, m.display_unit) for m in METRICS}
     assert shown == {
         "time_to_contact": ("time to contact", "s", 1.0, "s"),
         "time_difference": ("time difference", "s", 1.0, "s"),
+        "remaining_gap": ("gap left, no contact", "m", 1e3, "mm"),
+        "smallest_gap": ("smallest gap left", "m", 1e3, "mm"),
         "impact_velocity": ("impact velocity", "m/s", 1e3, "mm/s"),
         "impact_impulse": ("impact impulse", "N.s", 1e3, "mN.s"),
         "peak_contact_force": ("peak contact force", "N", 1.0, "N"),
@@ -378,3 +397,4 @@ def test_every_metric_has_a_unit_and_a_label() -> None:
         "damaged": ("object damaged", None, 1.0, ""),
     }
     assert {m.name for m in METRICS if m.optional} == set(OF_OBJECT)
+    assert {m.name for m in METRICS if m.reason} == OF_FREE_FINGERS

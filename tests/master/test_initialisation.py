@@ -64,7 +64,7 @@ def test_a_linear_loop_is_solved_and_said(mock: Make) -> None:
     started.master.initialise()
     assert started.signals()["b.y"][0] == pytest.approx(1.0 / 6.0, rel=1e-9)
     (line,) = started.master.log
-    assert "algebraic loop at t = 0: a.u -> a.y -> b.u -> b.y -> a.u: solved in " in line
+    assert line.startswith("algebraic loop at t = 0 through a.u: solved in ")
 
 
 def test_a_loop_that_any_value_solves_keeps_its_start_and_says_so(mock: Make) -> None:
@@ -107,7 +107,8 @@ def test_two_loops_are_solved_together(mock: Make) -> None:
     signals = started.signals()
     assert signals["a.y"][0] == pytest.approx(1.0 / 3.0, rel=1e-9)
     assert signals["c.y"][0] == pytest.approx(6.0, rel=1e-9)
-    assert len(started.master.log) == 2
+    (line,) = started.master.log
+    assert line.startswith("2 algebraic loops at t = 0 through a.u, c.u: solved in ")
 
 
 def test_a_loop_is_refused_by_its_path_where_that_is_chosen(mock: Make) -> None:

@@ -11,6 +11,7 @@ from ..errors import InputError, SimulationError, choices
 from ..master.simulation import simulate
 from ..metrics.metric import Metric, available, check_portable, measure, registered
 from ..metrics.units import in_si
+from ..numerals import fixed
 from ..parallel import run_all
 from ..system.description import System
 from ..system.parts import NANOSECONDS
@@ -163,10 +164,10 @@ class StepStudy:
             own = "*" if run.step_ns == self.step_ns else ""
             row = [f"{own}{1e3 * run.step:g}"]
             for name, c in self.limits.items():
-                row.append(_number(run.values.get(name), ".6f"))
-                row.append(_number(c.errors[i], ".4f" if self.unit == "s" else ".3g", factor))
-                row.append(_number(c.orders[i], ".2f"))
-            row += [_number(run.energies.get(name), ".2f", 1e6) for name in names]
+                row.append(_number(run.values.get(name), 6))
+                row.append(_number(c.errors[i], 4 if self.unit == "s" else None, factor))
+                row.append(_number(c.orders[i], 2))
+            row += [_number(run.energies.get(name), 2, 1e6) for name in names]
             rows.append(row)
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
         lines = [
@@ -190,7 +191,7 @@ class StepStudy:
             words = []
             if c.limit is not None and c.uncertainty is not None:
                 words.append(
-                    f"limit {c.limit:.7f} {self.unit or ''}".rstrip()
+                    f"limit {fixed(c.limit, 7)} {self.unit or ''}".rstrip()
                     + f", uncertain by {factor * c.uncertainty:.2g} {unit}".rstrip()
                 )
             if c.order is not None:
@@ -351,5 +352,8 @@ def run_step(job: tuple[System, Question]) -> StepRun:
     return StepRun(system.step_ns, values, energies)
 
 
-def _number(value: float | None, form: str, factor: float = 1.0) -> str:
-    return "-" if value is None else f"{factor * value:{form}}"
+def _number(value: float | None, decimals: int | None, factor: float = 1.0) -> str:
+    """A number in a table; without `decimals` it has three digits, whatever its size."""
+    if value is None:
+        return "-"
+    return f"{factor * value:.3g}" if decimals is None else fixed(factor * value, decimals)

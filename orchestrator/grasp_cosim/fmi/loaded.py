@@ -29,6 +29,7 @@ from ..errors import InputError, SimulationError
 from ..files import FULL
 from ..interface.interface import Interface, Value, Variable
 from ..scratch import ScratchFolder
+from .inputs import Inputs
 from .instance import DISCARD, EARLY, ERROR, FATAL, OK, STATUS, TRANSFER_3, Call, Native
 
 _PYTHON_FUNCTION = ctypes.PYFUNCTYPE(ctypes.c_int)
@@ -79,6 +80,7 @@ class LoadedInstance(ABC):
         self.interface = interface
         self._worst = FATAL  # until it is instantiated
         self._keep: list[Any] = []
+        self._inputs = Inputs()
         self._running = False
         self._clock: npt.NDArray[np.float64] | None = None
         self._unread: deque[str] = deque(maxlen=KEPT)
@@ -171,7 +173,7 @@ class LoadedInstance(ABC):
         """Leave initialisation mode."""
         with self._refusals():
             self._slave.exitInitializationMode()
-        self._running = True
+        self._running = self._inputs.running = True
 
     def get(self, variables: Sequence[Variable]) -> list[Value]:
         """The values of the variables now, one by one. For use outside the loop."""
@@ -192,6 +194,8 @@ class LoadedInstance(ABC):
         count, place = len(variables), data.ctypes.data
         references = (ctypes.c_uint * count)(*(v.reference for v in variables))
         self._keep += [references, data]
+        if action == "set":
+            self._inputs.bind(variables, data)
         again = [ctypes.c_size_t(count)] if self.SHAPE == TRANSFER_3 else []
         bound, address = self._function(
             action.capitalize() + self._suffix(variables[0].type),
@@ -212,6 +216,7 @@ class LoadedInstance(ABC):
         return _OF_KIND[variable.kind](getter([variable.reference])[0])
 
     def _set(self, variable: Variable, value: Value) -> None:
+        self._inputs.set(variable, value)
         setter = getattr(self._slave, f"set{self._suffix(variable.type)}")
         setter([variable.reference], [_OF_KIND[variable.kind](value)])
 
@@ -228,8 +233,9 @@ class LoadedInstance(ABC):
     def failure(self, status: int, time: float) -> SimulationError:
         """The error for a call that returned status at time in s. The FMU is not used again."""
         self._worst = OK if status == EARLY else status
+        inputs = str(self._inputs)
         if status in (DISCARD, EARLY) and self._wants_the_end():
-            what = "asked for the end of the simulation"
+            what, inputs = "asked for the end of the simulation", ""
         elif status == EARLY:
             what = "ended a step early"
         else:
@@ -237,7 +243,7 @@ class LoadedInstance(ABC):
         said = self._messages()
         reason = as_reason(said[self._said_before :] or said)
         error = SimulationError(
-            f"{self.name}: {self.interface.path.name} {what} at t = {time:.9g} s{reason}"
+            f"{self.name}: {self.interface.path.name} {what} at t = {time:.9g} s{reason}{inputs}"
         )
         for text in said:
             error.add_note(text)
@@ -267,7 +273,7 @@ class LoadedInstance(ABC):
             self._worst = error.status
             raise InputError(
                 f"{self.name}: {self.interface.path.name} refused its initialisation: "
-                f"{self._reason(error)}"
+                f"{self._reason(error)}{self._inputs}"
             ) from error
 
     @contextmanager

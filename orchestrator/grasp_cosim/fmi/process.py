@@ -26,6 +26,7 @@ from ..errors import InputError, SimulationError
 from ..interface.interface import Interface, Value, Variable
 from ..scratch import ScratchFolder
 from .exchange import ANSWER, CALL, FETCH, LOGGED, SIZE, STEP, Exchange
+from .inputs import Inputs
 from .instance import EARLY, WARNING, Call
 
 POSIX = os.name == "posix"
@@ -55,6 +56,7 @@ class ProcessInstance:
         self.name = name
         self.interface = interface
         self._fresh = False
+        self._inputs = Inputs()
         if not POSIX:
             raise InputError(
                 f"{name}: isolation = 'process' needs Linux or macOS; must be 'none' here"
@@ -114,11 +116,14 @@ class ProcessInstance:
         self, values: Mapping[str, Value], stop: float | None, start: float = 0.0
     ) -> None:
         """Set start values and enter initialisation mode; the times are in s."""
+        for name, value in values.items():
+            self._inputs.set(self.interface.by_name[name], value)
         self._prepare("enter_initialization", dict(values), stop, start)
 
     def exit_initialization(self) -> None:
         """Leave initialisation mode."""
         self._prepare("exit_initialization")
+        self._inputs.running = True
 
     def get(self, variables: Sequence[Variable]) -> list[Value]:
         """The values of the variables now, one by one. For use outside the loop."""
@@ -128,6 +133,8 @@ class ProcessInstance:
     def set(self, variables: Sequence[Variable], values: Sequence[Value]) -> None:
         """Set inputs or tunable parameters. For use outside the loop."""
         self._fresh = False
+        for variable, value in zip(variables, values, strict=True):
+            self._inputs.set(variable, value)
         self._ask("set", list(variables), list(values))
 
     def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:
@@ -137,6 +144,8 @@ class ProcessInstance:
         """
         pending, shared = self._exchange.add(self.interface, variables)
         self._ask("transfer", action, list(variables))
+        if action == "set":
+            self._inputs.bind(variables, data)
 
         def put() -> int:
             self._fresh = False
@@ -232,6 +241,7 @@ class ProcessInstance:
         self._lost = SimulationError(
             f"{self.name}: the process of {self.interface.path.name} "
             f"{what or f'ended with {ended}'} at t = {self._exchange.clock[0]:.9g} s{said}"
+            f"{self._inputs}"
         )
         for line in self._printed:
             self._lost.add_note(line.rstrip())

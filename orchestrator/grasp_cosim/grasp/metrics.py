@@ -112,6 +112,20 @@ def time_difference(signals: Signals) -> float | None:
     return None if first is None or second is None else abs(second - first)
 
 
+def _of_free_fingers(name: str, label: str, words: str, pick: Callable[[Floats], Any]) -> None:
+    """A metric that says how far from the object a finger stays that never touches it."""
+    description = f"{words} of a finger that never touches; None where it does."
+
+    @of_fingers(name, "m", label=label, description=description, reason=True)
+    def gap(signals: Signals, finger: int) -> float | None:
+        touches = first_contact(signals, finger)
+        return None if touches else float(pick(signals[f"plant.gap[{finger}]"]))
+
+
+_of_free_fingers("remaining_gap", "gap left, no contact", "Gap at the end", lambda gap: gap[-1])
+_of_free_fingers("smallest_gap", "smallest gap left", "Smallest gap", np.min)
+
+
 @of_fingers("impact_velocity", "m/s")
 def impact_velocity(signals: Signals, finger: int) -> float | None:
     """Rate at which the gap closes at first contact; None where it does not close."""

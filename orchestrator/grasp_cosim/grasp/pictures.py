@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..numerals import fixed
 from ..recording.result import Result
 from ..report.plot import BLUE, GREY, RED, finish, new_figure, save
 from .metrics import CLOSING, FINGERS, first_contact
@@ -98,7 +99,7 @@ def draw_contact_forces(axes: Axes, runs: Sequence[tuple[Result, str, str]]) -> 
             peak = float(force.max())
             name = f"{label}, finger {j}" if label else f"finger {j}"
             if peak > FORCE_LIMIT:
-                name += f", peak {peak:.0f} N"
+                name += f", peak {fixed(peak, 0)} N"
             axes.plot(result.time, force, style, color=COLOR[j], label=name)
             highest = max(highest, peak)
     axes.set_ylim(-0.03 * min(highest, FORCE_LIMIT), 1.1 * min(max(highest, 1e-3), FORCE_LIMIT))

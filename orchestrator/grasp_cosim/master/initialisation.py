@@ -24,6 +24,9 @@ Floats = npt.NDArray[np.float64]
 DIFFERENCE = 1e-7
 """Relative change of an input for the derivatives of Newton's method."""
 
+NAMED = 3
+"""The most inputs that the line on the loops names; an error has their whole paths."""
+
 ADVICE = (
     "must have a component without direct feedthrough in it, or [initialisation] "
     'loops = "iterate" with a tolerance that can be reached'
@@ -97,7 +100,7 @@ class Propagation:
         self._faults = faults
 
     def run(self) -> list[str]:
-        """Settle all values; a line for each algebraic loop that was iterated.
+        """Settle all values; a line for all algebraic loops that were iterated.
 
         InputError where a loop does not converge, or where loops are to be refused.
         """
@@ -118,12 +121,12 @@ class Propagation:
         solution = f"solved in {count} iteration{'' if count == 1 else 's'}"
         if not count:
             solution = "its start values solve it and are kept"
-        lines = [
-            f"{_described(self.system, [path])}: {solution}, to a relative residual of "
-            f"{residual:.1e}"
-            for path in order.loops
-        ]
-        return lines + self._check_dependencies()
+        loops = "algebraic loop" if len(order.loops) == 1 else f"{len(order.loops)} algebraic loops"
+        line = (
+            f"{loops} at t = 0 through {choices(order.cuts, NAMED)}: {solution}, to a relative "
+            f"residual of {residual:.1e}"
+        )
+        return [line, *self._check_dependencies()]
 
     def _solve(self, choice: Initialisation) -> tuple[int, float]:
         """Newton's method for the inputs that were cut; iterations and relative residual."""

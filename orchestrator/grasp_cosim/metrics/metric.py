@@ -106,6 +106,8 @@ class Metric:
     each is expected as well, or None, so that a signal of another quantity, or in a unit that is in
     doubt, is refused before a run. Metrics of one `group` are there
     together or not at all, and why not is said once; an `optional` one is then left out in silence.
+    A `reason` says why others have no value: it is left out where it has none itself, and
+    a qualification does not compare it.
     A `primary` one is what a study of the step size asks for where nothing else is named.
     """
 
@@ -120,6 +122,7 @@ class Metric:
     needs: Collection[str] = ()
     group: str = ""
     optional: bool = False
+    reason: bool = False
     primary: bool = False
     origin: tuple[str, str] | None = None
     """Of a metric from a file, the file's name and text: so it travels to other processes."""
@@ -268,7 +271,9 @@ def measure(signals: Signals, metrics: Iterable[Metric]) -> Measured:
     failures = []
     for m in there:
         try:
-            values[m.name] = _plain(m, m.function(signals))
+            value = _plain(m, m.function(signals))
+            if not (m.reason and _absent(value)):
+                values[m.name] = value
         except MissingSignalError as error:
             missing.append(f"no {m.name}: {error}")
         except Exception as error:  # a user's function may raise anything
@@ -342,6 +347,10 @@ def _plain(m: Metric, found: Any) -> Any:
     if m.entries and not (several and len(values) == len(m.entries)):
         raise InputError(f"returned {found!r}; must be a value for each of {choices(m.entries)}")
     return values if several else values[0]
+
+
+def _absent(value: Any) -> bool:
+    return all(v is None for v in value) if isinstance(value, list) else value is None
 
 
 def load_metrics(path: Path) -> tuple[Metric, ...]:

@@ -135,7 +135,7 @@ def qualify(
     )
     if swap.swapped is None:
         return Qualification(swap)
-    asked = registered(metrics)
+    asked = tuple(m for m in registered(metrics) if not m.reason)
     more = _conversions_of_candidate(swap.swapped, asked)
     reference = _run(swap.system, progress)
     to_si = {n: c for n, c in more.items() if n not in reference} | dict(reference.to_si)

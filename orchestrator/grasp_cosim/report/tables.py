@@ -9,6 +9,7 @@ from html import escape
 from typing import Any
 
 from ..metrics.metric import Metric
+from ..numerals import fixed
 from ..recording.result import Result
 
 EXPERIMENT = (
@@ -79,7 +80,7 @@ def _scaled(value: Any, factor: float) -> str:
     if isinstance(value, list):
         return ", ".join(_scaled(v, factor) for v in value)
     if isinstance(value, float):
-        return f"{factor * value:.4f}" if factor * abs(value) < 1e4 else number(factor * value)
+        return fixed(factor * value, 4, most=1e4, digits=6)
     return number(value)
 
 

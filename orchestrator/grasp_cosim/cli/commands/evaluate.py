@@ -12,6 +12,7 @@ from ...grasp.presets import with_preset
 from ...grasp.published.evaluate import evaluate as run_evaluation
 from ...grasp.published.store import FOLDER
 from ...grasp.published.tables import Source
+from ...numerals import fixed
 from ...sweep.store import Parts
 from ..frame import INTERRUPTED, NEGATIVE, PATH, fail, json_option, load_system, show
 
@@ -47,7 +48,8 @@ def evaluate(bench: bool, out: Path, workers: int, as_json: bool) -> int:
 
 def _verdict(report: Mapping[str, Any], out: Path) -> str:
     rms = ", ".join(
-        f"{name.replace('_', ' ')} {value:.3f}" for name, value in report["rms"].items()
+        f"{name.replace('_', ' ')} {fixed(value, 3, rounded=True)}"
+        for name, value in report["rms"].items()
     )
     return "\n".join(
         [

@@ -9,6 +9,7 @@ import click
 from ...errors import InputError, SimulationError
 from ...master.engine import ENGINES, Engine
 from ...master.simulation import MOST, simulate
+from ...numerals import fixed
 from ...recording.folder import RunFolder
 from ...recording.mdf import check_mdf
 from ...recording.result import Result
@@ -140,7 +141,7 @@ def _summary(result: Result) -> str:
     m = result.metrics
     lines = [
         f"{m['steps']} steps of {1e3 * m['step']:g} ms, {m['scheme']}, "
-        f"{m['real_time_factor']:.2f} times as fast as real time"
+        f"{fixed(m['real_time_factor'], 2)} times as fast as real time"
     ]
     lines += [
         f"{metric.title:22s}{_numbers(m[metric.name], metric.factor)} "
@@ -159,4 +160,4 @@ def _numbers(value: Any, factor: float) -> str:
 def _number(value: float | bool | None, factor: float) -> str:
     if isinstance(value, bool):
         return f"{'yes' if value else 'no':>8}"
-    return "    none" if value is None else f"{factor * value:8.3f}"
+    return "    none" if value is None else fixed(factor * value, 3, width=8)

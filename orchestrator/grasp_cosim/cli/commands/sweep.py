@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from ...errors import InputError
+from ...numerals import fixed
 from ...report.sweep import draw_sweep
 from ...sweep.read import read_study, study_file
 from ...sweep.sensitivity import Sensitivity
@@ -105,7 +106,7 @@ def _sensitivity_lines(found: Sensitivity) -> list[str]:
     lines = [f"variance of {found.metric}, {found.rows} of {found.of} rows complete, 95 %:"]
     for i in found.parameters:
         first, total = (
-            f"{value:6.3f} ({low:.3f} to {high:.3f})"
+            f"{fixed(value, 3, width=6)} ({fixed(low, 3)} to {fixed(high, 3)})"
             for value, (low, high) in ((i.first, i.first_interval), (i.total, i.total_interval))
         )
         lines.append(f"  {i.parameter:26s} alone {first:26s} in all {total}")

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ...numerals import fixed
 from ..published.report import table_csv
 from .fit import Estimate, Fit
 
@@ -90,4 +91,4 @@ def _about(e: Estimate) -> str:
 
 
 def _short(value: object) -> str:
-    return f"{value:.3f}" if isinstance(value, float) else str(value)
+    return fixed(value, 3, rounded=True) if isinstance(value, float) else str(value)

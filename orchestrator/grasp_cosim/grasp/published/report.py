@@ -5,6 +5,7 @@ import io
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ...numerals import fixed
 from ...plain import to_cell
 from ...system.description import System
 from ...system.parts import NANOSECONDS
@@ -28,7 +29,7 @@ def table_csv(rows: Sequence[Mapping[str, Any]]) -> str:
 def markdown(report: Mapping[str, Any], system: System) -> str:
     """The report, with the pictures beside it, as Markdown."""
     step = system.step_ns / NANOSECONDS
-    rms = {key: f"{value:.3f}" for key, value in report["rms"].items()}
+    rms = {key: _rounded(value, 3) for key, value in report["rms"].items()}
     return f"""# The published grasp, simulated again
 
 Cases 1 and 2 of the paper's position table against this co-simulation: four FMUs, {system.scheme}
@@ -66,7 +67,8 @@ def bench_markdown(report: Mapping[str, Any], system: System) -> str:
         [r for r in report["rows"] if r["table"] == table] for table in ("position", "reflectance")
     )
     rms = "\n".join(
-        f"| {name.replace('_', ' ')} | {value:.3f} |" for name, value in report["rms"].items()
+        f"| {name.replace('_', ' ')} | {_rounded(value, 3)} |"
+        for name, value in report["rms"].items()
     )
     return f"""# The published experiments on the bench preset
 
@@ -111,10 +113,11 @@ def _table(rows: Sequence[Mapping[str, Any]]) -> str:
         what = f"finger {r['finger']}" if r["finger"] else "time difference"
         line = (
             f"| {_condition(r)} | {r['case']} | {what} | {r['published']:.2f} "
-            f"| {r['simulated']:.3f} | {r['difference']:+.3f} |"
+            f"| {_rounded(r['simulated'], 3)} | {_rounded(r['difference'], 3, sign='+')} |"
         )
         if more:
-            line += f" {r['simulated_at_0.37_mm']:.3f} | {r['difference_at_0.37_mm']:+.3f} |"
+            simulated, difference = r["simulated_at_0.37_mm"], r["difference_at_0.37_mm"]
+            line += f" {_rounded(simulated, 3)} | {_rounded(difference, 3, sign='+')} |"
         lines.append(line)
     return "\n".join(lines)
 
@@ -138,16 +141,21 @@ def _run_table(runs: Sequence[Mapping[str, Any]]) -> str:
     ]
     for r in runs:
         times, speeds, peaks, steady = (
-            " / ".join(f"{factor * value:{form}}" for value in r[key])
-            for key, factor, form in (
-                ("time_to_contact", 1.0, ".3f"),
-                ("impact_velocity", 1e3, ".1f"),
-                ("peak_contact_force", 1.0, ".2f"),
-                ("steady_contact_force", 1.0, ".3f"),
+            " / ".join(_rounded(factor * value, decimals) for value in r[key])
+            for key, factor, decimals in (
+                ("time_to_contact", 1.0, 3),
+                ("impact_velocity", 1e3, 1),
+                ("peak_contact_force", 1.0, 2),
+                ("steady_contact_force", 1.0, 3),
             )
         )
         lines.append(
             f"| {_condition(r)} | {r['case']} | {times} | {speeds} | {peaks} | {steady} "
-            f"| {r['target_position']:.4f} |"
+            f"| {_rounded(r['target_position'], 4)} |"
         )
     return "\n".join(lines)
+
+
+def _rounded(value: float, decimals: int, sign: str = "") -> str:
+    """A number of the tables; a difference too small for them is 0 there."""
+    return fixed(value, decimals, sign=sign, rounded=True)

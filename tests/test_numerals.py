@@ -1,0 +1,39 @@
+"""Numbers in tables: usual sizes with their decimals, others with a power of ten."""
+
+import math
+
+import pytest
+from grasp_cosim.numerals import MOST, fixed
+from hypothesis import given
+from hypothesis import strategies as st
+
+
+@given(st.floats(0.001, 0.999 * MOST), st.booleans(), st.integers(3, 6), st.integers(0, 12))
+def test_usual_sizes_have_their_decimals(
+    size: float, down: bool, decimals: int, width: int
+) -> None:
+    value = -size if down else size
+    assert fixed(value, decimals, width=width) == f"{value:{width}.{decimals}f}"
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (4.6e40, "4.6e+40"), (-4.03977e41, "-4.04e+41"), (6.3e-15, "6.3e-15"), (4e-4, "0.0004"),
+        (0.0, "0.000"), (0.0006, "0.001"), (math.inf, "inf"), (math.nan, "nan"),
+    ],
+)  # fmt: skip
+def test_others_have_a_power_of_ten(value: float, text: str) -> None:
+    assert fixed(value, 3) == text
+
+
+@given(st.floats(allow_nan=False))
+def test_no_number_is_long_or_looks_like_0(value: float) -> None:
+    text = fixed(value, 3)
+    assert len(text) <= len("-999999999.999")
+    assert (float(text) == 0.0) == (value == 0.0)
+
+
+def test_what_is_too_small_may_be_rounded_to_0() -> None:
+    assert fixed(6.3e-15, 3, sign="+", rounded=True) == "+0.000"
+    assert fixed(4.6e40, 3, sign="+", rounded=True) == "+4.6e+40"
