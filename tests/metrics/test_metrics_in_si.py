@@ -206,6 +206,14 @@ def test_only_what_a_metric_expects_is_asked_for(load: Load) -> None:
     assert found(factor, silent).conversions == {"room.x": None}
 
 
+@pytest.mark.parametrize("name", ["mm", "cubit", ""])
+def test_a_metric_expects_units_of_si(load: Load, name: str) -> None:
+    wrong = Metric("wrong", travel.function, needs={"room.x": name})
+    message = rf"^wrong: needs room\.x in '{name}'; must be a unit of SI like 'm'"
+    with pytest.raises(InputError, match=message):
+        found(load({"x": MM}), wrong)
+
+
 def test_the_offset_of_a_temperature_does_not_apply_to_a_difference(load: Load) -> None:
     warm = Metric("warm", travel.function, needs={"room.x": "K", "room.y": "K"})
     rise = unit(OUTPUT, "degC", ' relativeQuantity="true"')

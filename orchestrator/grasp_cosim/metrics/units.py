@@ -79,9 +79,10 @@ def _doubt(
     signal without a unit in doubt, if it is expected, too, or of the same quantity.
     """
     quantity = known_unit(expected[name].unit)
-    if quantity is None:
+    if quantity is None or not quantity.si:
         raise InputError(
-            f"{expected[name].purpose}: {name} in {expected[name].unit!r}: no known unit"
+            f"{expected[name].purpose}: needs {name} in {expected[name].unit!r}; must be a unit of "
+            "SI like 'm' or 'N.s/m', as signals come in these"
         )
     if read.doubt:
         return read.doubt
