@@ -1,8 +1,11 @@
 """Units that are known by their names, without a definition."""
 
 import math
+import zipfile
+from pathlib import Path
 
 import pytest
+from grasp_cosim.interface.read import read_interface
 from grasp_cosim.interface.units import BASE, Unit, known_unit
 from grasp_fmus.model_description import UNITS
 from hypothesis import given
@@ -10,6 +13,14 @@ from hypothesis import strategies as st
 
 TEN = {"": 0, "m": -3, "u": -6, "n": -9, "k": 3, "M": 6, "G": 9, "c": -2, "h": 2}
 SYMBOLS = {"m": {"m": 1}, "s": {"s": 1}, "N": {"kg": 1, "m": 1, "s": -2}, "K": {"K": 1}}
+
+
+LAZY = """<fmiModelDescription fmiVersion="2.0" modelName="lazy" guid="1">
+<CoSimulation modelIdentifier="lazy"/>
+<UnitDefinitions><Unit name="{name}"><BaseUnit/></Unit></UnitDefinitions>
+<ModelVariables><ScalarVariable name="y" valueReference="0" causality="output"><Real unit="{name}"/>
+</ScalarVariable></ModelVariables>
+<ModelStructure><Outputs><Unknown index="1"/></Outputs></ModelStructure></fmiModelDescription>"""
 
 
 def exponents(**powers: int) -> tuple[int, ...]:
@@ -87,3 +98,18 @@ def test_prefixes_are_powers_of_ten_to_the_bit(
 def test_no_text_is_more_than_no_unit(name: str) -> None:
     found = known_unit(name)
     assert found is None or (math.isfinite(found.factor) and found.factor > 0.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "defined"), [("mm", False), ("N", False), ("rad", True), ("%", True), ("cubit", True)]
+)
+def test_a_definition_without_a_dimension_is_none_of_a_unit_that_has_one(
+    tmp_path: Path, name: str, defined: bool
+) -> None:
+    path = tmp_path / "lazy.fmu"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("modelDescription.xml", LAZY.format(name=name))
+    interface = read_interface(path)
+    assert (name in interface.units) is defined
+    found = interface.unit(interface.by_name["y"])
+    assert found == (Unit(name, exponents()) if defined else known_unit(name))

@@ -170,6 +170,25 @@ def test_one_without_a_unit_beside_one_in_another_than_si_is_a_doubt(load: Load)
     assert found(load({"x": M})).conversions == {}
 
 
+@pytest.mark.parametrize(
+    ("other", "said"),
+    [
+        ({"p": unit(ROOM["p"], "mm")}, "room.p is in mm"),
+        ({"u": unit(INPUT, "mm")}, "room.u is in mm"),
+        ({"u": INPUT}, "room.u is in mm"),  # as it takes sink.y, which is in mm
+    ],
+)
+def test_one_without_a_unit_in_a_component_that_has_that_quantity_in_another(
+    load: Load, other: Mapping[str, str], said: str
+) -> None:
+    links = ['"sink.y -> room.u"'] if "u" in other else []
+    system = load(other, {"y": MM}, links)
+    assert f"room.x has no unit, while {said}; travel must know its unit" in refusal(system)
+    newtons = {n: text.replace('unit="mm"', 'unit="kN"') for n, text in other.items()}
+    forces = load(newtons, {"y": unit(OUTPUT, "kN")}, links)
+    assert "room.x" not in found(forces).conversions
+
+
 def test_a_signal_of_another_quantity_is_refused(load: Load) -> None:
     assert "rooms.toml: room.x is in N; travel must know" in refusal(
         load({"x": unit(OUTPUT, "N"), "y": M})
@@ -185,6 +204,14 @@ def test_only_what_a_metric_expects_is_asked_for(load: Load) -> None:
     assert found(odd, silent, elsewhere) == InSi({}, ())
     factor = load({}, {"a": M_IN}, [*scaled(1e-3), '"room.y -> sink.b"'])
     assert found(factor, silent).conversions == {"room.x": None}
+
+
+@pytest.mark.parametrize("name", ["mm", "cubit", ""])
+def test_a_metric_expects_units_of_si(load: Load, name: str) -> None:
+    wrong = Metric("wrong", travel.function, needs={"room.x": name})
+    message = rf"^wrong: needs room\.x in '{name}'; must be a unit of SI like 'm'"
+    with pytest.raises(InputError, match=message):
+        found(load({"x": MM}), wrong)
 
 
 def test_the_offset_of_a_temperature_does_not_apply_to_a_difference(load: Load) -> None:

@@ -83,6 +83,7 @@ def test_json_has_the_metrics_and_what_led_to_them(
         **json.loads(json.dumps(dict(result.metrics))),
         **settings(grasp.with_experiment(stop=0.1)),
         "units": dict(result.units),
+        "to_si": {},
         "types": {
             name: {"f": "float64", "b": "bool"}[column.dtype.kind]
             for name, column in result.items()

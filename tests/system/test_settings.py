@@ -19,6 +19,7 @@ def test_the_settings_of_the_grasp(grasp: System) -> None:
         "step": None,
         "isolation": "none",
         "rename": {},
+        "units": {},
     }
     assert found["connections"][0] == {
         "from": "plant.gap[1]",

@@ -28,7 +28,7 @@ from .interface import (
     limits,
     typed,
 )
-from .units import BASE, Unit
+from .units import BASE, Unit, known_unit
 
 NUMERIC = ("Real", "Integer")
 CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029]")
@@ -187,13 +187,20 @@ class _Reader:
         return Enumeration(name, tuple(items))
 
     def units(self) -> dict[str, Unit]:
-        """The units that are defined in terms of the SI base units."""
+        """The units that are defined in terms of the SI base units.
+
+        Some tools write every unit without a dimension: one that is known to have one, like mm, is
+        then not defined.
+        """
         found = {}
         for element in self.root.iterfind("UnitDefinitions/Unit"):
             name, base = _printable("unit", element.get("name", "")), element.find("BaseUnit")
             if base is not None:
                 with self.tolerated():
-                    found[name] = _unit(name, base)
+                    unit, known = _unit(name, base), known_unit(name)
+                    empty = unit.si and not any(unit.exponents)
+                    if not (empty and known and not known.measures(unit)):
+                        found[name] = unit
         return found
 
     def variables(self) -> tuple[Variable, ...]:

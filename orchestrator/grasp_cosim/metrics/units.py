@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from ..errors import InputError
-from ..interface.units import Conversion, known_unit
-from ..system.readings import Reading, naming, readings
+from ..interface.units import Conversion, Unit, known_unit
+from ..system.readings import Reading, in_other_units, naming, readings
 from ..system.structure import Structure
 from .metric import Metric, available, resolved
 
@@ -37,9 +37,11 @@ def in_si(system: Structure, metrics: Iterable[Metric]) -> InSi:
     quantity than it expects, or its unit is in doubt. Signals without any unit are taken to be in
     that of SI.
     """
-    found = {str(port): r for port, r in readings(system).items()}
+    read = readings(system)
+    found = {str(port): r for port, r in read.items()}
     expected = {n: e for n, e in _expected(system, metrics).items() if n in found}
-    doubts = {n: d for n, e in expected.items() if (d := _doubt(n, found, expected, e))}
+    others = {str(port): u for port, u in in_other_units(system, read).items()} if expected else {}
+    doubts = {n: d for n, e in expected.items() if (d := _doubt(n, found[n], expected, others))}
     if doubts:
         raise InputError(_refusal(system, doubts, found, expected))
     return InSi(
@@ -58,14 +60,9 @@ def in_si(system: Structure, metrics: Iterable[Metric]) -> InSi:
 
 def _expected(system: Structure, metrics: Iterable[Metric]) -> dict[str, _Expected]:
     """What is expected of signals by their names, by the first metric that does."""
-    outputs = [
-        f"{c.name}.{v.name}"
-        for c in system.components
-        for v in c.interface.of("output")
-        if v.supported and v.kind != "String"
-    ]
+    recorded = {str(port) for port in system.recorded}
     found: dict[str, _Expected] = {}
-    for metric in available(metrics, outputs, system.roles)[0]:
+    for metric in available(metrics, recorded, system.roles)[0]:
         purpose = f"the metrics of the {metric.group}" if metric.group else metric.name
         for name, unit in metric.expects.items():
             if unit is not None:
@@ -74,26 +71,29 @@ def _expected(system: Structure, metrics: Iterable[Metric]) -> dict[str, _Expect
 
 
 def _doubt(
-    name: str,
-    found: Mapping[str, Reading],
-    expected: Mapping[str, _Expected],
-    wanted: _Expected,
+    name: str, read: Reading, expected: Mapping[str, _Expected], others: Mapping[str, Unit]
 ) -> str:
-    """Why a signal cannot be taken to be in the unit that is wanted of it."""
-    unit, quantity = found[name].unit, known_unit(wanted.unit)
-    if found[name].doubt:
-        return found[name].doubt
-    if unit is None:
-        component = name.partition(".")[0]
-        others = (n for n in expected if n.partition(".")[0] == component and found[n].conversion)
-        other = next(others, None)
-        return f"has no unit, while {other} is in {_name(found, other)}" if other else ""
-    return "" if quantity and unit.measures(quantity) else f"is in {unit.name}"
+    """Why a signal cannot be taken to be in the unit that is expected of it.
 
-
-def _name(found: Mapping[str, Reading], name: str) -> str:
-    unit = found[name].unit
-    return unit.name if unit else ""
+    `others` are units other than of SI by variable. One of these at the same component leaves a
+    signal without a unit in doubt, if it is expected, too, or of the same quantity.
+    """
+    quantity = known_unit(expected[name].unit)
+    if quantity is None or not quantity.si:
+        raise InputError(
+            f"{expected[name].purpose}: needs {name} in {expected[name].unit!r}; must be a unit of "
+            "SI like 'm' or 'N.s/m', as signals come in these"
+        )
+    if read.doubt:
+        return read.doubt
+    if read.unit is not None:
+        return "" if read.unit.measures(quantity) else f"is in {read.unit.name}"
+    component = name.partition(".")[0]
+    for other, unit in others.items():
+        alike = other in expected or unit.measures(quantity)
+        if other.partition(".")[0] == component and alike:
+            return f"has no unit, while {other} is in {unit.name}"
+    return ""
 
 
 def _refusal(

@@ -57,7 +57,10 @@ class System(Structure):
         return system
 
     def start(self, key: str) -> float:
-        """The number that 'component.variable' starts with: given in the system, or by its FMU."""
+        """The number that 'component.variable' starts with, in the unit that it has in the system.
+
+        Given there, or by its FMU.
+        """
         name, _, variable = key.partition(".")
         component = self.component(name, key)
         declared = component.interface.by_name.get(variable)

@@ -7,7 +7,7 @@ declares. An output without one is in the unit of the inputs that take its value
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from ..errors import InputError, choices
@@ -52,6 +52,22 @@ def readings(system: Structure) -> dict[Port, Reading]:
         for v in interfaces[c.name].of("output")
         if v.supported and v.kind in ("Real", "Integer") and (port := Port(c.name, v.name))
     }
+
+
+def in_other_units(system: Structure, found: Mapping[Port, Reading]) -> dict[Port, Unit]:
+    """The units other than of SI that are told for variables of any kind; found are readings().
+
+    An input without a unit has that of the output which it takes as it is.
+    """
+    told: dict[Port, Unit | None] = {port: r.unit for port, r in found.items()}
+    for component in system.components:
+        interface = component.interface
+        for v in interface.of(*SETTABLE):
+            told[Port(component.name, v.name)] = unit_of(interface, v)
+    for connection in system.connections:
+        if told[connection.target] is None and not _Taken(connection, None).scales:
+            told[connection.target] = told.get(connection.source)
+    return {port: unit for port, unit in told.items() if unit and not unit.si}
 
 
 def unit_of(interface: Interface, variable: Variable) -> Unit | None:
