@@ -16,6 +16,7 @@ from grasp_cosim.hil.protocol import link_signature
 from grasp_cosim.hil.served import BACKLOG, ServedFmu, Service
 from grasp_cosim.interface.interface import Value
 from grasp_cosim.interface.read import read_interface
+from grasp_fmus.link.peer import TOO_LONG
 from support import native_fmus
 from support.proxies import HandProxy
 
@@ -129,6 +130,52 @@ def test_lost_requests_are_made_up_for_with_the_newest_values(
     assert one.proxy.step(2 * STEP, STEP, starts(fmu, **push)) == whole
 
 
+def test_lost_requests_are_not_made_up_for_when_the_end_has_come(
+    fmus: Path, clocked: MakeClocked
+) -> None:
+    fmu = fmus / "ProximitySensor.fmu"
+    it, asked = clocked(fmu, Service(lockstep=True)), []
+
+    def over() -> bool:
+        asked.append(1)
+        return len(asked) > 10
+
+    it.served.over = over
+    it.proxy.begin(1, starts(fmu))
+    with pytest.raises(RuntimeError, match=r"the end came with 10 of 99000 lost steps made up$"):
+        it.proxy.step(99000 * STEP, STEP, starts(fmu))
+    assert len(asked) == 11
+
+
+def test_a_step_in_parts_is_given_up_when_the_end_has_come(
+    fmus: Path, clocked: MakeClocked
+) -> None:
+    fmu = fmus / "GripperPlantMovable.fmu"
+    it = clocked(fmu, Service(lockstep=True))
+    push = starts(fmu, **{"force[1]": -3.0, "force[2]": 3.0})
+    it.proxy.begin(1, push)
+    it.served.over = lambda: True
+    with pytest.raises(
+        RuntimeError, match=r"the end came at t = 0 s of a step to 100 s, in parts$"
+    ):
+        it.proxy.step(0.0, 100.0, push)
+
+
+@pytest.mark.parametrize("lockstep", [True, False])
+def test_a_step_that_is_too_long_ends_its_session_alone(
+    fmus: Path, clocked: MakeClocked, lockstep: bool
+) -> None:
+    fmu = fmus / "GripperPlant.fmu"
+    it = clocked(fmu, Service(lockstep=lockstep))
+    it.proxy.begin(1, starts(fmu))
+    with pytest.raises(RuntimeError, match="the step is too long: must be at most 3600 s"):
+        it.proxy.step(0.0, 1e300, starts(fmu))
+    assert it.said[-1] == f"the session is over at t = 0 s: {TOO_LONG}"
+    it.proxy.begin(2, starts(fmu))
+    it.proxy.step(0.0, STEP, starts(fmu))
+    assert (it.served.counters()["failures"], it.served.counters()["steps"]) == (1, 1)
+
+
 @pytest.mark.parametrize("time", [-1.0, 1e9, 1e300])
 def test_a_step_from_nowhere_fails_and_the_next_session_is_served(
     fmus: Path, time: float, clocked: MakeClocked
@@ -150,7 +197,7 @@ def test_a_step_that_no_clock_can_keep_fails_and_the_next_session_is_served(
     fmu = fmus / "ProximitySensor.fmu"
     it = clocked(fmu, Service())
     it.proxy.begin(1, starts(fmu))
-    with pytest.raises(RuntimeError, match=r"step of .* s: must be from 1 ns to 1e\+09 s"):
+    with pytest.raises(RuntimeError, match=r"step of .* s: must be 1 ns or more|too long: must be"):
         it.proxy.step(0.0, step, starts(fmu))
     assert it.served.due() is None
     it.proxy.begin(2, starts(fmu))

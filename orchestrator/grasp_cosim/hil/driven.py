@@ -65,7 +65,7 @@ class DrivenFmu:
         self.begin()
         self.set(values)
         self._catch_up(time, step, over)
-        self.advance(time, step)
+        self.advance(time, step, over)
 
     def begin(self) -> None:
         """Leave initialisation mode, if not done before."""
@@ -83,13 +83,16 @@ class DrivenFmu:
             instance.set(list(texts.values()), [values[i] for i in texts])
         self._set_changed(values, parameters_only=True)
 
-    def advance(self, time: float, step: float) -> None:
-        """Advance by `step` from `time`, both in s, with the values as they are."""
+    def advance(self, time: float, step: float, over: Callable[[], bool] = lambda: False) -> None:
+        """Advance by `step` from `time`, both in s, with the values as they are.
+
+        A step that the FMU takes only in parts is given up once `over` says so.
+        """
         instance = self._required()
         self._clock[0] = time
         status = self._stepper(step)()
         if status in (DISCARD, EARLY):
-            finish_step(instance, status, time, time + step)
+            finish_step(instance, status, time, time + step, over)
         elif status > WARNING:
             raise instance.failure(status, time)
         self.time = time + step
@@ -168,7 +171,8 @@ class DrivenFmu:
                     f"{name}: the end came with {k} of {whole} lost steps made up"
                 )
             at = begin + k * step
-            self.advance(at, (time if k == whole - 1 else begin + (k + 1) * step) - at)
+            after = time if k == whole - 1 else begin + (k + 1) * step
+            self.advance(at, after - at, over)
 
     def _stepper(self, step: float) -> Callable[[], int]:
         if self._bound is None or step != self._step:

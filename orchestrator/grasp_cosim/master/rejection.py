@@ -1,18 +1,28 @@
 """Steps that an FMU rejects: it discards them, or ends them early."""
 
+from collections.abc import Callable
+
 import numpy as np
 
+from ..errors import SimulationError
 from ..fmi.instance import DISCARD, EARLY, WARNING, Instance
 
 SMALLEST = 1024
 """A step that is rejected is divided down to this part of it, then the run fails."""
 
 
-def finish_step(instance: Instance, status: int, begin: float, end: float) -> None:
+def finish_step(
+    instance: Instance,
+    status: int,
+    begin: float,
+    end: float,
+    over: Callable[[], bool] = lambda: False,
+) -> None:
     """Bring an instance to end, in s, that rejected the step from begin to there.
 
     Goes on from where the step got to. Where it got nowhere, the rest is halved, at most down to
-    1/1024 of the step. SimulationError where that does not help.
+    1/1024 of the step. SimulationError where that does not help, or `over` says that there is no
+    time left for it.
     """
     if not instance.interface.can_vary_step:
         raise instance.failure(status, begin)
@@ -29,6 +39,11 @@ def finish_step(instance: Instance, status: int, begin: float, end: float) -> No
         elif (length := length / 2) < smallest or clock[0] + length == clock[0]:
             raise instance.failure(status, float(clock[0]))
         while clock[0] < end:
+            if over():
+                name, time = instance.interface.path.name, float(clock[0])
+                raise SimulationError(
+                    f"{name}: the end came at t = {time:.9g} s of a step to {end:.9g} s, in parts"
+                )
             length = min(length, end - float(clock[0]))
             status = instance.stepper(clock, length).python()
             if status > WARNING:
