@@ -267,6 +267,8 @@ def test_a_value_reference_that_two_variables_of_fmi_3_have(write: Write) -> Non
     [
         ("input", "input", "Real", False),
         ("input", "parameter", "Real", False),
+        ("parameter", "input", "Real", False),
+        ("parameter", "parameter", "Real", True),
         ("input", "output", "Real", True),  # two names of one
         ("output", "output", "Real", True),
         ("input", "input", "Integer", True),  # the references of a type are its own
