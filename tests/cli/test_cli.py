@@ -301,3 +301,16 @@ def test_a_folder_is_no_fmu(command: Run, tmp_path: Path, verb: str) -> None:
     code, out, err = command(verb, str(tmp_path))
     assert (code, out) == (2, "")
     assert err == f"grasp-cosim: {tmp_path}: is a folder; must be an FMU, a file\n"
+
+
+def test_of_a_very_long_message_the_middle_is_left_out(command: Run, tmp_path: Path) -> None:
+    (tmp_path / "long.toml").write_text(f"{'x' * 100_000} = 1\n")
+    code, _, said = command("run", "long.toml")
+    assert code == 2
+    assert len(said) < 3000
+    assert said.startswith("grasp-cosim: long.toml: unknown entry 'xxx")
+    assert said.endswith(
+        "; valid: components, connections, events, experiment, faults, "
+        "initialisation, presets, roles\n"
+    )
+    assert "x" * 100_000 in command("--debug", "run", "long.toml")[2]

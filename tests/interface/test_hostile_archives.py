@@ -3,13 +3,14 @@
 import struct
 import zipfile
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 from grasp_cosim.errors import InputError
-from grasp_cosim.inspection.doctor import examine
+from grasp_cosim.inspection.doctor import examine, unpack
 from grasp_cosim.inspection.inspection import inspect_fmu
-from grasp_cosim.interface import document
+from grasp_cosim.interface import document, read
 from grasp_cosim.interface.read import describe, read_interface
 
 HEAD = '<fmiModelDescription fmiVersion="2.0" modelName="M" guid="{1}">'
@@ -213,3 +214,112 @@ def test_names_in_other_scripts_are_names(write: Write) -> None:
     name = "Größe.圧力[1]"
     path = write(described(variable(f'name="{name}" valueReference="1"')))
     assert list(read_interface(path).by_name) == [name]
+
+
+def test_more_elements_than_an_fmu_has(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(document, "MOST_ELEMENTS", 100)
+    assert read_interface(write(f"{HEAD}{'<a/>' * 97}<ModelVariables/>{TAIL}")).identifier == "m"
+    refused(write(f"{HEAD}{'<a/>' * 98}<ModelVariables/>{TAIL}"), "more than 100 elements")
+
+
+@pytest.mark.slow
+def test_millions_of_elements(write: Write) -> None:
+    refused(write(f"{HEAD}{'<a/>' * 3_000_000}<ModelVariables/>{TAIL}"), "1000000 elements")
+
+
+def test_more_dependencies_than_an_fmu_has(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(read, "MOST_DEPENDENCIES", 100)
+    unknown = f'<Unknown index="1" dependencies="{"1 " * 60}"/>'
+    structure = f"<ModelStructure><Outputs>{2 * unknown}</Outputs></ModelStructure>"
+    text = described(variable('name="a" valueReference="1"')).replace(TAIL, structure + TAIL)
+    refused(write(text), "Outputs/Unknown: 120 dependencies; must have at most 100")
+
+
+@pytest.mark.parametrize("length", [read.LONGEST_NAME + 1, 10_000_000])
+def test_a_name_that_nobody_reads(write: Write, length: int) -> None:
+    path = write(described(variable(f'name="{"x" * length}" valueReference="1"')))
+    refused(path, f"{length} characters; must have at most {read.LONGEST_NAME}")
+
+
+@pytest.mark.parametrize(
+    "identifier", ["", "../../tmp/evil", "/tmp/evil", "a\\b", "C:evil", "..", "a&#10;b"]
+)
+def test_a_binary_that_is_not_in_the_fmu(write: Write, identifier: str) -> None:
+    path = write(PLAIN.replace('modelIdentifier="m"', f'modelIdentifier="{identifier}"'))
+    with pytest.raises(InputError, match=r"modelIdentifier = .*: must be the name of its binary"):
+        read_interface(path)
+
+
+def test_a_binary_with_a_name_of_its_tool(write: Write) -> None:
+    path = write(PLAIN.replace('modelIdentifier="m"', 'modelIdentifier="Größe-1.0 b"'))
+    assert read_interface(path).identifier == "Größe-1.0 b"
+
+
+def test_a_value_reference_that_two_variables_of_fmi_3_have(write: Write) -> None:
+    """A dependency on it would be on one of them, unsaid on which."""
+    text = described(*(f'<Float64 name="{n}" valueReference="7"/>' for n in "ab"))
+    path = write(text.replace('"2.0"', '"3.0"').replace("guid", "instantiationToken"))
+    refused(path, "variables 'a' and 'b' have the valueReference 7 both; must be unique")
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "type_", "valid"),
+    [
+        ("input", "input", "Real", False),
+        ("input", "parameter", "Real", False),
+        ("parameter", "input", "Real", False),
+        ("parameter", "parameter", "Real", True),
+        ("input", "output", "Real", True),  # two names of one
+        ("output", "output", "Real", True),
+        ("input", "input", "Integer", True),  # the references of a type are its own
+    ],
+)
+def test_a_value_reference_of_two_inputs(
+    write: Write, one: str, other: str, type_: str, valid: bool
+) -> None:
+    """Setting one would set the other, too."""
+    text = described(
+        variable(f'name="a" valueReference="7" causality="{one}"'),
+        variable(f'name="b" valueReference="7" causality="{other}"').replace("Real", type_),
+    )
+    if valid:
+        assert len(read_interface(write(text)).variables) == 2
+    else:
+        with pytest.raises(InputError, match="the valueReference 7 both; one of them at most"):
+            read_interface(write(text))
+
+
+@pytest.mark.parametrize(
+    ("type_", "start", "what"),
+    [
+        ("Float64", "abc", "must be a number"),
+        ("Int8", "128", "must be from -128 to 127, as Int8 is"),
+        ("UInt64", "-1", "must be from 0 to 18446744073709551615"),
+        ("Int32", "1.5", "must be a whole number"),
+        ("Int64", "9" * 5000, "must be a whole number"),
+    ],
+)
+def test_a_start_value_beyond_its_type(write: Write, type_: str, start: str, what: str) -> None:
+    text = described(f'<{type_} name="a" valueReference="7" causality="input" start="{start}"/>')
+    path = write(text.replace('"2.0"', '"3.0"').replace("guid", "instantiationToken"))
+    with pytest.raises(InputError, match=f"variable 'a': start = .*{start}.*: {what}"):
+        read_interface(path)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["../x", "../../x", "/tmp/x", "C:\\x", "a\\..\\..\\x", "binaries/../../x", "x\0y", "~/x"],
+)
+def test_no_entry_leads_out_of_the_folder(tmp_path: Path, name: str, write: Write) -> None:
+    path, inside = write(PLAIN), tmp_path / "out" / "side" / "folder"
+    with zipfile.ZipFile(path, "a") as archive:
+        info = zipfile.ZipInfo("x")
+        info.filename, info.external_attr = name, 0o120777 << 16
+        archive.writestr(info, "/etc/passwd")
+    before = {p for p in tmp_path.rglob("*") if inside not in p.parents}
+    inside.mkdir(parents=True)
+    with suppress(InputError):
+        unpack(path, inside)
+    left = {p for p in tmp_path.rglob("*") if inside not in p.parents} - before
+    assert left == {inside, *inside.parents} - {tmp_path, *tmp_path.parents}
+    assert not any(p.is_symlink() for p in inside.rglob("*"))

@@ -107,3 +107,15 @@ def test_the_offset_of_a_unit_does_not_apply_to_a_difference(tmp_path: Path) -> 
 def test_a_difference_is_no_temperature(tmp_path: Path, relative: str) -> None:
     with pytest.raises(InputError, match=r"only one of them is a difference .* factor = "):
         from_y_to_u(tmp_path, f'unit="degF" {relative}', RISE)
+
+
+@pytest.mark.parametrize(
+    ("source", "target"),
+    [
+        (Unit("a", LENGTH, 1e308), Unit("b", LENGTH, 1e-308)),
+        (Unit("a", LENGTH, 1e-308), Unit("b", LENGTH, 1e308)),
+        (Unit("a", TEMPERATURE, 1.0, 1e308), Unit("b", TEMPERATURE, 1e-5)),
+    ],
+)
+def test_a_conversion_beyond_what_a_number_can_be_is_none(source: Unit, target: Unit) -> None:
+    assert conversion(source, target) is None

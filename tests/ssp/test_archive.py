@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim import InputError, System
+from grasp_cosim.interface import document
 from grasp_cosim.ssp.write import write_ssp
 from ssp.hand_made import (
     archive,
@@ -378,3 +379,50 @@ def test_a_spoilt_annotation(
     text = message_of(tmp_path / "grasp.ssp")
     assert message in text
     assert "\n" not in text
+
+
+def test_an_archive_of_which_more_would_be_unpacked_than_there_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = archive(tmp_path, structure(TOP), {"a": A})
+    with zipfile.ZipFile(path, "a", zipfile.ZIP_DEFLATED) as file:
+        file.writestr("resources/zeros", bytes(1_000_000))
+    monkeypatch.setattr(document, "LARGEST_UNPACKED", 100_000)
+    message = message_of(path)
+    assert re.search(r"its files have \d+ bytes unpacked; must have at most \d+$", message)
+    assert len(message.splitlines()) == 1
+
+
+def test_an_archive_whose_names_are_no_text(tmp_path: Path) -> None:
+    path = archive(tmp_path, structure(TOP), {"a": A})
+    with zipfile.ZipFile(path, "a") as file:
+        file.writestr("grün", b"")
+    path.write_bytes(path.read_bytes().replace("grün".encode(), b"gr\xff\xffn"))
+    assert "not readable as an SSP archive" in message_of(path)
+
+
+@pytest.mark.parametrize(
+    "ssd",
+    [
+        structure(system("x" * 11_000_000, ELEMENT)),
+        structure(TOP.replace("<ssd:Elements>", "<ssd:Elements>" + "<a>" * 20_000)),
+    ],
+)
+def test_what_the_parser_does_not_take_is_one_line(tmp_path: Path, ssd: str) -> None:
+    assert "SystemStructure.ssd: not readable as XML: " in refused(tmp_path, ssd)
+
+
+def test_an_annotation_deeper_than_the_stack(tmp_path: Path) -> None:
+    text = f'<g:System xmlns:g="grasp-cosim:system">{"[" * 100_000}</g:System>'
+    entry = f'<ssc:Annotation type="grasp-cosim">{text}</ssc:Annotation>'
+    end = "</ssd:SystemStructureDescription>"
+    ssd = structure(TOP).replace(end, f"<ssd:Annotations>{entry}</ssd:Annotations>{end}")
+    assert "annotation 'grasp-cosim': not as it was written" in refused(tmp_path, ssd)
+
+
+@pytest.mark.parametrize("value", ["p Real 1e999", f"k Integer {'9' * 5000}", "p Real NaN"])
+def test_a_number_that_none_is(tmp_path: Path, value: str) -> None:
+    numbers = fmu("output Real y - m", "parameter Real p 1.0", "parameter Integer k 1")
+    ssd = structure(system("top", component("a", bindings=bind(parameter_set(value)))))
+    text = message_of(archive(tmp_path, ssd, {"a": numbers}))
+    assert len(text.splitlines()) == 1

@@ -21,8 +21,8 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-LIMIT = 10.0
-"""s of wall time for a command."""
+LIMIT, PATIENCE = 10.0, 100.0
+"""s of processor time for a command and the processes it starts; s until it is ended as hanging."""
 
 MEMORY = 8 << 30
 """Bytes of address space for a command: what wants more fails, instead of the machine."""
@@ -362,7 +362,7 @@ def tree(folder: Path) -> dict[str, tuple[int, int]]:
 
 
 def attempt(arguments: list[str], folder: Path, said: Path) -> tuple[int | None, float]:
-    """Exit code of a command line (minus a signal's number; None for no end), and s it took."""
+    """Exit code of a command line, minus a signal's number or None for no end; s of processor."""
     from grasp_cosim import cli
 
     began = time.monotonic()
@@ -383,14 +383,14 @@ def attempt(arguments: list[str], folder: Path, said: Path) -> tuple[int | None,
 
         atexit._run_exitfuncs()
         os._exit(code)
-    while time.monotonic() < began + LIMIT:
-        ended, status = os.waitpid(child, os.WNOHANG)
+    while time.monotonic() < began + PATIENCE:
+        ended, status, used = os.wait4(child, os.WNOHANG)
         if ended:
-            return os.waitstatus_to_exitcode(status), time.monotonic() - began
+            return os.waitstatus_to_exitcode(status), used.ru_utime + used.ru_stime
         time.sleep(0.005)
     os.killpg(child, signal.SIGKILL)
     os.waitpid(child, 0)
-    return None, LIMIT
+    return None, PATIENCE
 
 
 def complaints(code: int | None, said: str, changed: list[str]) -> list[str]:
@@ -436,6 +436,7 @@ def main(kind: str, first: int, count: int, fmus: Path, folder: Path) -> None:
             ]  # fmt: skip
             said = (folder / "said.txt").read_text("utf-8", errors="replace")
             wrong = complaints(code, said, changed if code is not None else [])
+            wrong += [f"took {took:.1f} s"] * (took > LIMIT)
             wrong += [f"wrote {OUTSIDE}"] * OUTSIDE.exists()
             last = (said.splitlines() or [""])[-1]
             result = {"kind": kind, "seed": seed, "command": arguments[0], "code": code}
@@ -445,4 +446,5 @@ def main(kind: str, first: int, count: int, fmus: Path, folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]), Path(sys.argv[4]), Path(sys.argv[5]))
+    what, start, many, *places = sys.argv[1:]
+    main(what, int(start), int(many), *(Path(place).resolve() for place in places))

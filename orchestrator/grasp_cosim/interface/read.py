@@ -152,21 +152,23 @@ class _Reader:
     def check_references(self) -> None:
         """ValueError where two variables of FMI 3.0 have the same: it says what depends on what.
 
-        In FMI 2.0 such are two names of one, and a flaw where both could be set.
+        In FMI 2.0 such are two names of one, and a flaw where an input could be set by both.
         """
-        seen: dict[tuple[int, str], str] = {}
+        seen: dict[tuple[int, str], tuple[str, str | None]] = {}
         for element, reference in zip(self.elements, self.references, strict=True):
-            key, name = (reference, ""), _name(element)
+            key, name, causality = (reference, ""), _name(element), element.get("causality")
             if self.major != "3":
-                if element.get("causality") not in SETTABLE:
+                if causality not in SETTABLE:
                     continue
                 key = (reference, next((kind_of(e.tag) for e in element if e.tag in TYPES), ""))
             if key in seen:
-                text = f"{seen[key]!r} and {name!r} have the valueReference {reference} both"
+                other, its = seen[key]
+                text = f"{other!r} and {name!r} have the valueReference {reference} both"
                 if self.major == "3":
                     raise ValueError(f"variables {text}; must be unique")
-                self.flaws.append(f"variables {text}; one of them at most may be set")
-            seen[key] = name
+                if "input" in (causality, its):
+                    self.flaws.append(f"variables {text}; one of them at most may be set")
+            seen[key] = (name, causality)
 
     @contextmanager
     def tolerated(self) -> Iterator[None]:

@@ -51,7 +51,8 @@ def parse(place: str, data: bytes, form: str) -> Any:
     try:
         root = etree.fromstring(data, parser)
     except etree.XMLSyntaxError as error:
-        raise InputError(f"{place}: not readable as XML: {error.msg}") from error
+        reason = " ".join(str(error.msg).split())
+        raise InputError(f"{place}: not readable as XML: {reason}") from error
     if root.getroottree().docinfo.doctype:
         raise InputError(f"{place}: has a document type; SSP has none")
     return checked(place, root, form)
