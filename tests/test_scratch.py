@@ -1,0 +1,92 @@
+"""Temporary folders: gone with their process, swept after a kill, nobody else's touched."""
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import pytest
+from conftest import UnpackIn
+from grasp_cosim.scratch import LOCK, PREFIX, TO_BE, YOUNG, ScratchFolder, sweep
+
+KEEPS = "import sys; from grasp_cosim.scratch import ScratchFolder; a = ScratchFolder(); "
+FILL = "open(a.name + '/library.so', 'w').close(); print(a.name, flush=True); "
+
+
+@pytest.fixture
+def folder(unpack_in: UnpackIn) -> Path:
+    """The folder for temporary ones."""
+    return unpack_in("tmp")
+
+
+def ended(folder: Path, how: str) -> Path:
+    """The folder of a process that ended in some way."""
+    done = subprocess.run(
+        [sys.executable, "-c", KEEPS + FILL + how],
+        env={**os.environ, "TMPDIR": str(folder)},
+        stdout=subprocess.PIPE,
+        text=True,
+        check=False,
+    )
+    return Path(done.stdout.strip())
+
+
+def test_it_is_there_until_its_end(folder: Path) -> None:
+    with ScratchFolder() as scratch:
+        (Path(scratch.name) / "sub").mkdir()
+        sweep.cache_clear()
+        sweep(str(folder))
+        assert (Path(scratch.name) / "sub").exists()
+    assert not list(folder.iterdir())
+    scratch.cleanup()
+
+
+@pytest.mark.parametrize("how", ["", "sys.exit(3)", "raise ValueError('on purpose')"])
+def test_a_process_takes_it_with_it(folder: Path, how: str) -> None:
+    assert not ended(folder, how).exists()
+
+
+def test_after_a_kill_the_next_process_removes_it(folder: Path) -> None:
+    left = ended(folder, "import os; os.kill(os.getpid(), 9)")
+    assert (left / "library.so").exists()
+    ended(folder, "")
+    assert not left.exists()
+
+
+def test_a_fork_leaves_that_of_its_parent(folder: Path) -> None:
+    how = "import os, pathlib; child = os.fork(); child or sys.exit(); os.wait(); "
+    left = ended(folder, how + "print(pathlib.Path(a.name, 'library.so').exists())")
+    assert str(left).endswith("True")
+
+
+def test_what_is_not_known_to_be_left_stays(folder: Path) -> None:
+    young = Path(tempfile.mkdtemp(prefix=PREFIX, dir=folder))
+    theirs = folder / "other"
+    theirs.mkdir()
+    (folder / "link").symlink_to(theirs)
+    link = folder / f"{PREFIX}link"
+    link.symlink_to(theirs)
+    (theirs / LOCK).touch()
+    (folder / f"{PREFIX}file").touch()
+    sweep.cache_clear()
+    sweep(str(folder))
+    assert young.exists()
+    assert (theirs / LOCK).exists()
+    assert link.is_symlink()
+    sweep.cache_clear()
+    sweep(str(folder / "missing"))
+
+
+@pytest.mark.parametrize("name", [TO_BE, None])
+def test_one_without_a_lock_is_left_once_it_is_old(folder: Path, name: str | None) -> None:
+    """Of a process that was killed as it made it, or as it removed it."""
+    old = Path(tempfile.mkdtemp(prefix=PREFIX, dir=folder))
+    if name:
+        (old / name).touch()
+    then = time.time() - 2.0 * YOUNG
+    os.utime(old, (then, then))
+    sweep.cache_clear()
+    sweep(str(folder))
+    assert not old.exists()
