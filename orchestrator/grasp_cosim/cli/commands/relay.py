@@ -78,7 +78,7 @@ def relay(
     """Relay UDP datagrams to a peer and back through a nasty network, until Ctrl-C.
 
     The n-th datagram of a direction has the same fate whenever the seed is the same. Both
-    directions have the same conditions. Counts are printed at the end. Exit code 130 (143 by SIGTERM) where a
+    directions have the same conditions. Counts are printed at the end. Exit code 130 where a
     --duration was cut short.
 
     \b
