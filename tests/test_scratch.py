@@ -4,12 +4,11 @@ import os
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 
 import pytest
 from conftest import UnpackIn
-from grasp_cosim.scratch import LOCK, PREFIX, TO_BE, YOUNG, ScratchFolder, sweep
+from grasp_cosim.scratch import PREFIX, ScratchFolder, sweep
 
 KEEPS = "import sys; from grasp_cosim.scratch import ScratchFolder; a = ScratchFolder(); "
 FILL = "open(a.name + '/library.so', 'w').close(); print(a.name, flush=True); "
@@ -62,31 +61,46 @@ def test_a_fork_leaves_that_of_its_parent(folder: Path) -> None:
 
 
 def test_what_is_not_known_to_be_left_stays(folder: Path) -> None:
-    young = Path(tempfile.mkdtemp(prefix=PREFIX, dir=folder))
     theirs = folder / "other"
     theirs.mkdir()
-    (folder / "link").symlink_to(theirs)
     link = folder / f"{PREFIX}link"
     link.symlink_to(theirs)
-    (theirs / LOCK).touch()
+    (theirs / "file").touch()
     (folder / f"{PREFIX}file").touch()
     sweep.cache_clear()
     sweep(str(folder))
-    assert young.exists()
-    assert (theirs / LOCK).exists()
+    assert (theirs / "file").exists()
+    assert (folder / f"{PREFIX}file").exists()
     assert link.is_symlink()
     sweep.cache_clear()
     sweep(str(folder / "missing"))
 
 
-@pytest.mark.parametrize("name", [TO_BE, None])
-def test_one_without_a_lock_is_left_once_it_is_old(folder: Path, name: str | None) -> None:
-    """Of a process that was killed as it made it, or as it removed it."""
-    old = Path(tempfile.mkdtemp(prefix=PREFIX, dir=folder))
-    if name:
-        (old / name).touch()
-    then = time.time() - 2.0 * YOUNG
-    os.utime(old, (then, then))
+def test_one_that_is_taken_for_left_as_it_is_made_is_made_again(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another process may look between the making and the locking of it."""
+    mkdtemp = tempfile.mkdtemp
+    taken: list[str] = []
+
+    def swept(prefix: str) -> str:
+        name = mkdtemp(prefix=prefix)
+        if not taken:
+            taken.append(name)
+            sweep.cache_clear()
+            sweep(str(folder))
+        return name
+
+    monkeypatch.setattr(tempfile, "mkdtemp", swept)
+    with ScratchFolder() as scratch:
+        assert not Path(taken[0]).exists()
+        assert Path(scratch.name).exists()
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root gives folders away")
+def test_those_of_others_stay(folder: Path) -> None:
+    theirs = Path(tempfile.mkdtemp(prefix=PREFIX, dir=folder))
+    os.chown(theirs, 12345, 12345)
     sweep.cache_clear()
     sweep(str(folder))
-    assert not old.exists()
+    assert theirs.exists()
