@@ -65,7 +65,7 @@ def check(folder: Path) -> None:
         return
     run = load_run(folder)
     gain = run.settings["components"]["a"]["values"]["gain"]
-    assert run["a.x"] == pytest.approx(gain * run.time, abs=1e-9)
+    assert run["a.x"] == pytest.approx(gain * run.time, rel=1e-9, abs=1e-9)
     assert np.array_equal(run.time, np.arange(len(run.time)) / 1000)
     if (folder / "report.html").exists():
         assert f"gain = {gain:g}" in (folder / "report.html").read_text("utf-8")
