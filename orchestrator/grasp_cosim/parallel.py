@@ -16,12 +16,14 @@ from itertools import islice
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
+from tempfile import gettempdir
 from typing import Any, NamedTuple, Self, TypeVar
 
 from tqdm import tqdm
 
 from . import interruption
 from .errors import SimulationError
+from .scratch import sweep
 
 Job = TypeVar("Job")
 Run = TypeVar("Run")
@@ -198,13 +200,18 @@ class _Worker:
         elif self._process.pid:
             self._process.kill()
 
-    def end(self, deadline: float) -> None:
-        """Wait for the end of a stopped process, until a time of the monotonic clock; kill it."""
+    def killed(self, deadline: float) -> bool:
+        """Wait for the end of a stopped process, until a time of the monotonic clock, or kill it.
+
+        True where it could not clean up after itself.
+        """
         self._process.join(max(deadline - time.monotonic(), 0.0))
         if self._process.is_alive():
             self._process.kill()
             self._process.join()
+        killed = self._process.exitcode == -signal.SIGKILL
         self._process.close()
+        return killed
 
     def _end(self) -> str:
         """Return how the process, whose pipe has ended, came to its end."""
@@ -240,8 +247,10 @@ def _end(workers: Iterable[_Worker]) -> None:
     for worker in ended:
         worker.stop()
     deadline = time.monotonic() + PATIENCE
-    for worker in ended:
-        worker.end(deadline)
+    killed = [worker.killed(deadline) for worker in ended]
+    if any(killed):
+        sweep.cache_clear()
+        sweep(gettempdir())
 
 
 def _work(pipe: Connection) -> None:

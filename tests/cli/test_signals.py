@@ -1,5 +1,6 @@
 """Commands as processes: what SIGINT, SIGTERM and SIGKILL leave behind."""
 
+import fcntl
 import json
 import os
 import signal
@@ -125,7 +126,9 @@ def test_a_second_signal_ends_a_run_that_hangs(
 
 @needs_gcc
 def test_a_killed_run_is_on_disk_and_its_folders_are_swept(start: Start, tmp_path: Path) -> None:
-    alive = tempfile.mkdtemp(prefix=PREFIX, dir=tmp_path / "tmp")  # about to be locked
+    alive = tempfile.mkdtemp(prefix=PREFIX, dir=tmp_path / "tmp")
+    lock = os.open(alive, os.O_RDONLY)
+    fcntl.flock(lock, fcntl.LOCK_EX)
     process = start("run", native_system(tmp_path), "--out", "out")
     wait_for(process, lambda: (tmp_path / "out/run.json").exists() and size(tmp_path) > 10_000)
     process.kill()
@@ -141,6 +144,7 @@ def test_a_killed_run_is_on_disk_and_its_folders_are_swept(start: Start, tmp_pat
     assert report.returncode == 0, err
     assert "unfinished: to t = " in Path(tmp_path, json.loads(out)["page"]).read_text("utf-8")
     assert left(tmp_path) == [Path(alive).name]
+    os.close(lock)
 
 
 def size(folder: Path) -> int:

@@ -428,6 +428,6 @@ def test_sigterm_before_the_duration_is_over(
     process, _ = started("--to", "127.0.0.1:5501", "--duration", "1000", "--json")
     process.send_signal(signal.SIGTERM)
     out, err = process.communicate(timeout=60)
-    assert process.returncode == 130
+    assert process.returncode == 143
     assert err == "grasp-cosim: interrupted before --duration 1000.0 was over\n"
     assert json.loads(out)["request"]["received"] == 0

@@ -61,7 +61,7 @@ def serve(
 
     It runs in real time, or with --lockstep one step at a request: then a loop over the proxy gives
     the same values as one without. Port 0 takes one that is free. What came is counted, and said
-    in the end. Exit code 1: --duration was over before --sessions; 130: cut short.
+    in the end. Exit code 1: --duration was over before --sessions; 130 or 143: cut short.
 
     \b
     Example: grasp-cosim serve fmus/build/GripperPlant.fmu --lockstep
