@@ -1,9 +1,10 @@
 """From an FMU's interface to what a proxy of it and its peer exchange."""
 
+from collections.abc import Callable
 from math import isfinite
 from pathlib import Path
 
-from grasp_fmus.link.message import check_size, read_key
+from grasp_fmus.link.message import check_size, exposed, read_key
 from grasp_fmus.link.signature import ORDER, LinkVariable, Signature
 
 from ..errors import InputError
@@ -40,12 +41,18 @@ def link_signature(interface: Interface) -> tuple[Signature, list[str]]:
     return signature, notes
 
 
-def shared_key(path: Path) -> bytes:
-    """Return the key in a file; InputError where it is too short to be one."""
+def shared_key(path: Path, say: Callable[[str], None]) -> bytes:
+    """Return the key in a file, and say where others can read it.
+
+    InputError where it is too short to be one.
+    """
     try:
-        return read_key(path)
+        key = read_key(path)
     except ValueError as error:
         raise InputError(f"{path}: {error}") from error
+    if said := exposed(path):
+        say(said)
+    return key
 
 
 def _obstacle(v: Variable) -> str | None:

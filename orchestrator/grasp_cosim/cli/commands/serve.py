@@ -7,7 +7,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import click
-from grasp_fmus.link.message import exposed
 
 from ...errors import InputError
 from ...hil.address import is_loopback, text
@@ -73,7 +72,7 @@ def serve(
         None if step is None else in_nanoseconds("--step", step),
         in_nanoseconds("--watchdog", watchdog),
         dict(pair("--failsafe", text, "INPUT=VALUE") for text in failsafe),
-        None if key_file is None else shared_key(key_file),
+        None if key_file is None else shared_key(key_file, _say),
     )
     end = None if duration is None else in_nanoseconds("--duration", duration)
     served = ServedFmu(read_interface(fmu), service, _say)
@@ -82,8 +81,6 @@ def serve(
             _say(note)
         at = text(server.address)
         _say(f"serving {fmu.name} at {at}, {'lockstep' if lockstep else 'real time'}")
-        if key_file is not None and (said := exposed(key_file)):
-            _say(said)
         if not is_loopback(server.address) and key_file is None:
             _say(f"{at} can be reached by others, who may take part: --key-file keeps them out")
         with ended_by_signals(server.stop) as came, _ended_after(duration, fmu.name):
