@@ -148,6 +148,9 @@ def test_a_factor_on_what_has_no_unit_is_a_doubt(
         (M, MM_IN, 1e-3, False),
         (M, unit(INPUT, "N"), 98.0, True),  # a spring: no conversion of lengths
         (M, INPUT, 1e-3, True),
+        (M, M_IN, 1.1, True),  # a gain
+        (M, M_IN, 2.0, True),
+        (M, M_IN, 39.37, False),  # inches
     ],
 )
 def test_a_factor_that_the_units_do_not_give_is_a_doubt(

@@ -83,6 +83,7 @@ def _actuators(result: Result) -> dict[int, str]:
         and (unit := known_unit(result.units.get(c["from"]) or ""))
         and newton
         and unit.measures(newton)
+        and (unit.si or result.to_si.get(c["from"]))
         and c["factor"] in (None, 1.0)
         and not c["offset"]
     }

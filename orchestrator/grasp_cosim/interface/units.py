@@ -137,6 +137,15 @@ def known_unit(name: str) -> Unit | None:
     return Unit(name, tuple(exponents), scale, offset) if 0.0 < scale < math.inf else None
 
 
+def between_units(ratio: float) -> bool:
+    """True if a number > 0 looks like one between two units and not like a gain: 1000, 25.4, 60."""
+    digits = math.log10(ratio)
+    if abs(digits - round(digits)) < 1e-9:
+        return round(digits) != 0
+    shifts = (sign * math.log10(factor) for factor, *_ in _OTHER.values() for sign in (-1, 1))
+    return any(abs(digits - s - round(digits - s)) < 1e-4 for s in shifts if s % 1.0)
+
+
 def _symbol(text: str) -> tuple[tuple[float, float, int, dict[str, int]], int] | None:
     """Factor, offset, power of ten and base units of a symbol like mm, and its power."""
     match = _FACTOR.fullmatch(text)

@@ -98,7 +98,7 @@ def prepare_swap(
             for v in ours.of("output")
             if v.name in theirs.by_name
         }
-        | (_between(swapped, system) if swapped else {}),
+        | (_between(swapped, system, component) if swapped else {}),
         {
             f"{name}.{v.name}": v.magnitude if isinstance(v.magnitude, float) else None
             for name, interface in interfaces.items()
@@ -107,11 +107,13 @@ def prepare_swap(
     )
 
 
-def _between(source: System, target: System) -> dict[str, Conversion | None]:
-    """The conversions of outputs whose units both systems tell, even if only by connections."""
+def _between(source: System, target: System, name: str) -> dict[str, Conversion | None]:
+    """The conversions of the outputs of a component whose units both systems tell, even if only by
+    connections.
+    """
     ends = readings(source), readings(target)
     return {
         str(port): conversion(start, end)
         for port in ends[0].keys() & ends[1].keys()
-        if (start := ends[0][port].unit) and (end := ends[1][port].unit)
+        if port.component == name and (start := ends[0][port].unit) and (end := ends[1][port].unit)
     }

@@ -6,18 +6,14 @@ declares. An output without one is in the unit of the inputs that take its value
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from ..errors import InputError, choices
 from ..interface.interface import SETTABLE, Interface, Variable
-from ..interface.units import IDENTITY, Conversion, Unit, conversion
+from ..interface.units import IDENTITY, Conversion, Unit, between_units, conversion
 from .parts import Connection, Port
 from .structure import Structure
-
-SAME = 1e-9
-"""Relative; factors this close are one, written with fewer digits."""
 
 
 class Reading(NamedTuple):
@@ -152,11 +148,11 @@ def _reading(
 
 
 def _contradiction(unit: Unit, taken: Iterable[_Taken]) -> str:
-    """Why a declared unit may be wrong: a factor to the same quantity that it does not explain."""
+    """Why a declared unit may be wrong: a factor that only other units of its quantity explain."""
     for t in taken:
         given = (t.connection.factor, t.connection.offset) != (None, None)
         expected = conversion(unit, t.unit) if given and t.unit else None
-        if expected and not math.isclose(abs(t.factor), abs(expected.factor), rel_tol=SAME):
+        if expected and between_units(abs(t.factor / expected.factor)):
             return (
                 f"is declared in {unit.name}, but its connection to {t.connection.target} has "
                 f"factor = {t.factor:g} where the units give {expected.factor:g}"
