@@ -66,8 +66,11 @@ def report(case: str, fmu: str, folder: str) -> dict[str, Any]:
     to_location = {**FOUND, **NOT_FOUND}.get(case, lambda p: "file://" + quote(p))
     location = "file:///no/%ff%fe" if case == "no text" else to_location(path)
     said: list[str] = []
-    logger = _LOGGER(lambda _, name, status, category, text: said.append(text.decode()))
-    logger = _LOGGER(0) if case.startswith("NULL logger") else logger
+
+    def log(_: Any, name: bytes, status: int, category: bytes, text: bytes) -> None:
+        said.append(text.decode())
+
+    logger = _LOGGER() if case.startswith("NULL logger") else _LOGGER(log)
     callbacks = _Callbacks(logger, _ALLOCATE(), _FREE(), None, None)
     component = loaded.library.fmi2Instantiate(
         NAMES.get(case, b"one"), 1, loaded.guid.encode(),
