@@ -97,7 +97,7 @@ def test_a_message_in_pythonfmus_own_log_is_passed_on_once(
     altered: Altered, tmp_path: Path
 ) -> None:
     """There it goes where the host's logger is not found."""
-    place = "    name = instance.encode()\n    if"
+    place = "    if sys.platform"
     path = altered("GripperPlant", "grasp_fmus/host_log.py", place, f"    return None\n{place}")
     with Instance(Fmu(path, tmp_path / "extracted"), "plant", logging=True) as instance:
         instance.initialise()

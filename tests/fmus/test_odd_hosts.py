@@ -59,11 +59,15 @@ CALLBACKS = ("NULL callbacks", "NULL logger", "NULL logger with logging on")
 LIVES = (*FOUND, *NAMES, *FOLDERS, *CALLBACKS)
 
 
+def usual(path: str) -> str:
+    return f"file://{quote(path)}"
+
+
 def report(case: str, fmu: str, folder: str) -> dict[str, Any]:
     """Whether there is an instance, the statuses of its calls, and what was logged."""
     loaded = Fmu(Path(fmu), Path(folder, FOLDERS.get(case, "fmu")))
     path = str(loaded.folder / "resources")
-    to_location = {**FOUND, **NOT_FOUND}.get(case, lambda p: "file://" + quote(p))
+    to_location = {**FOUND, **NOT_FOUND}.get(case, usual)
     location = "file:///no/%ff%fe" if case == "no text" else to_location(path)
     said: list[str] = []
 

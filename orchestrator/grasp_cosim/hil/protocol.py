@@ -4,6 +4,7 @@ from math import isfinite
 from pathlib import Path
 
 from grasp_fmus.link.message import check_size, read_key
+from grasp_fmus.link.message import exposed as exposed
 from grasp_fmus.link.signature import ORDER, LinkVariable, Signature
 
 from ..errors import InputError

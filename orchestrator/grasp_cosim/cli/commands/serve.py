@@ -7,11 +7,10 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import click
-from grasp_fmus.link.message import exposed
 
 from ...errors import InputError
 from ...hil.address import is_loopback, text
-from ...hil.protocol import shared_key
+from ...hil.protocol import exposed, shared_key
 from ...hil.served import ServedFmu, Service
 from ...hil.server import DEFAULT_ADDRESS, Server
 from ...interface.read import read_interface
