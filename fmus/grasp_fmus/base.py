@@ -132,14 +132,23 @@ class Slave(metaclass=Once):
     state_from_bytes: Callable[[bytes], Any]
 
     def __init__(
-        self, component: Component, instance_name: str, resources: str, logger: int, visible: int
+        self,
+        component: Component,
+        instance_name: bytes | str,
+        resources: str,
+        logger: int,
+        visible: int,
     ) -> None:
-        """As pythonfmu calls it: logger is the address of its logger."""
+        """As pythonfmu calls it: logger is the address of its logger.
+
+        The name is bytes on Linux, and may be no UTF-8.
+        """
         forget(resources)
-        self.instance_name = instance_name
+        name = instance_name.encode() if isinstance(instance_name, str) else instance_name
+        self.instance_name = name.decode(errors="replace")
         self.log_queue: list[Message] = []
         self._component = component
-        self._host_log = host_log(logger, instance_name)
+        self._host_log = host_log(logger, name)
         self._time = 0.0
         self._params: Any = None  # None: one was set and they are to be read again
         self._inputs: Any = None  # None: something was set and the outputs are out of date

@@ -88,6 +88,36 @@ _EDITS = {
     # In fmi2DoStep: a step that is discarded is no wish to end the simulation, for
     # fmi2GetBooleanStatus(fmi2Terminated).
     0x18CD0: bytes(1),
+    # In fmi2Instantiate, for the search for "%20" and "file://" in the resource location. Where
+    # callbacks, name or location are NULL, zeros or "" for them. The location into its string; of
+    # one that begins with "file:", without that, without "//" or "//localhost" before a "/", and
+    # with a byte for each %XX but %00. Then on to where the loader makes its logger.
+    0x1A8A7: bytes.fromhex(
+        "488d84243001000048894424084c8dac24400100004c8dbc2400010000488d0575e2010048837c24"
+        "28007505488944242848837c241800750548894424184885ed480f44e8488dbc24f00000004889ee"
+        "e894cfffff488bb424f00000004889f7813e66696c650f858a000000807e043a0f85800000004883"
+        "c60566813e2f2f751f4883c60248b86c6f63616c686f73483906750c66817e08742f75044883c609"
+        "0fb60648ffc684c074393c25752e0fb60ee84500000083fa0f77214189d041c1e0040fb64e01e830"
+        "00000083fa0f770c4109d074074489c04883c602880748ffc7ebbdc60700482bbc24f00000004889"
+        "bc24f8000000e97e0400008d51d083fa09761383c9208d519f83c20a83fa0a7305baff000000c3"
+    ),
+    # Behind that, for the call of the slave's class, which there is none of where there are no
+    # resources: the call, or a failed import whose text is the reason, in a log that is on.
+    0x1A9C0: bytes.fromhex(
+        "4885ff740a4885d27405e96196ffff4883ec084d85f6750d4d89fe418b07ffc07403418907498b45"
+        "08c6400801e8de9cffff488d3d0c000000e8c29bffff31c04883c408c3"
+    )
+    + b"the FMU's resources, which are not where the host says\x00",
+    0x37CDE: struct.pack("<i", 0x1A9C0 - 0x37CE2),
+    # Four copies of debugLog: jmp for jne, to where it is called.
+    **dict.fromkeys((0x18480, 0x187C9, 0x18AD0, 0x1C38C), bytes.fromhex("90e9")),
+    # Fmi2Logger::debugLog, which calls the host's logger: not where there is none.
+    0x17054: bytes.fromhex(
+        "488b47484c8b104d85d2741d4c8b0131c948837a0800480f450a89f2488b7710488b782031c041ffe2c3"
+    ),
+    # In the format of the arguments of a slave's class, {ss,ss,sn,si}: the instance's name as
+    # bytes, for it may be no UTF-8.
+    0x3A3F0: b"y",
     # In .rela.dyn, what the catch clauses wait for: for the type info of pythonfmu::fatal_error
     # that of pythonfmu::PyLogger, an abstract class, of which there is no object to throw.
     0x102C4: struct.pack("<I", 0x1E8),

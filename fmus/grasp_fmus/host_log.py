@@ -26,14 +26,13 @@ _NAME, _NAME_LENGTH, _SHORT_NAME, _CALLBACKS, _ENVIRONMENT = 0x10, 0x18, 0x20, 0
 fmi2CallbackFunctions, which begins with the logger; in that: componentEnvironment."""
 
 
-def host_log(address: int, instance: str) -> Log | None:
+def host_log(address: int, name: bytes) -> Log | None:
     """Return the logger of the host for an instance; None where it is not where it should be.
 
     `address` is that of pythonfmu's logger. The instance name, found where it is expected, is the
     proof that the layout is the known one: that of 64 bit Linux. There a string of up to 15 bytes
     stands in the object itself. A host without a logger gets none.
     """
-    name = instance.encode()
     if sys.platform != "linux" or _word(address + _NAME_LENGTH) != len(name):
         return None
     text_at = _word(address + _NAME)

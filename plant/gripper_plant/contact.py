@@ -52,6 +52,12 @@ def time_to_contact(gap: float, rate: float, acceleration: float) -> float:
     return (sqrt(discriminant) + rate) / -acceleration if acceleration < 0.0 else inf
 
 
+def flies(side: Side, s: float, v: float, f: float, h: float) -> bool:
+    """True if a finger without friction does not touch within h seconds."""
+    surface, m, rub = side
+    return not friction.acts(rub) and time_to_contact(s - surface, v, f / m) >= h
+
+
 def advance(side: Side, rates: Rates, s: float, v: float, f: float, h: float) -> Finger:
     """Advance a finger at s m with v m/s by h seconds, the actuator force f in N held.
 

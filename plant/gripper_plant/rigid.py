@@ -72,8 +72,9 @@ def initial_state(p: Params, u: Inputs) -> State:
 
 
 def substeps(p: Params, x: State, u: Inputs, h: float) -> float:
-    """At most so many sub-steps are in h seconds."""
-    return own.needed(p.fastest, h)
+    """At most so many sub-steps are in h seconds; none where both fingers fly freely."""
+    most = own.needed(p.fastest, h)
+    return 0.0 if most > MOST_SUBSTEPS and _both_fly(p, x, u, h) else most
 
 
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
@@ -100,3 +101,12 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
         (gap_1 <= 0.0, gap_2 <= 0.0),
         p.initial_object_position,
     )
+
+
+def _both_fly(p: Params, x: State, u: Inputs, h: float) -> bool:
+    """True if neither finger touches within h seconds, nor rubs."""
+    x_1, x_2 = x.position
+    v_1, v_2 = x.velocity
+    u_1, u_2 = fingers.forces(p.actuator, u)
+    right, left = p.sides
+    return contact.flies(right, x_1, v_1, u_1, h) and contact.flies(left, -x_2, -v_2, -u_2, h)
