@@ -46,14 +46,15 @@ def came() -> int | None:
 
 
 def handle(number: int, handler: Handler) -> None:
-    """Have a handler take a signal, once; the second one ends the process, or does nothing."""
+    """Have a handler take a signal; in a command once, a second one ends it at once."""
+    if _afterwards is not signal.SIG_DFL:
+        signal.signal(number, handler)
+        return
     blocked = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
     try:
         signal.signal(number, handler)
         libc = ctypes.CDLL(None)
-        if _afterwards is not signal.SIG_IGN and hasattr(
-            libc, "sysv_signal"
-        ):  # glibc; it leaves Python's own handler, but for one time
+        if hasattr(libc, "sysv_signal"):  # glibc; it leaves Python's own handler, but for one time
             set_once = libc.sysv_signal
             set_once.argtypes, set_once.restype = (ctypes.c_int, ctypes.c_void_p), ctypes.c_void_p
             set_once(number, set_once(number, None))

@@ -10,7 +10,7 @@ import click
 
 from ...errors import InputError
 from ...hil.address import is_loopback, text
-from ...hil.protocol import exposed, shared_key
+from ...hil.protocol import shared_key
 from ...hil.served import ServedFmu, Service
 from ...hil.server import DEFAULT_ADDRESS, Server
 from ...interface.read import read_interface
