@@ -5,7 +5,7 @@ from functools import cache
 from math import inf, isfinite
 from typing import Any, ClassVar
 
-from .base import INSTANTIATED, STEPPING, TIME_TOLERANCE, RefusalError, Slave, reported
+from .base import INSTANTIATED, PHASES, STEPPING, TIME_TOLERANCE, RefusalError, Slave, reported
 from .contract import (
     Block,
     Bound,
@@ -118,10 +118,19 @@ class Fmi2Slave(Slave):
     @reported
     def state_from_bytes(self, data: bytes) -> Snapshot:
         """A state of this FMU from its bytes."""
+        variables = (
+            *self._variables[: self._first_output],
+            *self._variables[self._first_parameter :],
+        )
         try:
-            return from_bytes(data, self._content, like=self._get_fmu_state())
-        except ValueError as error:
+            snapshot = from_bytes(data, self._content, like=self._get_fmu_state())
+            for v, value in zip(variables, snapshot.settable, strict=True):
+                v.check(value)
+        except (ValueError, OverflowError) as error:
             raise RefusalError(str(error)) from error
+        if snapshot.phase not in range(len(PHASES)) or not isfinite(snapshot.time):
+            raise RefusalError(f"state in phase {snapshot.phase} at {snapshot.time} s: is none")
+        return snapshot
 
     @property
     def _content(self) -> str:

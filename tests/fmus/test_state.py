@@ -1,6 +1,8 @@
 """FMU states: complete, exact to the bit, across instances and through bytes."""
 
 import random
+import struct
+from hashlib import blake2b
 from math import sin
 
 import pytest
@@ -210,3 +212,18 @@ def test_what_may_be_set_follows_from_the_phase_restored(load: Load) -> None:
         assert fresh.restore(state) == OK
         assert fresh.set({"finger_mass[1]": 0.7}) == ERROR
         state.free()
+
+
+@pytest.mark.parametrize("number", [1e300, float("inf"), float("nan"), -7.0, 9.0])
+@pytest.mark.parametrize("place", [0, -1])
+def test_bytes_with_a_right_check_sum_and_a_number_that_none_may_have(
+    load: Load, number: float, place: int
+) -> None:
+    """The phase, and the surface: an enumeration that no host could read again."""
+    with Instance(load("ProximitySensor")).initialise() as instance:
+        data = bytearray(instance.state().to_bytes())
+        surface = len(instance.fmu.names("input")) + len(instance.fmu.names("parameter"))
+        at = 40 if place == 0 else 40 + 8 * (1 + surface)
+        data[at : at + 8] = struct.pack("<d", number)
+        data[24:40] = blake2b(bytes(data[8:24] + data[40:]), digest_size=16).digest()
+        assert instance.from_bytes(bytes(data))[0] == ERROR
