@@ -10,6 +10,7 @@ from enum import IntEnum
 from functools import cache
 from itertools import count, islice
 from math import floor, inf, log10
+from types import ModuleType
 from typing import Annotated, Any, NamedTuple, Protocol, get_args, get_origin, get_type_hints
 
 from block_variables import Input, Output, Parameter
@@ -106,7 +107,7 @@ class Bound(NamedTuple):
 def bound(block: Block) -> Bound | None:
     """The bound that a block declares, None without one; TypeError where it is half of one."""
     substeps, most = (getattr(block, name, None) for name in ("substeps", "MOST_SUBSTEPS"))
-    if substeps is None and most is None:
+    if most is None and (substeps is None or isinstance(substeps, ModuleType)):  # an import
         return None
     if not callable(substeps) or not isinstance(most, int | float) or not most >= 1:
         raise TypeError(

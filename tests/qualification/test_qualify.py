@@ -119,12 +119,12 @@ def test_a_written_band_file_gives_the_same_verdict(
     assert second.numerics == ()
 
 
-FORCE = "u_1, u_2 = fingers.forces(p.actuator, u)"
+CONTACT = "s_1, v_1, f_1 = contact.advance("
 
 
 def test_a_candidate_that_fails_on_the_way(short: System, altered: Altered) -> None:
-    trap = f"{FORCE}\n    if u_2 > 0.5:\n        raise RuntimeError('the motor burns')"
-    fmu = altered("GripperPlant", "gripper_plant/rigid.py", FORCE, trap)
+    trap = f"if u_2 > 0.5:\n        raise RuntimeError('the motor burns')\n    {CONTACT}"
+    fmu = altered("GripperPlant", "gripper_plant/rigid.py", CONTACT, trap)
     found = qualify(short, "plant", fmu, isolation="none")
     assert not found.qualified
     assert found.failure is not None
@@ -151,8 +151,8 @@ def test_a_candidate_that_refuses_its_parameters(short: System, altered: Altered
 
 
 def test_an_original_that_fails_is_no_verdict(short: System, altered: Altered) -> None:
-    trap = f"{FORCE}\n    if u_2 > 0.5:\n        raise RuntimeError('the motor burns')"
-    fmu = altered("GripperPlant", "gripper_plant/rigid.py", FORCE, trap)
+    trap = f"if u_2 > 0.5:\n        raise RuntimeError('the motor burns')\n    {CONTACT}"
+    fmu = altered("GripperPlant", "gripper_plant/rigid.py", CONTACT, trap)
     with pytest.raises(SimulationError, match="the motor burns"):
         qualify(short.swap("plant", fmu), "plant", own_plant(short), isolation="none")
 
