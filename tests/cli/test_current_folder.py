@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim.grasp.presets import SYSTEM
+from support.slow import slow
 
 MARK = "imported.txt"
 STUDY = """outputs = ["plant.gap[1]"]
@@ -102,7 +103,9 @@ def test_a_command(
     not_imported(everything, installed, *(word.format(**places) for word in line.split()))
 
 
-@pytest.mark.parametrize("arguments", [("--stop", "0.001"), ("--stop", "0.0064", "--step-study")])
+@pytest.mark.parametrize(
+    "arguments", [("--stop", "0.001"), slow(("--stop", "0.0064", "--step-study"))]
+)
 def test_python_m_imports_what_it_needs_to_find_us_alone(
     arguments: tuple[str, ...], tmp_path: Path, system: Path
 ) -> None:

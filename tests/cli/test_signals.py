@@ -18,6 +18,7 @@ from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.recording.load import load_run
 from grasp_cosim.scratch import PREFIX
 from support.native_fmus import build, needs_gcc
+from support.slow import slow
 
 pytestmark = pytest.mark.usefixtures("ctrl_c")
 
@@ -99,7 +100,7 @@ def test_a_signal_keeps_what_a_run_recorded(
 
 
 @needs_gcc
-@pytest.mark.parametrize("engine", ["python", "compiled"])
+@pytest.mark.parametrize("engine", ["python", slow("compiled")])
 @pytest.mark.parametrize("number", FIRST)
 def test_a_second_signal_ends_a_run_that_hangs(
     start: Start, tmp_path: Path, engine: str, number: int
@@ -152,6 +153,7 @@ def size(folder: Path) -> int:
 
 
 @needs_gcc
+@pytest.mark.slow
 def test_folders_of_running_processes_are_not_swept(start: Start, tmp_path: Path) -> None:
     process = start("run", native_system(tmp_path), "--out", "out")
     wait_for(process, (tmp_path / "out/run.json").exists)

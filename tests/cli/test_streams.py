@@ -42,6 +42,7 @@ def test_standard_error_that_cannot_be_written(where: str) -> None:
     assert shell(f"$C inspect nothing.fmu {where}") == (2, "")
 
 
+@pytest.mark.slow
 def test_a_file_of_the_run_is_not_taken_for_standard_output(tmp_path: Path) -> None:
     grasp = "$C run --stop 0.001 --step 1e-3 --out"
     code, said = shell(f"{grasp} {tmp_path / 'a'} && {grasp} {tmp_path / 'b'} >&- <&-")

@@ -7,7 +7,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from ctypes import byref, c_double, c_void_p
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from urllib.parse import quote
 
 import pytest
 from support.fmi2 import _ALLOCATE, _FREE, _LOGGER, ERROR, OK, Fmu, _Callbacks
+from support.slow import slow
 
 Location = Callable[[str], str | None]
 
@@ -57,6 +58,11 @@ FOLDERS = {"umlaut": "höhe", "signs": "a+b #c %25 %d"}
 CALLBACKS = ("NULL callbacks", "NULL logger", "NULL logger with logging on")
 
 LIVES = (*FOUND, *NAMES, *FOLDERS, *CALLBACKS)
+
+
+def a_third(cases: Iterable[str]) -> list[Any]:
+    """The cases, every third of them in the quick tests: each starts a process."""
+    return [case if i % 3 == 0 else slow(case) for i, case in enumerate(cases)]
 
 
 def usual(path: str) -> str:
@@ -109,7 +115,7 @@ def hosted(case: str, fmus: Path, tmp_path: Path) -> dict[str, Any]:
     return reported
 
 
-@pytest.mark.parametrize("case", LIVES)
+@pytest.mark.parametrize("case", a_third(LIVES))
 def test_an_instance_lives_where_the_meaning_is_clear(
     case: str, fmus: Path, tmp_path: Path
 ) -> None:
@@ -120,7 +126,7 @@ def test_an_instance_lives_where_the_meaning_is_clear(
         assert "step from 9.0 s: must be from 0.001 s" in found["said"][0]
 
 
-@pytest.mark.parametrize("case", NOT_FOUND)
+@pytest.mark.parametrize("case", a_third(NOT_FOUND))
 def test_without_its_resources_there_is_no_instance_but_a_line(
     case: str, fmus: Path, tmp_path: Path
 ) -> None:

@@ -97,6 +97,7 @@ def test_a_system_file_lets_it_go_on_and_so_does_its_archive(fmus: Path, tmp_pat
     assert System.load(tmp_path / "turned.ssp").diverging == "continue"
 
 
+@pytest.mark.slow
 def test_a_step_study_and_a_qualification_say_which_run(grasp: System, fmus: Path) -> None:
     wrong = turned(grasp).with_experiment(step=1e-3, stop=0.64)
     study = step_study(wrong, of=["time_to_contact"])
@@ -105,6 +106,7 @@ def test_a_step_study_and_a_qualification_say_which_run(grasp: System, fmus: Pat
         qualify(wrong, "sensor_1", fmus / "ProximitySensor.fmu", isolation="none")
 
 
+@pytest.mark.slow
 def test_a_sweep_has_it_as_failed_runs(command: Run, fmus: Path, tmp_path: Path) -> None:
     as_file(tmp_path, fmus)
     (tmp_path / "study.toml").write_text(
@@ -118,6 +120,7 @@ def test_a_sweep_has_it_as_failed_runs(command: Run, fmus: Path, tmp_path: Path)
     assert summary["first_error"].startswith("controller.force[1] ran away: ")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", [0, 1, 2])
 @pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
 @pytest.mark.parametrize("plant", ["", "Compliant", "Movable"])

@@ -173,6 +173,7 @@ def test_the_scene_gets_what_it_draws_in_si(result: Result, original: Result) ->
         assert there["t"] == pytest.approx(here["t"], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_the_plant_may_take_the_place_of_the_original(
     grasp: System, plants: Path, original: Result
 ) -> None:
@@ -189,6 +190,7 @@ def test_the_plant_may_take_the_place_of_the_original(
     assert qualify(fast, "plant", bare, units=named, isolation="none").qualified
 
 
+@pytest.mark.slow
 def test_the_original_may_take_the_place_of_the_plant(
     defined: System, fmus: Path, original: Result
 ) -> None:
@@ -218,6 +220,7 @@ def test_a_parameter_without_a_unit_beside_others_in_mm_is_refused(defined: Syst
     assert start_in_si(unitless, "plant.object_width") == 70.0
 
 
+@pytest.mark.slow
 def test_friction_from_a_log_in_mm(
     result: Result, original: Result, grasp: System, tmp_path: Path
 ) -> None:
@@ -243,6 +246,7 @@ values = [30.0]
 """
 
 
+@pytest.mark.slow
 def test_a_sweep_has_the_metrics_in_si(
     command: Run, fmus: Path, plants: Path, tmp_path: Path, original: Result
 ) -> None:
