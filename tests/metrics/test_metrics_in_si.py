@@ -283,3 +283,28 @@ def test_a_signal_in_doubt_fails_the_metric_that_asks_for_it() -> None:
         "metric 'travel': the unit of room.x is in doubt, as it has none and its connections scale "
         "it; must be named in the system file, under units",
     )
+
+
+def towards(factor: float) -> list[str]:
+    """The connections of a room and a sink, of which the first goes to the room, with a factor."""
+    return [
+        f'{{ from = "sink.z", to = "room.i", factor = {factor} }}',
+        '"room.x -> sink.a"',
+        '"room.y -> sink.b"',
+    ]
+
+
+@pytest.mark.parametrize("declared", ["m", None])
+def test_a_factor_to_an_input_leaves_the_outputs_of_its_component_in_doubt(
+    load: Load, declared: str | None
+) -> None:
+    z = OUTPUT if declared is None else unit(OUTPUT, declared)
+
+    def system(factor: float, units: str = "") -> System:
+        return load({"i": INPUT}, {"z": z}, towards(factor), units)
+
+    said = "0.001 m" if declared else "another unit, by factor = 1000"
+    assert f"room.x has no unit, while room.i is in {said}; travel" in refusal(system(1000.0))
+    assert not found(system(-1.0)).conversions
+    assert not found(system(3.0)).conversions
+    assert found(system(1000.0, 'x = "m", y = "m"')).conversions == {}

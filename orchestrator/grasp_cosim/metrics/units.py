@@ -76,7 +76,7 @@ def _doubt(
     """Why a signal cannot be taken to be in the unit that is expected of it.
 
     `others` are units other than of SI by variable. One of these at the same component leaves a
-    signal without a unit in doubt, if it is expected, too, or of the same quantity.
+    signal without a unit in doubt, if it is expected, too, or perhaps of the same quantity.
     """
     quantity = known_unit(expected[name].unit)
     if quantity is None or not quantity.si:
@@ -90,7 +90,7 @@ def _doubt(
         return "" if read.unit.measures(quantity) else f"is in {read.unit.name}"
     component = name.partition(".")[0]
     for other, unit in others.items():
-        alike = other in expected or unit.measures(quantity)
+        alike = other in expected or not unit.exponents or unit.measures(quantity)
         if other.partition(".")[0] == component and alike:
             return f"has no unit, while {other} is in {unit.name}"
     return ""
