@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
 
@@ -48,6 +50,26 @@ def test_batches_share_their_processes() -> None:
     with Crew(1) as crew, progress_bar("runs", None, progress=False) as bar:
         first, second = (crew.map(_process, range(2), bar) for _ in range(2))
     assert first == second
+
+
+def test_a_signal_at_the_end_of_a_process_is_no_traceback() -> None:
+    program = """if True:
+        import contextlib, signal
+        from multiprocessing import Pipe
+        from grasp_cosim import parallel
+
+        class Late(contextlib.suppress):
+            def __exit__(self, *error):
+                signal.raise_signal(signal.SIGINT)
+                return super().__exit__(*error)
+
+        parallel.suppress = Late
+        ours, theirs = Pipe()
+        ours.close()
+        parallel._work(theirs)
+        """
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, check=False)
+    assert (run.returncode, run.stderr) == (0, b"")
 
 
 def test_ctrl_c_while_a_process_starts_is_not_lost(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -255,10 +255,14 @@ def _end(workers: Iterable[_Worker]) -> None:
 
 def _work(pipe: Connection) -> None:
     """The life of a process: say that it has started, then a job after the other."""
-    with suppress(EOFError, OSError, KeyboardInterrupt):
-        interruption.worker()
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, interruption.SIGNALS)
-        pipe.send(None)
-        while True:
-            run, job = pipe.recv()
-            pipe.send(run(job))
+    with suppress(KeyboardInterrupt):
+        try:
+            with suppress(EOFError, OSError):
+                interruption.worker()
+                signal.pthread_sigmask(signal.SIG_UNBLOCK, interruption.SIGNALS)
+                pipe.send(None)
+                while True:
+                    run, job = pipe.recv()
+                    pipe.send(run(job))
+        finally:  # its pipe may end just before the signal comes that ends its run
+            signal.pthread_sigmask(signal.SIG_BLOCK, interruption.SIGNALS)

@@ -408,3 +408,14 @@ def test_a_metric_of_every_result_comes_back_as_itself() -> None:
 def test_a_metric_that_cannot_go_to_another_process_is_refused() -> None:
     with pytest.raises(InputError, match=r"^metric 'x': cannot go to another process \(.*\); must"):
         check_portable([at_end, made("x", lambda _: 1.0)])
+
+
+@pytest.mark.parametrize("value", [float("nan"), [1.0, float("inf")], np.float64("-inf")])
+def test_what_is_not_finite_is_no_value(value: Any) -> None:
+    @metric("odd")
+    def odd(run: Signals) -> Any:
+        return value
+
+    measured = measure(Signals(np.zeros(1), {}), [odd])
+    assert measured.values == {}
+    assert re.fullmatch(r"metric 'odd': returned .*; must be finite, .*", measured.failures[0])

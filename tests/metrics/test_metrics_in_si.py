@@ -204,7 +204,7 @@ def test_only_what_a_metric_expects_is_asked_for(load: Load) -> None:
     odd = load({"x": unit(OUTPUT, "N"), "y": unit(OUTPUT, "cubit")})
     silent = Metric("silent", travel.function, needs=("room.x",))
     elsewhere = Metric("elsewhere", travel.function, needs={"room.x": "m", "room.z": "m"})
-    assert found(odd, silent, elsewhere) == InSi({}, ())
+    assert found(odd, silent, elsewhere).conversions == {}
     factor = load({}, {"a": M_IN}, [*scaled(1e-3), '"room.y -> sink.b"'])
     assert found(factor, silent).conversions == {"room.x": None}
 
@@ -283,3 +283,56 @@ def test_a_signal_in_doubt_fails_the_metric_that_asks_for_it() -> None:
         "metric 'travel': the unit of room.x is in doubt, as it has none and its connections scale "
         "it; must be named in the system file, under units",
     )
+
+
+def towards(factor: float) -> list[str]:
+    """The connections of a room and a sink, of which the first goes to the room, with a factor."""
+    return [
+        f'{{ from = "sink.z", to = "room.i", factor = {factor} }}',
+        '"room.x -> sink.a"',
+        '"room.y -> sink.b"',
+    ]
+
+
+@pytest.mark.parametrize("declared", ["m", None])
+def test_a_factor_to_an_input_leaves_the_outputs_of_its_component_in_doubt(
+    load: Load, declared: str | None
+) -> None:
+    z = OUTPUT if declared is None else unit(OUTPUT, declared)
+
+    def system(factor: float, units: str = "") -> System:
+        return load({"i": INPUT}, {"z": z}, towards(factor), units)
+
+    said = "0.001 m" if declared else "another unit, by factor = 1000"
+    assert f"room.x has no unit, while room.i is in {said}; travel" in refusal(system(1000.0))
+    assert not found(system(-1.0)).conversions
+    assert not found(system(3.0)).conversions
+    assert found(system(1000.0, 'x = "m", y = "m"')).conversions == {}
+
+
+def test_all_that_metrics_expect_of_a_signal_is_checked(load: Load) -> None:
+    @metric("milli", needs={"room.x": "mm"})
+    def milli(run: Signals) -> None: ...
+
+    @metric("force", needs={"room.x": "N"})
+    def force(run: Signals) -> None: ...
+
+    room = load({"x": M})
+    assert refusal(room, travel, milli).startswith("milli: needs room.x in 'mm'; must be a unit")
+    assert refusal(room, travel, force) == (
+        "force: needs room.x in N, travel in m; must be of one quantity"
+    )
+
+
+def test_what_a_metric_may_read_without_a_unit_is_said(load: Load) -> None:
+    @metric("free")
+    def free(run: Signals) -> float:
+        return float(run["room.x"][-1])
+
+    @metric("bound", needs={"room.x": "m"})
+    def bound(run: Signals) -> None: ...
+
+    room = load({"y": M})
+    assert found(room, free).notes == ("room.x: no unit, taken to be in SI, if free reads it",)
+    assert found(room, bound).notes == ("room.x has no unit, taken to be in m",)
+    assert found(load({"x": MM, "y": M}), free).notes == ()

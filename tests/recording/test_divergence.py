@@ -191,4 +191,7 @@ def test_the_hint_names_a_negative_factor_or_the_step() -> None:
     assert found.text.endswith("; look at factor = -1 of a.y0 -> b.u")
     found = watch((-1.8) ** K[:100], factor=-1.0)
     assert found is not None
-    assert found.text.endswith("; try a shorter step than 0.001 s, or the scheme sequential")
+    assert found.text.endswith(
+        "; look at factor = -1 of a.y0 -> b.u, or try a shorter step than 0.001 s, or the scheme "
+        "sequential"
+    )

@@ -20,6 +20,7 @@ import pickle
 import sys
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from math import isfinite
 from pathlib import Path
 from pkgutil import resolve_name
 from types import ModuleType
@@ -344,6 +345,8 @@ def _plain(m: Metric, found: Any) -> Any:
     values = [v.item() if isinstance(v, np.generic) else v for v in (plain if several else [plain])]
     if not all(v is None or isinstance(v, bool | int | float) for v in values):
         raise InputError(f"returned {found!r}; must be a number, True, False, None or a list of it")
+    if any(isinstance(v, float) and not isfinite(v) for v in values):
+        raise InputError(f"returned {plain!r}; must be finite, None where there is no value")
     if m.entries and not (several and len(values) == len(m.entries)):
         raise InputError(f"returned {found!r}; must be a value for each of {choices(m.entries)}")
     return values if several else values[0]

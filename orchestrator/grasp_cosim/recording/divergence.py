@@ -110,13 +110,12 @@ class Divergence:
     def _hint(self, decade: float) -> str:
         """What to look at, where it takes so many steps for a decade."""
         turned = [c for c in self._system.connections if c.factor is not None and c.factor < 0.0]
+        look = f"look at factor = {turned[0].factor:g} of {turned[0]}" if turned else ""
         if decade < FEW:
-            other = "sequential" if self._system.scheme == "jacobi" else "jacobi"
+            scheme = ", or the scheme sequential" if self._system.scheme == "jacobi" else ""
             step = f"{self._system.step_ns / NANOSECONDS:g} s"
-            return f"try a shorter step than {step}, or the scheme {other}"
-        if turned:
-            return f"look at factor = {turned[0].factor:g} of {turned[0]}"
-        return "look at the signs, factors and gains of its loop"
+            return ", or ".join(filter(None, [look, f"try a shorter step than {step}{scheme}"]))
+        return look or "look at the signs, factors and gains of its loop"
 
 
 def _scale(system: System, port: Port) -> float:

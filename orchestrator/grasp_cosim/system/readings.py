@@ -7,6 +7,7 @@ declares. An output without one is in the unit of the inputs that take its value
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from math import isclose
 from typing import NamedTuple
 
 from ..errors import InputError, choices
@@ -53,7 +54,8 @@ def readings(system: Structure) -> dict[Port, Reading]:
 def in_other_units(system: Structure, found: Mapping[Port, Reading]) -> dict[Port, Unit]:
     """The units other than of SI that are told for variables of any kind; found are readings().
 
-    An input without a unit has that of the output which it takes as it is.
+    An input without a unit has that of the output which it takes, times the factor of its
+    connection where that is one between units. It has no exponents where the output has no unit.
     """
     told: dict[Port, Unit | None] = {port: r.unit for port, r in found.items()}
     for component in system.components:
@@ -61,8 +63,8 @@ def in_other_units(system: Structure, found: Mapping[Port, Reading]) -> dict[Por
         for v in interface.of(*SETTABLE):
             told[Port(component.name, v.name)] = unit_of(interface, v)
     for connection in system.connections:
-        if told[connection.target] is None and not _Taken(connection, None).scales:
-            told[connection.target] = told.get(connection.source)
+        if told[connection.target] is None:
+            told[connection.target] = _Taken(connection, told.get(connection.source)).passed
     return {port: unit for port, unit in told.items() if unit and not unit.si}
 
 
@@ -121,7 +123,7 @@ def naming(component: str, variables: Iterable[str]) -> str:
 
 
 class _Taken(NamedTuple):
-    """A connection from an output, and the unit of the input it leads to."""
+    """A connection from an output, and the unit of the one or the other of its ends."""
 
     connection: Connection
     unit: Unit | None
@@ -134,6 +136,26 @@ class _Taken(NamedTuple):
     def scales(self) -> bool:
         """True if it makes another number of a value, beyond its sign."""
         return abs(self.factor) != 1.0 or bool(self.connection.offset)
+
+    @property
+    def passed(self) -> Unit | None:
+        """The unit of the input, if the connection's factor is one between units or there is none.
+
+        unit is that of the output.
+        """
+        if not self.scales:
+            return self.unit
+        factor = abs(self.factor)
+        if not between_units(factor):
+            return None
+        if self.unit is None:
+            return Unit(f"another unit, by factor = {self.factor:g}", (), 1.0 / factor)
+        scale = self.unit.factor / factor
+        return Unit(
+            f"{1.0 / factor:g} {self.unit.name}",
+            self.unit.exponents,
+            1.0 if isclose(scale, 1.0, rel_tol=1e-9) else scale,
+        )
 
 
 def _reading(
