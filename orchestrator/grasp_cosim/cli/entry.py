@@ -1,5 +1,7 @@
 """From a command line to an exit code."""
 
+import atexit
+import os
 import signal
 import sys
 from typing import NoReturn
@@ -21,7 +23,7 @@ def entry() -> NoReturn:
         keep_output_for_us()
         explain_crashes("--debug" in sys.argv)
         code = main(sys.argv[1:])
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # what is left is short, and nothing is lost
+        interruption.leave_to_system(signal.SIGINT, signal.SIG_IGN)  # what is left is short
     except KeyboardInterrupt:
         code = fail("interrupted", INTERRUPTED)
     if interruption.came() == signal.SIGTERM:
@@ -32,6 +34,10 @@ def entry() -> NoReturn:
         sys.stdout.close()
     except OSError as error:
         code = code or fail(str(OutputError(error)), FAILED)
+    if code in (INTERRUPTED, TERMINATED):  # maybe in an import, after which a library may crash
+        atexit._run_exitfuncs()
+        sys.stderr.flush()
+        os._exit(code)
     sys.exit(code)
 
 
@@ -62,7 +68,7 @@ def _main(arguments: list[str], debug: bool) -> int:
     except (KeyboardInterrupt, click.Abort):
         return fail("interrupted", INTERRUPTED)
     except Exception as error:
-        if _interrupted(error):
+        if interruption.came() or _interrupted(error):
             return fail("interrupted", INTERRUPTED)
         return fail(f"{type(error).__name__}: {error} (--debug shows where)", FAILED, debug)
 
