@@ -23,7 +23,9 @@ def entry() -> NoReturn:
         keep_output_for_us()
         explain_crashes("--debug" in sys.argv)
         code = main(sys.argv[1:])
-        interruption.leave_to_system(signal.SIGINT, signal.SIG_IGN)  # what is left is short
+        for number in interruption.SIGNALS:  # what is left is short, and nothing is lost
+            interruption.leave_to_system(number, signal.SIG_IGN)
+            signal.signal(number, signal.SIG_IGN)
     except KeyboardInterrupt:
         code = fail("interrupted", INTERRUPTED)
     if interruption.came() == signal.SIGTERM:
