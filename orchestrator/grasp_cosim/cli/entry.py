@@ -4,6 +4,7 @@ import atexit
 import os
 import signal
 import sys
+from contextlib import suppress
 from typing import NoReturn
 
 import click
@@ -36,11 +37,10 @@ def entry() -> NoReturn:
         sys.stdout.close()
     except OSError as error:
         code = code or fail(str(OutputError(error)), FAILED)
-    if code in (INTERRUPTED, TERMINATED):  # maybe in an import, after which a library may crash
-        atexit._run_exitfuncs()
+    atexit._run_exitfuncs()
+    with suppress(OSError):
         sys.stderr.flush()
-        os._exit(code)
-    sys.exit(code)
+    os._exit(code)  # without the end of libraries, which may crash where an import was interrupted
 
 
 def main(arguments: list[str]) -> int:
@@ -69,7 +69,7 @@ def _main(arguments: list[str], debug: bool) -> int:
         return fail(str(error), FAILED, debug)
     except (KeyboardInterrupt, click.Abort):
         return fail("interrupted", INTERRUPTED)
-    except Exception as error:
+    except (Exception, SystemExit) as error:  # which a Python FMU may raise
         if interruption.came() or _interrupted(error):
             return fail("interrupted", INTERRUPTED)
         return fail(f"{type(error).__name__}: {error} (--debug shows where)", FAILED, debug)
