@@ -115,7 +115,7 @@ def extra_module(name: str, purpose: str, extra: str) -> Any:
     """
     try:
         return import_module(name)
-    except ImportError as error:
+    except ModuleNotFoundError as error:
         raise InputError(
             f"{name.partition('.')[0]} is not installed, {purpose}; "
             f"install it with: pip install 'grasp-cosim[{extra}]'"

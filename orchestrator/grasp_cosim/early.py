@@ -1,4 +1,4 @@
-"""Ctrl-C before a command begins ends the process at once, in one line: there is nothing to keep.
+"""A signal before a command begins ends the process at once, in one line: there is nothing to keep.
 
 Imports next to nothing, as it comes before all else.
 """
@@ -10,11 +10,13 @@ _is_command = False
 
 
 def leave_at_once() -> None:
-    """Have Ctrl-C end the process, which is a command, unless the process ignores it."""
+    """Have Ctrl-C and SIGTERM end the process, which is a command, unless it ignores them."""
     global _is_command
     _is_command = True
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, _leave)
+    if signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
+        signal.signal(signal.SIGTERM, _leave)
 
 
 def begin() -> bool:
@@ -24,8 +26,8 @@ def begin() -> bool:
     return _is_command
 
 
-def _leave(*_: object) -> None:
+def _leave(number: int, _: object) -> None:
     try:
         os.write(2, b"grasp-cosim: interrupted\n")
     finally:
-        os._exit(130)
+        os._exit(128 + number)

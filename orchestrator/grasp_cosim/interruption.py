@@ -15,10 +15,16 @@ from types import FrameType
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 _came: list[int] = []
-"""The signals that came since command()."""
+"""The signal that came since command() or worker(), if any."""
 
 _afterwards: signal.Handlers | None = None
 """What becomes of further signals in a process that is there for one end; None in any other."""
+
+_raised = 0
+"""How often Ctrl-C was raised as KeyboardInterrupt by us."""
+
+_noticing = 0
+"""How many contexts of noticing() there are."""
 
 Handler = Callable[[int, FrameType | None], None]
 
@@ -28,8 +34,8 @@ def command() -> None:
     global _afterwards
     _afterwards = signal.SIG_DFL
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # not ignored, as after `&`
-        handle(signal.SIGINT, _interrupt)
-    handle(signal.SIGTERM, _terminate)
+        _handle(signal.SIGINT, _interrupt)
+    _handle(signal.SIGTERM, _terminate)
 
 
 def worker() -> None:
@@ -37,7 +43,7 @@ def worker() -> None:
     global _afterwards
     _afterwards = signal.SIG_IGN
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
-    handle(signal.SIGINT, _interrupt)
+    _handle(signal.SIGINT, _interrupt)
 
 
 def came() -> int | None:
@@ -45,7 +51,17 @@ def came() -> int | None:
     return _came[0] if _came else None
 
 
-def handle(number: int, handler: Handler) -> None:
+def leave_to_system(number: int, action: signal.Handlers) -> None:
+    """Have the kernel ignore a signal, or end the process by it.
+
+    Not by signal.signal(), by which Python complains of a signal that came right before.
+    """
+    set_action = ctypes.CDLL(None).signal
+    set_action.argtypes, set_action.restype = (ctypes.c_int, ctypes.c_void_p), ctypes.c_void_p
+    set_action(number, int(action))
+
+
+def _handle(number: int, handler: Handler) -> None:
     """Have a handler take a signal; in a command once, a second one ends it at once."""
     if _afterwards is not signal.SIG_DFL:
         signal.signal(number, handler)
@@ -62,21 +78,28 @@ def handle(number: int, handler: Handler) -> None:
         signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
 
 
+def _is_first(number: int) -> bool:
+    """True for the first signal, and in a process that is there for more than one end."""
+    if _afterwards is None:
+        return True
+    if _came:  # both came at once
+        return False
+    _came.append(number)
+    for each in SIGNALS:
+        leave_to_system(each, _afterwards)
+    return True
+
+
 def _interrupt(number: int, frame: FrameType | None) -> None:
-    _note(number)
-    signal.default_int_handler(number, frame)
+    global _raised
+    if _is_first(number):
+        _raised += 1
+        signal.default_int_handler(number, frame)
 
 
 def _terminate(number: int, frame: FrameType | None) -> None:
     handler = signal.getsignal(signal.SIGINT)
-    _note(number)
-    (handler if callable(handler) else signal.default_int_handler)(number, frame)
-
-
-def _note(number: int) -> None:
-    _came.append(number)
-    for each in SIGNALS:
-        signal.signal(each, _afterwards)
+    (handler if callable(handler) else _interrupt)(number, frame)
 
 
 @contextmanager
@@ -84,23 +107,37 @@ def handled(handler: Handler, *numbers: int) -> Iterator[None]:
     """A handler of these signals in this context; in a command it gets one of them, once."""
 
     def take(number: int, frame: FrameType | None) -> None:
-        if _afterwards is not None:
-            _note(number)
-        handler(number, frame)
+        if _is_first(number):
+            handler(number, frame)
 
-    previous = {number: signal.getsignal(number) for number in numbers}
-    for number in numbers:
-        handle(number, take)
+    previous = {} if _came else {number: signal.getsignal(number) for number in numbers}
+    for number in previous:
+        _handle(number, take)
     try:
         yield
     finally:
         for number, before in previous.items():
-            if _came:
-                signal.signal(number, _afterwards)
-            elif before in (_interrupt, _terminate):
-                handle(number, before)
-            else:
+            if before in (_interrupt, _terminate) and not _came:
+                _handle(number, before)
+            elif not _came:
                 signal.signal(number, before)
+
+
+@contextmanager
+def noticing() -> Iterator[None]:
+    """interruptible() works in this context, also outside of a command."""
+    global _noticing
+    here = threading.current_thread() is threading.main_thread()
+    if here and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, _interrupt)
+    _noticing += 1
+    try:
+        yield
+    finally:
+        _noticing -= 1
+        last = here and not _noticing and _afterwards is None
+        if last and signal.getsignal(signal.SIGINT) is _interrupt:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @contextmanager
@@ -109,26 +146,15 @@ def interruptible() -> Iterator[None]:
 
     A Python FMU does, or one that is a proxy and waits for its peer.
     """
-    usual = (signal.default_int_handler, _interrupt)
-    here = threading.current_thread() is threading.main_thread()
-    if not here or signal.getsignal(signal.SIGINT) not in usual:
+    before = _raised
+    try:
         yield
-        return
-    taken: list[int] = []
-
-    def interrupt(number: int, frame: FrameType | None) -> None:
-        taken.append(number)
-        signal.default_int_handler(number, frame)
-
-    with handled(interrupt, signal.SIGINT):
-        try:
-            yield
-        except Exception as error:
-            if taken:
-                raise KeyboardInterrupt from error
-            raise
-    if taken:  # an FMU has swallowed it
-        raise KeyboardInterrupt
+    except Exception as error:
+        if _raised != before and threading.current_thread() is threading.main_thread():
+            raise KeyboardInterrupt from error
+        raise
+    if _raised != before and threading.current_thread() is threading.main_thread():
+        raise KeyboardInterrupt  # an FMU has swallowed it
 
 
 @contextmanager

@@ -53,16 +53,22 @@ def test_with_debug_it_is_seen_where_python_was(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("does", "name"),
+    ("does", "how"),
     [
-        ("os.abort()", "SIGABRT"),
-        ("os.kill(os.getpid(), signal.SIGBUS)", "SIGBUS"),
-        ("ctypes.string_at(0)", "SIGSEGV"),
+        ("os.abort()", "crashed with SIGABRT"),
+        ("os.kill(os.getpid(), signal.SIGBUS)", "crashed with SIGBUS"),
+        ("ctypes.string_at(0)", "crashed with SIGSEGV"),
+        # after which a run in its midst would look like one that is done
+        ("ctypes.CDLL(None).exit(0)", "ended the process with exit code 0"),
+        ("os.fork() or ctypes.CDLL(None).exit(0); os.wait(); os.abort()", "crashed with SIGABRT"),
         # no lock of Python's keeps the words back: another thread, while this one waits for it
-        ("t = threading.Thread(target=ctypes.CDLL(None).abort); t.start(); t.join()", "SIGABRT"),
+        (
+            "t = threading.Thread(target=ctypes.CDLL(None).abort); t.start(); t.join()",
+            "crashed with SIGABRT",
+        ),
     ],
 )
-def test_a_crash_of_another_kind(does: str, name: str) -> None:
+def test_another_end(does: str, how: str) -> None:
     code = f"""
 import ctypes, os, signal, threading
 from grasp_cosim.cli.crash import explain_crashes
@@ -73,7 +79,7 @@ explain_crashes(debug=False)
         [sys.executable, "-P", "-c", code], capture_output=True, text=True, timeout=60, check=False
     )
     assert done.returncode == 3
-    assert done.stderr.startswith(f"grasp-cosim: the process crashed with {name}; ")
+    assert done.stderr.startswith(f"grasp-cosim: the process {how}; ")
     assert len(done.stderr.splitlines()) == 1
 
 

@@ -192,3 +192,33 @@ def test_an_interruption_inside_an_fmu_is_one(
         with pytest.raises(KeyboardInterrupt):
             session.step()
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+TWO_AT_ONCE = """
+import os, signal
+from grasp_cosim import interruption
+interruption.command()
+signal.pthread_sigmask(signal.SIG_BLOCK, interruption.SIGNALS)
+for number in interruption.SIGNALS:
+    os.kill(os.getpid(), number)
+try:
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, interruption.SIGNALS)
+except KeyboardInterrupt:
+    print(*(n * 0 for n in range(3)), "kept")
+"""
+
+
+def test_two_signals_at_once_are_one() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", TWO_AT_ONCE], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "0 0 0 kept\n", "")
+
+
+def test_a_session_leaves_ctrl_c_as_it_was(grasp: System) -> None:
+    with simulate.session(grasp, stop=0.1) as one, simulate.session(grasp, stop=0.1) as other:
+        one.close()
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        assert other.step(3)  # it came outside of an FMU
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler

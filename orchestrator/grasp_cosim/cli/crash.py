@@ -1,8 +1,9 @@
-"""Last words of the command, where the binary of an FMU crashes it: one line, and exit code 3.
+"""Last words of the command, where the binary of an FMU ends it: one line, and exit code 3.
 
-The handlers are C functions to the system, as those of the signal module are not: these wait for
-the interpreter to go on, to which a crash does not return. One that overflows the stack leaves no
-room for them.
+It crashes, or calls exit(), after which a run in its midst would look like one that is done. The
+handlers are C functions to the system, as those of the signal module are not: these wait for the
+interpreter to go on, to which a crash does not return. One that overflows the stack leaves no room
+for them.
 """
 
 import ctypes
@@ -43,29 +44,42 @@ class _Symbol(ctypes.Structure):
 
 
 def explain_crashes(debug: bool) -> None:
-    """Have a crash of this process end it with one line; `debug` shows where Python was instead."""
-    if debug:
-        faulthandler.enable()
+    """Have a crash of this process end it with one line; `debug` shows where Python was instead.
+
+    The process must end by os._exit(): an exit() is taken for that of an FMU.
+    """
     libc: Any = ctypes.CDLL(None) if SIGNALS else None
-    if faulthandler.is_enabled() or not hasattr(libc, "backtrace"):
+    if not hasattr(libc, "backtrace") or not hasattr(libc, "on_exit"):  # not glibc
         return
     _binary(libc)  # the first call loads what it needs
-    type_ = ctypes.CFUNCTYPE(None, ctypes.c_int)
 
-    def end(number: int) -> None:
+    def end(how: str) -> None:
         signal.alarm(LONGEST)
         try:
-            binary = on_one_line(_binary(libc))
-            line = f"grasp-cosim: {binary} crashed with {SIGNALS[number]}; {ADVICE}\n"
+            line = f"grasp-cosim: {on_one_line(_binary(libc))} {how}; {ADVICE}\n"
             os.write(2, line.encode(errors="replace"))
         finally:
             os._exit(FAILED)
 
-    handler = type_(end)
-    _keep.append(handler)
+    owner = os.getpid()
+
+    def leave(code: int, _: object) -> None:
+        if os.getpid() == owner:  # and not a fork
+            end(f"ended the process with exit code {code}")
+
+    leaves = ctypes.CFUNCTYPE(None, ctypes.c_int, ctypes.c_void_p)(leave)
+    _keep.append(leaves)
+    libc.on_exit(leaves, None)
+    if debug:
+        faulthandler.enable()
+    if faulthandler.is_enabled():
+        return
+    type_ = ctypes.CFUNCTYPE(None, ctypes.c_int)
+    crashes = type_(lambda number: end(f"crashed with {SIGNALS[number]}"))
+    _keep.append(crashes)
     libc.signal.argtypes, libc.signal.restype = (ctypes.c_int, type_), ctypes.c_void_p
     for name in CRASHES:
-        libc.signal(signal.Signals[name], handler)
+        libc.signal(signal.Signals[name], crashes)
 
 
 def _binary(libc: Any) -> str:

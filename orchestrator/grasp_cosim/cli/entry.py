@@ -1,7 +1,10 @@
 """From a command line to an exit code."""
 
+import atexit
+import os
 import signal
 import sys
+from contextlib import suppress
 from typing import NoReturn
 
 import click
@@ -21,7 +24,9 @@ def entry() -> NoReturn:
         keep_output_for_us()
         explain_crashes("--debug" in sys.argv)
         code = main(sys.argv[1:])
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # what is left is short, and nothing is lost
+        for number in interruption.SIGNALS:  # what is left is short, and nothing is lost
+            interruption.leave_to_system(number, signal.SIG_IGN)
+            signal.signal(number, signal.SIG_IGN)
     except KeyboardInterrupt:
         code = fail("interrupted", INTERRUPTED)
     if interruption.came() == signal.SIGTERM:
@@ -32,7 +37,10 @@ def entry() -> NoReturn:
         sys.stdout.close()
     except OSError as error:
         code = code or fail(str(OutputError(error)), FAILED)
-    sys.exit(code)
+    atexit._run_exitfuncs()
+    with suppress(OSError):
+        sys.stderr.flush()
+    os._exit(code)  # without the end of libraries, which may crash where an import was interrupted
 
 
 def main(arguments: list[str]) -> int:
@@ -61,8 +69,8 @@ def _main(arguments: list[str], debug: bool) -> int:
         return fail(str(error), FAILED, debug)
     except (KeyboardInterrupt, click.Abort):
         return fail("interrupted", INTERRUPTED)
-    except Exception as error:
-        if _interrupted(error):
+    except (Exception, SystemExit) as error:  # which a Python FMU may raise
+        if interruption.came() or _interrupted(error):
             return fail("interrupted", INTERRUPTED)
         return fail(f"{type(error).__name__}: {error} (--debug shows where)", FAILED, debug)
 

@@ -13,7 +13,7 @@ from tqdm import tqdm
 from ..errors import InputError, SimulationError, choices
 from ..fmi.load import load
 from ..interface.interface import Value
-from ..interruption import interruptible, interrupts
+from ..interruption import interruptible, interrupts, noticing
 from ..metrics.metric import Metric, registered
 from ..metrics.units import in_si
 from ..realtime.options import Realtime
@@ -81,6 +81,7 @@ class Session:
         self._stack = ExitStack()
         self._tell((*system.notes, *remarks(system)))
         try:
+            self._stack.enter_context(noticing())
             with interruptible():
                 instances = []
                 for component in system.components:
