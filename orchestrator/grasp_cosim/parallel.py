@@ -200,18 +200,13 @@ class _Worker:
         elif self._process.pid:
             self._process.kill()
 
-    def killed(self, deadline: float) -> bool:
-        """Wait for the end of a stopped process, until a time of the monotonic clock, or kill it.
-
-        True where it could not clean up after itself.
-        """
+    def join(self, deadline: float) -> None:
+        """Wait for the end of a stopped process, until a monotonic time in s, or kill it."""
         self._process.join(max(deadline - time.monotonic(), 0.0))
         if self._process.is_alive():
             self._process.kill()
             self._process.join()
-        killed = self._process.exitcode == -signal.SIGKILL
         self._process.close()
-        return killed
 
     def _end(self) -> str:
         """Return how the process, whose pipe has ended, came to its end."""
@@ -247,8 +242,9 @@ def _end(workers: Iterable[_Worker]) -> None:
     for worker in ended:
         worker.stop()
     deadline = time.monotonic() + PATIENCE
-    killed = [worker.killed(deadline) for worker in ended]
-    if any(killed):
+    for worker in ended:
+        worker.join(deadline)
+    if ended:  # one that was killed, or interrupted as it began, leaves its folders
         sweep.cache_clear()
         sweep(gettempdir())
 

@@ -163,6 +163,18 @@ def test_nothing_stays_behind(
     assert capfd.readouterr() == ("", "")  # of what the FMU prints
 
 
+def test_what_an_fmu_started_ends_with_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Such as a fork, which would keep open what the FMU printed to."""
+    python, child = tmp_path / "python", tmp_path / "child"
+    python.write_text(f'#!/bin/sh\nsleep 600 &\necho $! > {child}\nexec {sys.executable} "$@"\n')
+    python.chmod(0o700)
+    monkeypatch.setattr(sys, "executable", str(python))
+    monkeypatch.setattr(process, "OUTPUT_TIMEOUT", 600.0)
+    simulate(System.load(system_file(tmp_path, "2.0", "")))
+    found = Path("/proc", child.read_text().strip(), "stat")
+    assert not found.exists() or ") Z " in found.read_text()
+
+
 def test_without_posix_it_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(process, "POSIX", False)
     with (

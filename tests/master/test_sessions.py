@@ -1,6 +1,7 @@
 """Sessions: what can be done with one, and when that is over."""
 
 import math
+import os
 import signal
 from dataclasses import replace
 from pathlib import Path
@@ -85,6 +86,25 @@ def test_an_interruption_of_which_an_fmu_makes_an_error_is_one_all_the_same(
     with pytest.raises(KeyboardInterrupt):
         simulate(grasp, stop=0.01)
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_an_fmu_that_goes_to_another_folder_takes_nobody_with_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Paths are relative to where the user stands, to the end of the run."""
+    here = Path.cwd()
+    with simulate.session(alone(tmp_path, "2.0", "none"), engine="python") as session:
+        advance = session._master.advance
+
+        def away(steps: int) -> int:
+            os.chdir("/")
+            return advance(steps)
+
+        monkeypatch.setattr(session._master, "advance", away)
+        session.step()
+        assert Path.cwd() == here
+        session._stack.callback(os.chdir, "/")
+    assert Path.cwd() == here
 
 
 def test_a_session_that_has_not_stepped_has_metrics(tmp_path: Path) -> None:

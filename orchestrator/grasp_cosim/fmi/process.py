@@ -15,7 +15,7 @@ import threading
 import warnings
 from collections import deque
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -40,6 +40,9 @@ START_TIMEOUT = 120.0
 
 END_TIMEOUT = 10.0
 """s of wall time that ending it may take."""
+
+OUTPUT_TIMEOUT = 1.0
+"""s of wall time to wait for the last of what it printed, which a daemon of its may keep open."""
 
 LINES = 40
 """The last lines of what an FMU printed that are kept for the error."""
@@ -253,7 +256,9 @@ class ProcessInstance:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
-        self._reader.join(END_TIMEOUT)
+        with suppress(OSError):  # there are none, as a rule
+            os.killpg(self._process.pid, signal.SIGKILL)  # forks of it
+        self._reader.join(OUTPUT_TIMEOUT)
 
     def _value(self, kind: str, value: Any, notes: list[str]) -> Any:
         """The value of an answer, or the error that it is."""

@@ -1,6 +1,7 @@
 """Runs a system: to its end with simulate(), or step by step with simulate.session()."""
 
 import logging
+import os
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -82,7 +83,7 @@ class Session:
         self._tell((*system.notes, *remarks(system)))
         try:
             self._stack.enter_context(noticing())
-            with interruptible():
+            with interruptible(), _folder_kept():
                 instances = []
                 for component in system.components:
                     instances.append(load(component))
@@ -148,7 +149,7 @@ class Session:
         if self._note and not self._closed:
             self._tell(self._log())
         self._closed = True
-        with self._failures():
+        with _folder_kept(), self._failures():
             self._stack.close()
 
     @property
@@ -186,7 +187,7 @@ class Session:
             state = "closed" if self._closed else "broken off by a failure or an interruption"
             raise InputError(f"{self.system.name}: the session is {state}; must be a new one")
         try:
-            with interruptible(), self._failures():
+            with interruptible(), _folder_kept(), self._failures():
                 yield
         except InputError:  # which was found before any FMU was called
             raise
@@ -340,6 +341,17 @@ simulate = Simulate()
 def _check_count(name: str, count: object) -> None:
     if isinstance(count, bool) or not isinstance(count, Integral) or not 1 <= int(count) <= MOST:
         raise InputError(f"{name} = {count!r}: must be a whole number from 1 to {MOST}")
+
+
+@contextmanager
+def _folder_kept() -> Iterator[None]:
+    """Go back to the current folder from wherever an FMU went."""
+    here = os.getcwd()  # noqa: PTH109 - twice in a step, so as fast as can be
+    try:
+        yield
+    finally:
+        if os.getcwd() != here:  # noqa: PTH109
+            os.chdir(here)
 
 
 def _drive(session: Session, progress: bool) -> None:
