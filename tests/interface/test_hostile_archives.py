@@ -169,7 +169,9 @@ def test_an_alias_of_a_name_that_is_taken(write: Write, alias: str) -> None:
     refused(path, f"two variables have the name '{alias}'")
 
 
-@pytest.mark.parametrize("reference", [str(2**32), "-1", "x", "", "1.0", "9" * 5000])
+@pytest.mark.parametrize(
+    "reference", [str(2**32), "-1", "x", "", "1.0", "1_0", "\u0663", "9" * 5000]
+)
 def test_a_value_reference_of_more_than_32_bits(write: Write, reference: str) -> None:
     path = write(described(variable(f'name="a" valueReference="{reference}"')))
     refused(path, f"variable 'a': valueReference = '{reference}': must be a whole number from 0 to")

@@ -193,6 +193,12 @@ def test_a_number_that_only_a_master_needs(
             '<Dimension start="x"/>',
             "variable 'y': Dimension = 'x'",
         ),
+        (
+            FMI_3,
+            '<Dimension start="2"/>',
+            '<Dimension start="-2"/>',
+            "variable 'y': Dimension = '-2'",
+        ),
         (FMI_3, "ModelVariables", "Variables", "no ModelVariables"),
     ],
 )

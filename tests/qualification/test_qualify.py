@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -51,6 +52,15 @@ def test_a_copy_is_qualified_without_any_deviation(short: System) -> None:
     assert all(c.band.source == "derived" for c in (*found.signals, *found.metrics))
     assert by_name(found.signals)["plant.gap[1]"].band.time == 0.002  # two steps
     assert as_text(found).startswith("QUALIFIED: GripperPlant.fmu as plant")
+
+
+def test_without_anything_to_compare_there_is_no_qualification(short: System) -> None:
+    run = qualify(short, "plant", own_plant(short), isolation="none")
+    assert replace(run, signals=()).qualified
+    found = replace(run, signals=(), metrics=())
+    assert not found.qualified
+    assert as_text(found).startswith("NOT QUALIFIED")
+    assert as_json(found)["reason"].startswith("nothing was compared: no output")
 
 
 def test_a_heavier_finger_is_not_qualified(short: System, heavy: Path) -> None:

@@ -171,7 +171,19 @@ def test_a_damaged_conversion_is_one_line(tmp_path: Path, entry: object) -> None
 
 def test_a_log_comes_in_si_where_the_run_beside_it_tells(tmp_path: Path) -> None:
     in_unit(tmp_path, "mm", to_si={"a.x": {"factor": 1e-3, "offset": 0.0}})
-    assert load_log(tmp_path / "signals.csv")["a.x"][0] == 1.5e-3
+    said: list[str] = []
+    assert load_log(tmp_path / "signals.csv", said.append)["a.x"][0] == 1.5e-3
+    assert not said
     other = tmp_path / "measured.csv"
     other.write_text(CSV, "utf-8")
-    assert load_log(other)["a.x"][0] == 1.5
+    assert load_log(other, said.append)["a.x"][0] == 1.5
+    assert said == [f"{other}: no run.json of it beside it, taken to be in SI units"]
+
+
+def test_a_run_without_a_signal_says_so(tmp_path: Path) -> None:
+    in_unit(tmp_path, "mm")
+    (tmp_path / "signals.csv").unlink()
+    path = tmp_path / "run.json"
+    path.write_text(json.dumps({**json.loads(path.read_text("utf-8")), "units": {}}), "utf-8")
+    with pytest.raises(InputError, match=r"run\.json: this run recorded no signal; must"):
+        load_run(tmp_path)

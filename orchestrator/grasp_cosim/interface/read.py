@@ -7,7 +7,7 @@ read_interface() refuses the FMU, but describe() does not.
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -31,6 +31,7 @@ from .interface import (
 from .units import BASE, Unit, known_unit
 
 NUMERIC = ("Real", "Integer")
+WHOLE = re.compile(r"\s*[+-]?[0-9]+\s*")
 CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029]")
 """Characters that end a line of a message or table, or move the cursor of a terminal."""
 LONGEST_NAME = 2000
@@ -342,7 +343,7 @@ class _Reader:
         if text is None:
             holds = self.places.get(_whole(f"{place}: Dimension: valueReference", reference))
             text = None if holds is None else holds.get("start")
-        return _whole(f"{place}: Dimension", text)
+        return _whole(f"{place}: Dimension", text, 2**64 - 1)
 
 
 def _unit(name: str, base: Element) -> Unit:
@@ -385,12 +386,11 @@ def _real(place: str, text: str) -> float:
 
 def _whole(place: str, text: str | None, high: int | None = None) -> int:
     """The whole number in a text, from 0 to high where that is given."""
-    try:
-        number = int(text or "")
-        if high is None or 0 <= number <= high:
-            return number
-    except ValueError:
-        pass
+    if text is not None and WHOLE.fullmatch(text):
+        with suppress(ValueError):  # of a great many digits
+            number = int(text)
+            if high is None or 0 <= number <= high:
+                return number
     must = "a whole number" + ("" if high is None else f" from 0 to {high}")
     found = "missing" if text is None else repr(text)
     raise ValueError(f"{place} = {found}: must be {must}")

@@ -102,8 +102,9 @@ class Qualification:
 
     @property
     def qualified(self) -> bool:
-        """True if the candidate may take the original's place."""
-        return not (self.blocks or self.failure or self.outside)
+        """True if the candidate may take the original's place: all that there was to compare."""
+        compared = self.signals or self.metrics
+        return bool(compared) and not (self.blocks or self.failure or self.outside)
 
 
 def qualify(

@@ -84,6 +84,8 @@ def reason(q: Qualification) -> str:
         return f"not run, the interface does not fit: {names}"
     if q.failure:
         return f"the candidate failed: {q.failure}"
+    if not (q.signals or q.metrics):
+        return "nothing was compared: no output that both record is a number"
     counts = [
         f"{sum(not c.inside for c in compared)} of {len(compared)} {name}"
         for name, compared in (("signals", q.signals), ("metrics", q.metrics))

@@ -4,7 +4,7 @@ import csv
 import json
 import logging
 import os
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import islice
@@ -70,6 +70,8 @@ def load_run(folder: str | Path) -> Result:
     path = folder / SETTINGS
     written = _settings(path)
     units, types = written["units"], written.get("types", {})
+    if not units and not (folder / SIGNALS).exists():
+        raise InputError(f"{path}: this run recorded no signal; must have recorded one")
     unfinished = not written["complete"] and written["wall_time"] is None
     texts = {n for n, kind in types.items() if kind == TEXT}
     time, columns = _table(folder / SIGNALS, texts, unfinished)
@@ -140,12 +142,12 @@ def _constant(value: Any, _: Signals) -> Any:
     return value
 
 
-def load_log(path: Path) -> Signals:
+def load_log(path: Path, note: Callable[[str], None] | None = None) -> Signals:
     """The numbers in a file, all float64: CSV with the column "time" and names, or ASAM MDF (.mf4).
 
     They come in SI units where the run.json of the run beside it tells of others, or the channels
-    of an MDF do; else they are taken to be in SI. InputError where it is missing, damaged or of
-    another kind, or where asammdf is not installed.
+    of an MDF do; else they are taken to be in SI, which `note` is told of a CSV. InputError where
+    it is missing, damaged or of another kind, or where asammdf is not installed.
     """
     if not path.is_file():
         raise InputError(f"{path}: no such log; must be a .csv or .mf4 file")
@@ -158,6 +160,8 @@ def load_log(path: Path) -> Signals:
         raise InputError(f"{path}: must be a .csv or .mf4 file")
     beside = path.with_name(SETTINGS)
     if path.stem != Path(SIGNALS).stem or not beside.is_file():
+        if note and path.suffix.lower() == ".csv":
+            note(f"{path}: no {SETTINGS} of it beside it, taken to be in SI units")
         return log
     return replace(log, to_si=_to_si(f"{beside}: to_si", _settings(beside)))
 

@@ -19,7 +19,7 @@ from ...grasp.identification.log import identify_from_log
 from ...grasp.identification.parameters import DEFAULT, GROUPS, chosen
 from ...recording.load import load_log
 from ...system.description import System
-from ..frame import PATH, json_option, load_system, show
+from ..frame import PATH, json_option, load_system, say, show
 from ..options import set_option, set_values
 
 
@@ -71,7 +71,7 @@ def identify(
 
 def _from_log(system: System, path: Path, groups: tuple[str, ...]) -> report.Identification:
     parameters = chosen(groups, IN_A_LOG, f"--log {path}")
-    windows, fit = identify_from_log(system, load_log(path), parameters, str(path))
+    windows, fit = identify_from_log(system, load_log(path, say), parameters, str(path))
     rows = [{"finger": w.finger, "time": float(t)} for w in windows for t in w.time]
     return report.Identification(f"{path}, {len(rows)} windows", "N", fit, rows)
 
