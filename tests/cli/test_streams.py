@@ -43,6 +43,21 @@ def test_standard_error_that_cannot_be_written(where: str) -> None:
     assert shell(f"$C inspect nothing.fmu {where}") == (2, "")
 
 
+def test_what_a_binary_has_printed_is_not_lost_at_the_end() -> None:
+    code = """
+import ctypes
+from grasp_cosim.cli.streams import keep_output_for_us, leave
+keep_output_for_us()
+ctypes.CDLL(None).printf(b"kept in the buffer of C")
+print("ours", flush=True)
+leave(0)
+"""
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", code], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "ours\n", "kept in the buffer of C")
+
+
 @pytest.mark.slow
 def test_a_file_of_the_run_is_not_taken_for_standard_output(tmp_path: Path) -> None:
     grasp = "$C run --stop 0.001 --step 1e-3 --out"

@@ -46,7 +46,7 @@ class _Symbol(ctypes.Structure):
 def explain_crashes(debug: bool) -> None:
     """Have a crash of this process end it with one line; `debug` shows where Python was instead.
 
-    The process must end by os._exit(): an exit() is taken for that of an FMU.
+    The process must end by streams.leave(): an exit() is taken for that of an FMU.
     """
     libc: Any = ctypes.CDLL(None) if SIGNALS else None
     if not hasattr(libc, "backtrace") or not hasattr(libc, "on_exit"):  # not glibc

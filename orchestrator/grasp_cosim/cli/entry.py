@@ -1,10 +1,7 @@
 """From a command line to an exit code."""
 
-import atexit
-import os
 import signal
 import sys
-from contextlib import suppress
 from typing import NoReturn
 
 import click
@@ -15,7 +12,7 @@ from ..files import FULL
 from .crash import explain_crashes
 from .frame import FAILED, INTERRUPTED, TERMINATED, WRONG, fail
 from .group import cli
-from .streams import OutputError, harmless_streams, keep_output_for_us
+from .streams import OutputError, harmless_streams, keep_output_for_us, leave
 
 
 def entry() -> NoReturn:
@@ -37,10 +34,7 @@ def entry() -> NoReturn:
         sys.stdout.close()
     except OSError as error:
         code = code or fail(str(OutputError(error)), FAILED)
-    atexit._run_exitfuncs()
-    with suppress(OSError):
-        sys.stderr.flush()
-    os._exit(code)  # without the end of libraries, which may crash where an import was interrupted
+    leave(code)
 
 
 def main(arguments: list[str]) -> int:
