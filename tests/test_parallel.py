@@ -1,9 +1,11 @@
 """Runs spread over processes."""
 
+import ctypes
 import os
 import signal
 import subprocess
 import sys
+import time
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
 
@@ -83,3 +85,42 @@ def test_ctrl_c_while_a_process_starts_is_not_lost(monkeypatch: pytest.MonkeyPat
     with pytest.raises(KeyboardInterrupt):
         run_all(_process, range(6), 2, progress=False, what="runs")
     assert signal.pthread_sigmask(signal.SIG_BLOCK, ()) == set()
+
+
+def _endless(folder: Path) -> None:
+    """As an FMU that hangs in C code, and keeps the lock of the interpreter."""
+    (folder / "pid").write_text(str(os.getpid()))
+    ctypes.PyDLL(None).sleep(1000)
+
+
+def test_a_kill_ends_its_processes_whatever_they_are_at(tmp_path: Path) -> None:
+    code = (
+        "from pathlib import Path; from grasp_cosim.parallel import run_all; "
+        "from test_parallel import _endless; "
+        f"run_all(_endless, [Path({str(tmp_path)!r})], 1, False, '')"
+    )
+    path = os.pathsep.join(filter(None, sys.path))
+    killed = subprocess.Popen(
+        [sys.executable, "-c", f"if __name__ == '__main__': {code}"],
+        env={**os.environ, "PYTHONPATH": path},
+    )
+    file = tmp_path / "pid"
+    while not file.exists() or not file.read_text():
+        assert killed.poll() is None
+        time.sleep(0.01)
+    killed.kill()
+    killed.wait()
+    assert ended(int(file.read_text()))
+
+
+def ended(process: int) -> bool:
+    """True if a process ends within 20 s; else it is ended."""
+    for _ in range(2000):
+        try:
+            if "State:\tZ" in Path(f"/proc/{process}/status").read_text("utf-8"):
+                return True
+        except OSError:
+            return True
+        time.sleep(0.01)
+    os.kill(process, signal.SIGKILL)
+    return False

@@ -6,6 +6,8 @@ signals once for us, and after that by its default action, which is to end the p
 """
 
 import ctypes
+import fcntl
+import os
 import signal
 import threading
 from collections.abc import Callable, Iterator
@@ -44,6 +46,21 @@ def worker() -> None:
     _afterwards = signal.SIG_IGN
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     _handle(signal.SIGINT, _interrupt)
+
+
+def end_with(lifeline: int) -> None:
+    """End this process, whatever its FMU is doing, once another has ended that keeps a pipe open.
+
+    `lifeline` is the end of that pipe to read from, through which nothing comes.
+    """
+
+    def wait() -> None:
+        os.read(lifeline, 1)
+        os._exit(1)
+
+    fcntl.fcntl(lifeline, fcntl.F_SETOWN, os.getpid())
+    fcntl.fcntl(lifeline, fcntl.F_SETFL, os.O_ASYNC)  # SIGIO ends it while an FMU keeps the GIL
+    threading.Thread(target=wait, daemon=True).start()
 
 
 def came() -> int | None:

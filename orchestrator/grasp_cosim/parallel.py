@@ -2,8 +2,8 @@
 
 The processes are new ones: a fork of one that has loaded FMUs would share their state. Each has one
 pipe to us. One that dies takes its own job with it and no other: a new one takes its place. Where
-we die, the pipes end, and the processes with them. Where we stand, the current folder, they import
-nothing from.
+we die, they die, whatever they are at. Where we stand, the current folder, they import nothing
+from.
 """
 
 import os
@@ -13,7 +13,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from functools import partial
 from itertools import islice
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from tempfile import gettempdir
@@ -255,6 +255,8 @@ def _work(pipe: Connection) -> None:
         try:
             with suppress(EOFError, OSError):
                 interruption.worker()
+                if starter := parent_process():
+                    interruption.end_with(starter.sentinel)
                 signal.pthread_sigmask(signal.SIG_UNBLOCK, interruption.SIGNALS)
                 pipe.send(None)
                 while True:

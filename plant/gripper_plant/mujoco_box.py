@@ -93,6 +93,7 @@ class Simulator(NamedTuple):
     acceleration: Any
     force: Any
     constraint_force: Any
+    warnings: Any
 
 
 def initial_state(p: Params, u: Inputs) -> State:
@@ -130,6 +131,8 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     s.acceleration[:] = x.acceleration[:size]
     s.force[:2] = forces
     s.step(s.model, s.data, n)
+    if any(s.warnings.tolist()):
+        raise ArithmeticError(_said(s))
     q = (*s.q.tolist(), *x.q[size:])
     after = State(
         q,
@@ -275,4 +278,18 @@ def _simulator(p: Params) -> Simulator:
     model = mujoco.MjModel.from_xml_string(mjcf(p))
     data = mujoco.MjData(model)
     arrays = data.qpos, data.qvel, data.qacc_warmstart, data.qfrc_applied, data.qfrc_constraint
-    return Simulator(mujoco.mj_step, model, data, *arrays)
+    if mujoco.get_mju_user_warning() is None:  # it prints them, and logs them where the host stands
+        mujoco.set_mju_user_warning(_ignore)
+    return Simulator(mujoco.mj_step, model, data, *arrays, data.warning.number)
+
+
+def _ignore(warning: str) -> None:
+    """Say nothing: step() does."""
+
+
+def _said(s: Simulator) -> str:
+    """What MuJoCo has warned of, by its names for that: it goes on all the same."""
+    from mujoco import mjtWarning
+
+    kinds = [mjtWarning(k).name for k, count in enumerate(s.warnings.tolist()) if count]
+    return f"MuJoCo warns of {', '.join(kinds)}: its simulation is unstable"

@@ -1,18 +1,28 @@
-"""Commands ended at random moments: nothing torn, nothing mixed, and the same command goes on."""
+"""Commands ended at random moments: nothing torn, nothing mixed, and the same command goes on.
+
+KILLS=34 does what takes too long for every day: so many rounds of each signal for each command, and
+evaluate, too.
+"""
 
 import json
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
 import time
+import zipfile
+from collections import Counter
+from dataclasses import dataclass, field
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 import pytest
 from grasp_cosim.recording.load import load_run
-from grasp_cosim.scratch import PREFIX
+from grasp_cosim.scratch import sweep
+from grasp_fmus.folder import STAMP
 from support.native_fmus import build, needs_gcc
 
 pytestmark = [needs_gcc, pytest.mark.slow, pytest.mark.usefixtures("ctrl_c")]
@@ -21,8 +31,102 @@ HOW = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 ENDS = {-signal.SIGKILL, -signal.SIGTERM, -signal.SIGINT, 130, 143, 0}
 """A signal that comes before a command has begun ends it as it does any process."""
 
-ROUNDS = int(os.environ.get("KILLS", "8"))
+ROUNDS = int(os.environ.get("KILLS", "2"))
 """So many of each signal."""
+
+ORPHANED = 5.0
+"""s after which no process of a command that has ended may be there."""
+
+
+@dataclass
+class Rounds:
+    """Starts a command again and again in a folder, and ends it at random moments."""
+
+    folder: Path
+    chance: random.Random = field(default_factory=lambda: random.Random(14))
+    codes: Counter[int] = field(default_factory=Counter)
+    whole: float = 0.0
+    """The longest moment, in s."""
+
+    def start(self, *words: str) -> subprocess.Popen[bytes]:
+        """Start a command with a TMPDIR of its own, which all its processes know."""
+        self.scratch = self.folder / f"scratch{time.monotonic_ns()}"
+        self.scratch.mkdir()
+        return subprocess.Popen(
+            [sys.executable, "-m", "grasp_cosim", *words],
+            cwd=self.folder,
+            env={**os.environ, "TMPDIR": str(self.scratch)},
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+
+    def done(self, *words: str) -> None:
+        """Let a command do all it does, and take the time that it takes."""
+        began = time.monotonic()
+        assert self.start(*words).wait(300) == 0
+        self.whole = time.monotonic() - began
+        self.nothing_left()
+
+    def ended(self, how: int, *words: str) -> int:
+        """The exit code of a command that gets a signal at a random moment, unless it has ended."""
+        process = self.start(*words)
+        try:
+            code = process.wait(self.chance.uniform(0.0, self.whole))
+        except subprocess.TimeoutExpired:
+            process.send_signal(how)
+            code = process.wait(60)
+        self.codes[code] += 1
+        assert code in ENDS, words
+        self.nothing_left()
+        return code
+
+    def nothing_left(self) -> None:
+        """No process goes on; after what the next start does first, there is no folder."""
+        deadline = time.monotonic() + ORPHANED
+        while orphans := going_on(f"TMPDIR={self.scratch}".encode()):
+            assert time.monotonic() < deadline, orphans
+            time.sleep(0.02)
+        sweep.__wrapped__(str(self.scratch))
+        self.scratch.rmdir()
+
+
+def going_on(mark: bytes) -> list[str]:
+    """The command lines of processes with this in their environment."""
+    found = []
+    for process in Path("/proc").glob("[0-9]*"):
+        try:
+            if mark in (process / "environ").read_bytes().split(b"\0"):
+                found.append((process / "cmdline").read_text())
+        except OSError:  # of another user, or it has ended
+            continue
+    return found
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """The files in a folder, which need not be there."""
+    return {p.name: p.read_bytes() for p in folder.glob("*") if p.is_file()}
+
+
+def whole_files(folder: Path) -> set[str]:
+    """The names of the files there, but those of temporary ones."""
+    return {name for name in contents(folder) if not name.endswith(".part")}
+
+
+Parts = dict[str, tuple[int, int]]
+
+
+def parts(folder: Path) -> Parts:
+    """Each part's inode and time of writing: another one if it was written again."""
+    found = (folder / "parts").glob("*.json")
+    return {p.name: (p.stat().st_ino, p.stat().st_mtime_ns) for p in found}
+
+
+@pytest.fixture
+def built(fmus: Path, tmp_path: Path) -> None:
+    """The FMUs are where a command looks for them."""
+    (tmp_path / "fmus").mkdir()
+    (tmp_path / "fmus/build").symlink_to(fmus)
 
 
 def system_file(folder: Path) -> Path:
@@ -30,70 +134,156 @@ def system_file(folder: Path) -> Path:
     fmu = build(folder, "native", "2.0")
     path = folder / "system.toml"
     path.write_text(
-        f'[experiment]\nstep = 0.001\nstop = 40.0\n[components.a]\nfmu = "{fmu.name}"\n'
+        f'[experiment]\nstep = 0.001\nstop = 10.0\n[components.a]\nfmu = "{fmu.name}"\n'
         "values = { u_Real = 1.0, u_Integer = 0, u_Enumeration = 1, u_Boolean = false, "
         'u_String = "" }\n'
     )
     return path
 
 
-def command(folder: Path, *arguments: str) -> subprocess.Popen[bytes]:
-    (folder / "tmp").mkdir(exist_ok=True)
-    return subprocess.Popen(
-        [sys.executable, "-m", "grasp_cosim", *arguments],
-        cwd=folder,
-        env={**os.environ, "TMPDIR": str(folder / "tmp")},
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
-    )
-
-
-def ended(process: subprocess.Popen[bytes], how: int, after: float) -> int:
-    """The exit code of a command that gets a signal after so many s, unless it has ended."""
-    try:
-        return process.wait(after)
-    except subprocess.TimeoutExpired:
-        process.send_signal(how)
-        return process.wait(60)
-
-
-def check(folder: Path) -> None:
+def check_run(folder: Path) -> None:
     """All in the folder is of one run, if there is a run at all."""
     if not (folder / "run.json").exists():
         assert not list(folder.glob("*.html"))
         return
     run = load_run(folder)
     gain = run.settings["components"]["a"]["values"]["gain"]
-    assert run["a.x"] == pytest.approx(gain * run.time, rel=1e-9, abs=1e-9)
+    assert np.allclose(run["a.x"], gain * run.time, rtol=1e-9, atol=1e-9)
     assert np.array_equal(run.time, np.arange(len(run.time)) / 1000)
     if (folder / "report.html").exists():
         assert f"gain = {gain:g}" in (folder / "report.html").read_text("utf-8")
 
 
-def test_runs_and_reports(tmp_path: Path) -> None:
-    """Each with another gain, into one folder; every other time a report is made of it."""
-    generator, out = random.Random(14), tmp_path / "out"
-    system, seen = str(system_file(tmp_path)), set()
-    start = time.monotonic()
-    run = command(tmp_path, "run", system, "--out", "out", "--set", "a.gain=0.5")
-    assert run.wait(120) == 0
-    whole = time.monotonic() - start
+def test_run(tmp_path: Path) -> None:
+    """Each with another gain, into one folder, that of the last has been reported at times."""
+    rounds, out, system = Rounds(tmp_path), tmp_path / "out", str(system_file(tmp_path))
+
+    def run(gain: float) -> tuple[str, ...]:
+        return ("run", system, "--out", "out", "--set", f"a.gain={gain}")
+
+    rounds.done(*run(0.5))
     for k, how in enumerate(HOW * ROUNDS):
-        words = (
-            ("report", "out")
-            if k % 4 == 3
-            else ("run", system, "--out", "out", "--set", f"a.gain={k + 1}")
-        )
-        if words[0] == "report" and not (out / "run.json").exists():
-            continue
-        code = ended(command(tmp_path, *words), how, generator.uniform(0.0, 1.2 * whole))
-        seen.add(code)
-        assert code in ENDS, words
-        check(out)
-    assert len(seen) > 2
-    assert command(tmp_path, "run", system, "--out", "out", "--set", "a.gain=2").wait(120) == 0
-    check(out)
-    assert sorted(p.name for p in out.iterdir()) == ["run.json", "signals.csv"]
+        if k % 5 == 4:
+            assert rounds.start("report", "out").wait(60) in (0, 2)  # 2 where there is no run
+        rounds.ended(how, *run(k + 1))
+        check_run(out)
+    assert len(rounds.codes) > 2
+    rounds.done(*run(2))
+    check_run(out)
+    assert set(contents(out)) == {"run.json", "signals.csv"}
     assert json.loads((out / "run.json").read_text())["complete"]
-    assert not [p.name for p in (tmp_path / "tmp").iterdir() if p.name.startswith(PREFIX)]
+
+
+def test_report(tmp_path: Path, built: None) -> None:
+    """The page and its picture are as those that nobody has disturbed, or there are none."""
+    rounds, out = Rounds(tmp_path), tmp_path / "out"
+    rounds.done("run", "--stop", "0.3", "--out", "out")
+    rounds.done("report", "out")
+    made = contents(out)
+    assert set(made) == {"run.json", "signals.csv", "report.html", "grasp.png"}
+    for k, how in enumerate(HOW * ROUNDS):
+        if k % 2:
+            for name in ("report.html", "grasp.png"):
+                (out / name).unlink(missing_ok=True)
+        rounds.ended(how, "report", "out")
+        assert all(made[name] == (out / name).read_bytes() for name in whole_files(out))
+    assert len(rounds.codes) > 2
+    rounds.done("report", "out")
+    assert contents(out) == made
+
+
+STUDY = """
+step = 1e-3
+stop = 0.3
+[design]
+kind = "random"
+runs = 6
+seed = 1
+[[parameters]]
+name = "object position"
+variables = ["plant.initial_object_position"]
+uniform = { low = -0.04, high = 0.04 }
+[figures]
+distributions = ["plant.gap[1]"]
+"""
+
+
+def test_sweep(tmp_path: Path, built: None) -> None:
+    """No finished run is lost or done again, and the last start comes to the same files."""
+    (tmp_path / "study.toml").write_text(f'outputs = ["plant.gap[1]"]\n{STUDY}')
+    words = ("sweep", "study.toml", "--plot", "--workers", "2", "--out")
+    rounds, out, kept = Rounds(tmp_path), tmp_path / "out", Parts()
+    rounds.done(*words, "whole")
+    made = {k: v for k, v in contents(tmp_path / "whole").items() if k != "lock"}
+    assert set(made) == {"study.json", "runs.parquet", "distributions.png"}
+    for how in HOW * ROUNDS:
+        code = rounds.ended(how, *words, "out")
+        now, written = parts(out), whole_files(out) - {"lock"}
+        assert kept.items() <= now.items()
+        assert all(made[name] == (out / name).read_bytes() for name in written)
+        kept = now
+        if code == 0:
+            assert (written, len(kept)) == (set(made), 6)
+            shutil.rmtree(out)
+            kept = {}
+    assert len(rounds.codes) > 2
+    rounds.done(*words, "out")
+    last = contents(out)
+    assert {name: last[name] for name in set(last) - {"lock"}} == made
+
+
+@pytest.mark.skipif("KILLS" not in os.environ, reason="takes minutes; see test_evaluate_resume.py")
+def test_evaluate(tmp_path: Path, built: None) -> None:
+    """As a sweep, but finished grasps go with the end."""
+    rounds, out, kept = Rounds(tmp_path), tmp_path / "out", Parts()
+    rounds.done("evaluate", "--out", "whole")
+    made, finished = contents(tmp_path / "whole"), 0
+    rounds.whole *= 0.6
+    for how in HOW * ROUNDS:
+        code = rounds.ended(how, "evaluate", "--out", "out")
+        now, written = parts(out / "grasps"), whole_files(out)
+        assert all(made[name] == (out / name).read_bytes() for name in written)
+        if "report.md" in written:  # the last that is written
+            assert written == set(made)
+            shutil.rmtree(out)
+            now, finished = {}, finished + 1
+        else:
+            assert code
+            assert kept.items() <= now.items()
+        kept = now
+    assert len(rounds.codes) > 2
+    if not finished:
+        rounds.done("evaluate", "--out", "out")
+        assert contents(out) == made
+        assert not (out / "grasps").exists()
+
+
+def test_build(tmp_path: Path) -> None:
+    """Each file is the one that was there or the new one, and none is taken for another."""
+    rounds, out, choice = Rounds(tmp_path), tmp_path / "out", random.Random(15)
+    rounds.done("build", "--out", "out")
+    made = contents(out)
+    old = {name: older(name, data) for name, data in made.items() if name != STAMP}
+    for how in HOW * ROUNDS:
+        for name in choice.sample(sorted(old), 6):
+            (out / name).write_bytes(old[name])
+        for name in (STAMP, *choice.sample(sorted(old), 6)):
+            (out / name).unlink(missing_ok=True)
+        code = rounds.ended(how, "build", "--out", "out")
+        now, written = contents(out), whole_files(out)
+        assert all(now[name] in (made[name], old.get(name)) for name in written)
+        if code == 0 or STAMP in written:
+            assert now == made
+    assert len(rounds.codes) > 2
+    rounds.done("build", "--out", "out")
+    assert contents(out) == made
+
+
+def older(name: str, data: bytes) -> bytes:
+    """A file as an older build might have left it."""
+    if not name.endswith(".fmu"):
+        return data + b"\n"
+    file = BytesIO(data)
+    with zipfile.ZipFile(file, "a") as archive:
+        archive.writestr("resources/older.txt", "older")
+    return file.getvalue()

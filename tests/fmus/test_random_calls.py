@@ -48,7 +48,7 @@ def called(folder: Path, seeds: int, calls: int, fmus: Sequence[Path]) -> dict[s
     return report
 
 
-@pytest.mark.parametrize(("seeds", "calls"), [(2, 400), slow(12, 4000)])
+@pytest.mark.parametrize(("seeds", "calls"), [(2, 400), slow(12, 1500)])
 def test_the_fmus_live(fmus: Path, tmp_path: Path, seeds: int, calls: int) -> None:
     report = called(tmp_path / "host", seeds, calls, runnable(fmus))
     for name in ("SetFMUstate", "DeSerializeFMUstate"):

@@ -417,3 +417,16 @@ def test_a_step_that_mujoco_could_not_take_is_not_taken(force: Pair, h: float, t
         mujoco_box.step(NEAR, start(NEAR), Inputs(force), h)
     assert type(caught.value) is ArithmeticError
     assert str(caught.value).startswith(text)
+
+
+def test_an_unstable_step_is_not_taken_and_leaves_no_log(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """MuJoCo would go on with numbers that are past it, and write MUJOCO_LOG.TXT where we stand."""
+    monkeypatch.chdir(tmp_path)
+    x = start(FREE)._replace(v=(0.0, 0.0, 1e15, 0.0, 0.0))
+    with pytest.raises(ArithmeticError, match="warns of mjWARN_BADQPOS, mjWARN_BADQVEL"):
+        mujoco_box.step(FREE, x, Inputs(), 1e-3)
+    assert not list(tmp_path.iterdir())
+    assert capfd.readouterr() == ("", "")
+    mujoco_box.step(FREE, start(FREE), Inputs(), 1e-3)

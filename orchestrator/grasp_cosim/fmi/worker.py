@@ -5,12 +5,10 @@ that is closed when the master's process ends, whereupon this one ends, too.
 """
 
 import faulthandler
-import fcntl
 import logging
 import os
 import signal
 import sys
-import threading
 import warnings
 from contextlib import suppress
 from multiprocessing.connection import Connection
@@ -123,21 +121,13 @@ def _as_answer(error: Exception) -> Answer:
     return type(error).__name__, str(error), list(getattr(error, "__notes__", []))
 
 
-def _end_with(lifeline: int) -> None:
-    """End this process, whatever its FMU is doing, as soon as the master's has ended."""
-    fcntl.fcntl(lifeline, fcntl.F_SETOWN, os.getpid())
-    fcntl.fcntl(lifeline, fcntl.F_SETFL, os.O_ASYNC)  # SIGIO ends it while an FMU keeps the GIL
-    os.read(lifeline, 1)
-    os._exit(1)
-
-
 def main(connection: int, memory: int, lifeline: int) -> None:
     """Serve until the instance is closed."""
     faulthandler.enable()
     for number in interruption.SIGNALS:  # are for the master
         signal.signal(number, signal.SIG_IGN)
     logging.basicConfig(format=f"{LOGGED}%(message)s", level=logging.INFO)
-    threading.Thread(target=_end_with, args=(lifeline,), daemon=True).start()
+    interruption.end_with(lifeline)
     with suppress(EOFError):  # where the master wants no more of it
         Worker(Connection(connection), Exchange(memory)).serve()
     sys.stdout.flush()

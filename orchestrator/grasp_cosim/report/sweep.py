@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from ..files import remove_parts
 from ..sweep.study import Map, Study
 from ..sweep.sweep import Sweep
 from .plot import BLUE, GREY, RED, finish, new_figure, save
@@ -36,6 +37,7 @@ def draw_sweep(sweep: Sweep, folder: Path) -> list[Path]:
     """
     drawn = []
     pictures = sweep.study.pictures
+    remove_parts(folder, "map.png", "distributions.png")
     if pictures.map:
         drawn.append(folder / "map.png")
         _draw_map(sweep, pictures.map, drawn[-1])

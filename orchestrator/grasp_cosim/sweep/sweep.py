@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..files import write_text
+from ..files import remove_parts, write_text
 from ..parallel import Crew, Lost, progress_bar
 from .cluster import run_on_cluster
 from .run import Job, Outcome, Task, run_job
@@ -94,6 +94,7 @@ def sweep(
     store = Store(folder)
     with store.locked():
         done = store.open(study)
+        remove_parts(folder, RUNS, SENSITIVITY)
         resumed = len(done)
         left = [i for i in range(study.runs) if i not in done]
         jobs = (Job(i, study.values(i)) for i in left)
