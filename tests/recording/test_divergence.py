@@ -25,14 +25,19 @@ ROWS = 4000
 K = np.arange(ROWS)
 
 
-def watch(
+def watch(*columns: Floats, **more: Any) -> Runaway | None:
+    """What runs away, see followed()."""
+    return followed(*columns, **more)[1]
+
+
+def followed(
     *columns: Floats,
     block: int = 1000,
     unit: str | None = None,
     nominal: float | None = None,
     kind: str = "Real",
     factor: float | None = None,
-) -> Runaway | None:
+) -> tuple[Divergence, Runaway | None]:
     """The signals a.y0, a.y1, ... row by row, 1 ms apart; rows are counted over all blocks."""
     names = [f"y{i}" for i in range(len(columns))]
     variables = tuple(
@@ -51,8 +56,8 @@ def watch(
         piece = slice(first, first + block)
         found = divergence(np.arange(len(rows))[piece], rows[piece])
         if found is not None:
-            return Runaway(first + found.row, found.text)
-    return None
+            return divergence, Runaway(first + found.row, found.text)
+    return divergence, None
 
 
 def ten(low: float, high: float) -> st.SearchStrategy[float]:
@@ -138,6 +143,30 @@ def test_what_grows_evenly_trips_at_six_decades(rate: float) -> None:
 
 def test_what_stops_growing_before_that_does_not() -> None:
     assert watch(np.minimum(10.0 ** (K / 300.0), 1e4)) is None
+
+
+def test_what_grows_to_the_end_but_not_yet_far_is_told() -> None:
+    rate = 1.0 / 1250.0  # 3.2 decades
+    divergence, found = followed(np.sin(K), -(10.0 ** (rate * K)), unit="N", factor=-2.0)
+    assert found is None
+    assert divergence.still(ROWS - 1) == (
+        "a.y1 still grows at the end, beyond 1e+03 N, ten times as much every 1.2 s, as if it ran "
+        "away; look at factor = -2 of a.y0 -> b.u"
+    )
+
+
+@pytest.mark.parametrize(
+    "curve",
+    [
+        np.minimum(10.0 ** (K / 500.0), 1e4),  # ended long ago
+        99.0 * 10.0 ** ((K - ROWS) / 1000.0),  # no two decades
+        1e5 * (K > 5),
+        1e4 * (K / ROWS) ** 6,
+        10.0 ** (K[K < 3600] / 500.0),  # it ran away
+    ],
+)
+def test_of_others_there_is_no_such_line(curve: Floats) -> None:
+    assert followed(curve)[0].still(len(curve) - 1) == ""
 
 
 def test_the_scale_is_the_nominal_or_the_first_value() -> None:

@@ -22,6 +22,9 @@ from .listener import Signal
 DECADES = 6
 """A signal is looked at from so many decades above its scale on; over as many it has to grow."""
 
+FEWER = 2
+"""Decades above its scale by which a signal that still grows at the end of a run is noted."""
+
 UNEVEN = 2.5
 """Times as long as another that one of these may take: the peaks of an oscillation are apart."""
 
@@ -81,6 +84,23 @@ class Divergence:
         row, i = min(found, key=lambda f: (f[0], -abs(rows[f]) / self._scales[f[1]]))
         return Runaway(row, self._said(i, int(steps[row]), float(rows[row, i])))
 
+    def still(self, end: int) -> str:
+        """A line on the signal that has grown most, if it still grows exponentially at the step
+        `end`, the last one, and nothing ran away; else empty.
+        """
+        most = max(range(len(self._reached)), key=lambda i: len(self._reached[i]), default=None)
+        if self._over or most is None or not _grows(reached := self._reached[most], FEWER):
+            return ""
+        decade = reached[-1] - reached[-2]
+        if end - reached[-1] > SLOWER * decade:
+            return ""
+        signal, seconds = self._signals[most], decade * self._system.step_ns / NANOSECONDS
+        size = f"{0.1 * self._limits[most]:.3g} {signal.unit or ''}".rstrip()
+        return (
+            f"{signal.name} still grows at the end, beyond {size}, ten times as much every "
+            f"{seconds:.2g} s, as if it ran away; {self._hint(decade)}"
+        )
+
     def _follow(
         self, i: int, steps: npt.NDArray[np.int64], column: npt.NDArray[np.float64]
     ) -> int | None:
@@ -128,14 +148,14 @@ def _scale(system: System, port: Port) -> float:
     return max(1.0, 1.0 / abs(unit.factor))
 
 
-def _grows(reached: Sequence[int]) -> bool:
+def _grows(reached: Sequence[int], decades: int = DECADES) -> bool:
     """True if the last decades took about equally long, and the later ones no longer than before.
 
     Each took a step at least, so that a jump is no growth.
     """
-    if len(reached) <= DECADES:
+    if len(reached) <= decades:
         return False
-    spans = np.diff(reached[-DECADES - 1 :])
+    spans = np.diff(reached[-decades - 1 :])
     before, after = np.split(spans, 2)
     even = 0 < spans.max() <= UNEVEN * spans.min()
     return bool(even and after.sum() <= SLOWER * before.sum())
