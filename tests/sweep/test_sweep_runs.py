@@ -106,3 +106,12 @@ def _does_not_start(*_: object) -> None:
 def test_no_workers_are_no_workers(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="workers = 0: must be at least 1"):
         sweep(native_study(write_native(tmp_path), FAILING), tmp_path / "out", workers=0)
+
+
+def test_what_a_kill_left_of_its_files_is_removed(tmp_path: Path) -> None:
+    study = native_study(write_native(tmp_path), f"{GRID}values = [1.0]\n")
+    (tmp_path / "out").mkdir()
+    for name in ("runs.parquet.7.part", "sensitivity.json.7.part", "study.json.7.part"):
+        (tmp_path / "out" / name).touch()
+    sweep(study, tmp_path / "out", workers=1)
+    assert not list((tmp_path / "out").glob("*.part"))
