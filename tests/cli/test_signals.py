@@ -143,6 +143,7 @@ def test_a_killed_run_is_on_disk_and_its_folders_are_swept(start: Start, tmp_pat
     report = start("report", "out", "--json")
     out, err = report.communicate(timeout=120)
     assert report.returncode == 0, err
+    assert f"out: unfinished, to t = {run.time[-1]:.6g} s" in err
     assert "unfinished: to t = " in Path(tmp_path, json.loads(out)["page"]).read_text("utf-8")
     assert left(tmp_path) == [Path(alive).name]
     os.close(lock)

@@ -27,6 +27,8 @@ def report(run: Path, out: Path | None, as_json: bool) -> int:
     Example: grasp-cosim report results
     """
     recorded = load_run(run)
+    if recorded.wall_time is None:
+        click.echo(f"{run}: unfinished, to t = {recorded.time[-1]:.6g} s", err=True)
     page = out or run / "report.html"
     check_folder(page.parent)
     remove_parts(page.parent, page.name, f"{recorded.drawing.stem}.png", TIMING)
