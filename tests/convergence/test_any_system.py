@@ -66,6 +66,7 @@ def test_signals_tend_to_the_solution_in_continuous_time(
     assert found["runs"][0]["value"] == dict(study.runs[0].values)
 
 
+@pytest.mark.slow
 def test_a_metric_of_ones_own(oscillator: System) -> None:
     study = step_study(oscillator, 1e-2, of=("amplitude",), metrics=(amplitude,), workers=2)
     assert study.quantities == ("amplitude",)

@@ -308,6 +308,7 @@ def test_a_user_s_metrics_are_columns_of_a_sweep(command: Run, own: Path, tmp_pa
     assert "metric 'reach': is there twice" in err
 
 
+@pytest.mark.slow
 def test_a_user_s_metrics_have_bands_in_a_qualification(
     command: Run, own: Path, fmus: Path, tmp_path: Path
 ) -> None:

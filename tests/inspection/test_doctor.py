@@ -525,6 +525,7 @@ def test_a_trial_that_fails(script: str, text: str, opened: Opened) -> None:
     assert text in verdict[1]
 
 
+@pytest.mark.slow
 def test_a_trial_that_does_not_end(opened: Opened) -> None:
     script = b"import os, time\nopen('pid', 'w').write(str(os.getpid()))\ntime.sleep(60)\n"
     fmu = opened({"resources/Stock.py": script})

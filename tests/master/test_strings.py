@@ -13,6 +13,7 @@ from grasp_cosim.report.page import page_html
 from grasp_cosim.sweep.run import Job, Task, run_job
 from support.mocks import Mock, Run, make_system
 from support.native_fmus import TYPES, build, needs_gcc
+from support.slow import slow
 
 ENGINES: tuple[Engine, ...] = ("python", "compiled")
 STARTS = {"Boolean": "false", "String": "'at rest'", "Enumeration": "1"}
@@ -57,7 +58,7 @@ def changing(folder: Path, version: str, isolation: str, scheme: str = "sequenti
 @needs_gcc
 @pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
 @pytest.mark.parametrize(
-    ("version", "isolation"), [("2.0", "none"), ("3.0", "none"), ("3.0", "process")]
+    ("version", "isolation"), [("2.0", "none"), ("3.0", "none"), slow("3.0", "process")]
 )
 def test_native_fmus_and_what_is_read_back(
     tmp_path: Path, version: str, isolation: str, scheme: str
