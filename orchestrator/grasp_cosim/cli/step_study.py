@@ -13,7 +13,7 @@ from ..files import remove, write_json
 from ..metrics.metric import Metric
 from ..report.step_study import draw_step_study
 from ..system.description import System
-from .frame import NEGATIVE, check_outputs, show, together
+from .frame import NEGATIVE, check_outputs, say, show, together
 
 step_study_options = together(
     click.option(
@@ -58,6 +58,6 @@ def study_step(
         write_json(folder / "step_study.json", study.as_json())
     if given["plot"]:
         draw_step_study(study, folder / "step_study.png")
-        click.echo(f"drew {folder / 'step_study.png'}", err=True)
+        say(f"drew {folder / 'step_study.png'}")
     show(as_json, study.as_json(), study.as_text())
     return 0 if study.holds else NEGATIVE

@@ -20,6 +20,7 @@ from ..frame import (
     json_option,
     metrics_option,
     pair,
+    say,
     show,
 )
 from ..options import chosen_system, set_values, system_options
@@ -100,4 +101,4 @@ def _write(found: Qualification, out: Path) -> None:
     if found.signals:
         write_text(bands, verdict.as_bands(found))
         draw_qualification(found, figure)
-        click.echo(f"drew {figure}", err=True)
+        say(f"drew {figure}")

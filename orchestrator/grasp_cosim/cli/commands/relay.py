@@ -17,7 +17,7 @@ from ...hil.network import DIRECTIONS, Conditions, Network, Outage, check_time
 from ...hil.relay import Relay
 from ...hil.traffic import Entry, Log
 from ...system.parts import NANOSECONDS
-from ..frame import INTERRUPTED, PATH, Command, fail, json_option, show
+from ..frame import INTERRUPTED, PATH, Command, fail, json_option, say, show
 from ..signals import ended_by_signals
 
 
@@ -138,8 +138,8 @@ def _written(path: Path | None) -> Iterator[Log | None]:
 def _say(relay: Relay) -> None:
     if not is_loopback(relay.address):
         note = f"listening beyond this machine: whoever reaches {text(relay.address)} reaches"
-        click.echo(f"{note} {text(relay.peer)}", err=True)
-    click.echo(f"relaying {text(relay.address)} -> {text(relay.peer)}", err=True)
+        say(f"{note} {text(relay.peer)}")
+    say(f"relaying {text(relay.address)} -> {text(relay.peer)}")
 
 
 def _report(relay: Relay, seed: int) -> Mapping[str, Any]:

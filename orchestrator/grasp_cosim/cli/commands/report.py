@@ -9,7 +9,7 @@ from ...files import check_folder, remove_parts
 from ...recording.load import load_run
 from ...report.page import write_page
 from ...report.timing import TIMING, draw_result
-from ..frame import PATH, json_option, show
+from ..frame import PATH, json_option, say, show
 
 
 @click.command()
@@ -28,7 +28,7 @@ def report(run: Path, out: Path | None, as_json: bool) -> int:
     """
     recorded = load_run(run)
     if recorded.wall_time is None:
-        click.echo(f"{run}: unfinished, to t = {recorded.time[-1]:.6g} s", err=True)
+        say(f"{run}: unfinished, to t = {recorded.time[-1]:.6g} s")
     page = out or run / "report.html"
     check_folder(page.parent)
     remove_parts(page.parent, page.name, f"{recorded.drawing.stem}.png", TIMING)
@@ -38,7 +38,7 @@ def report(run: Path, out: Path | None, as_json: bool) -> int:
     try:
         drawn += map(str, draw_result(recorded, page.parent))
     except InputError as error:
-        click.echo(f"no picture: {error}", err=True)
+        say(f"no picture: {error}")
     size = page.stat().st_size
     written = {"page": str(page), "bytes": size, "pictures": drawn}
     show(as_json, written, "\n".join([f"{page}: {size / 1e6:.1f} MB", *drawn]))

@@ -103,7 +103,7 @@ def run(
             if error.result:
                 _write(error.result, folder, out, given["plot"], mdf)
                 if out:
-                    click.echo(f"kept what was recorded, in {out}", err=True)
+                    say(f"kept what was recorded, in {out}")
             raise
         _write(result, folder, out, given["plot"], mdf)
     show(as_json, _as_json(result), _summary(result))
@@ -123,7 +123,7 @@ def _write(
     if out and mdf:
         result.to_mdf(out / "signals.mf4")
     for picture in draw_result(result, out or Path()) if plot and result.numbers else ():
-        click.echo(f"drew {picture}", err=True)
+        say(f"drew {picture}")
 
 
 def _as_json(result: Result) -> dict[str, Any]:

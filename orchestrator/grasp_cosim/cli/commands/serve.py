@@ -15,7 +15,7 @@ from ...hil.served import ServedFmu, Service
 from ...hil.server import DEFAULT_ADDRESS, Server
 from ...interface.read import read_interface
 from ...system.description import in_nanoseconds
-from ..frame import FAILED, INTERRUPTED, NEGATIVE, PATH, fail, json_option, pair, show
+from ..frame import FAILED, INTERRUPTED, NEGATIVE, PATH, fail, json_option, pair, say, show
 from ..signals import ended_by_signals
 
 PATIENCE = 2.0
@@ -72,17 +72,17 @@ def serve(
         None if step is None else in_nanoseconds("--step", step),
         in_nanoseconds("--watchdog", watchdog),
         dict(pair("--failsafe", text, "INPUT=VALUE") for text in failsafe),
-        None if key_file is None else shared_key(key_file, _say),
+        None if key_file is None else shared_key(key_file, say),
     )
     end = None if duration is None else in_nanoseconds("--duration", duration)
-    served = ServedFmu(read_interface(fmu), service, _say)
-    with Server(served, (host, port), _say) as server:
+    served = ServedFmu(read_interface(fmu), service, say)
+    with Server(served, (host, port), say) as server:
         for note in served.notes:
-            _say(note)
+            say(note)
         at = text(server.address)
-        _say(f"serving {fmu.name} at {at}, {'lockstep' if lockstep else 'real time'}")
+        say(f"serving {fmu.name} at {at}, {'lockstep' if lockstep else 'real time'}")
         if not is_loopback(server.address) and key_file is None:
-            _say(f"{at} can be reached by others, who may take part: --key-file keeps them out")
+            say(f"{at} can be reached by others, who may take part: --key-file keeps them out")
         with ended_by_signals(server.stop) as came, _ended_after(duration, fmu.name):
             server.serve(sessions, end)
         counters = served.counters()
@@ -113,7 +113,3 @@ def _ended_after(duration: float | None, name: str) -> Iterator[None]:
         yield
     finally:
         timer.cancel()
-
-
-def _say(text: str) -> None:
-    click.echo(text, err=True)

@@ -24,6 +24,7 @@ from ..frame import (
     json_option,
     load_system,
     metrics_option,
+    say,
     show,
     with_preset,
 )
@@ -70,7 +71,7 @@ def sweep(
         return fail(f"interrupted; {kept}, the same command goes on", INTERRUPTED)
     drawn = draw_sweep(done, folder) if plot else []
     for picture in drawn:
-        click.echo(f"drew {picture}", err=True)
+        say(f"drew {picture}")
     show(as_json, done.as_json(), _as_text(done))
     return NEGATIVE if done.failed == chosen.runs else 0
 
