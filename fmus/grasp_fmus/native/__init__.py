@@ -1,0 +1,1 @@
+"""Native FMUs: blocks as C, compiled, which need no Python. The page: README.md."""
