@@ -56,7 +56,7 @@ def build_native(out: Path, plan: Plan | None = None, names: Sequence[str] = ())
     where a compiler is missing; CompilerError where one fails.
     """
     plan = plan or planned()
-    chosen = [_known(name) for name in names] or sorted(_requirements().keys() - python_only())
+    chosen = chosen_names(names)
     sources = sha256(f"{sources_hash()} {plan.key}".encode()).hexdigest()
     if not names and is_current(out, sources):
         return [Built(out / f"{name}.fmu", "unchanged") for name in chosen]
@@ -95,17 +95,22 @@ def build_native_block(file: Path, out: Path, plan: Plan | None = None) -> Built
     return write_members(out / f"{name}.fmu", complete)
 
 
+def chosen_names(names: Sequence[str] = ()) -> list[str]:
+    """Return these names of blocks that come with the package, by default all that can be native.
+
+    ValueError, one line, for one that is none, or that stays Python only.
+    """
+    only = python_only()
+    known = [name for name in _requirements() if name not in only]
+    for name in names:
+        if name not in known:
+            valid = f"no such block; must be of {', '.join(known)}, or a file NAME.py"
+            raise ValueError(only.get(name, f"{name}: {valid}"))
+    return [*names] or known
+
+
 def _requirements() -> dict[str, Sequence[str]]:
     return {script.stem: slave_class(script).requires for script in sorted(SCRIPTS.glob("*.py"))}
-
-
-def _known(name: str) -> str:
-    if why := python_only().get(name):
-        raise ValueError(why)
-    known = sorted(_requirements().keys() - python_only())
-    if name not in known:
-        raise ValueError(f"{name}: no such block; must be of {', '.join(known)}, or a file NAME.py")
-    return name
 
 
 def _with_binaries(fmus: Mapping[str, Members], plan: Plan) -> Iterator[tuple[str, Members]]:

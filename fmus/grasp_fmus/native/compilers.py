@@ -29,10 +29,10 @@ LIBM = (
 )  # fmt: skip
 """Functions whose calls no compiler may work out by itself: it rounds otherwise than libm."""
 
-FLAGS = (
-    "-std=c99", "-O2", "-ffp-contract=off", *(f"-fno-builtin-{name}" for name in LIBM),
-    "-fvisibility=hidden", "-shared",
-)  # fmt: skip
+BITS = ("-std=c99", "-O2", "-ffp-contract=off")
+"""What decides the bits, besides -fno-builtin-NAME for the functions in LIBM."""
+
+FLAGS = (*BITS, *(f"-fno-builtin-{name}" for name in LIBM), "-fvisibility=hidden", "-shared")
 
 
 class CompilerError(Exception):

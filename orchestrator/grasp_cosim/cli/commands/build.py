@@ -114,6 +114,27 @@ def _native(
         raise SimulationError(str(error)) from error
 
 
+def _write_c(block: Path | None, folder: Path, as_json: bool) -> int:
+    """Write the C of one block into the folder, of all into folders in it."""
+    from grasp_fmus.block_build import own_model
+    from grasp_fmus.fmu import shipped_model
+    from grasp_fmus.native.build import chosen_names
+    from grasp_fmus.native.c_only import write_c
+    from grasp_fmus.shipped import SCRIPTS
+
+    if block and not _is_name(block):
+        with own_model(block) as model:
+            written = write_c(folder, model)
+    else:
+        names = chosen_names([str(block)] if block else [])
+        models = {name: shipped_model(SCRIPTS / f"{name}.py") for name in names}
+        places = {name: folder if block else folder / name for name in names}
+        written = [path for name in names for path in write_c(places[name], models[name])]
+    files = [str(path) for path in written]
+    show(as_json, {"files": files}, "\n".join(f"{file}: written" for file in files))
+    return 0
+
+
 def _is_name(block: Path) -> bool:
     """True where it is to be the name of a block that comes with the package, not a file."""
     return block.suffix == "" and block.name == str(block) and not block.exists()
