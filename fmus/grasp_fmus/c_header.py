@@ -160,8 +160,8 @@ def _struct(group: Group, meaning: str, descriptions: Mapping[str, str]) -> str:
     for v, identifier, _ in group.members:
         size = f"[{STRING_SIZE}]" if v.kind == "String" else ""
         said = descriptions.get(v.name, "").replace("·", ".")
-        comment = comment((f"{v.name}, {v.unit}" if v.unit else v.name) + (said and f": {said}"))
-        lines.append(f"    {f'{_TYPES[v.kind]} {identifier}{size};':<40} /* {comment} */")
+        text = comment((f"{v.name}, {v.unit}" if v.unit else v.name) + (said and f": {said}"))
+        lines.append(f"    {f'{_TYPES[v.kind]} {identifier}{size};':<40} /* {text} */")
     head = f"/* {meaning} */\ntypedef struct {{"
     none = f"    uint8_t none; /* the model has no {group.causality}s */"
     return _lines(head, lines, none, f"}} {group.struct};")

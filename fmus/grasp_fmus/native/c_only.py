@@ -15,7 +15,7 @@ from ..fmu import Model
 from ..folder import write_file
 from ..link.message import Value
 from ..link.signature import ORDER, Causality, Kind, LinkVariable, Signature
-from ..variable import TYPES, Scalar, Variable
+from ..variable import Scalar, Variable
 from .compilers import BITS, LIBM
 from .translation import translated
 

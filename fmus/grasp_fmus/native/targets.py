@@ -81,7 +81,7 @@ def folders(asked: Iterable[Target], fmi: Version) -> tuple[dict[Target, str], s
         )
     if ours not in places:
         return places, (
-            f"{ours.folder} holds what was asked for, not {ours.tuple}, this machine's: FMI 2.0 has "
-            "one folder for both; --fmi 3 has two"
+            f"{ours.folder} holds what was asked for, not {ours.tuple}, this machine's: FMI 2.0 "
+            "has one folder for both; --fmi 3 has two"
         )
     return places, ""
