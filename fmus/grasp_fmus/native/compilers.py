@@ -32,7 +32,8 @@ LIBM = (
 BITS = ("-std=c99", "-O2", "-ffp-contract=off")
 """What decides the bits, besides -fno-builtin-NAME for the functions in LIBM."""
 
-FLAGS = (*BITS, *(f"-fno-builtin-{name}" for name in LIBM), "-fvisibility=hidden", "-shared")
+UNPREFIXED = tuple(f"FMI{fmi}_OVERRIDE_FUNCTION_PREFIX" for fmi in (2, 3))
+"""What is defined for a shared library, in which functions are called as the standard does."""
 
 
 class CompilerError(Exception):
@@ -50,9 +51,16 @@ class Compiler(NamedTuple):
         """Return the command that makes NAME.c, in the current folder, a shared library."""
         out = f"{name}{target.suffix}"
         if Path(self.command[0]).stem.lower() == "cl":
-            return [*self.command, "/nologo", "/O2", "/MT", "/LD", f"{name}.c", f"/Fe:{out}"]
-        pic = () if target.suffix == ".dll" else ("-fPIC",)
-        return [*self.command, *FLAGS, *pic, "-o", out, f"{name}.c", "-lm"]
+            defined = [f"/D{macro}" for macro in UNPREFIXED]
+            return [
+                *self.command, "/nologo", "/O2", "/fp:precise", "/MT", "/LD", *defined,
+                f"{name}.c", f"/Fe:{out}",
+            ]  # fmt: skip
+        return [
+            *self.command, *BITS, *(f"-fno-builtin-{function}" for function in LIBM),
+            *(f"-D{macro}" for macro in UNPREFIXED), "-fvisibility=hidden", "-shared",
+            *(() if target.suffix == ".dll" else ("-fPIC",)), "-o", out, f"{name}.c", "-lm",
+        ]  # fmt: skip
 
 
 class Job(NamedTuple):

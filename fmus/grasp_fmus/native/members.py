@@ -34,7 +34,7 @@ def native_members(model: Model, fmi: Version) -> dict[str, bytes]:
         }
     )
     sections = Template(TEMPLATE.read_text("utf-8")).substitute(
-        name=name, fmi=fmi, prefix=f"FMI{fmi}_FUNCTION_PREFIX"
+        name=name, fmi=fmi, override=f"FMI{fmi}_OVERRIDE_FUNCTION_PREFIX"
     )
     page = framed(
         name, model.description.summary, model.card, version(), f"{fmi}.0", sections
