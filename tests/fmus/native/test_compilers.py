@@ -21,7 +21,7 @@ from grasp_fmus.native.compilers import (
     compiler_for,
     universal,
 )  # fmt: skip
-from grasp_fmus.native.targets import LINUX_ARM, LINUX_X86, MAC_ARM, MAC_X86, WINDOWS, here
+from grasp_fmus.native.targets import LINUX_ARM, LINUX_X86, MAC_ARM, MAC_X86, WINDOWS, Target, here
 from support.compilers import needs_gcc, needs_zig
 
 SOURCES = {
@@ -185,7 +185,7 @@ def test_one_library_for_both_processors_of_macos() -> None:
 @needs_zig
 @pytest.mark.slow
 @pytest.mark.parametrize("target", [LINUX_X86, LINUX_ARM, MAC_X86, MAC_ARM])
-def test_zig_compiles_for_others(target: compilers.Target) -> None:
+def test_zig_compiles_for_others(target: Target) -> None:
     magic = b"\x7fELF" if target.suffix == ".so" else struct.pack("<I", 0xFEEDFACF)
     job = Job(SOURCES, "Sum", target, compiler_for(target, asked=True))
     first, second = compilers._compiled([job, job])
