@@ -81,9 +81,7 @@ const char *fmi2GetVersion(void)
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories,
                                const fmi2String categories[])
 {
-    (void)loggingOn;
-    (void)nCategories;
-    (void)categories;
+    (void)loggingOn, (void)nCategories, (void)categories;
     return c ? fmi2OK : fmi2Error;
 }
 
@@ -99,8 +97,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     Slave *s;
     Status status;
     (void)fmuResourceLocation;  /* nothing is read from there */
-    (void)visible;
-    (void)loggingOn;
+    (void)visible, (void)loggingOn;
     if (functions) {
         host.logger = functions->logger;
         host.environment = functions->componentEnvironment;
@@ -136,10 +133,7 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fm
                                fmi2Real startTime, fmi2Boolean stopTimeDefined, fmi2Real stopTime)
 {
     FMI2_INSTANCE(c)
-    (void)toleranceDefined;
-    (void)tolerance;
-    (void)stopTimeDefined;
-    (void)stopTime;
+    (void)toleranceDefined, (void)tolerance, (void)stopTimeDefined, (void)stopTime;
     if (slave_require(s, "SetupExperiment", INSTANTIATED) != SLAVE_OK) {
         return fmi2Error;
     }
@@ -334,8 +328,7 @@ fmi2Status fmi2CancelStep(fmi2Component c)
 
 fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Status *value)
 {
-    (void)kind;
-    (void)value;
+    (void)kind, (void)value;
     return fmi2_not_supported(c, "fmi2GetStatus: no step is ever pending");
 }
 
@@ -351,8 +344,7 @@ fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Rea
 
 fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value)
 {
-    (void)kind;
-    (void)value;
+    (void)kind, (void)value;
     return c ? fmi2Discard : fmi2Error;
 }
 
@@ -368,8 +360,7 @@ fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2
 
 fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind kind, fmi2String *value)
 {
-    (void)kind;
-    (void)value;
+    (void)kind, (void)value;
     return c ? fmi2Discard : fmi2Error;
 }
 
@@ -420,8 +411,10 @@ fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c)
     FMI2_NOT_THERE(c, "EnterContinuousTimeMode");
 }
 
-fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean noSetFMUStatePriorToCurrentPoint,
-                                       fmi2Boolean *enterEventMode, fmi2Boolean *terminateSimulation)
+fmi2Status fmi2CompletedIntegratorStep(fmi2Component c,
+                                       fmi2Boolean noSetFMUStatePriorToCurrentPoint,
+                                       fmi2Boolean *enterEventMode,
+                                       fmi2Boolean *terminateSimulation)
 {
     (void)noSetFMUStatePriorToCurrentPoint, (void)enterEventMode, (void)terminateSimulation;
     FMI2_NOT_THERE(c, "CompletedIntegratorStep");

@@ -11,8 +11,9 @@
 #include <string.h>
 
 #define TEXT_WORDS 40         /* 1280 bits: a double needs 1130 of them */
-#define TEXT_MOST_DIGITS 310  /* the largest double, written out, has 309 */
-#define TEXT_SIZE 340         /* what a text of a number needs at most, with its NUL */
+#define TEXT_DIGITS 768       /* no double has more */
+#define TEXT_WHOLE 310        /* the largest double, as a whole number, has 309 */
+#define TEXT_SIZE 340         /* what a text with up to so many digits needs, with its NUL */
 
 typedef struct {
     uint32_t words[TEXT_WORDS];  /* the lowest first */
@@ -103,8 +104,10 @@ static int text_digits(char *digits, int *count, double v, int most)
     left = text_shifted(m, exponent > 0 ? exponent + 2 : 2);
     whole = text_shifted(1, exponent > 0 ? 2 : 2 - exponent);
     above = text_shifted(2, exponent > 0 ? exponent : 0);
-    below = m == (uint64_t)1 << 52 && exponent > -1074 ? text_shifted(1, exponent > 0 ? exponent : 0)
-                                                       : above;
+    below = above;
+    if (m == (uint64_t)1 << 52 && exponent > -1074) {  /* the doubles below are twice as close */
+        below = text_shifted(1, exponent > 0 ? exponent : 0);
+    }
     if (most > 0) {
         above = below = zero;  /* the digits do not depend on them */
     }
@@ -194,7 +197,7 @@ static const char *text_special(double v)
 /* With `most` significant digits, no zeros at the end; the fewest that identify v for 0 */
 static size_t text_number(char *to, double v, int most)
 {
-    char digits[TEXT_MOST_DIGITS];
+    char digits[TEXT_DIGITS];
     const char *special = text_special(v);
     int n, point;
     uint64_t bits;
@@ -224,7 +227,7 @@ static size_t text_repr(char *to, double v)
     return n;
 }
 
-/* format(v, ".{digits}g"), digits from 1; TEXT_MOST_DIGITS writes out a whole number of any size */
+/* format(v, ".{digits}g"), digits from 1; TEXT_WHOLE writes out a whole number of any size */
 static size_t text_general(char *to, double v, int digits)
 {
     return text_number(to, v, digits);

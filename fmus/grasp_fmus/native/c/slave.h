@@ -27,9 +27,9 @@
 enum { INSTANTIATED, INITIALISING, STEPPING, TERMINATED };     /* phases */
 
 #define SLAVE_TIME N_VARIABLES  /* the place of the time, in s, behind the values */
-#define SLAVE_TIME_TOLERANCE 1e-9  /* s; how far the host's clock may be off; 1e-12 of large times */
+#define SLAVE_TIME_TOLERANCE 1e-9  /* how far the host's clock may be off, in s; or 1e-12 of it */
 #define SLAVE_CONTENT_SIZE 16
-#define SLAVE_HEAD 40  /* bytes of a serialised state before its numbers: magic, content, check sum */
+#define SLAVE_HEAD 40  /* bytes of a state before its numbers: magic, content, check sum */
 #define SLAVE_STATE_SIZE (SLAVE_HEAD + 8 * (2 + N_INPUTS + N_PARAMETERS + N_STATE))
 
 typedef struct {
@@ -42,7 +42,7 @@ typedef struct {
     BlockParams params;
     BlockInputs inputs;
     BlockState state;
-    char *text, *text_at, *text_end;  /* the message being written, its end and that of its memory */
+    char *text, *text_at, *text_end;  /* a message: its begin, its end, that of its memory */
 } Slave;
 
 /* A state of a slave at a moment: everything else follows from it */
@@ -121,7 +121,7 @@ static void slave_put_value(Slave *s, int kind, double v)
     if (kind == KIND_BOOLEAN) {
         slave_put(s, v != 0.0 ? "True" : "False");
     } else if (kind == KIND_INTEGER) {
-        slave_put_general(s, v, TEXT_MOST_DIGITS);
+        slave_put_general(s, v, TEXT_WHOLE);
     } else {
         slave_put_number(s, v);
     }
@@ -800,7 +800,7 @@ static int slave_is_output(int vr)
 
 static void slave_put_count(Slave *s, size_t n)
 {
-    slave_put_general(s, (double)n, TEXT_MOST_DIGITS);
+    slave_put_general(s, (double)n, TEXT_WHOLE);
 }
 
 /* To SLAVE_STATE_SIZE bytes, the same on every machine and as the Python slave's */
@@ -953,7 +953,7 @@ static Status slave_deserialise(Slave *s, const unsigned char *bytes, size_t siz
     if (phase < INSTANTIATED || phase > TERMINATED || !slave_finite(state->values[SLAVE_TIME])) {
         slave_begin_text(s);
         slave_put(s, "state in phase ");
-        slave_put_general(s, phase, TEXT_MOST_DIGITS);
+        slave_put_general(s, phase, TEXT_WHOLE);
         slave_put(s, " at ");
         slave_put_number(s, state->values[SLAVE_TIME]);
         slave_put(s, " s: is none");
