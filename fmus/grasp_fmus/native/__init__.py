@@ -1,1 +1,1 @@
-"""Native FMUs: blocks as C, compiled, which need no Python. The page: README.md."""
+"""Native FMUs: a block as C, which needs no Python. Card: README.md."""
