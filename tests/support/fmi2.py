@@ -1,7 +1,7 @@
 """An FMI 2.0 host as plain as can be: every call returns its status, every log message is kept."""
 
 import ctypes
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from ctypes import byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -9,6 +9,10 @@ from xml.etree import ElementTree
 from zipfile import ZipFile
 
 OK, WARNING, DISCARD, ERROR, FATAL = range(5)
+
+KINDS = {kind: kind for kind in ("Real", "Boolean", "Integer", "String")}
+KINDS["Enumeration"] = "Integer"
+"""By the element of a variable, the functions that get and set it."""
 
 _LOGGER = ctypes.CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
 _ALLOCATE = ctypes.CFUNCTYPE(c_void_p, c_size_t, c_size_t)
@@ -47,7 +51,9 @@ class Fmu:
         variables = list(root.iter("ScalarVariable"))
         self.references = {v.get("name", ""): int(v.get("valueReference", "")) for v in variables}
         self.causalities = {v.get("name", ""): v.get("causality", "") for v in variables}
-        self.booleans = {v.get("name", "") for v in variables if v.find("Boolean") is not None}
+        self.kinds = {v.get("name", ""): KINDS[v[0].tag] for v in variables}
+        self.booleans = {name for name, kind in self.kinds.items() if kind == "Boolean"}
+        self.tunable = [v.get("name", "") for v in variables if v.get("variability") == "tunable"]
         self.library = ctypes.CDLL(str(folder / "binaries" / "linux64" / f"{self.name}.so"))
         self.library.fmi2Instantiate.restype = c_void_p
 
@@ -101,9 +107,7 @@ class Instance:
     def initialise(self, **values: float) -> "Instance":
         """Set values and go through initialisation."""
         assert self.setup() == OK
-        for name, value in values.items():
-            flag = name in self.fmu.booleans
-            assert (self.switch({name: bool(value)}) if flag else self.set({name: value})) == OK
+        assert self.assign(values) == OK
         assert (self.enter(), self.exit()) == (OK, OK)
         return self
 
@@ -113,17 +117,30 @@ class Instance:
     def set(self, values: dict[str, float]) -> int:
         return self.set_real([self.fmu.references[name] for name in values], values.values())
 
-    def switch(self, values: dict[str, bool]) -> int:
-        """Set Boolean variables."""
-        return self.set_boolean([self.fmu.references[name] for name in values], values.values())
+    def assign(self, values: Mapping[str, float]) -> int:
+        """Set variables of any type but String, type by type; the first status that is not OK."""
+        for kind in ("Real", "Boolean", "Integer"):
+            chosen = {n: v for n, v in values.items() if self.fmu.kinds[n] == kind}
+            references = [self.fmu.references[n] for n in chosen]
+            set_ = getattr(self, f"set_{kind.lower()}")
+            if chosen and (status := set_(references, chosen.values())) != OK:
+                return int(status)
+        return OK
 
     def set_real(self, references: Sequence[int], values: Iterable[float]) -> int:
         n = len(references)
         return self.call("SetReal", (c_uint * n)(*references), c_size_t(n), (c_double * n)(*values))
 
-    def set_boolean(self, references: Sequence[int], values: Iterable[bool]) -> int:
+    def set_boolean(self, references: Sequence[int], values: Iterable[float]) -> int:
+        return self._set_whole("SetBoolean", references, values)
+
+    def set_integer(self, references: Sequence[int], values: Iterable[float]) -> int:
+        return self._set_whole("SetInteger", references, values)
+
+    def _set_whole(self, function: str, references: Sequence[int], values: Iterable[float]) -> int:
         n = len(references)
-        return self.call("SetBoolean", (c_uint * n)(*references), c_size_t(n), (c_int * n)(*values))
+        numbers = (c_int * n)(*map(int, values))
+        return self.call(function, (c_uint * n)(*references), c_size_t(n), numbers)
 
     def get_real(self, references: Sequence[int]) -> tuple[int, list[float]]:
         n = len(references)
