@@ -4,7 +4,6 @@ The pacer and the stamps between the components write wall times into the vector
 the slots of the ports. So they are in the rows of the loop, and cost nothing where there are none.
 """
 
-import ctypes
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -88,7 +87,6 @@ class Pacer:
         """Does something that may wait within so many ns; False if there is nothing to do."""
         self._measuring = self._recording = 0
         self._head: Any = memoryview(bytearray(8 * HEAD)).cast("d")
-        self._keep: list[Any] = []
 
     @property
     def sleeps(self) -> bool:
@@ -121,12 +119,7 @@ class Pacer:
 
         if now is not time.monotonic_ns or not HAS_CLOCK:
             return Call(python)
-        seconds = np.zeros(2, np.int64)
-        self._keep += [seconds, data]
-        function = ctypes.CDLL(None).clock_gettime
-        address = ctypes.cast(function, ctypes.c_void_p).value or 0
-        words, place = seconds.ctypes.data, data.ctypes.data
-        return Call(python, Native(CLOCK, address, time.CLOCK_MONOTONIC, words, origin, place))
+        return Call(python, Native(CLOCK, 0, 0, size=origin, data=data.ctypes.data))
 
     def __call__(self, step: int) -> None:
         """Wait for the beginning of a step.
@@ -251,5 +244,5 @@ class Pacer:
         return now
 
 
-HAS_CLOCK = sys.platform == "linux" and sys.maxsize > 2**32
-"""True if compiled code can read time.monotonic_ns(): clock_gettime with two 64-bit words."""
+HAS_CLOCK = sys.platform == "linux"
+"""True if time.monotonic_ns() is the clock that compiled code reads, CLOCK_MONOTONIC."""
