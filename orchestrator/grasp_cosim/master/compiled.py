@@ -13,7 +13,7 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from functools import lru_cache
 from importlib.util import find_spec
@@ -24,7 +24,9 @@ from ..errors import InputError
 from ..files import in_one_piece
 from ..fmi import instance
 from ..fmi.instance import PYTHON, Native
+from ..realtime import meter, pacer
 from ..scratch import ScratchFolder
+from ..system.parts import NANOSECONDS
 from . import loop
 from .plan import Plan
 
@@ -89,43 +91,52 @@ class _Plan(ctypes.Structure):
     ]
 
 
-class _Stop(ctypes.Structure):
-    _fields_ = [("operation", ctypes.c_int64), ("status", ctypes.c_int64)]
-
-
-def compiled(plan: Plan) -> Callable[[Any, int, int, int, int], tuple[int, int, int]]:
-    """Return the compiled loop over a plan; InputError as of library()."""
-    callbacks = [ctypes.CFUNCTYPE(ctypes.c_int)(call.python) for call in plan.calls]
-    calls = [
-        tuple(call.native or Native(PYTHON, ctypes.cast(callback, ctypes.c_void_p).value or 0, 0))
-        for call, callback in zip(plan.calls, callbacks, strict=True)
+class _Shared(ctypes.Structure):
+    _fields_ = [
+        (n, ctypes.c_int64) for n in ("operation", "status", "done", "taken", "halt", "ended")
     ]
-    buffers = [(ELEMENTS.index(b.dtype.name), b.ctypes.data) for b in plan.buffers]
-    tables = [
-        _table(row, rows)
-        for row, rows in (
-            (_Operation, plan.operations), (_Connection, plan.connections),
-            (_Cast, plan.casts), (_Buffer, buffers), (_Call, calls),
-        )
-    ]  # fmt: skip
-    operations, *others = tables
-    made = _Plan(
-        operations, len(plan.operations), *others,
-        plan.values.ctypes.data, len(plan.values), plan.clock.ctypes.data,
-    )  # fmt: skip
-    stop = _Stop()
-    addresses = ctypes.addressof(made), ctypes.addressof(stop)
-    lives = made, tables, callbacks, plan
-    function = library(any(call.keeps_lock for call in plan.calls)).run
 
-    def run(rows: Any, operation: int, start: int, end: int, step_ns: int) -> tuple[int, int, int]:
-        place = rows.ctypes.data
-        reached = function(addresses[0], place, operation, start, end, step_ns, addresses[1])
-        return reached, stop.operation, stop.status
 
-    run.__dict__["lives"] = lives  # what the addresses point to
+class CompiledLoop:
+    """The compiled loop over a plan.
 
-    return run
+    alone says that it makes no call of Python at all. It then may run while another thread looks
+    at shared.done, the number of the steps whose rows are there, sets shared.taken once it does
+    not need the rows of so many any more, or sets shared.halt. shared.ended is the wall time in ns
+    at which the last step ended.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        """InputError as of library()."""
+        self._callbacks = [ctypes.CFUNCTYPE(ctypes.c_int)(call.python) for call in plan.calls]
+        calls = [
+            call.native or Native(PYTHON, ctypes.cast(callback, ctypes.c_void_p).value or 0, 0)
+            for call, callback in zip(plan.calls, self._callbacks, strict=True)
+        ]
+        buffers = [(ELEMENTS.index(b.dtype.name), b.ctypes.data) for b in plan.buffers]
+        self._plan = plan
+        self._tables = _Plan(
+            _table(_Operation, plan.operations), len(plan.operations),
+            _table(_Connection, plan.connections), _table(_Cast, plan.casts),
+            _table(_Buffer, buffers), _table(_Call, calls),
+            plan.values.ctypes.data, len(plan.values), plan.clock.ctypes.data,
+        )  # fmt: skip
+        self.shared = _Shared()
+        self.alone = all(call.native and not call.keeps_lock for call in plan.calls)
+        self._places = ctypes.addressof(self._tables), ctypes.addressof(self.shared)
+        self._run = library(any(call.keeps_lock for call in plan.calls)).run
+
+    def __call__(
+        self, rows: Any, operation: int, start: int, stop: int, step_ns: int, row: int | None = None
+    ) -> tuple[int, int, int]:
+        """As loop.run(). Given the row of the first step, rows are filled round and round."""
+        tables, shared = self._places
+        self.shared.done = start
+        if row is None:
+            self.shared.taken, row = start, 0
+        place, room = rows.ctypes.data, len(rows)
+        step = self._run(tables, place, room, row, operation, start, stop, step_ns, shared)
+        return step, self.shared.operation, self.shared.status
 
 
 def _table(row: type[ctypes.Structure], rows: Sequence[Any]) -> Any:
@@ -162,7 +173,8 @@ def library(locked: bool) -> ctypes.CDLL:
     except OSError as error:
         raise InputError(f"{path}: the compiled loop does not load: {error}; {REMEDY}") from error
     found.run.restype = ctypes.c_int64
-    found.run.argtypes = [ctypes.c_void_p, ctypes.c_void_p, *[ctypes.c_int64] * 4, ctypes.c_void_p]
+    whole, place = ctypes.c_int64, ctypes.c_void_p
+    found.run.argtypes = [place, place, *[whole] * 6, place]
     return found
 
 
@@ -199,8 +211,11 @@ def _constants() -> list[str]:
     shared = {
         **{n: getattr(loop, n) for n in ("COPY", "SCALE", "STORE", "LOAD", "LOAD_LONG")},
         **{n: getattr(loop, n) for n in ("CALL", "STEP", "TOO_LONG", "EXACT", "WORST")},
+        **{n: getattr(loop, n) for n in ("FULL", "HALTED", "OVERRUN")},
         **{n: getattr(instance, n) for n in ("TRANSFER_2", "TRANSFER_3", "STEP_2", "STEP_3")},
-        **{n: getattr(instance, n) for n in ("CLOCK", "EARLY")},
+        **{n: getattr(instance, n) for n in ("CLOCK", "PACE", "EARLY")},
+        **{n: getattr(meter, n) for n in ("ARRIVED", "LATE", "DUE", "BEGIN")},
+        "SLICE": pacer.SLICE_NS, "NAP": round(pacer.NAP * NANOSECONDS),
         **{name.upper(): code for code, name in enumerate(ELEMENTS)},
     }
     return [f"-D{name}={value!r}" for name, value in shared.items()]

@@ -39,10 +39,10 @@ def make_loop(plan: Plan, engine: Engine, steps: int | None = None) -> Loop:
     """
     choice("engine", engine, ENGINES)
     if engine == "compiled":
-        return compiled.compiled(plan)
+        return compiled.CompiledLoop(plan)
     if engine == "auto" and _pays(plan, steps):
         with suppress(InputError):  # of a compiler that does not work
-            return compiled.compiled(plan)
+            return compiled.CompiledLoop(plan)
     return _interpreted(plan)
 
 

@@ -55,9 +55,21 @@ typedef struct {
     double *clock;
 } Plan;
 
-typedef struct {
-    int64_t operation, status;
-} Stop;
+typedef struct { /* what the loop and others tell each other while it runs */
+    int64_t operation, status; /* why it ended; 0, 0 at the end */
+    int64_t done;              /* steps whose rows are there */
+    int64_t taken;             /* steps whose rows have been taken, so that others may take their places */
+    int64_t halt;              /* not 0: end before the next step that has to be waited for */
+    int64_t ended;             /* when it ended, by the monotonic clock in ns */
+} Shared;
+
+typedef struct { /* of realtime/pacer.py; times in ns */
+    int64_t origin, base, base_step; /* base_step < 0: the first step is still to come */
+    int64_t numerator, denominator;  /* the period */
+    int64_t spin, slept, breath;     /* breath 0: no need to sleep for the sake of others */
+    int64_t shifts, stops;           /* what a late step does to the schedule */
+    int64_t arrived, late;
+} Pace;
 
 typedef int Python(void);
 typedef int Transfer2(void *, const uint32_t *, size_t, void *);
@@ -65,10 +77,61 @@ typedef int Transfer3(void *, const uint32_t *, size_t, void *, size_t);
 typedef int Step2(void *, double, double, int);
 typedef int Step3(void *, double, double, bool, void *, void *, void *, double *);
 
-/* Make a call; its FMI status. */
-static int invoke(const Call *call, double time) {
-    uint8_t *said = call->flags;
+static int64_t monotonic(void) {
     struct timespec now;
+
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
+}
+
+/* Sleep until a time; a signal ends that early. */
+static void sleep_until(int64_t time) {
+    struct timespec until;
+
+    until.tv_sec = (time_t)(time / 1000000000);
+    until.tv_nsec = (long)(time % 1000000000);
+    clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, NULL);
+}
+
+/* Wait for the beginning of a step, as Pacer.__call__(); head gets its times. */
+static int pace(Pace *p, int64_t step, double *head, const volatile int64_t *halt) {
+    int64_t now = monotonic() - p->origin, due;
+
+    p->arrived = now;
+    if (p->base_step < 0) {
+        p->base = p->slept = now;
+        p->base_step = step;
+    }
+    due = p->base + (step - p->base_step) * p->numerator / p->denominator;
+    p->late = now - due;
+    if (p->late > 0 && p->stops) return OVERRUN;
+    if (p->late > 0 && p->shifts) {
+        p->base = due = now;
+        p->base_step = step;
+    }
+    while (now + p->spin < due) {
+        int64_t until = due - p->spin < now + SLICE ? due - p->spin : now + SLICE;
+        if (*halt) return HALTED;
+        sleep_until(p->origin + until);
+        p->slept = now = monotonic() - p->origin;
+    }
+    if (p->breath && now - p->slept > p->breath) {
+        sleep_until(p->origin + now + NAP);
+        p->slept = now = monotonic() - p->origin;
+    }
+    while (now < due) now = monotonic() - p->origin;
+    if (*halt) return HALTED;
+    head[ARRIVED] = (double)p->arrived;
+    head[LATE] = (double)p->late;
+    head[DUE] = (double)due;
+    head[BEGIN] = (double)now;
+    return 0;
+}
+
+/* Make a call; its FMI status. clock: the time of the step, its number. */
+static int invoke(const Call *call, const double *clock, const Shared *shared) {
+    double time = clock[0];
+    uint8_t *said = call->flags;
     int status;
 
     switch (call->shape) {
@@ -85,10 +148,10 @@ static int invoke(const Call *call, double time) {
                                            said + 2, call->last);
         return status <= WORST && (said[1] || said[2]) ? EARLY : status;
     case CLOCK:
-        clock_gettime(CLOCK_MONOTONIC, &now);
-        *(double *)call->data =
-            (double)((int64_t)now.tv_sec * 1000000000 + now.tv_nsec - call->size);
+        *(double *)call->data = (double)(monotonic() - call->size);
         return 0;
+    case PACE:
+        return pace(call->instance, (int64_t)clock[1], call->data, &shared->halt);
     default:
         return ((Python *)call->function)();
     }
@@ -127,7 +190,8 @@ static void store(const Buffer *buffer, int64_t i, double value) {
 }
 
 /* Do one operation in step k; 0, or the status that ends the loop. */
-static int operate(const Plan *plan, const Operation *operation, int64_t k, int64_t step_ns) {
+static int operate(const Plan *plan, const Operation *operation, int64_t k, int64_t step_ns,
+                   const Shared *shared) {
     double *values = plan->values;
     int64_t i, begin = operation->first, end = operation->last;
 
@@ -136,7 +200,7 @@ static int operate(const Plan *plan, const Operation *operation, int64_t k, int6
         plan->clock[0] = (double)((k + 1 - operation->period) * step_ns) / 1e9;
         /* fall through */
     case CALL: {
-        int status = invoke(&plan->calls[begin], plan->clock[0]);
+        int status = invoke(&plan->calls[begin], plan->clock, shared);
         return status > WORST ? status : 0;
     }
     case COPY:
@@ -169,27 +233,35 @@ static int operate(const Plan *plan, const Operation *operation, int64_t k, int6
     }
 }
 
-int64_t run(const Plan *plan, double *rows, int64_t operation, int64_t start, int64_t stop,
-            int64_t step_ns, Stop *stopped) {
-    size_t row = (size_t)plan->width * sizeof(double);
+/* rows has room for so many, of which the first step takes the given one; then it begins anew. */
+int64_t run(const Plan *plan, double *rows, int64_t room, int64_t row, int64_t operation,
+            int64_t start, int64_t stop, int64_t step_ns, Shared *shared) {
     int64_t k;
 
+    shared->operation = shared->status = 0;
     for (k = start; k < stop; k++) {
         plan->clock[1] = (double)k;
+        if (k - __atomic_load_n(&shared->taken, __ATOMIC_ACQUIRE) >= room) {
+            shared->operation = operation;
+            shared->status = FULL;
+            return k;
+        }
         for (; operation < plan->size; operation++) {
             const Operation *o = &plan->operations[operation];
             if (o->period == 1 || k % o->period == o->phase) {
-                int status = operate(plan, o, k, step_ns);
+                int status = operate(plan, o, k, step_ns, shared);
                 if (status) {
-                    stopped->operation = operation;
-                    stopped->status = status;
+                    shared->operation = operation;
+                    shared->status = status;
                     return k;
                 }
             }
         }
         operation = 0;
-        memcpy(rows + (k - start) * plan->width, plan->values, row);
+        memcpy(rows + row * plan->width, plan->values, (size_t)plan->width * sizeof(double));
+        if (++row == room) row = 0;
+        __atomic_store_n(&shared->done, k + 1, __ATOMIC_RELEASE);
     }
-    stopped->operation = stopped->status = 0;
+    shared->ended = monotonic();
     return stop;
 }
