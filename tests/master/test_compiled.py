@@ -81,7 +81,7 @@ def test_what_is_damaged_is_built_anew(cache: Path, damage: Callable[[bytes], by
 
 def test_what_was_built_from_other_constants_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     before = compiled._place()
-    monkeypatch.setattr(compiled.instance, "EARLY", 7)
+    monkeypatch.setattr("grasp_cosim.fmi.instance.EARLY", 7)
     assert compiled._place() != before
 
 

@@ -27,8 +27,8 @@ class Native(NamedTuple):
     TRANSFER_2: f(instance, references, n, data). TRANSFER_3: the same and n again.
     STEP_2: f(instance, time, step, 1). STEP_3: f(instance, time, step, 1, &event, &terminate,
     &early, &last), where flags is the address of three bytes for the first three, last that of a
-    double for the last. CLOCK: time.monotonic_ns(), less size, goes to data, a double. PACE: wait for
-    the beginning of a step; instance is what realtime/pacer.py keeps for it, data its times.
+    double for the last. CLOCK: time.monotonic_ns(), less size, goes to data, a double. PACE: wait
+    for the beginning of a step; instance is what realtime/pacer.py keeps for it, data its times.
     """
 
     shape: int

@@ -1,4 +1,4 @@
-"""Something that goes on beside the loop, while that runs without Python's lock: handing rows on."""
+"""What goes on beside the loop while that runs without Python's lock: handing rows on."""
 
 import os
 import select

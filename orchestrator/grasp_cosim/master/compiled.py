@@ -215,7 +215,8 @@ def _constants() -> list[str]:
         **{n: getattr(instance, n) for n in ("TRANSFER_2", "TRANSFER_3", "STEP_2", "STEP_3")},
         **{n: getattr(instance, n) for n in ("CLOCK", "PACE", "EARLY")},
         **{n: getattr(meter, n) for n in ("ARRIVED", "LATE", "DUE", "BEGIN")},
-        "SLICE": pacer.SLICE_NS, "NAP": round(pacer.NAP * NANOSECONDS),
+        "SLICE": pacer.SLICE_NS,
+        "NAP": round(pacer.NAP * NANOSECONDS),
         **{name.upper(): code for code, name in enumerate(ELEMENTS)},
     }
     return [f"-D{name}={value!r}" for name, value in shared.items()]

@@ -17,7 +17,7 @@ from .plan import Plan
 Engine = Literal["auto", "python", "compiled"]
 ENGINES: tuple[str, ...] = get_args(Engine)
 
-Loop = Callable[[Any, int, int, int, int], tuple[int, int, int]]
+Loop = Callable[[Any, int, int, int, int], tuple[int, int, int]] | compiled.CompiledLoop
 """loop.run() over a plan: takes rows, operation, start, stop and step_ns."""
 
 BUILDING = 0.3

@@ -78,11 +78,12 @@ class Master:
         ).plan()
         self._pacer = pacer
         self._loop = make_loop(self.plan, engine, None if pacer else self.total_steps)
-        alone = pacer is not None and isinstance(self._loop, CompiledLoop) and self._loop.alone
-        self._alone = self._loop if alone else None
-        self._rows = np.empty((ROOM if alone else CHUNK, len(self.values)))
+        self._alone = None
+        if pacer is not None and isinstance(self._loop, CompiledLoop) and self._loop.alone:
+            self._alone = self._loop
+        self._rows = np.empty((ROOM if self._alone else CHUNK, len(self.values)))
         self._rows.fill(0.0)  # its memory is there from now on
-        self._cpus = os.sched_getaffinity(0) if alone else ()
+        self._cpus = os.sched_getaffinity(0) if self._alone else ()
         self._base = self._handed_on = 0
         self._handed_on_at = time.monotonic()
 
@@ -203,7 +204,7 @@ class Master:
     def _run_alone(self, stop: int, compiled: CompiledLoop, pacer: Pacer) -> None:
         """The same in real time without any call of Python; another thread hands the rows on."""
         step, operation, status, shared = self.steps_done, 0, 0, compiled.shared
-        shared.done, shared.taken, shared.halt = step, self._handed_on, 0
+        shared.done, shared.taken, shared.halt = step, self._handed_on, int(pacer.halted())
 
         def halt() -> None:
             shared.halt = 1

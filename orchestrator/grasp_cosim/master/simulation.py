@@ -105,7 +105,8 @@ class Session:
                     self._master.initialise()
             self._tell(self._early())
             if realtime and self.pacer:
-                granted = privileges(realtime, self.pacer.sleeps)
+                sleeps = self.pacer.sleeps or self._master.runs_alone
+                granted = privileges(realtime, sleeps)
                 self._privileges = self._stack.enter_context(granted)
                 self.pacer.breathes = realtime.priority is not None
             for line in self._privileges.refused:

@@ -22,6 +22,9 @@ from .timing import Timing
 SPIN_NS = 200_000
 """Before the deadline the pacer does not sleep any more: it may be woken too late."""
 
+MOST_SPIN = 0.85
+"""The most of a period that it spins: a real-time priority is broken off where it never sleeps."""
+
 SLICE_NS = 50_000_000
 """The longest sleep between two looks at Ctrl-C."""
 
@@ -82,7 +85,7 @@ class Pacer:
         period = realtime.period(system.step_ns)
         self.meter = Meter(system, realtime, period)
         self._period = period.as_integer_ratio()
-        self._spin = min(SPIN_NS, int(period / 2))
+        self._spin = min(SPIN_NS, int(MOST_SPIN * period))
         self.breathes = False
         """True if it has to sleep from time to time for the sake of other processes."""
         self._policy = realtime.overrun
