@@ -69,7 +69,8 @@ class FmuInstance(LoadedInstance):
     def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
         """The call that advances by step seconds from the time in clock[0]."""
         bound, address = self._stepping(clock, step, ctypes.c_int(1))
-        return Call(bound, Native(STEP_2, address, self._slave.component, step=step))
+        native = Native(STEP_2, address, self._slave.component, step=step)
+        return Call(bound, native, self._python)
 
     def _wants_the_end(self) -> bool:
         return bool(self._status(self._slave.getBooleanStatus, fmi2Terminated))

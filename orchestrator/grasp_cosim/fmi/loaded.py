@@ -205,7 +205,8 @@ class LoadedInstance(ABC):
             *again,
         )
         instance, first = self._slave.component, ctypes.addressof(references)
-        return Call(bound, Native(self.SHAPE, address, instance, first, count, place))
+        native = Native(self.SHAPE, address, instance, first, count, place)
+        return Call(bound, native, self._python)
 
     def _suffix(self, fmi_type: str) -> str:
         """The end of the names of the functions that set and get an FMI type."""
