@@ -18,6 +18,9 @@ FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 FMU_FOLDER = Path("fmus/build")
 """Where the FMUs of this project are built, below the current folder."""
 
+NATIVE_FOLDER = Path("fmus/native")
+"""Where their native twins are."""
+
 
 def check_folder(folder: Path) -> None:
     """InputError where files could not be written to the folder, which need not exist."""
@@ -33,10 +36,11 @@ def check_folder(folder: Path) -> None:
 
 def check_fmu_file(path: Path) -> None:
     """InputError where there is no file at path."""
+    if path.is_file():
+        return
     if path.is_dir():
         raise InputError(f"{path}: is a folder; must be an FMU, a file")
-    if not path.is_file():
-        raise InputError(f"{path}: no such FMU file")
+    raise InputError(f"{path}: no such FMU file")
 
 
 def write_text(path: Path, text: str) -> None:

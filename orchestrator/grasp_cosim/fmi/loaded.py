@@ -118,7 +118,8 @@ class LoadedInstance(ABC):
     def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
         """The call that advances by step seconds from the time in clock[0]."""
 
-    def _load(self, folder: Path) -> Any:
+    def _extract(self, folder: Path) -> None:
+        """Extract what an instance here may need; InputError where that fails."""
         try:
             fmpy.extract(self.interface.path, folder, _used_here)
         except Exception as error:  # FMPy and zipfile raise whatever they like
@@ -128,6 +129,9 @@ class LoadedInstance(ABC):
                     f"{error.strerror}; must have room there, or TMPDIR must be another folder"
                 ) from error
             raise InputError(f"{self.name}: {self.interface.path} is damaged: {error}") from error
+
+    def _load(self, folder: Path) -> Any:
+        self._extract(folder)
         self._python = (self._resources / "slavemodule.txt").exists()
         plain = str(folder).replace(" ", "")
         if self._python and quote(plain) != plain:
@@ -157,10 +161,14 @@ class LoadedInstance(ABC):
                 said = as_reason(self._messages())
                 warnings.warn(f"{self.name}: {error}{said}", stacklevel=2)
         if self._worst < FATAL:
-            self._slave.freeInstance()
+            self._free()
         if str(self._resources) in sys.path:  # pythonfmu puts it there and leaves it
             sys.path.remove(str(self._resources))
         self._folder.cleanup()
+
+    def _free(self) -> None:
+        """Free the instance, and the library with it."""
+        self._slave.freeInstance()
 
     def enter_initialization(
         self, values: Mapping[str, Value], stop: float | None, start: float = 0.0

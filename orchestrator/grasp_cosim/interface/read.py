@@ -64,11 +64,13 @@ def read_interface(path: Path) -> Interface:
     An input has one source, so its aliases are left out.
     """
     check_fmu_file(path)
-    return _for_master(path.resolve(), path.stat().st_mtime_ns)
+    there = path.stat()  # of another file at that path, or one that was altered, it is another
+    return _for_master(path, (there.st_dev, there.st_ino, there.st_mtime_ns, there.st_size))
 
 
 @lru_cache(maxsize=64)
-def _for_master(path: Path, modified: int) -> Interface:
+def _for_master(path: Path, state: tuple[int, ...]) -> Interface:
+    path = path.resolve()
     found = describe(path)
     if found.version == "1.0":
         raise InputError(f"{path}: FMI 1.0; must be an FMI 2.0 or 3.0 co-simulation FMU")
