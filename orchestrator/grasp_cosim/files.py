@@ -19,7 +19,7 @@ FMU_FOLDER = Path("fmus/build")
 """Where the FMUs of this project are built, below the current folder."""
 
 NATIVE_FOLDER = Path("fmus/native")
-"""Where their native twins are."""
+"""Where native ones are."""
 
 
 def check_folder(folder: Path) -> None:
@@ -36,11 +36,10 @@ def check_folder(folder: Path) -> None:
 
 def check_fmu_file(path: Path) -> None:
     """InputError where there is no file at path."""
-    if path.is_file():
-        return
     if path.is_dir():
         raise InputError(f"{path}: is a folder; must be an FMU, a file")
-    raise InputError(f"{path}: no such FMU file")
+    if not path.is_file():
+        raise InputError(f"{path}: no such FMU file")
 
 
 def write_text(path: Path, text: str) -> None:

@@ -63,13 +63,14 @@ def read_interface(path: Path) -> Interface:
 
     An input has one source, so its aliases are left out.
     """
-    check_fmu_file(path)
-    there = path.stat()  # of another file at that path, or one that was altered, it is another
-    return _for_master(path, (there.st_dev, there.st_ino, there.st_mtime_ns, there.st_size))
+    if not path.is_file():  # which is asked some hundred times a run
+        check_fmu_file(path)
+    found = path.stat()
+    return _for_master(path, (found.st_dev, found.st_ino, found.st_mtime_ns))
 
 
 @lru_cache(maxsize=64)
-def _for_master(path: Path, state: tuple[int, ...]) -> Interface:
+def _for_master(path: Path, identity: tuple[int, ...]) -> Interface:
     path = path.resolve()
     found = describe(path)
     if found.version == "1.0":

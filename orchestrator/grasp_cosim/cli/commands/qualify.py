@@ -23,6 +23,7 @@ from ..frame import (
     say,
     show,
 )
+from ..native import many_runs_option, natively
 from ..options import chosen_system, set_values, system_options
 
 
@@ -47,6 +48,7 @@ from ..options import chosen_system, set_values, system_options
     show_default=True,
     help="Where the candidate runs.",
 )
+@many_runs_option
 @metrics_option
 @click.option(
     "--out",
@@ -61,6 +63,7 @@ def qualify(
     renames: tuple[str, ...],
     named: tuple[str, ...],
     isolation: Isolation,
+    native: bool | None,
     metric_files: tuple[Path, ...],
     out: Path | None,
     as_json: bool,
@@ -76,7 +79,7 @@ def qualify(
     """
     check_outputs(out, plot=bool(out))
     found = run_qualification(
-        chosen_system(given),
+        natively(chosen_system(given), native),
         component,
         candidate,
         rename=dict(pair("--rename", text, "VARIABLE=CANDIDATES_VARIABLE") for text in renames),

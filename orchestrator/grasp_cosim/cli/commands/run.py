@@ -28,6 +28,7 @@ from ..frame import (
     say,
     show,
 )
+from ..native import native_option, natively
 from ..options import chosen_system, set_values, system_options
 from ..realtime import chosen_realtime, realtime_options, timing_lines
 from ..step_study import check_step_study, step_study_options, study_step
@@ -52,6 +53,7 @@ from ..step_study import check_step_study, step_study_options, study_step
     type=click.Choice(ISOLATIONS),
     help="Where all FMUs run: each in a process of its own, or none. Default: as SYSTEM says.",
 )
+@native_option("as SYSTEM names them; with --step-study, native where there is a C compiler.")
 @click.option("--engine", type=click.Choice(ENGINES), default="auto", show_default=True)
 @metrics_option
 @step_study_options
@@ -81,6 +83,7 @@ def run(
     metrics = chosen_metrics(metric_files)
     if given["step_study"]:
         return study_step(system, metrics, given, as_json)
+    system = natively(system, bool(given["native"]))
     if mdf and not out:
         raise InputError("--mdf: must come with --out, the folder for signals.mf4")
     if mdf:
