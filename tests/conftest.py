@@ -31,6 +31,9 @@ UnpackIn = Callable[[str], Path]
 Altered = Callable[[str, str, str, str], Path]
 
 
+os.environ["XDG_CACHE_HOME"] = str(Path(sys.prefix, "cache_of_the_tests"))
+"""Native FMUs are compiled once for all test processes and runs, too."""
+
 settings.register_profile("usual", deadline=None, derandomize=True, max_examples=100)
 settings.register_profile(
     "explore", deadline=None, derandomize=False, max_examples=1000, print_blob=True

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import click
@@ -14,7 +15,9 @@ from ..system.parts import Component
 from .frame import Command, say
 
 FEW = 3
-"""Components that have no twin of which the line tells."""
+"""Components without a twin that are named at most."""
+
+WAY_BACK = "--python runs those in Python, with the same bits"
 
 
 def native_option(default: str) -> Command:
@@ -30,41 +33,43 @@ many_runs_option = native_option("native, where there is a C compiler.")
 """The option of commands that do many runs."""
 
 
-def natively(system: System, native: bool | None) -> System:
+@contextmanager
+def natively(system: System, native: bool | None) -> Iterator[System]:
     """The system with the native twins of its FMUs; as it is, where `native` is False.
 
-    None takes the twins that there are or can be built, and says so in one line. With True,
-    InputError where those of our own blocks cannot be built. An FMU without a twin stays as it is.
+    None takes the twins that there are or can be built; which that were is said in one line at the
+    end of the context. With True, InputError where those of our own blocks cannot be built. An FMU
+    without a twin stays as it is.
     """
-    if native is False:
-        return system
+    twins, line = ({}, "") if native is False else _twins(system, native is True)
+    yield system.with_natives(twins)
+    if line:
+        say(line)
+
+
+def _twins(system: System, asked: bool) -> tuple[dict[str, Path], str]:
+    """The twins by component, and what is to be said of them; nothing where all is as asked."""
     from grasp_fmus.native.twins import NoTwinsError, shipped_twins
 
     folder, failure = None, ""
-    shipped = [c.name for c in system.components if _is_shipped(c)]
+    shipped = {c.name for c in system.components if _is_shipped(c)}
     if shipped:
         try:
             folder = shipped_twins()
         except NoTwinsError as error:
             failure = str(error)
     twins = {c.name: twin for c in system.components if (twin := _twin(c, folder))}
-    if native and failure and not twins.keys() >= {*shipped}:
+    if asked and failure and not twins.keys() >= shipped:
         raise InputError(f"--native: {failure}")
     left = [c for c in system.components if c.name not in twins]
-    if line := _line(bool(twins), left, failure, native is True):
-        say(line)
-    return system.with_natives(twins)
-
-
-def _line(native: bool, left: Sequence[Component], failure: str, asked: bool) -> str:
-    """What is said of the FMUs that run; nothing where it is as it was asked, or always is."""
     but = choices((f"{c.name} ({_why(c)})" for c in left), FEW)
-    if native:
-        but = f", but not for {but}" if left else ""
-        return "" if asked and not left else f"native FMUs{but}; --python runs those of Python"
+    if twins and left:
+        return twins, f"ran native FMUs, but not as {but}; {WAY_BACK}"
+    if twins:
+        return twins, "" if asked else f"ran native FMUs; {WAY_BACK}"
     if failure:
-        return f"FMUs in Python, which takes longer: {failure}"
-    return f"no native FMUs: {but}" if asked or any(map(_is_ours, left)) else ""
+        return twins, f"ran FMUs in Python, which takes longer: {failure}"
+    return twins, f"ran no native FMU: {but}" if asked or any(map(_is_ours, left)) else ""
 
 
 def _is_ours(component: Component) -> bool:

@@ -51,8 +51,11 @@ def study_step(
     """
     of, tolerance = given["quantities"], given["tolerance"]
     check_outputs(given["out"], given["plot"])
-    system, workers = natively(system, given["native"]), os.cpu_count() or 1
-    study = step_study(system, tolerance, workers=workers, progress=True, of=of, metrics=metrics)
+    workers = os.cpu_count() or 1
+    with natively(system, given["native"]) as chosen:
+        study = step_study(
+            chosen, tolerance, workers=workers, progress=True, of=of, metrics=metrics
+        )
     folder = given["out"] or Path()
     if given["out"]:
         remove(folder, "step_study.json", "step_study.png")

@@ -33,12 +33,12 @@ def evaluate(bench: bool, out: Path, workers: int, native: bool | None, as_json:
     Example: grasp-cosim evaluate --out results
     """
     check_folder(out)
-    system = natively(load_system(), native)
+    system = load_system()
     source: Source = "experiment" if bench else "simulation"
+    system = with_preset(system, "bench") if bench else system
     try:
-        report = run_evaluation(
-            with_preset(system, "bench") if bench else system, out, workers, True, source
-        )
+        with natively(system, native) as chosen:
+            report = run_evaluation(chosen, out, workers, True, source)
     except KeyboardInterrupt:
         kept = Parts(out / FOLDER).kept()
         goes_on = f"; {kept} grasps are kept in {out / FOLDER}, the same command goes on"

@@ -65,7 +65,7 @@ def identify(
     if log:
         found = _from_log(system, log, groups)
     else:
-        found = _from_times(natively(system, native), times, groups, workers)
+        found = _from_times(system, times, groups, workers, native)
     if out:
         remove(out, "identification.json", "values.toml", "residuals.csv")
         write_text(out / "values.toml", report.values_toml(found))
@@ -83,11 +83,16 @@ def _from_log(system: System, path: Path, groups: tuple[str, ...]) -> report.Ide
 
 
 def _from_times(
-    system: System, path: Path | None, groups: tuple[str, ...], workers: int
+    system: System,
+    path: Path | None,
+    groups: tuple[str, ...],
+    workers: int,
+    native: bool | None,
 ) -> report.Identification:
     contacts = read_contacts(path) if path else published_contacts()
     parameters = chosen(groups, tuple(GROUPS), "identify")
-    fit = identify_from_times(system, contacts, parameters, workers, progress=True)
+    with natively(system, native) as run:
+        fit = identify_from_times(run, contacts, parameters, workers, progress=True)
     rows = [
         {"condition": c.label, "case": c.case, "finger": c.finger, "measured": c.time}
         for c in contacts

@@ -78,18 +78,19 @@ def qualify(
     Example: grasp-cosim qualify vendor_plant.fmu --as plant --out qualification
     """
     check_outputs(out, plot=bool(out))
-    found = run_qualification(
-        natively(chosen_system(given), native),
-        component,
-        candidate,
-        rename=dict(pair("--rename", text, "VARIABLE=CANDIDATES_VARIABLE") for text in renames),
-        units=dict(pair("--units", text, "VARIABLE=UNIT") for text in named),
-        values=set_values(given["settings"]),
-        bands=read_bands(bands) if bands else None,
-        isolation=isolation,
-        progress=True,
-        metrics=chosen_metrics(metric_files),
-    )
+    with natively(chosen_system(given), native) as system:
+        found = run_qualification(
+            system,
+            component,
+            candidate,
+            rename=dict(pair("--rename", text, "VARIABLE=CANDIDATES_VARIABLE") for text in renames),
+            units=dict(pair("--units", text, "VARIABLE=UNIT") for text in named),
+            values=set_values(given["settings"]),
+            bands=read_bands(bands) if bands else None,
+            isolation=isolation,
+            progress=True,
+            metrics=chosen_metrics(metric_files),
+        )
     if out:
         _write(found, out)
     show(as_json, verdict.as_json(found), verdict.as_text(found))

@@ -83,17 +83,19 @@ def run(
     metrics = chosen_metrics(metric_files)
     if given["step_study"]:
         return study_step(system, metrics, given, as_json)
-    system = natively(system, bool(given["native"]))
     if mdf and not out:
         raise InputError("--mdf: must come with --out, the folder for signals.mf4")
     if mdf:
         check_mdf()
     check_outputs(out, given["plot"])
     command = ("grasp-cosim", *click.get_current_context().find_root().obj)
-    with RunFolder(out, system, command, paced is not None) if out else nullcontext() as folder:
+    with (
+        natively(system, bool(given["native"])) as chosen,
+        RunFolder(out, chosen, command, paced is not None) if out else nullcontext() as folder,
+    ):
         try:
             result = simulate(
-                system,
+                chosen,
                 progress=True,
                 every=every,
                 listeners=[folder] if folder else (),

@@ -70,9 +70,10 @@ def sweep(
     check_outputs(folder, plot)
     if scheduler is not None and native is None:  # whose machines may be others
         native = False
-    chosen = replace(chosen, system=natively(chosen.system, native))
     try:
-        done = run_study(chosen, folder, workers, scheduler, progress=True)
+        with natively(chosen.system, native) as system:
+            chosen = replace(chosen, system=system)
+            done = run_study(chosen, folder, workers, scheduler, progress=True)
     except KeyboardInterrupt:
         kept = f"{Store(folder).kept()} of {chosen.runs} runs are kept in {folder}"
         return fail(f"interrupted; {kept}, the same command goes on", INTERRUPTED)
