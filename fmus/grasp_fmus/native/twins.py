@@ -12,7 +12,7 @@ from pathlib import Path
 
 from ..folder import is_current, sources_hash, write_stamp
 from ..shipped import SCRIPTS
-from .build import build_native, native_names
+from .build import build_native, chosen_names
 from .compilers import CompilerError, cache_folder
 from .targets import here
 
@@ -25,7 +25,8 @@ def is_twin(fmu: Path, content: str) -> bool:
     """Return True if the file is a native FMU whose Python twin has this content hash."""
     with suppress(OSError, ValueError, zipfile.BadZipFile), zipfile.ZipFile(fmu) as archive:
         sources = [n for n in archive.namelist() if n.startswith("sources/") and n.endswith(".c")]
-        return any(content.encode() in archive.read(name) for name in sources)
+        said = f'#define CONTENT "{content}"'.encode()
+        return any(said in archive.read(name) for name in sources)
     return False
 
 
@@ -43,14 +44,14 @@ def shipped_twins() -> Path:
     kept = cache_folder()
     if kept is None:
         raise NoTwinsError(
-            "no folder to keep native ones in; must be a home, or XDG_CACHE_HOME, that can be "
+            "no folder to keep native FMUs in; must have a home, or XDG_CACHE_HOME, that can be "
             "written to"
         )
     sources = sources_hash()
     folder = kept / "fmus" / here().tuple / sources[:16]
     if not is_current(folder, sources):
         try:
-            built = build_native(folder, names=native_names())
+            built = build_native(folder, names=chosen_names())
             write_stamp(folder, sources, [fmu.path.name for fmu in built])
         except (ValueError, CompilerError, OSError) as error:
             raise NoTwinsError(str(error)) from error

@@ -94,8 +94,8 @@ class FmuInstance(LoadedInstance):
             self._read_log()
 
 
-_libraries: dict[tuple[Path, int], tuple[FMU2Slave, ScratchFolder]] = {}
-"""What SharedInstance has loaded, by path and time of change of the FMU, with its files."""
+_libraries: dict[tuple[Path, int], tuple[FMU2Slave, ScratchFolder | None]] = {}
+"""What SharedInstance has loaded, and from where, by path and time of change of the FMU."""
 
 
 class SharedInstance(FmuInstance):
@@ -104,18 +104,22 @@ class SharedInstance(FmuInstance):
     It stays loaded. That saves most of what loading takes where a process does many runs.
     """
 
-    def _extract(self, folder: Path) -> None:
-        """Nothing of the FMU is for one instance alone."""
+    def _unpacked(self) -> Path:
+        _, folder = _libraries.get(self._key, (None, None))
+        return Path(folder.name) if folder else super()._unpacked()
 
     def _opened(self, folder: Path) -> FMU2Slave:
-        key = self.interface.path, self.interface.path.stat().st_mtime_ns
-        if key not in _libraries:
-            shared = ScratchFolder()
-            super()._extract(Path(shared.name))
-            _libraries[key] = super()._opened(Path(shared.name)), shared
-        slave = copy(_libraries[key][0])
+        if self._key not in _libraries:
+            _libraries[self._key] = super()._opened(folder), self._folder
+        self._folder = None  # stays, with the library
+        slave = copy(_libraries[self._key][0])
         slave.instanceName = self.name
         return slave
+
+    @property
+    def _key(self) -> tuple[Path, int]:
+        path = self.interface.path
+        return path, path.stat().st_mtime_ns
 
     def _free(self) -> None:
         self._slave.fmi2FreeInstance(self._slave.component)
