@@ -42,11 +42,11 @@ MATH: dict[Any, tuple[str, tuple[str, ...]]] = {
     math.tan: ("py_tan", ("domain",)),
     math.asin: ("py_asin", ("domain",)),
     math.acos: ("py_acos", ("domain",)),
-    math.atan: ("atan", ()),
+    math.atan: ("py_atan", ()),
     math.sinh: ("py_sinh", ("range",)),
     math.cosh: ("py_cosh", ("range",)),
-    math.tanh: ("tanh", ()),
-    math.asinh: ("asinh", ()),
+    math.tanh: ("py_tanh", ()),
+    math.asinh: ("py_asinh", ()),
     math.acosh: ("py_acosh", ("domain",)),
     math.atanh: ("py_atanh", ("domain",)),
     math.exp: ("py_exp", ("range",)),
@@ -194,7 +194,7 @@ class Expressions:
         if translate is None:
             raise self.error(
                 node,
-                _UNTRANSLATED.get(
+                UNTRANSLATED.get(
                     type(node),
                     f"{type(node).__name__}: is not in the subset; see What a block may contain",
                 ),
@@ -601,13 +601,12 @@ class Expressions:
 
     def as_number(self, v: Value, node: ast.AST) -> Value:
         """A value as a number."""
-        if v.type == BOOLEAN:
+        if v.type == BOOLEAN or isinstance(v.type, Member):
             return self._whole_of(v)
         if v.type in NUMBERS:
             return v
-        fix = "; write int(...)" if isinstance(v.type, Member) else ""
         shown = ast.unparse(node) if isinstance(node, ast.expr) else "this"
-        raise self.error(node, f"{shown}: a {said(v.type)}, must be a number{fix}")
+        raise self.error(node, f"{shown}: a {said(v.type)}, must be a number")
 
     def _whole_of(self, v: Value) -> Value:
         return replace(_plain(v), text=f"(double){at(v, UNARY)}", level=UNARY, type=WHOLE)
@@ -1082,14 +1081,8 @@ class Expressions:
             )
         if f is bool:
             return self.truth(node.args[0])
-        given = [self._given(a) for a in node.args]
+        given = [self.numeric(a) for a in node.args]
         return self._applied(node, f, given)
-
-    def _given(self, node: ast.expr) -> Value:
-        v = self.value(node)
-        if isinstance(v.type, Member):
-            return self._whole_of(v)
-        return self.as_number(v, node)
 
     def _applied(self, node: ast.Call, f: Any, given: list[Value]) -> Value:
         v = given[0]
@@ -1215,7 +1208,7 @@ def _in_class(cls: type[Any], name: str) -> Any:
     return None
 
 
-_UNTRANSLATED: dict[type[ast.AST], str] = {
+UNTRANSLATED: dict[type[ast.AST], str] = {
     ast.Lambda: "lambda is not in the subset; define a function of the module",
     ast.ListComp: "a list is not in the subset; use a tuple",
     ast.List: "a list is not in the subset; use a tuple",

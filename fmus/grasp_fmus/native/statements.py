@@ -13,6 +13,7 @@ from typing import Any
 from . import names
 from .expressions import (
     POSTFIX,
+    UNTRANSLATED,
     Expressions,
     Static,
     Temporary,
@@ -563,7 +564,8 @@ class Body(Expressions):
             if isinstance(found, Value):
                 self._effect(self._flushed(found))
                 return
-        raise self.error(node, f"{ast.unparse(node)}: has no effect; leave it out")
+        no_effect = f"{ast.unparse(node)}: has no effect; leave it out"
+        raise self.error(node, UNTRANSLATED.get(type(node.value), no_effect))
 
     def _is_check(self, node: ast.Call) -> bool:
         """True for check(self) and Group.__post_init__(self): ranges are checked in each set."""
@@ -872,13 +874,14 @@ class Body(Expressions):
         operands, joint = self.ordered([self.apart(v) if v.faults else v for v in said_values])
         self._flushed(joint)
         values = iter(operands)
-        kind = _kind(cls)
+        raised: Any = cls
+        kind, name = _kind(raised), names.string(raised.__name__)
         self.faults.add(f"raise at line {node.lineno} of {self.source.name}")
         if all(isinstance(v, str) for v, _ in pieces):
             text = names.string("".join(v for v, _ in pieces if isinstance(v, str)))
-            self._emit(f'py_fault(fault, {kind}, "{cls.__name__}", {text});')
+            self._emit(f'py_fault(fault, {kind}, {name}, {text});')
         else:
-            self._emit(f'if (py_raise(fault, {kind}, "{cls.__name__}")) {{')
+            self._emit(f'if (py_raise(fault, {kind}, {name})) {{')
             self._indent += 1
             for v, how in pieces:
                 self._emit(

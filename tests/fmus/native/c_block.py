@@ -131,6 +131,13 @@ class PythonBlock:
         self._unpack = unpacker(self.fields)
         self._like = self.block.initial_state(self.block.Params(), self.block.Inputs())
 
+    def shaped(self, numbers: list[float]) -> list[float]:
+        """The numbers of a state as it holds them: whole ones where it has integers."""
+        try:
+            return [float(x) for x in _scalars(_shaped(self._like, iter(numbers)))]
+        except (OverflowError, ValueError):
+            return numbers
+
     def values(self, v: list[float]) -> list[Any]:
         kinds = [variable.kind for variable in self.variables]
         return [kind(x) for kind, x in zip(kinds, v, strict=True)]

@@ -310,6 +310,9 @@ NUMBERED.get(p.n, 1.0 / a)
 1.0 if p.mode is Mode.FAST or p.mode is not Mode.BACK else 0.0
 1.0 if p.mode > Mode.OFF else 0.0
 float(p.mode)
+p.mode * a + Mode.FAST
+float(Mode.FAST * 3 - p.mode)
+math.sqrt(p.mode)
 float(p.mode.value + 1)
 float(int(p.mode) * 2)
 helper(a)
