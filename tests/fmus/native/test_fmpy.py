@@ -1,7 +1,9 @@
 """FMPy reads, validates, compiles and simulates native FMUs of both versions, to the last bit."""
 
+import os
 import shutil
 import subprocess
+import sysconfig
 from pathlib import Path
 from typing import Any, Literal
 
@@ -18,6 +20,9 @@ from support.slow import slow
 
 NAMES = [name for name in blocks() if name != "GripperPlantMuJoCo"]
 BOTH = [(name, 2) for name in NAMES] + [slow(name, 3) for name in NAMES]
+
+PROGRAMS = os.pathsep.join([sysconfig.get_path("scripts"), os.environ["PATH"]])
+"""Where they are looked for; CMake is installed with FMPy."""
 
 pytestmark = needs_gcc
 
@@ -65,11 +70,14 @@ def test_it_gives_the_cross_check_reference(fmu: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not shutil.which("cmake"), reason="NO cmake on the PATH")
+@pytest.mark.skipif(not shutil.which("cmake", path=PROGRAMS), reason="NO cmake")
 @pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.parametrize("name", NAMES)
-def test_fmpy_compiles_its_sources(fmu: Path, tmp_path: Path) -> None:
+def test_fmpy_compiles_its_sources(
+    fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Without its binary, with another made by CMake: the same bits."""
+    monkeypatch.setenv("PATH", PROGRAMS)
     folder, made = tmp_path / "fmu", tmp_path / "made"
     made.mkdir()
     shutil.unpack_archive(fmu, folder, "zip")
