@@ -55,8 +55,8 @@ STEPPING = [
     (lambda i: i.step(nan, 1e-3), "step from nan s: must be from 0.001 s"),
     (real("force[1]", nan), "force[1] = nan N: must be a finite number"),
     (
-        real("finger_mass[1]", 1.0),
-        "finger_mass[1]: fixed parameter set in step mode: must be before fmi2ExitInit",
+        real("object_width", 0.05),
+        "object_width: fixed parameter set in step mode: must be before fmi2ExitInit",
     ),
     (lambda i: i.setup(), "fmi2SetupExperiment in step mode: must be before initialisation"),
     (lambda i: i.enter(), "fmi2EnterInitializationMode in step mode: must be before init"),
