@@ -1,49 +1,69 @@
-/* A controller on a target: the contact force control of Case 0, Eq. (7), in place of your own.
+/* The controller on a target: the C of the block alone, behind the header of its proxy.
  *
- *   grasp-cosim proxy fmus/build/GraspController.fmu --c-header grasp_controller.h
- *   cc -std=c99 -I . docs/controller_target.c -o controller_target -lm
+ *   grasp-cosim build --native --c-only controller_c GraspController
+ *   grasp-cosim proxy fmus/build/GraspController.fmu --c-header controller_c/grasp_controller.h
+ *   cc -std=c99 -O2 -ffp-contract=off -I controller_c docs/controller_target.c \
+ *       controller_c/GraspController.c -o controller_target -lm
  *   ./controller_target 5504
- *
- * It has no state: every answer follows from the inputs of its request.
  */
 #define GRASP_CONTROLLER_EXAMPLE_MAIN
 #include "grasp_controller.h"
 
-static void control(const grasp_controller_inputs *u, const grasp_controller_parameters *p,
-                    grasp_controller_outputs *y)
+#include "GraspController.h"
+
+static GraspController_State state;
+static char why[GRASPCONTROLLER_WHY_SIZE];
+
+/* The structs of both headers have the same members in the same order. */
+typedef char inputs_are_alike
+    [sizeof(GraspController_Inputs) == sizeof(grasp_controller_inputs) ? 1 : -1];
+typedef char parameters_are_alike
+    [sizeof(GraspController_Parameters) == sizeof(grasp_controller_parameters) ? 1 : -1];
+typedef char outputs_are_alike
+    [sizeof(GraspController_Outputs) == sizeof(grasp_controller_outputs) ? 1 : -1];
+
+/* A step of h seconds, or the beginning where h is 0 */
+static const char *control(double h, const grasp_controller_inputs *inputs,
+                           const grasp_controller_parameters *parameters,
+                           grasp_controller_outputs *outputs)
 {
-    static const grasp_controller_outputs nothing;
-    double damping = p->contact_force_damping, stiffness = p->contact_force_stiffness;
-    double middle = 0.5 * (u->position_1 + u->position_2);
-    *y = nothing;
-    y->force_1 = -damping * u->velocity_1 - stiffness * (u->position_1 - middle);
-    y->force_2 = -damping * u->velocity_2 - stiffness * (u->position_2 - middle);
-    y->target_position = y->virtual_position_1 = y->virtual_position_2 = middle;
+    GraspController_Inputs u;
+    GraspController_Parameters p;
+    GraspController_Outputs y;
+    int fault;
+    memcpy(&u, inputs, sizeof u);
+    memcpy(&p, parameters, sizeof p);
+    fault = GraspController_check(&p, why);
+    if (!fault)
+        fault = h > 0.0 ? GraspController_step(&p, &u, h, &state, why)
+                        : GraspController_initial_state(&p, &u, &state, why);
+    if (!fault)
+        fault = GraspController_outputs(&p, &u, &state, &y, why);
+    if (fault)
+        return why;
+    memcpy(outputs, &y, sizeof y);
+    return NULL;
 }
 
-const char *grasp_controller_initialise(double time, const grasp_controller_inputs *u,
-                                        const grasp_controller_parameters *p,
-                                        grasp_controller_outputs *y)
+const char *grasp_controller_initialise(double time, const grasp_controller_inputs *inputs,
+                                        const grasp_controller_parameters *parameters,
+                                        grasp_controller_outputs *outputs)
 {
     (void)time;
-    if (p->simultaneous_contact_enabled || p->impact_reduction_enabled)
-        return "layers 2 and 3 are not on this target: must be switched off";
-    control(u, p, y);
-    return NULL;
+    return control(0.0, inputs, parameters, outputs);
 }
 
-const char *grasp_controller_step(double time, double step, const grasp_controller_inputs *u,
-                                  const grasp_controller_parameters *p,
-                                  grasp_controller_outputs *y)
+const char *grasp_controller_step(double time, double step, const grasp_controller_inputs *inputs,
+                                  const grasp_controller_parameters *parameters,
+                                  grasp_controller_outputs *outputs)
 {
-    (void)time, (void)step;
-    control(u, p, y);
-    return NULL;
+    (void)time;
+    return control(step, inputs, parameters, outputs);
 }
 
-void grasp_controller_make_safe(grasp_controller_inputs *u)
+void grasp_controller_make_safe(grasp_controller_inputs *inputs)
 {
-    /* What a silent loop leaves behind: fingers at rest in the middle, so no force */
-    u->velocity_1 = u->velocity_2 = 0.0;
-    u->position_1 = u->position_2 = 0.0;
+    /* What a silent loop leaves behind: fingers at rest, nothing near */
+    static const grasp_controller_inputs nothing;
+    *inputs = nothing;
 }

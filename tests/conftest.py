@@ -17,6 +17,7 @@ from grasp_cosim import System, cli
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_fmus.build import build
 from grasp_fmus.fmu import build_fmu
+from grasp_fmus.native.build import build_native
 from grasp_fmus.shipped import SCRIPTS
 from hypothesis import settings
 from support.fmi2 import Fmu
@@ -30,6 +31,9 @@ MadeOnce = Callable[[str, Callable[[Path], object]], Path]
 UnpackIn = Callable[[str], Path]
 Altered = Callable[[str, str, str, str], Path]
 
+
+os.environ["XDG_CACHE_HOME"] = str(Path(sys.prefix, "cache_of_the_tests"))
+"""Native FMUs are compiled once for all test processes and runs, too."""
 
 settings.register_profile("usual", deadline=None, derandomize=True, max_examples=100)
 settings.register_profile(
@@ -87,6 +91,19 @@ def fmus() -> Path:
     with (folder.parent / f"{folder.name}.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         build(folder)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def natives() -> Path:
+    """The folder of the native FMUs of these sources, as `fmus`."""
+    if not shutil.which("gcc"):
+        pytest.skip("NO gcc")
+    folder = Path(sys.prefix, "native_fmus_of_the_tests")
+    folder.mkdir(exist_ok=True)
+    with (folder.parent / f"{folder.name}.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        build_native(folder)
     return folder
 
 

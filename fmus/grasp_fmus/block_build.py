@@ -16,7 +16,7 @@ from typing import Any
 
 from .cards import BEGIN, variable_tables
 from .contract import bound, declared, unpacker, variables
-from .fmu import HASH, write_fmu
+from .fmu import HASH, Model, write_fmu
 from .folder import Built
 from .model_description import Description
 from .packing import IMPORT, packages
@@ -30,8 +30,18 @@ PARTS = ("Params", "Inputs", "State", "Outputs", "initial_state", "step", "outpu
 def build_block(file: Path, out: Path, bind_python: str | None = None) -> Built:
     """Build the FMU of the block in a file into the folder out: spring_plant.py, SpringPlant.fmu.
 
+    bind_python is as in build(). ValueError, one line, where the file is no block, see own_model().
+    """
+    with own_model(file) as model:
+        return write_fmu(out / f"{model.description.name}.fmu", model, bind_python)
+
+
+@contextmanager
+def own_model(file: Path) -> Iterator[Model]:
+    """The model of the block in a file, which is among the imported modules meanwhile.
+
     The block may import the standard library, and from the packages of the blocks in SCRIPTS.
-    bind_python is as in build(). ValueError, one line, where the file is no such block.
+    ValueError, one line, where the file is no such block.
     """
     is_identifier = file.stem.isascii() and file.stem.isidentifier()
     if file.suffix != ".py" or not is_identifier or file.stem.startswith("_"):
@@ -46,13 +56,16 @@ def build_block(file: Path, out: Path, bind_python: str | None = None) -> Built:
         summary, _, rest = inspect.cleandoc(block.__doc__ or "").partition("\n")
         if not summary:
             raise ValueError(f"{file}: must begin with a docstring; its first line says what it is")
-        description = Description(name, summary.rstrip("."), _variables(file, block))
-        card = f"{rest.strip()}\n\n{BEGIN}{variable_tables({name: block})}"
-    sources = {
-        f"{name}.py": _script(name, file.stem).encode(),
-        f"{file.stem}_block.py": text.encode(),
-    }
-    return write_fmu(out / f"{name}.fmu", description, card, sources, bind_python)
+        yield Model(
+            Description(name, summary.rstrip("."), _variables(file, block)),
+            f"{rest.strip()}\n\n{BEGIN}{variable_tables({name: block})}",
+            {
+                f"{name}.py": _script(name, file.stem).encode(),
+                f"{file.stem}_block.py": text.encode(),
+            },
+            block,
+            file,
+        )
 
 
 def _script(name: str, stem: str) -> str:

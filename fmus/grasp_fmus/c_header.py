@@ -6,7 +6,7 @@ variables. What it does is what link/peer.py does. Protocol: link/README.md
 
 import re
 import struct
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from itertools import chain, count
 from pathlib import Path
 from string import Template
@@ -61,7 +61,6 @@ class Group(NamedTuple):
 
     prefix: str
     causality: Causality
-    plural: str
     struct: str
     members: list[Member]
     size: int
@@ -84,19 +83,16 @@ def c_header(
     """
     check_size(signature)
     prefix = c_prefix(name)
-    inputs, parameters, outputs = groups = [_group(prefix, signature, c) for c in ORDER]
-    structs = []
-    for group in groups:
-        structs.append(_struct(group, descriptions or {}))
-        if group is not outputs:
-            structs.append(_defaults(group, starts or {}))
+    inputs, parameters, outputs = groups = [
+        Group(prefix, c, f"{prefix}_{c}s", *members(signature, c)) for c in ORDER
+    ]
     packing = [*map(_check, groups), _unpack(inputs), _unpack(parameters), _pack(outputs)]
     text_size = len(signature.text.encode())
     lines = [_quoted(f"{line}\n") for line in signature.text.split("\n")[:-1]]
     octets = [f"0x{octet:02x}" for octet in signature.hash]
     return Template(_named(TEMPLATE.read_text("utf-8"), prefix)).substitute(
-        title=_comment(name),
-        structs="\n".join(structs),
+        title=comment(name),
+        structs=structs(groups, _MEANINGS, starts or {}, descriptions or {}),
         first_half_of_the_hash=", ".join(octets[:8]),
         second_half_of_the_hash=", ".join(octets[8:]),
         signature_lines="".join(f"        {line},\n" for line in lines),
@@ -129,8 +125,24 @@ def _named(template: str, prefix: str) -> str:
     return re.sub(r"\bmodel_", f"{prefix}_", template)
 
 
-def _group(prefix: str, signature: Signature, causality: Causality) -> Group:
-    members: list[Member] = []
+def structs(
+    groups: Iterable[Group],
+    meanings: Mapping[Causality, str],
+    starts: Mapping[str, Value],
+    descriptions: Mapping[str, str],
+) -> str:
+    """Return the structs of groups in C, those that are set with a macro of their start values."""
+    lines = []
+    for group in groups:
+        lines.append(_struct(group, meanings[group.causality], descriptions))
+        if group.causality != "output":
+            lines.append(_defaults(group, starts))
+    return "\n".join(lines)
+
+
+def members(signature: Signature, causality: Causality) -> tuple[list[Member], int]:
+    """Return the variables of a causality in C, and the size in bytes of a body with them."""
+    found: list[Member] = []
     taken = set(_TAKEN)
     offset = 0
     for variable in signature.of(causality):
@@ -138,28 +150,27 @@ def _group(prefix: str, signature: Signature, causality: Causality) -> Group:
         endings = chain(["_"] if wanted in _TAKEN else [""], (f"_{i}" for i in count(2)))
         identifier = next(n for n in (f"{wanted}{ending}" for ending in endings) if n not in taken)
         taken.add(identifier)
-        members.append(Member(variable, identifier, offset))
+        found.append(Member(variable, identifier, offset))
         offset += Codec([variable]).size
-    plural = f"{causality}s"
-    return Group(prefix, causality, plural, f"{prefix}_{plural}", members, offset)
+    return found, offset
 
 
-def _struct(group: Group, descriptions: Mapping[str, str]) -> str:
+def _struct(group: Group, meaning: str, descriptions: Mapping[str, str]) -> str:
     lines = []
     for v, identifier, _ in group.members:
         size = f"[{STRING_SIZE}]" if v.kind == "String" else ""
         said = descriptions.get(v.name, "").replace("·", ".")
-        comment = _comment((f"{v.name}, {v.unit}" if v.unit else v.name) + (said and f": {said}"))
-        lines.append(f"    {f'{_TYPES[v.kind]} {identifier}{size};':<40} /* {comment} */")
-    head = f"/* {_MEANINGS[group.causality]} */\ntypedef struct {{"
-    none = f"    uint8_t none; /* the model has no {group.plural} */"
+        text = comment((f"{v.name}, {v.unit}" if v.unit else v.name) + (said and f": {said}"))
+        lines.append(f"    {f'{_TYPES[v.kind]} {identifier}{size};':<40} /* {text} */")
+    head = f"/* {meaning} */\ntypedef struct {{"
+    none = f"    uint8_t none; /* the model has no {group.causality}s */"
     return _lines(head, lines, none, f"}} {group.struct};")
 
 
 def _defaults(group: Group, starts: Mapping[str, Value]) -> str:
     values = [_literal(v, starts.get(v.name, _ZEROS[v.kind])) for v, _, _ in group.members]
     padded = [f"{value}," for value in values[:-1]] + values[-1:]
-    names = [_comment(v.name) for v, _, _ in group.members]
+    names = [comment(v.name) for v, _, _ in group.members]
     lines = [f"    {v:<40} /* {name} */ \\" for v, name in zip(padded, names, strict=True)]
     return _lines(f"#define {group.struct.upper()}_DEFAULTS {{ \\", lines, "    0 \\", "}")
 
@@ -187,7 +198,7 @@ def _check(group: Group) -> str:
         f"        return {_quoted(v.name)};"
         for v, _, offset in group.members
     ]
-    head = f"const char *{group.prefix}_check_{group.plural}(const uint8_t *body)"
+    head = f"const char *{group.prefix}_check_{group.causality}s(const uint8_t *body)"
     return _function(head, lines, "(void)body;", "    return NULL;\n}")
 
 
@@ -200,7 +211,7 @@ def _unpack(group: Group) -> str:
             else f"    values->{identifier} = {get});"
         )  # fmt: skip
     arguments = f"(const uint8_t *body, {group.struct} *values)"
-    head = f"void {group.prefix}_unpack_{group.plural}{arguments}"
+    head = f"void {group.prefix}_unpack_{group.causality}s{arguments}"
     return _function(head, lines, "(void)body, (void)values;")
 
 
@@ -210,7 +221,7 @@ def _pack(group: Group) -> str:
         for v, identifier, offset in group.members
     ]
     arguments = f"(const {group.struct} *values, uint8_t *body)"
-    head = f"void {group.prefix}_pack_{group.plural}{arguments}"
+    head = f"void {group.prefix}_pack_{group.causality}s{arguments}"
     return _function(head, lines, "(void)values, (void)body;")
 
 
@@ -230,8 +241,8 @@ def _quoted(text: str) -> str:
     return '"' + "".join(plain.get(octet, f"\\{octet:03o}") for octet in text.encode()) + '"'
 
 
-def _comment(text: str) -> str:
-    """Return the text for a comment, which it neither ends nor continues on another line."""
+def comment(text: str) -> str:
+    """Return the text for a comment in C, which it neither ends nor continues on another line."""
     plain = text.encode("ascii", "backslashreplace").decode()
     plain = "".join(c if c.isprintable() else "?" for c in plain)
     return plain.replace("*/", "* /").replace("/*", "/ *").replace("\\", "/").replace("??", "? ?")

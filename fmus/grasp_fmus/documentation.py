@@ -1,6 +1,6 @@
 """Makes what an FMU holds for its reader: documentation/index.html, the licences, the icon."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
 from re import MULTILINE, sub
@@ -10,9 +10,12 @@ from typing import NamedTuple
 from .cards import BEGIN
 
 ICONS = Path(__file__).parent / "icons"
-TEMPLATE = Path(__file__).with_name("page.html.in")
+FRAME = Path(__file__).with_name("page.html.in")
+PYTHON = Path(__file__).with_name("python.html.in")
+"""The page, and what it says of an FMU that runs in Python."""
 
-_LICENCES = {"license.txt": "grasp-cosim", "pythonfmu.txt": "pythonfmu"}
+OURS = {"license.txt": "grasp-cosim"}
+_LICENCES = {**OURS, "pythonfmu.txt": "pythonfmu"}
 """The distribution whose licence is in each file of documentation/licenses."""
 
 _ANY = """A libpython in the process: start the host with
@@ -61,21 +64,32 @@ def page(
 
     `library` is the libpython to which the FMU is bound, if it is; `requires` are the extras of
     grasp-cosim, each called as its package, that it needs in the host's Python.
-
-    The page stands alone: links and pictures of the card point to nothing in an FMU and come out as
-    their text, HTML in it as it is written. The result is XML as well.
     """
-    return Template(TEMPLATE.read_text("utf-8")).substitute(
+    sections = Template(PYTHON.read_text("utf-8")).substitute(
         name=escape(name),
-        summary=escape(summary.rstrip(".")),
-        card=_rendered(card),
-        version=escape(version),
         linux=Template(_BOUND if library else _ANY).substitute(
             library=escape(str(library)), command=making.command
         ),
         packages=_packages(requires),
         steps=making.steps,
         states=making.states,
+    )
+    return framed(name, summary, card, version, "2.0", sections)
+
+
+def framed(name: str, summary: str, card: str, version: str, fmi: str, sections: str) -> str:
+    """Return documentation/index.html with these sections, which are HTML, behind the card.
+
+    The page stands alone: links and pictures of the card point to nothing in an FMU and come out as
+    their text, HTML in it as it is written. The result is XML as well.
+    """
+    return Template(FRAME.read_text("utf-8")).substitute(
+        name=escape(name),
+        summary=escape(summary.rstrip(".")),
+        card=_rendered(card),
+        version=escape(version),
+        fmi=fmi,
+        sections=sections,
     )
 
 
@@ -91,15 +105,15 @@ def _packages(requires: Sequence[str]) -> str:
     )
 
 
-def licences() -> dict[str, bytes]:
-    """Return the files of documentation/licenses, from the installed distributions.
+def licences(files: Mapping[str, str] = _LICENCES) -> dict[str, bytes]:
+    """Return the files of documentation/licenses, each from an installed distribution.
 
     FileNotFoundError if one is not installed, or has no licence.
     """
     from importlib import metadata  # takes time to load
 
     found = {}
-    for file, distribution in _LICENCES.items():
+    for file, distribution in files.items():
         try:
             text = metadata.distribution(distribution).read_text("licenses/LICENSE")
         except metadata.PackageNotFoundError:

@@ -8,8 +8,10 @@ import io
 import re
 import zipfile
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from .binary import answers, bound, mended, preamble
 from .changes import changes, read_members
@@ -25,52 +27,67 @@ HASH = "CONTENT_HASH"
 """Stands for the content hash until it is known."""
 
 
+@dataclass(frozen=True)
+class Model:
+    """What an FMU is made of, whether it will run in Python or by itself."""
+
+    description: Description
+    card: str
+    """In Markdown."""
+    sources: Mapping[str, bytes]
+    """Its script NAME.py, and modules beside it; what they import is packed with them."""
+    block: Any = None
+    """The module of the block; None for a proxy."""
+    file: Path | None = None
+    """The source of a block that is a file of one's own."""
+    picture: bytes | None = None
+    making: Making = BLOCK
+    requires: Sequence[str] = ()
+    """Packages that must be installed where it runs."""
+
+
 def build_fmu(script: Path, out: Path, bind_python: str | None = None) -> Built:
     """Build the FMU of one script into the folder `out`; the script's name is that of the FMU.
 
     `bind_python` is as in build(). An FMU that is there with the same content is left alone.
     """
+    return write_fmu(out / f"{script.stem}.fmu", shipped_model(script), bind_python)
+
+
+def shipped_model(script: Path) -> Model:
+    """Return the model of a script."""
     slave = slave_class(script)
     name = script.stem
-    description = Description(
-        name, (slave.__doc__ or "").rstrip("."), variables(declared(slave.block))
-    )
-    return write_fmu(
-        out / f"{name}.fmu",
-        description,
+    return Model(
+        Description(name, (slave.__doc__ or "").rstrip("."), variables(declared(slave.block))),
         card_file(slave.block.__package__).read_text("utf-8"),
         {script.name: script.read_bytes()},
-        bind_python,
+        slave.block,
         picture=icon(name),
         requires=slave.requires,
     )
 
 
-def write_fmu(
-    target: Path,
-    description: Description,
-    card: str,
-    sources: Mapping[str, bytes],
-    bind_python: str | None,
-    *,
-    picture: bytes | None = None,
-    making: Making = BLOCK,
-    requires: Sequence[str] = (),
-) -> Built:
-    """Write an FMU, unless it is there already with the same content.
+def write_fmu(target: Path, model: Model, bind_python: str | None) -> Built:
+    """Write the FMU that runs in Python, unless it is there already with the same content."""
+    return write_members(target, python_members(model, bind_python)[1])
 
-    `sources` are its script NAME.py and modules beside it; what they import is packed with them.
-    `card`, in Markdown, `making` and `requires` are for the documentation. `picture` is the icon.
-    """
-    name = description.name
-    library = answers(bind_python).library if bind_python else None
-    html = page(name, description.summary, card, version(), library, making, requires)
-    packed = with_imports(sources)
+
+def python_members(model: Model, bind_python: str | None = None) -> tuple[str, dict[str, bytes]]:
+    """Return the content hash of the FMU that runs in Python, and the files in it."""
+    name = model.description.name
+    packed = with_imports(model.sources)
+    library = None
     if bind_python:
         packed[f"{name}.py"] = preamble(bind_python).encode() + packed[f"{name}.py"]
+        library = answers(bind_python).library
+    html = page(
+        name, model.description.summary, model.card, version(), library, model.making,
+        model.requires,
+    )  # fmt: skip
     template = {
-        "modelDescription.xml": model_description(description, HASH),
-        **({"model.png": picture} if picture else {}),
+        "modelDescription.xml": model_description(model.description, HASH),
+        **({"model.png": model.picture} if model.picture else {}),
         "documentation/index.html": html.encode(),
         **{f"documentation/licenses/{file}": text for file, text in licences().items()},
         f"binaries/linux64/{name}.so": _linux_binary(bind_python),
@@ -78,14 +95,23 @@ def write_fmu(
         "resources/slavemodule.txt": f"{name}_{HASH}".encode(),
         **_renamed(packed),
     }
+    return hashed(template)
+
+
+def hashed(template: Mapping[str, bytes]) -> tuple[str, dict[str, bytes]]:
+    """Return the hash of files, and the files with it in the place of HASH."""
     digest = hashlib.sha256()
     for member, data in sorted(template.items()):
         digest.update(f"{member}\0{len(data)}\0".encode() + data)
     content = digest.hexdigest()[:16]
-    files = {
+    return content, {
         name.replace(HASH, content): data.replace(HASH.encode(), content.encode())
         for name, data in template.items()
     }
+
+
+def write_members(target: Path, files: Mapping[str, bytes]) -> Built:
+    """Write an FMU that holds these files, unless it is there already and holds the same."""
     there = target.is_file()
     before = read_members(target.read_bytes()) if there else {}
     if before == files:

@@ -1,4 +1,7 @@
-"""Writes modelDescription.xml of FMI 2.0 from the variables of a slave."""
+"""Writes modelDescription.xml of FMI 2.0 from the variables of a slave.
+
+What FMI 3.0 has in common with it is here as well; the rest of that is in native/description.py.
+"""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -8,7 +11,7 @@ from typing import NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from .host_log import CATEGORIES, DISCARD, ERROR
-from .variable import Scalar, Variable
+from .variable import Enumeration, Scalar, Variable
 
 _WORD = r"(?:[A-Za-z_]\w*|'(?:[^'\\]|\\.)+')(?:\[\d+(?:,\d+)*\])?"
 _STRUCTURED = re.compile(rf"{_WORD}(?:\.{_WORD})*", re.ASCII)
@@ -72,47 +75,52 @@ class Description:
     """The statuses that are logged with messages."""
 
 
-def model_description(d: Description, guid: str) -> bytes:
-    """Return modelDescription.xml in UTF-8."""
-    structured = all(_STRUCTURED.fullmatch(v.name) for v in d.variables)
-    root = Element(
-        "fmiModelDescription",
-        fmiVersion="2.0",
-        modelName=d.name,
-        guid=guid,
-        description=d.summary,
-        version=version(),
-        license="MIT",
-        generationTool=f"grasp-cosim with pythonfmu {version('pythonfmu')}",
-        variableNamingConvention="structured" if structured else "flat",
-        numberOfEventIndicators="0",
-    )
-    SubElement(
+def model_description(d: Description, guid: str, native: bool = False) -> bytes:
+    """Return modelDescription.xml in UTF-8; that of an FMU in C, with sources, if it is native."""
+    tool = "grasp-cosim" if native else f"grasp-cosim with pythonfmu {version('pythonfmu')}"
+    root = root_element(d, "2.0", {"guid": guid}, tool)
+    root.set("numberOfEventIndicators", "0")
+    interface = SubElement(
         root,
         "CoSimulation",
         modelIdentifier=d.name,
-        needsExecutionTool="true",
-        canHandleVariableCommunicationStepSize=_literal(d.can_vary_step),
-        canNotUseMemoryManagementFunctions="true",
-        canGetAndSetFMUstate=_literal(d.has_states),
-        canSerializeFMUstate=_literal(d.has_states),
+        needsExecutionTool=literal(not native),
+        canHandleVariableCommunicationStepSize=literal(d.can_vary_step),
+        canNotUseMemoryManagementFunctions=literal(not native),
+        canGetAndSetFMUstate=literal(d.has_states),
+        canSerializeFMUstate=literal(d.has_states),
     )
-    _add_units(root, d)
+    if native:
+        SubElement(SubElement(interface, "SourceFiles"), "File", name=f"{d.name}.c")
+    add_units(root, d)
     _add_enumerations(root, d)
-    categories = SubElement(root, "LogCategories")
-    for status in d.statuses:
-        SubElement(categories, "Category", name=CATEGORIES[status])
-    times = zip(("startTime", "stopTime", "tolerance", "stepSize"), d.experiment, strict=True)
-    experiment = {key: repr(time) for key, time in times if time is not None}
-    if experiment:
-        SubElement(root, "DefaultExperiment", experiment)
+    add_categories_and_experiment(root, d)
     variables = SubElement(root, "ModelVariables")
     for v in d.variables:
         _add_variable(variables, v, d.units)
     _add_structure(root, d.variables)
+    return document(root)
+
+
+def root_element(d: Description, fmi: str, token: Mapping[str, str], tool: str) -> Element:
+    """Return the root of a model description, with what an FMU of any version says of itself."""
+    structured = all(_STRUCTURED.fullmatch(v.name) for v in d.variables)
+    return Element(
+        "fmiModelDescription",
+        {"fmiVersion": fmi, "modelName": d.name, **token},
+        description=d.summary,
+        version=version(),
+        license="MIT",
+        generationTool=tool,
+        variableNamingConvention="structured" if structured else "flat",
+    )
+
+
+def document(root: Element) -> bytes:
+    """Return an XML document in UTF-8."""
     indent(root)
-    document: bytes = tostring(root, "UTF-8", xml_declaration=True)
-    return document + b"\n"
+    text: bytes = tostring(root, "UTF-8", xml_declaration=True)
+    return text + b"\n"
 
 
 def version(distribution: str = "grasp-cosim") -> str:
@@ -122,12 +130,14 @@ def version(distribution: str = "grasp-cosim") -> str:
     return metadata.version(distribution)
 
 
-def _literal(value: Scalar) -> str:
+def literal(value: Scalar) -> str:
+    """Return a value as it stands in an attribute."""
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def _add_units(root: Element, d: Description) -> None:
-    names = dict.fromkeys(v.unit for v in d.variables if v.unit)
+def add_units(root: Element, d: Description, *more: str) -> None:
+    """Add the units of the variables, and more, with what is known of them."""
+    names = dict.fromkeys([*(v.unit for v in d.variables if v.unit), *more])
     if not names:
         return
     definitions = SubElement(root, "UnitDefinitions")
@@ -145,32 +155,55 @@ def _add_units(root: Element, d: Description) -> None:
             SubElement(element, "DisplayUnit", name=display, factor=repr(factor))
 
 
+def enumerations(d: Description) -> list[Enumeration]:
+    """Return the types of the variables that are whole numbers with names."""
+    return list(dict.fromkeys(v.enumeration for v in d.variables if v.enumeration))
+
+
+def add_items(parent: Element, enumeration: Enumeration) -> None:
+    """Add the names of an enumeration."""
+    for name, number in enumeration.items:
+        SubElement(parent, "Item", name=name, value=str(number))
+
+
 def _add_enumerations(root: Element, d: Description) -> None:
-    used = dict.fromkeys(v.enumeration for v in d.variables if v.enumeration)
-    if not used:
+    if not enumerations(d):
         return
     definitions = SubElement(root, "TypeDefinitions")
-    for enumeration in used:
+    for enumeration in enumerations(d):
         simple = SubElement(definitions, "SimpleType", name=enumeration.name)
-        parent = SubElement(simple, "Enumeration")
-        for name, number in enumeration.items:
-            SubElement(parent, "Item", name=name, value=str(number))
+        add_items(SubElement(simple, "Enumeration"), enumeration)
+
+
+def add_categories_and_experiment(root: Element, d: Description) -> None:
+    """Add the categories of messages in the log, and the default experiment if there is one."""
+    categories = SubElement(root, "LogCategories")
+    for status in d.statuses:
+        SubElement(categories, "Category", name=CATEGORIES[status])
+    times = zip(("startTime", "stopTime", "tolerance", "stepSize"), d.experiment, strict=True)
+    experiment = {key: repr(time) for key, time in times if time is not None}
+    if experiment:
+        SubElement(root, "DefaultExperiment", experiment)
 
 
 def _add_variable(parent: Element, v: Variable, units: Mapping[str, Unit]) -> None:
-    element = SubElement(
-        parent,
-        "ScalarVariable",
-        name=v.name,
-        valueReference=str(len(parent)),
-        causality=v.causality,
-        variability=v.variability,
-    )
+    element = SubElement(parent, "ScalarVariable", role(v, len(parent)))
+    SubElement(element, v.type, attributes(v, units))
+
+
+def role(v: Variable, reference: int) -> dict[str, str]:
+    """Return the attributes of a variable that say what it is for."""
+    found = {
+        "name": v.name,
+        "valueReference": str(reference),
+        "causality": v.causality,
+        "variability": v.variability,
+    }
     if v.description:
-        element.set("description", v.description)
+        found["description"] = v.description
     if v.causality != "input":
-        element.set("initial", _initial(v))
-    SubElement(element, v.type, _attributes(v, units))
+        found["initial"] = _initial(v)
+    return found
 
 
 def _initial(v: Variable) -> str:
@@ -179,36 +212,46 @@ def _initial(v: Variable) -> str:
     return "calculated" if v.start is None else "approx"
 
 
-def _attributes(v: Variable, units: Mapping[str, Unit]) -> dict[str, str]:
-    attributes: dict[str, str] = {}
+def attributes(v: Variable, units: Mapping[str, Unit]) -> dict[str, str]:
+    """Return the attributes of a variable that say what values it has."""
+    found: dict[str, str] = {}
     if v.enumeration:
-        attributes["declaredType"] = v.enumeration.name
+        found["declaredType"] = v.enumeration.name
     if v.kind is float and v.unit:
-        attributes["unit"] = v.unit
+        found["unit"] = v.unit
         if v.unit in units and (display := units[v.unit].display):
-            attributes["displayUnit"] = display[0]
+            found["displayUnit"] = display[0]
     if v.relative:
-        attributes["relativeQuantity"] = "true"
+        found["relativeQuantity"] = "true"
     if v.kind in (float, int) and v.limits:
         limits = zip(("min", "max"), v.limits, strict=True)
-        attributes |= {key: repr(v.kind(limit)) for key, limit in limits if isfinite(limit)}
+        found |= {key: repr(v.kind(limit)) for key, limit in limits if isfinite(limit)}
     if v.nominal is not None:
-        attributes["nominal"] = repr(v.nominal)
+        found["nominal"] = repr(v.nominal)
     if v.start is not None:
-        attributes["start"] = _literal(float(v.start) if v.kind is float else v.start)
-    return attributes
+        found["start"] = literal(float(v.start) if v.kind is float else v.start)
+    return found
 
 
 def _add_structure(root: Element, variables: Sequence[Variable]) -> None:
-    index = {v.name: i for i, v in enumerate(variables, 1)}
     structure = SubElement(root, "ModelStructure")
+    for section, listed in unknowns(variables, first=1).items():
+        parent = SubElement(structure, f"{section}s") if listed else structure
+        for index, dependencies in listed:
+            SubElement(parent, "Unknown", index=index, dependencies=dependencies)
+
+
+def unknowns(variables: Sequence[Variable], first: int) -> dict[str, list[tuple[str, str]]]:
+    """Return outputs and initial unknowns with what they depend on, counted from `first`."""
+    number = {v.name: str(i) for i, v in enumerate(variables, first)}
+
+    def known(v: Variable, names: Sequence[str]) -> tuple[str, str]:
+        return number[v.name], " ".join(number[name] for name in names)
+
     outputs = [v for v in variables if v.causality == "output"]
-    unknowns = {
-        "Outputs": [(v, v.dependencies) for v in outputs],
-        "InitialUnknowns": [(v, v.initial_dependencies) for v in outputs if _initial(v) != "exact"],
+    return {
+        "Output": [known(v, v.dependencies) for v in outputs],
+        "InitialUnknown": [
+            known(v, v.initial_dependencies) for v in outputs if _initial(v) != "exact"
+        ],
     }
-    for section, listed in unknowns.items():
-        parent = SubElement(structure, section) if listed else structure
-        for v, known in listed:
-            dependencies = " ".join(str(index[name]) for name in known)
-            SubElement(parent, "Unknown", index=str(index[v.name]), dependencies=dependencies)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from .documentation import PROXY, icon
-from .fmu import write_fmu
+from .fmu import Model, write_fmu
 from .folder import Built
 from .host_log import ERROR, WARNING
 from .model_description import UNITS, Description, Experiment, Unit
@@ -61,15 +61,14 @@ def build_proxy(
         experiment=original.experiment,
         statuses=(WARNING, ERROR),
     )
-    return write_fmu(
-        target,
+    model = Model(
         description,
         _card(own),
         {f"{name}.py": _script(name, original, settings).encode()},
-        bind_python,
         picture=icon("Proxy"),
         making=PROXY,
     )
+    return write_fmu(target, model, bind_python)
 
 
 def _script(name: str, original: Original, settings: Settings) -> str:

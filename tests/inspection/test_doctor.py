@@ -12,12 +12,14 @@ from collections.abc import Callable
 from pathlib import Path
 from shlex import quote
 
+import fmpy
 import pytest
 from conftest import UnpackIn
 from fmpy.fmi2 import FMU2Slave
 from grasp_cosim.errors import InputError
 from grasp_cosim.inspection import doctor
 from grasp_cosim.inspection.doctor import Finding, Unpacked, Verdict, examine, unpack
+from support import native_fmus
 
 Changes = dict[str, bytes | None]
 Opened = Callable[..., Unpacked]
@@ -258,7 +260,7 @@ def test_a_folder_is_no_fmu(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("version", "kinds"),
     [
-        ("3.0", '<CoSimulation modelIdentifier="N"/>'),
+        ("3.0", '<ModelExchange modelIdentifier="N"/>'),
         ("2.0", '<ModelExchange modelIdentifier="N"/>'),
         ("1.0", ""),
     ],
@@ -273,7 +275,7 @@ def test_an_fmu_of_another_kind_is_not_loaded(version: str, kinds: str, tmp_path
     found = {f.check: f for f in examine(tmp_path / "n.fmu")}
     assert found["fmu"].status == "problem"
     assert f"FMI {version}" in found["fmu"].text
-    assert "must be FMI 2.0, CoSimulation" in found["fmu"].text
+    assert "must be FMI 2.0 or 3.0, CoSimulation" in found["fmu"].text
     assert found["binary"].status == ("ok" if version == "3.0" else "problem")
     assert found["trial"].status == "warning"
     assert "not loaded" in found["trial"].text
@@ -303,11 +305,45 @@ def test_no_binary_for_this_system(stock: Path, tmp_path: Path) -> None:
     fmu = altered(stock, tmp_path / "windows.fmu", {LINUX64: None})
     found = {f.check: f for f in examine(fmu)}
     assert found["binary"].status == "problem"
-    assert found["binary"].text == f"no {LINUX64}; there is: win64/Stock.dll"
+    assert found["binary"].text == f"no {LINUX64}; there is: win64/Stock.dll; this machine: linux64"
     assert "pythonfmu 0.7.0" in (found["binary"].fix or "")
     assert "host" not in found
     assert "libraries" not in found
     assert found["trial"].status == "warning"
+
+
+SOURCES = "<b><SourceFileSet><SourceFile name='N.c'/></SourceFileSet></b>"
+
+
+@pytest.mark.parametrize(
+    ("files", "expected", "text"),
+    [
+        ({}, None, ""),
+        ({"N.c": ""}, "warning", "sources/ without buildDescription.xml"),
+        ({"N.c": "", "buildDescription.xml": SOURCES}, "ok", "sources/N.c, to compile for other"),
+        ({"M.c": "", "buildDescription.xml": SOURCES}, "problem", "names N.c, which is not there"),
+        ({"N.c": "", "buildDescription.xml": "<b/>"}, "problem", "names none"),
+        ({"N.c": "", "buildDescription.xml": "<b"}, "problem", "buildDescription.xml: unclosed"),
+    ],
+)
+def test_sources_can_be_compiled(
+    files: dict[str, str], expected: str | None, text: str, opened: Opened
+) -> None:
+    verdict = doctor.sources(opened({f"sources/{n}": t.encode() for n, t in files.items()}))
+    assert (verdict and verdict[0]) == expected
+    assert text in (verdict[1] if verdict else "")
+
+
+@gcc
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_a_native_fmu_of_either_version_is_tried(version: str, tmp_path: Path) -> None:
+    found = {
+        f.check: f for f in examine(native_fmus.build(tmp_path, version=version, complete=True))
+    }
+    assert found["fmu"].status == found["binary"].status == found["trial"].status == "ok"
+    assert "needs no Python" in found["fmu"].text
+    ours = fmpy.platform_tuple if version == "3.0" else fmpy.platform
+    assert f"there is: {ours}; this machine: {ours}" in found["binary"].text
 
 
 def test_no_binary_but_sources(opened: Opened) -> None:

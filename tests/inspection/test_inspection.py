@@ -209,7 +209,8 @@ def test_json_and_text_hold_the_same_variables(archive: Archive, xml: str) -> No
 def test_the_keys_of_the_report(valve: Report) -> None:
     assert list(valve) == [
         "fmu", "model_name", "fmi_version", "kinds", "generation_tool", "guid",
-        "default_experiment", "platforms", "python", "capabilities", "variables",
+        "default_experiment", "platforms", "this_machine", "sources", "python", "capabilities",
+        "variables",
     ]  # fmt: skip
     assert set(valve["variables"][0]) == {
         "name", "causality", "variability", "initial", "type", "dimensions", "unit",
@@ -281,8 +282,9 @@ def test_every_line_of_the_head(archive: Archive) -> None:
         "generation tool": "Tool 7",
         "GUID": "{2}",
         "default experiment": "start 1, stop 2.5, tolerance 1e-06, step 0.01",
-        "platforms": "aarch64-darwin, linux64, win64",
-        "Python": "yes, made with pythonfmu",
+        "platforms": f"aarch64-darwin, linux64, win64; this machine: {fmpy.platform}",
+        "sources": "yes, in C",
+        "Python": "needed, made with pythonfmu",
         "capabilities": "canInterpolateInputs, providesDirectionalDerivative (model exchange), "
         "completedIntegratorStepNotNeeded",
     }
@@ -295,8 +297,9 @@ def test_what_is_absent_is_said(archive: Archive) -> None:
         >= {
             "generation tool": "not declared",
             "default experiment": "none",
-            "platforms": "none",
-            "Python": "no",
+            "platforms": f"none; this machine: {fmpy.platform_tuple}",
+            "sources": "no",
+            "Python": "not needed",
             "capabilities": "none",
         }.items()
     )

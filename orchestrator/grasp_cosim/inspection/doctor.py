@@ -14,6 +14,7 @@ from pathlib import Path
 from shlex import quote
 from shutil import which
 from typing import Literal
+from xml.etree import ElementTree
 
 import fmpy
 
@@ -39,9 +40,11 @@ _PACKAGES = {"cv2": "opencv-python", "sklearn": "scikit-learn", "yaml": "pyyaml"
 _TRIAL = """
 import sys
 from fmpy.fmi2 import FMU2Slave
-folder, guid, identifier = sys.argv[1:]
+from fmpy.fmi3 import FMU3Slave
+folder, guid, identifier, major = sys.argv[1:]
+slave = FMU3Slave if major == "3" else FMU2Slave
 try:
-    fmu = FMU2Slave(guid=guid, unzipDirectory=folder, modelIdentifier=identifier)
+    fmu = slave(guid=guid, unzipDirectory=folder, modelIdentifier=identifier)
     fmu.instantiate(loggingOn=True)
 except Exception as error:
     sys.exit(str(error))
@@ -179,7 +182,7 @@ def _processor(path: Path) -> str:
 
 
 HERE = _processor(Path(sys.executable))
-RUNS = "FMI 2.0, CoSimulation"
+RUNS = re.compile(r"FMI (2\.0|3\.\S+), CoSimulation")
 """The processor of this Python, and what the master runs."""
 
 
@@ -201,6 +204,8 @@ class Unpacked:
 
     folder: Path
     kind: str
+    major: str
+    """Its version of FMI, without the minor one."""
     tool: str
     guid: str
     binary: Path
@@ -223,6 +228,7 @@ def unpack(fmu: Path, folder: Path) -> Unpacked:
     return Unpacked(
         folder,
         kind=", ".join([f"FMI {found.version}", *found.kinds]),
+        major=found.version[0],
         tool=found.tool or "an unknown tool",
         guid=found.guid,
         binary=binary,
@@ -234,10 +240,11 @@ def unpack(fmu: Path, folder: Path) -> Unpacked:
 
 def description(fmu: Unpacked) -> Verdict:
     """FMI version and kind, and whether FMPy accepts the description."""
-    source = "Python" if fmu.python else "native, so nothing of Python is checked"
+    source = "needs Python" if fmu.python else "native, needs no Python"
     text = f"{fmu.kind}, made by {fmu.tool}; {source}"
-    if not fmu.kind.startswith(RUNS):
-        return "problem", f"{text}; must be {RUNS}", "export it again as FMI 2.0 for co-simulation"
+    if not RUNS.match(fmu.kind):
+        text += "; must be FMI 2.0 or 3.0, CoSimulation"
+        return "problem", text, "export it again as FMI 2.0 for co-simulation"
     try:
         fmpy.read_model_description(fmu.folder)
     except Exception as error:  # FMPy raises whatever it likes
@@ -249,17 +256,40 @@ def description(fmu: Unpacked) -> Verdict:
 def binary(fmu: Unpacked) -> Verdict:
     """Check that there is a binary for this system and processor."""
     wanted, its = fmu.binary.relative_to(fmu.folder).as_posix(), _processor(fmu.binary)
+    ours = fmu.binary.parent.name
+    there = sorted(fmu.folder.glob("binaries/*/*"))
     if its == HERE:
-        return "ok", f"{wanted}, {its}", None
+        folders = choices(dict.fromkeys(path.parent.name for path in there))
+        return "ok", f"{wanted}, {its}; there is: {folders}; this machine: {ours}", None
     if its:
         return "problem", f"{wanted} is {its}; must be {HERE}", f"build it again for {HERE}"
-    fix = f"build it again for {fmu.binary.parent.name}"
+    fix = f"build it again for {ours}"
     if any(fmu.folder.glob("sources/*.c")):
         fix = "fmpy compile FMU"
     elif fmu.python:
         fix += " (pythonfmu 0.7.0 does for linux64 and win64)"
-    there = choices(sorted(f"{p.parent.name}/{p.name}" for p in fmu.folder.glob("binaries/*/*")))
-    return "problem", f"no {wanted}; there is: {there}", fix
+    files = choices(f"{path.parent.name}/{path.name}" for path in there)
+    return "problem", f"no {wanted}; there is: {files}; this machine: {ours}", fix
+
+
+def sources(fmu: Unpacked) -> Verdict | None:
+    """Check that the sources are those that its build description names, and can be compiled."""
+    folder = fmu.folder / "sources"
+    build = folder / "buildDescription.xml"
+    if not build.is_file():
+        found = any(folder.glob("*.c"))
+        return ("warning", "sources/ without buildDescription.xml", None) if found else None
+    try:
+        named = [e.get("name", "") for e in ElementTree.parse(build).iter("SourceFile")]  # noqa: S314 - of the FMU that is loaded
+    except ElementTree.ParseError as error:
+        return "problem", f"sources/buildDescription.xml: {error}", "correct it where it is made"
+    missing = [name for name in named if not (folder / name).is_file()]
+    if missing or not named:
+        text = f"sources/buildDescription.xml names {choices(missing)}, which is not there"
+        return "problem", text, "correct it where the FMU is made"
+    compiler = next(filter(which, ("cc", "gcc", "clang", "cl")), None)
+    able = f"{compiler} is here" if compiler else "no C compiler here"
+    return "ok", f"sources/{choices(named)}, to compile for other machines; {able}", None
 
 
 def host(fmu: Unpacked) -> Verdict | None:
@@ -343,10 +373,10 @@ def modules(fmu: Unpacked) -> Verdict | None:
 
 def trial(fmu: Unpacked, timeout: float = 60.0) -> Verdict:
     """Load, instantiate and free the FMU in a child process, which gets timeout in s."""
-    if not fmu.kind.startswith(RUNS) or _processor(fmu.binary) != HERE:
+    if not RUNS.match(fmu.kind) or _processor(fmu.binary) != HERE:
         return "warning", "not loaded: of another kind than this master, or without a binary", None
     started = time.monotonic()
-    arguments = ["-P", "-u", "-c", _TRIAL, str(fmu.folder), fmu.guid, fmu.binary.stem]
+    arguments = ["-P", "-u", "-c", _TRIAL, str(fmu.folder), fmu.guid, fmu.binary.stem, fmu.major]
     code, said = _run(sys.executable, *arguments, timeout=timeout, cwd=fmu.folder)
     said = said.replace(f"{fmu.folder}/", "").replace("Failed to instantiate model\n", "")
     said = _REPEATED.sub("", said)
@@ -364,7 +394,7 @@ def trial(fmu: Unpacked, timeout: float = 60.0) -> Verdict:
 
 
 CHECKS: dict[str, Callable[[Unpacked], Verdict | None]] = {
-    "fmu": description, "binary": binary, "host": host, "libraries": libraries,
+    "fmu": description, "binary": binary, "sources": sources, "host": host, "libraries": libraries,
     "script": script, "modules": modules, "trial": trial,
 }  # fmt: skip
 """The checks of an FMU; None where one does not apply."""

@@ -1,5 +1,7 @@
 """The self-description of any FMU: FMI 1.0, 2.0 or 3.0, from whichever tool."""
 
+import platform
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -32,6 +34,8 @@ def inspect_fmu(path: Path) -> dict[str, Any]:
         "guid": found.guid or None,
         "default_experiment": dict(found.experiment),
         "platforms": list(found.platforms),
+        "this_machine": this_machine(found.version),
+        "sources": found.sources,
         "python": found.python,
         "capabilities": dict(found.capabilities),
         "variables": [_variable(v) for v in found.variables],
@@ -50,6 +54,7 @@ def as_text(report: Mapping[str, Any], width: int | None = None) -> str:
         for flag, value in report["capabilities"].items()
         if value
     ]
+    platforms = ", ".join(report["platforms"]) or "none"
     head = {
         "model": _shown(report["model_name"]) or "not declared",
         "FMI version": report["fmi_version"],
@@ -57,12 +62,22 @@ def as_text(report: Mapping[str, Any], width: int | None = None) -> str:
         "generation tool": _shown(report["generation_tool"]) or "not declared",
         "GUID": _shown(report["guid"]) or "not declared",
         "default experiment": ", ".join(experiment) or "none",
-        "platforms": ", ".join(report["platforms"]) or "none",
-        "Python": "yes, made with pythonfmu" if report["python"] else "no",
+        "platforms": f"{platforms}; this machine: {report['this_machine']}",
+        "sources": "yes, in C" if report["sources"] else "no",
+        "Python": "needed, made with pythonfmu" if report["python"] else "not needed",
         "capabilities": ", ".join(able) or "none",
     }
     lines = [f"{label:20s}{text}" for label, text in head.items()]
     return "\n".join([*lines, "", *_table([_row(v) for v in report["variables"]], width)])
+
+
+def this_machine(version: str) -> str:
+    """The folder for binaries of this machine in an FMU of that version of FMI."""
+    if not version.startswith("3"):
+        return f"{'win' if sys.platform == 'win32' else sys.platform}{sys.maxsize.bit_length() + 1}"
+    processor = platform.machine().lower()
+    processor = {"amd64": "x86_64", "arm64": "aarch64"}.get(processor, processor)
+    return f"{processor}-{platform.system().lower()}"
 
 
 def _variable(v: Variable) -> dict[str, Any]:

@@ -165,8 +165,8 @@ class Interface:
     kinds are CoSimulation, ModelExchange, ScheduledExecution. capabilities are those of the first
     kind and, where a later kind has another value, of that kind, 'FLAG (model exchange)'.
     experiment is the default one: start_time, stop_time, tolerance and step_size, as typed() gives
-    them. platforms are those it has a binary for. flaw is the first number that could not be read,
-    for which no master takes the FMU.
+    them. platforms are those it has a binary for, sources says that it has C. flaw is the first
+    number that could not be read, for which no master takes the FMU.
     """
 
     path: Path
@@ -179,6 +179,7 @@ class Interface:
     capabilities: Mapping[str, Value | None] = field(default_factory=dict)
     experiment: Mapping[str, Value | None] = field(default_factory=dict)
     platforms: tuple[str, ...] = ()
+    sources: bool = False
     python: bool = False
     """True if it was made with pythonfmu: its binary calls Python, and keeps the GIL."""
     model_name: str | None = None

@@ -114,6 +114,7 @@ def describe(path: Path) -> Interface:
         capabilities=capabilities_of(kinds, reader.major),
         experiment={key: typed("Real", experiment.get(name)) for key, name in EXPERIMENT.items()},
         platforms=_platforms(files),
+        sources=any(re.match(r"sources/.*\.c(c|pp|xx)?$", name) for name in files),
         python="resources/slavemodule.txt" in files,
         model_name=root.get("modelName"),
         tool=root.get("generationTool"),

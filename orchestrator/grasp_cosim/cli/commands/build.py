@@ -1,47 +1,140 @@
 """The command build."""
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Literal
 
 import click
 
-from ...errors import InputError
+from ...errors import InputError, SimulationError
 from ...files import FMU_FOLDER, check_folder
-from ..frame import PATH, bind_python_option, json_option, show
+from ..frame import PATH, bind_python_option, json_option, say, show
+
+if TYPE_CHECKING:
+    from grasp_fmus.folder import Built
 
 BOUND_FOLDER = Path("fmus/bound")
-"""Where FMUs for hosts that are not Python are built, below the current folder."""
+NATIVE_FOLDER = Path("fmus/native")
+"""Where FMUs for hosts without Python are built, below the current folder."""
 
 
 @click.command()
 @click.argument("block", required=False, type=PATH)
 @click.option("--out", type=PATH, help=f"Default: {FMU_FOLDER}")
 @bind_python_option(f" Default of --out: {BOUND_FOLDER}")
+@click.option(
+    "--native", is_flag=True, help=f"As C, without Python. Default of --out: {NATIVE_FOLDER}"
+)
+@click.option(
+    "--target",
+    metavar="NAMES",
+    help="Binaries for others too: linux64,win64,darwin64,aarch64-linux. They need ziglang.",
+)
+@click.option("--fmi", type=click.Choice(["2", "3"]), help="Of a native FMU. Default: 2")
+@click.option(
+    "--c-only", type=PATH, metavar="DIR", help="No FMUs: their C alone, for real-time targets."
+)
 @json_option
-def build(block: Path | None, out: Path | None, bind_python: str | None, as_json: bool) -> int:
+def build(
+    block: Path | None,
+    out: Path | None,
+    bind_python: str | None,
+    native: bool,
+    target: str | None,
+    fmi: str | None,
+    c_only: Path | None,
+    as_json: bool,
+) -> int:
     """Build the FMUs: the plants, GripperPlant*, then ProximitySensor and GraspController.
 
     With BLOCK, a Python file: the FMU of that block alone, spring_plant.py becomes SpringPlant.fmu.
-    docs/your_plant.md shows one.
+    docs/your_plant.md shows one. With --native, BLOCK may be the name of one of ours as well.
 
     Says what is not as it was built last. --bind-python adds the libpython of PYTHON, by default
-    of this one, to what the FMUs load.
+    of this one, to what the FMUs load. --native translates the blocks to C and compiles them.
 
     \b
     Example: grasp-cosim build --out my_fmus
     Your own: grasp-cosim build docs/spring_plant.py
+    Native: grasp-cosim build --native --target linux64,win64
     """
+    only_native = {"--target": target, "--fmi": fmi, "--c-only": c_only}
+    for option, value in only_native.items():
+        if value is not None and not native:
+            raise InputError(f"{option} {value}: must be with --native")
+    if native and bind_python:
+        raise InputError("--bind-python: a native FMU needs no Python; must be without --native")
+    folder = out or (NATIVE_FOLDER if native else BOUND_FOLDER if bind_python else FMU_FOLDER)
+    check_folder(c_only or folder)
+    notes: list[str] = []
+    try:
+        if c_only:
+            if target or fmi or out:
+                raise ValueError("--c-only: C without FMI; must be without --target, --fmi, --out")
+            return _write_c(block, c_only, as_json)
+        if native:
+            built, notes = _native(block, folder, target, 3 if fmi == "3" else 2)
+        else:
+            built = _in_python(block, folder, bind_python)
+    except ValueError as error:
+        raise InputError(f"build: {error}") from error
+    for note in notes:
+        say(note)
+    report = {str(b.path): {"status": b.status, "changes": list(b.changes)} for b in built}
+    lines = ("\n    ".join((f"{b.path}: {b.status}", *b.changes)) for b in built)
+    made = {"fmus": list(report), "built": report, **({"notes": notes} if native else {})}
+    show(as_json, made, "\n".join(lines))
+    return 0
+
+
+def _in_python(block: Path | None, folder: Path, bind_python: str | None) -> "Sequence[Built]":
     from grasp_fmus.block_build import build_block
     from grasp_fmus.build import build as build_fmus
 
-    folder = out or (BOUND_FOLDER if bind_python else FMU_FOLDER)
-    check_folder(folder)
+    return [build_block(block, folder, bind_python)] if block else build_fmus(folder, bind_python)
+
+
+def _native(
+    block: Path | None, folder: Path, target: str | None, fmi: Literal[2, 3]
+) -> "tuple[Sequence[Built], list[str]]":
+    """What was built, and what is to be said of it."""
+    from grasp_fmus.native.build import build_native, build_native_block, planned, python_only
+    from grasp_fmus.native.compilers import CompilerError
+    from grasp_fmus.native.targets import targets
+
+    plan = planned(targets(target.split(",")) if target is not None else (), fmi)
+    notes = [plan.note] if plan.note else []
     try:
-        built = (
-            [build_block(block, folder, bind_python)] if block else build_fmus(folder, bind_python)
-        )
-    except ValueError as error:
-        raise InputError(f"build: {error}") from error
-    report = {str(b.path): {"status": b.status, "changes": list(b.changes)} for b in built}
-    lines = ("\n    ".join((f"{b.path}: {b.status}", *b.changes)) for b in built)
-    show(as_json, {"fmus": list(report), "built": report}, "\n".join(lines))
+        if block is None:
+            return build_native(folder, plan), [*notes, *python_only().values()]
+        if _is_name(block):
+            return build_native(folder, plan, [str(block)]), notes
+        return [build_native_block(block, folder, plan)], notes
+    except CompilerError as error:
+        raise SimulationError(str(error)) from error
+
+
+def _write_c(block: Path | None, folder: Path, as_json: bool) -> int:
+    """Write the C of one block into the folder, of all into folders in it."""
+    from grasp_fmus.block_build import own_model
+    from grasp_fmus.fmu import shipped_model
+    from grasp_fmus.native.build import chosen_names
+    from grasp_fmus.native.c_only import write_c
+    from grasp_fmus.shipped import SCRIPTS
+
+    if block and not _is_name(block):
+        with own_model(block) as model:
+            written = write_c(folder, model)
+    else:
+        names = chosen_names([str(block)] if block else [])
+        models = {name: shipped_model(SCRIPTS / f"{name}.py") for name in names}
+        places = {name: folder if block else folder / name for name in names}
+        written = [path for name in names for path in write_c(places[name], models[name])]
+    files = [str(path) for path in written]
+    show(as_json, {"files": files}, "\n".join(f"{file}: written" for file in files))
     return 0
+
+
+def _is_name(block: Path) -> bool:
+    """True where it is to be the name of a block that comes with the package, not a file."""
+    return block.suffix == "" and block.name == str(block) and not block.exists()

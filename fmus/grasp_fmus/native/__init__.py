@@ -1,0 +1,1 @@
+"""Native FMUs: a block as C, which needs no Python. Card: README.md."""

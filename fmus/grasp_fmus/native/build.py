@@ -1,0 +1,141 @@
+"""Builds native FMUs: those of the blocks that come with the package, or of one of your own."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from hashlib import sha256
+from pathlib import Path
+from typing import NamedTuple
+
+from ..folder import Built, is_current, sources_hash, write_file, write_stamp
+from ..shipped import SCRIPTS, slave_class
+from .compilers import Compiler, Job, compile_all, compiler_for, universal
+from .targets import Target, Version, folders
+
+Members = Mapping[str, bytes]
+"""The files in an FMU, by name."""
+
+
+class Plan(NamedTuple):
+    """Which binaries an FMU gets: by target its folder and its compiler."""
+
+    fmi: Version
+    places: Mapping[Target, str]
+    compilers: Mapping[Target, Compiler]
+    note: str
+    """What is to be said of the folders, or ""."""
+
+    @property
+    def key(self) -> str:
+        """A hash of all that decides the binaries, but for the sources."""
+        known = [(self.fmi, *item, self.compilers[item[0]]) for item in self.places.items()]
+        return sha256(repr(known).encode()).hexdigest()
+
+
+def planned(asked: Sequence[Target] = (), fmi: Version = 2) -> Plan:
+    """Return the plan for this machine and the targets asked for.
+
+    ValueError, one line, where there is no compiler for one of them.
+    """
+    places, note = folders(asked, fmi)
+    return Plan(fmi, places, {t: compiler_for(t, t in asked) for t in places}, note)
+
+
+def python_only() -> dict[str, str]:
+    """Why a block that comes with the package cannot be native, by its name."""
+    return {
+        name: f"{name}: stays Python only, as it needs {', '.join(requires)}"
+        for name, requires in _requirements().items()
+        if requires
+    }
+
+
+def build_native(out: Path, plan: Plan | None = None, names: Sequence[str] = ()) -> list[Built]:
+    """Build native FMUs into the folder `out`, with their cross-check files; by default all.
+
+    Nothing is made where the stamp in the folder says that all is as it was built from these
+    sources with this plan. ValueError, one line, for a name that is none or stays Python only, or
+    where a compiler is missing; CompilerError where one fails.
+    """
+    plan = plan or planned()
+    chosen = chosen_names(names)
+    sources = sha256(f"{sources_hash()} {plan.key}".encode()).hexdigest()
+    if not names and is_current(out, sources):
+        return [Built(out / f"{name}.fmu", "unchanged") for name in chosen]
+    from ..cross_check import cross_check_files  # only now: they take longer to load
+    from ..fmu import shipped_model, write_members
+    from .members import native_members
+
+    models = {name: shipped_model(SCRIPTS / f"{name}.py") for name in chosen}
+    members = {name: native_members(model, plan.fmi) for name, model in models.items()}
+    built = []
+    files = []
+    for name, complete in _with_binaries(members, plan):
+        built.append(write_members(out / f"{name}.fmu", complete))
+        checks = cross_check_files(name, models[name].block)
+        for file, data in checks.items():
+            write_file(out / file, data)
+        files += [f"{name}.fmu", *checks]
+    if not names:
+        write_stamp(out, sources, files)
+    return built
+
+
+def build_native_block(file: Path, out: Path, plan: Plan | None = None) -> Built:
+    """Build the native FMU of the block in a file of your own into the folder `out`.
+
+    ValueError, one line, where the file is no block, or cannot be translated; else as build_native.
+    """
+    from ..block_build import own_model
+    from ..fmu import write_members
+    from .members import native_members
+
+    plan = plan or planned()
+    with own_model(file) as model:
+        name, files = model.description.name, native_members(model, plan.fmi)
+    ((_, complete),) = _with_binaries({name: files}, plan)
+    return write_members(out / f"{name}.fmu", complete)
+
+
+def chosen_names(names: Sequence[str] = ()) -> list[str]:
+    """Return these names of blocks that come with the package, by default all that can be native.
+
+    ValueError, one line, for one that is none, or that stays Python only.
+    """
+    only = python_only()
+    known = [name for name in _requirements() if name not in only]
+    for name in names:
+        if name not in known:
+            valid = f"no such block; must be of {', '.join(known)}, or a file NAME.py"
+            raise ValueError(only.get(name, f"{name}: {valid}"))
+    return [*names] or known
+
+
+def _requirements() -> dict[str, Sequence[str]]:
+    return {script.stem: slave_class(script).requires for script in sorted(SCRIPTS.glob("*.py"))}
+
+
+def _with_binaries(fmus: Mapping[str, Members], plan: Plan) -> Iterator[tuple[str, Members]]:
+    """Yield the FMUs by name with their binaries; those of one place become one for all."""
+    jobs = [
+        Job(_sources(files), name, target, plan.compilers[target])
+        for name, files in fmus.items()
+        for target in plan.places
+    ]
+    made = iter(compile_all(jobs))
+    for name, files in fmus.items():
+        thin: dict[str, list[bytes]] = {}
+        for target, folder in plan.places.items():
+            thin.setdefault(f"binaries/{folder}/{name}{target.suffix}", []).append(next(made))
+        binaries = {
+            place: several[0] if len(several) == 1 else universal(several)
+            for place, several in thin.items()
+        }
+        yield name, {**files, **binaries}
+
+
+def _sources(files: Members) -> dict[str, bytes]:
+    """Return the files of sources/ by their names there."""
+    return {
+        name.removeprefix("sources/"): data
+        for name, data in files.items()
+        if name.startswith("sources/")
+    }

@@ -1,0 +1,252 @@
+"""Compiles the C of native FMUs: with the compiler of this machine, for others with zig.
+
+What was compiled is kept in a folder of the user, under a hash of all that decides it.
+"""
+
+import importlib.util
+import os
+import re
+import shlex
+import shutil
+import signal
+import struct
+import subprocess
+import sys
+import tempfile
+from collections import deque
+from collections.abc import Iterable, Mapping, Sequence
+from hashlib import sha256
+from pathlib import Path
+from typing import NamedTuple
+
+from ..folder import write_file
+from .targets import Target, here
+
+LIBM = (
+    "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "cbrt", "cos", "cosh", "erf",
+    "erfc", "exp", "exp2", "expm1", "fmod", "frexp", "hypot", "ldexp", "lgamma", "log", "log10",
+    "log1p", "log2", "modf", "pow", "sin", "sinh", "tan", "tanh", "tgamma",
+)  # fmt: skip
+"""Functions whose calls no compiler may work out by itself: it rounds otherwise than libm."""
+
+BITS = ("-std=c99", "-O2", "-ffp-contract=off")
+"""What decides the bits, besides -fno-builtin-NAME for the functions in LIBM."""
+
+UNPREFIXED = tuple(f"FMI{fmi}_OVERRIDE_FUNCTION_PREFIX" for fmi in (2, 3))
+"""What is defined for a shared library, in which functions are called as the standard does."""
+
+
+class CompilerError(Exception):
+    """A compiler failed: which, its exit code, and its first error, in one line."""
+
+
+class Compiler(NamedTuple):
+    """A program that compiles, and what tells it from others."""
+
+    command: tuple[str, ...]
+    identity: str
+    environment: Mapping[str, str] = {}
+
+    def line(self, name: str, target: Target) -> list[str]:
+        """Return the command that makes NAME.c, in the current folder, a shared library."""
+        out = f"{name}{target.suffix}"
+        if Path(self.command[0]).stem.lower() == "cl":
+            defined = [f"/D{macro}" for macro in UNPREFIXED]
+            return [
+                *self.command, "/nologo", "/O2", "/fp:precise", "/MT", "/LD", *defined,
+                f"{name}.c", f"/Fe:{out}",
+            ]  # fmt: skip
+        return [
+            *self.command, *BITS, *(f"-fno-builtin-{function}" for function in LIBM),
+            *(f"-D{macro}" for macro in UNPREFIXED), "-fvisibility=hidden", "-shared",
+            *(() if target.suffix == ".dll" else ("-fPIC",)), "-o", out, f"{name}.c", "-lm",
+        ]  # fmt: skip
+
+
+class Job(NamedTuple):
+    """A shared library to make: of NAME.c among sources, for a target."""
+
+    sources: Mapping[str, bytes]
+    name: str
+    target: Target
+    compiler: Compiler
+
+    @property
+    def key(self) -> str:
+        """A hash of all that decides the library."""
+        digest = sha256(repr((self.compiler.identity, self.line, self.target)).encode())
+        for file, data in sorted(self.sources.items()):
+            digest.update(f"\0{file}\0{len(data)}\0".encode() + data)
+        return digest.hexdigest()[:32]
+
+    @property
+    def line(self) -> list[str]:
+        """The command."""
+        return self.compiler.line(self.name, self.target)
+
+
+def compile_binary(sources: Mapping[str, bytes], name: str, target: Target) -> bytes:
+    """Return a shared library of NAME.c among sources, for a target, of this machine's compiler.
+
+    ValueError where there is no compiler, CompilerError where it fails.
+    """
+    (binary,) = compile_all([Job(sources, name, target, compiler_for(target, asked=False))])
+    return binary
+
+
+def compile_all(jobs: Sequence[Job]) -> list[bytes]:
+    """Return the shared library of each job, made now, as many at once as there are processors.
+
+    What was made before comes from the user's folder. CompilerError where a compiler fails.
+    """
+    keys = [job.key for job in jobs]
+    kept = cache_folder()
+    folder = kept / "native" if kept else None
+    found = {key: data for key in keys if folder and (data := _read(folder / key)) is not None}
+    missing = {key: job for key, job in zip(keys, jobs, strict=True) if key not in found}
+    for key, data in zip(missing, _compiled(missing.values()), strict=True):
+        found[key] = data
+        if folder:
+            write_file(folder / key, data)
+    return [found[key] for key in keys]
+
+
+def _read(file: Path) -> bytes | None:
+    return file.read_bytes() if file.is_file() else None
+
+
+class _Running(NamedTuple):
+    job: Job
+    folder: Path
+    process: subprocess.Popen[bytes]
+
+
+def _compiled(jobs: Iterable[Job]) -> list[bytes]:
+    """Return the libraries of jobs, in their order; however this ends, no compiler runs on."""
+    most = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    waiting, running, done = deque(jobs), deque[_Running](), []
+    with tempfile.TemporaryDirectory(prefix="grasp_fmus_") as scratch:
+        try:
+            while waiting or running:
+                while waiting and len(running) < most:
+                    folder = Path(tempfile.mkdtemp(dir=scratch))
+                    running.append(_started(waiting.popleft(), folder))
+                done.append(_result(running[0]))
+                running.popleft()
+        finally:
+            for started in running:
+                _end(started.process)
+    return done
+
+
+def _started(job: Job, folder: Path) -> _Running:
+    for file, data in job.sources.items():
+        (folder / file).write_bytes(data)
+    environment = {**os.environ, "TMPDIR": str(folder), "LC_ALL": "C", **job.compiler.environment}
+    with (folder / "said").open("wb") as said:
+        process = subprocess.Popen(  # noqa: S603 - the user's compiler
+            job.line, cwd=folder, stdin=subprocess.DEVNULL, stdout=said, stderr=said,
+            env=environment, start_new_session=True,
+        )  # fmt: skip
+    return _Running(job, folder, process)
+
+
+def _result(running: _Running) -> bytes:
+    code = running.process.wait()
+    job, file = running.job, running.folder / f"{running.job.name}{running.job.target.suffix}"
+    if code == 0 and file.is_file():
+        return file.read_bytes()
+    lines = (running.folder / "said").read_text("utf-8", "replace").splitlines()
+    said = [line.strip() for line in lines if line.strip()] or ["no message"]
+    errors = (line for line in said if re.search(r"\berror\b", line, re.IGNORECASE))
+    text = f"{shlex.join(job.compiler.command)}: exit code {code}: {next(errors, said[-1])}"
+    raise CompilerError(f"{job.name}.c for {job.target.tuple}: {text}")
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """End a compiler with what it has started."""
+    if process.poll() is None:
+        if hasattr(os, "killpg"):
+            os.killpg(process.pid, signal.SIGKILL)
+        else:
+            process.kill()
+        process.wait()
+
+
+def compiler_for(target: Target, asked: bool) -> Compiler:
+    """Return the compiler for a target; ValueError where there is none, with what to install.
+
+    For this machine that is CC, or the first of cc, gcc, clang and cl, else zig. For others, and
+    where the target was asked for by name, to go to machines with an older libc, it is zig.
+    """
+    if target == here() and not asked:
+        own = _own_compiler()
+        if own:
+            return own
+    zig = _zig()
+    if zig and target.zig:
+        return zig._replace(command=(*zig.command, "-target", target.zig, "-s"))
+    install = f"{sys.executable} -m pip install ziglang"
+    if target == here():
+        raise ValueError(f"no C compiler for {target.tuple}: none of CC, cc, gcc, clang; {install}")
+    raise ValueError(f"no C compiler for {target.tuple}: must be zig; {install}")
+
+
+def _own_compiler() -> Compiler | None:
+    given = os.environ.get("CC")
+    if given:
+        command = shlex.split(given)
+        if not command or not shutil.which(command[0]):
+            raise ValueError(f"CC={given}: no such program; must be a C compiler, or unset")
+        return _identified(command)
+    found = next(filter(shutil.which, ("cc", "gcc", "clang", "cl")), None)
+    return _identified([found]) if found else None
+
+
+def _zig() -> Compiler | None:
+    spec = importlib.util.find_spec("ziglang")
+    places = spec.submodule_search_locations if spec else None
+    program = shutil.which("zig", path=places[0]) if places else None
+    if not program:
+        return None
+    kept = cache_folder()
+    folder = str(kept / "zig") if kept else ""
+    names = ("ZIG_GLOBAL_CACHE_DIR", "ZIG_LOCAL_CACHE_DIR") if kept else ()
+    return _identified([program, "cc"], dict.fromkeys(names, folder))
+
+
+def _identified(command: Sequence[str], environment: Mapping[str, str] | None = None) -> Compiler:
+    """Return the compiler with what it says of itself; cl does so whatever it is asked."""
+    asked = [*command, *([] if Path(command[0]).stem.lower() == "cl" else ["--version"])]
+    try:
+        said = subprocess.run(  # noqa: S603 - the user's compiler
+            asked, stdin=subprocess.DEVNULL, capture_output=True, check=False,
+            env={**os.environ, **(environment or {})},
+        )  # fmt: skip
+    except OSError as error:
+        raise ValueError(f"{command[0]}: does not start: {error.strerror}") from error
+    identity = (said.stdout or said.stderr).decode("utf-8", "replace")
+    return Compiler(tuple(command), identity, environment or {})
+
+
+def cache_folder() -> Path | None:
+    """Return the folder of the user for what can be made again; None where there can be none."""
+    try:
+        base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+        folder = Path(base, "grasp-cosim")
+        folder.mkdir(parents=True, exist_ok=True)
+    except (OSError, RuntimeError):
+        return None
+    return folder if os.access(folder, os.W_OK) else None
+
+
+def universal(thin: Sequence[bytes]) -> bytes:
+    """Return libraries for processors of macOS as one that serves them all."""
+    page = 1 << 14
+    head, body, place = struct.pack(">II", 0xCAFEBABE, len(thin)), b"", page
+    for binary in thin:
+        processor = struct.unpack_from("<II", binary, 4)
+        head += struct.pack(">5I", *processor, place, len(binary), 14)
+        body += binary + bytes(-len(binary) % page)
+        place = page + len(body)
+    return head + bytes(page - len(head)) + body
