@@ -13,6 +13,9 @@ from typing import Any
 import pytest
 from conftest import Altered, Load
 from support.fmi2 import DISCARD, ERROR, OK, Fmu, Instance
+from support.kinds import all_kinds
+
+pytestmark = all_kinds
 
 Act = Callable[[Instance], int]
 

@@ -15,6 +15,9 @@ from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 from support.examples import examples
 from support.fmi2 import DISCARD, ERROR, OK, Fmu, Instance, State
+from support.kinds import all_kinds
+
+pytestmark = all_kinds
 
 NAMES = (
     "GripperPlant",
