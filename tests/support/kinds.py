@@ -8,8 +8,8 @@ from typing import Literal
 
 import pytest
 from grasp_fmus.block_build import build_block
-from grasp_fmus.fmu import build_fmu
-from grasp_fmus.native.build import Plan, build_native, build_native_block, planned
+from grasp_fmus.fmu import build_fmu, shipped_model
+from grasp_fmus.native.build import Plan, build_native_block, build_native_model, planned
 from grasp_fmus.native.targets import Version
 from grasp_fmus.shipped import SCRIPTS
 
@@ -44,8 +44,7 @@ def build_shipped(name: str, kind: Kind, out: Path) -> Path:
     """Build the FMU of a script."""
     if kind == "python":
         return build_fmu(SCRIPTS / f"{name}.py", out).path
-    (built,) = build_native(out, plan(kind), [name])
-    return built.path
+    return build_native_model(shipped_model(SCRIPTS / f"{name}.py"), out, plan(kind)).path
 
 
 def build_own(name: str, kind: Kind, out: Path) -> Path:
