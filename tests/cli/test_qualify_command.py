@@ -31,7 +31,7 @@ def qualify(
     monkeypatch.setattr("grasp_cosim.grasp.system.grasp_system", lambda: grasp)
 
     def run(*arguments: str | Path) -> tuple[int, str, str]:
-        code = cli.main(["qualify", *map(str, arguments)])
+        code = cli.main(["qualify", "--python", *map(str, arguments)])
         out, err = capsys.readouterr()
         return code, out, err
 

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy.typing as npt
 import pytest
 from grasp_cosim import InputError, Result, SimulationError, System, simulate
 from grasp_cosim.system.parts import Condition, Event, Fault, Port
+from support.both_engines import needs_compiler
 
 Array = npt.NDArray[Any]
 
@@ -212,10 +212,9 @@ def bits(result: Result) -> dict[str, bytes]:
     return {name: np.ascontiguousarray(result[name]).tobytes() for name in result}
 
 
+@needs_compiler
 @pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
 def test_both_engines_give_the_same_bits(grasp: System, scheme: str) -> None:
-    if find_spec("numba") is None:
-        pytest.skip("numba is not installed")
     system = replace(grasp, **FULL).with_experiment(STEP, 0.3, scheme)
     plain = simulate(system, engine="python")
     compiled = simulate(system, engine="compiled")

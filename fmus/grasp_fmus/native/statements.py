@@ -11,7 +11,6 @@ from typing import Any
 
 from . import names
 from .expressions import (
-    COMMA,
     POSTFIX,
     Expressions,
     Static,
@@ -31,11 +30,9 @@ from .shapes import (
     TEXT,
     WHOLE,
     Group,
-    Member,
     Record,
     Tuple,
     Type,
-    fits,
     joined,
     said,
 )

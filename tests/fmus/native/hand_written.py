@@ -1,8 +1,8 @@
 """A mass that is pushed, with a fault on demand; hand_written.h is the same in C."""
 
+from dataclasses import dataclass
 from math import nan, sqrt
 from typing import Annotated, NamedTuple
-from dataclasses import dataclass
 
 from block_variables import Input, Output, Parameter, check
 

@@ -75,9 +75,7 @@ def test_any_name(fmu: Fmu, name: bytes) -> None:
     component = instantiate(fmu, functions, name)
     assert refuse(fmu, component) == ERROR
     shown = name.decode(errors="replace").replace("%", "%%")
-    assert said == [
-        f"{shown}, t = 0 s: fmi2DoStep before initialisation: must be in step mode"
-    ]
+    assert said == [f"{shown}, t = 0 s: fmi2DoStep before initialisation: must be in step mode"]
     fmu.library.fmi2FreeInstance(component)
 
 

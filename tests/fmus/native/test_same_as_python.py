@@ -6,7 +6,6 @@ line; where pythonfmu itself refuses, it says nothing.
 
 from ctypes import c_double, c_int, c_size_t, c_uint
 from math import inf, nan
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -138,10 +137,10 @@ calls = st.one_of(
         st.lists(st.tuples(st.sampled_from([*REALS.values(), 1, 99]), numbers), max_size=3),
     ),
     st.tuples(st.just("set"), st.just("Real"), st.lists(st.tuples(st.just(0), numbers))),
+    st.tuples(st.just("set"), kinds.filter("Real".__ne__), st.lists(st.tuples(references, whole))),
     st.tuples(
-        st.just("set"), kinds.filter("Real".__ne__), st.lists(st.tuples(references, whole))
+        st.just("set"), st.just("Integer"), st.tuples(st.just(FAULT), whole).map(lambda v: [v])
     ),
-    st.tuples(st.just("set"), st.just("Integer"), st.tuples(st.just(FAULT), whole).map(lambda v: [v])),
     st.tuples(st.just("get"), kinds, st.lists(references, max_size=3)),
     st.tuples(st.just("get"), st.just("Real"), st.just([2, 3])),
     st.tuples(st.just("get"), st.just("Boolean"), st.just([4])),
