@@ -27,7 +27,7 @@ class Params:
     """Each with its meaning, unit and range; check() refuses what is out of it."""
 
     finger_mass: Annotated[
-        Pair, Parameter("m_j, mass of the finger", unit="kg", low=1e-3, high=1e3)
+        Pair, Parameter("m_j, mass of the finger", unit="kg", low=1e-3, high=1e3, tunable=True)
     ] = (0.5, 0.5)
     initial_position: Annotated[
         Pair,
@@ -42,19 +42,19 @@ class Params:
         float, Parameter("x_0, centre of the object at the start", unit="m", low=-10.0, high=10.0)
     ] = 0.03
     object_mass: Annotated[
-        float, Parameter("m, mass of the object", unit="kg", low=1e-3, high=1e3)
+        float, Parameter("m, mass of the object", unit="kg", low=1e-3, high=1e3, tunable=True)
     ] = 0.1
     spring_stiffness: Annotated[
-        float, Parameter("k, stiffness of the spring", unit="N/m", low=0.0, high=1e6)
+        float, Parameter("k, stiffness of the spring", unit="N/m", low=0.0, high=1e6, tunable=True)
     ] = 100.0
     spring_damping: Annotated[
-        float, Parameter("d, damping of the spring", unit="N.s/m", low=0.0, high=1e3)
+        float, Parameter("d, damping of the spring", unit="N.s/m", low=0.0, high=1e3, tunable=True)
     ] = 2.0
     face_stiffness: Annotated[
-        float, Parameter("k_c, stiffness of a face", unit="N/m", low=1.0, high=1e6)
+        float, Parameter("k_c, stiffness of a face", unit="N/m", low=1.0, high=1e6, tunable=True)
     ] = 10000.0
     face_damping: Annotated[
-        float, Parameter("d_c, damping of a face", unit="N.s/m", low=0.0, high=1e4)
+        float, Parameter("d_c, damping of a face", unit="N.s/m", low=0.0, high=1e4, tunable=True)
     ] = 20.0
 
     def __post_init__(self) -> None:

@@ -17,10 +17,12 @@ class Params(Group, name="contact_force"):
     """
 
     damping: Annotated[
-        float, Parameter("D_i, damping of the impedance", unit="N.s/m", low=0.0, high=1e5)
+        float,
+        Parameter("D_i, damping of the impedance", unit="N.s/m", low=0.0, high=1e5, tunable=True),
     ] = 14.0
     stiffness: Annotated[
-        float, Parameter("K_i, stiffness of the impedance", unit="N/m", low=0.0, high=1e6)
+        float,
+        Parameter("K_i, stiffness of the impedance", unit="N/m", low=0.0, high=1e6, tunable=True),
     ] = 98.0
 
 

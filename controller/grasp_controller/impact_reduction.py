@@ -28,21 +28,32 @@ class Params(Group, name="impact_reduction"):
     """
 
     enabled: Annotated[
-        bool, Parameter("layer 2 on; off, the fingers head for the target directly")
+        bool, Parameter("layer 2 on; off, the fingers head for the target directly", tunable=True)
     ] = True
-    mass: Annotated[float, Parameter("M_a1, virtual mass", unit="kg", low=1e-3, high=1e3)] = 1.0
+    mass: Annotated[
+        float, Parameter("M_a1, virtual mass", unit="kg", low=1e-3, high=1e3, tunable=True)
+    ] = 1.0
     damping: Annotated[
-        float, Parameter("D_a1, virtual damping", unit="N.s/m", low=0.0, high=1e5)
+        float, Parameter("D_a1, virtual damping", unit="N.s/m", low=0.0, high=1e5, tunable=True)
     ] = 10.0
     stiffness: Annotated[
-        float, Parameter("K_a1, virtual stiffness", unit="N/m", low=1e-3, high=1e6)
+        float, Parameter("K_a1, virtual stiffness", unit="N/m", low=1e-3, high=1e6, tunable=True)
     ] = 25.0
     viscosity: Annotated[
-        Pair, Parameter("D_pj, viscosity of the virtual force", unit="N.s", low=-1e3, high=1e3)
+        Pair,
+        Parameter(
+            "D_pj, viscosity of the virtual force", unit="N.s", low=-1e3, high=1e3, tunable=True
+        ),
     ] = (0.6, -0.6)
     intensity_floor: Annotated[
         float,
-        Parameter("intensity below which the sensor sees nothing", unit="V", low=1e-12, high=1e3),
+        Parameter(
+            "intensity below which the sensor sees nothing",
+            unit="V",
+            low=1e-12,
+            high=1e3,
+            tunable=True,
+        ),
     ] = 1e-6
 
 

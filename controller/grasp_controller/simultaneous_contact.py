@@ -22,17 +22,20 @@ class Params(Group, name="simultaneous_contact"):
     """
 
     enabled: Annotated[
-        bool, Parameter("layer 3 on; off, the target is the middle of the fingers")
+        bool, Parameter("layer 3 on; off, the target is the middle of the fingers", tunable=True)
     ] = True
-    mass: Annotated[float, Parameter("M_a2, virtual mass", unit="kg", low=1e-3, high=1e3)] = 1.0
+    mass: Annotated[
+        float, Parameter("M_a2, virtual mass", unit="kg", low=1e-3, high=1e3, tunable=True)
+    ] = 1.0
     damping: Annotated[
-        float, Parameter("D_a2, virtual damping", unit="N.s/m", low=0.0, high=1e5)
+        float, Parameter("D_a2, virtual damping", unit="N.s/m", low=0.0, high=1e5, tunable=True)
     ] = 12.0
     stiffness: Annotated[
-        float, Parameter("K_a2, virtual stiffness", unit="N/m", low=1e-3, high=1e6)
+        float, Parameter("K_a2, virtual stiffness", unit="N/m", low=1e-3, high=1e6, tunable=True)
     ] = 36.0
     gain: Annotated[
-        float, Parameter("K_s, gain of the virtual force", unit="N", low=-1e3, high=1e3)
+        float,
+        Parameter("K_s, gain of the virtual force", unit="N", low=-1e3, high=1e3, tunable=True),
     ] = 3.0
 
 

@@ -18,6 +18,9 @@ FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 FMU_FOLDER = Path("fmus/build")
 """Where the FMUs of this project are built, below the current folder."""
 
+NATIVE_FOLDER = Path("fmus/native")
+"""Where native ones are built, below the current folder."""
+
 
 def check_folder(folder: Path) -> None:
     """InputError where files could not be written to the folder, which need not exist."""

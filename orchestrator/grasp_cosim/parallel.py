@@ -262,5 +262,6 @@ def _work(pipe: Connection) -> None:
                 while True:
                     run, job = pipe.recv()
                     pipe.send(run(job))
-        finally:  # its pipe may end just before the signal comes that ends its run
-            signal.pthread_sigmask(signal.SIG_BLOCK, interruption.SIGNALS)
+        finally:  # its pipe may end just before the signal comes that ends its run, in any thread
+            for number in interruption.SIGNALS:
+                interruption.leave_to_system(number, signal.SIG_IGN)

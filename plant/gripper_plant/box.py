@@ -32,7 +32,7 @@ class Params(fingers.Params):
     """
 
     object_mass: Annotated[
-        float, Parameter("m, mass of the object", unit="kg", low=1e-3, high=1e3)
+        float, Parameter("m, mass of the object", unit="kg", low=1e-3, high=1e3, tunable=True)
     ] = 0.05
     object_height: Annotated[
         float, Parameter("H, height of the object", unit="m", low=1e-3, high=10.0)
@@ -42,7 +42,10 @@ class Params(fingers.Params):
         Parameter("h, height of the fingertips above the floor", unit="m", low=0.0, high=10.0),
     ] = 0.05
     floor_friction: Annotated[
-        float, Parameter("mu, friction of the object on the floor", unit="1", low=0.0, high=1.0)
+        float,
+        Parameter(
+            "mu, friction of the object on the floor", unit="1", low=0.0, high=1.0, tunable=True
+        ),
     ] = 0.3
 
     def __post_init__(self) -> None:

@@ -31,7 +31,10 @@ class Params(fingers.Params):
     kelvin_voigt: KelvinVoigt = KelvinVoigt()
     hunt_crossley: HuntCrossley = HuntCrossley()
     squeeze_limit: Annotated[
-        float, Parameter("squeeze above which the object is damaged", unit="m", low=0.0, high=10.0)
+        float,
+        Parameter(
+            "squeeze above which the object is damaged", unit="m", low=0.0, high=10.0, tunable=True
+        ),
     ] = 0.01
 
     @cached_property

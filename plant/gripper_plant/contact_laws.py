@@ -29,10 +29,11 @@ class KelvinVoigt(Group, name="kelvin_voigt"):
     """By default a side of a paper cup: 1 N/mm, damped by a fifth of critical under 0.5 kg."""
 
     stiffness: Annotated[
-        float, Parameter("k, stiffness of the surface", unit="N/m", low=1e-3, high=1e7)
+        float,
+        Parameter("k, stiffness of the surface", unit="N/m", low=1e-3, high=1e7, tunable=True),
     ] = 1000.0
     damping: Annotated[
-        float, Parameter("c, damping of the surface", unit="N.s/m", low=0.0, high=1e5)
+        float, Parameter("c, damping of the surface", unit="N.s/m", low=0.0, high=1e5, tunable=True)
     ] = 10.0
 
 
@@ -40,15 +41,21 @@ class KelvinVoigt(Group, name="kelvin_voigt"):
 class HuntCrossley(Group, name="hunt_crossley"):
     """By default 3.1 N are 2.9 mm deep, as in the paper cup; n = 1.5 is Hertz's, for a sphere."""
 
-    enabled: Annotated[bool, Parameter("Hunt-Crossley contact; off, Kelvin-Voigt")] = False
+    enabled: Annotated[
+        bool, Parameter("Hunt-Crossley contact; off, Kelvin-Voigt", tunable=True)
+    ] = False
     stiffness: Annotated[
-        float, Parameter("k, stiffness of the surface", unit="N/m^n", low=1e-3, high=1e9)
+        float,
+        Parameter("k, stiffness of the surface", unit="N/m^n", low=1e-3, high=1e9, tunable=True),
     ] = 20000.0
     exponent: Annotated[
-        float, Parameter("n, exponent of the depth", unit="1", low=1.0, high=3.0)
+        float, Parameter("n, exponent of the depth", unit="1", low=1.0, high=3.0, tunable=True)
     ] = 1.5
     damping: Annotated[
-        float, Parameter("lambda, damping relative to the force", unit="s/m", low=0.0, high=1e3)
+        float,
+        Parameter(
+            "lambda, damping relative to the force", unit="s/m", low=0.0, high=1e3, tunable=True
+        ),
     ] = 1.0
 
 

@@ -22,7 +22,11 @@ class Actuator(Group, name="actuator"):
     force_limit: Annotated[
         Pair,
         Parameter(
-            "largest force of the actuator, either way; 0 is no limit", unit="N", low=0.0, high=1e6
+            "largest force of the actuator, either way; 0 is no limit",
+            unit="N",
+            low=0.0,
+            high=1e6,
+            tunable=True,
         ),
     ] = (0.0, 0.0)
 
@@ -47,7 +51,7 @@ class Params:
     """
 
     finger_mass: Annotated[
-        Pair, Parameter("m_j, mass of the finger", unit="kg", low=1e-3, high=1e3)
+        Pair, Parameter("m_j, mass of the finger", unit="kg", low=1e-3, high=1e3, tunable=True)
     ] = (0.5, 0.5)
     initial_position: Annotated[
         Pair,

@@ -24,7 +24,10 @@ class Params(Group, name="friction"):
     """None, as in the paper's simulation. v_s has no source; it matters where F_S > F_C."""
 
     coulomb: Annotated[
-        Pair, Parameter("F_Cj, Coulomb friction of the finger", unit="N", low=0.0, high=1e3)
+        Pair,
+        Parameter(
+            "F_Cj, Coulomb friction of the finger", unit="N", low=0.0, high=1e3, tunable=True
+        ),
     ] = (0.0, 0.0)
     static: Annotated[
         Pair,
@@ -33,10 +36,14 @@ class Params(Group, name="friction"):
             unit="N",
             low=0.0,
             high=1e3,
+            tunable=True,
         ),
     ] = (0.0, 0.0)
     viscous: Annotated[
-        Pair, Parameter("B_j, viscous friction of the finger", unit="N.s/m", low=0.0, high=1e3)
+        Pair,
+        Parameter(
+            "B_j, viscous friction of the finger", unit="N.s/m", low=0.0, high=1e3, tunable=True
+        ),
     ] = (0.0, 0.0)
     stribeck_velocity: Annotated[
         float,
@@ -45,6 +52,7 @@ class Params(Group, name="friction"):
             unit="m/s",
             low=1e-6,
             high=1e3,
+            tunable=True,
         ),
     ] = 0.01
 

@@ -50,7 +50,13 @@ class Params(standing.Params):
     ] = 0.005
     contact_time_constant: Annotated[
         float,
-        Parameter("T, time constant in which a contact settles", unit="s", low=2e-5, high=0.1),
+        Parameter(
+            "T, time constant in which a contact settles",
+            unit="s",
+            low=2e-5,
+            high=0.1,
+            tunable=True,
+        ),
     ] = 0.005
     timestep: Annotated[
         float, Parameter("longest timestep of MuJoCo", unit="s", low=1e-5, high=1e-3)

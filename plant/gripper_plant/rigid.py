@@ -28,12 +28,22 @@ class Params(fingers.Params):
     baumgarte_alpha: Annotated[
         float,
         Parameter(
-            "alpha, damping rate of the contact stabilisation", unit="1/s", low=1.0, high=1e5
+            "alpha, damping rate of the contact stabilisation",
+            unit="1/s",
+            low=1.0,
+            high=1e5,
+            tunable=True,
         ),
     ] = 200.0
     baumgarte_beta: Annotated[
         float,
-        Parameter("beta, natural rate of the contact stabilisation", unit="1/s", low=1.0, high=1e5),
+        Parameter(
+            "beta, natural rate of the contact stabilisation",
+            unit="1/s",
+            low=1.0,
+            high=1e5,
+            tunable=True,
+        ),
     ] = 200.0
 
     @cached_property

@@ -15,10 +15,12 @@ class Params(Group, name="adc"):
     """16 bits over 20 V are usual for controllers like the paper's."""
 
     enabled: Annotated[bool, Parameter("conversion to digital values")] = False
-    bits: Annotated[int, Parameter("resolution", low=1, high=32)] = 16
+    bits: Annotated[int, Parameter("resolution", low=1, high=32, tunable=True)] = 16
     range: Annotated[
         tuple[float, float],
-        Parameter("lower and upper end of the input range", unit="V", low=-1e3, high=1e3),
+        Parameter(
+            "lower and upper end of the input range", unit="V", low=-1e3, high=1e3, tunable=True
+        ),
     ] = (-10.0, 10.0)
 
     def __post_init__(self) -> None:

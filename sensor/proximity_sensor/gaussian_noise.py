@@ -17,7 +17,11 @@ class Params(Group, name="noise"):
     standard_deviation: Annotated[
         float,
         Parameter(
-            "standard deviation of a sample of the raw voltage", unit="V", low=0.0, high=10.0
+            "standard deviation of a sample of the raw voltage",
+            unit="V",
+            low=0.0,
+            high=10.0,
+            tunable=True,
         ),
     ] = 0.005
     seed: Annotated[int, Parameter("equal seeds, equal noise", low=0, high=1_000_000_000)] = 1

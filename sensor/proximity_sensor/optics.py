@@ -24,14 +24,23 @@ class Params:
         ),
     ] = 1.0
     gain: Annotated[
-        float, Parameter("K = G·psi, fitted to the white surface", unit="V.m^n", low=0.0, high=1e6)
+        float,
+        Parameter(
+            "K = G·psi, fitted to the white surface", unit="V.m^n", low=0.0, high=1e6, tunable=True
+        ),
     ] = 0.0024
     diffusion_exponent: Annotated[
-        float, Parameter("n, diffusion exponent", unit="1", low=0.1, high=10.0)
+        float, Parameter("n, diffusion exponent", unit="1", low=0.1, high=10.0, tunable=True)
     ] = 1.1506
     offset_distance: Annotated[
         float,
-        Parameter("l_0, from the sensor face to the sensing element", unit="m", low=1e-6, high=1.0),
+        Parameter(
+            "l_0, from the sensor face to the sensing element",
+            unit="m",
+            low=1e-6,
+            high=1.0,
+            tunable=True,
+        ),
     ] = 0.005
 
     def __post_init__(self) -> None:

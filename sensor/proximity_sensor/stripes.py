@@ -11,22 +11,40 @@ from block_variables import Group, Parameter
 class Params(Group, name="pattern"):
     """The ratio is that of the paper's black paper to the white one; the lengths have no source."""
 
-    enabled: Annotated[bool, Parameter("the surface is striped along the approach")] = False
+    enabled: Annotated[
+        bool, Parameter("the surface is striped along the approach", tunable=True)
+    ] = False
     ratio: Annotated[
         float,
         Parameter(
-            "reflectance of every other stripe relative to the first", unit="1", low=0.0, high=1e3
+            "reflectance of every other stripe relative to the first",
+            unit="1",
+            low=0.0,
+            high=1e3,
+            tunable=True,
         ),
     ] = 0.57
     period: Annotated[
-        float, Parameter("length of two stripes along the gap", unit="m", low=1e-6, high=10.0)
+        float,
+        Parameter(
+            "length of two stripes along the gap", unit="m", low=1e-6, high=10.0, tunable=True
+        ),
     ] = 0.02
     phase: Annotated[
-        float, Parameter("gap at the middle of a first stripe", unit="m", low=-10.0, high=10.0)
+        float,
+        Parameter(
+            "gap at the middle of a first stripe", unit="m", low=-10.0, high=10.0, tunable=True
+        ),
     ] = 0.0
     edge: Annotated[
         float,
-        Parameter("length over which stripes blend, a spot of light", unit="m", low=1e-9, high=1.0),
+        Parameter(
+            "length over which stripes blend, a spot of light",
+            unit="m",
+            low=1e-9,
+            high=1.0,
+            tunable=True,
+        ),
     ] = 0.002
 
 

@@ -13,7 +13,7 @@ from grasp_cosim.qualification.bands import read_bands
 
 Run = Callable[..., tuple[int, str, str]]
 
-BEFORE = "high=1e3)\n    ] = (0.5, 0.5)"
+BEFORE = "high=1e3, tunable=True)\n    ] = (0.5, 0.5)"
 SHORT = ["--step", "1e-3", "--stop", "0.05", "--isolation", "none"]
 
 
@@ -31,7 +31,7 @@ def qualify(
     monkeypatch.setattr("grasp_cosim.grasp.system.grasp_system", lambda: grasp)
 
     def run(*arguments: str | Path) -> tuple[int, str, str]:
-        code = cli.main(["qualify", *map(str, arguments)])
+        code = cli.main(["qualify", "--python", *map(str, arguments)])
         out, err = capsys.readouterr()
         return code, out, err
 

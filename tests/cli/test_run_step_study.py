@@ -49,7 +49,9 @@ def invented(monkeypatch: pytest.MonkeyPatch) -> list[tuple[System, float]]:
 
 @pytest.mark.slow
 def test_the_grasp(command: Run) -> None:
-    code, out, err = command("run", "--step-study", "--step", "3.2e-3", "--stop", "1.92")
+    code, out, err = command(
+        "run", "--step-study", "--python", "--step", "3.2e-3", "--stop", "1.92"
+    )
     assert code == 1
     assert err == ""
     assert "no step here keeps time_to_contact within 1 ms; the finest is 0.8 ms" in out
@@ -86,7 +88,7 @@ def test_the_exit_code_says_whether_the_step_is_short_enough(
 
 @pytest.mark.usefixtures("invented")
 def test_json_is_all_there_is_on_standard_output(command: Run) -> None:
-    code, out, err = command("run", "--step-study", "--json")
+    code, out, err = command("run", "--step-study", "--python", "--json")
     found: dict[str, Any] = json.loads(out)
     assert (code, err, found["holds"]) == (0, "", True)
     assert found["largest_step"] == 8e-4
@@ -94,7 +96,8 @@ def test_json_is_all_there_is_on_standard_output(command: Run) -> None:
 
 @pytest.mark.usefixtures("invented")
 def test_files(command: Run, tmp_path: Path) -> None:
-    code, out, err = command("run", "--step-study", "--out", "results", "--plot", "--json")
+    asked = ("--python", "--out", "results", "--plot", "--json")
+    code, out, err = command("run", "--step-study", *asked)
     folder = tmp_path / "results"
     assert code == 0
     assert sorted(p.name for p in folder.iterdir()) == ["step_study.json", "step_study.png"]

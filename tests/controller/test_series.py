@@ -159,6 +159,34 @@ def test_without_impact_reduction_the_fingers_follow_the_target() -> None:
         np.testing.assert_allclose(y.force, expected, rtol=0.0, atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [(CASE_1, CASE_2), (CASE_0, NO_IMPACT_REDUCTION), (CASE_0, CASE_1),
+     (NO_IMPACT_REDUCTION, CASE_2)],
+)  # fmt: skip
+def test_a_layer_that_is_switched_on_takes_over_without_a_jump(
+    before: Params, after: Params
+) -> None:
+    """It begins at the layer above, and from there goes its own way."""
+    x, y = run(before, SAMPLES)[-1]
+    assert series.outputs(after, x, SAMPLES[-1]) == y
+    x_before, x_after = (series.step(p, x, SAMPLES[0], H) for p in (before, after))
+    assert series.outputs(after, x_after, SAMPLES[0]) != series.outputs(
+        before, x_before, SAMPLES[0]
+    )
+
+
+def test_a_layer_that_is_switched_off_leaves_the_target_to_the_one_above() -> None:
+    x, _ = run(CASE_2, SAMPLES)[-1]
+    u = SAMPLES[-1]
+    assert series.outputs(CASE_1, x, u).target_position == 0.5 * sum(u.position)
+    assert (
+        series.outputs(CASE_1, x, u).virtual_position
+        == series.outputs(CASE_2, x, u).virtual_position
+    )
+    assert series.outputs(NO_IMPACT_REDUCTION, x, u).virtual_position == (x.target[0],) * 2
+
+
 @pytest.mark.parametrize("p", [CASE_0, CASE_1, CASE_2, NO_IMPACT_REDUCTION])
 def test_the_force_follows_the_sample_it_is_asked_for(p: Params) -> None:
     """Also where it is not the one of the last step; the virtual objects do not move by it."""

@@ -10,6 +10,7 @@ from grasp_cosim import SimulationError, System, simulate
 from grasp_cosim.fmi.inputs import Inputs
 from grasp_cosim.interface.interface import Kind, Value, Variable
 from grasp_cosim.system.parts import Component, Connection, Isolation, Port
+from support.both_engines import engines
 from support.native_fmus import TYPES, build, needs_gcc
 
 
@@ -57,13 +58,11 @@ def test_of_many_those_that_are_out_of_range_come_first() -> None:
 
 @needs_gcc
 @pytest.mark.parametrize(("version", "isolation"), KINDS)
-@pytest.mark.parametrize("engine", ["python", "compiled"])
+@engines
 def test_a_failing_step_names_what_came_over_its_connections(
     tmp_path: Path, version: str, isolation: Isolation, engine: str
 ) -> None:
     """Under the system's name, after the factor of the connection."""
-    if engine == "compiled":
-        pytest.importorskip("numba")
     u, y = f"u_{real(version)}", f"y_{real(version)}"
     starts: dict[str, Value] = {"Boolean": False, "String": "", "Enumeration": 1}
     others = {f"u_{t}": starts.get(t, 0) for t in list(TYPES[version])[1:]}

@@ -20,8 +20,8 @@ OPTICS, CARD = "proximity_sensor/optics.py", "README.md"
 CLOCK = "proximity_sensor/clock.py"
 """Of the parameters the last."""
 
-GAIN = "low=0.0, high=1e6)\n    ] = 0.0024"
-EXPONENT = '"n, diffusion exponent", unit="1", low=0.1, high=10.0)'
+GAIN = "low=0.0, high=1e6, tunable=True\n        ),\n    ] = 0.0024"
+EXPONENT = '"n, diffusion exponent", unit="1", low=0.1, high=10.0, tunable=True)'
 OUTPUT = (
     "    intensity: Annotated[\n        float, "
     'Output("xi, offset-compensated output", unit="V", nominal=0.1, depends_on={"gap"})\n    ]\n'
@@ -116,8 +116,12 @@ def test_a_change_is_reported_once(build: Build) -> None:
             id="range",
         ),
         pytest.param(
-            [(OPTICS, GAIN, GAIN.replace("1e6", "1e6, tunable=True"))],
-            ["gain: variability fixed -> tunable", DESCRIPTION, SOURCE],
+            [(CLOCK, RATE, RATE.replace("1e6", "1e6, tunable=True"))],
+            [
+                "sampling.rate: variability fixed -> tunable",
+                DESCRIPTION,
+                f"resources/{CLOCK}: changed",
+            ],
             id="variability",
         ),
         pytest.param(

@@ -28,6 +28,7 @@ from lxml import etree  # type: ignore[import-untyped]
 from proximity_sensor import channel
 from proximity_sensor.surfaces import Surface
 from support.fmi2 import OK, Instance
+from support.kinds import all_kinds
 from support.packages import skip_where_it_cannot_run
 
 BLOCKS: dict[str, ModuleType] = {
@@ -224,14 +225,33 @@ def test_only_a_real_is_continuous(root: Element) -> None:
             assert variable.attrib["variability"] == kind, n
 
 
-def test_the_surface_alone_is_tunable(fmus: Path) -> None:
-    tunable = [
-        (name, n)
-        for name in BLOCKS
+PLACE = ["initial_position[1]", "initial_position[2]", "object_width", "initial_object_position"]
+FIXED = {
+    "GripperPlant": PLACE,
+    "GripperPlantCompliant": PLACE,
+    "GripperPlantMovable": [*PLACE, "object_height", "contact_height"],
+    "GripperPlantMuJoCo": [
+        *(*PLACE, "object_height", "contact_height"),
+        *("object_fixed", "fingertip_radius", "timestep"),
+    ],
+    "ProximitySensor": [
+        *("ambient.enabled", "ambient.offset", "ambient.drift", "noise.enabled", "noise.seed"),
+        *("adc.enabled", "filter.enabled", "filter.cutoff", "median.enabled", "sampling.rate"),
+    ],
+    "GraspController": [],
+}
+"""Start values, geometry, and what the state was made with; the cards say why of each."""
+
+
+@pytest.mark.parametrize("name", FIXED)
+def test_all_else_is_tunable(fmus: Path, name: str) -> None:
+    parameters = {
+        n: v.attrib["variability"]
         for n, v in variables(read(fmus, name)).items()
-        if v.attrib["variability"] == "tunable"
-    ]
-    assert tunable == [("ProximitySensor", "reflectance"), ("ProximitySensor", "surface")]
+        if v.attrib["causality"] == "parameter"
+    }
+    assert [n for n, variability in parameters.items() if variability == "fixed"] == FIXED[name]
+    assert set(parameters.values()) <= {"fixed", "tunable"}
 
 
 def test_surfaces_are_chosen_by_name(fmus: Path) -> None:
@@ -632,6 +652,7 @@ def responses(instance: Instance) -> dict[str, set[str]]:
     return found
 
 
+@all_kinds
 def test_the_fmu_depends_on_what_it_declares(load: Load, root: Element, name: str) -> None:
     """Through the interface: in initialisation mode, and between two steps."""
     fmu = load(name)
@@ -640,7 +661,7 @@ def test_the_fmu_depends_on_what_it_declares(load: Load, root: Element, name: st
     rng = random.Random(1)
     for switches in SWITCHES[name]:
         with Instance(fmu) as instance:
-            assert instance.switch(switches) == OK
+            assert instance.assign(switches) == OK
             assert (instance.setup(), instance.enter()) == (OK, OK)
             seen = [("InitialUnknowns", responses(instance))]
             assert instance.exit() == OK

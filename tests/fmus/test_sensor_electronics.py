@@ -1,6 +1,5 @@
 """The sensor's electronics through the FMU: states, steps, seeds, refusals."""
 
-from ctypes import c_int, c_size_t, c_uint
 from math import sin
 
 import pytest
@@ -8,6 +7,9 @@ from conftest import Load
 from grasp_fmus.contract import declared
 from proximity_sensor import channel
 from support.fmi2 import ERROR, OK, Instance
+from support.kinds import all_kinds
+
+pytestmark = all_kinds
 
 STAGES = ("pattern", "ambient", "noise", "adc", "filter", "median")
 H = 1e-4
@@ -16,15 +18,9 @@ H = 1e-4
 def sensor(load: Load, seed: int = 1, **values: float) -> Instance:
     """With every stage on; a double underscore in a name stands for the point."""
     instance = Instance(load("ProximitySensor"))
-    switches = [instance.fmu.references[f"{stage}.enabled"] for stage in STAGES]
-    assert instance.set_boolean(switches, [True] * len(STAGES)) == OK
-    assert set_integer(instance, "noise.seed", seed) == OK
-    return instance.initialise(**{n.replace("__", "."): v for n, v in values.items()})
-
-
-def set_integer(instance: Instance, name: str, value: int) -> int:
-    reference = (c_uint * 1)(instance.fmu.references[name])
-    return instance.call("SetInteger", reference, c_size_t(1), (c_int * 1)(value))
+    on = {f"{stage}.enabled": True for stage in STAGES}
+    given = {name.replace("__", "."): value for name, value in values.items()}
+    return instance.initialise(**on, **{"noise.seed": seed}, **given)
 
 
 def drive(instance: Instance, first: int, last: int, size: float = H) -> list[float]:
@@ -102,8 +98,7 @@ def test_equal_seeds_equal_noise(load: Load) -> None:
 )
 def test_what_does_not_fit_is_refused(load: Load, name: str, value: float, text: str) -> None:
     with Instance(load("ProximitySensor")) as instance:
-        switch = [instance.fmu.references["filter.enabled"]]
-        assert (instance.set_boolean(switch, [True]), instance.set({name: value})) == (OK, OK)
+        assert instance.assign({"filter.enabled": True, name: value}) == OK
         assert (instance.setup(), instance.enter()) == (OK, ERROR)
         assert text in instance.log[0].text
 
@@ -117,5 +112,5 @@ def test_what_does_not_fit_is_refused(load: Load, name: str, value: float, text:
 )
 def test_whole_numbers_have_a_range_too(load: Load, name: str, value: int, text: str) -> None:
     with Instance(load("ProximitySensor")) as instance:
-        assert set_integer(instance, name, value) == ERROR
+        assert instance.assign({name: value}) == ERROR
         assert text in instance.log[0].text

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from grasp_cosim import Result, System, simulate
 from grasp_cosim.interface.interface import Value
+from support.both_engines import needs_compiler
 from support.cases import CASES
 from support.packages import skip_where_it_cannot_run
 
@@ -94,8 +95,8 @@ def test_case_1_topples_what_case_2_grasps_here_too(grasp: System, fmus: Path) -
     assert np.abs(two["plant.tilt"]).max() < 1e-3
 
 
+@needs_compiler
 def test_the_compiled_loop_gives_the_same_bits(grasp: System, fmus: Path) -> None:
-    pytest.importorskip("numba")
     system = grasp.swap("plant", fmus / "GripperPlantMuJoCo.fmu").with_values(FREE)
     one, two = (
         simulate(system, step=1e-3, stop=0.3, engine=engine) for engine in ("python", "compiled")

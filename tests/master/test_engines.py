@@ -1,9 +1,7 @@
 """The interpreted and the compiled loop give the same bits, the same errors, the same rows."""
 
 import math
-import subprocess
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -11,20 +9,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from grasp_cosim import InputError, SimulationError, System, simulate
-from grasp_cosim.fmi import instance
+from grasp_cosim import SimulationError, System, simulate
 from grasp_cosim.fmi.instance import STEP_2, Call, Native
-from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.master import compiled, loop
 from grasp_cosim.master import engine as engines
 from grasp_cosim.master.engine import Engine
 from grasp_cosim.master.plan import Plan
 from grasp_cosim.recording.result import Rejection, Result
 from grasp_cosim.system.parts import Connection, Port
+from support.both_engines import needs_compiler
 from support.cases import CASES
 from support.mocks import Mock, Run, make_system
 
-pytest.importorskip("numba")
+pytestmark = needs_compiler
 ENGINES: tuple[Engine, ...] = ("python", "compiled")
 
 
@@ -135,43 +132,6 @@ def test_what_a_call_raises_ends_the_run(tmp_path: Path, engine: Engine) -> None
     assert run.signals()["a.y"] == pytest.approx([0.0, 0.1, 0.2])
 
 
-def test_without_numba_the_compiled_engine_is_refused(
-    grasp: System, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    compiled.compiled_loop.cache_clear()
-    monkeypatch.setitem(__import__("sys").modules, "numba", None)
-    with pytest.raises(InputError, match=r"numba is not installed.*grasp-cosim\[fast\]"):
-        simulate(grasp, stop=1e-3, engine="compiled")
-    monkeypatch.undo()
-    compiled.compiled_loop.cache_clear()
-    assert np.isfinite(simulate(grasp, stop=1e-3, engine="compiled")["plant.gap[1]"]).all()
-
-
-def test_it_is_compiled_where_the_user_has_no_home(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def no_home() -> Path:
-        raise RuntimeError("Could not determine home directory.")
-
-    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
-    monkeypatch.setattr(Path, "home", no_home)
-    compiled.compiled_loop.cache_clear()
-    try:
-        assert callable(compiled.compiled_loop())
-    finally:
-        compiled.compiled_loop.cache_clear()
-
-
-def test_what_was_compiled_from_other_constants_is_not_taken(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    before = compiled._cache()
-    changed = tmp_path / "instance.py"
-    changed.write_text(Path(instance.__file__).read_text().replace("EARLY = 6", "EARLY = 7"))
-    monkeypatch.setattr(instance, "__file__", str(changed))
-    assert compiled._cache() != before
-
-
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_value_that_is_not_finite_at_t_0_is_kept_too(
     tmp_path: Path, engine: Engine, monkeypatch: pytest.MonkeyPatch
@@ -195,20 +155,23 @@ def plan(calls: list[Call], period: int = 1) -> Plan:
     return Plan(np.zeros(1), np.zeros(2), operations, calls=calls)
 
 
-@pytest.fixture
-def fresh(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """As in a process that has not compiled anything and could not have saved anything."""
-    compiled.compiled_loop.cache_clear()
+@pytest.fixture(autouse=True)
+def fresh(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in a process that could not have saved anything yet."""
     monkeypatch.setattr(engines, "_forgone", 0.0)
-    yield
-    compiled.compiled_loop.cache_clear()
 
 
-ENOUGH = round(engines.START_UP / (10 * engines.SAVED))
-"""The steps with 10 native calls that save what the start-up costs."""
+@pytest.fixture
+def not_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As on a machine on which the loop was never built."""
+    monkeypatch.setattr(compiled, "is_there", lambda: False)
 
 
-@pytest.mark.usefixtures("fresh")
+ENOUGH = round(engines.BUILDING / (10 * engines.SAVED))
+"""The steps with 10 native calls that save what building the loop costs."""
+
+
+@pytest.mark.usefixtures("not_there")
 @pytest.mark.parametrize(
     ("made", "steps", "pays"),
     [
@@ -221,39 +184,25 @@ ENOUGH = round(engines.START_UP / (10 * engines.SAVED))
         (plan(native(1)), None, True),
     ],
 )
-def test_auto_compiles_where_the_steps_save_more_than_the_start_up(
+def test_auto_builds_it_where_the_steps_save_more_than_that_takes(
     made: Plan, steps: int | None, pays: bool
 ) -> None:
     assert engines._pays(made, steps) is pays
 
 
-@pytest.mark.usefixtures("fresh")
-def test_auto_compiles_once_many_short_runs_of_a_process_would_have_saved_as_much() -> None:
+@pytest.mark.usefixtures("not_there")
+def test_auto_builds_it_once_many_short_runs_of_a_process_would_have_saved_as_much() -> None:
     made = plan(native(10))
     assert [engines._pays(made, ENOUGH // 4 + 1) for _ in range(5)] == [False] * 3 + [True] * 2
 
 
-@pytest.mark.usefixtures("fresh")
-def test_what_is_compiled_already_is_taken_at_once() -> None:
-    assert not engines._pays(plan(native(1)), 1)
-    compiled.compiled_loop()
+def test_what_is_built_already_is_taken_at_once() -> None:
+    compiled.library(False)
     assert engines._pays(plan(native(1)), 1)
 
 
-def test_a_short_run_does_not_import_numba(fmus: Path) -> None:
-    """Of the built-in grasp 3 s are short; it is asked for them, and does 10 ms."""
-    code = (
-        "import sys; from pathlib import Path; from grasp_cosim import System, simulate\n"
-        "system = System.load(Path(sys.argv[1]), Path(sys.argv[2]))\n"
-        "with simulate.session(system, engine=sys.argv[3]) as session:\n"
-        "    assert session.step(100)\n"
-        "print(system.total_steps, 'numba' in sys.modules, 'llvmlite' in sys.modules)"
-    )
-    found = [
-        subprocess.run(
-            [sys.executable, "-c", code, str(SYSTEM), str(fmus), engine],
-            capture_output=True, check=True, text=True,
-        ).stdout
-        for engine in ("auto", "compiled")
-    ]  # fmt: skip
-    assert found == ["30000 False False\n", "30000 True True\n"]
+@pytest.mark.usefixtures("not_there")
+def test_without_a_compiler_auto_runs_in_python(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compiled, "compiler", lambda: None)
+    assert not engines._pays(plan(native(10)), 10 * ENOUGH)
+    assert not engines._pays(plan(native(10)), None)

@@ -9,8 +9,8 @@ from grasp_cosim.master import loop
 from grasp_cosim.master.engine import Engine, Loop, make_loop
 from grasp_cosim.master.loop import CALL, COPY, LOAD, LOAD_LONG, SCALE, STEP, STORE
 from grasp_cosim.master.plan import Plan
+from support.both_engines import engines
 
-ENGINES: tuple[Engine, ...] = ("python", "compiled")
 TYPES = [
     "float32",
     "int8",
@@ -24,13 +24,7 @@ TYPES = [
     "bool",
 ]
 
-pytestmark = pytest.mark.parametrize("engine", ENGINES)
-
-
-@pytest.fixture(autouse=True)
-def numba(engine: Engine) -> None:
-    if engine == "compiled":
-        pytest.importorskip("numba")
+pytestmark = engines
 
 
 def plan(values: Any, operations: Any, **parts: Any) -> Plan:

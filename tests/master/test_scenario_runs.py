@@ -3,14 +3,14 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pytest
-from grasp_cosim import InputError, Result, System, simulate
+from grasp_cosim import InputError, Result, SimulationError, System, simulate
 from grasp_cosim.system.parts import Condition, Event, Fault, Port
+from support.both_engines import needs_compiler
 
 Array = npt.NDArray[Any]
 
@@ -56,6 +56,38 @@ def test_a_change_of_reflectance_moves_the_target(grasp: System) -> None:
     assert not difference[: k + 1].any()
     assert (np.diff(difference[k + 1 :]) < 0).all()
     assert "t = 0.1 s: sensor_1.reflectance = 0.6" in changed.log
+
+
+TUNED: dict[str, bool | float] = {
+    "plant.finger_mass[1]": 0.8,
+    "plant.friction.coulomb[2]": 0.05,
+    "plant.actuator.force_limit[1]": 0.5,
+    "controller.simultaneous_contact.enabled": False,
+    "controller.impact_reduction.viscosity[2]": -0.4,
+}
+"""What acts by the steps alone."""
+
+
+def test_an_event_at_the_start_is_a_start_value(grasp: System) -> None:
+    at_once = Event({Port(*name.split(".", 1)): v for name, v in TUNED.items()}, at_ns=0)
+    changed, began = run(grasp, events=(at_once,)), run(grasp.with_values(TUNED))
+    for name in began:
+        assert changed[name][1:].tobytes() == began[name][1:].tobytes(), name
+    assert changed["plant.position[1]"][-1] != run(grasp)["plant.position[1]"][-1]
+    assert "t = 0 s: controller.simultaneous_contact.enabled = false" in changed.log
+
+
+def test_values_that_do_not_go_together_end_the_run_with_the_reason(grasp: System) -> None:
+    event = Event({REFLECTANCE: 0.6, Port("sensor_1", "surface"): "black"}, at_ns=10_000_000)
+    with pytest.raises(
+        SimulationError, match=r"reflectance = 0\.6 with surface = black: must be 1"
+    ):
+        run(grasp, events=(event,))
+    back = Event({REFLECTANCE: 1.0}, at_ns=10_000_000)
+    result = run(grasp, events=(event, back))
+    assert result["sensor_1.intensity"][11] == pytest.approx(
+        intensity(result["plant.gap[1]"], 0.57)[11]
+    )
 
 
 def test_an_event_on_a_condition_happens_where_it_holds_first(grasp: System) -> None:
@@ -180,10 +212,9 @@ def bits(result: Result) -> dict[str, bytes]:
     return {name: np.ascontiguousarray(result[name]).tobytes() for name in result}
 
 
+@needs_compiler
 @pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
 def test_both_engines_give_the_same_bits(grasp: System, scheme: str) -> None:
-    if find_spec("numba") is None:
-        pytest.skip("numba is not installed")
     system = replace(grasp, **FULL).with_experiment(STEP, 0.3, scheme)
     plain = simulate(system, engine="python")
     compiled = simulate(system, engine="compiled")

@@ -11,6 +11,7 @@ from grasp_cosim.cli import main
 from grasp_cosim.master.engine import Engine
 from grasp_cosim.report.page import page_html
 from grasp_cosim.sweep.run import Job, Task, run_job
+from support.both_engines import engines, needs_compiler
 from support.mocks import Mock, Run, make_system
 from support.native_fmus import TYPES, build, needs_gcc
 from support.slow import slow
@@ -21,10 +22,8 @@ TEXTS = ("=1+1", 'a "b", c\r\n\\n', "\x1b[31mred\u202e", "", "ü\u2028", "@x", "
 """What a String may be changed to, one at each step."""
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@engines
 def test_a_text_that_changes_at_every_own_step(tmp_path: Path, engine: Engine) -> None:
-    if engine == "compiled":
-        pytest.importorskip("numba")
     mock = Mock(tmp_path, "a", lambda u, t: f"t = {t:g}", "String")  # type: ignore[arg-type, return-value]
     run = Run(make_system([mock], [], own={"a": 200_000_000}), [mock], engine)
     first, second = "t = 0", "t = 0.2"
@@ -55,6 +54,7 @@ def changing(folder: Path, version: str, isolation: str, scheme: str = "sequenti
     return System.load(path)
 
 
+@needs_compiler
 @needs_gcc
 @pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
 @pytest.mark.parametrize(
@@ -63,7 +63,6 @@ def changing(folder: Path, version: str, isolation: str, scheme: str = "sequenti
 def test_native_fmus_and_what_is_read_back(
     tmp_path: Path, version: str, isolation: str, scheme: str
 ) -> None:
-    pytest.importorskip("numba")
     system = changing(tmp_path, version, isolation, scheme)
     for engine in ENGINES:
         result = simulate(system, engine=engine)

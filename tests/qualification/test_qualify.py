@@ -27,7 +27,7 @@ def short(grasp: System) -> System:
 @pytest.fixture
 def heavy(altered: Altered) -> Path:
     """The plant with a heavier second finger, which its model description tells."""
-    before = "high=1e3)\n    ] = (0.5, 0.5)"
+    before = "high=1e3, tunable=True)\n    ] = (0.5, 0.5)"
     after = before.replace("0.5)", "0.6)")
     return altered("GripperPlant", "gripper_plant/fingers.py", before, after)
 
@@ -205,8 +205,8 @@ def test_damage_is_a_difference(grasp: System, fmus: Path, altered: Altered) -> 
     fmu = altered(
         "GripperPlantCompliant",
         "gripper_plant/compliant.py",
-        "high=10.0)\n    ] = 0.01",
-        "high=10.0)\n    ] = 0.001",
+        "),\n    ] = 0.01",
+        "),\n    ] = 0.001",
     )
     cup = grasp.swap("plant", fmus / "GripperPlantCompliant.fmu").with_values(dict(CASES[0]))
     found = qualify(cup.with_experiment(step=1e-3, stop=0.3), "plant", fmu, isolation="none")

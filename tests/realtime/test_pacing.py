@@ -14,15 +14,12 @@ from grasp_cosim.realtime.options import Overrun
 from grasp_cosim.realtime.pacer import BREATH_NS, SLICE_NS, SOME, SPIN_NS, Pacer
 from grasp_cosim.realtime.timing import Timing
 from realtime.fake import MS, NEAR, US, Fake, Paced
+from support.both_engines import ENGINES
 from support.mocks import Mock, make_system
-
-ENGINES: tuple[Engine, ...] = ("python", "compiled")
 
 
 @pytest.fixture(params=ENGINES)
 def engine(request: pytest.FixtureRequest) -> Engine:
-    if request.param == "compiled":
-        pytest.importorskip("numba")
     chosen: Engine = request.param
     return chosen
 

@@ -20,6 +20,7 @@ from grasp_cosim.realtime.pacer import HAS_CLOCK
 from grasp_cosim.realtime.timing import Timing
 from grasp_cosim.recording.load import load_run
 from grasp_cosim.report.tables import metrics_table
+from support.both_engines import ENGINES
 from support.mocks import Mock, make_system
 from support.slow import slow
 
@@ -29,10 +30,8 @@ FAST = Realtime(factor=1e4)
 PARTS = ["step", "start", "plant", "sensor_1", "sensor_2", "controller", "exchange", "between"]
 
 
-@pytest.fixture(params=["python", "compiled"])
+@pytest.fixture(params=ENGINES)
 def engine(request: pytest.FixtureRequest) -> Engine:
-    if request.param == "compiled":
-        pytest.importorskip("numba")
     chosen: Engine = request.param
     return chosen
 

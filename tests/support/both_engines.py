@@ -1,7 +1,8 @@
-"""Tests in both engines, in the compiled one where numba is installed."""
+"""Tests in both engines, in the compiled one where there is a C compiler."""
 
 import pytest
-from grasp_cosim.master.engine import has_numba
+from grasp_cosim.master.compiled import compiler
 
-needs_numba = pytest.mark.skipif(not has_numba(), reason="numba is not installed")
-engines = pytest.mark.parametrize("engine", ["python", pytest.param("compiled", marks=needs_numba)])
+needs_compiler = pytest.mark.skipif(compiler() is None, reason="there is no C compiler")
+ENGINES = ["python", pytest.param("compiled", marks=needs_compiler)]
+engines = pytest.mark.parametrize("engine", ENGINES)

@@ -1,14 +1,24 @@
 """An FMI 2.0 host as plain as can be: every call returns its status, every log message is kept."""
 
 import ctypes
-from collections.abc import Iterable, Sequence
+import platform
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from ctypes import byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
 from zipfile import ZipFile
 
+from . import fmi3
+
 OK, WARNING, DISCARD, ERROR, FATAL = range(5)
+
+KINDS = {kind: kind for kind in ("Real", "Boolean", "Integer", "String")}
+KINDS |= {"Enumeration": "Integer", "Float64": "Real", "Int32": "Integer"}
+"""By the element of a variable, the functions that get and set it."""
+
+HERE = {2: "linux64", 3: f"{platform.machine()}-linux"}
+"""The folder of binaries, by the version of FMI."""
 
 _LOGGER = ctypes.CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
 _ALLOCATE = ctypes.CFUNCTYPE(c_void_p, c_size_t, c_size_t)
@@ -42,18 +52,56 @@ class Fmu:
             archive.extractall(folder)
         self.folder = folder
         root = ElementTree.parse(folder / "modelDescription.xml").getroot()
-        self.guid = root.get("guid", "")
+        self.fmi = int(root.get("fmiVersion", "")[0])
+        self.guid = root.get("guid", root.get("instantiationToken", ""))
         self.name = root.get("modelName", "")
-        variables = list(root.iter("ScalarVariable"))
+        listed = root.find("ModelVariables")
+        assert listed is not None
+        variables = [v for v in listed if v.get("causality") != "independent"]
+        tags = [(v[0] if self.fmi == 2 else v).tag for v in variables]
         self.references = {v.get("name", ""): int(v.get("valueReference", "")) for v in variables}
         self.causalities = {v.get("name", ""): v.get("causality", "") for v in variables}
-        self.booleans = {v.get("name", "") for v in variables if v.find("Boolean") is not None}
-        self.library = ctypes.CDLL(str(folder / "binaries" / "linux64" / f"{self.name}.so"))
-        self.library.fmi2Instantiate.restype = c_void_p
+        self.kinds = {v.get("name", ""): KINDS[tag] for v, tag in zip(variables, tags, strict=True)}
+        self.enumerations = {
+            int(v.get("valueReference", ""))
+            for v, tag in zip(variables, tags, strict=True)
+            if tag == "Enumeration"
+        }
+        self.booleans = {name for name, kind in self.kinds.items() if kind == "Boolean"}
+        self.tunable = [v.get("name", "") for v in variables if v.get("variability") == "tunable"]
+        self.binary = folder / "binaries" / HERE[self.fmi] / f"{self.name}.so"
+        self.library = ctypes.CDLL(str(self.binary))
+        if self.fmi == 2:
+            self.library.fmi2Instantiate.restype = c_void_p
 
     def names(self, causality: str) -> list[str]:
         """The variables of a causality."""
         return [name for name, c in self.causalities.items() if c == causality]
+
+
+class _Calls:
+    """The functions of one instance for FMI 2.0."""
+
+    def __init__(
+        self,
+        library: Any,
+        guid: str,
+        resources: bytes,
+        name: bytes,
+        logging: bool,
+        log: Callable[[bytes, int, bytes, bytes], None] | None,
+    ) -> None:
+        self._library = library
+        logger = _LOGGER() if log is None else _LOGGER(lambda _, *said: log(*said))
+        self._callbacks = _Callbacks(logger, _ALLOCATE(), _FREE(), None, None)
+        self.component = c_void_p(
+            library.fmi2Instantiate(
+                name, 1, guid.encode(), resources, byref(self._callbacks), 0, logging
+            )
+        )
+
+    def __call__(self, function: str, *arguments: Any) -> int:
+        return int(getattr(self._library, f"fmi2{function}")(self.component, *arguments))
 
 
 class Instance:
@@ -64,17 +112,23 @@ class Instance:
     ) -> None:
         self.fmu = fmu
         self.log: list[Logged] = []
-        log = _LOGGER(self._logged) if logger else _LOGGER()
-        self._callbacks = _Callbacks(log, _ALLOCATE(), _FREE(), None, None)
-        resources = (fmu.folder / "resources").as_uri().encode()
-        self._component = c_void_p(
-            fmu.library.fmi2Instantiate(
-                name.encode(), 1, fmu.guid.encode(), resources, byref(self._callbacks), 0, logging
+        resources, called = fmu.folder / "resources", name.encode()
+        self._calls: _Calls | fmi3.Calls
+        if fmu.fmi == 2:
+            uri = resources.as_uri().encode()
+            self._calls = _Calls(
+                fmu.library, fmu.guid, uri, called, logging, self._logged if logger else None
             )
-        )
+        else:
+            self._calls = fmi3.Calls(
+                fmu.library, fmu.guid, resources, called, logging,
+                (lambda *said: self._logged(called, *said)) if logger else None,
+            )  # fmt: skip
+            self._calls.enumerations = fmu.enumerations
+        self._component = self._calls.component
         assert self._component
 
-    def _logged(self, _: Any, instance: bytes, status: int, category: bytes, text: bytes) -> None:
+    def _logged(self, instance: bytes, status: int, category: bytes, text: bytes) -> None:
         self.log.append(
             Logged(instance.decode(), status, (category or b"").decode(), text.decode())
         )
@@ -86,8 +140,8 @@ class Instance:
         self.call("FreeInstance")
 
     def call(self, function: str, *arguments: Any) -> int:
-        """Any function, by its name without fmi2."""
-        return int(getattr(self.fmu.library, f"fmi2{function}")(self._component, *arguments))
+        """Any function, by its name without fmi2; one of FMI 3.0 where that is its counterpart."""
+        return self._calls(function, *arguments)
 
     def setup(self, start: float = 0.0) -> int:
         return self.call("SetupExperiment", 0, c_double(0), c_double(start), 0, c_double(0))
@@ -101,9 +155,7 @@ class Instance:
     def initialise(self, **values: float) -> "Instance":
         """Set values and go through initialisation."""
         assert self.setup() == OK
-        for name, value in values.items():
-            flag = name in self.fmu.booleans
-            assert (self.switch({name: bool(value)}) if flag else self.set({name: value})) == OK
+        assert self.assign(values) == OK
         assert (self.enter(), self.exit()) == (OK, OK)
         return self
 
@@ -113,17 +165,30 @@ class Instance:
     def set(self, values: dict[str, float]) -> int:
         return self.set_real([self.fmu.references[name] for name in values], values.values())
 
-    def switch(self, values: dict[str, bool]) -> int:
-        """Set Boolean variables."""
-        return self.set_boolean([self.fmu.references[name] for name in values], values.values())
+    def assign(self, values: Mapping[str, float]) -> int:
+        """Set variables of any type but String, type by type; the first status that is not OK."""
+        for kind in ("Real", "Boolean", "Integer"):
+            chosen = {n: v for n, v in values.items() if self.fmu.kinds[n] == kind}
+            references = [self.fmu.references[n] for n in chosen]
+            set_ = getattr(self, f"set_{kind.lower()}")
+            if chosen and (status := set_(references, chosen.values())) != OK:
+                return int(status)
+        return OK
 
     def set_real(self, references: Sequence[int], values: Iterable[float]) -> int:
         n = len(references)
         return self.call("SetReal", (c_uint * n)(*references), c_size_t(n), (c_double * n)(*values))
 
-    def set_boolean(self, references: Sequence[int], values: Iterable[bool]) -> int:
+    def set_boolean(self, references: Sequence[int], values: Iterable[float]) -> int:
+        return self._set_whole("SetBoolean", references, values)
+
+    def set_integer(self, references: Sequence[int], values: Iterable[float]) -> int:
+        return self._set_whole("SetInteger", references, values)
+
+    def _set_whole(self, function: str, references: Sequence[int], values: Iterable[float]) -> int:
         n = len(references)
-        return self.call("SetBoolean", (c_uint * n)(*references), c_size_t(n), (c_int * n)(*values))
+        numbers = (c_int * n)(*map(int, values))
+        return self.call(function, (c_uint * n)(*references), c_size_t(n), numbers)
 
     def get_real(self, references: Sequence[int]) -> tuple[int, list[float]]:
         n = len(references)

@@ -56,9 +56,11 @@ def build(
     capabilities: Mapping[str, str] | None = None,
     token: str = "{native}",
     complete: bool = False,
+    strings: bool = True,
 ) -> Path:
     """The FMU name.fmu in folder; units by variable, capabilities as attributes (else CAPABLE).
 
+    It has outputs that are Strings only with strings.
     It loads with the right token only. With complete, it has the functions of FMI 3.0 for other
     kinds of FMUs, too, without which FMPy does not load it.
     """
@@ -66,7 +68,7 @@ def build(
     describe = _description_2 if version == "2.0" else _description_3
     platform = fmpy.platform if version == "2.0" else fmpy.platform_tuple
     path = folder / f"{name}.fmu"
-    xml = describe(dict(units or {}), dict(capabilities)).replace("{native}", token)
+    xml = describe(dict(units or {}), dict(capabilities), strings).replace("{native}", token)
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("modelDescription.xml", xml)
         archive.writestr(
@@ -106,7 +108,7 @@ def _unit_definitions() -> str:
     return f'<UnitDefinitions>{units}<Unit name="bare"/></UnitDefinitions>'
 
 
-def _variables(version: str) -> list[tuple[str, str, int, str, str]]:
+def _variables(version: str, strings: bool) -> list[tuple[str, str, int, str, str]]:
     """Name, type, value reference, causality and variability."""
     real, whole = ("Real", "Integer") if version == "2.0" else ("Float64", "UInt64")
     rows = []
@@ -118,7 +120,8 @@ def _variables(version: str) -> list[tuple[str, str, int, str, str]]:
         varies = "tunable" if name == "gain" else "fixed"
         rows.append((name, real, number, "parameter", varies))
     rows += [("x", real, 20, "output", "continuous"), ("now", real, 21, "output", "continuous")]
-    return [*rows, ("steps", whole, 30, "output", "discrete")]
+    rows.append(("steps", whole, 30, "output", "discrete"))
+    return [row for row in rows if strings or row[1] != "String" or row[3] != "output"]
 
 
 def _start(name: str, fmi_type: str) -> str:
@@ -128,8 +131,8 @@ def _start(name: str, fmi_type: str) -> str:
     return ""
 
 
-def _description_2(units: Mapping[str, str], capabilities: Mapping[str, str]) -> str:
-    rows = _variables("2.0")
+def _description_2(units: Mapping[str, str], capabilities: Mapping[str, str], strings: bool) -> str:
+    rows = _variables("2.0", strings)
     index = {name: number for number, (name, *_) in enumerate(rows, 1)}
     variables = ""
     for name, fmi_type, reference, causality, variability in rows:
@@ -160,9 +163,9 @@ def _description_2(units: Mapping[str, str], capabilities: Mapping[str, str]) ->
     )
 
 
-def _description_3(units: Mapping[str, str], capabilities: Mapping[str, str]) -> str:
+def _description_3(units: Mapping[str, str], capabilities: Mapping[str, str], strings: bool) -> str:
     rows = [
-        *_variables("3.0"),
+        *_variables("3.0", strings),
         ("size", "UInt64", 40, "structuralParameter", "fixed"),
         ("size_out", "UInt64", 41, "output", "discrete"),
     ]

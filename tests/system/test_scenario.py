@@ -108,7 +108,7 @@ WRONG_EVENTS = [
     (
         '"sensor_1.reflectance" = 0.6',
         "",
-        r"set is empty; valid: sensor_1.reflectance, sensor_1.surf",
+        r"set is empty; valid: plant\.finger_mass\[1\], plant\.finger_mass\[2\], plant\.fric",
     ),
     ('set = { "sensor_1.reflectance" = 0.6 }', "", r"events\[0\]: set: missing; must be a table"),
     ('"sensor_1.reflectance" = 0.6', "reflectance = 0.6", "must be 'component.variable'"),
@@ -122,9 +122,13 @@ WRONG_EVENTS = [
         "sensor_1.reflectance",
         "sensor_1.reflection",
         r"set\.sensor_1\.reflection: not there; must be a tunable parameter or an input "
-        r"without a connection; valid: sensor_1\.reflectance, sensor_1\.surface, ",
+        r"without a connection; valid: sensor_1\.reflectance, sensor_1\.gain, ",
     ),
-    ("sensor_1.reflectance", "sensor_1.gain", "is a fixed parameter; must be a tunable parameter"),
+    (
+        "sensor_1.reflectance",
+        "plant.object_width",
+        "is a fixed parameter; must be a tunable parameter",
+    ),
     ("sensor_1.reflectance", "sensor_1.intensity", "is a continuous output; must be a tunable"),
     (
         "sensor_1.reflectance",

@@ -32,9 +32,11 @@ _MEANINGS: dict[Causality, str] = {
     "output": "What it gives",
 }
 _KINDS: dict[type[Scalar], Kind] = {float: "Real", int: "Integer", bool: "Boolean"}
+_COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 _FUNCTION = re.compile(
-    r"^static [^;{}#]*?\b(\w+)\([^;{}]*\)\s*\{(.*?)^\}", re.MULTILINE | re.DOTALL
+    r"^static [^;{}#]*?\b(\w+)\([^;{}]*\)\s*\{([^\n]*\}$|.*?^\})", re.MULTILINE | re.DOTALL
 )
+"""A function with its name and body, which ends on its line, or with a brace that begins one."""
 
 
 def c_only(model: Model) -> dict[str, bytes]:
@@ -81,11 +83,12 @@ def write_c(folder: Path, model: Model) -> list[Path]:
 def called_of_libm(texts: Iterable[str]) -> list[str]:
     """Return the functions of libm that the functions in texts called block_... reach, sorted."""
     known = {*LIBM, *EXACT}
-    bodies = {name: body for text in texts for name, body in _FUNCTION.findall(text)}
+    plain = (_COMMENT.sub("", text) for text in texts)
+    bodies = {name: body for text in plain for name, body in _FUNCTION.findall(text)}
     waiting = [name for name in bodies if name.startswith("block_")]
     found: set[str] = set()
     while waiting:
-        for name in re.findall(r"\w+", bodies[waiting.pop()]):
+        for name in re.findall(r"\w+(?=\()", bodies[waiting.pop()]):
             if name not in found and (name in known or name in bodies):
                 found.add(name)
                 waiting += [name] if name in bodies else []

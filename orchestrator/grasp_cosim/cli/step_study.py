@@ -14,6 +14,7 @@ from ..metrics.metric import Metric
 from ..report.step_study import draw_step_study
 from ..system.description import System
 from .frame import NEGATIVE, check_outputs, say, show, together
+from .native import natively
 
 step_study_options = together(
     click.option(
@@ -51,7 +52,10 @@ def study_step(
     of, tolerance = given["quantities"], given["tolerance"]
     check_outputs(given["out"], given["plot"])
     workers = os.cpu_count() or 1
-    study = step_study(system, tolerance, workers=workers, progress=True, of=of, metrics=metrics)
+    with natively(system, given["native"]) as chosen:
+        study = step_study(
+            chosen, tolerance, workers=workers, progress=True, of=of, metrics=metrics
+        )
     folder = given["out"] or Path()
     if given["out"]:
         remove(folder, "step_study.json", "step_study.png")

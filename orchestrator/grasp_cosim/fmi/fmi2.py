@@ -3,6 +3,7 @@
 import ctypes
 from collections import defaultdict, deque
 from collections.abc import Callable, Mapping
+from copy import copy
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from fmpy.fmi2 import (
 from fmpy.logging import addLoggerProxy
 
 from ..interface.interface import Value
+from ..scratch import ScratchFolder
 from .instance import STEP_2, TRANSFER_2, Call, Native
 from .loaded import KEPT, LoadedInstance, keep_message
 
@@ -48,14 +50,18 @@ class FmuInstance(LoadedInstance):
     ENUMERATION = "Integer"
 
     def _instantiate(self, folder: Path) -> FMU2Slave:
-        slave = FMU2Slave(
+        slave = self._opened(folder)
+        slave.instantiate(callbacks=_callbacks, loggingOn=True)
+        return slave
+
+    def _opened(self, folder: Path) -> FMU2Slave:
+        """FMPy's slave with the library from the folder, not instantiated yet."""
+        return FMU2Slave(
             guid=self.interface.guid,
             unzipDirectory=folder,
             modelIdentifier=self.interface.identifier,
             instanceName=self.name,
         )
-        slave.instantiate(callbacks=_callbacks, loggingOn=True)
-        return slave
 
     def _read_log(self) -> list[str]:
         return list(_messages.pop(self.name, ()))
@@ -69,7 +75,8 @@ class FmuInstance(LoadedInstance):
     def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
         """The call that advances by step seconds from the time in clock[0]."""
         bound, address = self._stepping(clock, step, ctypes.c_int(1))
-        return Call(bound, Native(STEP_2, address, self._slave.component, step=step))
+        native = Native(STEP_2, address, self._slave.component, step=step)
+        return Call(bound, native, self._python)
 
     def _wants_the_end(self) -> bool:
         return bool(self._status(self._slave.getBooleanStatus, fmi2Terminated))
@@ -86,3 +93,34 @@ class FmuInstance(LoadedInstance):
             return None
         finally:
             self._read_log()
+
+
+_libraries: dict[tuple[Path, int], tuple[FMU2Slave, ScratchFolder | None]] = {}
+"""What SharedInstance has loaded, and from where, by path and time of change of the FMU."""
+
+
+class SharedInstance(FmuInstance):
+    """One instance of a native twin of ours: without global state, so all share one library.
+
+    It stays loaded. That saves most of what loading takes where a process does many runs.
+    """
+
+    def _unpacked(self) -> Path:
+        _, folder = _libraries.get(self._key, (None, None))
+        return Path(folder.name) if folder else super()._unpacked()
+
+    def _opened(self, folder: Path) -> FMU2Slave:
+        if self._key not in _libraries:
+            _libraries[self._key] = super()._opened(folder), self._folder
+        self._folder = None  # stays, with the library
+        slave = copy(_libraries[self._key][0])
+        slave.instanceName = self.name
+        return slave
+
+    @property
+    def _key(self) -> tuple[Path, int]:
+        path = self.interface.path
+        return path, path.stat().st_mtime_ns
+
+    def _free(self) -> None:
+        self._slave.fmi2FreeInstance(self._slave.component)

@@ -101,7 +101,7 @@ class Fmi3Instance(LoadedInstance):
             return EARLY if status <= WARNING and (said[TERMINATE] or said[SHORT]) else status
 
         native = Native(STEP_3, address, self._slave.component, step=step, flags=flags, last=last)
-        return Call(advance, native)
+        return Call(advance, native, self._python)
 
     def _wants_the_end(self) -> bool:
         return bool(self._flags[TERMINATE])

@@ -17,8 +17,8 @@ OK, WARNING, DISCARD, ERROR, FATAL = 0, 1, 2, 3, 4
 EARLY = 6
 """No FMI status: a step that returned OK, but before its end (FMI 3.0)."""
 
-TRANSFER_2, TRANSFER_3, STEP_2, STEP_3, PYTHON, CLOCK = range(6)
-"""The shapes of a call, as the compiled loop makes it: see master/compiled.py."""
+TRANSFER_2, TRANSFER_3, STEP_2, STEP_3, PYTHON, CLOCK, PACE = range(7)
+"""The shapes of a call, as the compiled loop makes it: see master/loop.c."""
 
 
 class Native(NamedTuple):
@@ -27,8 +27,8 @@ class Native(NamedTuple):
     TRANSFER_2: f(instance, references, n, data). TRANSFER_3: the same and n again.
     STEP_2: f(instance, time, step, 1). STEP_3: f(instance, time, step, 1, &event, &terminate,
     &early, &last), where flags is the address of three bytes for the first three, last that of a
-    double for the last. CLOCK: clock_gettime(instance, references), where references is the address
-    of two words; the time in ns, less size, then goes to data, a double.
+    double for the last. CLOCK: time.monotonic_ns(), less size, goes to data, a double. PACE: wait
+    for the beginning of a step; instance is what realtime/pacer.py keeps for it, data its times.
     """
 
     shape: int
@@ -44,10 +44,14 @@ class Native(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """A bound call that returns an FMI status: as a Python function, and natively if possible."""
+    """A bound call that returns an FMI status: as a Python function, and natively if possible.
+
+    Made natively it keeps_lock (Python's, the GIL) if what it calls would take that back at once.
+    """
 
     python: Callable[[], int]
     native: Native | None = None
+    keeps_lock: bool = False
 
 
 class Instance(Protocol):

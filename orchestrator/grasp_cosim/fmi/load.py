@@ -2,7 +2,7 @@
 
 from ..interface.interface import Interface
 from ..system.parts import Component
-from .fmi2 import FmuInstance
+from .fmi2 import FmuInstance, SharedInstance
 from .fmi3 import Fmi3Instance
 from .instance import Instance
 from .loaded import LoadedInstance
@@ -15,8 +15,10 @@ def load(component: Component) -> Instance:
     InputError where the FMU does not load. The caller closes it.
     """
     if component.isolation == "process":
-        return ProcessInstance(component.name, component.interface)
-    return load_here(component.name, component.interface)
+        return ProcessInstance(component.name, component.loaded)
+    if component.native and component.loaded.version == "2.0":
+        return SharedInstance(component.name, component.loaded)
+    return load_here(component.name, component.loaded)
 
 
 def load_here(name: str, interface: Interface) -> LoadedInstance:

@@ -86,10 +86,9 @@ class LoadedInstance(ABC):
         self._unread: deque[str] = deque(maxlen=KEPT)
         self._said_before = 0  # of these, on longer parts of a step that is divided
         self._read_log()  # forgets what an earlier instance of this name said
-        self._folder = ScratchFolder()
-        self._resources = Path(self._folder.name, "resources")
+        self._folder: ScratchFolder | None = None
         try:
-            self._slave = self._load(Path(self._folder.name))
+            self._slave = self._load(self._unpacked())
         except BaseException:
             self.close()
             raise
@@ -118,7 +117,10 @@ class LoadedInstance(ABC):
     def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
         """The call that advances by step seconds from the time in clock[0]."""
 
-    def _load(self, folder: Path) -> Any:
+    def _unpacked(self) -> Path:
+        """The folder with what an instance here may need of the FMU; InputError if that fails."""
+        self._folder = ScratchFolder()
+        folder = Path(self._folder.name)
         try:
             fmpy.extract(self.interface.path, folder, _used_here)
         except Exception as error:  # FMPy and zipfile raise whatever they like
@@ -128,7 +130,10 @@ class LoadedInstance(ABC):
                     f"{error.strerror}; must have room there, or TMPDIR must be another folder"
                 ) from error
             raise InputError(f"{self.name}: {self.interface.path} is damaged: {error}") from error
-        self._python = (self._resources / "slavemodule.txt").exists()
+        return folder
+
+    def _load(self, folder: Path) -> Any:
+        self._python = (folder / "resources/slavemodule.txt").exists()
         plain = str(folder).replace(" ", "")
         if self._python and quote(plain) != plain:
             raise InputError(
@@ -157,10 +162,16 @@ class LoadedInstance(ABC):
                 said = as_reason(self._messages())
                 warnings.warn(f"{self.name}: {error}{said}", stacklevel=2)
         if self._worst < FATAL:
-            self._slave.freeInstance()
-        if str(self._resources) in sys.path:  # pythonfmu puts it there and leaves it
-            sys.path.remove(str(self._resources))
-        self._folder.cleanup()
+            self._free()
+        if self._folder:
+            resources = str(Path(self._folder.name, "resources"))
+            if resources in sys.path:  # pythonfmu puts it there and leaves it
+                sys.path.remove(resources)
+            self._folder.cleanup()
+
+    def _free(self) -> None:
+        """Free the instance, and the library with it."""
+        self._slave.freeInstance()
 
     def enter_initialization(
         self, values: Mapping[str, Value], stop: float | None, start: float = 0.0
@@ -205,7 +216,8 @@ class LoadedInstance(ABC):
             *again,
         )
         instance, first = self._slave.component, ctypes.addressof(references)
-        return Call(bound, Native(self.SHAPE, address, instance, first, count, place))
+        native = Native(self.SHAPE, address, instance, first, count, place)
+        return Call(bound, native, self._python)
 
     def _suffix(self, fmi_type: str) -> str:
         """The end of the names of the functions that set and get an FMI type."""

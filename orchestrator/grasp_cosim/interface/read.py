@@ -63,12 +63,15 @@ def read_interface(path: Path) -> Interface:
 
     An input has one source, so its aliases are left out.
     """
-    check_fmu_file(path)
-    return _for_master(path.resolve(), path.stat().st_mtime_ns)
+    if not path.is_file():  # which is asked some hundred times a run
+        check_fmu_file(path)
+    found = path.stat()
+    return _for_master(path, (found.st_dev, found.st_ino, found.st_mtime_ns))
 
 
 @lru_cache(maxsize=64)
-def _for_master(path: Path, modified: int) -> Interface:
+def _for_master(path: Path, identity: tuple[int, ...]) -> Interface:
+    path = path.resolve()
     found = describe(path)
     if found.version == "1.0":
         raise InputError(f"{path}: FMI 1.0; must be an FMI 2.0 or 3.0 co-simulation FMU")

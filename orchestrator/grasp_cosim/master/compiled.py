@@ -1,240 +1,243 @@
-"""The hot loop compiled with numba (the optional extra `fast`).
+"""The hot loop in C: compiled by the user's compiler at the first need, kept, and loaded.
 
-What the loop calls gets its counterparts here: calls of FMI functions by their addresses, and
-typed buffers by theirs. The GIL is held throughout, so a Python FMU does not have to wait for it.
+What is kept is a file of its own for each state of the source, in the user's cache folder, with a
+check sum at its end; it serves every later process, also one without a compiler. Where no component
+is Python the loop runs without Python's lock (the GIL), which callbacks take for themselves.
 """
 
 import ctypes
 import hashlib
 import os
-from collections.abc import Callable, Sequence
+import platform
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
 from functools import lru_cache
-from inspect import Parameter, Signature
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
-from ..checks import extra_module
+from ..errors import InputError
+from ..files import in_one_piece
 from ..fmi import instance
-from ..fmi.instance import (
-    CLOCK,
-    EARLY,
-    PYTHON,
-    STEP_2,
-    STEP_3,
-    TRANSFER_2,
-    TRANSFER_3,
-    Call,
-    Native,
-)
+from ..fmi.instance import PYTHON, Native
+from ..realtime import meter, pacer
+from ..scratch import ScratchFolder
+from ..system.parts import NANOSECONDS
 from . import loop
+from .plan import Plan
 
-_WHOLE = [f"{sign}int{bits}" for bits in (8, 16, 32, 64) for sign in ("", "u")]
-ELEMENTS = {name: code for code, name in enumerate(["float32", "boolean", *_WHOLE])}
-"""The element types of buffers, as numba names them, and their codes."""
+SOURCE = Path(__file__).with_name("loop.c")
 
-ARGUMENTS = {
-    PYTHON: "",
-    CLOCK: "iw",
-    TRANSFER_2: "wwww",
-    TRANSFER_3: "wwwww",
-    STEP_2: "wddi",
-    STEP_3: "wddbwwww",
-}
-"""The arguments of C functions by the shape of their calls, a letter each: w is a word or an
-address, d a double, i an int, b a byte.
-"""
+ELEMENTS = (
+    *("float32", "bool", "int8", "uint8", "int16", "uint16"),
+    *("int32", "uint32", "int64", "uint64"),
+)
+"""The element types of buffers; the source has them in capitals."""
 
+FLAGS = ("-std=c99", "-O2", "-fPIC", "-shared", "-ffp-contract=off")
+"""Without contraction a*b + c is rounded twice, as in Python."""
 
-class BufferTable(NamedTuple):
-    """Buffers of other types than float64: codes of their types, and addresses."""
+REMEDY = "it needs gcc or clang, or `pip install ziglang`; engine python needs none"
 
-    code: npt.NDArray[np.int64]
-    address: npt.NDArray[np.int64]
+_CHECKED = 32
+"""Bytes of the check sum at the end of what is kept."""
 
 
-def call_table(calls: Sequence[Call]) -> tuple[Native, list[Any]]:
-    """Return the calls as columns, each field of the Native an array; and what must outlive them.
+class _Operation(ctypes.Structure):
+    _fields_ = [(n, ctypes.c_int64) for n in ("kind", "first", "last", "period", "phase")]
 
-    Those without a native form are called back in Python.
-    """
-    callbacks = [ctypes.PYFUNCTYPE(ctypes.c_int)(call.python) for call in calls]
-    natives = [
-        call.native or Native(PYTHON, ctypes.cast(callback, ctypes.c_void_p).value or 0, 0)
-        for call, callback in zip(calls, callbacks, strict=True)
+
+class _Connection(ctypes.Structure):
+    _fields_ = [
+        *((n, ctypes.c_int64) for n in ("source", "target")),
+        *((n, ctypes.c_double) for n in ("factor", "offset")),
     ]
-    table = Native._make(
-        np.array([call[i] for call in natives], np.float64 if name == "step" else np.int64)
-        for i, name in enumerate(Native._fields)
-    )
-    return table, callbacks
 
 
-def buffer_table(buffers: Sequence[npt.NDArray[Any]]) -> BufferTable:
-    """Return the table of the given buffers, which must outlive it."""
-    names = [b.dtype.name.replace("bool", "boolean") for b in buffers]
-    return BufferTable(
-        np.array([ELEMENTS[name] for name in names], np.int64),
-        np.array([b.ctypes.data for b in buffers], np.int64),
-    )
+class _Cast(ctypes.Structure):
+    _fields_ = [(n, ctypes.c_int64) for n in ("buffer", "index", "slot")]
+
+
+class _Buffer(ctypes.Structure):
+    _fields_ = [("element", ctypes.c_int64), ("data", ctypes.c_void_p)]
+
+
+class _Call(ctypes.Structure):
+    _fields_ = [
+        ("shape", ctypes.c_int64),
+        *((n, ctypes.c_void_p) for n in ("function", "instance", "references")),
+        ("size", ctypes.c_int64),
+        ("data", ctypes.c_void_p),
+        ("step", ctypes.c_double),
+        *((n, ctypes.c_void_p) for n in ("flags", "last")),
+    ]
+
+
+class _Plan(ctypes.Structure):
+    _fields_ = [
+        ("operations", ctypes.POINTER(_Operation)),
+        ("size", ctypes.c_int64),
+        ("connections", ctypes.POINTER(_Connection)),
+        ("casts", ctypes.POINTER(_Cast)),
+        ("buffers", ctypes.POINTER(_Buffer)),
+        ("calls", ctypes.POINTER(_Call)),
+        ("values", ctypes.c_void_p),
+        ("width", ctypes.c_int64),
+        ("clock", ctypes.c_void_p),
+    ]
+
+
+class _Shared(ctypes.Structure):
+    _fields_ = [
+        (n, ctypes.c_int64) for n in ("operation", "status", "done", "taken", "halt", "ended")
+    ]
+
+
+class CompiledLoop:
+    """The compiled loop over a plan.
+
+    alone says that it makes no call of Python at all. It then may run while another thread looks
+    at shared.done, the number of the steps whose rows are there, sets shared.taken once it does
+    not need the rows of so many any more, or sets shared.halt. shared.ended is the wall time in ns
+    at which the last step ended.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        """InputError as of library()."""
+        self._callbacks = [ctypes.CFUNCTYPE(ctypes.c_int)(call.python) for call in plan.calls]
+        calls = [
+            call.native or Native(PYTHON, ctypes.cast(callback, ctypes.c_void_p).value or 0, 0)
+            for call, callback in zip(plan.calls, self._callbacks, strict=True)
+        ]
+        buffers = [(ELEMENTS.index(b.dtype.name), b.ctypes.data) for b in plan.buffers]
+        self._plan = plan
+        self._tables = _Plan(
+            _table(_Operation, plan.operations), len(plan.operations),
+            _table(_Connection, plan.connections), _table(_Cast, plan.casts),
+            _table(_Buffer, buffers), _table(_Call, calls),
+            plan.values.ctypes.data, len(plan.values), plan.clock.ctypes.data,
+        )  # fmt: skip
+        self.shared = _Shared()
+        self.alone = all(call.native and not call.keeps_lock for call in plan.calls)
+        self._places = ctypes.addressof(self._tables), ctypes.addressof(self.shared)
+        self._run = library(any(call.keeps_lock for call in plan.calls)).run
+
+    def __call__(
+        self, rows: Any, operation: int, start: int, stop: int, step_ns: int, row: int | None = None
+    ) -> tuple[int, int, int]:
+        """As loop.run(). Given the row of the first step, rows are filled round and round."""
+        tables, shared = self._places
+        self.shared.done = start
+        if row is None:
+            self.shared.taken, row = start, 0
+        place, room = rows.ctypes.data, len(rows)
+        step = self._run(tables, place, room, row, operation, start, stop, step_ns, shared)
+        return step, self.shared.operation, self.shared.status
+
+
+def _table(row: type[ctypes.Structure], rows: Sequence[Any]) -> Any:
+    return (row * len(rows))(*rows)
 
 
 @lru_cache(maxsize=1)
-def compiled_loop() -> Callable[..., tuple[int, int, int]]:
-    """Return loop.run() compiled. What is compiled is kept in a cache folder.
+def _file() -> Path | ScratchFolder:
+    """The library on disk: the one that is kept, or else built anew; InputError as of library().
 
-    InputError without numba.
+    A folder that ends with this process where nothing can be kept.
     """
-    numba = extra_module("numba", "it compiles the loop", "fast")
-    _register_invoke()
-    _register_buffers()
-    before = numba.config.CACHE_DIR
+    if kept := _kept():
+        return kept
+    folder = ScratchFolder()
+    made = Path(folder.name, "loop.so")
+    _build(made)
+    content = made.read_bytes()
+    with suppress(OSError, RuntimeError), in_one_piece(_place()) as part:
+        part.write_bytes(content + _check_sum(content))
+    return _kept() or folder
+
+
+@lru_cache(maxsize=2)
+def library(locked: bool) -> ctypes.CDLL:
+    """The compiled loop, which runs with Python's lock held (the GIL) or without.
+
+    InputError where it has to be built and there is no compiler, or it fails.
+    """
+    file = _file()
+    path = str(file) if isinstance(file, Path) else f"{file.name}/loop.so"
     try:
-        numba.config.CACHE_DIR = str(_cache())
-        return numba.njit(loop.run, cache=True)  # type: ignore[no-any-return]
-    except RuntimeError:  # the user has no home, or no folder to keep it in can be written to
-        return numba.njit(loop.run)  # type: ignore[no-any-return]
-    finally:
-        numba.config.CACHE_DIR = before
+        found: ctypes.CDLL = (ctypes.PyDLL if locked else ctypes.CDLL)(path)
+    except OSError as error:
+        raise InputError(f"{path}: the compiled loop does not load: {error}; {REMEDY}") from error
+    found.run.restype = ctypes.c_int64
+    whole, place = ctypes.c_int64, ctypes.c_void_p
+    found.run.argtypes = [place, place, *[whole] * 6, place]
+    return found
 
 
-def _cache() -> Path:
-    """Return a folder for this very source: numba looks for changes in loop.py only."""
-    files = (__file__, loop.__file__, instance.__file__)  # with all constants that are compiled in
-    sources = b"".join(Path(f).read_bytes() for f in files)
+def is_there() -> bool:
+    """Return True if the compiled loop need not be built."""
+    return bool(library.cache_info().currsize or _kept())
+
+
+def compiler() -> list[str] | None:
+    """The command of a C compiler: that of CC, cc, gcc, clang, or the package ziglang."""
+    named = shlex.split(os.environ.get("CC", ""))
+    for command in (named, ["cc"], ["gcc"], ["clang"]):
+        if command and shutil.which(command[0]):
+            return command
+    return [sys.executable, "-m", "ziglang", "cc"] if find_spec("ziglang") else None
+
+
+def _build(out: Path) -> None:
+    command = compiler()
+    if command is None:
+        raise InputError(f"engine compiled: there is no C compiler (CC, cc, gcc, clang); {REMEDY}")
+    done = subprocess.run(  # noqa: S603 - the user's compiler
+        [*command, *FLAGS, *_constants(), "-o", out, SOURCE],
+        capture_output=True, text=True, errors="replace",
+    )  # fmt: skip
+    if done.returncode:
+        lines = done.stderr.splitlines()
+        said = next((line for line in lines if "error" in line), f"exit code {done.returncode}")
+        raise InputError(f"engine compiled: {shlex.join(command)}: {said}; {REMEDY}")
+
+
+def _constants() -> list[str]:
+    """The numbers that the source shares with the other modules, as options of a compiler."""
+    shared = {
+        **{n: getattr(loop, n) for n in ("COPY", "SCALE", "STORE", "LOAD", "LOAD_LONG")},
+        **{n: getattr(loop, n) for n in ("CALL", "STEP", "TOO_LONG", "EXACT", "WORST")},
+        **{n: getattr(loop, n) for n in ("FULL", "HALTED", "OVERRUN")},
+        **{n: getattr(instance, n) for n in ("TRANSFER_2", "TRANSFER_3", "STEP_2", "STEP_3")},
+        **{n: getattr(instance, n) for n in ("CLOCK", "PACE", "EARLY")},
+        **{n: getattr(meter, n) for n in ("ARRIVED", "LATE", "DUE", "BEGIN")},
+        "SLICE": pacer.SLICE_NS,
+        "NAP": round(pacer.NAP * NANOSECONDS),
+        **{name.upper(): code for code, name in enumerate(ELEMENTS)},
+    }
+    return [f"-D{name}={value!r}" for name, value in shared.items()]
+
+
+def _place() -> Path:
+    """Where it is kept; RuntimeError where the user has no home."""
+    made_of = [SOURCE.read_text("utf-8"), *FLAGS, *_constants(), sys.platform, platform.machine()]
+    name = hashlib.blake2b("\0".join(made_of).encode(), digest_size=8).hexdigest()
     base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(base, "grasp-cosim", hashlib.sha256(sources).hexdigest()[:16])
+    return Path(base, "grasp-cosim", name, "loop.so")
 
 
-def _intrinsic(names: str, result: str, generate: Callable[..., Any]) -> Any:
-    """Return a function of compiled code whose body is what `generate` builds.
-
-    `names` are those of its arguments, all of type int64 but for d... of float64; `result` is the
-    numba type that it returns. `generate` takes numba's context, the builder and the arguments.
-    """
-    from numba import types
-    from numba.extending import intrinsic
-
-    def typed(typing: Any, *given: Any) -> Any:
-        taken = [types.float64 if n[0] == "d" else types.int64 for n in names.split()]
-        made = getattr(types, result)(*taken)
-        return made, lambda context, builder, _, values: generate(context, builder, *values)
-
-    typed.__signature__ = Signature(  # type: ignore[attr-defined]
-        [Parameter(n, Parameter.POSITIONAL_ONLY) for n in ["typing", *names.split()]]
-    )
-    return intrinsic(typed)
+def _kept() -> Path | None:
+    """What is kept, if it is there and not damaged."""
+    try:
+        content = (place := _place()).read_bytes()
+    except (OSError, RuntimeError):
+        return None
+    return place if content[-_CHECKED:] == _check_sum(content[:-_CHECKED]) else None
 
 
-def _c_function(arguments: str) -> Any:
-    """Return an intrinsic that calls the C function at an address: see ARGUMENTS."""
-    from llvmlite import ir
-
-    word, status = ir.IntType(64), ir.IntType(32)
-    kinds = {"w": word, "d": ir.DoubleType(), "i": status, "b": ir.IntType(8)}
-    declared = [kinds[a] for a in arguments]
-
-    def generate(context: Any, builder: Any, address: Any, *given: Any) -> Any:
-        pointer = ir.FunctionType(status, declared).as_pointer()
-        passed = [
-            builder.trunc(value, kinds[a]) if a in "ib" else value
-            for a, value in zip(arguments, given, strict=True)
-        ]
-        return builder.call(builder.inttoptr(address, pointer), passed)
-
-    names = [f"{'d' if a == 'd' else 'w'}{i}" for i, a in enumerate(arguments)]
-    return _intrinsic(" ".join(["address", *names]), "int32", generate)
-
-
-def _register_invoke() -> None:
-    """Teach numba invoke(): a call by its shape."""
-    from numba import carray
-    from numba.core import types
-    from numba.extending import overload
-
-    call_python, call_clock, transfer_2, transfer_3, step_2, step_3 = (
-        _c_function(ARGUMENTS[shape])
-        for shape in (PYTHON, CLOCK, TRANSFER_2, TRANSFER_3, STEP_2, STEP_3)
-    )
-    pointer = _intrinsic(
-        "address",
-        "voidptr",
-        lambda context, builder, address: builder.inttoptr(
-            address, context.get_value_type(types.voidptr)
-        ),
-    )
-
-    @overload(loop.invoke)
-    def invoke(calls: Any, i: Any, clock: Any) -> Any:
-        def compiled(calls: Any, i: Any, clock: Any) -> Any:
-            shape, f, instance = calls.shape[i], calls.function[i], calls.instance[i]
-            refs, size, data = calls.references[i], calls.size[i], calls.data[i]
-            if shape == TRANSFER_2:
-                return transfer_2(f, instance, refs, size, data)
-            if shape == STEP_2:
-                return step_2(f, instance, clock[0], calls.step[i], 1)
-            if shape == TRANSFER_3:
-                return transfer_3(f, instance, refs, size, data, size)
-            if shape == STEP_3:
-                flags, last = calls.flags[i], calls.last[i]
-                time, step = clock[0], calls.step[i]
-                status = step_3(f, instance, time, step, 1, flags, flags + 1, flags + 2, last)
-                said = carray(pointer(flags), 3, np.uint8)
-                return EARLY if status <= loop.WORST and (said[1] or said[2]) else status
-            if shape == CLOCK:
-                status = call_clock(f, instance, refs)
-                now = carray(pointer(refs), 2, np.int64)
-                carray(pointer(data), 1, np.float64)[0] = now[0] * 1_000_000_000 + now[1] - size
-                return status
-            return call_python(f)
-
-        return compiled
-
-
-def _register_buffers() -> None:
-    """Teach numba load() and store(): by the code of the element type, the same for each."""
-    from numba import types
-    from numba.core import cgutils
-    from numba.extending import overload
-
-    def elements(context: Any, builder: Any, code: Any, address: Any, index: Any) -> Any:
-        """Build, for the type of each code, what follows where it is that of the buffer."""
-        for name, number in ELEMENTS.items():
-            element = getattr(types, name)
-            with builder.if_then(builder.icmp_signed("==", code, code.type(number))):
-                start = builder.inttoptr(address, context.get_data_type(element).as_pointer())
-                yield element, builder.gep(start, [index])
-
-    def generate_load(context: Any, builder: Any, code: Any, address: Any, index: Any) -> Any:
-        result = cgutils.alloca_once(builder, context.get_value_type(types.float64))
-        for element, place in elements(context, builder, code, address, index):
-            found = context.unpack_value(builder, element, place)  # a byte but 0 is true, as in C
-            builder.store(context.cast(builder, found, element, types.float64), result)
-        return builder.load(result)
-
-    def generate_store(
-        context: Any, builder: Any, code: Any, address: Any, index: Any, value: Any
-    ) -> Any:
-        for element, place in elements(context, builder, code, address, index):
-            cast = context.cast(builder, value, types.float64, element)
-            context.pack_value(builder, element, cast, place)
-        return context.get_dummy_value()
-
-    load_element = _intrinsic("code address index", "float64", generate_load)
-    store_element = _intrinsic("code address index double", "void", generate_store)
-
-    @overload(loop.load)
-    def load(buffers: Any, i: Any, index: Any) -> Any:
-        def compiled(buffers: Any, i: Any, index: Any) -> Any:
-            return load_element(buffers.code[i], buffers.address[i], index)
-
-        return compiled
-
-    @overload(loop.store)
-    def store(buffers: Any, i: Any, index: Any, value: Any) -> Any:
-        def compiled(buffers: Any, i: Any, index: Any, value: Any) -> Any:
-            store_element(buffers.code[i], buffers.address[i], index, value)
-
-        return compiled
+def _check_sum(content: bytes) -> bytes:
+    return hashlib.blake2b(content, digest_size=_CHECKED).digest()

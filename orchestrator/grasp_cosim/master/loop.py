@@ -21,6 +21,9 @@ TOO_LONG = 100
 RAISED = 101
 """The status of a Python call that raised; the exception waits in the plan."""
 
+FULL, HALTED, OVERRUN = 102, 103, 104
+"""Of the compiled loop alone: the rows have no room left; it was halted; a late step ends it."""
+
 EXACT = 2.0**53
 """Integers of a smaller magnitude are exact as a float64."""
 

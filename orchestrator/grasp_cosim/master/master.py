@@ -3,8 +3,10 @@
 The schemes, components with a longer step and time are in the README of the orchestrator.
 """
 
+import os
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +19,8 @@ from ..recording.result import Rejection
 from ..system.description import System
 from ..system.parts import NANOSECONDS, Port
 from . import loop
+from .aside import Aside
+from .compiled import CompiledLoop
 from .engine import Engine, make_loop
 from .initialisation import Propagation
 from .plan import Planner, slots_of
@@ -26,11 +30,17 @@ from .scenario import Scenario
 CHUNK = 1024
 """The most steps between two times that rows are handed on."""
 
+ROOM = 1 << 15
+"""The same where another thread hands them on."""
+
 ENOUGH = 32
 """The rows that advance() collects before it hands them on: one alone costs more than a step."""
 
 LONG = 0.1
 """s of wall time after which it hands on any."""
+
+SPARE = 5e7
+"""ns that this thread may take at a time for what listeners have put off."""
 
 RowReceiver = Callable[[npt.NDArray[np.int64], npt.NDArray[np.float64]], None]
 """Takes step numbers and rows of all values; the rows are reused afterwards."""
@@ -61,12 +71,19 @@ class Master:
             pacer.bind(self.values[len(self.slots) :], self._hand_on_until)
         self.scenario = Scenario(system, instances, self.slots, self.values)
         self._receive = receive
+        self.meanwhile: Callable[[], None] = lambda: None
+        """Called while the loop of a run in real time goes on without Python's lock."""
         self.plan = Planner(
             system, instances, self.slots, self.values, self.scenario, self.texts, pacer
         ).plan()
         self._pacer = pacer
         self._loop = make_loop(self.plan, engine, None if pacer else self.total_steps)
-        self._rows = np.empty((CHUNK, len(self.values)))
+        self._alone = None
+        if pacer is not None and isinstance(self._loop, CompiledLoop) and self._loop.alone:
+            self._alone = self._loop
+        self._rows = np.empty((ROOM if self._alone else CHUNK, len(self.values)))
+        self._rows.fill(0.0)  # its memory is there from now on
+        self._cpus = os.sched_getaffinity(0) if self._alone else ()
         self._base = self._handed_on = 0
         self._handed_on_at = time.monotonic()
 
@@ -92,6 +109,11 @@ class Master:
         self._receive(np.zeros(1, np.int64), self.values[np.newaxis])
         self._handed_on_at = time.monotonic()
 
+    @property
+    def runs_alone(self) -> bool:
+        """True if the loop of a run in real time needs nothing of Python's until it ends."""
+        return self._alone is not None
+
     def advance(self, steps: int) -> int:
         """Do the given number of steps, or fewer where the stop time is nearer; how many it were.
 
@@ -103,14 +125,15 @@ class Master:
         end = min(first + steps, self.total_steps)
         try:
             while self.steps_done < end:
-                self._chunk(min(self._base + CHUNK, end))
+                self._chunk(end if self._alone else min(self._base + CHUNK, end))
         except HaltError:
             pass
         except OverrunError:
             assert self._pacer is not None  # noqa: S101 - who else has raised it
             raise SimulationError(self._pacer.verdict()) from None
         fresh = self._waiting()[max(first - self._handed_on, 0) :]
-        if self._enough() or not np.isfinite(fresh).all():
+        wraps = len(self._waiting()) < self.steps_done - self._handed_on
+        if self._enough() or wraps or not np.isfinite(fresh).all():
             self.hand_on()
         return self.steps_done - first
 
@@ -122,19 +145,22 @@ class Master:
     def _hand_on_until(self, step: int) -> None:
         """Hand on the rows up to a step that is done; the pacer does while it waits in the loop."""
         self.steps_done = step
-        rows = self._waiting()
-        if not len(rows):
-            return
-        steps = np.arange(self._handed_on + 1, self.steps_done + 1)
-        self._handed_on, self._handed_on_at = self.steps_done, time.monotonic()
-        if self._pacer is None:
-            self._receive(steps, rows)
-        else:
+        while len(rows := self._waiting()):
+            steps = self._handed_on + np.arange(1, len(rows) + 1)
+            self._handed_on, self._handed_on_at = int(steps[-1]), time.monotonic()
             times = rows[:, len(self.slots) :]
-            self._pacer.record(steps, times, lambda: self._receive(steps, rows))
+            if self._pacer is None:
+                self._receive(steps, rows)
+            elif self._alone:
+                self._pacer.record_aside(steps, times)
+                self._receive(steps, rows)
+            else:
+                self._pacer.record(steps, times, partial(self._receive, steps, rows))
 
     def _waiting(self) -> npt.NDArray[np.float64]:
-        return self._rows[self._handed_on - self._base : self.steps_done - self._base]
+        """Rows that wait to be handed on, as far as they are in one piece."""
+        first = (self._handed_on - self._base) % len(self._rows)
+        return self._rows[first : first + self.steps_done - self._handed_on]
 
     def _enough(self) -> bool:
         """Return True if the rows are many, have waited long or include the last one."""
@@ -147,13 +173,17 @@ class Master:
     def _chunk(self, stop: int) -> None:
         """Run the loop until stop; hand the rows on where there is no room left, or it fails."""
         try:
-            self._run(stop)
+            if self._alone and self._pacer:
+                self._run_alone(stop, self._alone, self._pacer)
+            else:
+                self._run(stop)
             if self._pacer is not None and self.steps_done == self.total_steps:
-                self._pacer.finish(self.total_steps)
+                ended = self._alone.shared.ended if self._alone else None
+                self._pacer.finish(self.total_steps, ended)
         except BaseException:
             self.hand_on()
             raise
-        if self.steps_done == self._base + CHUNK:
+        if self.steps_done == self._base + CHUNK and not self._alone:
             self.hand_on()
 
     def _run(self, stop: int) -> None:
@@ -170,6 +200,46 @@ class Master:
                     operation += 1
         finally:  # an interruption of the loop does not say how far it came; the pacer knows more
             self.steps_done = max(step, self._handed_on)
+
+    def _run_alone(self, stop: int, compiled: CompiledLoop, pacer: Pacer) -> None:
+        """The same in real time without any call of Python; another thread hands the rows on."""
+        step, operation, status, shared = self.steps_done, 0, 0, compiled.shared
+        shared.done, shared.taken, shared.halt = step, self._handed_on, int(pacer.halted())
+
+        def halt() -> None:
+            shared.halt = 1
+
+        def hand_on() -> None:
+            self._hand_on_until(shared.done)
+            shared.taken = self._handed_on
+            if pacer.spare is not None:
+                pacer.spare(SPARE)
+            self.meanwhile()
+            if pacer.halted():
+                halt()
+
+        pacer.hand_over()
+        try:
+            with Aside(hand_on, halt, self._cpus) as aside:
+                while step < stop:
+                    row = (step - self._base) % len(self._rows)
+                    step, operation, status = compiled(
+                        self._rows, operation, step, stop, self.system.step_ns, row
+                    )
+                    if status == loop.OVERRUN:
+                        raise OverrunError
+                    if status == loop.HALTED:
+                        if pacer.halted() or aside.failed:
+                            raise HaltError
+                        shared.halt = 0
+                    elif status == loop.FULL:
+                        time.sleep(LONG)
+                    elif status:
+                        self._resolve(step, operation, status)
+                        operation += 1
+        finally:
+            self.steps_done = shared.done
+            pacer.take_over(status == loop.OVERRUN)
 
     def _resolve(self, step: int, operation: int, status: int) -> None:
         """Make good for a step that was rejected; any other bad status ends the run."""

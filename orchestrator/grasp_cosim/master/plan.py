@@ -116,6 +116,10 @@ class Planner:
             for name in names:
                 self._step(name)
                 self._stamp()
+        waits, *others = self.made.calls
+        if self.pacer is not None and all(c.native and not c.keeps_lock for c in others):
+            native = self.pacer.native(self.system.total_steps)
+            self.made.calls[0] = Call(waits.python, native)
         return self.made
 
     def _move(self, name: str, phase: int) -> None:

@@ -105,7 +105,8 @@ class Session:
                     self._master.initialise()
             self._tell(self._early())
             if realtime and self.pacer:
-                granted = privileges(realtime, self.pacer.sleeps)
+                sleeps = self.pacer.sleeps or self._master.runs_alone
+                granted = privileges(realtime, sleeps)
                 self._privileges = self._stack.enter_context(granted)
                 self.pacer.breathes = realtime.priority is not None
             for line in self._privileges.refused:
@@ -194,6 +195,14 @@ class Session:
         except BaseException:
             self._failed = True
             raise
+
+    def shown_by(self, show: Callable[[], None]) -> int:
+        """Have `show` called while a long step goes on; returns the steps that are best at first.
+
+        These are all of them where a run in real time needs no look in between.
+        """
+        self._master.meanwhile = show
+        return self._master.total_steps if self._master.runs_alone else 1
 
     def __getitem__(self, name: str) -> Any:
         """The value now of an output or a connected input, by a name like 'plant.gap[1]'.
@@ -367,11 +376,15 @@ def _drive(session: Session, progress: bool) -> None:
             bar_format="{l_bar}{bar}| {n:.2f}/{total:.2f} s [{elapsed}<{remaining}]{postfix}",
         ) as bar,
     ):
-        steps, start = 1, time.perf_counter()
-        while not session.halt.is_set() and session.step(steps):
+
+        def show() -> None:
             if session.pacer and not bar.disable:
                 bar.set_postfix_str(session.pacer.live(), refresh=False)
             bar.update(session.time - bar.n)
+
+        steps, start = session.shown_by(show), time.perf_counter()
+        while not session.halt.is_set() and session.step(steps):
+            show()
             now = time.perf_counter()
             steps = max(1, min(2 * steps, int(steps * LOOK / (now - start))))
             start = now

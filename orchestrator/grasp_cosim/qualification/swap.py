@@ -77,6 +77,7 @@ def prepare_swap(
         place = replace(
             place,
             fmu=candidate,
+            native=None,
             rename=rename,
             values=given,
             isolation=isolation,

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ..fmi.instance import CLOCK, Call, Native
+from ..fmi.instance import CLOCK, PACE, Call, Native
 from ..system.description import System
 from .meter import ARRIVED, BEGIN, DUE, HEAD, LATE, Meter, Steps, Table
 from .options import Realtime
@@ -21,6 +21,9 @@ from .timing import Timing
 
 SPIN_NS = 200_000
 """Before the deadline the pacer does not sleep any more: it may be woken too late."""
+
+MOST_SPIN = 0.85
+"""The most of a period that it spins: a real-time priority is broken off where it never sleeps."""
 
 SLICE_NS = 50_000_000
 """The longest sleep between two looks at Ctrl-C."""
@@ -44,6 +47,18 @@ class OverrunError(Exception):
 
 class HaltError(Exception):
     """The run was interrupted while it waited for the beginning of a step."""
+
+
+class _State(ctypes.Structure):
+    """What compiled code knows of a pacer: see master/loop.c."""
+
+    _fields_ = [
+        (name, ctypes.c_int64)
+        for name in (
+            *("origin", "base", "base_step", "numerator", "denominator", "spin", "slept"),
+            *("breath", "shifts", "stops", "arrived", "late"),
+        )
+    ]
 
 
 class Clock(NamedTuple):
@@ -70,10 +85,11 @@ class Pacer:
         period = realtime.period(system.step_ns)
         self.meter = Meter(system, realtime, period)
         self._period = period.as_integer_ratio()
+        self._spin = min(SPIN_NS, int(MOST_SPIN * period))
         self.breathes = False
         """True if it has to sleep from time to time for the sake of other processes."""
         self._policy = realtime.overrun
-        self._halted = halted
+        self.halted = halted
         self._clock = clock or Clock()
         self._now = self._clock.now
         self._origin = self._now()
@@ -87,8 +103,8 @@ class Pacer:
         self.spare: Callable[[float], bool] | None = None
         """Does something that may wait within so many ns; False if there is nothing to do."""
         self._measuring = self._recording = 0
+        self._state = _State()
         self._head: Any = memoryview(bytearray(8 * HEAD)).cast("d")
-        self._keep: list[Any] = []
 
     @property
     def sleeps(self) -> bool:
@@ -121,12 +137,35 @@ class Pacer:
 
         if now is not time.monotonic_ns or not HAS_CLOCK:
             return Call(python)
-        seconds = np.zeros(2, np.int64)
-        self._keep += [seconds, data]
-        function = ctypes.CDLL(None).clock_gettime
-        address = ctypes.cast(function, ctypes.c_void_p).value or 0
-        words, place = seconds.ctypes.data, data.ctypes.data
-        return Call(python, Native(CLOCK, address, time.CLOCK_MONOTONIC, words, origin, place))
+        return Call(python, Native(CLOCK, 0, 0, size=origin, data=data.ctypes.data))
+
+    def native(self, steps: int) -> Native | None:
+        """The same as calling it, in compiled code that nobody else has to wait for; None where
+        that is not possible in a run of so many steps. The state is handed over meanwhile.
+        """
+        if self._now is not time.monotonic_ns or not HAS_CLOCK:
+            return None
+        if self._period[0] * steps >= 2**62 or self._period[1] >= 2**62:
+            return None
+        head = np.frombuffer(self._head)
+        return Native(PACE, 0, ctypes.addressof(self._state), data=head.ctypes.data)
+
+    def hand_over(self) -> None:
+        """Have compiled code go on from here: see native()."""
+        state = self._state
+        state.origin, state.base, state.slept = self._origin, self._base, self._slept
+        state.base_step = -1 if self._base_step is None else self._base_step
+        state.numerator, state.denominator = self._period
+        state.spin, state.breath = self._spin, BREATH_NS if self.breathes else 0
+        state.shifts, state.stops = self._policy == "continue", self._policy == "stop"
+
+    def take_over(self, overrun: bool) -> None:
+        """Go on from where compiled code came to; `overrun` if it was to stop at one."""
+        state = self._state
+        self._base, self._slept = state.base, state.slept
+        self._base_step = None if state.base_step < 0 else state.base_step
+        if overrun:
+            self._end = state.arrived, state.late
 
     def __call__(self, step: int) -> None:
         """Wait for the beginning of a step.
@@ -142,9 +181,12 @@ class Pacer:
         head = self._head
         head[ARRIVED], head[LATE], head[DUE], head[BEGIN] = arrived, late, due, begin
 
-    def finish(self, step: int) -> None:
-        """The last step has just ended, where another step would begin; OverrunError as above."""
-        self._end = self._arrive(step)
+    def finish(self, step: int, now: int | None = None) -> None:
+        """The last step has just ended, or at `now`, where another step would begin.
+
+        OverrunError as above.
+        """
+        self._end = self._arrive(step, now)
 
     def record(self, steps: Steps, rows: Table, hand_on: Callable[[], None]) -> None:
         """Take steps that were done: the numbers they lead to, and what was written of each.
@@ -154,6 +196,10 @@ class Pacer:
         """
         self._taken = int(steps[-1])
         self._timed(self._taken - 1, lambda: self._take(steps - 1, rows, hand_on))
+
+    def record_aside(self, steps: Steps, rows: Table) -> None:
+        """Take steps as record() does, from another thread than that of the steps."""
+        self.meter.add(steps - 1, rows)
 
     def timing(self, granted: Sequence[str], refused: Sequence[str]) -> Timing:
         """Return the timing so far: see Meter.timing()."""
@@ -219,9 +265,9 @@ class Pacer:
         finally:
             self.meter.recorded(step, self._now() - start)
 
-    def _arrive(self, step: int) -> tuple[int, int]:
+    def _arrive(self, step: int, now: int | None = None) -> tuple[int, int]:
         """The time now, and by how much the step before ended late; negative where it did not."""
-        arrived = self._now() - self._origin
+        arrived = (self._now() if now is None else now) - self._origin
         if self._base_step is None:
             self._base, self._base_step, self._slept = arrived, step, arrived
         late = arrived - self._due(step)
@@ -236,9 +282,9 @@ class Pacer:
 
     def _wait(self, due: int, now: int) -> int:
         """Sleep, then spin, until it is due; the time then."""
-        if now + SPIN_NS < due:
-            while (left := due - SPIN_NS - now) > 0:
-                if self._halted():
+        if now + self._spin < due:
+            while (left := due - self._spin - now) > 0:
+                if self.halted():
                     raise HaltError
                 self._clock.sleep(min(left, SLICE_NS) / 1e9)
                 now = self._now() - self._origin
@@ -251,5 +297,5 @@ class Pacer:
         return now
 
 
-HAS_CLOCK = sys.platform == "linux" and sys.maxsize > 2**32
-"""True if compiled code can read time.monotonic_ns(): clock_gettime with two 64-bit words."""
+HAS_CLOCK = sys.platform == "linux"
+"""True if time.monotonic_ns() is the clock that compiled code reads, CLOCK_MONOTONIC."""

@@ -50,6 +50,7 @@ class Dispatcher:
         """What ran away in a run that went on."""
         self._energy = ExchangeEnergy(bonds(system), slots, transforms(system))
         self.signals = (*outputs.values(), *self._energy.signals)
+        self._block = np.empty((len(self.signals), 0))
         self._pending: tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]] | None = None
         experiment = Experiment.of(settings(system))
         with ExitStack() as begun:
@@ -63,15 +64,19 @@ class Dispatcher:
 
         Its row is the last that is kept.
         """
-        outputs = rows[:, self._columns]
+        if len(rows) > self._block.shape[1]:
+            self._block = np.empty((len(self.signals), len(rows)))
+        columns = self._block[:, : len(rows)].T  # each of them in one piece, which is fast
+        outputs = columns[:, : len(self._columns)]
+        outputs[:] = rows[:, self._columns]
         count, wrong = self._check(steps, outputs)
-        steps, rows, outputs = steps[:count], rows[:count], outputs[:count]
-        columns = np.concatenate((outputs, self._energy(rows)), axis=1)
-        wanted = steps % self._every == 0
+        steps, columns = steps[:count], columns[:count]
+        columns[:, len(self._columns) :] = self._energy(rows[:count])
         self._pending = None
-        if wanted.any():
+        wanted = slice(-int(steps[0]) % self._every, None, self._every)
+        if len(steps[wanted]):
             self._hand_on(steps[wanted], columns[wanted])
-        if not wanted[-1]:
+        if steps[-1] % self._every:
             self._pending = steps[-1:].copy(), columns[-1:].copy()
         if wrong:
             raise SimulationError(wrong)

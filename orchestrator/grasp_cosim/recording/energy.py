@@ -140,17 +140,17 @@ class ExchangeEnergy:
 
     def __call__(self, rows: Floats) -> Floats:
         """Energies as (len(rows), len(bonds)) of rows as (n, all columns)."""
-        energies = np.empty((len(rows), len(self.signals)))
+        energies = np.empty((len(self.signals), len(rows)))
         # The master reports values that are not finite; they are none of this function's concern.
         with np.errstate(invalid="ignore", over="ignore"):
             for places, ledger in self._ledgers:
-                energies[:, places] = ledger.add(self._rows, rows)
+                energies[places] = ledger.add(self._rows, rows)
         self._rows += len(rows)
-        return energies
+        return energies.T
 
 
 class _Ledger:
-    """The sums of some bonds of the same period, up to the last row; a column for each."""
+    """The sums of some bonds of the same period, up to the last row; a line for each."""
 
     def __init__(
         self,
@@ -158,44 +158,48 @@ class _Ledger:
         column: Mapping[Port, int],
         transforms: Mapping[Port, tuple[float, float]],
     ) -> None:
-        self._period = bonds[0].period
-        self._scale = np.array([bond.scale for bond in bonds])
-        self._held, self._position, self._source, self._seen = np.array(
-            [
-                [column[port] for port in (b.force, b.position, b.source, b.seen or b.position)]
-                for b in bonds
-            ]
-        ).T
+        self._period, self._count = bonds[0].period, len(bonds)
+        self._scale = np.array([[bond.scale] for bond in bonds])
+        self._mover = [column[b.force] for b in bonds] + [column[b.position] for b in bonds]
+        self._answerer = [column[b.source] for b in bonds]
+        self._answerer += [column[b.seen or b.position] for b in bonds]
         of_force = [transforms.get(bond.force, IDENTITY) for bond in bonds]
         of_seen = [transforms.get(bond.seen, IDENTITY) if bond.seen else IDENTITY for bond in bonds]
-        self._of_force, self._of_seen = np.array(of_force).T, np.array(of_seen).T
+        self._plain = {*of_force, *of_seen} == {IDENTITY}
+        self._of_force, self._of_seen = np.array([of_force, of_seen]).transpose(0, 2, 1)[..., None]
         self._of_seen[0, self._of_seen[0] == 0.0] = np.inf  # hides all motion
-        none = np.empty((0, len(bonds)))
-        self._moved = self._answered = (none, none)
-        self._total = np.zeros((1, len(bonds)))
+        self._moved = self._answered = np.empty((2 * len(bonds), 0))
+        self._total = np.zeros((len(bonds), 1))
 
     def add(self, first: int, rows: Floats) -> Floats:
         """The energies at each of the rows, which are those of the steps from first on."""
-        earned = np.zeros((len(rows), len(self._scale)))
-        held = np.concatenate((self._moved[0], rows[:, self._held]))
-        position = np.concatenate((self._moved[1], rows[:, self._position]))
-        _add_last(earned, held[1:] * (position[1:] - position[:-1]))
+        n = self._count
+        earned = np.zeros((n, len(rows)))
+        moved = np.concatenate((self._moved, rows[:, self._mover].T), axis=1)
+        held, position = moved[:n], moved[n:]
+        _add_last(earned, held[:, 1:] * (position[:, 1:] - position[:, :-1]))
         # A source with a step of its own answers for what it saw at the ends of that step.
         ends = slice(-first % self._period, None, self._period)
-        factor, offset = self._of_force
-        forces = factor * rows[ends, self._source] + offset
-        force = np.concatenate((self._answered[0], forces))
-        factor, offset = self._of_seen
-        seen = np.concatenate((self._answered[1], (rows[ends, self._seen] - offset) / factor))
-        _add_last(earned[ends], -0.5 * (force[1:] + force[:-1]) * (seen[1:] - seen[:-1]))
-        self._moved = held[-1:], position[-1:]
-        self._answered = force[-1:], seen[-1:]
+        answered = np.concatenate((self._answered, self._in_units(rows[ends, self._answerer].T)), 1)
+        force, seen = answered[:n], answered[n:]
+        mean = -0.5 * (force[:, 1:] + force[:, :-1])
+        _add_last(earned[:, ends], mean * (seen[:, 1:] - seen[:, :-1]))
+        self._moved, self._answered = moved[:, -1:], answered[:, -1:]
         # One sum after the other from the carried total on: the same bits for any blocks.
-        total = np.cumsum(np.concatenate((self._total, self._scale * earned)), axis=0)
-        self._total = total[-1:]
-        return total[1:]
+        total = np.cumsum(np.concatenate((self._total, self._scale * earned), axis=1), axis=1)
+        self._total = total[:, -1:]
+        return total[:, 1:]
+
+    def _in_units(self, answered: Floats) -> Floats:
+        """Forces and positions of the source in the units of the component that moves."""
+        if self._plain:
+            return answered
+        force, seen = answered[: self._count], answered[self._count :]
+        factor, offset = self._of_force
+        per_factor, from_offset = self._of_seen
+        return np.concatenate((factor * force + offset, (seen - from_offset) / per_factor))
 
 
 def _add_last(sums: Floats, changes: Floats) -> None:
     """Add the changes in place; the first row of a run has none."""
-    sums[len(sums) - len(changes) :] += changes
+    sums[:, sums.shape[1] - changes.shape[1] :] += changes

@@ -20,6 +20,7 @@ from ..errors import InputError
 from ..files import remove, unwritable, write_json
 from ..metrics.units import in_si
 from ..system.description import System
+from ..system.parts import Component
 from .csv import CsvListener
 from .listener import Experiment, Signal
 from .load import SETTINGS, SIGNALS, TEXT
@@ -181,8 +182,12 @@ def origin(system: System, command: Sequence[str]) -> dict[str, Any]:
             "python": platform.python_version(),
             **{name: version(name) for name in ("grasp-cosim", "numpy", "fmpy")},
         },
-        "fmus": {
-            c.name: {"guid": c.interface.guid, "tool": c.interface.tool} for c in system.components
-        },
+        "fmus": {c.name: _ran(c) for c in system.components},
         "command": list(command),
     }
+
+
+def _ran(component: Component) -> dict[str, Any]:
+    """Which FMU a component runs; of a native one also the FMU whose place it takes."""
+    ran = {"guid": component.loaded.guid, "tool": component.loaded.tool}
+    return ran | ({"native_twin_of": component.interface.guid} if component.native else {})

@@ -80,7 +80,23 @@ def load_run(folder: str | Path) -> Result:
             f"{path}: units are those of {choices(units)}; "
             f"must be those of the columns of {SIGNALS}: {choices(columns)}"
         )
-    realtime = written.get("realtime")
+    return _result(path, written, time, columns)
+
+
+def result_with(
+    path: Path, time: npt.NDArray[np.float64], columns: Mapping[str, npt.NDArray[Any]]
+) -> Result:
+    """The result with these signals that the run.json at path is of, which to_json() wrote."""
+    return _result(path, _settings(path), time, columns)
+
+
+def _result(
+    path: Path,
+    written: Mapping[str, Any],
+    time: npt.NDArray[np.float64],
+    columns: Mapping[str, npt.NDArray[Any]],
+) -> Result:
+    realtime, types = written.get("realtime"), written.get("types", {})
     return Result(
         settings={key: written[key] for key in (*SETTING_KEYS, "roles") if key in written},
         time=time,
@@ -88,7 +104,7 @@ def load_run(folder: str | Path) -> Result:
             name: _typed(f"{path}: type of {name}", column, types.get(name, "float64"))
             for name, column in columns.items()
         },
-        units=units,
+        units=written["units"],
         wall_time=written["wall_time"],
         complete=written["complete"],
         descriptions=written.get("descriptions", {}),

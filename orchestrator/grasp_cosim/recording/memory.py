@@ -28,7 +28,7 @@ class MemoryListener:
         """Make room; InputError where the run does not fit into memory."""
         self._experiment, self._signals = experiment, tuple(signals)
         self._steps = np.empty(0, np.int64)
-        self._table = np.empty((0, len(signals)))
+        self._table = np.empty((len(signals), 0))
         total = experiment.total_steps
         try:
             self._grow(total // self._every + 2)  # t = 0, and the last one besides every n-th
@@ -49,7 +49,7 @@ class MemoryListener:
                     f"{self._experiment.name}: {end} recorded rows do not fit into memory"
                 ) from None
         self._steps[self._rows : end] = steps
-        self._table[self._rows : end] = rows
+        self._table[:, self._rows : end] = rows.T
         self._rows = end
 
     def end(self, complete: bool) -> None:
@@ -67,20 +67,20 @@ class MemoryListener:
         Real ones are views, Strings arrays of str objects. An Integer is exact up to 2**53, as the
         rows are float64.
         """
-        rows = self._table[: self._rows].T
+        columns = self._table[:, : self._rows]
         return {
             s.name: s.texts.column(column)
             if s.kind == "String"
             else column.astype(TYPES[s.kind], copy=False)
-            for s, column in zip(self._signals, rows, strict=True)
+            for s, column in zip(self._signals, columns, strict=True)
         }
 
     def _grow(self, rows: int) -> None:
         """Have room for so many rows; MemoryError where there is none."""
         try:
-            steps, table = np.empty(rows, np.int64), np.empty((rows, len(self._signals)))
+            steps, table = np.empty(rows, np.int64), np.empty((len(self._signals), rows))
         except ValueError as error:  # more bytes than an address can count
             raise MemoryError from error
         steps[: self._rows] = self._steps[: self._rows]
-        table[: self._rows] = self._table[: self._rows]
+        table[:, : self._rows] = self._table[:, : self._rows]
         self._steps, self._table = steps, table

@@ -37,7 +37,7 @@ class Shipment:
 
 def ship(task: Task) -> Shipment:
     """The task with its FMUs."""
-    contents = tuple(c.fmu.read_bytes() for c in task.system.components)
+    contents = tuple((c.native or c.fmu).read_bytes() for c in task.system.components)
     return Shipment(task, contents, hash_of(contents))
 
 
@@ -114,5 +114,7 @@ def unpacked(shipment: Shipment) -> Task:
             path.parent.mkdir()
             path.write_bytes(content)
         _unpacked[shipment.key] = folder
-    moved = tuple(replace(c, fmu=path) for c, path in zip(components, paths, strict=True))
+    moved = tuple(
+        replace(c, fmu=path, native=None) for c, path in zip(components, paths, strict=True)
+    )
     return replace(shipment.task, system=replace(shipment.task.system, components=moved))

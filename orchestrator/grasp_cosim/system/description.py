@@ -123,6 +123,13 @@ class System(Structure):
         components = tuple(replace(c, isolation=isolation) for c in self.components)
         return replace(self, components=components)
 
+    def with_natives(self, natives: Mapping[str, Path]) -> "System":
+        """A copy in which components of these names run native twins of their FMUs."""
+        components = tuple(
+            replace(c, native=natives.get(c.name, c.native)) for c in self.components
+        )
+        return replace(self, components=components)
+
     def with_experiment(
         self,
         step: float | None = None,

@@ -46,7 +46,8 @@ class Component:
     name of a variable to the FMU's, where they differ. step_ns is the component's own communication
     step in nanoseconds, None for the system's. With isolation "process" it runs in a process of its
     own. units name the units of variables that the FMU declares without one, or wrongly, by the
-    system's names.
+    system's names. native is the FMU that runs in the place of fmu, its native twin: with the same
+    variables and the same bits, so that all else goes by fmu.
     """
 
     name: str
@@ -56,11 +57,20 @@ class Component:
     step_ns: int | None = None
     isolation: Isolation = "none"
     units: Mapping[str, str] = field(default_factory=dict)
+    native: Path | None = None
 
     @property
     def interface(self) -> Interface:
         """The declared interface of the FMU, under the system's names and with its units."""
-        declared = read_interface(self.fmu).renamed(self.rename, f"{self.name}: rename")
+        return self._interface(self.fmu)
+
+    @property
+    def loaded(self) -> Interface:
+        """The same of the FMU that runs: of its native twin, where it has one."""
+        return self._interface(self.native or self.fmu)
+
+    def _interface(self, fmu: Path) -> Interface:
+        declared = read_interface(fmu).renamed(self.rename, f"{self.name}: rename")
         return declared.in_units(self.units, f"{self.name}: units")
 
 

@@ -57,9 +57,10 @@ def check_setting(system: Structure, port: Port, value: Value, place: str) -> No
     if port not in settable:
         variable = interface.by_name.get(port.variable)
         found = f"is a {variable.variability} {variable.causality}" if variable else "not there"
+        own = [p for p in settable if p.component == port.component]
         raise InputError(
             f"{place}: {found}; must be a tunable parameter or an input without a connection; "
-            f"valid: {choices(settable)}"
+            f"valid: {choices(own or settable)}"
         )
     interface.parse(place, port.variable, value)
 

@@ -31,7 +31,7 @@ def with_fmu(
         if name not in theirs.by_name
         or theirs.by_name[name].unit in (None, ours.by_name[name].unit)
     }
-    now = replace(was, fmu=fmu, units=units)
+    now = replace(was, fmu=fmu, native=None, units=units)
     before, after = was.interface, now.interface
     kept = {name: value for name, value in was.values.items() if name not in anew}
     for name in [*kept, *sorted(stated(system, was.name))]:

@@ -1,5 +1,5 @@
 /* A block as the translator writes them, by hand: a mass that is pushed, with a fault on demand.
-   Its Python is in test_slave.py. */
+   Its Python is hand_written.py. */
 #define BLOCK_NAME "HandWritten"
 #define N_INPUTS 2
 #define N_OUTPUTS 3
@@ -30,7 +30,7 @@ static const Variable variables[N_VARIABLES] = {
     {"mass", " kg", KIND_REAL, PARAMETER, 1, 1, 1e-3, 1e3, 0.5},
     {"gain", " 1", KIND_REAL, PARAMETER, 0, 1, 0.0, 10.0, 1.0},
     {"start", " m", KIND_REAL, PARAMETER, 1, 0, 0.0, 0.0, 0.0},
-    {"seed", "", KIND_INTEGER, PARAMETER, 1, 1, 0.0, 4294967295.0, 1.0},
+    {"seed", "", KIND_INTEGER, PARAMETER, 1, 1, 0.0, 2147483647.0, 1.0},
     {"fault", "", KIND_INTEGER, PARAMETER, 0, 1, 0.0, 6.0, 0.0},
     {"noisy", "", KIND_BOOLEAN, PARAMETER, 1, 0, 0.0, 0.0, 0.0},
 };
@@ -99,10 +99,14 @@ static void block_load(const double numbers[N_STATE], BlockState *x, Fault *faul
 {
     x->position = numbers[0];
     x->velocity = numbers[1];
-    x->steps = numbers[2];
     x->moves = numbers[3] != 0.0;
-    if (x->steps != x->steps) {
+    if (numbers[2] != numbers[2]) {
         py_fault(fault, FAULT_VALUE, "ValueError", "cannot convert float NaN to integer");
+    } else if (numbers[2] - numbers[2] != 0.0) {
+        py_fault(fault, FAULT_ARITHMETIC, "OverflowError",
+                 "cannot convert float infinity to integer");
+    } else {
+        x->steps = (numbers[2] < 0.0 ? ceil(numbers[2]) : floor(numbers[2])) + 0.0;
     }
 }
 

@@ -177,7 +177,7 @@ def test_the_guid_is_that_of_sources_and_description(
 ) -> None:
     """Whatever it is compiled with, for, and where."""
     fmu = natives / "GripperPlant.fmu"
-    monkeypatch.setenv("CC", "gcc -O0")
+    monkeypatch.setenv("CC", "gcc -fno-inline")
     (other,) = build_native(tmp_path, names=["GripperPlant"])
     assert cache_folder() is not None
     for name in ("modelDescription.xml", "sources/GripperPlant.c"):

@@ -30,12 +30,13 @@ typedef fmi2Status Status;
 
 #include "slave.h"
 
+static const char *const fmi2_categories[] = {"", "logStatusWarning", "logStatusDiscard",
+                                              "logStatusError"};
+
 static void slave_log(const Slave *s, Status status)
 {
-    static const char *const categories[] = {"", "logStatusWarning", "logStatusDiscard",
-                                             "logStatusError"};
     if (s->host.logger) {
-        s->host.logger(s->host.environment, s->name, status, categories[status], s->text);
+        s->host.logger(s->host.environment, s->name, status, fmi2_categories[status], s->text);
     }
 }
 

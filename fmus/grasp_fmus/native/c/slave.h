@@ -614,7 +614,6 @@ static Status slave_end_step(Slave *s, double h, const Fault *fault)
     return slave_discarded(s);
 }
 
-#if BLOCK_HAS_SUBSTEPS
 static double slave_substeps(const Slave *s, double h, Fault *fault)
 {
     return block_substeps(&s->params, &s->state, &s->inputs, h, fault);
@@ -648,9 +647,7 @@ static Status slave_end_long_step(Slave *s, double h)
     if (longest != 0.0) {
         digit = pow(10.0, floor(log10(longest)) - 2.0);  /* the third */
         if (digit == 0.0) {
-            fault.kind = FAULT_ARITHMETIC;
-            fault.type = "ZeroDivisionError";
-            strcpy(fault.text, "float division by zero");
+            py_fault(&fault, FAULT_ARITHMETIC, "ZeroDivisionError", "float division by zero");
             return slave_end_step(s, h, &fault);
         }
     }
@@ -666,7 +663,6 @@ static Status slave_end_long_step(Slave *s, double h)
     }
     return slave_discarded(s);
 }
-#endif
 
 /* Advance the block by h seconds with the inputs as they are; it stays where it is if not OK */
 static Status slave_do_step(Slave *s, double time, double h)
@@ -676,6 +672,7 @@ static Status slave_do_step(Slave *s, double time, double h)
     BlockState after;
     BlockOutputs y;
     Fault fault;
+    int few;
     if (!(s->phase == STEPPING && 0.0 < h && h <= DBL_MAX && -SLAVE_TIME_TOLERANCE <= apart
           && apart <= SLAVE_TIME_TOLERANCE)
         && slave_check_step(s, time, h) != SLAVE_OK) {
@@ -688,17 +685,13 @@ static Status slave_do_step(Slave *s, double time, double h)
         block_inputs(s->values, &s->inputs);
     }
     fault.kind = FAULT_NONE;
-#if BLOCK_HAS_SUBSTEPS
-    {
-        int few = slave_substeps(s, h, &fault) <= block_most_substeps;
-        if (fault.kind != FAULT_NONE) {
-            return slave_end_step(s, h, &fault);
-        }
-        if (!few) {
-            return slave_end_long_step(s, h);
-        }
+    few = slave_substeps(s, h, &fault) <= block_most_substeps;  /* one without a bound has none */
+    if (fault.kind != FAULT_NONE) {
+        return slave_end_step(s, h, &fault);
     }
-#endif
+    if (!few) {
+        return slave_end_long_step(s, h);
+    }
     block_step(&s->params, &s->state, &s->inputs, h, &after, &fault);
     if (fault.kind == FAULT_NONE) {
         block_outputs(&s->params, &after, &s->inputs, &y, &fault);

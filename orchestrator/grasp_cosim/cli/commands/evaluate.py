@@ -15,14 +15,16 @@ from ...grasp.published.tables import Source
 from ...numerals import fixed
 from ...sweep.store import Parts
 from ..frame import INTERRUPTED, NEGATIVE, PATH, fail, json_option, load_system, show
+from ..native import many_runs_option, natively
 
 
 @click.command()
 @click.option("--bench", is_flag=True, help="The experiments, with friction and electronics.")
 @click.option("--out", type=PATH, default=Path("results"), show_default=True)
 @click.option("--workers", type=click.IntRange(1), default=os.cpu_count(), show_default="all cores")
+@many_runs_option
 @json_option
-def evaluate(bench: bool, out: Path, workers: int, as_json: bool) -> int:
+def evaluate(bench: bool, out: Path, workers: int, native: bool | None, as_json: bool) -> int:
     """Run the published simulation table and figures and compare; --bench: the experiments.
 
     Finished grasps are kept until all are done: the same command goes on where it was ended.
@@ -33,10 +35,10 @@ def evaluate(bench: bool, out: Path, workers: int, as_json: bool) -> int:
     check_folder(out)
     system = load_system()
     source: Source = "experiment" if bench else "simulation"
+    system = with_preset(system, "bench") if bench else system
     try:
-        report = run_evaluation(
-            with_preset(system, "bench") if bench else system, out, workers, True, source
-        )
+        with natively(system, native) as chosen:
+            report = run_evaluation(chosen, out, workers, True, source)
     except KeyboardInterrupt:
         kept = Parts(out / FOLDER).kept()
         goes_on = f"; {kept} grasps are kept in {out / FOLDER}, the same command goes on"

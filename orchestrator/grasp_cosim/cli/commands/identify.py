@@ -20,6 +20,7 @@ from ...grasp.identification.parameters import DEFAULT, GROUPS, chosen
 from ...recording.load import load_log
 from ...system.description import System
 from ..frame import PATH, json_option, load_system, say, show
+from ..native import many_runs_option, natively
 from ..options import set_option, set_values
 
 
@@ -38,6 +39,7 @@ from ..options import set_option, set_values
 @set_option
 @click.option("--out", type=PATH, help="Folder for values and residuals.")
 @click.option("--workers", type=click.IntRange(1), default=os.cpu_count(), show_default="all cores")
+@many_runs_option
 @json_option
 def identify(
     log: Path | None,
@@ -46,6 +48,7 @@ def identify(
     settings: tuple[str, ...],
     out: Path | None,
     workers: int,
+    native: bool | None,
     as_json: bool,
 ) -> int:
     """Fit the fingers' friction to contact times, by default the published experimental ones.
@@ -59,7 +62,10 @@ def identify(
     if out:
         check_folder(out)
     system = load_system().revised({}, set_values(settings), ("--swap", "--set"))
-    found = _from_log(system, log, groups) if log else _from_times(system, times, groups, workers)
+    if log:
+        found = _from_log(system, log, groups)
+    else:
+        found = _from_times(system, times, groups, workers, native)
     if out:
         remove(out, "identification.json", "values.toml", "residuals.csv")
         write_text(out / "values.toml", report.values_toml(found))
@@ -77,11 +83,16 @@ def _from_log(system: System, path: Path, groups: tuple[str, ...]) -> report.Ide
 
 
 def _from_times(
-    system: System, path: Path | None, groups: tuple[str, ...], workers: int
+    system: System,
+    path: Path | None,
+    groups: tuple[str, ...],
+    workers: int,
+    native: bool | None,
 ) -> report.Identification:
     contacts = read_contacts(path) if path else published_contacts()
     parameters = chosen(groups, tuple(GROUPS), "identify")
-    fit = identify_from_times(system, contacts, parameters, workers, progress=True)
+    with natively(system, native) as run:
+        fit = identify_from_times(run, contacts, parameters, workers, progress=True)
     rows = [
         {"condition": c.label, "case": c.case, "finger": c.finger, "measured": c.time}
         for c in contacts

@@ -23,6 +23,7 @@ from ..frame import (
     say,
     show,
 )
+from ..native import many_runs_option, natively
 from ..options import chosen_system, set_values, system_options
 
 
@@ -47,6 +48,7 @@ from ..options import chosen_system, set_values, system_options
     show_default=True,
     help="Where the candidate runs.",
 )
+@many_runs_option
 @metrics_option
 @click.option(
     "--out",
@@ -61,6 +63,7 @@ def qualify(
     renames: tuple[str, ...],
     named: tuple[str, ...],
     isolation: Isolation,
+    native: bool | None,
     metric_files: tuple[Path, ...],
     out: Path | None,
     as_json: bool,
@@ -75,18 +78,19 @@ def qualify(
     Example: grasp-cosim qualify vendor_plant.fmu --as plant --out qualification
     """
     check_outputs(out, plot=bool(out))
-    found = run_qualification(
-        chosen_system(given),
-        component,
-        candidate,
-        rename=dict(pair("--rename", text, "VARIABLE=CANDIDATES_VARIABLE") for text in renames),
-        units=dict(pair("--units", text, "VARIABLE=UNIT") for text in named),
-        values=set_values(given["settings"]),
-        bands=read_bands(bands) if bands else None,
-        isolation=isolation,
-        progress=True,
-        metrics=chosen_metrics(metric_files),
-    )
+    with natively(chosen_system(given), native) as system:
+        found = run_qualification(
+            system,
+            component,
+            candidate,
+            rename=dict(pair("--rename", text, "VARIABLE=CANDIDATES_VARIABLE") for text in renames),
+            units=dict(pair("--units", text, "VARIABLE=UNIT") for text in named),
+            values=set_values(given["settings"]),
+            bands=read_bands(bands) if bands else None,
+            isolation=isolation,
+            progress=True,
+            metrics=chosen_metrics(metric_files),
+        )
     if out:
         _write(found, out)
     show(as_json, verdict.as_json(found), verdict.as_text(found))

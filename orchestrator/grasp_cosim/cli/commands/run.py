@@ -28,6 +28,7 @@ from ..frame import (
     say,
     show,
 )
+from ..native import native_option, natively
 from ..options import chosen_system, set_values, system_options
 from ..realtime import chosen_realtime, realtime_options, timing_lines
 from ..step_study import check_step_study, step_study_options, study_step
@@ -52,6 +53,7 @@ from ..step_study import check_step_study, step_study_options, study_step
     type=click.Choice(ISOLATIONS),
     help="Where all FMUs run: each in a process of its own, or none. Default: as SYSTEM says.",
 )
+@native_option("as SYSTEM names them; with --step-study, native where there is a C compiler.")
 @click.option("--engine", type=click.Choice(ENGINES), default="auto", show_default=True)
 @metrics_option
 @step_study_options
@@ -87,10 +89,13 @@ def run(
         check_mdf()
     check_outputs(out, given["plot"])
     command = ("grasp-cosim", *click.get_current_context().find_root().obj)
-    with RunFolder(out, system, command, paced is not None) if out else nullcontext() as folder:
+    with (
+        natively(system, bool(given["native"])) as chosen,
+        RunFolder(out, chosen, command, paced is not None) if out else nullcontext() as folder,
+    ):
         try:
             result = simulate(
-                system,
+                chosen,
                 progress=True,
                 every=every,
                 listeners=[folder] if folder else (),

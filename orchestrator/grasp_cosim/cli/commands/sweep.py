@@ -1,5 +1,6 @@
 """The command sweep."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -28,6 +29,7 @@ from ..frame import (
     show,
     with_preset,
 )
+from ..native import many_runs_option, natively
 
 
 @click.command()
@@ -39,6 +41,7 @@ from ..frame import (
 @click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster, like tcp://host:8786.")
 @click.option("--plot", is_flag=True, help="Draw what the study asks for under [figures].")
 @metrics_option
+@many_runs_option
 @json_option
 def sweep(
     study: str,
@@ -47,6 +50,7 @@ def sweep(
     scheduler: str | None,
     plot: bool,
     metric_files: tuple[Path, ...],
+    native: bool | None,
     as_json: bool,
 ) -> int:
     """Do all runs of STUDY: a .toml file, or reflectance_map, grasp_sensitivity, bench_monte_carlo.
@@ -64,8 +68,12 @@ def sweep(
     if plot and chosen.pictures == Pictures():
         raise InputError(f"--plot: {path.name} has no [figures]; must say what to draw")
     check_outputs(folder, plot)
+    if scheduler is not None and native is None:  # whose machines may be others
+        native = False
     try:
-        done = run_study(chosen, folder, workers, scheduler, progress=True)
+        with natively(chosen.system, native) as system:
+            chosen = replace(chosen, system=system)
+            done = run_study(chosen, folder, workers, scheduler, progress=True)
     except KeyboardInterrupt:
         kept = f"{Store(folder).kept()} of {chosen.runs} runs are kept in {folder}"
         return fail(f"interrupted; {kept}, the same command goes on", INTERRUPTED)

@@ -1,0 +1,340 @@
+"""--native and --python: which FMUs a command runs, what it says of them, and the same bytes."""
+
+import json
+import os
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from conftest import Altered, Run
+from grasp_cosim import System
+from grasp_cosim.cli.native import natively
+from grasp_cosim.grasp.presets import SYSTEM
+from grasp_fmus.block_build import build_block
+from grasp_fmus.native import compilers, twins
+from grasp_fmus.native.build import build_native_block
+from support.both_engines import needs_compiler
+from support.oscillator import write_oscillator
+
+pytestmark = needs_compiler
+
+SAID = "ran native FMUs; --python runs those in Python, with the same bits\n"
+SPRING = Path(__file__).parents[2] / "docs/spring_plant.py"
+SHORT = ("--step", "1e-3", "--stop", "0.3")
+STUDY = """case = 0
+step = 1e-3
+stop = 0.3
+outputs = ["plant.gap[1]"]
+[design]
+kind = "grid"
+[[parameters]]
+variables = ["plant.object_width"]
+values = [0.06, 0.07, 0.08]
+"""
+
+
+@pytest.fixture
+def no_compiler(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[None]:
+    """A machine without a compiler, on which nothing was built yet."""
+    monkeypatch.setenv("PATH", str(tmp_path / "nothing"))
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setattr(compilers, "_zig", lambda: None)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    twins.shipped_twins.cache_clear()
+    yield
+    twins.shipped_twins.cache_clear()
+
+
+def ran(folder: str) -> dict[str, Any]:
+    """The FMUs that a recorded run names, by component."""
+    found: dict[str, Any] = json.loads(Path(folder, "run.json").read_text())["fmus"]
+    return found
+
+
+def recorded(command: Run, folder: str, *arguments: str | Path) -> bytes:
+    code, _, err = command("run", "--out", folder, *arguments)
+    assert code == 0, err
+    return Path(folder, "signals.csv").read_bytes()
+
+
+# ------------------------------------------------------------------ the same bytes
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
+@pytest.mark.parametrize("case", ["0", "1", "2"])
+def test_a_run_has_the_same_bytes(command: Run, case: str, scheme: str) -> None:
+    asked = ("--case", case, "--scheme", scheme, "--step", "1e-3")
+    python = recorded(command, "python", *asked)
+    for engine in ("python", "compiled"):
+        native = recorded(command, engine, *asked, "--native", "--engine", engine)
+        assert native == python
+        assert all("native_twin_of" in fmu for fmu in ran(engine).values())
+
+
+@pytest.mark.slow
+def test_at_the_published_step_with_all_electronics(command: Run) -> None:
+    asked = ("--bench", "--stop", "0.5")
+    assert recorded(command, "a", *asked) == recorded(command, "b", *asked, "--native")
+
+
+@pytest.mark.parametrize("plant", ["GripperPlantCompliant", "GripperPlantMovable"])
+def test_a_swapped_plant_has_its_own_twin(command: Run, fmus: Path, plant: str) -> None:
+    asked = ("--swap", f"plant={fmus / plant}.fmu", *SHORT, "--case", "0")
+    assert recorded(command, "a", *asked) == recorded(command, "b", *asked, "--native")
+    native, python = ran("b")["plant"], ran("a")["plant"]
+    assert native["native_twin_of"] == python["guid"] != native["guid"]
+
+
+def test_in_processes_of_their_own(command: Run) -> None:
+    asked = ("--step", "1e-3", "--stop", "0.05")
+    native = recorded(command, "b", *asked, "--native", "--isolation", "process")
+    assert recorded(command, "a", *asked) == native
+
+
+# ------------------------------------------------------------------ what each command does
+
+
+def test_run_takes_the_fmus_as_they_are_named(command: Run) -> None:
+    assert command("run", *SHORT, "--out", "a")[::2] == (0, "")
+    assert all(fmu["tool"].endswith("pythonfmu 0.7.0") for fmu in ran("a").values())
+    assert command("run", *SHORT, "--native", "--out", "a")[::2] == (0, "")
+    assert ran("a").keys() == {"plant", "sensor_1", "sensor_2", "controller"}
+    assert not any("pythonfmu" in fmu["tool"] for fmu in ran("a").values())
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("run", "--step-study", "--step", "3.2e-3", "--stop", "0.64", "--of", "plant.gap[1]",
+         "--tolerance", "1"),
+        ("sweep", "study.toml", "--workers", "1"),
+        ("qualify", "plant.fmu", "--as", "plant", *SHORT, "--isolation", "none"),
+    ],
+    ids=lambda arguments: arguments[0],
+)  # fmt: skip
+def test_a_command_of_many_runs_takes_native_ones_and_says_so(
+    command: Run, fmus: Path, arguments: tuple[str, ...]
+) -> None:
+    Path("study.toml").write_text(STUDY)
+    shutil.copy(fmus / "GripperPlant.fmu", "plant.fmu")
+    first, second, third = (
+        command(*arguments, *option, "--json", *folder(arguments, i))
+        for i, option in enumerate(((), ("--native",), ("--python",)))
+    )
+    assert [first[2], second[2], third[2]] == [SAID, "", ""]
+    assert first[0] == second[0] == third[0] == 0
+    results = [json.loads(out) for _, out, _ in (first, second, third)]
+    for result in results:
+        result.pop("folder", None)
+    assert results[0] == results[1] == results[2]
+    assert not Path("fmus").exists()
+
+
+def folder(arguments: tuple[str, ...], number: int) -> tuple[str, ...]:
+    return ("--out", f"out_{number}") if arguments[0] == "sweep" else ()
+
+
+def test_a_sweep_goes_on_with_the_other_kind(command: Run) -> None:
+    Path("study.toml").write_text(STUDY)
+    for i, option in enumerate(("--python", "--native")):
+        assert command("sweep", "study.toml", "--out", f"{i}", "--workers", "1", option)[0] == 0
+    ours, theirs = (sorted(Path(f"{i}", "parts").iterdir()) for i in range(2))
+    assert [p.read_bytes() for p in ours] == [p.read_bytes() for p in theirs]
+    before = Path("0/runs.parquet").read_bytes()
+    ours[1].unlink()
+    code, out, _ = command("sweep", "study.toml", "--out", "0", "--workers", "1", "--json")
+    assert (code, json.loads(out)["resumed"]) == (0, 2)
+    assert Path("0/runs.parquet").read_bytes() == before == Path("1/runs.parquet").read_bytes()
+
+
+def test_a_cluster_gets_native_ones_only_if_asked(
+    command: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its workers may be other machines."""
+    natives: list[set[bool]] = []
+
+    def run(study: Any, *_: Any, **__: Any) -> Any:
+        natives.append({c.native is not None for c in study.system.components})
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("grasp_cosim.cli.commands.sweep.run_study", run)
+    Path("study.toml").write_text(STUDY)
+    for option in ((), ("--native",)):
+        command("sweep", "study.toml", "--scheduler", "tcp://127.0.0.1:1", *option)
+    assert natives == [{False}, {True}]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("source", [(), ("--bench",)], ids=["simulation", "bench"])
+def test_evaluate_has_the_same_files(
+    command: Run, grasp: System, monkeypatch: pytest.MonkeyPatch, source: tuple[str, ...]
+) -> None:
+    coarse = grasp.with_experiment(step=2e-3)
+    monkeypatch.setattr("grasp_cosim.grasp.system.grasp_system", lambda: coarse)
+    code, out, err = command("evaluate", *source, "--out", "native", "--json")
+    assert err == SAID
+    assert command("evaluate", *source, "--out", "python", "--json", "--python") == (code, out, "")
+    made, other = (
+        {p.name: p.read_bytes() for p in Path(kind).iterdir()} for kind in ("native", "python")
+    )
+    assert made == other
+    assert "evaluation.json" in made
+
+
+@pytest.mark.slow
+def test_identify_finds_the_same(command: Run) -> None:
+    Path("times.csv").write_text(
+        "x_m,case,finger,time\n0.03,2,1,2.1\n0.03,2,2,2.2\n0.03,1,1,1.4\n0.03,1,2,2.7\n"
+    )
+    asked = ("identify", "--times", "times.csv", "--fit", "viscous", "--json", "--workers", "1")
+    code, out, err = command(*asked)
+    assert (code, err) == (0, SAID)
+    assert command(*asked, "--python") == (0, out, "")
+
+
+def test_a_log_needs_no_fmu_to_run(command: Run) -> None:
+    assert command("run", *SHORT, "--case", "0", "--out", "run")[0] == 0
+    code, _, err = command("identify", "--log", "run/signals.csv", "--fit", "coulomb")
+    assert (code, err) == (0, "")
+
+
+# ------------------------------------------------------------------ without a compiler
+
+
+@pytest.mark.usefixtures("no_compiler")
+def test_without_a_compiler_native_is_refused_in_one_line(command: Run) -> None:
+    code, out, err = command("run", *SHORT, "--native")
+    assert (code, out) == (2, "")
+    assert err.startswith("grasp-cosim: --native: no C compiler for ")
+    assert err.count("\n") == 1
+    assert "pip install ziglang" in err
+
+
+@pytest.mark.usefixtures("no_compiler")
+def test_without_a_compiler_a_sweep_takes_python_and_says_why(command: Run) -> None:
+    Path("study.toml").write_text(STUDY)
+    code, out, err = command("sweep", "study.toml", "--workers", "1", "--json")
+    assert (code, json.loads(out)["failed"]) == (0, 0)
+    assert err.startswith("ran FMUs in Python, which takes longer: no C compiler for ")
+    assert err.count("\n") == 1
+
+
+def test_what_was_built_once_needs_no_compiler(
+    command: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    twins.shipped_twins()
+    twins.shipped_twins.cache_clear()
+    monkeypatch.setenv("PATH", str(tmp_path / "nothing"))
+    assert command("run", *SHORT, "--native")[0] == 0
+
+
+def test_where_nothing_can_be_kept_it_is_said(
+    command: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    twins.shipped_twins.cache_clear()
+    code, _, err = command("run", *SHORT, "--native")
+    twins.shipped_twins.cache_clear()
+    assert code == 2
+    assert err.startswith("grasp-cosim: --native: no folder to keep native FMUs in; ")
+
+
+# ------------------------------------------------------------------ whose FMUs, and where
+
+
+def system_file(folder: Path, plant: Path, fmus: Path) -> Path:
+    """The built-in grasp with FMUs by their paths, whose names are not ours."""
+    folder.mkdir(parents=True)
+    text = SYSTEM.read_text("utf-8")
+    for name, fmu in (
+        ("GripperPlant", plant),
+        ("ProximitySensor", None),
+        ("GraspController", None),
+    ):
+        other = folder / f"their_{name}.fmu"
+        shutil.copy(fmu or fmus / f"{name}.fmu", other)
+        text = text.replace(f'"{name}.fmu"', f'"{other.name}"')
+    path = folder / "theirs.toml"
+    path.write_text(text, "utf-8")
+    return path
+
+
+def test_it_is_the_content_that_counts_not_the_name(command: Run, fmus: Path) -> None:
+    system = system_file(Path("deep/down"), fmus / "GripperPlantMovable.fmu", fmus)
+    asked = (system, *SHORT, "--case", "0")
+    assert recorded(command, "a", *asked) == recorded(command, "b", *asked, "--native")
+    assert all("native_twin_of" in fmu for fmu in ran("b").values())
+
+
+def test_one_of_other_sources_stays_as_it_is(command: Run, altered: Altered) -> None:
+    heavy = altered("GripperPlant", "gripper_plant/fingers.py", "= (0.5, 0.5)", "= (0.5, 0.6)")
+    asked = ("--swap", f"plant={heavy}", *SHORT, "--native")
+    code, _, err = command("run", *asked, "--out", "a")
+    assert code == 0
+    assert err == (
+        "ran native FMUs, but not as plant (GripperPlant.fmu has no native twin); --python runs "
+        "those in Python, with the same bits\n"
+    )
+    assert "native_twin_of" not in ran("a")["plant"]
+    assert "native_twin_of" in ran("a")["sensor_1"]
+
+
+def test_a_block_of_ones_own(command: Run, tmp_path: Path) -> None:
+    """Its twin is one that the user has built, of the same source."""
+    swap = ("--swap", "plant=fmus/build/SpringPlant.fmu", *SHORT)
+    shutil.copy(SPRING, tmp_path)
+    source = tmp_path / SPRING.name
+    build_block(source, Path("fmus/build"))
+    python = recorded(command, "a", *swap)
+    without = "ran native FMUs, but not as plant (SpringPlant.fmu has no native twin); "
+    assert command("run", *swap, "--native")[2].startswith(without)
+    build_native_block(source, Path("fmus/native"))
+    assert recorded(command, "b", *swap, "--native") == python
+    assert "native_twin_of" in ran("b")["plant"]
+    source.write_text(source.read_text("utf-8") + "\n# another\n", "utf-8")
+    build_block(source, Path("fmus/build"))
+    assert command("run", *swap, "--native")[2].startswith(
+        "ran native FMUs, but not as plant (fmus/native/SpringPlant.fmu is of another "
+        "SpringPlant.fmu); "
+    )
+
+
+def test_a_twin_is_found_beside_the_folder_of_its_fmu(command: Run, tmp_path: Path) -> None:
+    build_block(SPRING, tmp_path / "project/build")
+    build_native_block(SPRING, tmp_path / "project/native")
+    swap = f"plant={tmp_path / 'project/build/SpringPlant.fmu'}"
+    assert command("run", "--swap", swap, *SHORT, "--native", "--out", "a")[::2] == (0, "")
+    assert "native_twin_of" in ran("a")["plant"]
+
+
+def test_a_system_of_others_is_none_of_our_business(
+    grasp: System, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    system = System.load(write_oscillator(tmp_path))
+    with natively(system, None) as chosen:
+        assert chosen == system
+    assert capsys.readouterr().err == ""
+    with natively(system, True) as chosen:
+        assert chosen == system
+    assert capsys.readouterr().err == (
+        "ran no native FMU: a (integrator.fmu has no native twin), b (integrator.fmu has no native "
+        "twin)\n"
+    )
+
+
+def test_nothing_is_said_of_a_run_that_failed(
+    grasp: System, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(KeyboardInterrupt), natively(grasp, None):
+        raise KeyboardInterrupt
+    assert capsys.readouterr().err == ""
+
+
+def test_nothing_is_built_into_the_current_folder(command: Run) -> None:
+    """So one that cannot be written to will do."""
+    assert command("run", *SHORT, "--native")[0] == 0
+    assert os.listdir() == []  # noqa: PTH208

@@ -1,0 +1,82 @@
+"""A mass that is pushed, with a fault on demand; hand_written.h is the same in C."""
+
+from dataclasses import dataclass
+from math import nan, sqrt
+from typing import Annotated, NamedTuple
+
+from block_variables import Input, Output, Parameter, check
+
+MOST_SUBSTEPS = 1000
+
+
+@dataclass(frozen=True)
+class Params:
+    """Of the mass."""
+
+    mass: Annotated[float, Parameter("m", unit="kg", low=1e-3, high=1e3)] = 0.5
+    gain: Annotated[float, Parameter("K", unit="1", low=0.0, high=10.0, tunable=True)] = 1.0
+    start: Annotated[float, Parameter("x_0", unit="m")] = 0.0
+    seed: Annotated[int, Parameter("seed", low=0, high=2147483647)] = 1
+    fault: Annotated[int, Parameter("what goes wrong", low=0, high=6, tunable=True)] = 0
+    noisy: Annotated[bool, Parameter("has noise")] = False
+
+    def __post_init__(self) -> None:
+        check(self)
+        if self.noisy and self.seed == 0:
+            raise ValueError("seed = 0: must be above 0 with noise, 100 %")
+
+
+class Inputs(NamedTuple):
+    """Of the mass."""
+
+    force: Annotated[float, Input("F", unit="N", nominal=1.0)] = 0.0
+    held: Annotated[bool, Input("does not move")] = False
+
+
+class State(NamedTuple):
+    """Of the mass."""
+
+    position: float
+    velocity: float
+    steps: int
+    moves: bool
+
+
+class Outputs(NamedTuple):
+    """Of the mass."""
+
+    position: Annotated[float, Output("x", unit="m", nominal=1.0, depends_on=set())]
+    velocity: Annotated[float, Output("v", unit="m/s", nominal=1.0, depends_on=set())]
+    moves: Annotated[bool, Output("moves", depends_on=set(), depends_initially_on={"held"})]
+
+
+def initial_state(p: Params, u: Inputs) -> State:
+    """At rest."""
+    if p.fault == 5:
+        raise LookupError("no lamp")
+    return State(p.start, 0.0, 0, not u.held)
+
+
+def step(p: Params, x: State, u: Inputs, h: float) -> State:
+    """Pushed for h seconds."""
+    acceleration = 0.0 if u.held else p.gain * u.force / p.mass
+    if p.fault == 1:
+        raise ArithmeticError("too fast: must be slower")
+    if p.fault == 2:
+        acceleration = 1.0 / 0.0
+    if p.fault == 3:
+        acceleration = sqrt(-1.0)
+    velocity = x.velocity + h * acceleration
+    return State(x.position + h * velocity, velocity, x.steps + 1, velocity != 0.0)
+
+
+def outputs(p: Params, x: State, u: Inputs) -> Outputs:
+    """What is seen."""
+    if p.fault == 4:
+        raise KeyError("50 %n")
+    return Outputs(x.position, nan if p.fault == 6 else x.velocity, x.moves)
+
+
+def substeps(p: Params, x: State, u: Inputs, h: float) -> float:
+    """One per millisecond."""
+    return h / 1e-3

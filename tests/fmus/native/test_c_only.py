@@ -1,0 +1,227 @@
+"""The C of a block alone: compiles, calls nothing but what it lists, gives the block's bits."""
+
+import ctypes
+import re
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
+from math import inf, nan
+from pathlib import Path
+from typing import Any
+
+import pytest
+from grasp_fmus.block_build import own_model
+from grasp_fmus.contract import build_params, declared, packer, unpacker
+from grasp_fmus.cross_check import STEP_SIZE, STEPS
+from grasp_fmus.fmu import Model, shipped_model
+from grasp_fmus.native.c_only import called_of_libm, write_c
+from grasp_fmus.native.compilers import BITS
+from grasp_fmus.shipped import SCRIPTS, blocks
+from support.compilers import needs_gcc
+from support.slow import slow
+
+ROOT = Path(__file__).parents[3]
+SPRING = ROOT / "docs/spring_plant.py"
+NAMES = [name for name in blocks() if name != "GripperPlantMuJoCo"]
+STRICT = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
+OF_THE_COMPILER = {"memcpy", "memset", "memmove", "memcmp", "strlen", "strcpy", "strcspn"}
+"""Functions of string.h, which a compiler without an operating system has as well."""
+
+pytestmark = needs_gcc
+
+
+ALLOWED = {"float.h", "math.h", "stdbool.h", "stddef.h", "stdint.h", "string.h"}
+"""Headers without input and output, memory, or time."""
+
+
+@contextmanager
+def model_of(name: str) -> Iterator[Model]:
+    """The model of one of ours, or of a user's own block."""
+    if name == "SpringPlant":
+        with own_model(SPRING) as own:
+            yield own
+    else:
+        yield shipped_model(SCRIPTS / f"{name}.py")
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """The folder with the C of a block, written once."""
+
+    @cache
+    def folder(name: str) -> Path:
+        folder = tmp_path_factory.mktemp(name)
+        with model_of(name) as model:
+            write_c(folder, model)
+        return folder
+
+    return folder
+
+
+def compiled(folder: Path, *options: str, compiler: str = "gcc") -> None:
+    subprocess.run([compiler, *STRICT, *options], cwd=folder, check=True)
+
+
+@pytest.mark.parametrize("level", ["-O0", slow("-O3")])
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+@pytest.mark.parametrize("name", [*map(slow, NAMES[1:]), NAMES[0], "SpringPlant"])
+def test_compiles_without_a_warning_and_calls_what_it_lists(
+    name: str, compiler: str, level: str, written: Callable[[str], Path]
+) -> None:
+    if not shutil.which(compiler):
+        pytest.skip(f"NO {compiler}")
+    folder = written(name)
+    exact = re.findall(r"-fno-builtin-\w+", (folder / "main.c").read_text())
+    compiled(folder, level, *exact, "-c", f"{name}.c", "main.c", compiler=compiler)
+    said = subprocess.check_output(["nm", "-u", f"{name}.o"], cwd=folder, text=True)
+    listed = re.search(r"it calls:\n \*\n \* +(.*)\n", (folder / f"{name}.h").read_text())
+    assert listed
+    called = {line.split()[-1] for line in said.splitlines()} - OF_THE_COMPILER
+    assert called <= {*listed[1].split(", ")}
+    symbols = subprocess.check_output(["nm", "-g", f"{name}.o"], cwd=folder, text=True)
+    defined = {line.split()[-1] for line in symbols.splitlines() if " U " not in line}
+    functions = ("check", "initial_state", "step", "outputs")
+    assert defined == {f"{name}_{function}" for function in functions}
+
+
+@pytest.mark.parametrize("name", [*NAMES, "SpringPlant"])
+def test_what_is_written(name: str, written: Callable[[str], Path]) -> None:
+    files = {path.name: path for path in written(name).glob("*.[ch]")}
+    assert {f"{name}.h", f"{name}.c", "main.c", "block.h", "python_arithmetic.h"} <= files.keys()
+    texts = [path.read_text("ascii") for file, path in files.items() if file != "main.c"]
+    text = "\n".join(texts)
+    assert {*re.findall(r"#include <(.*)>", text)} <= ALLOWED
+    assert {*re.findall(r'#include "(.*)"', text)} <= files.keys()
+    assert not re.search(r"\bfmi[23]", text)
+
+
+@pytest.mark.parametrize("name", [*map(slow, NAMES[1:]), NAMES[0], "SpringPlant"])
+def test_the_example_runs_by_the_command_at_its_top(
+    name: str, written: Callable[[str], Path]
+) -> None:
+    """And holds the inputs at their start values, as the block does here."""
+    folder = written(name)
+    command, run = re.findall(r"^ \* {5}(\S.*)$", (folder / "main.c").read_text(), re.MULTILINE)
+    assert all(flag in command for flag in BITS)
+    subprocess.run(command, cwd=folder, shell=True, check=True)
+    said = subprocess.check_output(run.replace("1000 0.001", "20 0.01"), cwd=folder, shell=True)
+    rows = [[float(cell) for cell in line.split()] for line in said.splitlines()]
+    with model_of(name) as model:
+        block, fields = model.block, declared(model.block)
+        p = build_params(block, fields, [start for f in fields for start in f.starts])
+        u, listed = block.Inputs(), unpacker(fields)
+        x = block.initial_state(p, u)
+        for k in range(21):
+            expected = [k * 0.01, *map(float, listed(block.outputs(p, x, u)))]
+            assert repr(rows[k]) == repr(expected)
+            x = block.step(p, x, u, 0.01)
+
+
+class InC:
+    """The block in C, called from here; its structs are of doubles but for those of `packing`."""
+
+    def __init__(self, model: Model, folder: Path) -> None:
+        name = model.description.name
+        write_c(folder, model)
+        compiled(folder, *BITS, "-shared", "-fPIC", "-o", "block.so", f"{name}.c", "-lm")
+        library = ctypes.CDLL(str(folder / "block.so"))
+        self.call: Callable[[str], Any] = lambda function: getattr(library, f"{name}_{function}")
+        self.state = (ctypes.c_double * 64)()
+        self.why = ctypes.create_string_buffer(2000)
+
+
+CONTROLLER_INPUTS = ctypes.c_double * 6
+
+
+def controller(tmp_path: Path) -> tuple[InC, Any]:
+    """The controller, and its default parameters as its header has them."""
+    made = InC(shipped_model(SCRIPTS / "GraspController.py"), tmp_path)
+    (tmp_path / "p.c").write_text(
+        '#include "GraspController.h"\n'
+        "const GraspController_Parameters defaults = GRASPCONTROLLER_PARAMETERS_DEFAULTS;\n"
+        "int size = sizeof defaults;\n"
+    )
+    compiled(tmp_path, "-shared", "-fPIC", "-o", "p.so", "p.c")
+    library = ctypes.CDLL(str(tmp_path / "p.so"))
+    size = ctypes.c_int.in_dll(library, "size").value
+    return made, (ctypes.c_char * size).in_dll(library, "defaults")
+
+
+def test_the_same_bits_as_the_block_over_changing_inputs(tmp_path: Path) -> None:
+    c, p = controller(tmp_path)
+    block = blocks()["GraspController"]
+    fields = declared(block)
+    pack, listed = packer(block.Inputs, fields), unpacker(fields)
+    params = block.Params()
+    y = (ctypes.c_double * 16)()
+    names = [n for f in fields if f.causality == "input" for n in f.names]
+    lines = (ROOT / "fmus/build/GraspController_in.csv").read_text().splitlines()
+    assert [cell.strip('"') for cell in lines[0].split(",")] == ["time", *names]
+    rows = [[float(cell) for cell in line.split(",")[1:]] for line in lines[1:]]
+    assert len(rows) == STEPS + 1
+    x = block.initial_state(params, pack(rows[0]))
+    u = CONTROLLER_INPUTS(*rows[0])
+    assert c.call("check")(p, c.why) == 0
+    assert c.call("initial_state")(p, u, c.state, c.why) == 0
+    for row in rows:
+        u = CONTROLLER_INPUTS(*row)
+        assert c.call("step")(p, u, ctypes.c_double(STEP_SIZE), c.state, c.why) == 0
+        assert c.call("outputs")(p, u, c.state, y, c.why) == 0
+        x = block.step(params, x, pack(row), STEP_SIZE)
+        expected = listed(block.outputs(params, x, pack(row)))
+        assert repr([*y][: len(expected)]) == repr(expected)
+
+
+@pytest.mark.parametrize(
+    ("inputs", "step", "code", "why"),
+    [
+        ([nan, 0, 0, 0, 0, 0], 1e-3, 1, "position[1] = nan m: must be a finite number"),
+        ([0, 0, 0, 0, 0, -inf], 1e-3, 1, "intensity[2] = -inf V: must be a finite number"),
+        ([0, 0, 0, 0, 0, 0], 0.0, 1, "step: must be over 0 s, and finite"),
+        ([0, 0, 0, 0, 0, 0], nan, 1, "step: must be over 0 s, and finite"),
+    ],
+)
+def test_what_is_refused_leaves_the_state(
+    inputs: list[float], step: float, code: int, why: str, tmp_path: Path
+) -> None:
+    c, p = controller(tmp_path)
+    zeros = CONTROLLER_INPUTS()
+    assert c.call("initial_state")(p, zeros, c.state, None) == 0
+    before = bytes(c.state)
+    u = CONTROLLER_INPUTS(*inputs)
+    assert c.call("step")(p, u, ctypes.c_double(step), c.state, c.why) == code
+    assert c.why.value.decode() == why
+    assert c.call("step")(p, u, ctypes.c_double(step), c.state, None) == code
+    assert bytes(c.state) == before
+
+
+def test_a_parameter_out_of_its_range_is_named(tmp_path: Path) -> None:
+    """As the FMU names it."""
+    made = shipped_model(SCRIPTS / "GripperPlant.py")
+    c = InC(made, tmp_path)
+    variables = [v for v in made.description.variables if v.causality == "parameter"]
+    assert {v.kind for v in variables} == {float}
+    p = (ctypes.c_double * 64)(*(float(v.start or 0.0) for v in variables))
+    (place,) = (i for i, v in enumerate(variables) if v.name == "finger_mass[1]")
+    p[place] = -1.0
+    assert c.call("check")(p, c.why) == 1
+    assert c.why.value.decode() == "finger_mass[1] = -1.0 kg: must be from 0.001 to 1000 kg"
+
+
+def test_libm_is_what_is_reached() -> None:
+    text = """\
+static inline double one(double x) { return acos(x); }
+static double two(double x)
+{
+    return exp(x); /* not log(x) */
+}
+static void block_step(
+    double *x)
+{
+    *x = two(*x) + sqrt(*x);
+}
+"""
+    assert called_of_libm([text]) == ["exp", "sqrt"]
+    assert called_of_libm([text.replace("two(*x)", "one(*x)")]) == ["acos", "sqrt"]

@@ -1,0 +1,232 @@
+"""Parameters that change between two steps: from there, the FMU is the block with the new ones."""
+
+import sys
+from collections.abc import Callable
+from importlib.util import module_from_spec, spec_from_file_location
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import pytest
+from conftest import Load
+from grasp_fmus.block_build import build_block
+from grasp_fmus.contract import Field, bound, build_params, declared, unpacker
+from grasp_fmus.shipped import blocks
+from hypothesis import HealthCheck, given
+from hypothesis import strategies as st
+from support.examples import examples
+from support.fmi2 import DISCARD, ERROR, OK, Fmu, Instance
+from support.kinds import all_kinds
+
+pytestmark = all_kinds
+
+SPRING = Path(__file__).parents[2] / "docs/spring_plant.py"
+BLOCKS = blocks()
+CLOSED = {
+    "initial_position[1]": 0.0655,
+    "initial_position[2]": -0.0055,
+    "force[1]": -1.0,
+    "force[2]": 1.2,
+}
+STARTS: dict[str, dict[str, float]] = {
+    "GripperPlant": CLOSED,
+    "GripperPlantCompliant": CLOSED,
+    "GripperPlantMovable": CLOSED,
+    "GripperPlantMuJoCo": {**CLOSED, "object_fixed": False},
+    "ProximitySensor": {
+        f"{stage}.enabled": True for stage in ("ambient", "noise", "adc", "filter", "median")
+    },
+    "GraspController": {"position[1]": 0.09, "velocity[1]": -0.1, "intensity[1]": 0.1},
+}
+"""The fingers are about to touch, the sensor samples."""
+
+H = 2e-3
+
+
+class Twin:
+    """The block itself, called as its FMU is."""
+
+    def __init__(self, block: Any, start: dict[str, float]) -> None:
+        self.block, self.fields = block, declared(block)
+        names = [(n, f) for f in self.fields for n in f.names]
+        starts = [s for f in self.fields for s in f.starts]
+        self.values = {n: start.get(n, s) for (n, _), s in zip(names, starts, strict=True)}
+        self.unpack = unpacker(self.fields)
+        self.state = block.initial_state(self.params, self.inputs)
+
+    @property
+    def params(self) -> Any:
+        return build_params(self.block, self.fields, list(self.values.values()))
+
+    @property
+    def inputs(self) -> Any:
+        fields = [f for f in self.fields if f.causality == "input"]
+        values = {f.path[0]: [self.values[n] for n in f.names] for f in fields}
+        own = {f.path[0]: values[f.path[0]][0] for f in fields if f.size is None}
+        return self.block.Inputs(**{n: tuple(v) for n, v in values.items()} | own)
+
+    def outputs(self) -> list[Any]:
+        """Those of now; ValueError where the parameters do not go together."""
+        y = self.unpack(self.block.outputs(self.params, self.state, self.inputs))
+        if not all(map(isfinite, y)):
+            raise ArithmeticError
+        return y
+
+    def step(self, h: float) -> None:
+        """ArithmeticError where it cannot, ValueError where the parameters do not go together."""
+        p, before = self.params, self.state
+        limit = bound(self.block)
+        if limit and not limit.substeps(p, self.state, self.inputs, h) <= limit.most:
+            raise ArithmeticError
+        self.state = self.block.step(p, self.state, self.inputs, h)
+        try:
+            self.outputs()
+        except ArithmeticError:
+            self.state = before
+            raise
+
+
+def expected(call: Callable[[], Any]) -> tuple[int, Any]:
+    """The status that the FMU has, and the reason where it is an error."""
+    try:
+        return OK, call()
+    except ArithmeticError:
+        return DISCARD, None
+    except ValueError as error:
+        return ERROR, str(error)
+
+
+def outputs(instance: Instance) -> tuple[int, list[Any]]:
+    """All of them, in the order of declaration."""
+    fmu = instance.fmu
+    found: dict[str, Any] = {}
+    for get, names in (
+        (instance.get_real, [n for n in fmu.names("output") if n not in fmu.booleans]),
+        (instance.get_boolean, [n for n in fmu.names("output") if n in fmu.booleans]),
+    ):
+        status, values = get([fmu.references[n] for n in names])
+        if status != OK:
+            return status, []
+        found.update(zip(names, values, strict=True))
+    return OK, [found[n] for n in fmu.names("output")]
+
+
+def values(f: Field) -> st.SearchStrategy[float]:
+    """In the range of a parameter, mostly of the order of its start value."""
+    low, high = f.limits or (-1e3, 1e3)
+    if f.kind is bool:
+        return st.booleans()
+    if f.kind is int:
+        return st.integers(int(low), int(high))
+    sizes = [abs(s) or 0.5 for s in f.starts]
+    near = st.sampled_from([-2.0, -0.5, 0.0, 0.1, 0.7, 1.0, 1.5, 4.0]).map(
+        lambda x: min(max(x * sizes[0], low), high)
+    )
+    return near | st.floats(max(low, -10.0 * sizes[0]), min(high, 10.0 * sizes[0]))
+
+
+def changes(block: Any) -> st.SearchStrategy[list[tuple[dict[str, float], int]]]:
+    """Values of some tunable parameters, and how many steps follow; several times."""
+    tunable = [(n, f) for f in declared(block) if f.tunable for n in f.names]
+    one = st.sampled_from(tunable).flatmap(lambda t: values(t[1]).map(lambda v: (t[0], v)))
+    some = st.lists(one, min_size=1, max_size=4).map(dict)
+    return st.lists(st.tuples(some, st.integers(0, 3)), min_size=1, max_size=6)
+
+
+def agree(instance: Instance, twin: Twin, status: int, call: Callable[[], object]) -> None:
+    """A call ended as the block's does, for the same reason; and the outputs are the block's."""
+    asked, reason = expected(call)
+    assert status == asked, instance.log
+    if status == ERROR:
+        assert instance.log[0].text.endswith(reason)
+        assert "\n" not in instance.log[0].text
+    instance.log.clear()
+    status, y = outputs(instance)
+    asked, found = expected(twin.outputs)
+    if asked == OK:
+        assert (status, [*map(repr, y)]) == (OK, [*map(repr, found)])
+    else:
+        assert status == ERROR
+        assert instance.log[0].text.endswith(found or "must be finite")
+    instance.log.clear()
+
+
+def same_as_the_block(fmu: Fmu, block: Any, start: dict[str, float]) -> None:
+    """Whatever changes, between whichever steps."""
+
+    @given(drawn=changes(block))
+    @examples(25, suppress_health_check=list(HealthCheck))
+    def run(drawn: list[tuple[dict[str, float], int]]) -> None:
+        twin, time = Twin(block, start), 0.0
+        with Instance(fmu).initialise(**start) as instance:
+            for change, steps in [({}, 2), *drawn]:
+                assert instance.assign(change) == OK
+                twin.values.update(change)
+                agree(instance, twin, OK, lambda: None)
+                for _ in range(steps):
+                    status = instance.step(time, H)
+                    agree(instance, twin, status, lambda: twin.step(H))
+                    time += H if status == OK else 0.0
+
+    run()
+
+
+@pytest.mark.hypothesis
+@pytest.mark.parametrize("name", BLOCKS)
+def test_a_change_is_that_of_the_block(load: Load, name: str) -> None:
+    same_as_the_block(load(name), BLOCKS[name], STARTS[name])
+
+
+@pytest.mark.hypothesis
+def test_a_change_is_that_of_a_block_of_the_users(tmp_path: Path) -> None:
+    fmu = Fmu(build_block(SPRING, tmp_path).path, tmp_path / "unpacked")
+    spec = spec_from_file_location("spring_plant", SPRING)
+    assert spec is not None
+    assert spec.loader is not None
+    block: Any = module_from_spec(spec)
+    sys.modules["spring_plant"] = block  # where its declarations are looked up
+    spec.loader.exec_module(block)
+    same_as_the_block(fmu, block, CLOSED)
+
+
+def test_what_does_not_go_together_is_refused_when_it_is_needed(load: Load) -> None:
+    """So that a host may set them in two calls; nothing has happened, and a set mends it."""
+    with Instance(load("ProximitySensor"), "eye").initialise() as instance:
+        assert instance.step(0.0, H) == OK
+        before = instance.outputs()
+        assert instance.assign({"reflectance": 0.5, "surface": 4}) == OK
+        refusal = (
+            "eye, t = 0.002 s: reflectance = 0.5 with surface = brown: must be 1, its default; "
+            "surface = custom takes others"
+        )
+        state = instance.state()
+        for step in (True, False):
+            status = instance.step(H, H) if step else instance.get_real([1])[0]
+            assert status == ERROR
+            assert [said.text for said in instance.log] == [refusal]
+            instance.log.clear()
+        assert instance.get("reflectance") == [0.5]
+        saved = state.to_bytes()
+        assert instance.restore(state) == OK
+        state.free()
+        assert instance.assign({"reflectance": 1.0}) == OK
+        assert instance.step(H, H) == OK
+        assert instance.outputs() == [0.86 * value for value in before]
+        status, again = instance.from_bytes(saved)  # of the moment with both
+        assert (status, instance.restore(again)) == (OK, OK)
+        assert instance.step(H, H) == ERROR
+        again.free()
+
+
+@pytest.mark.parametrize("name", BLOCKS)
+def test_one_that_is_fixed_is_refused(load: Load, name: str) -> None:
+    fmu = load(name)
+    with Instance(fmu, "one").initialise() as instance:
+        for n in fmu.names("parameter"):
+            if n not in fmu.tunable:
+                assert instance.assign({n: 1.0}) == ERROR
+                assert instance.log[-1].text == (
+                    f"one, t = 0 s: {n}: fixed parameter set in step mode: must be before "
+                    "fmi2ExitInitializationMode"
+                )
+        assert instance.step(0.0, H) == OK

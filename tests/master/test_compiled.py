@@ -1,0 +1,201 @@
+"""The loop in C: built at the first need, kept, shared by processes; Python's lock, Ctrl-C."""
+
+import ctypes
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from grasp_cosim import InputError, System, simulate
+from grasp_cosim.fmi.instance import STEP_2, Call, Native
+from grasp_cosim.master import compiled, loop
+from grasp_cosim.master.engine import make_loop
+from grasp_cosim.master.plan import Plan
+from support.both_engines import needs_compiler
+
+pytestmark = needs_compiler
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """An empty cache folder, of a process that has not loaded the loop."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    forget()
+    yield tmp_path / "cache"
+    forget()
+
+
+def forget() -> None:
+    compiled.library.cache_clear()
+    compiled._file.cache_clear()
+
+
+def kept(cache: Path) -> list[Path]:
+    return sorted(path for path in cache.rglob("*") if path.is_file())
+
+
+def counts(steps: int = 3) -> int:
+    """Runs a loop of one call; how often it was made."""
+    seen: list[int] = []
+
+    def call() -> int:
+        seen.append(1)
+        return 0
+
+    made = Plan(np.zeros(1), np.zeros(2), [(loop.CALL, 0, 1, 1, 0)], calls=[Call(call)])
+    rows = np.zeros((steps, 1))
+    assert make_loop(made, "compiled")(rows, 0, 0, steps, 1000) == (steps, 0, 0)
+    return len(seen)
+
+
+def test_it_is_built_once_and_kept(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert not compiled.is_there()
+    assert counts() == 3
+    (file,) = kept(cache)
+    assert file.parent.parent == cache / "grasp-cosim"
+    forget()
+    assert compiled.is_there()
+    monkeypatch.setattr(compiled, "compiler", lambda: None)
+    assert counts() == 3
+
+
+@pytest.mark.parametrize(
+    "damage", [lambda b: b[: len(b) // 2], lambda b: b"", lambda b: b[:99] + b"?" + b[100:]]
+)
+def test_what_is_damaged_is_built_anew(cache: Path, damage: Callable[[bytes], bytes]) -> None:
+    counts()
+    (file,) = kept(cache)
+    whole = file.read_bytes()
+    forget()
+    file.unlink()  # the old one may still be mapped
+    file.write_bytes(damage(whole))
+    assert not compiled.is_there()
+    assert counts() == 3
+    assert file.read_bytes() == whole
+
+
+def test_what_was_built_from_other_constants_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = compiled._place()
+    monkeypatch.setattr("grasp_cosim.fmi.instance.EARLY", 7)
+    assert compiled._place() != before
+
+
+@pytest.mark.usefixtures("cache")
+def test_where_nothing_can_be_kept_it_is_built_for_this_process(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    assert counts() == 3
+    assert not compiled._kept()
+
+
+@pytest.mark.usefixtures("cache")
+def test_where_the_user_has_no_home(monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_home() -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.setattr(Path, "home", no_home)
+    assert counts() == 3
+
+
+def test_processes_that_build_it_at_once_all_run(cache: Path) -> None:
+    code = (
+        "from grasp_cosim.master import compiled; import sys; sys.stdin.read(1)\n"
+        "print(compiled.library(True).run.argtypes is not None, compiled.is_there())"
+    )
+    started = [
+        subprocess.Popen([sys.executable, "-c", code], stdin=-1, stdout=-1, stderr=-1, text=True)
+        for _ in range(4)
+    ]
+    for process in started:
+        assert process.stdin
+        process.stdin.write("\n")
+        process.stdin.flush()
+    assert [p.communicate() for p in started] == [("True True\n", "")] * 4
+    assert [path.name for path in kept(cache)] == ["loop.so"]
+
+
+@pytest.mark.usefixtures("cache")
+def test_without_a_compiler_engine_compiled_is_refused(
+    grasp: System, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(compiled, "compiler", lambda: None)
+    with pytest.raises(InputError, match=r"no C compiler \(CC, cc, gcc, clang\).*engine python"):
+        simulate(grasp, stop=1e-3, engine="compiled")
+    assert simulate(grasp, stop=1e-3).complete
+
+
+@pytest.mark.usefixtures("cache")
+def test_a_compiler_that_fails_is_one_line_and_auto_goes_on(
+    grasp: System, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CC", "false")
+    with pytest.raises(InputError, match=r"^engine compiled: false: exit code 1; it needs gcc"):
+        simulate(grasp, stop=1e-3, engine="compiled")
+    assert simulate(grasp, stop=3.0, every=30000, diverging="continue").complete
+
+
+def test_the_compiler_that_is_named_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CC", "env LANG=C cc")
+    assert compiled.compiler() == ["env", "LANG=C", "cc"]
+    monkeypatch.setenv("CC", "no-such-compiler")
+    assert compiled.compiler() in (["cc"], ["gcc"], ["clang"])
+
+
+def test_it_compiles_without_warnings(tmp_path: Path) -> None:
+    strict = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-fPIC", "-shared"]
+    for level in ("-O0", "-O2", "-O3"):
+        command = [*(compiled.compiler() or ()), *strict, level, *compiled._constants()]
+        subprocess.run([*command, "-o", tmp_path / "loop.so", compiled.SOURCE], check=True)
+
+
+def spinning(keeps_lock: bool) -> Plan:
+    """A native call that takes a while: usleep(20 ms), by the shape of a step."""
+    usleep = ctypes.cast(ctypes.CDLL(None).usleep, ctypes.c_void_p).value or 0
+    call = Call(lambda: 0, Native(STEP_2, usleep, 20_000), keeps_lock)
+    return Plan(np.zeros(1), np.zeros(2), [(loop.CALL, 0, 1, 1, 0)], calls=[call])
+
+
+@pytest.mark.parametrize("keeps_lock", [False, True])
+def test_other_threads_run_meanwhile_unless_a_component_is_python(keeps_lock: bool) -> None:
+    run = make_loop(spinning(keeps_lock), "compiled")
+    during, inside, done = [0], threading.Event(), threading.Event()
+
+    def count() -> None:
+        inside.wait()
+        while not done.is_set():
+            during[0] += 1
+
+    thread = threading.Thread(target=count)
+    thread.start()
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(10.0)  # only who gives the lock away loses it
+    try:
+        inside.set()
+        before = during[0]
+        run(np.zeros((5, 1)), 0, 0, 5, 1000)
+        counted = during[0] - before
+    finally:
+        sys.setswitchinterval(interval)
+        done.set()
+    thread.join()
+    assert (counted == 0) is keeps_lock
+
+
+def test_ctrl_c_in_the_loop_is_raised_behind_it() -> None:
+    def interrupt() -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+
+    timer = threading.Timer(0.05, interrupt)
+    timer.start()
+    run = make_loop(spinning(False), "compiled")
+    with pytest.raises(KeyboardInterrupt):
+        run(np.zeros((5, 1)), 0, 0, 5, 1000)
+    timer.join()

@@ -1,0 +1,205 @@
+"""Runs in real time of native FMUs alone: the loop waits and steps without Python's lock."""
+
+import os
+import signal
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from grasp_cosim import InputError, Realtime, SimulationError, System, simulate
+from grasp_cosim.fmi.instance import PACE
+from grasp_cosim.master import aside, master
+from grasp_cosim.realtime.pacer import HAS_CLOCK
+from grasp_cosim.recording.folder import RunFolder
+from grasp_cosim.recording.load import load_run
+from grasp_cosim.recording.result import Result
+from support.both_engines import needs_compiler
+from support.native_fmus import TYPES, build, needs_gcc
+
+pytestmark = [
+    needs_compiler,
+    needs_gcc,
+    pytest.mark.skipif(not HAS_CLOCK, reason="this system's clock is read in Python"),
+]
+FAST = Realtime(factor=1e4)
+
+
+def system(
+    folder: Path, version: str = "2.0", scheme: str = "sequential", **given: float
+) -> System:
+    """Two native FMUs, the integral of one the input of the other; 2 s at 1 ms."""
+    fmu = build(folder, "native", version, strings=False)
+    real, whole = ("Real", "Integer") if version == "2.0" else ("Float64", "Int32")
+    starts = {"Boolean": "true", "String": "''", "Enumeration": "1", "Float32": "0.5", real: "0.25"}
+    components = ""
+    for name, connected in (("a", whole), ("b", real)):
+        own = {f"u_{t}": starts.get(t, "3") for t in TYPES[version] if t != connected}
+        values = ", ".join(f"{key} = {value}" for key, value in {**own, **given}.items())
+        components += f"[components.{name}]\nfmu = '{fmu.name}'\nvalues = {{ {values} }}\n"
+    path = folder / "two.toml"
+    path.write_text(
+        f'connections = ["a.x -> b.u_{real}", "b.y_{whole} -> a.u_{whole}"]\n'
+        f"[experiment]\nstep = 1e-3\nstop = 2.0\nscheme = '{scheme}'\n{components}"
+    )
+    return System.load(path)
+
+
+class Kills:
+    """A listener that sends this process a signal with the first step that it hears of."""
+
+    def __init__(self, number: int) -> None:
+        self.number: int | None = number
+
+    def begin(self, *_: Any) -> None: ...
+    def end(self, *_: Any) -> None: ...
+    def block(self, steps: Any, _: Any) -> None:
+        if steps[-1] > 0 and self.number is not None:
+            number, self.number = self.number, None
+            os.kill(os.getpid(), number)
+
+
+def same_bits(one: Result, two: Result) -> bool:
+    same = [one[name].tobytes() == two[name].tobytes() for name in one]
+    return all(same) and one.time.tobytes() == two.time.tobytes() and list(one) == list(two)
+
+
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+@pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
+def test_it_has_the_bits_of_a_free_run_and_a_timing(
+    tmp_path: Path, version: str, scheme: str
+) -> None:
+    two = system(tmp_path, version, scheme)
+    with simulate.session(two, realtime=FAST) as session:
+        assert session._master.runs_alone
+        shapes = [c.native and c.native.shape for c in session._master.plan.calls]
+        assert shapes.count(PACE) == 1
+    free, paced = simulate(two, engine="python"), simulate(two, realtime=FAST)
+    assert same_bits(free, paced)
+    assert paced.timing
+    assert paced.timing.steps == 2000
+    assert paced.timing.overruns == sum(paced.timing.culprits.values())
+    assert "recording" not in {*paced.timing.culprits, *paced.timing.parts}
+
+
+def test_rows_go_round_in_their_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    two = system(tmp_path)
+    monkeypatch.setattr(master, "ROOM", 7)
+    monkeypatch.setattr(aside, "PAUSE", 0)
+    monkeypatch.setattr(master, "LONG", 0.0)
+    assert same_bits(simulate(two), simulate(two, realtime=FAST))
+
+
+def test_steps_in_pieces_and_looks_in_between_come_to_the_same(tmp_path: Path) -> None:
+    two = system(tmp_path)
+    with simulate.session(two, realtime=FAST) as session:
+        for steps in (1, 1, 3, 700, 5, 5000):
+            assert session.step(steps)
+            assert len(session.result().time) == round(session.time * 1e3) + 1
+        assert session.complete
+        assert same_bits(session.result(), simulate(two))
+
+
+def test_it_keeps_to_the_clock(tmp_path: Path) -> None:
+    """Each step begins at or after its time, in order, whatever the machine does."""
+    two = system(tmp_path).with_experiment(stop=0.2)
+    timing = simulate(two, realtime=Realtime(factor=1.0)).timing
+    assert timing is not None
+    assert timing.real_time_factor <= 1.0 + 1e-6
+    assert timing.parts["start"].median >= 0.0
+
+
+def test_the_folder_has_every_row_of_it(tmp_path: Path) -> None:
+    two = system(tmp_path)
+    with RunFolder(tmp_path / "out", two, paced=True) as folder:
+        result = simulate(two, realtime=FAST, listeners=[folder])
+        folder.finish(result)
+    assert same_bits(load_run(tmp_path / "out"), result)
+
+
+@pytest.mark.parametrize("at", [0.5005, 1.9995])
+def test_an_fmu_that_fails_ends_it_with_what_was_recorded(tmp_path: Path, at: float) -> None:
+    with pytest.raises(SimulationError, match="returned error") as caught:
+        simulate(system(tmp_path, error_at=at), realtime=FAST)
+    assert caught.value.result is not None
+    assert len(caught.value.result.time) == int(at * 1e3) + 1
+
+
+def test_a_step_that_is_discarded_is_taken_in_parts(tmp_path: Path) -> None:
+    two = system(tmp_path, discard_at=0.5005)
+    try:
+        free: Any = simulate(two)
+    except SimulationError as error:
+        free = str(error)
+    try:
+        paced: Any = simulate(two, realtime=FAST)
+    except SimulationError as error:
+        paced = str(error)
+    assert type(free) is type(paced)
+    assert free == paced if isinstance(free, str) else free.rejections == paced.rejections
+
+
+def test_a_late_step_ends_it_where_it_should(tmp_path: Path) -> None:
+    with pytest.raises(SimulationError, match=r"the step at t = 0(\.\d+)? s ended .* ms late"):
+        simulate(system(tmp_path), realtime=Realtime(factor=1e6, overrun="stop"))
+
+
+def test_what_a_listener_raises_ends_it(tmp_path: Path) -> None:
+    class Full:
+        def begin(self, *_: Any) -> None: ...
+        def end(self, *_: Any) -> None: ...
+        def block(self, steps: Any, rows: Any) -> None:
+            if steps[-1] > 10:
+                raise SimulationError("the disk is full")
+
+    with pytest.raises(SimulationError, match="the disk is full"):
+        simulate(system(tmp_path), realtime=Realtime(factor=1.0), listeners=[Full()])
+
+
+@pytest.mark.parametrize("waits", [True, False])
+def test_ctrl_c_ends_it_soon_and_keeps_what_was_recorded(tmp_path: Path, waits: bool) -> None:
+    """While it sleeps between steps, and where it never does."""
+    long = system(tmp_path).with_experiment(stop=1e5)
+    realtime = Realtime(factor=1.0 if waits else 1e6)
+    result = simulate(long, realtime=realtime, every=10, listeners=[Kills(signal.SIGINT)])
+    assert not result.complete
+    assert 0 < result.time[-1] < 1e5
+
+
+def test_a_halt_from_another_thread_ends_it(tmp_path: Path) -> None:
+    long = system(tmp_path).with_experiment(stop=1e5)
+    with simulate.session(long, realtime=Realtime(), every=100) as session:
+        timer = threading.Timer(0.2, session.halt.set)
+        timer.start()
+        assert session.step(10**8)
+        timer.join()
+        assert not session.complete
+        assert not session.step(1)
+
+
+def test_another_signal_does_not_end_it(tmp_path: Path) -> None:
+    seen: list[int] = []
+    before = signal.signal(signal.SIGUSR1, lambda number, _: seen.append(number))
+    try:
+        two = system(tmp_path).with_experiment(stop=0.3)
+        assert simulate(two, realtime=Realtime(), listeners=[Kills(signal.SIGUSR1)]).complete
+    finally:
+        signal.signal(signal.SIGUSR1, before)
+    assert seen == [signal.SIGUSR1]
+
+
+def test_a_python_call_in_the_plan_keeps_the_pacer_in_python(tmp_path: Path) -> None:
+    """An event, say: nobody would hand the rows on in its wait otherwise."""
+    text = (tmp_path / "two.toml", system(tmp_path))[0]
+    text.write_text(text.read_text() + "[[events]]\nat = 0.5\nset = { 'a.gain' = 2.0 }\n")
+    two = System.load(text)
+    with simulate.session(two, realtime=FAST) as session:
+        assert not session._master.runs_alone
+    assert same_bits(simulate(two), simulate(two, realtime=FAST))
+    assert np.isfinite(simulate(two)["a.x"]).all()
+
+
+def test_an_unknown_policy_is_refused_as_ever() -> None:
+    with pytest.raises(InputError, match="overrun"):
+        Realtime(overrun="hurry")  # type: ignore[arg-type]
