@@ -32,18 +32,20 @@ def run(host: Host, grasp: Grasp, folder: Path, steps: int, h: float) -> Rows:
     return grasp.read(folder / "rows")
 
 
-LOOPS: list[tuple[str, dict[str, Any], int, float]] = [
-    ("GripperPlant", {}, 3000, H),
-    ("GripperPlant", BENCH, 3000, H),
-    ("GripperPlantCompliant", BENCH, 3000, H),
-    ("GripperPlantMovable", BENCH, 3000, H),
-    ("GripperPlantMovable", BENCH, 10_000, 1e-4),
+LOOPS: list[tuple[str, dict[str, Any], int, float, float]] = [
+    ("GripperPlant", {}, 30_000, 1e-4, CLOSE),
+    ("GripperPlant", BENCH, 30_000, 1e-4, CLOSE),
+    ("GripperPlantCompliant", BENCH, 3000, 1e-4, CLOSE),
+    ("GripperPlantMovable", BENCH, 10_000, 1e-4, CLOSE),
+    ("GripperPlant", BENCH, 3000, H, 100.0 * CLOSE),
+    ("GripperPlantMovable", BENCH, 3000, H, 100.0 * CLOSE),
 ]
+"""Plant, values, steps, their size, how close. At 1 ms the loop makes more of a difference."""
 
 
 @cache
 def in_python(loop: int) -> Rows:
-    plant, values, steps, h = LOOPS[loop]
+    plant, values, steps, h, _ = LOOPS[loop]
     return rows_in_python(values, steps, h, plant)
 
 
@@ -53,7 +55,7 @@ def test_the_loop_on_other_platforms(
 ) -> None:
     """Every plant, with and without electronics and friction."""
     host, made = host_for(platform.target), parts_on(platform, fmi)
-    for loop, (plant, values, steps, h) in enumerate(LOOPS):
+    for loop, (plant, values, steps, h, close) in enumerate(LOOPS):
         found = run(host, Grasp(made, values, plant), tmp_path, steps, h)
         expected = in_python(loop)
         assert found.shape == expected.shape
@@ -61,7 +63,7 @@ def test_the_loop_on_other_platforms(
         if platform.same_bits:
             assert np.array_equal(found.view(np.uint64), expected.view(np.uint64)), far
         else:
-            assert far <= CLOSE
+            assert far <= close, (plant, h)
 
 
 @pytest.mark.parametrize(("platform", "fmi"), cases([*ARM, *WIN]))
