@@ -379,9 +379,7 @@ class Expressions:
         if isinstance(v, FunctionType):
             return Static(v)
         if type(v) in (float, int, bool):
-            t = self.program.type_of(v, ast.unparse(node))
-            number = None if t == BOOLEAN else v
-            return Value(self.program.initialiser(v, t), POSTFIX, t, number=number, is_path=True)
+            return self.literal(v, node)
         raise self.error(node, f"{ast.unparse(node)}: must be a function, a member or a number")
 
     def _member(self, node: ast.Attribute, base: Value, t: Record | Group) -> Value | Static:
@@ -407,6 +405,8 @@ class Expressions:
             return Static("_replace", of=base)
         if isinstance(found, FunctionType):
             return Static(found, of=base)
+        if type(found) in (float, int, bool):
+            return self.literal(found, node)
         raise self.error(node, f"{ast.unparse(node)}: {t.cls.__name__} has no such field")
 
     def _subscript(self, node: ast.Subscript) -> Value:

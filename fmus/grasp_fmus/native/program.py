@@ -494,7 +494,7 @@ def _hints(of: Any) -> dict[str, Any]:
         found |= (
             vars(base).get("__annotations__", {}) if isinstance(base, type) else of.__annotations__
         )
-    if any(isinstance(hint, str) for hint in found.values()):
+    if any(isinstance(hint, str | typing.ForwardRef) for hint in found.values()):
         try:
             return typing.get_type_hints(of)
         except (NameError, TypeError, AttributeError):
