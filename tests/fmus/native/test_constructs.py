@@ -12,7 +12,6 @@ from grasp_fmus.block_build import _run
 from grasp_fmus.native.translation import translated
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from support.slow import slow
 
 HEAD = '''
 """Blocks of the tests: `which` chooses one."""
@@ -662,7 +661,7 @@ def test_a_construct_gives_the_bits_and_the_faults_of_python(
         _agree(blocks, which, reals, n, flag, random.choice([0, 2, 5, -1]))
 
 
-@slow
+@pytest.mark.slow
 @settings(
     max_examples=20_000, deadline=None, suppress_health_check=list(HealthCheck), database=None
 )
