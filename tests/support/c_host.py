@@ -271,8 +271,11 @@ class Grasp:
 
     def read(self, rows: Path) -> Rows:
         """What was recorded, one row for each communication point."""
-        columns = sum(len(part.fmu.outputs()) for part in self.parts.values())
-        return np.fromfile(rows).reshape(-1, columns)
+        return np.fromfile(rows).reshape(-1, len(self.columns()))
+
+    def columns(self) -> list[str]:
+        """The outputs in a row, as COMPONENT.VARIABLE."""
+        return [f"{c}.{name}" for c, part in self.parts.items() for name in part.fmu.outputs()]
 
 
 def good(answers: Iterable[Answer]) -> None:
