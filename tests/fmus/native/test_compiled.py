@@ -89,7 +89,7 @@ def test_two_fmus_in_one_program(tmp_path: Path) -> None:
 def test_what_it_imports(fmi: Literal[2, 3], tmp_path: Path) -> None:
     """Memory, copies and arithmetic: no file, time, process, environment, locale."""
     write_sources(tmp_path / "c", fmi)
-    command = ["nm", "-D", "--undefined-only", compile_in(tmp_path / "c", fmi)]
+    command = ["nm", "-D", "--undefined-only", str(compile_in(tmp_path / "c", fmi))]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     names = {line.split()[-1].partition("@")[0] for line in done.stdout.splitlines()}
     names = {name for name in names if not name.startswith(("_", "__"))}
