@@ -4,9 +4,15 @@ Statuses, values, texts in the log, bytes of states. Where Python logs a traceba
 line; where pythonfmu itself refuses, it says nothing.
 """
 
+import struct
+from collections import Counter
 from ctypes import c_double, c_int, c_size_t, c_uint
+from hashlib import blake2b
 from math import inf, nan
+from pathlib import Path
+from random import Random
 from typing import Any
+from xml.etree import ElementTree
 
 import pytest
 from hypothesis import example, given
@@ -39,7 +45,7 @@ class Twin:
     def __init__(self, fmu: Fmu, name: str = "twin") -> None:
         self.instance = Instance(fmu, name)
         self.saved: State | None = None
-        self.time = 0.0
+        self.time = self.saved_at = 0.0
 
     def end(self) -> None:
         if self.saved:
@@ -80,21 +86,21 @@ class Twin:
     def _save(self) -> bytes:
         if self.saved:
             self.saved.free()
-        self.saved = self.instance.state()
+        self.saved, self.saved_at = self.instance.state(), self.time
         return self.saved.to_bytes()
 
     def _restore(self) -> int | None:
         if not self.saved:
             return None
-        self.time = 0.0
+        self.time = self.saved_at
         return self.instance.restore(self.saved)
 
-    def _read(self, data: bytes) -> int:
+    def _read(self, data: bytes) -> tuple[int, bytes]:
         status, state = self.instance.from_bytes(data)
         if status == OK:
-            assert state.to_bytes()
+            data = state.to_bytes()
             state.free()
-        return status
+        return status, data
 
 
 def last_line(text: str) -> str:
@@ -114,6 +120,80 @@ def the_same(twins: tuple[Fmu, Fmu], acts: list[Act], name: str = "twin") -> lis
     finally:
         python.end()
         native.end()
+
+
+READY: list[Act] = [
+    ("setup", 0.0),
+    ("call", "EnterInitializationMode"),
+    ("call", "ExitInitializationMode"),
+]
+
+SHIPPED = ("GraspController", "GripperPlant", "GripperPlantCompliant", "GripperPlantMovable",
+           "ProximitySensor")  # fmt: skip
+
+
+class Drawn:
+    """Calls drawn at random for an FMU, often in the ranges of its variables."""
+
+    def __init__(self, fmu: Fmu, random: Random) -> None:
+        self._random = random
+        root = ElementTree.parse(fmu.folder / "modelDescription.xml").getroot()
+        self._ranges: dict[int, tuple[float, float]] = {}
+        for v in root.iter("ScalarVariable"):
+            low, high = (float(v[0].get(key, nan)) for key in ("min", "max"))
+            self._ranges[int(v.get("valueReference", ""))] = low, high
+        kinds = {fmu.references[name]: kind for name, kind in fmu.kinds.items()}
+        self._by_kind = {k: [r for r in kinds if kinds[r] == k] for k in set(kinds.values())}
+        self._inputs = [r for r in map(fmu.references.get, fmu.names("input")) if r is not None]
+        self._inputs = [r for r in self._inputs if kinds[r] == "Real"]
+        self._outputs = [fmu.references[n] for n in fmu.names("output")]
+        self._outputs = [r for r in self._outputs if kinds[r] == "Real"]
+
+    def _number(self, low: float, high: float) -> float:
+        r = self._random
+        if low < high and r.random() < 0.6:
+            return float(r.choice([low, high, r.uniform(low, high), low + (high - low) * 1e-3]))
+        if r.random() < 0.2:
+            return float(r.choice([0.0, -0.0, 5e-324, 1e300, -1e300, inf, nan]))
+        return float(r.choice([1.0, -1.0]) * 10.0 ** r.uniform(-9.0, 3.0))
+
+    def parameters(self) -> Act:
+        kind = self._random.choice(["Real", "Real", "Boolean", "Integer"])
+        chosen = self._random.choices(self._by_kind.get(kind, [0]), k=2)
+        if kind == "Real":
+            return "set", kind, [(r, self._number(*self._ranges[r])) for r in chosen]
+        return "set", kind, [(r, self._random.choice([0, 1, 2, 5, -1])) for r in chosen]
+
+    def act(self) -> Act:
+        r = self._random
+        choice = r.randrange(10)
+        if choice < 3:
+            return "step", r.choice([1e-4, 1e-3, 1e-2, 0.3, float(10.0 ** r.uniform(-6, 8))]), 0.0
+        if choice < 6:
+            return "set", "Real", [(u, self._number(-1.0, 1.0)) for u in self._inputs]
+        if choice == 6:
+            return self.parameters()
+        if choice == 7:
+            return "get", "Real", self._outputs
+        return ("save",) if choice == 8 else ("restore",)
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("seeds", [range(20), pytest.param(range(20, 600), marks=pytest.mark.slow)])
+def test_any_calls_of_the_blocks_that_come_with_the_package(
+    name: str, seeds: range, fmus: Path, natives: Path, tmp_path: Path
+) -> None:
+    python, native = fmus / f"{name}.fmu", natives / f"{name}.fmu"
+    both = Fmu(python, tmp_path / "one"), Fmu(native, tmp_path / "two")
+    steps = Counter[int]()
+    for seed in seeds:
+        drawn = Drawn(both[0], Random(f"{name} {seed}"))
+        acts = [drawn.parameters() for _ in range(seed % 6)] + READY
+        acts += [drawn.act() for _ in range(60)]
+        answers = the_same(both, acts)
+        steps.update(a[0] for a, act in zip(answers, acts, strict=True) if act[0] == "step")
+    assert steps[OK] > len(seeds)
+    assert steps[DISCARD] or name == "GraspController"
 
 
 numbers = st.one_of(
@@ -152,11 +232,6 @@ calls = st.one_of(
     st.just(("save",)),
     st.just(("restore",)),
 )
-READY: list[Act] = [
-    ("setup", 0.0),
-    ("call", "EnterInitializationMode"),
-    ("call", "ExitInitializationMode"),
-]
 
 
 @given(st.booleans(), st.lists(calls, max_size=20))
@@ -199,22 +274,60 @@ def test_any_name_and_time(twins: tuple[Fmu, Fmu], name: str, start: float) -> N
     the_same(twins, [*acts, ("step", nan, 0.0), ("step", 1e-3, 1.0)], name)
 
 
+@pytest.mark.parametrize(("start", "off"), [(0.0, 1e-9), (-3.0, 1e-9), (1e6, 1e-6), (1e300, 1e288)])
+@pytest.mark.parametrize("factor", [1.5, 0.8, -0.8, -1.5])
+def test_how_far_the_clocks_may_be_apart(
+    twins: tuple[Fmu, Fmu], start: float, off: float, factor: float
+) -> None:
+    acts: list[Act] = [("setup", start), *READY[1:], ("step", 1e-3, start + factor * off)]
+    (status, _) = the_same(twins, acts)[-1]
+    assert status == (OK if abs(factor) < 1.0 else ERROR)
+
+
+@pytest.mark.parametrize("reference", range(5, 11))
+@pytest.mark.parametrize("ready", [1, 2])
+def test_each_parameter_that_is_set_late(
+    twins: tuple[Fmu, Fmu], reference: int, ready: int
+) -> None:
+    """After outputs were read, which may not keep what they came from."""
+    kind = {SEED: "Integer", FAULT: "Integer", NOISY: "Boolean"}.get(reference, "Real")
+    acts: list[Act] = [("set", "Real", [(0, 3.0)]), *READY[:ready], ("get", "Real", [2, 3])]
+    acts += [("set", kind, [(reference, 2)]), ("get", "Real", [2, 3]), *READY[ready:]]
+    the_same(twins, [*acts, ("step", 1e-3, 0.0), ("get", "Real", [2, 3]), ("save",)])
+
+
+WHOLE = (-0.5, -0.0, 2.7, -7.9, 1e300, -1e300, inf, nan, 0.5)
+
+
+@pytest.mark.parametrize("number", WHOLE)
+@pytest.mark.parametrize("place", [0, 1, 3, 7, 12, 13])
+def test_a_state_with_a_number_that_is_not_whole(
+    twins: tuple[Fmu, Fmu], place: int, number: float
+) -> None:
+    """The phase, the time, a Boolean, an Integer, and both of the block's state."""
+    ((good, _),) = the_same(twins, [*READY, ("step", 1e-3, 0.0), ("save",)])[-1:]
+    the_same(twins, [("read", altered(good, [(place, number)]))])
+
+
+def altered(state: bytes, changes: list[tuple[int, float]], signed: bool = True) -> bytes:
+    """A state with other numbers at places, with the right check sum if it is signed."""
+    data = bytearray(state)
+    for place, number in changes:
+        data[40 + 8 * place : 48 + 8 * place] = struct.pack("<d", number)
+    if signed:
+        data[24:40] = blake2b(bytes(data[8:24] + data[40:]), digest_size=16).digest()
+    return bytes(data)
+
+
 @given(st.lists(st.tuples(st.integers(0, 13), numbers), max_size=3), st.booleans(), st.data())
 @examples(200)
 def test_any_state(
     twins: tuple[Fmu, Fmu], changes: list[tuple[int, float]], signed: bool, data: st.DataObject
 ) -> None:
     """Bytes with any numbers in them, with the right check sum or not, and some cut off."""
-    import struct
-    from hashlib import blake2b
-
     ((good, _),) = the_same(twins, [*READY, ("step", 1e-3, 0.0), ("save",)])[-1:]
-    state = bytearray(good)
-    for place, number in changes:
-        state[40 + 8 * place : 48 + 8 * place] = struct.pack("<d", number)
-    if signed:
-        state[24:40] = blake2b(bytes(state[8:24] + state[40:]), digest_size=16).digest()
-    else:
+    state = bytearray(altered(good, changes, signed))
+    if not signed:
         at = data.draw(st.integers(0, len(state)))
         state[at : at + data.draw(st.integers(0, 9))] = data.draw(st.binary(max_size=9))
     the_same(twins, [("read", bytes(state))])
