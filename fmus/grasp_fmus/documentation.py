@@ -26,7 +26,7 @@ _BOUND = """Nothing where there is <code>$library</code>, to which this FMU is b
 along, and knows where its standard library is. On another machine build it there."""
 """The needs of a host on Linux, for an FMU bound to a libpython and for any other."""
 
-_NATIVE = "The native FMU of this block, from <code>grasp-cosim build --native</code>, needs no Python."
+_NATIVE = "The native FMU of it, from <code>grasp-cosim build --native</code>, needs no Python."
 
 
 class Making(NamedTuple):
