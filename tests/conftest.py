@@ -11,22 +11,25 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pytest
 from grasp_cosim import System, cli
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_fmus.build import build
-from grasp_fmus.fmu import build_fmu
 from grasp_fmus.native.build import build_native
-from grasp_fmus.shipped import SCRIPTS
 from hypothesis import settings
+from support import kinds
 from support.fmi2 import Fmu
+from support.kinds import Kind
 from support.packages import skip_where_it_cannot_run
 
 Run = Callable[..., tuple[int, str, str]]
 """A command line without its program; exit code, standard output, standard error."""
 
 Load = Callable[[str], Fmu]
+LoadAs = Callable[[str, Kind], Fmu]
+Folder = Callable[[Kind], Path]
 MadeOnce = Callable[[str, Callable[[Path], object]], Path]
 UnpackIn = Callable[[str], Path]
 Altered = Callable[[str, str, str, str], Path]
@@ -48,7 +51,27 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """The slow ones first: in the end no process waits for another for long."""
+    items[:] = [item for item in items if _exists(item)]
     items.sort(key=lambda item: item.get_closest_marker("slow") is None)
+
+
+def _exists(item: pytest.Item) -> bool:
+    drawn: dict[str, Any] = getattr(getattr(item, "callspec", None), "params", {})
+    return kinds.exists(str(drawn.get("name")), drawn.get("kind", "python"))
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """A test that loads FMUs runs on each kind that it, or its module, is marked with."""
+    marker = metafunc.definition.get_closest_marker("kinds")
+    if marker and "kind" in metafunc.fixturenames:
+        metafunc.parametrize("kind", marker.args, indirect=True, scope="module")
+
+
+@pytest.fixture(scope="module")
+def kind(request: pytest.FixtureRequest) -> Kind:
+    """The kind of FMUs that load and altered give; by default those that Python runs."""
+    chosen: Kind = getattr(request, "param", "python")
+    return chosen
 
 
 @pytest.fixture
@@ -81,44 +104,64 @@ def made_once(tmp_path_factory: pytest.TempPathFactory) -> MadeOnce:
 
 
 @pytest.fixture(scope="session")
-def fmus() -> Path:
-    """The folder with the FMUs of these sources, built once for all test processes and runs.
+def folder_of() -> Folder:
+    """The folder with the FMUs of these sources, by kind: built once for all test processes.
 
-    What is not of these sources, or was altered, build() makes anew.
+    What is not of these sources, or was altered, is made anew.
     """
-    folder = Path(sys.prefix, "fmus_of_the_tests")
-    folder.mkdir(exist_ok=True)
-    with (folder.parent / f"{folder.name}.lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        build(folder)
+    done: dict[Kind, Path] = {}
+
+    def folder(kind: Kind) -> Path:
+        if kind not in done:
+            at = Path(sys.prefix, f"{kind}_fmus_of_the_tests".replace(" ", "_"))
+            plan = None if kind == "python" else kinds.plan(kind)
+            at.mkdir(exist_ok=True)
+            with (at.parent / f"{at.name}.lock").open("w") as lock:
+                fcntl.flock(lock, fcntl.LOCK_EX)
+                if plan is None:
+                    build(at)
+                else:
+                    build_native(at, plan)
+            done[kind] = at
+        return done[kind]
+
     return folder
 
 
 @pytest.fixture(scope="session")
-def natives() -> Path:
-    """The folder of the native FMUs of these sources, as `fmus`."""
-    if not shutil.which("gcc"):
-        pytest.skip("NO gcc")
-    folder = Path(sys.prefix, "native_fmus_of_the_tests")
-    folder.mkdir(exist_ok=True)
-    with (folder.parent / f"{folder.name}.lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        build_native(folder)
-    return folder
+def fmus(folder_of: Folder) -> Path:
+    """The folder with the FMUs that Python runs."""
+    return folder_of("python")
 
 
 @pytest.fixture(scope="session")
-def load(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Load:
-    """An FMU by its name, as an FMI host loads it, once per test process."""
-    loaded: dict[str, Fmu] = {}
+def natives(folder_of: Folder) -> Path:
+    """The folder with the native FMUs, for FMI 2.0."""
+    return folder_of("native")
 
-    def fmu(name: str) -> Fmu:
-        skip_where_it_cannot_run(name)
-        if name not in loaded:
-            loaded[name] = Fmu(fmus / f"{name}.fmu", tmp_path_factory.mktemp(name))
-        return loaded[name]
+
+@pytest.fixture(scope="session")
+def load_as(folder_of: Folder, tmp_path_factory: pytest.TempPathFactory) -> LoadAs:
+    """An FMU by its name and kind, as an FMI host loads it, once per test process."""
+    loaded: dict[tuple[str, Kind], Fmu] = {}
+
+    def fmu(name: str, kind: Kind) -> Fmu:
+        if kind == "python":
+            skip_where_it_cannot_run(name)
+        if (name, kind) not in loaded:
+            folder = tmp_path_factory.mktemp(name)
+            own = name in kinds.OWN
+            path = kinds.build_own(name, kind, folder) if own else folder_of(kind) / f"{name}.fmu"
+            loaded[name, kind] = Fmu(path, folder / "unpacked")
+        return loaded[name, kind]
 
     return fmu
+
+
+@pytest.fixture(scope="module")
+def load(load_as: LoadAs, kind: Kind) -> Load:
+    """An FMU by its name, of the kind that the test is run on."""
+    return lambda name: load_as(name, kind)
 
 
 @pytest.fixture(scope="session")
@@ -165,7 +208,7 @@ def unpack_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> UnpackIn:
 
 
 @pytest.fixture
-def altered(tmp_path: Path) -> Altered:
+def altered(tmp_path: Path, kind: Kind) -> Altered:
     """Builds the FMU of a script with one place in one source file changed."""
 
     def build_altered(script: str, source: str, before: str, after: str) -> Path:
@@ -179,8 +222,7 @@ def altered(tmp_path: Path) -> Altered:
         assert text.count(before) == 1
         (sources / source).write_text(text.replace(before, after), "utf-8")
         with _imported_from(sources, package):
-            built = build_fmu(SCRIPTS / f"{script}.py", tmp_path / "altered")
-        return built.path
+            return kinds.build_shipped(script, kind, tmp_path / "altered")
 
     return build_altered
 

@@ -53,15 +53,15 @@ class Variables:
         root = ElementTree.parse(fmu.folder / "modelDescription.xml").getroot()
         self.by_type: dict[str, list[tuple[int, float, float]]] = {}
         self.left_alone: set[int] = set()
-        for v in root.iter("ScalarVariable"):
-            reference = int(v.get("valueReference", ""))
-            for kind in ("Real", "Integer", "Boolean", "String", "Enumeration"):
-                if (declared := v.find(kind)) is not None:
-                    low, high = (float(declared.get(k, math.nan)) for k in ("min", "max"))
-                    name = "Integer" if kind == "Enumeration" else kind
-                    self.by_type.setdefault(name, []).append((reference, low, high))
-            if v.get("name") in LEFT_ALONE:
-                self.left_alone.add(reference)
+        for v in root.findall("ModelVariables/*"):
+            name, declared = v.get("name", ""), v[0] if fmu.fmi == 2 else v
+            if name not in fmu.references:  # the time of FMI 3.0
+                continue
+            low, high = (float(declared.get(k, math.nan)) for k in ("min", "max"))
+            known = self.by_type.setdefault(fmu.kinds[name], [])
+            known.append((fmu.references[name], low, high))
+            if name in LEFT_ALONE:
+                self.left_alone.add(fmu.references[name])
 
 
 class State(NamedTuple):
@@ -306,7 +306,7 @@ class Caller:
         vector, n = self._vector(self._references("Real"))
         numbers = (c_double * n.value)()
         orders = (c_int * n.value)()
-        which = r.randrange(6)
+        which = r.randrange(6 if self.fmu.fmi == 2 else 2)  # FMI 3.0 has none of the others
         if which == 0:
             self._call("SetDebugLogging", r.randrange(2), c_size_t(0), None)
         elif which == 1:

@@ -14,6 +14,7 @@ import pytest
 from conftest import Altered, Load
 from grasp_fmus.packing import package_folder
 from support.fmi2 import OK, Fmu, Instance
+from support.kinds import all_kinds
 from support.packages import runnable
 from support.slow import slow
 
@@ -140,6 +141,7 @@ def driven(instance: Instance, steps: int) -> Iterator[list[float]]:
         yield [*instance.outputs(), *contacts]
 
 
+@all_kinds
 @pytest.mark.parametrize("name", BLOCKS)
 def test_interleaved_instances_are_as_each_one_alone(load: Load, name: str) -> None:
     """Bit for bit, with other parameters and other numbers of steps."""
@@ -158,8 +160,9 @@ def test_interleaved_instances_are_as_each_one_alone(load: Load, name: str) -> N
     assert together == alone
 
 
+@all_kinds
 def test_two_builds_of_one_fmu_run_their_own_code(
-    fmus: Path, tmp_path: Path, altered: Altered
+    load: Load, tmp_path: Path, altered: Altered
 ) -> None:
     """Alive at the same time and step by step in turn; whichever came first."""
     other = altered(
@@ -168,8 +171,7 @@ def test_two_builds_of_one_fmu_run_their_own_code(
         "p.gain * p.alpha",
         "2.0 * p.gain * p.alpha",
     )
-    ours = Fmu(fmus / "ProximitySensor.fmu", tmp_path / "ours")
-    theirs = Fmu(other, tmp_path / "theirs")
+    ours, theirs = load("ProximitySensor"), Fmu(other, tmp_path / "theirs")
     assert ours.guid != theirs.guid
     for order in ((ours, theirs, ours), (theirs, ours, theirs)):
         instances = [Instance(fmu).initialise(gap=0.02) for fmu in order]

@@ -12,13 +12,14 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 import pytest
 from block_variables import Input, Output
-from conftest import Altered
+from conftest import Altered, Folder
 from fmpy import read_model_description, simulate_fmu
 from fmpy.cross_check.validate_vendor_repo import read_csv as read_csv_of_the_rules
 from fmpy.cross_check.validate_vendor_repo import validate_test_fmu
 from fmpy.util import read_csv, read_ref_opt_file, validate_result
 from grasp_fmus.contract import declared
 from grasp_fmus.cross_check import SIGNALS, STEP_SIZE, cross_check_files
+from support.kinds import Kind, all_kinds
 
 BLOCKS = {
     "GripperPlant": "gripper_plant.rigid",
@@ -132,8 +133,11 @@ def test_every_line_of_the_options_is_read(folder: Path, name: str) -> None:
     assert all(re.fullmatch(r"\w+, [0-9.e-]+", line) for line in lines)
 
 
-def test_the_fmu_gives_the_reference_to_the_last_bit(folder: Path, name: str) -> None:
-    result = simulated(folder / f"{name}.fmu", folder, name)
+@all_kinds
+def test_the_fmu_gives_the_reference_to_the_last_bit(
+    folder: Path, folder_of: Folder, kind: Kind, name: str
+) -> None:
+    result = simulated(folder_of(kind) / f"{name}.fmu", folder, name)
     reference = read_csv(folder / f"{name}_ref.csv")
     assert set(result.dtype.names) == set(reference.dtype.names)
     for column in reference.dtype.names:

@@ -17,7 +17,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from conftest import Folder
 from support.fmi2 import ERROR, OK, Fmu, Instance
+from support.kinds import Kind, all_kinds
 from support.packages import skip_where_it_cannot_run
 
 NAMES = ("GraspController", "GripperPlant", "GripperPlantMuJoCo", "ProximitySensor")
@@ -167,11 +169,14 @@ def main(fmu: str, folder: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="asks Linux and glibc")
+@all_kinds
 @pytest.mark.parametrize("name", NAMES)
-def test_a_thousand_instances_leave_nothing_behind(fmus: Path, tmp_path: Path, name: str) -> None:
+def test_a_thousand_instances_leave_nothing_behind(
+    folder_of: Folder, kind: Kind, tmp_path: Path, name: str
+) -> None:
     skip_where_it_cannot_run(name)
     done = subprocess.run(
-        [sys.executable, __file__, fmus / f"{name}.fmu", tmp_path],
+        [sys.executable, __file__, folder_of(kind) / f"{name}.fmu", tmp_path],
         env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])},
         capture_output=True, text=True,
     )  # fmt: skip

@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from threading import Thread
 from typing import Any
@@ -106,8 +107,17 @@ HOSTS: dict[str, Any] = {
 
 @pytest.mark.parametrize("host", HOSTS)
 def test_the_host_lives(fmus: Path, tmp_path: Path, host: str) -> None:
+    hosted(host, tmp_path, runnable(fmus))
+
+
+def test_threads_live_with_native_fmus_too(natives: Path, tmp_path: Path) -> None:
+    hosted("in_threads", tmp_path, sorted(natives.glob("*.fmu")))
+
+
+def hosted(host: str, folder: Path, fmus: Sequence[Path]) -> None:
+    """It ends in peace."""
     done = subprocess.run(
-        [sys.executable, __file__, host, tmp_path, *runnable(fmus)],
+        [sys.executable, __file__, host, folder, *fmus],
         env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])},
         capture_output=True, text=True, timeout=120,
     )  # fmt: skip

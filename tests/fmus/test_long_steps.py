@@ -11,6 +11,9 @@ from grasp_fmus.contract import Bound, bound
 from hypothesis import given
 from hypothesis import strategies as st
 from support.fmi2 import DISCARD, OK, Instance
+from support.kinds import all_kinds
+
+pytestmark = all_kinds
 
 ELECTRONICS: dict[str, float] = {
     "noise.enabled": True,

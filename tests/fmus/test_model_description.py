@@ -28,6 +28,7 @@ from lxml import etree  # type: ignore[import-untyped]
 from proximity_sensor import channel
 from proximity_sensor.surfaces import Surface
 from support.fmi2 import OK, Instance
+from support.kinds import all_kinds
 from support.packages import skip_where_it_cannot_run
 
 BLOCKS: dict[str, ModuleType] = {
@@ -651,6 +652,7 @@ def responses(instance: Instance) -> dict[str, set[str]]:
     return found
 
 
+@all_kinds
 def test_the_fmu_depends_on_what_it_declares(load: Load, root: Element, name: str) -> None:
     """Through the interface: in initialisation mode, and between two steps."""
     fmu = load(name)

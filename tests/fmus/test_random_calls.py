@@ -13,7 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from conftest import Folder
 from grasp_cosim.hil.served import Service
+from support.kinds import Kind, all_kinds
 from support.packages import runnable
 from support.proxies import build_proxy, serving
 from support.slow import slow
@@ -48,9 +50,12 @@ def called(folder: Path, seeds: int, calls: int, fmus: Sequence[Path]) -> dict[s
     return report
 
 
+@all_kinds
 @pytest.mark.parametrize(("seeds", "calls"), [(2, 400), slow(12, 1500)])
-def test_the_fmus_live(fmus: Path, tmp_path: Path, seeds: int, calls: int) -> None:
-    report = called(tmp_path / "host", seeds, calls, runnable(fmus))
+def test_the_fmus_live(
+    folder_of: Folder, kind: Kind, tmp_path: Path, seeds: int, calls: int
+) -> None:
+    report = called(tmp_path / "host", seeds, calls, runnable(folder_of(kind)))
     for name in ("SetFMUstate", "DeSerializeFMUstate"):
         assert report["calls"][f"{name} 0"] > 0
         assert report["calls"][f"{name} 3"] > 0

@@ -7,6 +7,9 @@ from conftest import Load
 from grasp_fmus.contract import declared
 from proximity_sensor import channel
 from support.fmi2 import ERROR, OK, Instance
+from support.kinds import all_kinds
+
+pytestmark = all_kinds
 
 STAGES = ("pattern", "ambient", "noise", "adc", "filter", "median")
 H = 1e-4

@@ -5,13 +5,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from conftest import Folder
 from fmpy import extract, read_model_description, simulate_fmu
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
+from fmpy.fmi3 import FMU3Slave
 from grasp_controller import series
 from gripper_plant import compliant, movable, mujoco_box, rigid
 from proximity_sensor import channel
+from support.kinds import Kind, all_kinds
 from support.packages import skip_where_it_cannot_run
+
+pytestmark = all_kinds
 
 BLOCKS: dict[str, Any] = {
     "GripperPlant": rigid,
@@ -23,6 +28,15 @@ BLOCKS: dict[str, Any] = {
 }
 
 
+class Fmi3(FMU3Slave):  # type: ignore[misc]  # FMPy is not typed
+    """With the names that FMPy's class for FMI 2.0 has."""
+
+    getReal, setReal = FMU3Slave.getFloat64, FMU3Slave.setFloat64
+
+    def setupExperiment(self, startTime: float) -> None:
+        """Nothing: the time is given in enterInitializationMode()."""
+
+
 class Host:
     """An instance driven by FMPy's own class, by variable name."""
 
@@ -31,7 +45,7 @@ class Host:
         if not folder.exists() or not any(folder.iterdir()):  # never over a library that is loaded
             extract(fmu, folder)
         self.references = {v.name: v.valueReference for v in description.modelVariables}
-        self.slave = FMU2Slave(
+        self.slave: Any = (FMU2Slave if description.fmiVersion == "2.0" else Fmi3)(
             guid=description.guid,
             unzipDirectory=folder,
             modelIdentifier=description.coSimulation.modelIdentifier,
@@ -55,17 +69,23 @@ class Host:
         self.slave.freeInstance()
 
 
+@pytest.fixture(scope="module")
+def of(folder_of: Folder, kind: Kind) -> Path:
+    """The folder with the FMUs of the kind that the test is run on."""
+    return folder_of(kind)
+
+
 @pytest.mark.parametrize("name", BLOCKS)
-def test_runs_in_plain_fmpy(fmus: Path, name: str) -> None:
+def test_runs_in_plain_fmpy(of: Path, name: str) -> None:
     skip_where_it_cannot_run(name)
-    result: Any = simulate_fmu(fmus / f"{name}.fmu", stop_time=0.01, validate=True)
+    result: Any = simulate_fmu(of / f"{name}.fmu", stop_time=0.01, validate=True)
     assert len(result) > 10
     assert all(np.isfinite(result[column]).all() for column in result.dtype.names)
 
 
-def test_a_free_finger_in_plain_fmpy_is_a_parabola(fmus: Path) -> None:
+def test_a_free_finger_in_plain_fmpy_is_a_parabola(of: Path) -> None:
     result: Any = simulate_fmu(
-        fmus / "GripperPlant.fmu",
+        of / "GripperPlant.fmu",
         stop_time=0.1,
         step_size=1e-3,
         start_values={"force[1]": -1.0, "finger_mass[1]": 0.8},
@@ -75,8 +95,8 @@ def test_a_free_finger_in_plain_fmpy_is_a_parabola(fmus: Path) -> None:
     assert (result["position[2]"] == -0.11).all()
 
 
-def test_outputs_agree_with_inputs_in_initialisation_mode(fmus: Path, tmp_path: Path) -> None:
-    with Host(fmus / "ProximitySensor.fmu", tmp_path) as host:
+def test_outputs_agree_with_inputs_in_initialisation_mode(of: Path, tmp_path: Path) -> None:
+    with Host(of / "ProximitySensor.fmu", tmp_path) as host:
         host.slave.enterInitializationMode()
         for gap, reflectance in ((0.02, 1.0), (0.01, 0.5)):
             host.set(gap=gap, reflectance=reflectance)
@@ -84,8 +104,8 @@ def test_outputs_agree_with_inputs_in_initialisation_mode(fmus: Path, tmp_path: 
             assert host.get("intensity") == pytest.approx(expected, rel=1e-14)
 
 
-def test_outputs_follow_a_tunable_parameter_at_run_time(fmus: Path, tmp_path: Path) -> None:
-    with Host(fmus / "ProximitySensor.fmu", tmp_path) as host:
+def test_outputs_follow_a_tunable_parameter_at_run_time(of: Path, tmp_path: Path) -> None:
+    with Host(of / "ProximitySensor.fmu", tmp_path) as host:
         host.slave.enterInitializationMode()
         host.slave.exitInitializationMode()
         host.slave.doStep(0.0, 1e-3)
@@ -96,8 +116,8 @@ def test_outputs_follow_a_tunable_parameter_at_run_time(fmus: Path, tmp_path: Pa
         assert host.get("intensity") == 0.25 * before
 
 
-def test_values_in_any_order(fmus: Path, tmp_path: Path) -> None:
-    with Host(fmus / "GraspController.fmu", tmp_path) as host:
+def test_values_in_any_order(of: Path, tmp_path: Path) -> None:
+    with Host(of / "GraspController.fmu", tmp_path) as host:
         names = ["intensity[2]", "position[1]", "intensity[1]"]
         references = [host.references[name] for name in names]
         host.slave.enterInitializationMode()
@@ -107,25 +127,25 @@ def test_values_in_any_order(fmus: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_many_instances_come_and_go(fmus: Path, tmp_path: Path) -> None:
+def test_many_instances_come_and_go(of: Path, tmp_path: Path) -> None:
     """pythonfmu 0.7.0 alone crashes the process at the second or third instance."""
     for k in range(40):
-        with Host(fmus / "ProximitySensor.fmu", tmp_path / str(k % 3)) as host:
+        with Host(of / "ProximitySensor.fmu", tmp_path / str(k % 3)) as host:
             host.slave.enterInitializationMode()
             assert host.get("intensity") > 0.0
 
 
-def test_no_values_at_all(fmus: Path, tmp_path: Path) -> None:
-    with Host(fmus / "ProximitySensor.fmu", tmp_path) as host:
+def test_no_values_at_all(of: Path, tmp_path: Path) -> None:
+    with Host(of / "ProximitySensor.fmu", tmp_path) as host:
         host.slave.enterInitializationMode()
         host.slave.setReal([], [])
         assert host.slave.getReal([]) == []
 
 
-def test_a_host_outlives_what_a_block_refuses(fmus: Path, tmp_path: Path) -> None:
+def test_a_host_outlives_what_a_block_refuses(of: Path, tmp_path: Path) -> None:
     """pythonfmu 0.7.0 alone: terminate or free after an exception crashes the process."""
     for k in range(20):
-        with Host(fmus / "GripperPlant.fmu", tmp_path / str(k % 3)) as host:
+        with Host(of / "GripperPlant.fmu", tmp_path / str(k % 3)) as host:
             host.set(object_width=0.5)
             for _ in range(3):
                 with pytest.raises(FMICallException, match="EnterInitializationMode"):
@@ -141,10 +161,10 @@ def test_a_host_outlives_what_a_block_refuses(fmus: Path, tmp_path: Path) -> Non
     BLOCKS.items(),
 )
 def test_start_values_are_those_of_the_block(
-    fmus: Path, tmp_path: Path, name: str, block: Any
+    of: Path, tmp_path: Path, name: str, block: Any
 ) -> None:
     skip_where_it_cannot_run(name)
-    with Host(fmus / f"{name}.fmu", tmp_path) as host:
+    with Host(of / f"{name}.fmu", tmp_path) as host:
         host.slave.enterInitializationMode()
         u = block.Inputs()
         y = block.outputs(block.Params(), block.initial_state(block.Params(), u), u)

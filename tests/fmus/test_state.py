@@ -11,6 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.examples import examples
 from support.fmi2 import ERROR, OK, Fmu, Instance
+from support.kinds import all_kinds
+
+pytestmark = all_kinds
 
 H = 1e-3
 NAMES = (

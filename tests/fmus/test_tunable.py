@@ -16,6 +16,9 @@ from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 from support.examples import examples
 from support.fmi2 import DISCARD, ERROR, OK, Fmu, Instance
+from support.kinds import all_kinds
+
+pytestmark = all_kinds
 
 SPRING = Path(__file__).parents[2] / "docs/spring_plant.py"
 BLOCKS = blocks()

@@ -125,7 +125,8 @@ class Instance:
                 (lambda *said: self._logged(called, *said)) if logger else None,
             )  # fmt: skip
             self._calls.enumerations = fmu.enumerations
-        assert self._calls.component
+        self._component = self._calls.component
+        assert self._component
 
     def _logged(self, instance: bytes, status: int, category: bytes, text: bytes) -> None:
         self.log.append(

@@ -1,14 +1,19 @@
 """Builds native FMUs: those of the blocks that come with the package, or of one of your own."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Mapping, Sequence
 from hashlib import sha256
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..folder import Built, is_current, sources_hash, write_file, write_stamp
 from ..shipped import SCRIPTS, slave_class
 from .compilers import Compiler, Job, compile_all, compiler_for, universal
 from .targets import Target, Version, folders
+
+if TYPE_CHECKING:
+    from ..fmu import Model
 
 Members = Mapping[str, bytes]
 """The files in an FMU, by name."""
@@ -85,13 +90,18 @@ def build_native_block(file: Path, out: Path, plan: Plan | None = None) -> Built
     ValueError, one line, where the file is no block, or cannot be translated; else as build_native.
     """
     from ..block_build import own_model
+
+    with own_model(file) as model:
+        return build_native_model(model, out, plan or planned())
+
+
+def build_native_model(model: Model, out: Path, plan: Plan) -> Built:
+    """Build the native FMU of a model into the folder `out`, without cross-check files."""
     from ..fmu import write_members
     from .members import native_members
 
-    plan = plan or planned()
-    with own_model(file) as model:
-        name, files = model.description.name, native_members(model, plan.fmi)
-    ((_, complete),) = _with_binaries({name: files}, plan)
+    name = model.description.name
+    ((_, complete),) = _with_binaries({name: native_members(model, plan.fmi)}, plan)
     return write_members(out / f"{name}.fmu", complete)
 
 

@@ -60,7 +60,7 @@ class Twin:
 
     def _set(self, kind: str, values: list[tuple[int, float]]) -> int:
         n = len(values)
-        item = c_double if kind == "Real" else c_int
+        item: Any = c_double if kind == "Real" else c_int
         numbers = (item * n)(*(v for _, v in values))
         references = (c_uint * n)(*(r for r, _ in values))
         return self.instance.call(f"Set{kind}", references, c_size_t(n), numbers)

@@ -348,6 +348,9 @@ static inline double py_checked_range(double x, double result, Fault *fault)
     return py_checked(x, result, fault);
 }
 
+static inline double py_atan(double x) { return atan(x); }
+static inline double py_asinh(double x) { return asinh(x); }
+static inline double py_tanh(double x) { return tanh(x); }
 static inline double py_sqrt(double x, Fault *fault) { return py_checked(x, sqrt(x), fault); }
 static inline double py_sin(double x, Fault *fault) { return py_checked(x, sin(x), fault); }
 static inline double py_cos(double x, Fault *fault) { return py_checked(x, cos(x), fault); }

@@ -7,15 +7,14 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from ...errors import InputError, SimulationError
-from ...files import FMU_FOLDER, check_folder
+from ...files import FMU_FOLDER, NATIVE_FOLDER, check_folder
 from ..frame import PATH, bind_python_option, json_option, say, show
 
 if TYPE_CHECKING:
     from grasp_fmus.folder import Built
 
 BOUND_FOLDER = Path("fmus/bound")
-NATIVE_FOLDER = Path("fmus/native")
-"""Where FMUs for hosts without Python are built, below the current folder."""
+"""Where FMUs bound to a Python are built, below the current folder."""
 
 
 @click.command()

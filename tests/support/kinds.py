@@ -1,0 +1,54 @@
+"""The kinds of FMUs that a block becomes: run by Python, or native, for either version of FMI.
+
+A test that loads FMUs runs on each kind that it, or its module, is marked with.
+"""
+
+from pathlib import Path
+from typing import Literal
+
+import pytest
+from grasp_fmus.block_build import build_block
+from grasp_fmus.fmu import build_fmu, shipped_model
+from grasp_fmus.native.build import Plan, build_native_block, build_native_model, planned
+from grasp_fmus.native.targets import Version
+from grasp_fmus.shipped import SCRIPTS
+
+from .packages import PACKAGES
+
+Kind = Literal["python", "native", "native FMI 3"]
+
+NATIVE: dict[Kind, Version] = {"native": 2, "native FMI 3": 3}
+
+all_kinds = pytest.mark.kinds("python", "native", "native FMI 3")
+both_of_fmi_2 = pytest.mark.kinds("python", "native")
+python_only = pytest.mark.kinds("python")
+
+OWN = {"SpringPlant": Path(__file__).parents[2] / "docs/spring_plant.py"}
+"""Blocks that are a file of one's own, by the names of their FMUs."""
+
+
+def exists(name: str, kind: Kind) -> bool:
+    """Whether there is such an FMU: what needs a package stays Python only."""
+    return kind == "python" or name not in PACKAGES
+
+
+def plan(kind: Kind) -> Plan:
+    """How it is compiled; the test is skipped where there is no compiler."""
+    try:
+        return planned(fmi=NATIVE[kind])
+    except ValueError as error:
+        pytest.skip(f"NO compiler: {error}")
+
+
+def build_shipped(name: str, kind: Kind, out: Path) -> Path:
+    """Build the FMU of a script."""
+    if kind == "python":
+        return build_fmu(SCRIPTS / f"{name}.py", out).path
+    return build_native_model(shipped_model(SCRIPTS / f"{name}.py"), out, plan(kind)).path
+
+
+def build_own(name: str, kind: Kind, out: Path) -> Path:
+    """Build the FMU of one of OWN."""
+    if kind == "python":
+        return build_block(OWN[name], out).path
+    return build_native_block(OWN[name], out, plan(kind)).path
