@@ -678,9 +678,7 @@ def test_a_construct_gives_the_bits_and_the_faults_of_python(
 
 
 @pytest.mark.slow
-@settings(
-    max_examples=20_000, deadline=None, suppress_health_check=list(HealthCheck), database=None
-)
+@settings(max_examples=8_000, deadline=None, suppress_health_check=list(HealthCheck), database=None)
 @given(
     st.integers(0, len(NAMES) - 1),
     st.tuples(numbers, numbers, numbers),
