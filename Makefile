@@ -52,4 +52,4 @@ cards: .venv/run
 	@touch $@
 
 clean:
-	rm -rf .venv fmus/build results dist .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf .venv fmus/build fmus/native results dist .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -3,7 +3,7 @@
     python -m benchmarks.against_revision 0b702d1
 
 Builds the FMUs of both revisions and runs them alternately, in short chunks, behind today's master,
-compiled where numba is installed.
+compiled where there is a C compiler.
 """
 
 import os

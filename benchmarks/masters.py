@@ -1,10 +1,11 @@
 """What a macro step of the grasp costs in grasp-cosim and in other masters, in one run.
 
-    python -m benchmarks.masters [--cofmupy-python PYTHON]
+    grasp-cosim build --native
+    python -m benchmarks.masters [--cofmupy-python PYTHON] [--native FOLDER] [--only CASE]
 
 Runs the loop of four instances and ten connections at 10 kHz with the Jacobi scheme, everything
-recorded, on our Python FMUs and on native ones of the same shape, in short chunks, one master after
-the other. Prints the tables of README.md. A master that is not installed is skipped by
+recorded, on our Python FMUs, our native ones, and native ones of the same shape without work, in
+short chunks, one master after the other. Prints the tables of README.md. A master that is not installed is skipped by
 name; cofmupy pins an FMPy and a matplotlib of its own, so it may be in an environment of its own.
 """
 
@@ -43,20 +44,22 @@ REFERENCE = "grasp-cosim compiled"
 
 
 class Case(NamedTuple):
-    """What is measured: the FMUs, macro steps to a chunk, chunks of each master, one core only?"""
+    """What is measured: which FMUs, macro steps to a chunk, chunks of each master, one core only?"""
 
     title: str
-    native: bool
+    fmus: str
     steps: int
     rounds: int
     one_core: bool
 
 
 CASES = (
-    Case("Python FMUs, all cores, long chunks", False, 5000, 10, False),
-    Case("Python FMUs, all cores", False, 300, 60, False),
-    Case("Python FMUs, one core", False, 300, 60, True),
-    Case("native FMUs, all cores", True, 1000, 60, False),
+    Case("Python FMUs, all cores, long chunks", "python", 5000, 10, False),
+    Case("Python FMUs, all cores", "python", 300, 60, False),
+    Case("Python FMUs, one core", "python", 300, 60, True),
+    Case("our native FMUs, runs of 3 s", "native", 30_000, 20, False),
+    Case("our native FMUs, short chunks", "native", 1000, 60, False),
+    Case("native FMUs without work, all cores", "hollow", 1000, 60, False),
 )
 """ecospy and libcosimpy step their instances in several threads, which a Python FMU makes wait for
 one another: there one core can be faster than two, and a long chunk slower than a short one.
@@ -111,7 +114,7 @@ def report(title: str, times: dict[str, list[float]]) -> None:
     head(title, "best", "median", "worst", "times ours", "best / our best", "recorded")
     for name, chunks in times.items():
         ratio = statistics.median(t / own for t, own in zip(chunks, ours, strict=True))
-        costs = [f"{cost:.1f} us" for cost in spread(chunks)]
+        costs = [f"{cost:.2f} us" for cost in spread(chunks)]
         best = f"{min(chunks) / min(ours):.1f}"
         row(name, *costs, f"{ratio:.1f}", best, MASTERS[name].recorded)
 
@@ -122,10 +125,20 @@ def main() -> None:
     parser.add_argument(
         "--cofmupy-python", metavar="PYTHON", help="a Python that has cofmupy; default: this one"
     )
-    masters = pythons(parser.parse_args().cofmupy_python)
-    with built_fmus() as (python, native):
+    parser.add_argument(
+        "--native", metavar="FOLDER", type=Path, default=Path("fmus/native"),
+        help="what `grasp-cosim build --native` wrote; default: %(default)s",
+    )  # fmt: skip
+    parser.add_argument("--only", choices=("python", "native", "hollow"), help="FMUs to measure")
+    given = parser.parse_args()
+    masters = pythons(given.cofmupy_python)
+    with built_fmus() as (python, hollow):
+        folders = {"python": python, "native": given.native, "hollow": hollow}
         for case in CASES:
-            report(case.title, measure(masters, native if case.native else python, case))
+            if not any(folders[case.fmus].glob("*.fmu")):
+                print(f"{case.title}: skipped, build them with `grasp-cosim build --native`")
+            elif given.only in (None, case.fmus):
+                report(case.title, measure(masters, folders[case.fmus].resolve(), case))
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ FMU_FOLDER = Path("fmus/build")
 """Where the FMUs of this project are built, below the current folder."""
 
 NATIVE_FOLDER = Path("fmus/native")
-"""Where native ones are."""
+"""Where native ones are built, below the current folder."""
 
 
 def check_folder(folder: Path) -> None:

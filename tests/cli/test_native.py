@@ -15,10 +15,9 @@ from grasp_cosim.grasp.presets import SYSTEM
 from grasp_fmus.block_build import build_block
 from grasp_fmus.native import compilers, twins
 from grasp_fmus.native.build import build_native_block
+from support.both_engines import needs_compiler
+from support.oscillator import write_oscillator
 
-needs_compiler = pytest.mark.skipif(
-    not any(map(shutil.which, ("cc", "gcc", "clang"))), reason="no C compiler is installed"
-)
 pytestmark = needs_compiler
 
 SAID = "ran native FMUs; --python runs those in Python, with the same bits\n"
@@ -272,10 +271,7 @@ def test_it_is_the_content_that_counts_not_the_name(command: Run, fmus: Path) ->
 
 
 def test_one_of_other_sources_stays_as_it_is(command: Run, altered: Altered) -> None:
-    before = "high=1e3)\n    ] = (0.5, 0.5)"
-    heavy = altered(
-        "GripperPlant", "gripper_plant/fingers.py", before, before.replace(".5)", ".6)")
-    )
+    heavy = altered("GripperPlant", "gripper_plant/fingers.py", "= (0.5, 0.5)", "= (0.5, 0.6)")
     asked = ("--swap", f"plant={heavy}", *SHORT, "--native")
     code, _, err = command("run", *asked, "--out", "a")
     assert code == 0
@@ -318,8 +314,6 @@ def test_a_twin_is_found_beside_the_folder_of_its_fmu(command: Run, tmp_path: Pa
 def test_a_system_of_others_is_none_of_our_business(
     grasp: System, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    from support.oscillator import write_oscillator
-
     system = System.load(write_oscillator(tmp_path))
     with natively(system, None) as chosen:
         assert chosen == system

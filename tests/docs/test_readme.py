@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from grasp_cosim import System, cli, simulate
 from grasp_cosim.grasp.presets import SYSTEM
+from grasp_cosim.master.compiled import compiler
 from grasp_cosim.ssp.write import write_ssp
 from support.slow import slow
 
@@ -52,13 +53,15 @@ def user(checkout: Path, grasp: System, recorded: Path) -> Path:
 
 
 def test_there_is_something_to_try() -> None:
-    assert len(COMMANDS) == 21
+    assert len(COMMANDS) == 22
     assert len(EXAMPLES) == 1
 
 
 @pytest.mark.parametrize("command", [slow(c) if "--step-study" in c else c for c in COMMANDS])
 def test_command(user: Path, command: str) -> None:
     arguments = shlex.split(command)
+    if "--native" in arguments and compiler() is None:
+        pytest.skip("there is no C compiler")
     if arguments[1] in ("run", "qualify"):
         arguments += ["--stop", "0.01"]
     if arguments[1] in ("serve", "relay"):

@@ -10,6 +10,7 @@ import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
+from typing import Literal
 
 import fmpy
 from grasp_fmus.block_build import build_block
@@ -42,19 +43,20 @@ def python_fmu(folder: Path) -> Path:
 
 def content(fmu: Path) -> str:
     """The content hash of an FMU in Python, which is its GUID."""
-    return fmpy.read_model_description(fmu, validate=False).guid
+    return str(fmpy.read_model_description(fmu, validate=False).guid)
 
 
-def write_sources(folder: Path, fmi: int = 2, content: str = "0123456789abcdef") -> None:
+def write_sources(folder: Path, fmi: Literal[2, 3] = 2, content: str = "0123456789abcdef") -> None:
     """The C sources, in a folder that is made."""
     folder.mkdir(parents=True)
     translation = {"block.h": PYTHON.with_suffix(".h").read_text("utf-8")}
-    assert fmi in (2, 3)
     for file, data in native_sources(NAME, translation, content, GUID, fmi).items():
         (folder / file).write_bytes(data)
 
 
-def compile_in(folder: Path, fmi: int = 2, options: Sequence[str] = (), cc: str = "gcc") -> Path:
+def compile_in(
+    folder: Path, fmi: Literal[2, 3] = 2, options: Sequence[str] = (), cc: str = "gcc"
+) -> Path:
     """The shared library of sources in a folder; without warnings."""
     library = folder / f"{NAME}.so"
     plain = f"-DFMI{fmi}_OVERRIDE_FUNCTION_PREFIX"
@@ -64,9 +66,8 @@ def compile_in(folder: Path, fmi: int = 2, options: Sequence[str] = (), cc: str 
     return library
 
 
-def native_fmu(folder: Path, fmi: int = 2, content: str = "0123456789abcdef") -> Path:
+def native_fmu(folder: Path, fmi: Literal[2, 3] = 2, content: str = "0123456789abcdef") -> Path:
     """A native FMU for this machine, without what only a reader needs."""
-    assert fmi in (2, 3)
     write_sources(folder / "sources", fmi, content)
     library = compile_in(folder / "sources", fmi)
     description = Description(NAME, "Mass", variables(declared(block())))

@@ -15,9 +15,28 @@ from .statements import function
 KINDS = {float: "KIND_REAL", bool: "KIND_BOOLEAN", int: "KIND_INTEGER"}
 
 
+_VARIABLE = """
+enum { KIND_REAL, KIND_BOOLEAN, KIND_INTEGER };
+enum { INPUT, OUTPUT, PARAMETER };
+
+typedef struct {
+    const char *name;
+    const char *in_unit; /* as after a number: " kg" */
+    int kind;
+    int causality;
+    int fixed;   /* 0: it may change at run time */
+    int limited; /* from low to high */
+    double low, high;
+    double start;
+} Variable;
+
+"""
+
+
 def block_header(program: Program, name: str, block: Any) -> tuple[str, set[Key]]:
     """The text of block.h without its includes, and what it needs."""
-    program.needed = needed = set()
+    program.needed = set()
+    needed = program.needed
     params, inputs, outputs = Group(block.Params), Record(block.Inputs), Record(block.Outputs)
     first = _part(program, block, "initial_state", [params, inputs])
     state = first.returns
@@ -110,8 +129,9 @@ def _table(name: str, described: list[Field], states: int, has_substeps: bool) -
         start = 0.0 if v.start is None else float(v.start)
         rows.append(
             f"    {{{names.string(v.name)}, {names.string(v.in_unit)}, {KINDS[v.kind]}, "
-            f"{v.causality.upper()}, {int(v.variability == 'fixed')},\n     {int(v.limits is not None)}, "
-            f"{names.real(float(low))}, {names.real(float(high))}, {names.real(start)}}},\n"
+            f"{v.causality.upper()}, {int(v.variability == 'fixed')},\n"
+            f"     {int(v.limits is not None)}, "
+            f"{', '.join(names.real(float(x)) for x in (low, high, start))}}},\n"
         )
     defined = {
         "BLOCK_NAME": names.string(name),
@@ -124,11 +144,7 @@ def _table(name: str, described: list[Field], states: int, has_substeps: bool) -
     }
     return (
         "".join(f"#define {n} {v}\n" for n, v in defined.items())
-        + "\nenum { KIND_REAL, KIND_BOOLEAN, KIND_INTEGER };\nenum { INPUT, OUTPUT, PARAMETER };\n\n"
-        'typedef struct {\n    const char *name;\n    const char *in_unit; /* as after a number: " kg" */\n'
-        "    int kind;\n    int causality;\n    int fixed;\n    int limited;\n    double low, high;\n"
-        "    double start;\n} Variable;\n\n"
-        f"static const Variable variables[N_VARIABLES] = {{\n{''.join(rows)}}};\n"
+        + f"{_VARIABLE}static const Variable variables[N_VARIABLES] = {{\n{''.join(rows)}}};\n"
     )
 
 
@@ -169,11 +185,10 @@ def _conversions(program: Program, block: Any, described: list[Field]) -> str:
     return "\n".join(_function(heads[c], "".join(texts[c]) or none[c]) for c in heads)
 
 
-def _kind_at(program: Program, t: Type, path: tuple[str, ...]) -> Type:
+def _kind_at(program: Program, t: Any, path: tuple[str, ...]) -> Type:
     for name in path:
-        assert isinstance(t, Record | Group)
         t = program.members(t)[name]
-    return t
+    return t  # type: ignore[no-any-return]
 
 
 def _scalars(program: Program, t: Type, path: str) -> Iterator[tuple[str, Type]]:
@@ -191,8 +206,8 @@ def _scalars(program: Program, t: Type, path: str) -> Iterator[tuple[str, Type]]
     else:
         fix = "; write 0.0 for 0, or float(...)" if t in NUMBERS else ""
         raise UntranslatableError(
-            f"{program.sources.block_file}: line 1: the state has {said(t)} in it; must be float, bool, "
-            f"int, and tuples of them, each of one type{fix}"
+            f"{program.sources.block_file}: line 1: the state has {said(t)} in it; must be float, "
+            f"bool, int, and tuples of them, each of one type{fix}"
         )
 
 
@@ -200,8 +215,9 @@ def _states(scalars: list[tuple[str, Type]]) -> str:
     save, load = "", ""
     for i, (path, t) in enumerate(scalars):
         save += f"    numbers[{i}] = {path};\n"
-        value = {BOOLEAN: f"numbers[{i}] != 0.0", WHOLE: f"py_int(numbers[{i}], fault)"}
-        load += f"    {path} = {value.get(t, f'numbers[{i}]')};\n"
+        value = f"numbers[{i}]"
+        value = f"py_int({value}, fault)" if t == WHOLE else value
+        load += f"    {path} = {value}{' != 0.0' if t == BOOLEAN else ''};\n"
     none = "    (void)x;\n    (void)numbers;\n" if not scalars else ""
     quiet = "" if any(t == WHOLE for _, t in scalars) else "    (void)fault;\n"
     return (

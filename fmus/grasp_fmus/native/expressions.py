@@ -1,4 +1,4 @@
-"""Expressions of Python as expressions of C, which evaluate in Python's order where that matters."""
+"""Expressions of Python as expressions of C, worked out in Python's order where that matters."""
 
 import ast
 import builtins
@@ -42,11 +42,11 @@ MATH: dict[Any, tuple[str, tuple[str, ...]]] = {
     math.tan: ("py_tan", ("domain",)),
     math.asin: ("py_asin", ("domain",)),
     math.acos: ("py_acos", ("domain",)),
-    math.atan: ("atan", ()),
+    math.atan: ("py_atan", ()),
     math.sinh: ("py_sinh", ("range",)),
     math.cosh: ("py_cosh", ("range",)),
-    math.tanh: ("tanh", ()),
-    math.asinh: ("asinh", ()),
+    math.tanh: ("py_tanh", ()),
+    math.asinh: ("py_asinh", ()),
     math.acosh: ("py_acosh", ("domain",)),
     math.atanh: ("py_atanh", ("domain",)),
     math.exp: ("py_exp", ("range",)),
@@ -194,7 +194,7 @@ class Expressions:
         if translate is None:
             raise self.error(
                 node,
-                _UNTRANSLATED.get(
+                UNTRANSLATED.get(
                     type(node),
                     f"{type(node).__name__}: is not in the subset; see What a block may contain",
                 ),
@@ -237,7 +237,12 @@ class Expressions:
             past |= v.past
             later_past = later_past or bool(v.past)
         joint = Value(
-            "", POSTFIX, NOTHING, later, tuple(t for own in reversed(before) for t in own), past
+            "",
+            POSTFIX,
+            NOTHING,
+            later,
+            tuple(dict.fromkeys(t for own in reversed(before) for t in own)),
+            past,
         )
         return found[::-1], joint
 
@@ -256,23 +261,22 @@ class Expressions:
         before, found = self._apart(v, hint)
         return replace(found, before=before)
 
-    def folded(self, v: Value) -> Value:
-        """A value that is worked out only where its condition holds, temporaries included."""
-        if not v.before:
-            return v
-        for t in v.before:
+    def folded(self, v: Value, done: Value) -> Value:
+        """A value that is worked out only where a condition holds, temporaries included.
+
+        Those of `done` are there already.
+        """
+        before = [t for t in v.before if t not in done.before]
+        for t in before:
             self.reserve(t)
-        parts = [f"{t.name} = {t.text}" for t in v.before]
-        text = f"({', '.join([*parts, v.text])})"
-        return replace(
-            v,
-            text=text,
-            level=POSTFIX,
-            faults=v.faults | v.past,
-            before=(),
-            past=frozenset(),
-            is_path=False,
-        )
+        parts = [f"{t.name} = {t.text}" for t in before]
+        text = f"({', '.join([*parts, v.text])})" if before else v.text
+        found = replace(v, text=text, faults=v.faults | v.past, before=(), past=frozenset())
+        return replace(found, level=POSTFIX, is_path=False) if before else found
+
+    def named(self, v: Value) -> Value:
+        """A tuple of which items may be left out, or be taken more than once."""
+        return v if v.items is not None and not v.faults else self.apart(v)
 
     def operation(
         self, values: Sequence[Value], make: Callable[..., str], level: int, t: Type, *faults: str
@@ -397,7 +401,7 @@ class Expressions:
             )
         found = _in_class(t.cls, node.attr)
         if isinstance(found, property | cached_property):
-            function = found.fget if isinstance(found, property) else found.func
+            function: Any = found.fget if isinstance(found, property) else found.func
             return self.invoked(node, function, [base])
         if isinstance(t, Record) and node.attr == "_replace":
             return Static("_replace", of=base)
@@ -422,17 +426,14 @@ class Expressions:
             return self._indexed(node, base, t)
         if not -len(t.items) <= constant < len(t.items):
             raise self.error(node, f"{ast.unparse(node)}: there are {len(t.items)} items")
-        if base.items is None:
-            base = self.apart(base)
-        return self.items(base)[constant]
+        return self.items(self.named(base))[constant]
 
     def _slice(self, node: ast.Subscript, base: Value) -> list[Value]:
-        assert isinstance(node.slice, ast.Slice)
-        parts = (node.slice.lower, node.slice.upper, node.slice.step)
+        parts = [getattr(node.slice, name) for name in ("lower", "upper", "step")]
         numbers = [None if part is None else _whole_constant(part) for part in parts]
         if any(part is not None and n is None for part, n in zip(parts, numbers, strict=True)):
             raise self.error(node, f"{ast.unparse(node)}: must have constant bounds")
-        return list(self.items(self.apart(base))[slice(*numbers)])
+        return self.items(self.named(base))[slice(*numbers)]
 
     def _indexed(self, node: ast.Subscript, base: Value, t: Tuple) -> Value:
         if not self.program.is_array(t) or isinstance(base.type, Record):
@@ -486,9 +487,8 @@ class Expressions:
             names_of = [names.identifier(n) for n in self.program.members(v.type)]
             kinds = list(self.program.members(v.type).values())
         else:
-            assert isinstance(v.type, Tuple)
-            kinds = list(v.type.items)
-            array = self.program.is_array(v.type) if kinds else False
+            kinds = list(v.type.items) if isinstance(v.type, Tuple) else []
+            array = isinstance(v.type, Tuple) and self.program.is_array(v.type)
             names_of = [f"at[{i}]" if array else f"at_{i}" for i in range(len(kinds))]
         return [
             replace(
@@ -514,9 +514,13 @@ class Expressions:
         inner = ", ".join(initialiser(v) for v in operands)
         shape = self.program.shape(t)
         braces = f"{{{{{inner}}}}}" if self.program.is_array(t) else f"{{{inner}}}"
-        kept = tuple(operands) if not joint.before else tuple(operands)
         return replace(
-            joint, text=f"({shape}){braces}", level=POSTFIX, type=t, items=kept, braces=braces
+            joint,
+            text=f"({shape}){braces}",
+            level=POSTFIX,
+            type=t,
+            items=tuple(operands),
+            braces=braces,
         )
 
     def spread(self, nodes: Sequence[ast.expr]) -> list[Value]:
@@ -529,7 +533,7 @@ class Expressions:
             v = self.value(node.value)
             if not isinstance(v.type, Tuple | Record):
                 raise self.error(node, f"{ast.unparse(node)}: must be a tuple")
-            found += self.items(v if v.items is not None else self.apart(v))
+            found += self.items(self.named(v))
         return found
 
     def _tuple(self, node: ast.Tuple) -> Value:
@@ -597,13 +601,12 @@ class Expressions:
 
     def as_number(self, v: Value, node: ast.AST) -> Value:
         """A value as a number."""
-        if v.type == BOOLEAN:
+        if v.type == BOOLEAN or isinstance(v.type, Member):
             return self._whole_of(v)
         if v.type in NUMBERS:
             return v
-        fix = "; write int(...)" if isinstance(v.type, Member) else ""
         shown = ast.unparse(node) if isinstance(node, ast.expr) else "this"
-        raise self.error(node, f"{shown}: a {said(v.type)}, must be a number{fix}")
+        raise self.error(node, f"{shown}: a {said(v.type)}, must be a number")
 
     def _whole_of(self, v: Value) -> Value:
         return replace(_plain(v), text=f"(double){at(v, UNARY)}", level=UNARY, type=WHOLE)
@@ -612,7 +615,7 @@ class Expressions:
         left, right = self.value(node.left), self.value(node.right)
         if isinstance(left.type, Tuple):
             if isinstance(node.op, ast.Add) and isinstance(right.type, Tuple):
-                both = [v if v.items is not None else self.apart(v) for v in (left, right)]
+                both = [self.named(v) for v in (left, right)]
                 return self.display([i for v in both for i in self.items(v)], node)
             if isinstance(node.op, ast.Mult) and right.type == WHOLE:
                 return self._repeated(node, left, right)
@@ -622,7 +625,7 @@ class Expressions:
     def _repeated(self, node: ast.BinOp, left: Value, times: Value) -> Value:
         if times.number is None:
             raise self.error(node, f"{ast.unparse(node)}: the number of items must be a constant")
-        items = self.items(left if left.items is not None else self.apart(left))
+        items = self.items(self.named(left))
         own = [i if i.is_path or i.number is not None else self.apart(i) for i in items]
         bare = [replace(i, before=(), past=frozenset()) for i in own]
         return self.display([*own, *bare * (int(times.number) - 1)], node)
@@ -686,7 +689,7 @@ class Expressions:
 
     def _boolop(self, node: ast.BoolOp) -> Value:
         values = [self.value(node.values[0])]
-        values += [self.folded(self.value(n)) for n in node.values[1:]]
+        values += [self.folded(self.value(n), values[0]) for n in node.values[1:]]
         if all(v.type == BOOLEAN for v in values):
             return self.either(values, isinstance(node.op, ast.And))
         return self._chosen(node, values)
@@ -725,7 +728,7 @@ class Expressions:
                 b = self.apart(b)
                 values[i + 1] = b
             part = self._compared(node, op, a, b)
-            parts.append(part if i == 0 else self.folded(part))
+            parts.append(self.folded(part, parts[0]) if parts else part)
         return parts[0] if len(parts) == 1 else self.either(parts, every=True)
 
     def _compared(self, node: ast.Compare, op: ast.cmpop, a: Value, b: Value) -> Value:
@@ -762,16 +765,17 @@ class Expressions:
             return replace(made, text=f"!{made.text}", level=UNARY) if negative else made
         if not isinstance(where.type, Tuple):
             raise self.error(node, f"{ast.unparse(node)}: must be a mapping, or a tuple of numbers")
-        operand, joint = self.ordered([self.apart(self.value(node.left)), self.apart(where)])
+        where = self.named(where)
+        left, joint = self.ordered([self.apart(self.value(node.left)), where])
         sign = ast.NotEq() if negative else ast.Eq()
-        items = self.items(where) if where.items is not None else self.items(operand[1])
-        parts = [self._compared(node, sign, operand[0], _plain(i)) for i in items]
+        items = [replace(i, before=()) for i in self.items(where if where.items else left[1])]
+        parts = [self._compared(node, sign, left[0], i) for i in items]
         made = self.either(parts, every=negative)
         return replace(made, before=joint.before, past=joint.past)
 
     def _ifexp(self, node: ast.IfExp) -> Value:
         test = self.truth(node.test)
-        a, b = (self.folded(self.value(n)) for n in (node.body, node.orelse))
+        a, b = (self.folded(self.value(n), test) for n in (node.body, node.orelse))
         t = joined(a.type, b.type)
         if t is None:
             raise self.error(
@@ -811,7 +815,7 @@ class Expressions:
         if f == "_replace" or f is dataclasses.replace:
             return self._replaced(node, target)
         if f is str.lower and target.of is not None:
-            return self._lower(node, target.of)
+            return self._lower(node)
         function = getattr(f, "__wrapped__", f)
         if isinstance(function, FunctionType):
             return self._function_call(node, function, target.of)
@@ -928,18 +932,13 @@ class Expressions:
         unknown = [n for n in named if n not in members]
         if unknown:
             raise self.error(node, f"{of.type.cls.__name__} has no field {unknown[0]}")
-        kept = dict(zip(members, self.items(base), strict=True))
-        bare = {
-            n: (kept[n] if i == 0 else _plain(kept[n], bare=True)) for i, n in enumerate(members)
-        }
-        found = bare | named
+        found = dict(zip(members, self.items(base), strict=True)) | named
         first = [n for n in members if n not in named]
         return self.record(node, of.type, found, [*first, *named])
 
     def _mapping_get(self, node: ast.Call, target: Static) -> Value:
-        value = self.program.sources
-        assert target.source is not None
-        mapping = target.source.names[target.name]
+        if target.source is None:
+            raise self.error(node, f"{ast.unparse(node)}: is no mapping")
         if (
             not isinstance(node.func, ast.Attribute)
             or node.func.attr != "get"
@@ -948,8 +947,9 @@ class Expressions:
             raise self.error(
                 node, f"{ast.unparse(node)}: of a mapping there is in, [...] and .get(key, default)"
             )
-        del value
-        name, _, t = self.program.mapping(target.source, target.name, mapping)
+        name, _, t = self.program.mapping(
+            target.source, target.name, target.source.names[target.name]
+        )
         key, otherwise = self.key(node.args[0]), self.value(node.args[1])
         if not fits(otherwise.type, t):
             raise self.error(
@@ -967,12 +967,10 @@ class Expressions:
             return v
         raise self.error(node, f"{ast.unparse(node)}: must be a {cls.__name__} already")
 
-    def _lower(self, node: ast.Call, text: Value) -> Value:
-        prefix, _, rest = text.text.partition("_name(")
-        inner = node.func
-        assert isinstance(inner, ast.Attribute)
-        member = self.value(inner.value.value) if isinstance(inner.value, ast.Attribute) else None
-        if not rest or member is None or not isinstance(member.type, Member):
+    def _lower(self, node: ast.Call) -> Value:
+        name = getattr(node.func, "value", None)
+        member = self.value(name.value) if isinstance(name, ast.Attribute) else None
+        if member is None or not isinstance(member.type, Member):
             raise self.error(
                 node, f"{ast.unparse(node)}: .lower() is only for the name of a member"
             )
@@ -983,7 +981,7 @@ class Expressions:
     def _any(self, node: ast.Call, every: bool) -> Value:
         values = [self.as_truth(v, node) for v in self._generated(node)]
         first, *rest = values
-        return self.either([first, *(self.folded(v) for v in rest)], every)
+        return self.either([first, *(self.folded(v, first) for v in rest)], every)
 
     def _generated(self, node: ast.Call) -> list[Value]:
         """The values that a generator over tuples gives, or the items of a tuple."""
@@ -994,7 +992,7 @@ class Expressions:
             v = self.value(inner)
             if not isinstance(v.type, Tuple | Record):
                 raise self.error(node, f"{ast.unparse(node)}: must be of a tuple")
-            return self.items(v if v.items is not None else self.apart(v))
+            return self.items(self.named(v))
         if len(inner.generators) != 1 or inner.generators[0].ifs:
             raise self.error(node, f"{ast.unparse(node)}: must have one for, and no if")
         loop = inner.generators[0]
@@ -1029,7 +1027,7 @@ class Expressions:
                 node,
                 f"{ast.unparse(node)}: must be a tuple, zip or enumerate of tuples, or a range",
             )
-        return self.items(v if v.items is not None else self.apart(v))
+        return self.items(self.named(v))
 
     def row(self, values: Sequence[Value]) -> Value:
         """Several values that are taken apart again."""
@@ -1083,14 +1081,8 @@ class Expressions:
             )
         if f is bool:
             return self.truth(node.args[0])
-        given = [self._given(a) for a in node.args]
+        given = [self.numeric(a) for a in node.args]
         return self._applied(node, f, given)
-
-    def _given(self, node: ast.expr) -> Value:
-        v = self.value(node)
-        if isinstance(v.type, Member):
-            return self._whole_of(v)
-        return self.as_number(v, node)
 
     def _applied(self, node: ast.Call, f: Any, given: list[Value]) -> Value:
         v = given[0]
@@ -1112,8 +1104,7 @@ class Expressions:
                 type=BOOLEAN,
             )
         if f is abs:
-            made = self.call("fabs", given, v.type)
-            return made
+            return self.call("fabs", given, v.type)
         if f is float:
             return replace(v, type=REAL)
         if f is pow:
@@ -1138,7 +1129,7 @@ class Expressions:
                 raise self.error(
                     node, f"{ast.unparse(node)}: must be of two numbers, or of a tuple"
                 )
-            values = self.items(v if v.items is not None else self.apart(v))
+            values = self.items(self.named(v))
         values = [self.as_number(v, node) for v in values]
         t: Type = values[0].type
         for v in values[1:]:
@@ -1174,10 +1165,9 @@ def _branch(v: Value) -> str:
     return argument(v) if v.level >= CONDITION else f"({v.text})"
 
 
-def _plain(v: Value, bare: bool = False) -> Value:
+def _plain(v: Value) -> Value:
     """A value of which something else is made."""
-    plain = replace(v, number=None, is_path=False, is_address=False, items=None, braces="")
-    return replace(v, before=(), past=frozenset()) if bare else plain
+    return replace(v, number=None, is_path=False, is_address=False, items=None, braces="")
 
 
 def _result(a: Type, b: Type) -> Type | None:
@@ -1218,7 +1208,7 @@ def _in_class(cls: type[Any], name: str) -> Any:
     return None
 
 
-_UNTRANSLATED: dict[type[ast.AST], str] = {
+UNTRANSLATED: dict[type[ast.AST], str] = {
     ast.Lambda: "lambda is not in the subset; define a function of the module",
     ast.ListComp: "a list is not in the subset; use a tuple",
     ast.List: "a list is not in the subset; use a tuple",

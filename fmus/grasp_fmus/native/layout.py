@@ -41,7 +41,7 @@ def wrapped(line: str) -> list[str]:
 
 
 def _break(line: str) -> tuple[int, int] | None:
-    """The best place to break a line, the last of those that are nested least, and how deep it is."""
+    """The best place to break a line, the last of those nested least, and how deep it is."""
     start = len(line) - len(line.lstrip())
     depth, quoted, best = 0, False, None
     for i, c in enumerate(line[:WIDTH]):

@@ -35,7 +35,7 @@ _LETTERS |= {"²": "^2", "³": "^3", "“": '"', "”": '"', "’": "'", "‘": 
 def identifier(name: str) -> str:
     """A Python name as one of C, not yet told from its neighbours."""
     plain = "".join(c if c.isascii() else _word(c) for c in name)
-    clashes = plain in RESERVED or plain.startswith("py_") or plain.startswith("__")
+    clashes = plain in RESERVED or plain.startswith(("py_", "__"))
     return f"{plain}_" if clashes else plain
 
 
@@ -81,8 +81,7 @@ def real(value: float) -> str:
         return "PY_NAN"
     if value in (float("inf"), float("-inf")):
         return "PY_INF" if value > 0 else "-PY_INF"
-    text = repr(value)
-    return text
+    return repr(value)
 
 
 def whole(value: int) -> str:

@@ -62,9 +62,8 @@ class Source:
         found = set(self.assigned)
         for node in self.tree.body:
             if isinstance(node, ast.FunctionDef | ast.ClassDef):
-                found.add(node.name)
-            for inner in node.body if isinstance(node, ast.ClassDef) else ():
-                found.add(f"{node.name}_{getattr(inner, 'name', '')}")
+                inner = [getattr(n, "name", "") for n in getattr(node, "body", [])]
+                found |= {node.name, *(f"{node.name}_{name}" for name in inner)}
         return {f"{self.prefix}_{name.lstrip('_')}" for name in found}
 
     def line_of(self, name: str) -> int:
@@ -172,6 +171,7 @@ def _absolute(source: Source, node: ast.ImportFrom) -> str:
 
 
 def _targets(node: ast.stmt) -> list[ast.Name]:
+    found: list[ast.expr] = []
     if isinstance(node, ast.AnnAssign):
         found = [node.target]
     elif isinstance(node, ast.Assign):
@@ -180,8 +180,6 @@ def _targets(node: ast.stmt) -> list[ast.Name]:
             for target in node.targets
             for item in (target.elts if isinstance(target, ast.Tuple) else [target])
         ]
-    else:
-        found = []
     return [target for target in found if isinstance(target, ast.Name)]
 
 
@@ -189,7 +187,7 @@ def _functions(body: list[ast.stmt], at: str) -> list[tuple[tuple[str, int], ast
     found = []
     for node in body:
         if isinstance(node, ast.FunctionDef):
-            first = min(n.lineno for n in (node, *node.decorator_list))
+            first = min([node.lineno, *(d.lineno for d in node.decorator_list)])
             found.append(((f"{at}{node.name}", first), node))
         elif isinstance(node, ast.ClassDef):
             found += _functions(node.body, f"{at}{node.name}.")

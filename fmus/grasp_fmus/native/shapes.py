@@ -80,5 +80,5 @@ def said(t: Type) -> str:
         return f"tuple[{', '.join(said(item) for item in t.items)}]"
     if isinstance(t, Member):
         return t.enum.__name__
-    assert isinstance(t, Record | Group)
-    return t.cls.__name__
+    cls: type[Any] = t.cls  # type: ignore[attr-defined]  # of a NamedTuple or a dataclass
+    return cls.__name__

@@ -2,6 +2,7 @@
 
 import ast
 import builtins
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -12,6 +13,7 @@ from typing import Any
 from . import names
 from .expressions import (
     POSTFIX,
+    UNTRANSLATED,
     Expressions,
     Static,
     Temporary,
@@ -51,13 +53,16 @@ class Loop:
 def function(
     program: Program, of: FunctionType, arguments: list[Type], caller: UntranslatableError
 ) -> Function:
-    """A function for arguments of these types, translated once; `caller` is the error of its call."""
+    """A function for arguments of these types, translated once.
+
+    `caller` is the beginning of the error of a call that has none.
+    """
     source = program.sources.of(of.__globals__["__name__"])
     definition = source.function(of) if source else None
     if source is None or definition is None:
         raise UntranslatableError(
-            f"{caller}{of.__module__}.{of.__qualname__}: must be a function of the block's modules, "
-            "defined at the top level or in a class"
+            f"{caller}{of.__module__}.{of.__qualname__}: must be a function of the block's "
+            "modules, defined at the top level or in a class"
         )
     key = ("function", source.name, of.__qualname__, definition.lineno, tuple(arguments))
     if key in program.functions:
@@ -192,17 +197,29 @@ class Body(Expressions):
             )
         if self.returns is None:
             self.returned = NOTHING
+        self._note_unused()
         return "".join(f"{line}\n" for line in self._lines)
+
+    def _note_unused(self) -> None:
+        """Say so of variables that are read in Python only: len(t) needs no t in C."""
+        text = "\n".join(self._lines)
+        for name in sorted(self._locals - set(self.parameters)):
+            cname = self.cname(name)
+            if len(re.findall(rf"(?<![.\w>]){cname}\b", text)) == 1:
+                at_ = next(i for i, line in enumerate(self._lines) if _uses(line, cname))
+                while not self._lines[at_].partition(" /*")[0].endswith(";"):
+                    at_ += 1
+                indent = self._lines[at_][: len(self._lines[at_]) - len(self._lines[at_].lstrip())]
+                self._lines.insert(at_ + 1, f"{indent}(void){cname};")
 
     def whole(self, made: Function, text: str) -> str:
         """The definition in C."""
         declared = []
         unused = []
-        read = self._reads | {n.id for n in ast.walk(self.definition) if isinstance(n, ast.Name)}
         for name in self.parameters:
             t = self.types[name]
             declared.append(self.program.held(t, self.cname(name)))
-            if name not in read:
+            if not _uses(text, self.cname(name)):
                 unused.append(f"    (void){self.cname(name)};\n")
         if made.faults:
             declared.append("Fault *fault")
@@ -220,9 +237,11 @@ class Body(Expressions):
     # What expressions ask for
 
     def cname(self, name: str) -> str:
+        """What a variable is called in C."""
         return self._cnames[name]
 
     def temporary(self, hint: str) -> str:
+        """A name that is free."""
         hint = names.identifier(hint)
         hint = names.identifier(self.program.plain.get(hint, hint))
         if hint in names.RESERVED or hint.endswith("_"):
@@ -235,6 +254,7 @@ class Body(Expressions):
         return name
 
     def read(self, node: ast.Name) -> Value | None:
+        """A variable with what is known of it."""
         if node.id in self._environment:
             return self._environment[node.id]
         if node.id not in self._locals:
@@ -242,17 +262,21 @@ class Body(Expressions):
         if node.id not in self._has:
             raise self.error(node, f"{node.id}: may have no value here; give it one before")
         t = self.known.get(node.id) or self.types.get(node.id)
-        assert t is not None
+        if t is None:
+            raise self.error(node, f"{node.id}: may have no value here; give it one before")
         return Value(self.cname(node.id), POSTFIX, t, is_path=True, is_address=isinstance(t, Group))
 
     def called(self, function_: FunctionType, arguments: list[Type], node: ast.AST) -> Function:
+        """Translate a function that is called."""
         return function(self.program, function_, arguments, self.error(node, ""))
 
     def reserve(self, t: Temporary) -> None:
+        """Declare a temporary before the next statement."""
         self._reserved.append(t)
 
     @contextmanager
     def binding(self, target: ast.expr, v: Value) -> Iterator[None]:
+        """Let the variables of a generator stand for values."""
         before = self._environment
         self._environment = {**before, **self._matched(target, v)}
         yield
@@ -390,10 +414,9 @@ class Body(Expressions):
         before = self.types.get(name)
         both = t if before is None else joined(before, t)
         if both is None:
-            assert before is not None
             raise self.error(
                 node,
-                f"{name} is {said(t)}, was {said(before)}; must stay of one type: "
+                f"{name} is {said(t)}, was {said(before or t)}; must stay of one type: "
                 "take another name",
             )
         known = self.known.get(name)
@@ -541,10 +564,11 @@ class Body(Expressions):
             if isinstance(found, Value):
                 self._effect(self._flushed(found))
                 return
-        raise self.error(node, f"{ast.unparse(node)}: has no effect; leave it out")
+        no_effect = f"{ast.unparse(node)}: has no effect; leave it out"
+        raise self.error(node, UNTRANSLATED.get(type(node.value), no_effect))
 
     def _is_check(self, node: ast.Call) -> bool:
-        """True for check(self) and Group.__post_init__(self): ranges are checked when they are set."""
+        """True for check(self) and Group.__post_init__(self): ranges are checked in each set."""
         if isinstance(node.func, ast.Attribute) and node.func.attr == "__post_init__":
             return self._is_base_check(node, node.func)
         found = self.found(node.func)
@@ -607,11 +631,10 @@ class Body(Expressions):
     def _returns(self, t: Type, node: ast.AST) -> None:
         both = t if self.returns is None else joined(self.returns, t)
         if both is None:
-            assert self.returns is not None
             raise self.error(
                 node,
                 f"{self.definition.name}: returns {said(t)} here, "
-                f"{said(self.returns)} before; must be one type",
+                f"{said(self.returns or t)} before; must be one type",
             )
         self.returns = both
         self.returned = both
@@ -723,7 +746,7 @@ class Body(Expressions):
         head: str,
         by: str,
         times: int | None,
-        given: list[tuple[ast.expr, Value]],
+        given: Sequence[tuple[ast.expr, Value]],
         counter: str,
     ) -> None:
         """A loop; times is how often, None where that is not known before."""
@@ -800,9 +823,9 @@ class Body(Expressions):
         return [self.value(node)]
 
     def _item(self, v: Value, counter: str) -> Value:
-        assert isinstance(v.type, Tuple)
-        kind: Type = v.type.items[0]
-        for item in v.type.items:
+        items = v.type.items if isinstance(v.type, Tuple) else ()
+        kind: Type = items[0]
+        for item in items:
             kind = joined(kind, item) or kind
         return replace(
             v,
@@ -832,7 +855,7 @@ class Body(Expressions):
             )
         inner = call.func if isinstance(call, ast.Call) else call
         found = self.found(inner)
-        cls = found.object if isinstance(found, Static) else None
+        cls: Any = found.object if isinstance(found, Static) else None
         if not (
             isinstance(cls, type)
             and issubclass(cls, Exception)
@@ -847,16 +870,18 @@ class Body(Expressions):
         if len(arguments) > 1 or (isinstance(call, ast.Call) and call.keywords):
             raise self.error(node, f"{ast.unparse(call)}: must have one text")
         pieces = self._pieces(arguments[0]) if arguments else []
-        operands, joint = self.ordered([v for v, _ in pieces if isinstance(v, Value)])
+        said_values = [v for v, _ in pieces if isinstance(v, Value)]
+        operands, joint = self.ordered([self.apart(v) if v.faults else v for v in said_values])
         self._flushed(joint)
         values = iter(operands)
-        kind = _kind(cls)
+        raised: Any = cls
+        kind, name = _kind(raised), names.string(raised.__name__)
         self.faults.add(f"raise at line {node.lineno} of {self.source.name}")
         if all(isinstance(v, str) for v, _ in pieces):
             text = names.string("".join(v for v, _ in pieces if isinstance(v, str)))
-            self._emit(f'py_fault(fault, {kind}, "{cls.__name__}", {text});')
+            self._emit(f'py_fault(fault, {kind}, {name}, {text});')
         else:
-            self._emit(f'if (py_raise(fault, {kind}, "{cls.__name__}")) {{')
+            self._emit(f'if (py_raise(fault, {kind}, {name})) {{')
             self._indent += 1
             for v, how in pieces:
                 self._emit(
@@ -883,8 +908,7 @@ class Body(Expressions):
         for part in node.values:
             if isinstance(part, ast.Constant):
                 found.append((str(part.value), ""))
-            else:
-                assert isinstance(part, ast.FormattedValue)
+            elif isinstance(part, ast.FormattedValue):
                 found.append(self._formatted(part))
         return found
 

@@ -17,7 +17,7 @@ from grasp_fmus.native.sources import C
 from hypothesis import example, given
 from hypothesis import strategies as st
 from support.examples import examples
-from support.fmi2 import _ALLOCATE, _FREE, _LOGGER, ERROR, OK, Fmu, Instance, _Callbacks
+from support.fmi2 import _ALLOCATE, _FREE, _LOGGER, ERROR, OK, Fmu, Instance, _Callbacks, _Calls
 from support.hand_written import GUID, native_fmu
 from support.native_fmus import needs_gcc
 
@@ -170,8 +170,9 @@ def test_no_memory(fmu: Fmu, least: int) -> None:
 
 def adopted(fmu: Fmu, component: c_void_p) -> Instance:
     """An instance that was made elsewhere."""
-    instance = object.__new__(Instance)
-    instance.fmu, instance.log, instance._component = fmu, [], component
+    calls, instance = object.__new__(_Calls), object.__new__(Instance)
+    calls._library, calls.component = fmu.library, component
+    instance.fmu, instance.log, instance._calls = fmu, [], calls
     return instance
 
 

@@ -40,7 +40,7 @@ typedef struct {
 
 /* Exceptions */
 
-static inline void py_say(Fault *fault, const char *text)
+static void py_say(Fault *fault, const char *text)
 {
     size_t used = strlen(fault->text), more = strlen(text);
     if (more > sizeof fault->text - 1 - used) {
@@ -98,7 +98,7 @@ static inline void py_say_whole(Fault *fault, double n)
 }
 
 /* True if this is the first fault: what it says follows. */
-static inline int py_raise(Fault *fault, int kind, const char *type)
+static int py_raise(Fault *fault, int kind, const char *type)
 {
     if (fault->kind != FAULT_NONE) {
         return 0;
@@ -109,7 +109,7 @@ static inline int py_raise(Fault *fault, int kind, const char *type)
     return 1;
 }
 
-static inline double py_fault(Fault *fault, int kind, const char *type, const char *text)
+static double py_fault(Fault *fault, int kind, const char *type, const char *text)
 {
     if (py_raise(fault, kind, type)) {
         py_say(fault, text);
@@ -348,6 +348,9 @@ static inline double py_checked_range(double x, double result, Fault *fault)
     return py_checked(x, result, fault);
 }
 
+static inline double py_atan(double x) { return atan(x); }
+static inline double py_asinh(double x) { return asinh(x); }
+static inline double py_tanh(double x) { return tanh(x); }
 static inline double py_sqrt(double x, Fault *fault) { return py_checked(x, sqrt(x), fault); }
 static inline double py_sin(double x, Fault *fault) { return py_checked(x, sin(x), fault); }
 static inline double py_cos(double x, Fault *fault) { return py_checked(x, cos(x), fault); }

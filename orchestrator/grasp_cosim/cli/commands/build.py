@@ -7,15 +7,14 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from ...errors import InputError, SimulationError
-from ...files import FMU_FOLDER, check_folder
+from ...files import FMU_FOLDER, NATIVE_FOLDER, check_folder
 from ..frame import PATH, bind_python_option, json_option, say, show
 
 if TYPE_CHECKING:
     from grasp_fmus.folder import Built
 
 BOUND_FOLDER = Path("fmus/bound")
-NATIVE_FOLDER = Path("fmus/native")
-"""Where FMUs for hosts without Python are built, below the current folder."""
+"""Where FMUs bound to a Python are built, below the current folder."""
 
 
 @click.command()
@@ -118,7 +117,7 @@ def _write_c(block: Path | None, folder: Path, as_json: bool) -> int:
     """Write the C of one block into the folder, of all into folders in it."""
     from grasp_fmus.block_build import own_model
     from grasp_fmus.fmu import shipped_model
-    from grasp_fmus.native.build import chosen_names
+    from grasp_fmus.native.build import chosen_names, python_only
     from grasp_fmus.native.c_only import write_c
     from grasp_fmus.shipped import SCRIPTS
 
@@ -130,8 +129,11 @@ def _write_c(block: Path | None, folder: Path, as_json: bool) -> int:
         models = {name: shipped_model(SCRIPTS / f"{name}.py") for name in names}
         places = {name: folder if block else folder / name for name in names}
         written = [path for name in names for path in write_c(places[name], models[name])]
+    notes = [] if block else [*python_only().values()]
+    for note in notes:
+        say(note)
     files = [str(path) for path in written]
-    show(as_json, {"files": files}, "\n".join(f"{file}: written" for file in files))
+    show(as_json, {"files": files, "notes": notes}, "\n".join(f"{file}: written" for file in files))
     return 0
 
 

@@ -1,0 +1,163 @@
+"""build --native: what it writes, says, refuses, and with which exit code."""
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+from conftest import Run
+from grasp_cosim.interface.read import describe
+from grasp_fmus.native import compilers
+from support.compilers import needs_gcc, needs_zig
+
+ROOT = Path(__file__).parents[2]
+SPRING = ROOT / "docs/spring_plant.py"
+ONLY = "GripperPlantMuJoCo: stays Python only, as it needs mujoco\n"
+
+pytestmark = needs_gcc
+
+
+def test_builds_all_that_can_be_native_and_says_of_the_other(command: Run) -> None:
+    code, out, err = command("build", "--native")
+    assert (code, err) == (0, ONLY)
+    lines = out.splitlines()
+    assert len(lines) == 5
+    assert "fmus/native/GripperPlant.fmu: new" in lines
+    code, out, err = command("build", "--native")
+    assert (code, err) == (0, ONLY)
+    assert {line.partition(": ")[2] for line in out.splitlines()} == {"unchanged"}
+
+
+def test_json_names_files_and_notes(command: Run, natives: Path) -> None:
+    code, out, err = command("build", "--native", "--json", "--out", natives)
+    report = json.loads(out)
+    assert (code, err) == (0, ONLY)
+    assert report["notes"] == [ONLY.strip()]
+    assert report["fmus"] == [*report["built"]]
+    assert {Path(fmu).parent for fmu in report["fmus"]} == {natives}
+
+
+def test_one_by_name_and_one_of_ones_own(command: Run) -> None:
+    assert command("build", "--native", "ProximitySensor") == (
+        0, "fmus/native/ProximitySensor.fmu: new\n", "",
+    )  # fmt: skip
+    code, out, err = command("build", "--native", SPRING, "--fmi", "3", "--out", "mine")
+    assert (code, out, err) == (0, "mine/SpringPlant.fmu: new\n", "")
+    found = describe(Path("mine/SpringPlant.fmu"))
+    assert (found.version, found.python, found.sources) == ("3.0", False, True)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--native", "GripperPlantMuJoCo"], f"build: {ONLY.strip()}"),
+        (["--native", "Gripper"], "build: Gripper: no such block; must be of GraspController, "),
+        (["--native", "missing.py"], "missing.py: No such file or directory"),
+        (["--native", "--target", "linux65"], "build: --target 'linux65': must be of linux64, "),
+        (["--native", "--target", ""], "build: --target '': must be of linux64, "),
+        (["--native", "--fmi", "1"], "Invalid value for '--fmi': '1' is not one of '2', '3'."),
+        (["--target", "linux64"], "--target linux64: must be with --native"),
+        (["--fmi", "2"], "--fmi 2: must be with --native"),
+        (["--c-only", "c"], "--c-only c: must be with --native"),
+        (["--native", "--bind-python"], "--bind-python: a native FMU needs no Python; must be"),
+        (["--native", "--c-only", "c", "--fmi", "3"], "build: --c-only: C without FMI; must be"),
+        (["--native", "--out", "/dev/null/x"], "--out /dev/null/x: cannot write to /dev/null"),
+        (["--native", "--c-only", "c", "Gripper"], "build: Gripper: no such block; must be of"),
+    ],
+)
+def test_what_is_wrong_is_one_line(arguments: list[str], said: str, command: Run) -> None:
+    code, out, err = command("build", *arguments)
+    assert (code, out) == (2, "")
+    assert err.startswith(f"grasp-cosim: {said}")
+    assert err.count("\n") == 1
+    assert [*Path().iterdir()] == []
+
+
+def test_what_cannot_be_translated_is_named_with_its_line(command: Run, tmp_path: Path) -> None:
+    text = SPRING.read_text("utf-8")
+    (tmp_path / "lists.py").write_text(f"{text}\n\ndef unused() -> None:\n    [1, 2]\n")
+    assert command("build", "--native", "lists.py")[0] == 0
+    before, found, after = text.partition("def step(")
+    body = after.replace(":\n", ":\n    listed = [h, h]\n", 1)
+    (tmp_path / "lists.py").write_text(f"{before}{found}{body}")
+    code, out, err = command("build", "--native", "lists.py")
+    assert (code, out) == (2, "")
+    line = f"{before}{found}{body}".partition("listed")[0].count("\n") + 1
+    assert err.startswith(f"grasp-cosim: build: lists.py: line {line}: ")
+    assert err.count("\n") == 1
+
+
+def test_no_compiler_is_one_line_with_its_fix(
+    command: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(compilers, "_zig", lambda: None)
+    code, _, err = command("build", "--native", "--target", "win64")
+    assert (code, err.count("\n")) == (2, 1)
+    fix = f"must be zig; {sys.executable} -m pip install ziglang\n"
+    assert err == f"grasp-cosim: build: no C compiler for x86_64-windows: {fix}"
+    monkeypatch.setenv("PATH", str(tmp_path))
+    code, _, err = command("build", "--native")
+    assert (code, err.count("\n")) == (2, 1)
+    assert err.endswith(f"{sys.executable} -m pip install ziglang\n")
+
+
+def test_a_compiler_that_fails_is_a_failure_on_the_way(
+    command: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CC", "gcc --no-such-option")
+    code, out, err = command("build", "--native", "GripperPlant")
+    assert (code, out, err.count("\n")) == (3, "", 1)
+    assert err.startswith(
+        "grasp-cosim: GripperPlant.c for x86_64-linux: gcc --no-such-option: exit code 1: "
+    )
+    assert "error: unrecognized command-line option" in err
+    assert not Path("fmus").exists()
+
+
+def test_c_alone(command: Run) -> None:
+    code, out, err = command("build", "--native", "--c-only", "one", "GraspController")
+    assert (code, err) == (0, "")
+    assert "one/GraspController.h: written" in out.splitlines()
+    code, out, _ = command("build", "--native", "--c-only", "own", SPRING, "--json")
+    assert "own/main.c" in json.loads(out)["files"]
+    code, out, err = command("build", "--native", "--c-only", "all")
+    assert (code, err) == (0, ONLY)
+    assert len([*Path("all").glob("*/main.c")]) == 5
+    for path in Path("one").iterdir():
+        assert path.read_bytes() == (Path("all/GraspController") / path.name).read_bytes()
+    assert not Path("fmus").exists()
+
+
+@needs_zig
+@pytest.mark.slow
+def test_for_others(command: Run) -> None:
+    """The first time in a folder for what is kept, the libraries of zig are made."""
+    targets = "linux64,win64,darwin64,aarch64-linux"
+    code, out, err = command("build", "--native", "GraspController", "--target", targets)
+    assert (code, out) == (0, "fmus/native/GraspController.fmu: new\n")
+    assert err.startswith("FMI 2.0 has one folder for both, linux64: x86_64-linux is there, ")
+    assert err.count("\n") == 1
+    found = describe(Path("fmus/native/GraspController.fmu"))
+    assert found.platforms == ("aarch64-linux", "darwin64", "linux64", "win64")
+    code, out, err = command("doctor", "fmus/native/GraspController.fmu")
+    assert code == 0
+    assert "there is: aarch64-linux, darwin64, linux64, win64; this machine: linux64" in out
+    code, out, err = command(
+        "build", "--native", "GraspController", "--target", "aarch64-linux", "--fmi", "3"
+    )
+    assert (code, err) == (0, "")
+    found = describe(Path("fmus/native/GraspController.fmu"))
+    assert found.platforms == ("aarch64-linux", "x86_64-linux")
+
+
+def test_doctor_and_inspect_say_that_it_needs_no_python(command: Run, natives: Path) -> None:
+    fmu = natives / "GripperPlant.fmu"
+    code, out, _ = command("doctor", fmu)
+    assert code == 0
+    assert "problem" not in out
+    assert "native, needs no Python" in out
+    assert "sources/GripperPlant.c, to compile for other machines" in out
+    code, out, _ = command("inspect", fmu)
+    assert "platforms           linux64; this machine: linux64" in out
+    assert "Python              not needed" in out
+    assert json.loads(command("inspect", fmu, "--json")[1])["sources"] is True

@@ -1,0 +1,109 @@
+"""FMPy reads, validates, compiles and simulates native FMUs of both versions, to the last bit."""
+
+import os
+import shutil
+import subprocess
+import sysconfig
+from pathlib import Path
+from typing import Any, Literal
+
+import pytest
+from fmpy import simulate_fmu
+from fmpy.build import build_platform_binary
+from fmpy.util import read_csv, read_ref_opt_file
+from fmpy.validation import validate_fmu
+from grasp_fmus.native.build import build_native, planned
+from grasp_fmus.native.compilers import BITS, UNPREFIXED
+from grasp_fmus.shipped import blocks
+from support.compilers import needs_gcc
+from support.slow import slow
+
+NAMES = [name for name in blocks() if name != "GripperPlantMuJoCo"]
+BOTH = [(name, 2) for name in NAMES] + [slow(name, 3) for name in NAMES]
+
+PROGRAMS = os.pathsep.join([sysconfig.get_path("scripts"), os.environ["PATH"]])
+"""Where they are looked for; CMake is installed with FMPy."""
+
+pytestmark = needs_gcc
+
+
+@pytest.fixture(scope="module")
+def natives_3(tmp_path_factory: pytest.TempPathFactory, natives: Path) -> Path:
+    """The folder of those of FMI 3.0."""
+    folder = tmp_path_factory.mktemp("fmi3")
+    build_native(folder, planned(fmi=3))
+    return folder
+
+
+@pytest.fixture
+def fmu(request: pytest.FixtureRequest, natives: Path, name: str, fmi: Literal[2, 3]) -> Path:
+    """A native FMU of one of the versions."""
+    folder = natives if fmi == 2 else request.getfixturevalue("natives_3")
+    return Path(folder) / f"{name}.fmu"
+
+
+def assert_gives_the_reference(fmu: Path, folder: Path, name: str) -> None:
+    """Run by FMPy with the options and inputs in the folder, every output is that of the block."""
+    options = read_ref_opt_file(folder / f"{name}_ref.opt")
+    result: Any = simulate_fmu(
+        fmu,
+        start_time=options["StartTime"],
+        stop_time=options["StopTime"],
+        output_interval=options["StepSize"],
+        input=read_csv(folder / f"{name}_in.csv"),
+    )
+    reference = read_csv(folder / f"{name}_ref.csv")
+    assert len(reference) == 769
+    assert set(result.dtype.names) >= set(reference.dtype.names)
+    for column in reference.dtype.names:
+        assert result[column].astype(float).tobytes() == reference[column].tobytes(), column
+
+
+@pytest.mark.parametrize(("name", "fmi"), BOTH)
+def test_it_is_valid(fmu: Path) -> None:
+    assert validate_fmu(fmu) == []
+
+
+@pytest.mark.parametrize(("name", "fmi"), BOTH)
+def test_it_gives_the_cross_check_reference(fmu: Path) -> None:
+    assert_gives_the_reference(fmu, fmu.parent, fmu.stem)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not shutil.which("cmake", path=PROGRAMS), reason="NO cmake")
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("name", NAMES)
+def test_fmpy_compiles_its_sources(
+    fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without its binary, with another made by CMake: the same bits."""
+    monkeypatch.setenv("PATH", PROGRAMS)
+    folder, made = tmp_path / "fmu", tmp_path / "made"
+    made.mkdir()
+    shutil.unpack_archive(fmu, folder, "zip")
+    shutil.rmtree(folder / "binaries")
+    build_platform_binary(folder, made)
+    assert [*folder.glob("binaries/*/*")]
+    assert_gives_the_reference(folder, fmu.parent, fmu.stem)
+
+
+@pytest.mark.parametrize("fmi", [2, slow(3)])
+@pytest.mark.parametrize("name", ["GraspController"])
+@pytest.mark.skipif("fma" not in Path("/proc/cpuinfo").read_text(), reason="NO fma")
+def test_contraction_is_caught(
+    fmu: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Compiled for this processor without a word on contraction, it refuses to be instantiated."""
+    for place, flags in (("contracted", ()), ("exact", BITS)):
+        folder = tmp_path / place
+        shutil.unpack_archive(fmu, folder, "zip")
+        (binary,) = folder.glob("binaries/*/*")
+        command = ["gcc", "-std=gnu99", "-O2", "-march=native", *flags, "-shared", "-fPIC"]
+        defined = [f"-D{macro}" for macro in UNPREFIXED]
+        source = str(folder / f"sources/{fmu.stem}.c")
+        subprocess.run([*command, *defined, "-o", str(binary), source, "-lm"], check=True)
+    with pytest.raises(Exception, match="Failed to instantiate"):
+        simulate_fmu(tmp_path / "contracted", stop_time=0.01)
+    said = "".join(capfd.readouterr())
+    assert "a * b + c is not rounded twice: must be compiled with -ffp-contract=off" in said
+    simulate_fmu(tmp_path / "exact", stop_time=0.01)
