@@ -14,9 +14,7 @@ from typing import Any
 from urllib.parse import quote
 
 import pytest
-from conftest import Folder
 from support.fmi2 import _ALLOCATE, _FREE, _LOGGER, ERROR, OK, Fmu, _Callbacks
-from support.kinds import Kind, both_of_fmi_2
 from support.slow import slow
 
 Location = Callable[[str], str | None]
@@ -117,12 +115,11 @@ def hosted(case: str, folder: Path, tmp_path: Path) -> dict[str, Any]:
     return reported
 
 
-@both_of_fmi_2
 @pytest.mark.parametrize("case", a_third(LIVES))
 def test_an_instance_lives_where_the_meaning_is_clear(
-    case: str, folder_of: Folder, kind: Kind, tmp_path: Path
+    case: str, fmus: Path, tmp_path: Path
 ) -> None:
-    lives(case, hosted(case, folder_of(kind), tmp_path))
+    lives(case, hosted(case, fmus, tmp_path))
 
 
 def lives(case: str, found: dict[str, Any]) -> None:
@@ -132,7 +129,8 @@ def lives(case: str, found: dict[str, Any]) -> None:
         assert "step from 9.0 s: must be from 0.001 s" in found["said"][0]
 
 
-@pytest.mark.parametrize("case", a_third((*NOT_FOUND, "no text")))
+@pytest.mark.slow
+@pytest.mark.parametrize("case", [*LIVES, *NOT_FOUND, "no text"])
 def test_a_native_fmu_reads_nothing_and_lives_all_the_same(
     case: str, natives: Path, tmp_path: Path
 ) -> None:
