@@ -4,7 +4,7 @@ import ast
 import builtins
 import dataclasses
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cached_property
@@ -220,46 +220,30 @@ class Expressions:
         C evaluates operands in any order: where that could show, by which of two faults is the
         first, the earlier ones are worked out before.
         """
-        found: list[Value] = []
-        before: list[tuple[Temporary, ...]] = []
-        later: frozenset[str] = frozenset()
-        past: frozenset[str] = frozenset()
-        later_past = False
+        later, past = frozenset[str](), False
+        must: list[bool] = []
         for v in reversed(values):
             differs = bool(v.faults and later) and not (v.faults == later and len(later) == 1)
-            own = v.before
-            if v.faults and (later_past or differs):
-                own, v = self._apart(v)
-            else:
+            must.insert(0, bool(v.faults) and (past or differs))
+            if not must[0]:
                 later |= v.faults
-            before.append(own)
-            found.append(replace(v, before=()))
-            past |= v.past
-            later_past = later_past or bool(v.past)
-        joint = Value(
-            "",
-            POSTFIX,
-            NOTHING,
-            later,
-            tuple(dict.fromkeys(t for own in reversed(before) for t in own)),
-            past,
-        )
-        return found[::-1], joint
-
-    def _apart(self, v: Value, hint: str = "part") -> tuple[tuple[Temporary, ...], Value]:
-        name = self.temporary(_hint(v.text, hint))
-        t = Temporary(name, v.type, v.text)
-        past = v.past | v.faults
-        return (*v.before, t), Value(
-            name, POSTFIX, v.type, past=past, is_path=True, is_address=isinstance(v.type, Group)
-        )
+            past = past or must[0] or bool(v.past)
+        made = [self.apart(v) if apart else v for v, apart in zip(values, must, strict=True)]
+        before = tuple(dict.fromkeys(t for v in made for t in v.before))
+        joint = Value("", POSTFIX, NOTHING, later, before, _union(v.past for v in made))
+        return [replace(v, before=(), past=frozenset()) for v in made], joint
 
     def apart(self, v: Value, hint: str = "part") -> Value:
         """A value that can be named more than once without being worked out again."""
         if v.is_path or v.number is not None:
             return v
-        before, found = self._apart(v, hint)
-        return replace(found, before=before)
+        name = self.temporary(_hint(v.text, hint))
+        before = (*v.before, Temporary(name, v.type, v.braces or v.text))
+        is_address = isinstance(v.type, Group)
+        past = v.past | v.faults
+        return Value(
+            name, POSTFIX, v.type, before=before, past=past, is_path=True, is_address=is_address
+        )
 
     def folded(self, v: Value, done: Value) -> Value:
         """A value that is worked out only where a condition holds, temporaries included.
@@ -269,10 +253,14 @@ class Expressions:
         before = [t for t in v.before if t not in done.before]
         for t in before:
             self.reserve(t)
-        parts = [f"{t.name} = {t.text}" for t in before]
+        parts = [f"{t.name} = {self._whole_text(t)}" for t in before]
         text = f"({', '.join([*parts, v.text])})" if before else v.text
         found = replace(v, text=text, faults=v.faults | v.past, before=(), past=frozenset())
         return replace(found, level=POSTFIX, is_path=False) if before else found
+
+    def _whole_text(self, t: Temporary) -> str:
+        """The value of a temporary outside its declaration, where braces need a type."""
+        return f"({self.program.shape(t.type)}){t.text}" if t.text.startswith("{") else t.text
 
     def named(self, v: Value) -> Value:
         """A tuple of which items may be left out, or be taken more than once."""
@@ -379,9 +367,7 @@ class Expressions:
         if isinstance(v, FunctionType):
             return Static(v)
         if type(v) in (float, int, bool):
-            t = self.program.type_of(v, ast.unparse(node))
-            number = None if t == BOOLEAN else v
-            return Value(self.program.initialiser(v, t), POSTFIX, t, number=number, is_path=True)
+            return self.literal(v, node)
         raise self.error(node, f"{ast.unparse(node)}: must be a function, a member or a number")
 
     def _member(self, node: ast.Attribute, base: Value, t: Record | Group) -> Value | Static:
@@ -407,6 +393,8 @@ class Expressions:
             return Static("_replace", of=base)
         if isinstance(found, FunctionType):
             return Static(found, of=base)
+        if type(found) in (float, int, bool):
+            return self.literal(found, node)
         raise self.error(node, f"{ast.unparse(node)}: {t.cls.__name__} has no such field")
 
     def _subscript(self, node: ast.Subscript) -> Value:
@@ -700,7 +688,7 @@ class Expressions:
         first, *rest = values
         parts = [first, *rest]
         texts = [f"({v.text})" if v.level == AND and level == OR else at(v, level) for v in parts]
-        faults = frozenset[str]().union(*(v.faults for v in parts))
+        faults = _union(v.faults for v in parts)
         return replace(
             _plain(first),
             text=f" {sign} ".join(texts),
@@ -1163,6 +1151,10 @@ def initialiser(v: Value) -> str:
 
 def _branch(v: Value) -> str:
     return argument(v) if v.level >= CONDITION else f"({v.text})"
+
+
+def _union(sets: Iterable[frozenset[str]]) -> frozenset[str]:
+    return frozenset[str]().union(*sets)
 
 
 def _plain(v: Value) -> Value:

@@ -389,9 +389,9 @@ class Program:
                 for k, v in keys
             )
             text = (
-                f"{about}static inline int {cname}_has(double key)\n{{\n    return "
-                + " || ".join(f"key == {k}" for k, _ in keys)
-                + f";\n}}\n\nstatic inline {shape} {cname}_get(double key, {shape} otherwise)\n"
+                f"{about}static inline int {cname}_has(double key)\n{{\n"
+                + _lines(f"    return {' || '.join(f'key == {k}' for k, _ in keys)};")
+                + f"}}\n\nstatic inline {shape} {cname}_get(double key, {shape} otherwise)\n"
                 f"{{\n{found}    return otherwise;\n}}\n"
             )
             self.define(key, source.name, text, self.needed)
@@ -494,7 +494,7 @@ def _hints(of: Any) -> dict[str, Any]:
         found |= (
             vars(base).get("__annotations__", {}) if isinstance(base, type) else of.__annotations__
         )
-    if any(isinstance(hint, str) for hint in found.values()):
+    if any(isinstance(hint, str | typing.ForwardRef) for hint in found.values()):
         try:
             return typing.get_type_hints(of)
         except (NameError, TypeError, AttributeError):

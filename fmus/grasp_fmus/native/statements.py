@@ -443,8 +443,12 @@ class Body(Expressions):
         self._has.add(name)
 
     def _assign_statement(self, node: ast.Assign) -> None:
-        v = self.value(node.value)
         first, *rest = node.targets
+        pairs = self._pairs(first, node.value) if not rest else None
+        if pairs is not None:
+            self._parallel(pairs, node)
+            return
+        v = self.value(node.value)
         if rest and not (v.is_path or v.number is not None):
             names_ = [t for t in node.targets if isinstance(t, ast.Name)]
             if not names_:
@@ -484,6 +488,26 @@ class Body(Expressions):
         self._pair(target, v, pairs)
         self._parallel(pairs, node)
 
+    def _pairs(self, target: ast.expr, value: ast.expr) -> list[tuple[str, Value]] | None:
+        """The assignments of one tuple to another, item by item; None where they do not match."""
+        if not isinstance(target, ast.Tuple) or not isinstance(value, ast.Tuple):
+            return None
+        both = [*target.elts, *value.elts]
+        if len(target.elts) != len(value.elts) or any(isinstance(n, ast.Starred) for n in both):
+            return None
+        pairs: list[tuple[str, Value]] = []
+        for inner, item in zip(target.elts, value.elts, strict=True):
+            nested = self._pairs(inner, item)
+            if nested is not None:
+                pairs += nested
+            elif isinstance(inner, ast.Name):
+                pairs.append((inner.id, self.value(item)))
+            elif isinstance(inner, ast.Tuple):
+                self._pair(inner, self.value(item), pairs)
+            else:
+                raise self.error(inner, f"{ast.unparse(inner)}: only variables are assigned to")
+        return pairs
+
     def _pair(self, target: ast.Tuple, v: Value, pairs: list[tuple[str, Value]]) -> None:
         if not isinstance(v.type, Tuple | Record):
             raise self.error(target, f"{ast.unparse(target)}: a {said(v.type)} has no items")
@@ -511,27 +535,13 @@ class Body(Expressions):
         for i, (name, v) in enumerate(pairs):
             cname = self.cname(name)
             later = pairs[i + 1 :]
-            if (
-                self._declared(name)
-                and self._is_read(name)
-                and any(_uses(w.text, cname) for _, w in later)
-            ):
-                if v.text == cname:
-                    continue
+            is_old = self._declared(name) and self._is_read(name) and v.text != cname
+            if is_old and any(_uses(text, cname) for _, w in later for text in _texts(w)):
                 old = self.temporary(f"old_{cname}")
                 self._emit(f"{self.program.held(self.types[name], old)} = {cname};")
-                pairs[i + 1 :] = [
-                    (
-                        n,
-                        replace(
-                            w,
-                            text=_renamed(w.text, cname, old),
-                            braces=_renamed(w.braces, cname, old),
-                        ),
-                    )
-                    for n, w in later
-                ]
-            self._store(name, self._flushed(v), node)
+                pairs[i + 1 :] = [(n, _with(w, cname, old)) for n, w in later]
+            if v.text != cname:
+                self._store(name, self._flushed(v), node)
 
     def _augassign_statement(self, node: ast.AugAssign) -> None:
         if not isinstance(node.target, ast.Name):
@@ -879,9 +889,9 @@ class Body(Expressions):
         self.faults.add(f"raise at line {node.lineno} of {self.source.name}")
         if all(isinstance(v, str) for v, _ in pieces):
             text = names.string("".join(v for v, _ in pieces if isinstance(v, str)))
-            self._emit(f'py_fault(fault, {kind}, {name}, {text});')
+            self._emit(f"py_fault(fault, {kind}, {name}, {text});")
         else:
-            self._emit(f'if (py_raise(fault, {kind}, {name})) {{')
+            self._emit(f"if (py_raise(fault, {kind}, {name})) {{")
             self._indent += 1
             for v, how in pieces:
                 self._emit(
@@ -1052,6 +1062,17 @@ def _owners(
 
 def _uses(text: str, name: str) -> bool:
     return _renamed(text, name, "") != text
+
+
+def _texts(v: Value) -> list[str]:
+    return [v.text, *(t.text for t in v.before)]
+
+
+def _with(v: Value, name: str, to: str) -> Value:
+    """A value with a variable called otherwise."""
+    before = tuple(replace(t, text=_renamed(t.text, name, to)) for t in v.before)
+    text, braces = _renamed(v.text, name, to), _renamed(v.braces, name, to)
+    return replace(v, text=text, braces=braces, before=before)
 
 
 def _renamed(text: str, name: str, to: str) -> str:

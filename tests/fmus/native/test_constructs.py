@@ -12,7 +12,6 @@ from grasp_fmus.block_build import _run
 from grasp_fmus.native.translation import translated
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from support.slow import slow
 
 HEAD = '''
 """Blocks of the tests: `which` chooses one."""
@@ -42,6 +41,7 @@ ON = True
 ROW: Row = (0.5, -0.25, 1e300)
 NESTED = ((1.0, 2.0), (3.0, -0.0))
 FAR, NEAR = 10.0, 0.1
+TABLE = ((0.0, 1.0), (0.5, 3.0), (2.0, -1.0), (4.0, 0.25))
 
 
 class Mode(IntEnum):
@@ -99,8 +99,13 @@ class Other(Group, name="other"):
     far: Annotated[bool, Parameter("a word of old compilers")] = False
 
 
+DEFAULT = Inner(gain=0.75)
+
+
 @dataclass(frozen=True)
 class Params:
+    SCALE = -2.5
+
     which: Annotated[int, Parameter("which", low=0, high=10000)] = 0
     n: Annotated[int, Parameter("a number", low=-1000, high=1000)] = 3
     flag: Annotated[bool, Parameter("a flag")] = False
@@ -150,6 +155,22 @@ def signed(a: float) -> float:
 @lru_cache(maxsize=4)
 def both(a: float, b: float) -> Pair:
     return a + b, a - b
+
+
+def clipped(x, low, high):
+    return low if x < low else high if x > high else x
+
+
+def v_of(p: Params, factor: float = Params.SCALE) -> float:
+    return total(p.weights) * factor
+
+
+def total(w: Row) -> float:
+    """Its int becomes a float."""
+    found: float = 0
+    for x in w:
+        found += x
+    return found
 
 
 def demand(a: float) -> None:
@@ -338,6 +359,15 @@ ORIGIN.product * a
 p.doubled + p.inner.both
 p.inner.gain ** p.inner.exponent
 inf if a > 0.0 else -inf
+p.SCALE * a - p.SCALE - Params.SCALE
+DEFAULT.gain * a + DEFAULT.both
+clipped(a, 0, 1) * b
+clipped(p.n, -2, 2) * b
+clipped(a, -b, 1.0 / c)
+v_of(p) + v_of(p, 2.0)
+(1 if a > 0.0 else -1) * b
+min(max(a, -1.0), 1.0) * (b > 0.0)
+(a > 0.0) - (a < 0.0) + b
 a if a < inf else 1e300 * 1e10
 1.0 if ON else 0.0
 5e-324 * a + 1.7976931348623157e308 * b
@@ -497,6 +527,67 @@ return x[0] * y + g.both
 return a  # the end
 b = 1.0
 ---
+for (x_0, y_0), (x_1, y_1) in zip(TABLE, TABLE[1:]):
+    if x_0 <= a < x_1:
+        return y_0 + (y_1 - y_0) * (a - x_0) / (x_1 - x_0)
+return TABLE[0][1] if a < TABLE[0][0] else TABLE[-1][1]
+---
+for i in range(len(TABLE) - 1):
+    if TABLE[i][0] <= a < TABLE[i + 1][0]:
+        return TABLE[i][1] * i
+return TABLE[p.n][1]
+---
+best = -inf
+where = 0
+for i, (x, y) in enumerate(TABLE):
+    value = x * a + y * b
+    if value > best:
+        best, where = value, i
+return best + where
+---
+x = 0.0
+for i in range(3):
+    for j in range(i):
+        for k in range(j, 5):
+            if k > 3:
+                break
+            x += a * i + j * b - k
+        else_ = x
+        x = else_ * 0.5
+return x
+---
+flag = p.flag
+for w in p.weights:
+    flag = flag or w > a
+    flag = flag and not w > b
+return 1.0 if flag else 2.0
+---
+a, b = b, a / b
+a, b, c = c, a, b
+(a, b), c = (c, a), b
+return a + 2.0 * b + 3.0 * c
+---
+def_ = Point(a, b)
+x, y, z = def_
+w = (x, y)
+(x, y), z = w, z + 1.0
+return x - y * z + w[0]
+---
+if a > 0.0:
+    if b > 0.0:
+        x = 1.0 / c
+    else:
+        raise ArithmeticError("b")
+else:
+    x = sqrt(b)
+return x
+---
+x = -0.0 if a > 0.0 else 0.0
+n = -0
+y = n * x
+m = p.n * 0
+return 1.0 / (m - 1) + x + y
+---
 x = (a, 1.0 / b)
 return sqrt(x[0]) if x[1] > 0.0 else (1.0 / c, x[0])[1]
 """
@@ -563,14 +654,14 @@ def test_a_construct_gives_the_bits_and_the_faults_of_python(
     blocks: tuple[CBlock, PythonBlock], which: int
 ) -> None:
     random = Random(which)
-    for _ in range(80):
+    for _ in range(50):
         small = [random.uniform(-4.0, 4.0) for _ in range(3)]
         reals = [random.choice([x, random.choice(EXTREME)]) for x in small]
         n, flag = random.randint(-20, 20), random.random() < 0.5
         _agree(blocks, which, reals, n, flag, random.choice([0, 2, 5, -1]))
 
 
-@slow
+@pytest.mark.slow
 @settings(
     max_examples=20_000, deadline=None, suppress_health_check=list(HealthCheck), database=None
 )

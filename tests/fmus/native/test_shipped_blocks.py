@@ -14,7 +14,6 @@ from fmus.native.c_block import CBlock, PythonBlock, compiler, library, same
 from grasp_fmus.block_build import _parsed, _run
 from grasp_fmus.native.translation import translated
 from grasp_fmus.shipped import SCRIPTS, slave_class
-from support.slow import slow
 
 SHIPPED = [script.stem for script in sorted(SCRIPTS.glob("*.py")) if "MuJoCo" not in script.stem]
 NAMES = [*SHIPPED, "SpringPlant"]
@@ -115,7 +114,7 @@ def test_c_gives_the_bits_and_the_faults_of_python(
     _many(CBlock(library(files, folder / name)), python, range(30))
 
 
-@slow
+@pytest.mark.slow
 @pytest.mark.parametrize("flag", ["-O0", "-O2", "-O3"])
 @pytest.mark.parametrize("cc", ["gcc", "clang"])
 @pytest.mark.parametrize("name", NAMES)
@@ -126,7 +125,7 @@ def test_any_compiler_gives_the_bits_of_python(
     _many(CBlock(library(files, folder / name, cc, flag)), python, range(1000, 1150))
 
 
-@slow
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_the_sanitizers_find_nothing(built: dict[str, Built], folder: Path, name: str) -> None:
     """With the library in a Python that has them preloaded."""
