@@ -12,7 +12,7 @@ from grasp_fmus.model_description import Description, model_description
 from grasp_fmus.native.description import build_description, native_description
 from grasp_fmus.shipped import SCRIPTS, slave_class
 from grasp_fmus.variable import Variable
-from lxml import etree
+from lxml import etree  # type: ignore[import-untyped]
 
 NAMES = (
     "GraspController", "GripperPlant", "GripperPlantCompliant", "GripperPlantMovable",
