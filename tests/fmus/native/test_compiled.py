@@ -151,6 +151,7 @@ def test_a_compiler_that_calculates_otherwise_makes_no_instance(
     assert lives or said[0].startswith(f"one, t = 0 s: {reason}")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="NO x86-64")
 def test_a_processor_that_drops_small_numbers_makes_no_instance(tmp_path: Path) -> None:
     """As a library that is linked with -ffast-math leaves it in the thread that loads it."""

@@ -5,6 +5,7 @@ import math
 import textwrap
 from collections.abc import Iterator, Sequence
 from random import Random
+from typing import Any
 
 import pytest
 from fmus.native.c_block import CBlock, PythonBlock, library, same
@@ -330,6 +331,7 @@ NUMBERED.get(p.n, 1.0 / a)
 1.0 if p.mode == Mode.FAST else 0.0
 1.0 if p.mode is Mode.FAST or p.mode is not Mode.BACK else 0.0
 1.0 if p.mode > Mode.OFF else 0.0
+1.0 if (not p.flag) == (a > b) else 0.0
 float(p.mode)
 p.mode * a + Mode.FAST
 float(Mode.FAST * 3 - p.mode)
@@ -499,6 +501,7 @@ return I + y1 + unix + near + far + div + gamma + register + fault + free + exp_
 Δx = b
 return θ * Δx
 ---
+nothing = clipped(a, b, c) + total(p.weights)
 unused = 1.0 / a
 _ = sqrt(b)
 _, kept = 1.0 / c, b
@@ -624,6 +627,19 @@ def blocks(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[CBlock, P
 EXTREME = [0.0, -0.0, 0.5, 1.0, -1.0, 2.0, -2.0, 3.0, -8.0, 5e-324, -5e-324, 1e-300, 1e300, -1e300]
 EXTREME += [710.0, -1e9, 2.0**53, 1e16, 1e22, math.inf, -math.inf, math.nan, 2.5, -2.5, 0.1]
 numbers = st.one_of(st.sampled_from(EXTREME), st.floats(), st.floats(-4.0, 4.0))
+
+
+@pytest.mark.parametrize("mode", range(-1, 6))
+def test_a_number_that_is_no_member_is_refused(
+    blocks: tuple[CBlock, PythonBlock], mode: int
+) -> None:
+    in_c, in_python = blocks
+    v = [float(mode) if x.name == "mode" else s for x, s in zip(*_named(in_python), strict=True)]
+    assert same(in_c.check(v), in_python.check(v))
+
+
+def _named(block: PythonBlock) -> tuple[list[Any], list[float]]:
+    return block.variables, block.starts
 
 
 def _agree(
