@@ -1,0 +1,160 @@
+"""The grasp on other compilers and machines: the bits of Python, or nearly so, and the same states.
+
+Where the libm is glibc's, every bit is that of Python here; elsewhere the loop stays within 1e-12.
+"""
+
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from grasp_fmus.native.targets import Target, here
+from support.c_host import BENCH, Grasp, Host, Rows, Script, bits, good, rows_in_python
+from support.hosts import Parts
+from support.platforms import ARM, WIN, X86, Platform, cases
+
+pytestmark = pytest.mark.slow
+
+H = 1e-3
+CLOSE = 1e-12
+"""How far the outputs of the loop may be from those in Python, where libm is another."""
+
+PartsOf = Callable[[int], Parts]
+PartsOn = Callable[[Platform, int], Parts]
+HostFor = Callable[[Target], Host]
+
+
+def run(host: Host, grasp: Grasp, folder: Path, steps: int, h: float) -> Rows:
+    (answers,) = host.run(grasp.whole(folder / "rows", steps, h), folder=folder)
+    good(answers)
+    return grasp.read(folder / "rows")
+
+
+LOOPS: list[tuple[str, dict[str, Any], int, float, float]] = [
+    ("GripperPlant", {}, 30_000, 1e-4, CLOSE),
+    ("GripperPlant", BENCH, 30_000, 1e-4, CLOSE),
+    ("GripperPlantCompliant", BENCH, 3000, 1e-4, CLOSE),
+    ("GripperPlantMovable", BENCH, 10_000, 1e-4, CLOSE),
+    ("GripperPlant", BENCH, 3000, H, 100.0 * CLOSE),
+    ("GripperPlantMovable", BENCH, 3000, H, 100.0 * CLOSE),
+]
+"""Plant, values, steps, their size, how close. At 1 ms the loop makes more of a difference."""
+
+
+@cache
+def in_python(loop: int) -> Rows:
+    plant, values, steps, h, _ = LOOPS[loop]
+    return rows_in_python(values, steps, h, plant)
+
+
+@pytest.mark.parametrize(("platform", "fmi"), [*cases(X86, [2]), *cases([*ARM, *WIN])])
+def test_the_loop_on_other_platforms(
+    platform: Platform, fmi: int, parts_on: PartsOn, host_for: HostFor, tmp_path: Path
+) -> None:
+    """Every plant, with and without electronics and friction."""
+    host, made = host_for(platform.target), parts_on(platform, fmi)
+    for loop, (plant, values, steps, h, close) in enumerate(LOOPS):
+        found = run(host, Grasp(made, values, plant), tmp_path, steps, h)
+        expected = in_python(loop)
+        assert found.shape == expected.shape
+        far = float(np.max(np.abs(found - expected)))
+        if platform.same_bits:
+            assert np.array_equal(found.view(np.uint64), expected.view(np.uint64)), far
+        else:
+            assert far <= close, (plant, h)
+
+
+@pytest.mark.parametrize(("platform", "fmi"), cases([*ARM, *WIN]))
+def test_a_state_goes_from_machine_to_machine_and_back(
+    platform: Platform,
+    fmi: int,
+    parts_of: PartsOf,
+    parts_on: PartsOn,
+    host_for: HostFor,
+    tmp_path: Path,
+) -> None:
+    """As bytes, here, there, here again; the first bytes that there are made are those of here."""
+    there = Grasp(parts_on(platform, fmi), BENCH)
+    ours = Grasp(parts_of(fmi), BENCH)
+    whole = run(host_for(here()), ours, tmp_path, 300, H)
+    first, states = leg(host_for(here()), ours, tmp_path, None, 0)
+    second, states = leg(host_for(platform.target), there, tmp_path, states, 100)
+    third, _ = leg(host_for(here()), ours, tmp_path, states, 200)
+    found = np.vstack([first[:-1], second[:-1], third])
+    if platform.same_bits:
+        assert np.array_equal(found.view(np.uint64), whole.view(np.uint64))
+    np.testing.assert_allclose(found, whole, rtol=0.0, atol=CLOSE)
+
+
+def leg(
+    host: Host, grasp: Grasp, folder: Path, states: list[str] | None, first: int
+) -> tuple[Rows, list[str]]:
+    """Go on for 100 steps from the states, or begin; what was recorded, and the states then."""
+    script = Script()
+    grasp.load(script)
+    grasp.make(script)
+    if states is None:
+        grasp.initialise(script)
+    for i, data in enumerate(states or []):
+        script.add("from", i, i, data).add("restore", i, i).add("bytes", i, i).add("forget", i, i)
+    grasp.record(script, folder / "leg")
+    script.add("loop", first, 100, bits(H))
+    grasp.all_of(script, "save")
+    grasp.all_of(script, "bytes")
+    grasp.all_of(script, "forget")
+    grasp.end(script)
+    (answers,) = host.run(script, folder=folder)
+    good(answers)
+    written = [answer.found[0] for answer in answers if answer.command == "bytes"]
+    assert written[: len(states or [])] == (states or [])
+    return grasp.read(folder / "leg"), written[len(states or []) :]
+
+
+@pytest.mark.parametrize(("platform", "fmi"), cases([*ARM, *WIN]))
+def test_texts_are_the_same_everywhere(
+    platform: Platform,
+    fmi: int,
+    parts_of: PartsOf,
+    parts_on: PartsOn,
+    host_for: HostFor,
+    tmp_path: Path,
+) -> None:
+    """Numbers in them included: no printf of the machine writes them."""
+    made, texts = parts_on(platform, fmi), []
+    for host, parts in ((host_for(here()), parts_of(fmi)), (host_for(platform.target), made)):
+        grasp = Grasp(parts)
+        script = Script()
+        grasp.load(script)
+        grasp.make(script)
+        grasp.initialise(script)
+        for value in (1e300, 5e-324, 0.1, 1 / 3, 123456789012345678.0, -1e22, 1e23, float("inf")):
+            for i in grasp.index.values():
+                script.add("step", i, bits(value), bits(H)).add("step", i, bits(0.0), bits(value))
+                script.add("set", i, "real", 0, bits(value)).add("get", i, "real", 0, 10**6)
+        script.add("locale", "German").add("step", 0, bits(0.25), bits(H))
+        (answers,) = host.run(script, folder=tmp_path)
+        texts.append([(a.status, a.said) for a in answers if a.command != "locale"])
+    assert texts[0] == texts[1]
+    assert len({text for _, said in texts[0] for _, _, _, text in said}) > 40
+
+
+@pytest.mark.parametrize(("platform", "fmi"), cases([*ARM, *WIN]))
+def test_load_run_free_unload_load_and_threads_there(
+    platform: Platform, fmi: int, parts_on: PartsOn, host_for: HostFor, tmp_path: Path
+) -> None:
+    grasp = Grasp(parts_on(platform, fmi), BENCH)
+    script = grasp.whole(tmp_path / "first", 100, H)
+    grasp.load(script)
+    grasp.make(script, callbacks="none", resources="file:///no/such/folder")
+    grasp.initialise(script)
+    script.add("rows", tmp_path / "second").add("row").add("loop", 0, 100, bits(H))
+    grasp.end(script)
+    grasp.unload(script)
+    other = grasp.whole(tmp_path / "third", 100, H)
+    for answers in host_for(platform.target).run(script, other, folder=tmp_path):
+        good(answers)
+    first, second, third = (grasp.read(tmp_path / n) for n in ("first", "second", "third"))
+    assert np.array_equal(first, second)
+    assert np.array_equal(first, third)

@@ -1,0 +1,189 @@
+"""The sources of native FMUs in the hands of those who compile them: real-time targets, old tools.
+
+Each file to compile is compiled alone, with nothing but its own folder, and linked with others.
+"""
+
+import re
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from grasp_fmus.native.compilers import LIBM
+from support.c_host import HEADERS, Unpacked, number, rows_in_python
+from support.hosts import Parts
+from support.platforms import MINGW
+
+LINKED = Path(__file__).with_name("linked.c")
+ROLES = {"PLANT": "GripperPlant", "SENSOR": "ProximitySensor", "CONTROLLER": "GraspController"}
+PLAIN = ["gcc", "-std=c99", "-O1", "-ffp-contract=off"]
+
+PartsOf = Callable[[int], Parts]
+
+pytestmark = pytest.mark.skipif(not shutil.which("gcc"), reason="NO gcc")
+
+
+def sources(fmu: Unpacked) -> Path:
+    return fmu.folder / "sources"
+
+
+def words(path: Path) -> str:
+    """C without its comments and texts."""
+    text = re.sub(r"/\*.*?\*/", " ", path.read_text("ascii"), flags=re.DOTALL)
+    return re.sub(r'"(?:\\.|[^"\\])*"', '""', text)
+
+
+@pytest.fixture
+def fmu(parts: Parts, name: str) -> Unpacked:
+    return parts[name].fmu
+
+
+every = pytest.mark.parametrize(
+    "name",
+    ["GraspController", "GripperPlant", "GripperPlantCompliant", "GripperPlantMovable",
+     "ProximitySensor"],
+)  # fmt: skip
+
+
+# Linked into one program
+
+
+def program(
+    parts: Parts, folder: Path, prefixes: dict[str, str], defined: dict[str, list[str]]
+) -> Path:
+    """All three and a host in one program; each compiled alone, first in folders of the others."""
+    objects = []
+    names = []
+    for role, name in ROLES.items():
+        fmu = parts[name].fmu
+        found = folder / f"{role}.o"
+        others = [f"-I{sources(parts[other].fmu)}" for other in ROLES.values() if other != name]
+        command = [*PLAIN, *others, *defined.get(role, []), "-c", sources(fmu) / f"{name}.c"]
+        subprocess.run([*command, "-o", found], cwd=folder, check=True)
+        objects.append(found)
+        names += [f"-D{role}={prefixes[role]}fmi2", f'-D{role}_TOKEN="{fmu.token}"']
+    host = [*PLAIN, "-Wall", "-Wextra", "-Werror", f"-I{HEADERS}", *names, LINKED, *objects, "-lm"]
+    subprocess.run([*host, "-o", folder / "linked"], check=True)
+    return folder / "linked"
+
+
+@pytest.mark.parametrize("given", [False, True], ids=["own prefixes", "prefixes given"])
+def test_three_fmus_in_one_program_are_the_grasp(
+    given: bool, parts_of: PartsOf, tmp_path: Path
+) -> None:
+    own = {role: f"{name}_" for role, name in ROLES.items()}
+    mine = {role: f"rt_{role.lower()}_" for role in ROLES}
+    defined = {role: [f"-DFMI2_FUNCTION_PREFIX={prefix}"] for role, prefix in mine.items()}
+    made = program(parts_of(2), tmp_path, mine if given else own, defined if given else {})
+    done = subprocess.run([made], capture_output=True, text=True, check=True)
+    found = np.array([[number(word) for word in line.split()] for line in done.stdout.splitlines()])
+    assert np.array_equal(found, rows_in_python({}, 500, 1e-3)[:, :2])
+
+
+@every
+def test_all_but_the_functions_of_fmi_is_static(fmu: Unpacked, tmp_path: Path) -> None:
+    """Nothing to clash, and nothing that can be written: no state of the process."""
+    done = tmp_path / "it.o"
+    subprocess.run([*PLAIN, "-c", sources(fmu) / f"{fmu.name}.c", "-o", done], check=True)
+    listed = subprocess.run(
+        ["nm", "--format=posix", done], capture_output=True, text=True, check=True
+    ).stdout
+    kinds: dict[str, set[str]] = {}
+    for line in listed.splitlines():
+        symbol, kind, *_ = line.split()
+        kinds.setdefault(kind, set()).add(symbol)
+    assert all(symbol.startswith(f"{fmu.name}_fmi{fmu.fmi}") for symbol in kinds["T"])
+    assert len(kinds["T"]) == {2: 44, 3: 75}[fmu.fmi]
+    assert not kinds.keys() & set("BbCGgSsVvWw")
+    # what is in the section for data holds addresses, and is constant but for the linker's work
+    assert kinds.get("D", set()) == set()
+    writable = subprocess.run(["objdump", "-h", done], capture_output=True, text=True, check=True)
+    sizes = re.findall(r"^ *\d+ (\.data|\.bss) +([0-9a-f]+)", writable.stdout, re.MULTILINE)
+    assert sizes
+    assert all(int(size, 16) == 0 for _, size in sizes)
+    memory = {"calloc", "free", "memcpy", "memset", "memcmp", "memmove"}
+    texts = {"strlen", "strcmp", "strcpy", "strcat", "strcspn", "strncmp"}
+    linker = {"_GLOBAL_OFFSET_TABLE_", "__stack_chk_fail"}
+    plain = {"floor", "ceil", "fabs", "sqrt", "copysign", "sincos"}  # gcc makes one of two
+    assert kinds["U"] <= {*LIBM, *memory, *texts, *linker, *plain}
+
+
+# What other tools find in the folder
+
+
+@every
+def test_one_file_to_compile_and_no_file_too_many(fmu: Unpacked) -> None:
+    """All others are included by it, and none from elsewhere, but of C itself."""
+    files = {path.name for path in sources(fmu).iterdir()} - {"buildDescription.xml"}
+    assert {name for name in files if not name.endswith(".h")} == {f"{fmu.name}.c"}
+    reached, left, of_c = set[str](), [f"{fmu.name}.c"], set[str]()
+    while left:
+        name = left.pop()
+        if name not in reached:
+            reached.add(name)
+            text = (sources(fmu) / name).read_text("ascii")
+            left += re.findall(r'^\s*#\s*include\s+"([^"]+)"', text, re.MULTILINE)
+            of_c |= {*re.findall(r"^\s*#\s*include\s+<([^>]+)>", text, re.MULTILINE)}
+    assert reached == files
+    assert of_c <= {
+        "float.h", "math.h", "stdbool.h", "stddef.h", "stdint.h", "stdlib.h", "string.h",
+    }  # fmt: skip
+
+
+@every
+def test_names_of_files_differ_in_more_than_their_case(fmu: Unpacked) -> None:
+    """For file systems of Windows and macOS; and none is a device there."""
+    names = [path.name.lower() for path in sources(fmu).iterdir()]
+    assert len(set(names)) == len(names)
+    assert not {name.partition(".")[0] for name in names} & {"con", "prn", "aux", "nul", "com1"}
+    assert all(re.fullmatch(r"[a-z0-9_]+\.(h|c|xml)", name) for name in names)
+
+
+@every
+def test_c_that_old_and_strict_compilers_take(fmu: Unpacked) -> None:
+    """No `for (int`, no //, no extension of GNU, no complex, no array of variable length."""
+    for path in sources(fmu).glob("*.[ch]"):
+        if path.name.startswith(("fmi2Func", "fmi2Types", "fmi3Func", "fmi3Platf")):
+            continue  # the standard's own
+        text = words(path)
+        found = re.findall(
+            r"for\s*\(\s*(?:int|size_t|double)\b|//|__typeof__|__attribute__|__builtin|"
+            r"\(\s*\{|\basm\b|\b_Complex\b|\balloca\b|\brestrict\b|\b__int128\b|0[bB][01]+\b",
+            text,
+        )
+        assert found == [], path.name
+        assert "\t" not in text
+        assert max(len(line) for line in path.read_text("ascii").splitlines()) <= 120, path.name
+
+
+STRICT = {
+    "gcc, as old ones": [
+        "gcc", "-std=c99", "-pedantic-errors", "-Wall", "-Wextra", "-Werror", "-Wvla",
+        "-Wshadow", "-Wundef",
+    ],
+    "gcc, newer C": ["gcc", "-std=c17", "-pedantic-errors", "-Wall", "-Wextra", "-Werror"],
+    "gcc, GNU's C": ["gcc", "-std=gnu99", "-Wall", "-Wextra", "-Werror"],
+    "clang, everything but style": [
+        "clang", "-std=c99", "-Weverything", "-Werror", "-Wno-unknown-warning-option",
+        "-Wno-padded", "-Wno-float-equal", "-Wno-declaration-after-statement",
+        "-Wno-disabled-macro-expansion", "-Wno-strict-prototypes", "-Wno-unsafe-buffer-usage",
+    ],
+    "mingw": [MINGW, "-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror"],
+    "aarch64": ["aarch64-linux-gnu-gcc", "-std=c99", "-Wall", "-Wextra", "-Werror"],
+    "gcc, 32 bit": ["gcc", "-m32", "-msse2", "-mfpmath=sse", "-std=c99", "-Wall", "-Werror"],
+}  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("options", STRICT.values(), ids=STRICT)
+@every
+def test_strict_compilers_say_nothing(fmu: Unpacked, options: list[str], tmp_path: Path) -> None:
+    if not shutil.which(options[0]):
+        pytest.skip(f"NO {options[0]}")
+    if "-m32" in options and not Path("/usr/include/gnu/stubs-32.h").exists():
+        pytest.skip("NO headers for 32 bit")
+    command = [*options, "-fsyntax-only", f"{fmu.name}.c"]
+    done = subprocess.run(command, cwd=sources(fmu), capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")

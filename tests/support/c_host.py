@@ -1,0 +1,338 @@
+"""Drives the host in C (fmus/native/hosts/host.c): scripts of commands, and the closed loop."""
+
+import os
+import struct
+import subprocess
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+from xml.etree import ElementTree
+from zipfile import ZipFile
+
+import fmpy
+import numpy as np
+import numpy.typing as npt
+from grasp_cosim.grasp.presets import SYSTEM
+from grasp_fmus.contract import build_params, declared, packer, unpacker, variables
+from grasp_fmus.shipped import blocks
+
+SOURCE = Path(__file__).parents[1] / "fmus" / "native" / "hosts" / "host.c"
+HEADERS = Path(fmpy.__file__).parent / "c-code"
+MISSING = 99
+"""The status of a command that the host could not even try."""
+
+Rows = npt.NDArray[np.float64]
+
+GRASP = tomllib.loads(SYSTEM.read_text("utf-8"))
+COMPONENTS = {name: Path(c["fmu"]).stem for name, c in GRASP["components"].items()}
+CONNECTIONS = [
+    (*source.split(".", 1), *target.split(".", 1))
+    for source, target in (text.split(" -> ") for text in GRASP["connections"])
+]
+"""Of the grasp: FMUs by component; source, output, target, input."""
+
+BENCH: dict[str, Any] = {
+    **GRASP["presets"]["bench"],
+    "sensor_1.pattern.enabled": True,
+    "sensor_2.surface": 4,
+    "plant.friction.coulomb[1]": 0.7,
+    "plant.friction.viscous[2]": 3.0,
+    "plant.initial_object_position": 0.02,
+}
+"""Values that have every function of a block run, and all of libm's that they call."""
+
+
+# FMUs
+
+
+@dataclass(frozen=True)
+class Unpacked:
+    """An FMU, unpacked; nothing of it is loaded."""
+
+    folder: Path
+    name: str
+    token: str
+    fmi: int
+    kinds: Mapping[str, str]
+    """real, boolean or integer, by the name of a variable; the references are their positions."""
+    causalities: Mapping[str, str]
+
+    def reference(self, name: str) -> int:
+        return list(self.kinds).index(name)
+
+    def outputs(self) -> list[str]:
+        return [name for name, causality in self.causalities.items() if causality == "output"]
+
+    def sources(self) -> dict[str, bytes]:
+        return {path.name: path.read_bytes() for path in (self.folder / "sources").iterdir()}
+
+    def binary(self, place: str = "") -> Path:
+        """The library of a folder in binaries/, by default that of this machine."""
+        place = place or ("linux64" if self.fmi == 2 else "x86_64-linux")
+        (found,) = (self.folder / "binaries" / place).iterdir()
+        return found
+
+
+KINDS = {
+    "Real": "real", "Boolean": "boolean", "Integer": "integer", "Enumeration": "integer",
+    "Float64": "real", "Int32": "integer",
+}  # fmt: skip
+
+
+def unpacked(path: Path, folder: Path) -> Unpacked:
+    """Unpack an FMU, and read what a host needs to know."""
+    with ZipFile(path) as archive:
+        archive.extractall(folder)
+    root = ElementTree.parse(folder / "modelDescription.xml").getroot()
+    fmi = int(root.attrib["fmiVersion"][0])
+    found = root.find("ModelVariables")
+    assert found is not None
+    rows = [(v, (v[0].tag if fmi == 2 else v.tag)) for v in found]
+    assert [int(v.attrib["valueReference"]) for v, _ in rows] == list(range(len(rows)))
+    return Unpacked(
+        folder,
+        root.attrib["modelName"],
+        root.attrib["guid" if fmi == 2 else "instantiationToken"],
+        fmi,
+        {v.attrib["name"]: KINDS[tag] for v, tag in rows},
+        {v.attrib["name"]: v.attrib["causality"] for v, _ in rows},
+    )
+
+
+# The host
+
+
+def bits(value: float) -> str:
+    """A number as the host reads it."""
+    return struct.pack(">d", value).hex()
+
+
+def number(word: str) -> float:
+    """A number that the host wrote."""
+    return float(struct.unpack(">d", bytes.fromhex(word))[0])
+
+
+class Answer(NamedTuple):
+    """What the host says of a command."""
+
+    command: str
+    status: int
+    found: list[str]
+    said: list[tuple[int, str, str, str]]
+    """What the FMU logged: status, category, instance, text."""
+
+
+@dataclass(frozen=True)
+class Host:
+    """The host, compiled for a platform; what runs it there."""
+
+    program: Path
+    wrapper: tuple[str, ...] = ()
+    environment: Mapping[str, str] = field(default_factory=dict)
+
+    def run(self, *scripts: "Script", folder: Path, **environment: str) -> list[list[Answer]]:
+        """Follow scripts in as many threads; the answers to each. The host must end well."""
+        words = []
+        for i, script in enumerate(scripts):
+            path = folder / f"script_{i}"
+            path.write_bytes("".join(f"{line}\n" for line in script.lines).encode(*RAW))
+            words += [str(path), str(folder / f"answers_{i}")]
+        done = subprocess.run(
+            [*self.wrapper, str(self.program), *words],
+            env={"PATH": os.environ["PATH"], "HOME": str(folder), **self.environment,
+                 **environment},
+            cwd=folder, capture_output=True, text=True, timeout=600,
+        )  # fmt: skip
+        assert done.returncode == 0, f"{done.returncode}: {done.stdout}{done.stderr}"
+        return [
+            list(_answers((folder / f"answers_{i}").read_bytes().decode(*RAW)))
+            for i in range(len(scripts))
+        ]
+
+
+RAW = ("utf-8", "surrogateescape")
+"""Names of instances need not be text."""
+
+
+def _answers(text: str) -> Iterator[Answer]:
+    said = []
+    for line in text.splitlines():
+        words = line.split("\t")
+        if words[0] == "log":
+            said.append((int(words[1]), words[2], words[3], words[4]))
+        elif len(words) > 1:
+            yield Answer(words[0], int(words[1]), words[2:], said)
+            said = []
+        else:
+            yield Answer(line, MISSING, [], said)  # what the loader says
+
+
+class Script:
+    """Commands for the host, in their order."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+
+    def add(self, *words: object) -> "Script":
+        self.lines.append("\t".join("-" if word is None else str(word) for word in words))
+        return self
+
+
+@dataclass(frozen=True)
+class Part:
+    """A component of the grasp: its FMU, and the library to load."""
+
+    fmu: Unpacked
+    library: Path
+
+
+class Grasp:
+    """Scripts of the closed loop, with parts by the names of their FMUs.
+
+    `plant` is the FMU of the plant; values are by COMPONENT.VARIABLE.
+    """
+
+    def __init__(
+        self,
+        parts: Mapping[str, Part],
+        values: Mapping[str, Any] | None = None,
+        plant: str = "GripperPlant",
+    ) -> None:
+        names = {**COMPONENTS, "plant": plant}
+        self.parts = {component: parts[name] for component, name in names.items()}
+        self.values = values or {}
+        self.index = {component: i for i, component in enumerate(self.parts)}
+
+    def load(self, script: Script) -> None:
+        for component, part in self.parts.items():
+            script.add("load", self.index[component], part.fmu.fmi, part.library)
+
+    def unload(self, script: Script) -> None:
+        for i in self.index.values():
+            script.add("unload", i)
+
+    def make(self, script: Script, callbacks: str = "full", resources: str | None = None) -> None:
+        """Make the instances, connect them, and say what is recorded."""
+        for component, part in self.parts.items():
+            i, fmu = self.index[component], part.fmu
+            script.add("new", i, i, callbacks, component, fmu.token, resources)
+        for source, output, target, name in CONNECTIONS:
+            from_, to = self.parts[source].fmu, self.parts[target].fmu
+            script.add(
+                "connect", self.index[target], to.reference(name), self.index[source],
+                from_.reference(output),
+            )  # fmt: skip
+
+    def initialise(self, script: Script) -> None:
+        for name, value in self.values.items():
+            component, _, variable = name.partition(".")
+            fmu = self.parts[component].fmu
+            place = (self.index[component], fmu.kinds[variable], fmu.reference(variable))
+            script.add("set", *place, bits(float(value)))
+        for i in self.index.values():
+            script.add("init", i, bits(0.0))
+        for component, i in self.index.items():
+            if component != "plant":  # which has its start values: the loop is closed by a step
+                script.add("feed", i)
+        for i in self.index.values():
+            script.add("leave", i)
+
+    def record(self, script: Script, rows: Path) -> None:
+        """Record from now on; first of all the outputs of now."""
+        for component, part in self.parts.items():
+            for name in part.fmu.outputs():
+                script.add(
+                    "record", self.index[component], part.fmu.kinds[name], part.fmu.reference(name)
+                )
+        script.add("rows", rows).add("row")
+
+    def end(self, script: Script) -> None:
+        for i in self.index.values():
+            script.add("terminate", i).add("free", i)
+
+    def all_of(self, script: Script, command: str, *words: object) -> None:
+        """A command for each instance, whose number is its first word, and a state's the second."""
+        for i in self.index.values():
+            script.add(command, i, i, *words)
+
+    def whole(self, rows: Path, steps: int, h: float) -> Script:
+        """A whole run, from load to unload."""
+        script = Script()
+        self.load(script)
+        self.make(script)
+        self.initialise(script)
+        self.record(script, rows)
+        script.add("loop", 0, steps, bits(h))
+        self.end(script)
+        self.unload(script)
+        return script
+
+    def read(self, rows: Path) -> Rows:
+        """What was recorded, one row for each communication point."""
+        columns = sum(len(part.fmu.outputs()) for part in self.parts.values())
+        return np.fromfile(rows).reshape(-1, columns)
+
+
+def good(answers: Iterable[Answer]) -> None:
+    """Every command was answered with OK, and nothing was logged."""
+    assert [answer for answer in answers if answer.status or answer.said] == []
+
+
+# The same loop, of the blocks
+
+
+class _Block:
+    def __init__(self, name: str, values: Mapping[str, Any]) -> None:
+        self.block = blocks()[name]
+        fields = declared(self.block)
+        self.names = {v.name: i for i, v in enumerate(variables(fields))}
+        self.values = [start for f in fields for start in f.starts]
+        for variable, value in values.items():
+            self.values[self.names[variable]] = value
+        self.params = build_params(self.block, fields, self.values)
+        self.pack, self.unpack = packer(self.block.Inputs, fields), unpacker(fields)
+        self.first_output = sum(len(f.names) for f in fields if f.causality == "input")
+        self.x: Any = None
+
+    def advance(self, h: float) -> None:
+        """A step of h seconds; without one, the initial state."""
+        u = self.pack(self.values)
+        if h:
+            self.x = self.block.step(self.params, self.x, u, h)
+        else:
+            self.x = self.block.initial_state(self.params, u)
+        self.outputs: Sequence[float] = self.unpack(self.block.outputs(self.params, self.x, u))
+        end = self.first_output + len(self.outputs)
+        self.values[self.first_output : end] = self.outputs
+
+
+def rows_in_python(
+    values: Mapping[str, Any], steps: int, h: float, plant: str = "GripperPlant"
+) -> Rows:
+    """The outputs that the blocks have at each communication point, in a plain loop in Python."""
+    own: dict[str, dict[str, Any]] = {component: {} for component in COMPONENTS}
+    for name, value in values.items():
+        component, _, variable = name.partition(".")
+        own[component][variable] = value
+    parts = {
+        component: _Block(name, own[component])
+        for component, name in {**COMPONENTS, "plant": plant}.items()
+    }
+    feeds = {
+        component: [
+            (parts[source], parts[source].names[output], parts[component].names[name])
+            for source, output, target, name in CONNECTIONS
+            if target == component
+        ]
+        for component in parts
+    }
+    rows = []
+    for k in range(steps + 1):
+        for component, part in parts.items():
+            for source, output, name in feeds[component] if k or component != "plant" else ():
+                part.values[name] = source.values[output]
+            part.advance(h if k else 0.0)
+        rows.append([value for part in parts.values() for value in part.outputs])
+    return np.array(rows, dtype=np.float64)

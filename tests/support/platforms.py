@@ -1,0 +1,129 @@
+"""Platforms and compilers that native FMUs are tried on: what compiles for them, what runs them."""
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from grasp_fmus.native.compilers import Compiler, Job, compile_all, compiler_for
+from grasp_fmus.native.targets import LINUX_ARM, LINUX_X86, WINDOWS, Target, here
+
+from .c_host import HEADERS, SOURCE, Host, Unpacked
+from .compilers import needs_zig
+
+ZIG = ("zig",)
+"""Stands for the compiler that build takes for a target."""
+
+ARM_LIBRARIES = Path("/usr/aarch64-linux-gnu")
+"""The libc that Debian has for aarch64, in libc6-dev-arm64-cross."""
+
+
+def _needs(*programs: str) -> pytest.MarkDecorator:
+    missing = [program for program in programs if not shutil.which(program)]
+    return pytest.mark.skipif(bool(missing), reason=f"NO {', '.join(missing)}")
+
+
+@dataclass(frozen=True)
+class Platform:
+    """A compiler, its options, and the machine it compiles for."""
+
+    name: str
+    compiler: tuple[str, ...]
+    target: Target = LINUX_X86
+    level: str = "-O2"
+    same_bits: bool = True
+    """Its libm is the one that Python uses."""
+    mark: Any = ()
+
+    def compiled(self, fmu: Unpacked, folder: Path) -> Path:
+        """The library of an FMU in a folder, made from its sources alone."""
+        library = folder / f"{fmu.name}{self.target.suffix}"
+        if self.compiler == ZIG:
+            job = Job(fmu.sources(), fmu.name, self.target, compiler_for(self.target, asked=True))
+            library.write_bytes(*compile_all([job]))
+            return library
+        line = Compiler(self.compiler, "").line(fmu.name, self.target)
+        command = [self.level if word == "-O2" else word for word in line]
+        done = subprocess.run(
+            [*command, "-o", str(library)],
+            cwd=fmu.folder / "sources", capture_output=True, text=True,
+        )  # fmt: skip
+        assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+        return library
+
+
+X86 = [
+    *(Platform(f"gcc {level}", ("gcc",), level=level, mark=_needs("gcc"))
+      for level in ("-O0", "-O1", "-O2", "-O3", "-Os")),
+    *(Platform(f"clang {level}", ("clang",), level=level, mark=_needs("clang"))
+      for level in ("-O0", "-O2", "-O3")),
+    Platform("gcc -march=native", ("gcc", "-march=native"), level="-O3", mark=_needs("gcc")),
+    Platform("clang -march=native", ("clang", "-march=native"), level="-O3", mark=_needs("clang")),
+    Platform("zig for glibc 2.17", ZIG, mark=needs_zig),
+]  # fmt: skip
+ARM = [
+    Platform("aarch64 gcc", ("aarch64-linux-gnu-gcc",), LINUX_ARM,
+             mark=_needs("qemu-aarch64", "aarch64-linux-gnu-gcc")),
+    Platform("aarch64 gcc -O3", ("aarch64-linux-gnu-gcc",), LINUX_ARM, level="-O3",
+             mark=_needs("qemu-aarch64", "aarch64-linux-gnu-gcc")),
+    Platform("aarch64 zig", ZIG, LINUX_ARM,
+             mark=[_needs("qemu-aarch64", "aarch64-linux-gnu-gcc"), needs_zig]),
+]  # fmt: skip
+MINGW = "x86_64-w64-mingw32-gcc"
+WIN = [
+    Platform("windows zig", ZIG, WINDOWS, same_bits=False, mark=[_needs("wine"), needs_zig]),
+    Platform("windows mingw", (MINGW,), WINDOWS, same_bits=False, mark=_needs("wine", MINGW)),
+]
+
+
+def cases(platforms: Sequence[Platform], versions: Sequence[int] = (2, 3)) -> list[Any]:
+    """Parameters of a test, each with its marks: a platform and a version of FMI."""
+    return [
+        pytest.param(p, fmi, id=f"{p.name}, FMI {fmi}", marks=p.mark)
+        for p in platforms
+        for fmi in versions
+    ]
+
+
+def host_of(target: Target, folder: Path, options: Sequence[str] = ()) -> Host:
+    """The host in C for a platform, compiled into a folder, and what runs it here."""
+    strict = ["-std=c99", "-O1", "-Wall", "-Wextra", "-Werror", f"-I{HEADERS}", *options]
+    program = folder / ("host.exe" if target == WINDOWS else "host")
+    rest = [str(SOURCE), "-o", str(program)]
+    if target == WINDOWS:
+        mingw = shutil.which(MINGW)
+        command = [mingw] if mingw else [*compiler_for(WINDOWS, asked=True).command]
+        subprocess.run([*command, *strict, *rest], check=True)
+        return Host(program, ("wine",), {"WINEPREFIX": str(_wine()), "WINEDEBUG": "-all"})
+    compiler = "gcc" if target == here() else "aarch64-linux-gnu-gcc"
+    posix = ["-D_POSIX_C_SOURCE=200809L", "-pthread", "-ldl"]
+    subprocess.run([compiler, *strict, *rest, *posix], check=True)
+    if target == here():
+        return Host(program)
+    return Host(program, ("qemu-aarch64", "-L", str(ARM_LIBRARIES)))
+
+
+def _wine() -> Path:
+    """A Windows of the tests, made once: it takes 20 s, and 700 MB beside this Python."""
+    folder = Path(sys.prefix, "wine_of_the_tests")
+    if not folder.exists():
+        with tempfile.TemporaryDirectory(dir=sys.prefix) as name:
+            part = Path(name, "wine")
+            run_in_wine(["wineboot", "--init"], part)
+            run_in_wine(["wineserver", "--wait"], part)
+            part.rename(folder)
+    return folder
+
+
+def run_in_wine(command: Sequence[str], prefix: Path) -> None:
+    """Run one of wine's own programs, which say much."""
+    more: Mapping[str, str] = {
+        "WINEPREFIX": str(prefix), "WINEDEBUG": "-all", "WINEDLLOVERRIDES": "mscoree,mshtml=",
+    }  # fmt: skip
+    subprocess.run(command, env={**os.environ, **more}, capture_output=True, timeout=300)
