@@ -5,8 +5,9 @@
 
 Runs the loop of four instances and ten connections at 10 kHz with the Jacobi scheme, everything
 recorded, on our Python FMUs, our native ones, and native ones of the same shape without work, in
-short chunks, one master after the other. Prints the tables of README.md. A master that is not installed is skipped by
-name; cofmupy pins an FMPy and a matplotlib of its own, so it may be in an environment of its own.
+chunks, one master after the other. Prints the tables of README.md. A master that is not installed
+is skipped by name; cofmupy pins an FMPy and a matplotlib of its own, so it may be in an environment
+of its own.
 """
 
 import argparse
@@ -44,7 +45,7 @@ REFERENCE = "grasp-cosim compiled"
 
 
 class Case(NamedTuple):
-    """What is measured: which FMUs, macro steps to a chunk, chunks of each master, one core only?"""
+    """What is measured: the FMUs, macro steps to a chunk, chunks of each master, one core only?"""
 
     title: str
     fmus: str
