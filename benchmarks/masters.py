@@ -79,9 +79,14 @@ def pythons(cofmupy_python: str | None) -> dict[str, str]:
     return found
 
 
-def measure(masters: dict[str, str], folder: Path, case: Case) -> dict[str, list[float]]:
-    """Us per macro step of all masters with the FMUs of a folder, chunk by chunk alternately."""
-    environment = {**os.environ, "TMPDIR": str(folder.parent)}
+def measure(
+    masters: dict[str, str], folder: Path, case: Case, scratch: Path
+) -> dict[str, list[float]]:
+    """Us per macro step of all masters with the FMUs of a folder, chunk by chunk alternately.
+
+    What the masters leave behind goes to `scratch`.
+    """
+    environment = {**os.environ, "TMPDIR": str(scratch)}
     core = [str(max(os.sched_getaffinity(0)))] if case.one_core else []
     with ExitStack() as stack:
         workers = {}
@@ -139,7 +144,8 @@ def main() -> None:
             if not any(folders[case.fmus].glob("*.fmu")):
                 print(f"{case.title}: skipped, build them with `grasp-cosim build --native`")
             elif given.only in (None, case.fmus):
-                report(case.title, measure(masters, folders[case.fmus].resolve(), case))
+                folder = folders[case.fmus].resolve()
+                report(case.title, measure(masters, folder, case, hollow.parent))
 
 
 if __name__ == "__main__":
