@@ -5,8 +5,9 @@
 
 Runs the loop of four instances and ten connections at 10 kHz with the Jacobi scheme, everything
 recorded, on our Python FMUs, our native ones, and native ones of the same shape without work, in
-short chunks, one master after the other. Prints the tables of README.md. A master that is not installed is skipped by
-name; cofmupy pins an FMPy and a matplotlib of its own, so it may be in an environment of its own.
+chunks, one master after the other. Prints the tables of README.md. A master that is not installed
+is skipped by name; cofmupy pins an FMPy and a matplotlib of its own, so it may be in an environment
+of its own.
 """
 
 import argparse
@@ -44,7 +45,7 @@ REFERENCE = "grasp-cosim compiled"
 
 
 class Case(NamedTuple):
-    """What is measured: which FMUs, macro steps to a chunk, chunks of each master, one core only?"""
+    """What is measured: the FMUs, macro steps to a chunk, chunks of each master, one core only?"""
 
     title: str
     fmus: str
@@ -78,9 +79,14 @@ def pythons(cofmupy_python: str | None) -> dict[str, str]:
     return found
 
 
-def measure(masters: dict[str, str], folder: Path, case: Case) -> dict[str, list[float]]:
-    """Us per macro step of all masters with the FMUs of a folder, chunk by chunk alternately."""
-    environment = {**os.environ, "TMPDIR": str(folder.parent)}
+def measure(
+    masters: dict[str, str], folder: Path, case: Case, scratch: Path
+) -> dict[str, list[float]]:
+    """Us per macro step of all masters with the FMUs of a folder, chunk by chunk alternately.
+
+    What the masters leave behind goes to `scratch`.
+    """
+    environment = {**os.environ, "TMPDIR": str(scratch)}
     core = [str(max(os.sched_getaffinity(0)))] if case.one_core else []
     with ExitStack() as stack:
         workers = {}
@@ -138,7 +144,8 @@ def main() -> None:
             if not any(folders[case.fmus].glob("*.fmu")):
                 print(f"{case.title}: skipped, build them with `grasp-cosim build --native`")
             elif given.only in (None, case.fmus):
-                report(case.title, measure(masters, folders[case.fmus].resolve(), case))
+                folder = folders[case.fmus].resolve()
+                report(case.title, measure(masters, folder, case, hollow.parent))
 
 
 if __name__ == "__main__":

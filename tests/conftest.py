@@ -51,15 +51,17 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+@pytest.hookimpl(tryfirst=True)  # before those that are slow are chosen, or left out
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """The slow ones first: in the end no process waits for another for long."""
-    items[:] = [item for item in items if _exists(item)]
+    for item in [*items]:
+        drawn: dict[str, Any] = getattr(getattr(item, "callspec", None), "params", {})
+        kind, name = drawn.get("kind", "python"), str(drawn.get("name"))
+        if not kinds.exists(name, kind):
+            items.remove(item)
+        elif kinds.is_slow(name, kind, "altered" in getattr(item, "fixturenames", ())):
+            item.add_marker("slow")
     items.sort(key=lambda item: item.get_closest_marker("slow") is None)
-
-
-def _exists(item: pytest.Item) -> bool:
-    drawn: dict[str, Any] = getattr(getattr(item, "callspec", None), "params", {})
-    return kinds.exists(str(drawn.get("name")), drawn.get("kind", "python"))
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:

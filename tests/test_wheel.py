@@ -40,11 +40,11 @@ def test_wheel_runs_in_an_empty_folder(tmp_path: Path) -> None:
     python("-m", "grasp_cosim", "report", "results", cwd=empty, path=site)
     assert (empty / "results/report.html").read_text("utf-8").endswith("</html>\n")
     if shutil.which("gcc"):
-        build = ("build", "--native", "GripperPlant", "--out", "native")
-        python("-m", "grasp_cosim", *build, cwd=empty, path=site)
+        native = ("build", "--native", "GripperPlant", "--out", "native")
+        python("-m", "grasp_cosim", *native, cwd=empty, path=site)
         assert (empty / "native/GripperPlant.fmu").is_file()
-        c = ("build", "--native", "--c-only", "c", "GraspController")
-        python("-m", "grasp_cosim", *c, cwd=empty, path=site)
+        alone = ("build", "--native", "--c-only", "c", "GraspController")
+        python("-m", "grasp_cosim", *alone, cwd=empty, path=site)
         assert (empty / "c/python_arithmetic.h").is_file()
     assert {p.name for p in site.iterdir() if p.is_dir() and "-" not in p.name} == {
         "bin", "block_variables", "grasp_cosim", "grasp_controller", "grasp_fmus", "gripper_plant",

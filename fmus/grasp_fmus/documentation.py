@@ -26,6 +26,8 @@ _BOUND = """Nothing where there is <code>$library</code>, to which this FMU is b
 along, and knows where its standard library is. On another machine build it there."""
 """The needs of a host on Linux, for an FMU bound to a libpython and for any other."""
 
+_NATIVE = "The native FMU of it, from <code>grasp-cosim build --native</code>, needs no Python."
+
 
 class Making(NamedTuple):
     """How an FMU was made: the command, and what to say of its steps and states, as HTML."""
@@ -71,6 +73,7 @@ def page(
             library=escape(str(library)), command=making.command
         ),
         packages=_packages(requires),
+        native="" if requires or making != BLOCK else _NATIVE,
         steps=making.steps,
         states=making.states,
     )
@@ -105,7 +108,7 @@ def _packages(requires: Sequence[str]) -> str:
     )
 
 
-def licences(files: Mapping[str, str] = _LICENCES) -> dict[str, bytes]:
+def licences(files: Mapping[str, str] | None = None) -> dict[str, bytes]:
     """Return the files of documentation/licenses, each from an installed distribution.
 
     FileNotFoundError if one is not installed, or has no licence.
@@ -113,7 +116,7 @@ def licences(files: Mapping[str, str] = _LICENCES) -> dict[str, bytes]:
     from importlib import metadata  # takes time to load
 
     found = {}
-    for file, distribution in files.items():
+    for file, distribution in (files or _LICENCES).items():
         try:
             text = metadata.distribution(distribution).read_text("licenses/LICENSE")
         except metadata.PackageNotFoundError:

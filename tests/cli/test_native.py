@@ -3,6 +3,7 @@
 import json
 import os
 import shutil
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from grasp_cosim.grasp.presets import SYSTEM
 from grasp_fmus.block_build import build_block
 from grasp_fmus.native import compilers, twins
 from grasp_fmus.native.build import build_native_block
+from grasp_fmus.native.targets import here
 from support.both_engines import needs_compiler
 from support.oscillator import write_oscillator
 
@@ -298,8 +300,8 @@ def test_a_block_of_ones_own(command: Run, tmp_path: Path) -> None:
     source.write_text(source.read_text("utf-8") + "\n# another\n", "utf-8")
     build_block(source, Path("fmus/build"))
     assert command("run", *swap, "--native")[2].startswith(
-        "ran native FMUs, but not as plant (fmus/native/SpringPlant.fmu is of another "
-        "SpringPlant.fmu); "
+        "ran native FMUs, but not as plant (fmus/native/SpringPlant.fmu is not the twin of this "
+        "SpringPlant.fmu, or not for this machine); "
     )
 
 
@@ -309,6 +311,33 @@ def test_a_twin_is_found_beside_the_folder_of_its_fmu(command: Run, tmp_path: Pa
     swap = f"plant={tmp_path / 'project/build/SpringPlant.fmu'}"
     assert command("run", "--swap", swap, *SHORT, "--native", "--out", "a")[::2] == (0, "")
     assert "native_twin_of" in ran("a")["plant"]
+
+
+@pytest.mark.parametrize("wrong", ["processor", "platform", "damaged"])
+def test_a_twin_that_does_not_run_here_is_left_alone(
+    command: Run, tmp_path: Path, wrong: str
+) -> None:
+    """One may have been built for another machine, with --target."""
+    build_block(SPRING, Path("fmus/build"))
+    twin = build_native_block(SPRING, tmp_path / "made").path
+    with zipfile.ZipFile(twin) as archive:
+        files = {name: archive.read(name) for name in archive.namelist()}
+    (binary,) = (name for name in files if name.startswith("binaries/"))
+    library = files.pop(binary)
+    if wrong == "processor":
+        files[binary] = library[:18] + bytes(255 - b for b in library[18:20]) + library[20:]
+    elif wrong == "platform":
+        files[binary.replace(here().folder, "elsewhere")] = library
+    Path("fmus/native").mkdir()
+    with zipfile.ZipFile("fmus/native/SpringPlant.fmu", "w") as archive:
+        for name, data in files.items():
+            archive.writestr(name, data)
+    if wrong == "damaged":
+        Path("fmus/native/SpringPlant.fmu").write_bytes(twin.read_bytes()[:-100])
+    swap = ("--swap", "plant=fmus/build/SpringPlant.fmu", *SHORT)
+    code, _, err = command("run", *swap, "--native")
+    assert code == 0
+    assert "but not as plant (fmus/native/SpringPlant.fmu is not the twin" in err
 
 
 def test_a_system_of_others_is_none_of_our_business(

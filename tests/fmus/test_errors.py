@@ -380,7 +380,7 @@ FROM_C = [
 
 @pytest.mark.parametrize("act", FROM_C)
 def test_exceptions_that_never_reach_the_slave(load: Load, act: Act) -> None:
-    """In a Python FMU they arise in pythonfmu, which would give up references that it still uses."""
+    """In a Python FMU they arise in pythonfmu, which would give up references that it uses."""
     with plant(load) as instance:
         instance.initialise()
         assert [act(instance) for _ in range(20)] == [ERROR] * 20

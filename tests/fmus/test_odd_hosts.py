@@ -104,9 +104,9 @@ def report(case: str, fmu: str, folder: str) -> dict[str, Any]:
     return {"lives": True, "said": said, "statuses": statuses}
 
 
-def hosted(case: str, fmus: Path, tmp_path: Path) -> dict[str, Any]:
+def hosted(case: str, folder: Path, tmp_path: Path) -> dict[str, Any]:
     done = subprocess.run(
-        [sys.executable, __file__, case, fmus / "GripperPlant.fmu", tmp_path],
+        [sys.executable, __file__, case, folder / "GripperPlant.fmu", tmp_path],
         env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])},
         capture_output=True, text=True, timeout=120,
     )  # fmt: skip
@@ -119,11 +119,22 @@ def hosted(case: str, fmus: Path, tmp_path: Path) -> dict[str, Any]:
 def test_an_instance_lives_where_the_meaning_is_clear(
     case: str, fmus: Path, tmp_path: Path
 ) -> None:
-    found = hosted(case, fmus, tmp_path)
+    lives(case, hosted(case, fmus, tmp_path))
+
+
+def lives(case: str, found: dict[str, Any]) -> None:
     assert found["lives"]
     assert found["statuses"] == [OK, OK, OK, OK, ERROR, ERROR, ERROR, OK]
     if case not in CALLBACKS:
         assert "step from 9.0 s: must be from 0.001 s" in found["said"][0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", [*LIVES, *NOT_FOUND, "no text"])
+def test_a_native_fmu_reads_nothing_and_lives_all_the_same(
+    case: str, natives: Path, tmp_path: Path
+) -> None:
+    lives(case, hosted(case, natives, tmp_path))
 
 
 @pytest.mark.parametrize("case", a_third(NOT_FOUND))

@@ -3,19 +3,18 @@
 import random
 import struct
 from hashlib import blake2b
-from math import sin
 
 import pytest
 from conftest import Load
 from hypothesis import given
 from hypothesis import strategies as st
+from support.driven import H, drive
 from support.examples import examples
 from support.fmi2 import ERROR, OK, Fmu, Instance
 from support.kinds import all_kinds
 
 pytestmark = all_kinds
 
-H = 1e-3
 NAMES = (
     "GripperPlant",
     "GripperPlantCompliant",
@@ -40,19 +39,6 @@ PARAMETERS = {
 def ready(fmu: Fmu) -> Instance:
     """An instance in step mode, with parameters that are not those it starts with."""
     return Instance(fmu).initialise(**PARAMETERS[fmu.name])
-
-
-def drive(instance: Instance, first: int, last: int) -> list[float]:
-    """Steps from first to last with inputs that change; returns all outputs."""
-    seen = []
-    for k in range(first, last):
-        inputs = instance.fmu.names("input")
-        scale = -2.0 if "force[1]" in inputs else 0.05
-        values = {n: scale * sin(0.1 * k + i) + 0.06 for i, n in enumerate(inputs)}
-        assert instance.set(values) == OK
-        assert instance.step(k * H, H) == OK
-        seen += instance.outputs()
-    return seen
 
 
 @pytest.mark.parametrize("name", NAMES)

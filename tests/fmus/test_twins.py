@@ -3,21 +3,21 @@
 Statuses, values, what is logged and the bytes of states; whatever is called, with whatever.
 """
 
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
 from conftest import LoadAs
-from grasp_fmus.shipped import blocks
 from hypothesis import HealthCheck, given
 from support.drawn_calls import SEQUENCES, Drawn
+from support.driven import drive
 from support.examples import examples
-from support.fmi2 import OK
-from support.kinds import Kind
+from support.fmi2 import OK, Instance
+from support.kinds import NAMES, Kind
 from support.twins import Twins
 
 pytestmark = pytest.mark.kinds("native", "native FMI 3")
-
-NAMES = [*blocks(), "SpringPlant"]
 
 
 @pytest.mark.hypothesis
@@ -41,3 +41,46 @@ def test_any_sequence_of_calls(load_as: LoadAs, kind: Kind, name: str) -> None:
             assert twins.call("Terminate") == OK
 
     run()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_run_that_is_saved_in_one_goes_on_in_the_other(
+    load_as: LoadAs, kind: Kind, name: str
+) -> None:
+    """To and fro; with the bytes alone, in an instance that has had another life."""
+    python, native = load_as(name, "python"), load_as(name, kind)
+    with Instance(python).initialise() as alone:
+        expected = drive(alone, 0, 400)
+    seen: list[float] = []
+    saved = b""
+    for k, fmu in enumerate((python, native, python, native)):
+        with Instance(fmu, "another").initialise() as instance:
+            if saved:
+                drive(instance, 0, 7)
+                status, state = instance.from_bytes(saved)
+                assert (status, instance.restore(state)) == (OK, OK)
+                state.free()
+            seen += drive(instance, 100 * k, 100 * (k + 1))
+            state = instance.state()
+            saved = state.to_bytes()
+            state.free()
+    assert seen == expected
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_instances_in_threads(load_as: LoadAs, kind: Kind, name: str) -> None:
+    """Native ones run at the same time, beside one in Python; each as alone."""
+
+    def life(fmu_kind: Kind) -> Callable[[], list[float]]:
+        def live() -> list[float]:
+            with Instance(load_as(name, fmu_kind)).initialise() as instance:
+                return drive(instance, 0, 300)
+
+        return live
+
+    lives = [life(k) for k in ("python", kind, kind, kind)]
+    expected = lives[0]()
+    assert lives[1]() == expected
+    with ThreadPoolExecutor(len(lives)) as pool:
+        together = [pool.submit(live) for live in lives]
+        assert all(one.result() == expected for one in together)

@@ -81,6 +81,7 @@ def test_what_ssp_has_no_form_for_comes_back(grasp: System, tmp_path: Path) -> N
         initialisation=Initialisation("refuse", 1e-8, 7),
         events=(
             Event({Port("sensor_1", "reflectance"): 0.5}, at_ns=1_000_000),
+            Event({Port("controller", "simultaneous_contact.enabled"): False}, at_ns=2_000_000),
             Event({Port("sensor_2", "reflectance"): 0.1}, when=Condition(gap, "<", 0.01)),
             Event({Port("sensor_2", "reflectance"): 1}, when=Condition(contact, "!=", False)),
         ),

@@ -83,8 +83,9 @@ class Drawn:
         """Any variable, in its own type."""
         names = list(self.instance.fmu.references)
         name = names[which % len(names)]
-        whole = self.instance.fmu.kinds[name] != "Real"
-        return self.instance.assign({name: min(max(value, -2e9), 2e9) if whole else value})
+        if self.instance.fmu.kinds[name] != "Real":
+            value = min(max(value, -2e9), 2e9) if value == value else 0.0
+        return self.instance.assign({name: value})
 
     def _get(self, references: list[int]) -> int:
         return self.instance.get_real(self._known(references))[0]

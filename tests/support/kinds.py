@@ -11,7 +11,7 @@ from grasp_fmus.block_build import build_block
 from grasp_fmus.fmu import build_fmu, shipped_model
 from grasp_fmus.native.build import Plan, build_native_block, build_native_model, planned
 from grasp_fmus.native.targets import Version
-from grasp_fmus.shipped import SCRIPTS
+from grasp_fmus.shipped import SCRIPTS, blocks
 
 from .packages import PACKAGES
 
@@ -27,9 +27,20 @@ OWN = {"SpringPlant": Path(__file__).parents[2] / "docs/spring_plant.py"}
 """Blocks that are a file of one's own, by the names of their FMUs."""
 
 
+NAMES = (*blocks(), *OWN)
+
+QUICK = "ProximitySensor"
+"""It has variables of every type, and sub-steps."""
+
+
 def exists(name: str, kind: Kind) -> bool:
     """Whether there is such an FMU: what needs a package stays Python only."""
     return kind == "python" or name not in PACKAGES
+
+
+def is_slow(name: str, kind: Kind, compiles: bool) -> bool:
+    """Whether the quick tests do without: native are one FMU, for FMI 2.0, and no altered ones."""
+    return kind != "python" and (kind != "native" or compiles or (name != QUICK and name in NAMES))
 
 
 def plan(kind: Kind) -> Plan:

@@ -7,9 +7,10 @@ from typing import Any
 
 from ..contract import Field, bound, declared, variables
 from . import names
+from .layout import wrapped
 from .program import Function, Key, Program
 from .python_source import UntranslatableError
-from .shapes import BOOLEAN, NUMBERS, REAL, WHOLE, Group, Record, Tuple, Type, fits, said
+from .shapes import BOOLEAN, NUMBERS, REAL, WHOLE, Group, Member, Record, Tuple, Type, fits, said
 from .statements import function
 
 KINDS = {float: "KIND_REAL", bool: "KIND_BOOLEAN", int: "KIND_INTEGER"}
@@ -91,7 +92,7 @@ def _error(program: Program, block: Any, name: str, reason: str) -> Untranslatab
     return UntranslatableError(f"{program.sources.block_file}: line {line}: {name}: {reason}")
 
 
-def _checks(program: Program, cls: type[Any], path: str) -> Iterator[tuple[Function, str]]:
+def _checks(program: Program, cls: type[Any], path: str) -> Iterator[str]:
     """The checks in the order in which the classes are made: what is inside comes before."""
     members = program.members(Group(cls))
     for f in fields(cls):
@@ -99,21 +100,35 @@ def _checks(program: Program, cls: type[Any], path: str) -> Iterator[tuple[Funct
         if isinstance(kind, Group):
             arrow = "->" if path == "p" else "."
             yield from _checks(program, kind.cls, f"{path}{arrow}{names.identifier(f.name)}")
+        if isinstance(kind, Member):
+            arrow = "->" if path == "p" else "."
+            yield _member_check(kind, f"{path}{arrow}{names.identifier(f.name)}")
     check = getattr(cls, "__post_init__", None)
     if isinstance(check, FunctionType) and check.__module__ != "block_variables":
         where = program.home(cls).error(1, "")
         made = function(program, check, [Group(cls)], where)
         if made.faults:
-            yield made, path
+            yield f"    {made.name}({path if path == 'p' else f'&{path}'}, fault);\n"
         else:
             program.needed.discard(made.key)
 
 
-def _check(checks: list[tuple[Function, str]]) -> str:
-    lines = [
-        f"    {made.name}({path if path == 'p' else f'&{path}'}, fault);\n" for made, path in checks
-    ] or ["    (void)p;\n    (void)fault;\n"]
-    return _function("static void block_check(const BlockParams *p, Fault *fault)", "".join(lines))
+def _member_check(t: Member, path: str) -> str:
+    """That a number in the range of an enumeration is one of its members; nothing without gaps."""
+    found = sorted(int(m) for m in t.enum)
+    if found == list(range(found[0], found[-1] + 1)):
+        return ""
+    is_none = " && ".join(f"{path} != {names.whole(m)}" for m in found)
+    said_ = names.string(f" is not a valid {t.enum.__qualname__}")
+    return (
+        "\n".join(wrapped(f'    if ({is_none} && py_raise(fault, FAULT_VALUE, "ValueError")) {{'))
+        + f"\n        py_say_whole(fault, {path});\n        py_say(fault, {said_});\n    }}\n"
+    )
+
+
+def _check(checks: list[str]) -> str:
+    text = "".join(checks) or "    (void)p;\n    (void)fault;\n"
+    return _function("static void block_check(const BlockParams *p, Fault *fault)", text)
 
 
 def _function(head: str, body: str) -> str:

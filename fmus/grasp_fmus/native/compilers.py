@@ -187,9 +187,8 @@ def compiler_for(target: Target, asked: bool) -> Compiler:
     if zig and target.zig:
         return zig._replace(command=(*zig.command, "-target", target.zig, "-s"))
     install = f"{sys.executable} -m pip install ziglang"
-    if target == here():
-        raise ValueError(f"no C compiler for {target.tuple}: none of CC, cc, gcc, clang; {install}")
-    raise ValueError(f"no C compiler for {target.tuple}: must be zig; {install}")
+    needed = "one of CC, cc, gcc, clang, zig" if target == here() and not asked else "zig"
+    raise ValueError(f"no C compiler for {target.tuple}: must be {needed}; {install}")
 
 
 def _own_compiler() -> Compiler | None:

@@ -18,12 +18,13 @@ from ..model_description import (
     unknowns,
 )
 from ..variable import Scalar, Variable
+from .compilers import BITS, LIBM
 
 TYPES: dict[type[Scalar], str] = {float: "Float64", bool: "Boolean", int: "Int32"}
 """What FMI 3.0 calls a kind of variable."""
 
-OPTIONS = "-O2 -ffp-contract=off"
-"""Of any compiler that calls them so; without the second the FMU makes no instance."""
+OPTIONS = " ".join((*BITS, *(f"-fno-builtin-{function}" for function in LIBM)))
+"""Of any compiler that calls them so; contracted, an FMU makes no instance."""
 
 
 def native_description(d: Description, guid: str, fmi: Literal[2, 3]) -> bytes:

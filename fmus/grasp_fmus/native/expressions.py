@@ -735,7 +735,7 @@ class Expressions:
         sign, level = COMPARISONS[type(op)]
         return self.operation(
             [a, b],
-            lambda x, y: f"{at(x, RELATION + 1)} {sign} {at(y, RELATION + 1)}",
+            lambda x, y: f"{_compared_text(x)} {sign} {_compared_text(y)}",
             level,
             BOOLEAN,
         )
@@ -1151,6 +1151,11 @@ def initialiser(v: Value) -> str:
 
 def _branch(v: Value) -> str:
     return argument(v) if v.level >= CONDITION else f"({v.text})"
+
+
+def _compared_text(v: Value) -> str:
+    """An operand of a comparison, in which compilers suspect a bare !x."""
+    return f"({v.text})" if v.text.startswith("!") else at(v, RELATION + 1)
 
 
 def _union(sets: Iterable[frozenset[str]]) -> frozenset[str]:

@@ -18,6 +18,8 @@ atan2 ldexp log log2 log10 log1p exp expm1 sin cos tan asin acos acosh atanh cos
 RESERVED = frozenset(_WORDS.split())
 """Keywords, macros, and the functions that python_arithmetic.h and the generated C call."""
 
+_BEGINNINGS = ("py_", "__", "PY_", "FAULT_", "TEXT_", "M_PI", "M_E", "M_LN", "M_LOG", "M_SQRT")
+
 _HEADERS = """
 py python_arithmetic number_text text fault block slave blake2b tuples fmi2 fmi3 fmi2_interface
 fmi3_interface main math string float limits errno signal time locale stdio stdlib stddef stdint
@@ -35,7 +37,7 @@ _LETTERS |= {"²": "^2", "³": "^3", "“": '"', "”": '"', "’": "'", "‘": 
 def identifier(name: str) -> str:
     """A Python name as one of C, not yet told from its neighbours."""
     plain = "".join(c if c.isascii() else _word(c) for c in name)
-    clashes = plain in RESERVED or plain.startswith(("py_", "__"))
+    clashes = plain in RESERVED or plain.startswith(_BEGINNINGS)
     return f"{plain}_" if clashes else plain
 
 

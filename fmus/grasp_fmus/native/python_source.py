@@ -139,7 +139,7 @@ class Sources:
             path = self._file if is_block and self._file else getattr(module, "__file__", None)
             if path is None or Path(path).suffix != ".py":
                 return None
-            text = Path(path).read_text("utf-8")
+            text = Path(path).read_text("utf-8-sig")
             source = Source(name, vars(module), Path(path), text)
             taken = [other.prefix.lower() for other in self._read.values()]
             if source.prefix.lower() in taken:

@@ -94,6 +94,9 @@ def _translated(
             if body.types == types and body.returned == returned:
                 break
             types, returned = body.types, body.returned
+        for needed in [k for k in program.needed if program.functions.get(k)]:
+            if not _uses(text, getattr(program.functions[needed], "name", "")):
+                program.needed.discard(needed)  # its value is not used, and it cannot fail
         made = Function(_name(program, source, of, key), body.returned, frozenset(body.faults), key)
         program.plain[made.name] = of.__name__.lstrip("_")
         program.define(key, source.name, body.whole(made, text), program.needed)
@@ -149,7 +152,7 @@ class Body(Expressions):
         self._cnames: dict[str, str] = {}
         for name in sorted(self._locals):
             plain = names.identifier(name)
-            if plain in program.sources.global_names or plain in self._cnames.values():
+            while plain in program.sources.global_names or plain in self._cnames.values():
                 plain += "_"
             self._cnames[name] = plain
         self._environment: dict[str, Value] = {}

@@ -5,7 +5,9 @@ latter. Those of the blocks that come with the package are built where they are 
 content, in the user's folder for what can be made again.
 """
 
+import sys
 import zipfile
+import zlib
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -16,18 +18,38 @@ from .build import build_native, chosen_names
 from .compilers import CompilerError, cache_folder
 from .targets import here
 
+UNREADABLE = (OSError, EOFError, ValueError, RuntimeError, zipfile.BadZipFile, zlib.error)
+"""What reading a damaged archive may raise."""
+
+HEAD = 20
+"""Bytes of a binary that say which processor it is for."""
+
 
 class NoTwinsError(Exception):
     """There are no native FMUs here, and none can be built: why, and what helps, in one line."""
 
 
 def is_twin(fmu: Path, content: str) -> bool:
-    """Return True if the file is a native FMU whose Python twin has this content hash."""
-    with suppress(OSError, ValueError, zipfile.BadZipFile), zipfile.ZipFile(fmu) as archive:
-        sources = [n for n in archive.namelist() if n.startswith("sources/") and n.endswith(".c")]
+    """Return True for a native FMU that runs here, and whose Python twin has this content hash."""
+    with suppress(*UNREADABLE), zipfile.ZipFile(fmu) as archive:
         said = f'#define CONTENT "{content}"'.encode()
-        return any(said in archive.read(name) for name in sources)
+        sources = [n for n in archive.namelist() if n.startswith("sources/") and n.endswith(".c")]
+        return any(said in archive.read(name) for name in sources) and _runs_here(archive)
     return False
+
+
+def _runs_here(archive: zipfile.ZipFile) -> bool:
+    """Return True if a binary is for this machine: linux64 may hold one for another processor."""
+    places = tuple(f"binaries/{name}/" for name in (here().folder, here().tuple))
+    binaries = [name for name in archive.namelist() if name.startswith(places)]
+    with Path(sys.executable).open("rb") as python:
+        ours = _processor(python.read(HEAD))
+    return any(_processor(archive.read(name)[:HEAD]) == ours for name in binaries)
+
+
+def _processor(head: bytes) -> bytes:
+    """Return the processor that an ELF file is for; of other files nothing."""
+    return head[18:20] if head.startswith(b"\x7fELF") else b""
 
 
 def is_shipped(name: str) -> bool:

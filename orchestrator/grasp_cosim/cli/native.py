@@ -108,4 +108,6 @@ def _file(component: Component) -> str:
 def _why(component: Component) -> str:
     there = [p for p in _users(component) if p.is_file()] if _is_ours(component) else []
     name = component.fmu.name
-    return f"{there[0]} is of another {name}" if there else f"{name} has no native twin"
+    if there:
+        return f"{there[0]} is not the twin of this {name}, or not for this machine"
+    return f"{name} has no native twin"

@@ -25,7 +25,7 @@ from fmpy.logging import addLoggerProxy
 from ..interface.interface import Value
 from ..scratch import ScratchFolder
 from .instance import STEP_2, TRANSFER_2, Call, Native
-from .loaded import KEPT, LoadedInstance, keep_message
+from .loaded import KEPT, LoadedInstance, keep_message, know_signatures
 
 _messages: defaultdict[str, deque[str]] = defaultdict(lambda: deque(maxlen=KEPT))
 """Messages that FMUs logged, by instance. FMPy's logger proxy is one per process, so is this."""
@@ -56,7 +56,7 @@ class FmuInstance(LoadedInstance):
 
     def _opened(self, folder: Path) -> FMU2Slave:
         """FMPy's slave with the library from the folder, not instantiated yet."""
-        return FMU2Slave(
+        return know_signatures(FMU2Slave)(
             guid=self.interface.guid,
             unzipDirectory=folder,
             modelIdentifier=self.interface.identifier,

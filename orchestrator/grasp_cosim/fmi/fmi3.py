@@ -17,7 +17,7 @@ from fmpy.fmi3 import FMU3Slave
 
 from ..interface.interface import Interface, Value
 from .instance import EARLY, STEP_3, TRANSFER_3, WARNING, Call, Native
-from .loaded import KEPT, LoadedInstance, keep_message
+from .loaded import KEPT, LoadedInstance, keep_message, know_signatures
 
 TERMINATE, SHORT = 1, 2
 """Places in the flags of a step, after that of an event."""
@@ -55,7 +55,7 @@ class Fmi3Instance(LoadedInstance):
         super().__init__(name, interface)
 
     def _instantiate(self, folder: Path) -> FMU3Slave:
-        slave = _Slave(
+        slave = know_signatures(_Slave)(
             guid=self.interface.guid,
             unzipDirectory=str(folder),
             modelIdentifier=self.interface.identifier,

@@ -309,7 +309,8 @@ def host(fmu: Unpacked) -> Verdict | None:
         return None
     fix = f"LD_PRELOAD={quote(path or LIBPYTHON)} HOST"
     if "grasp-cosim" in fmu.tool:
-        fix += ", or grasp-cosim build --bind-python"
+        fix += ", or grasp-cosim build --native, or, where that cannot be, "
+        fix += "grasp-cosim build --bind-python"
     text = "bound to no libpython: hosts that are not Python miss the symbol _Py_NoneStruct"
     return "warning", text, fix
 

@@ -316,7 +316,7 @@ class Simulate:
         step and stop in s and the scheme replace those of the system. progress shows a bar on
         standard error if that is a terminal. every keeps only each n-th communication point, and
         the last. listeners get what is kept while it is recorded. engine is "python", "compiled"
-        (needs numba) or "auto", compiled where that pays; the results have the same bits.
+        (needs a C compiler) or "auto", compiled where that pays; the results have the same bits.
         realtime paces the run by the clock: the result has a timing, and the same bits. metrics are
         worked out beside those that every result is asked for. diverging, "stop" or "continue",
         replaces that of the system. note gets the lines of the log but for system.notes: what is

@@ -11,9 +11,7 @@ from ctypes import c_char_p, c_int, c_void_p
 from pathlib import Path
 from typing import Literal
 
-import fmpy
 import pytest
-from fmpy.build import build_platform_binary
 from support.fmi2 import ERROR, OK, Fmu, Instance
 from support.hand_written import GUID, NAME, STRICT, compile_in, native_fmu, write_sources
 from support.native_fmus import needs_gcc
@@ -46,7 +44,7 @@ def exported(library: Path) -> set[str]:
 
 
 @pytest.mark.skipif(not shutil.which("nm"), reason="NO nm")
-@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("fmi", [2, slow(3)])
 @pytest.mark.parametrize(
     ("define", "prefix"),
     [
@@ -82,21 +80,6 @@ def test_two_fmus_in_one_program(tmp_path: Path) -> None:
     subprocess.run([*command, "-o", "both"], cwd=tmp_path, check=True)
     done = subprocess.run([tmp_path / "both"], capture_output=True, text=True, check=True)
     assert done.stdout == "0.5 1\n"
-
-
-@pytest.mark.skipif(not shutil.which("nm"), reason="NO nm")
-@pytest.mark.parametrize("fmi", [2, 3])
-def test_what_it_imports(fmi: Literal[2, 3], tmp_path: Path) -> None:
-    """Memory, copies and arithmetic: no file, time, process, environment, locale."""
-    write_sources(tmp_path / "c", fmi)
-    command = ["nm", "-D", "--undefined-only", str(compile_in(tmp_path / "c", fmi))]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    names = {line.split()[-1].partition("@")[0] for line in done.stdout.splitlines()}
-    names = {name for name in names if not name.startswith(("_", "__"))}
-    memory = {"calloc", "free", "memcpy", "memset", "memcmp", "strlen", "strcmp", "strcpy"}
-    texts = {"strcat", "strcspn", "memmove"}
-    arithmetic = {"floor", "ceil", "log10", "pow", "fabs"}
-    assert names <= memory | texts | arithmetic
 
 
 def instantiated(library: Path) -> tuple[bool, list[str]]:
@@ -168,6 +151,7 @@ def test_a_compiler_that_calculates_otherwise_makes_no_instance(
     assert lives or said[0].startswith(f"one, t = 0 s: {reason}")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="NO x86-64")
 def test_a_processor_that_drops_small_numbers_makes_no_instance(tmp_path: Path) -> None:
     """As a library that is linked with -ffast-math leaves it in the thread that loads it."""
@@ -238,16 +222,3 @@ def test_checkers_of_memory_find_nothing(cc: str, checker: str, tmp_path: Path) 
     done = subprocess.run([*prefix, tmp_path / "c" / "host"], capture_output=True)
     assert (done.returncode, done.stderr) == (0, b"")
     assert done.stdout.splitlines()[-1] == b"done"
-
-
-@pytest.mark.skipif(not shutil.which("cmake"), reason="NO cmake")
-@pytest.mark.slow
-@pytest.mark.parametrize("fmi", [2, 3])
-def test_fmpy_compiles_the_sources(fmi: Literal[2, 3], tmp_path: Path) -> None:
-    fmu = native_fmu(tmp_path, fmi)
-    folder = Path(fmpy.extract(fmu, tmp_path / "unpacked"))
-    shutil.rmtree(folder / "binaries")
-    (tmp_path / "build").mkdir()
-    build_platform_binary(folder, tmp_path / "build", configuration="Release", all_warnings=True)
-    result = fmpy.simulate_fmu(folder, stop_time=0.01, step_size=1e-3, start_values={"force": 1.0})
-    assert result["velocity"][-1] == pytest.approx(0.02, rel=1e-12)

@@ -4,8 +4,10 @@ Statuses, values, texts in the log, bytes of states. Where Python logs a traceba
 line; where pythonfmu itself refuses, it says nothing.
 """
 
+import struct
 from collections import Counter
 from ctypes import c_double, c_int, c_size_t, c_uint
+from hashlib import blake2b
 from math import inf, nan
 from pathlib import Path
 from random import Random
@@ -93,12 +95,12 @@ class Twin:
         self.time = self.saved_at
         return self.instance.restore(self.saved)
 
-    def _read(self, data: bytes) -> int:
+    def _read(self, data: bytes) -> tuple[int, bytes]:
         status, state = self.instance.from_bytes(data)
         if status == OK:
-            assert state.to_bytes()
+            data = state.to_bytes()
             state.free()
-        return status
+        return status, data
 
 
 def last_line(text: str) -> str:
@@ -272,22 +274,60 @@ def test_any_name_and_time(twins: tuple[Fmu, Fmu], name: str, start: float) -> N
     the_same(twins, [*acts, ("step", nan, 0.0), ("step", 1e-3, 1.0)], name)
 
 
+@pytest.mark.parametrize(("start", "off"), [(0.0, 1e-9), (-3.0, 1e-9), (1e6, 1e-6), (1e300, 1e288)])
+@pytest.mark.parametrize("factor", [1.5, 0.8, -0.8, -1.5])
+def test_how_far_the_clocks_may_be_apart(
+    twins: tuple[Fmu, Fmu], start: float, off: float, factor: float
+) -> None:
+    acts: list[Act] = [("setup", start), *READY[1:], ("step", 1e-3, start + factor * off)]
+    (status, _) = the_same(twins, acts)[-1]
+    assert status == (OK if abs(factor) < 1.0 else ERROR)
+
+
+@pytest.mark.parametrize("reference", range(5, 11))
+@pytest.mark.parametrize("ready", [1, 2])
+def test_each_parameter_that_is_set_late(
+    twins: tuple[Fmu, Fmu], reference: int, ready: int
+) -> None:
+    """After outputs were read, which may not keep what they came from."""
+    kind = {SEED: "Integer", FAULT: "Integer", NOISY: "Boolean"}.get(reference, "Real")
+    acts: list[Act] = [("set", "Real", [(0, 3.0)]), *READY[:ready], ("get", "Real", [2, 3])]
+    acts += [("set", kind, [(reference, 2)]), ("get", "Real", [2, 3]), *READY[ready:]]
+    the_same(twins, [*acts, ("step", 1e-3, 0.0), ("get", "Real", [2, 3]), ("save",)])
+
+
+WHOLE = (-0.5, -0.0, 2.7, -7.9, 1e300, -1e300, inf, nan, 0.5)
+
+
+@pytest.mark.parametrize("number", WHOLE)
+@pytest.mark.parametrize("place", [0, 1, 3, 7, 12, 13])
+def test_a_state_with_a_number_that_is_not_whole(
+    twins: tuple[Fmu, Fmu], place: int, number: float
+) -> None:
+    """The phase, the time, a Boolean, an Integer, and both of the block's state."""
+    ((good, _),) = the_same(twins, [*READY, ("step", 1e-3, 0.0), ("save",)])[-1:]
+    the_same(twins, [("read", altered(good, [(place, number)]))])
+
+
+def altered(state: bytes, changes: list[tuple[int, float]], signed: bool = True) -> bytes:
+    """A state with other numbers at places, with the right check sum if it is signed."""
+    data = bytearray(state)
+    for place, number in changes:
+        data[40 + 8 * place : 48 + 8 * place] = struct.pack("<d", number)
+    if signed:
+        data[24:40] = blake2b(bytes(data[8:24] + data[40:]), digest_size=16).digest()
+    return bytes(data)
+
+
 @given(st.lists(st.tuples(st.integers(0, 13), numbers), max_size=3), st.booleans(), st.data())
 @examples(200)
 def test_any_state(
     twins: tuple[Fmu, Fmu], changes: list[tuple[int, float]], signed: bool, data: st.DataObject
 ) -> None:
     """Bytes with any numbers in them, with the right check sum or not, and some cut off."""
-    import struct
-    from hashlib import blake2b
-
     ((good, _),) = the_same(twins, [*READY, ("step", 1e-3, 0.0), ("save",)])[-1:]
-    state = bytearray(good)
-    for place, number in changes:
-        state[40 + 8 * place : 48 + 8 * place] = struct.pack("<d", number)
-    if signed:
-        state[24:40] = blake2b(bytes(state[8:24] + state[40:]), digest_size=16).digest()
-    else:
+    state = bytearray(altered(good, changes, signed))
+    if not signed:
         at = data.draw(st.integers(0, len(state)))
         state[at : at + data.draw(st.integers(0, 9))] = data.draw(st.binary(max_size=9))
     the_same(twins, [("read", bytes(state))])

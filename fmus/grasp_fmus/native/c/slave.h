@@ -139,7 +139,6 @@ static void slave_begin_text(Slave *s)
 /* End a call with the text that was begun */
 static Status slave_refused(Slave *s)
 {
-    s->outputs_follow = 0;  /* they may not have been worked out */
     slave_log(s, SLAVE_ERROR);
     return SLAVE_ERROR;
 }
@@ -583,7 +582,6 @@ static Status slave_check_step(Slave *s, double time, double h)
 
 static void slave_begin_discard(Slave *s, double h)
 {
-    s->outputs_follow = 0;
     slave_begin_text(s);
     slave_put(s, "step of ");
     slave_put_number(s, h);
