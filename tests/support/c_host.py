@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_fmus.contract import build_params, declared, packer, unpacker, variables
+from grasp_fmus.native.targets import here
 from grasp_fmus.shipped import blocks
 
 SOURCE = Path(__file__).parents[1] / "fmus" / "native" / "hosts" / "host.c"
@@ -70,7 +71,7 @@ class Unpacked:
 
     def binary(self, place: str = "") -> Path:
         """The library of a folder in binaries/, by default that of this machine."""
-        place = place or ("linux64" if self.fmi == 2 else "x86_64-linux")
+        place = place or (here().folder if self.fmi == 2 else here().tuple)
         (found,) = (self.folder / "binaries" / place).iterdir()
         return found
 
