@@ -335,8 +335,8 @@ def rows_in_python(
     rows = []
     for k in range(steps + 1):
         for component, part in parts.items():
-            for source, output, name in feeds[component] if k or component != "plant" else ():
-                part.values[name] = source.values[output]
+            for source, from_, to in feeds[component] if k or component != "plant" else ():
+                part.values[to] = source.values[from_]
             part.advance(h if k else 0.0)
         rows.append([value for part in parts.values() for value in part.outputs])
     return np.array(rows, dtype=np.float64)

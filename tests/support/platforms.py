@@ -104,13 +104,18 @@ def host_of(target: Target, folder: Path, options: Sequence[str] = ()) -> Host:
         mingw = shutil.which(MINGW)
         command = [mingw] if mingw else [*compiler_for(WINDOWS, asked=True).command]
         subprocess.run([*command, *strict, *rest], check=True)
-        return Host(program, ("wine",), {"WINEPREFIX": str(_wine()), "WINEDEBUG": "-all"})
+        return Host(program, ("wine",), windows())
     compiler = "gcc" if target == here() else "aarch64-linux-gnu-gcc"
     posix = ["-D_POSIX_C_SOURCE=200809L", "-pthread", "-ldl"]
     subprocess.run([compiler, *strict, *rest, *posix], check=True)
     if target == here():
         return Host(program)
     return Host(program, ("qemu-aarch64", "-L", str(ARM_LIBRARIES)))
+
+
+def windows() -> dict[str, str]:
+    """The environment of a program that wine runs; with a small one, such a program starts none."""
+    return {**os.environ, "WINEPREFIX": str(_wine()), "WINEDEBUG": "-all"}
 
 
 def _wine() -> Path:
