@@ -2,8 +2,8 @@
 
     python -m benchmarks.blocks
 
-Each block runs through the inputs of its cross-check, 3 s of a grasp, at 8192 Hz: the sub-steps asked
-for, the step and the outputs, without the FMU around them. ns of CPU time, means over the run.
+Each block runs through the inputs of its cross-check, 3 s of a grasp, at 8192 Hz: the sub-steps
+asked for, the step and the outputs, without the FMU around them. ns of CPU time, means over a run.
 """
 
 import csv
@@ -57,7 +57,8 @@ def built(name: str, block: Any, folder: Path) -> Path:
         (folder / file).write_text(text)
     flags = [*BITS, *(f"-fno-builtin-{function}" for function in LIBM), "-w", "-I", str(folder)]
     program = folder / "block"
-    subprocess.run(["gcc", *flags, str(PROGRAM), "-o", str(program), "-lm"], check=True)
+    compiler = ["gcc", *flags]
+    subprocess.run([*compiler, str(PROGRAM), "-o", str(program), "-lm"], check=True)
     return program
 
 

@@ -213,6 +213,8 @@ def test_a_setting_is_checked_each_time(grasp: System) -> None:
         with pytest.raises(InputError, match=r"^set: sensor_1\.reflectance: reflectance = 'dark'"):
             session.set("sensor_1.reflectance", "dark")
         for _ in range(2):
-            with pytest.raises(InputError, match=r"^set: sensor_1\.gain: is a fixed parameter"):
-                session.set("sensor_1.gain", 1.0)
+            with pytest.raises(
+                InputError, match=r"^set: sensor_1\.sampling\.rate: is a fixed param"
+            ):
+                session.set("sensor_1.sampling.rate", 1e3)
         assert len(session.result().log) == 2

@@ -9,7 +9,7 @@ import numpy.typing as npt
 import pytest
 from grasp_cosim.interface.interface import Interface, Variable
 from grasp_cosim.interface.units import Unit
-from grasp_cosim.recording.divergence import DECADES, FAR, Divergence, Runaway
+from grasp_cosim.recording.divergence import DECADES, FAR, Divergence, Runaway, largest
 from grasp_cosim.recording.listener import Signal
 from grasp_cosim.system.parts import Connection, Port
 from hypothesis import given
@@ -54,7 +54,7 @@ def followed(
     divergence, rows = Divergence(system, outputs), np.column_stack(columns)
     for first in range(0, len(rows), block):
         piece = slice(first, first + block)
-        found = divergence(np.arange(len(rows))[piece], rows[piece])
+        found = divergence(np.arange(len(rows))[piece], rows[piece], largest(rows[piece]))
         if found is not None:
             return divergence, Runaway(first + found.row, found.text)
     return divergence, None

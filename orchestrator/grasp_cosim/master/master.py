@@ -27,7 +27,7 @@ from .plan import Planner, slots_of
 from .rejection import finish_step
 from .scenario import Scenario
 
-CHUNK = 1024
+CHUNK = 2048
 """The most steps between two times that rows are handed on."""
 
 ROOM = 1 << 15

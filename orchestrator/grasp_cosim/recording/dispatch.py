@@ -13,7 +13,7 @@ from ..system.checks import transforms
 from ..system.description import System
 from ..system.parts import Port
 from ..system.settings import settings
-from .divergence import Divergence
+from .divergence import Divergence, largest
 from .energy import ExchangeEnergy, bonds
 from .listener import Experiment, Leisurely, Listener, Signal, Texts
 
@@ -85,16 +85,18 @@ class Dispatcher:
         self, steps: npt.NDArray[np.int64], outputs: npt.NDArray[np.float64]
     ) -> tuple[int, str]:
         """The number of rows to keep, and what is wrong in the last of them, if anything is."""
-        finite = np.isfinite(outputs)
-        good = len(steps) if finite.all() else int(finite.all(axis=1).argmin())
-        runaway = self._divergence(steps[:good], outputs[:good])
+        good, sizes = len(steps), largest(outputs)
+        if not np.isfinite(sizes).all():
+            good = int(np.isfinite(outputs).all(axis=1).argmin())
+            sizes = largest(outputs[:good])
+        runaway = self._divergence(steps[:good], outputs[:good], sizes)
         if runaway and not self._goes_on:
             return runaway.row + 1, f'{runaway.text}; or let it go on: diverging = "continue"'
         if runaway:
             self.log.append(f"{runaway.text}; the run went on")
         if good == len(steps):
             return good, ""
-        i = int(finite[good].argmin())
+        i = int(np.isfinite(outputs[good]).argmin())
         name, value = self.signals[i].name, outputs[good, i]
         return good + 1, f"{name} = {value} at step {steps[good]}: must be finite"
 

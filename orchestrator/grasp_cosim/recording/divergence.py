@@ -40,6 +40,14 @@ FEW = 20.0
 """Steps a decade, below which the step itself is likely to be the reason."""
 
 
+def largest(rows: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """The largest magnitude in each column; not finite where one of its values is not."""
+    if not len(rows):
+        return np.zeros(rows.shape[1])
+    highest: npt.NDArray[np.float64] = np.maximum(rows.max(axis=0), -rows.min(axis=0))
+    return highest
+
+
 class Runaway(NamedTuple):
     """The row of a block in which a signal ran away, and what is said of it, one line."""
 
@@ -65,17 +73,20 @@ class Divergence:
         self._begun, self._over = False, False
 
     def __call__(
-        self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]
+        self,
+        steps: npt.NDArray[np.int64],
+        rows: npt.NDArray[np.float64],
+        sizes: npt.NDArray[np.float64],
     ) -> Runaway | None:
         """The first signal that runs away in a block of finite rows, (len(steps), len(outputs)).
 
-        None where there is none, and after the first. Blocks of any length come to the same.
+        sizes are largest(rows). None where there is none, and after the first. Blocks of any length
+        come to the same.
         """
         if self._over or not rows.size:
             return None
         if not self._begun:
             self._begun, self._scales = True, np.maximum(self._scales, np.abs(rows[0]))
-        sizes = np.maximum(rows.max(axis=0), -rows.min(axis=0))
         grown = np.flatnonzero((sizes >= self._limits) & (sizes > 0.0)).tolist()
         found = [(row, i) for i in grown if (row := self._follow(i, steps, rows[:, i])) is not None]
         if not found:

@@ -1,5 +1,7 @@
 """Keeps a run in memory, as NumPy columns."""
 
+import mmap
+import sys
 from collections.abc import Sequence
 from typing import Any
 
@@ -78,9 +80,20 @@ class MemoryListener:
     def _grow(self, rows: int) -> None:
         """Have room for so many rows; MemoryError where there is none."""
         try:
-            steps, table = np.empty(rows, np.int64), np.empty((len(self._signals), rows))
-        except ValueError as error:  # more bytes than an address can count
+            steps, table = np.empty(rows, np.int64), _table(len(self._signals), rows)
+        except (ValueError, OverflowError, OSError) as error:  # more bytes than there can be
             raise MemoryError from error
         steps[: self._rows] = self._steps[: self._rows]
         table[:, : self._rows] = self._table[:, : self._rows]
         self._steps, self._table = steps, table
+
+
+def _table(columns: int, rows: int) -> npt.NDArray[np.float64]:
+    """Return a table without a huge page, of which each column would make the system clear one,
+    every now and then, in the middle of a run.
+    """
+    if sys.platform == "win32" or not columns * rows:
+        return np.empty((columns, rows))
+    private = mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS
+    memory = mmap.mmap(-1, columns * rows * np.dtype(np.float64).itemsize, flags=private)
+    return np.frombuffer(memory, np.float64).reshape(columns, rows)
