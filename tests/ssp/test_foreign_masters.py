@@ -1,7 +1,7 @@
 """Our archive in the two C++ masters of PyPI: they load it and find the same contacts.
 
 Both step all components with the values of the last communication point, as our Jacobi scheme does.
-Each runs in a process of its own, where our FMUs find the Python they need.
+Each runs in a process of its own, where our Python FMUs find the Python they need.
 """
 
 import importlib.util
@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from grasp_cosim import System, simulate
+from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.ssp.write import write_ssp
 from support.cases import CASES
 
@@ -54,12 +55,14 @@ json.dump(rows, open(sys.argv[4], "w"))
 """
 
 
-@pytest.fixture(scope="module")
-def jacobi(grasp: System) -> System:
+@pytest.fixture(scope="module", params=["python", "native"])
+def jacobi(request: pytest.FixtureRequest) -> System:
     """A grasp that needs its values of all types and a transformation on a connection.
 
     Case 1, the object elsewhere, one side darker, the other sensor 1 mm behind its place.
     """
+    folder = request.getfixturevalue("fmus" if request.param == "python" else "natives")
+    grasp = System.load(SYSTEM, folder)
     connections = tuple(
         replace(connection, factor=1.0, offset=0.001)
         if connection.target.component == "sensor_2"

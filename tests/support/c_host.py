@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_fmus.contract import build_params, declared, packer, unpacker, variables
+from grasp_fmus.native.targets import here
 from grasp_fmus.shipped import blocks
 
 SOURCE = Path(__file__).parents[1] / "fmus" / "native" / "hosts" / "host.c"
@@ -70,7 +71,7 @@ class Unpacked:
 
     def binary(self, place: str = "") -> Path:
         """The library of a folder in binaries/, by default that of this machine."""
-        place = place or ("linux64" if self.fmi == 2 else "x86_64-linux")
+        place = place or (here().folder if self.fmi == 2 else here().tuple)
         (found,) = (self.folder / "binaries" / place).iterdir()
         return found
 
@@ -271,8 +272,11 @@ class Grasp:
 
     def read(self, rows: Path) -> Rows:
         """What was recorded, one row for each communication point."""
-        columns = sum(len(part.fmu.outputs()) for part in self.parts.values())
-        return np.fromfile(rows).reshape(-1, columns)
+        return np.fromfile(rows).reshape(-1, len(self.columns()))
+
+    def columns(self) -> list[str]:
+        """The outputs in a row, as COMPONENT.VARIABLE."""
+        return [f"{c}.{name}" for c, part in self.parts.items() for name in part.fmu.outputs()]
 
 
 def good(answers: Iterable[Answer]) -> None:
@@ -331,8 +335,8 @@ def rows_in_python(
     rows = []
     for k in range(steps + 1):
         for component, part in parts.items():
-            for source, output, name in feeds[component] if k or component != "plant" else ():
-                part.values[name] = source.values[output]
+            for source, from_, to in feeds[component] if k or component != "plant" else ():
+                part.values[to] = source.values[from_]
             part.advance(h if k else 0.0)
         rows.append([value for part in parts.values() for value in part.outputs])
     return np.array(rows, dtype=np.float64)

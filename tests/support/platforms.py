@@ -24,7 +24,7 @@ ARM_LIBRARIES = Path("/usr/aarch64-linux-gnu")
 """The libc that Debian has for aarch64, in libc6-dev-arm64-cross."""
 
 
-def _needs(*programs: str) -> pytest.MarkDecorator:
+def needs_programs(*programs: str) -> pytest.MarkDecorator:
     missing = [program for program in programs if not shutil.which(program)]
     return pytest.mark.skipif(bool(missing), reason=f"NO {', '.join(missing)}")
 
@@ -59,26 +59,30 @@ class Platform:
 
 
 X86 = [
-    *(Platform(f"gcc {level}", ("gcc",), level=level, mark=_needs("gcc"))
+    *(Platform(f"gcc {level}", ("gcc",), level=level, mark=needs_programs("gcc"))
       for level in ("-O0", "-O1", "-O2", "-O3", "-Os")),
-    *(Platform(f"clang {level}", ("clang",), level=level, mark=_needs("clang"))
+    *(Platform(f"clang {level}", ("clang",), level=level, mark=needs_programs("clang"))
       for level in ("-O0", "-O2", "-O3")),
-    Platform("gcc -march=native", ("gcc", "-march=native"), level="-O3", mark=_needs("gcc")),
-    Platform("clang -march=native", ("clang", "-march=native"), level="-O3", mark=_needs("clang")),
+    *(Platform(f"{cc} -march=native", (cc, "-march=native"), level="-O3", mark=needs_programs(cc))
+      for cc in ("gcc", "clang")),
     Platform("zig for glibc 2.17", ZIG, mark=needs_zig),
 ]  # fmt: skip
 ARM = [
     Platform("aarch64 gcc", ("aarch64-linux-gnu-gcc",), LINUX_ARM,
-             mark=_needs("qemu-aarch64", "aarch64-linux-gnu-gcc")),
+             mark=needs_programs("qemu-aarch64", "aarch64-linux-gnu-gcc")),
     Platform("aarch64 gcc -O3", ("aarch64-linux-gnu-gcc",), LINUX_ARM, level="-O3",
-             mark=_needs("qemu-aarch64", "aarch64-linux-gnu-gcc")),
+             mark=needs_programs("qemu-aarch64", "aarch64-linux-gnu-gcc")),
     Platform("aarch64 zig", ZIG, LINUX_ARM,
-             mark=[_needs("qemu-aarch64", "aarch64-linux-gnu-gcc"), needs_zig]),
+             mark=[needs_programs("qemu-aarch64", "aarch64-linux-gnu-gcc"), needs_zig]),
 ]  # fmt: skip
 MINGW = "x86_64-w64-mingw32-gcc"
 WIN = [
-    Platform("windows zig", ZIG, WINDOWS, same_bits=False, mark=[_needs("wine"), needs_zig]),
-    Platform("windows mingw", (MINGW,), WINDOWS, same_bits=False, mark=_needs("wine", MINGW)),
+    Platform(
+        "windows zig", ZIG, WINDOWS, same_bits=False, mark=[needs_programs("wine"), needs_zig]
+    ),
+    Platform(
+        "windows mingw", (MINGW,), WINDOWS, same_bits=False, mark=needs_programs("wine", MINGW)
+    ),
 ]
 
 
@@ -100,13 +104,18 @@ def host_of(target: Target, folder: Path, options: Sequence[str] = ()) -> Host:
         mingw = shutil.which(MINGW)
         command = [mingw] if mingw else [*compiler_for(WINDOWS, asked=True).command]
         subprocess.run([*command, *strict, *rest], check=True)
-        return Host(program, ("wine",), {"WINEPREFIX": str(_wine()), "WINEDEBUG": "-all"})
+        return Host(program, ("wine",), windows())
     compiler = "gcc" if target == here() else "aarch64-linux-gnu-gcc"
     posix = ["-D_POSIX_C_SOURCE=200809L", "-pthread", "-ldl"]
     subprocess.run([compiler, *strict, *rest, *posix], check=True)
     if target == here():
         return Host(program)
     return Host(program, ("qemu-aarch64", "-L", str(ARM_LIBRARIES)))
+
+
+def windows() -> dict[str, str]:
+    """The environment of a program that wine runs; with a small one, such a program starts none."""
+    return {**os.environ, "WINEPREFIX": str(_wine()), "WINEDEBUG": "-all"}
 
 
 def _wine() -> Path:

@@ -27,6 +27,10 @@ _MAIN = """\
 #define FMI{fmi}_FUNCTION_PREFIX {name}_
 #endif
 
+#if defined(_MSC_VER) && !defined(_CRT_SECURE_NO_WARNINGS)
+#define _CRT_SECURE_NO_WARNINGS /* strcpy and strcat are given room for what they write */
+#endif
+
 #define TOKEN "{guid}"
 #define CONTENT "{content}" /* of the FMU in Python with which states are exchanged */
 

@@ -207,7 +207,7 @@ def german(folder: Path) -> dict[str, str]:
     """An environment with a locale that has a decimal comma, made for the purpose."""
     if not shutil.which("localedef") or not Path("/usr/share/i18n/locales/de_DE").exists():
         pytest.skip("NO localedef, or no definition of de_DE: in the package locales")
-    command = ["localedef", "-i", "de_DE", "-f", "UTF-8", folder / "de_DE.UTF-8"]
+    command = ["localedef", "-i", "de_DE", "-f", "UTF-8", str(folder / "de_DE.UTF-8")]
     subprocess.run(command, check=True, capture_output=True)
     return {"LOCPATH": str(folder)}
 

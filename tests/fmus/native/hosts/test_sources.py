@@ -15,6 +15,7 @@ from grasp_fmus.native.compilers import LIBM
 from support.c_host import HEADERS, Unpacked, number, rows_in_python
 from support.hosts import Parts
 from support.platforms import MINGW
+from support.slow import slow
 
 LINKED = Path(__file__).with_name("linked.c")
 ROLES = {"PLANT": "GripperPlant", "SENSOR": "ProximitySensor", "CONTROLLER": "GraspController"}
@@ -60,16 +61,17 @@ def program(
         fmu = parts[name].fmu
         found = folder / f"{role}.o"
         others = [f"-I{sources(parts[other].fmu)}" for other in ROLES.values() if other != name]
-        command = [*PLAIN, *others, *defined.get(role, []), "-c", sources(fmu) / f"{name}.c"]
-        subprocess.run([*command, "-o", found], cwd=folder, check=True)
+        command = [*PLAIN, *others, *defined.get(role, []), "-c", str(sources(fmu) / f"{name}.c")]
+        subprocess.run([*command, "-o", str(found)], cwd=folder, check=True)
         objects.append(found)
         names += [f"-D{role}={prefixes[role]}fmi2", f'-D{role}_TOKEN="{fmu.token}"']
-    host = [*PLAIN, "-Wall", "-Wextra", "-Werror", f"-I{HEADERS}", *names, LINKED, *objects, "-lm"]
-    subprocess.run([*host, "-o", folder / "linked"], check=True)
+    files = [str(LINKED), *map(str, objects), "-lm", "-o", str(folder / "linked")]
+    strict = ["-Wall", "-Wextra", "-Werror", f"-I{HEADERS}"]
+    subprocess.run([*PLAIN, *strict, *names, *files], check=True)
     return folder / "linked"
 
 
-@pytest.mark.parametrize("given", [False, True], ids=["own prefixes", "prefixes given"])
+@pytest.mark.parametrize("given", [False, slow(True)])
 def test_three_fmus_in_one_program_are_the_grasp(
     given: bool, parts_of: PartsOf, tmp_path: Path
 ) -> None:
@@ -82,6 +84,7 @@ def test_three_fmus_in_one_program_are_the_grasp(
     assert np.array_equal(found, rows_in_python({}, 500, 1e-3)[:, :2])
 
 
+@pytest.mark.slow
 @every
 def test_all_but_the_functions_of_fmi_is_static(fmu: Unpacked, tmp_path: Path) -> None:
     """Nothing to clash, and nothing that can be written: no state of the process."""
