@@ -14,7 +14,8 @@ import subprocess
 import sys
 import tempfile
 from collections import deque
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from hashlib import sha256
 from pathlib import Path
 from typing import NamedTuple
@@ -97,7 +98,8 @@ def compile_binary(sources: Mapping[str, bytes], name: str, target: Target) -> b
 def compile_all(jobs: Sequence[Job]) -> list[bytes]:
     """Return the shared library of each job, made now, as many at once as there are processors.
 
-    What was made before comes from the user's folder. CompilerError where a compiler fails.
+    What was made before comes from the user's folder, if it is whole; what cannot be kept there is
+    made again the next time. CompilerError where a compiler fails.
     """
     keys = [job.key for job in jobs]
     kept = cache_folder()
@@ -107,12 +109,19 @@ def compile_all(jobs: Sequence[Job]) -> list[bytes]:
     for key, data in zip(missing, _compiled(missing.values()), strict=True):
         found[key] = data
         if folder:
-            write_file(folder / key, data)
+            with suppress(OSError):
+                write_file(folder / key, sha256(data).digest() + data)
     return [found[key] for key in keys]
 
 
 def _read(file: Path) -> bytes | None:
-    return file.read_bytes() if file.is_file() else None
+    """Return what is kept in a file, behind its check sum; None where there is none, or damaged."""
+    try:
+        content = file.read_bytes()
+    except OSError:
+        return None
+    check, data = content[: sha256().digest_size], content[sha256().digest_size :]
+    return data if check == sha256(data).digest() else None
 
 
 class _Running(NamedTuple):
@@ -125,7 +134,7 @@ def _compiled(jobs: Iterable[Job]) -> list[bytes]:
     """Return the libraries of jobs, in their order; however this ends, no compiler runs on."""
     most = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     waiting, running, done = deque(jobs), deque[_Running](), []
-    with tempfile.TemporaryDirectory(prefix="grasp_fmus_") as scratch:
+    with _scratch_folder() as scratch:
         try:
             while waiting or running:
                 while waiting and len(running) < most:
@@ -137,6 +146,31 @@ def _compiled(jobs: Iterable[Job]) -> list[bytes]:
             for started in running:
                 _end(started.process)
     return done
+
+
+@contextmanager
+def _scratch_folder() -> Iterator[str]:
+    """Make a temporary folder; what a kill leaves of it, the next command of grasp-cosim removes.
+
+    That knows it by its name, and by its lock whether its process still runs.
+    """
+    if sys.platform == "win32":
+        with tempfile.TemporaryDirectory(prefix="grasp_scratch_") as folder:
+            yield folder
+        return
+    import fcntl
+
+    made = Path(tempfile.mkdtemp(prefix="grasp_fmus_"))
+    folder = str(made.with_name(made.name.replace("fmus", "scratch", 1)))
+    lock = os.open(made, os.O_RDONLY)
+    try:
+        with suppress(OSError):  # a file system without locks
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        made.rename(folder)
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        os.close(lock)
 
 
 def _started(job: Job, folder: Path) -> _Running:
@@ -194,7 +228,10 @@ def compiler_for(target: Target, asked: bool) -> Compiler:
 def _own_compiler() -> Compiler | None:
     given = os.environ.get("CC")
     if given:
-        command = shlex.split(given)
+        try:
+            command = shlex.split(given)
+        except ValueError:
+            command = []
         if not command or not shutil.which(command[0]):
             raise ValueError(f"CC={given}: no such program; must be a C compiler, or unset")
         return _identified(command)
@@ -209,8 +246,8 @@ def _zig() -> Compiler | None:
     if not program:
         return None
     kept = cache_folder()
-    folder = str(kept / "zig") if kept else ""
-    names = ("ZIG_GLOBAL_CACHE_DIR", "ZIG_LOCAL_CACHE_DIR") if kept else ()
+    folder = str(kept / "zig") if kept and can_write(kept / "zig") else ""
+    names = ("ZIG_GLOBAL_CACHE_DIR", "ZIG_LOCAL_CACHE_DIR") if folder else ()
     return _identified([program, "cc"], dict.fromkeys(names, folder))
 
 
@@ -229,14 +266,23 @@ def _identified(command: Sequence[str], environment: Mapping[str, str] | None = 
 
 
 def cache_folder() -> Path | None:
-    """Return the folder of the user for what can be made again; None where there can be none."""
-    try:
-        base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-        folder = Path(base, "grasp-cosim")
+    """Return the folder of the user for what can be made again; None where there can be none.
+
+    A relative path, which would be another folder in each, does not count, as the standard has it.
+    """
+    with suppress(RuntimeError):  # nobody's home
+        base = Path(os.environ.get("XDG_CACHE_HOME", ""))
+        base = base if base.is_absolute() else Path.home() / ".cache"
+        return base / "grasp-cosim" if base.is_absolute() else None
+    return None
+
+
+def can_write(folder: Path) -> bool:
+    """Return True if the folder is there, or can be made, and written to."""
+    with suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True)
-    except (OSError, RuntimeError):
-        return None
-    return folder if os.access(folder, os.W_OK) else None
+        return os.access(folder, os.W_OK)
+    return False
 
 
 def universal(thin: Sequence[bytes]) -> bytes:
