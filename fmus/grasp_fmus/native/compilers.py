@@ -33,6 +33,9 @@ LIBM = (
 BITS = ("-std=c99", "-O2", "-ffp-contract=off")
 """What decides the bits, besides -fno-builtin-NAME for the functions in LIBM."""
 
+ZIG_CACHES = "ZIG_GLOBAL_CACHE_DIR", "ZIG_LOCAL_CACHE_DIR"
+"""Where zig keeps its libraries, and what it has compiled."""
+
 UNPREFIXED = tuple(f"FMI{fmi}_OVERRIDE_FUNCTION_PREFIX" for fmi in (2, 3))
 """What is defined for a shared library, in which functions are called as the standard does."""
 
@@ -176,7 +179,8 @@ def _scratch_folder() -> Iterator[str]:
 def _started(job: Job, folder: Path) -> _Running:
     for file, data in job.sources.items():
         (folder / file).write_bytes(data)
-    environment = {**os.environ, "TMPDIR": str(folder), "LC_ALL": "C", **job.compiler.environment}
+    own = dict.fromkeys(("TMPDIR", *ZIG_CACHES), str(folder))
+    environment = {**os.environ, **own, "LC_ALL": "C", **job.compiler.environment}
     with (folder / "said").open("wb") as said:
         process = subprocess.Popen(  # noqa: S603 - the user's compiler
             job.line, cwd=folder, stdin=subprocess.DEVNULL, stdout=said, stderr=said,
@@ -247,8 +251,7 @@ def _zig() -> Compiler | None:
         return None
     kept = cache_folder()
     folder = str(kept / "zig") if kept and can_write(kept / "zig") else ""
-    names = ("ZIG_GLOBAL_CACHE_DIR", "ZIG_LOCAL_CACHE_DIR") if folder else ()
-    return _identified([program, "cc"], dict.fromkeys(names, folder))
+    return _identified([program, "cc"], dict.fromkeys(ZIG_CACHES if folder else (), folder))
 
 
 def _identified(command: Sequence[str], environment: Mapping[str, str] | None = None) -> Compiler:

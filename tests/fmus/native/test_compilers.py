@@ -96,6 +96,19 @@ def test_works_where_nothing_can_be_kept(place: str, monkeypatch: pytest.MonkeyP
     assert compile_binary(SOURCES, "Sum", here())[:4] == b"\x7fELF"
 
 
+@needs_zig
+@pytest.mark.slow
+def test_zig_needs_no_folder_to_keep_its_libraries_in(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Its own default is below the same folder, and it stops where that cannot be written to."""
+    monkeypatch.setenv("XDG_CACHE_HOME", "/dev/null")
+    monkeypatch.chdir(tmp_path)
+    library = compile_all([Job(SOURCES, "Sum", here(), compiler_for(here(), asked=True))])[0]
+    assert library[:4] == b"\x7fELF"
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_relative_folder_does_not_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """It would be another one in each folder, and lost in that where a compiler runs."""
     monkeypatch.setenv("XDG_CACHE_HOME", "here")
