@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 DESCRIPTION = "modelDescription.xml"
 
-_CONTENT_HASH = re.compile(rb"_[0-9a-f]{16}(?![0-9a-f])|guid=.[0-9a-f]{16}")
+_CONTENT_HASH = re.compile(rb"_[0-9a-f]{16}(?![0-9a-f])|(?:guid|instantiationToken)=.[0-9a-f]{16}")
 
 
 def read_members(fmu: bytes) -> dict[str, bytes]:
@@ -63,7 +63,8 @@ def _attributes(description: bytes) -> dict[str, dict[str, str]]:
             **variable.attrib,
             **{k: v for t in variable for k, v in t.items()},
         }
-        for variable in root.iter("ScalarVariable")
+        for variables in root.iter("ModelVariables")
+        for variable in variables
     }
 
 

@@ -1,5 +1,6 @@
 """--native and --python: which FMUs a command runs, what it says of them, and the same bytes."""
 
+import errno
 import json
 import os
 import shutil
@@ -16,6 +17,7 @@ from grasp_cosim.grasp.presets import SYSTEM
 from grasp_fmus.block_build import build_block
 from grasp_fmus.native import compilers, twins
 from grasp_fmus.native.build import build_native_block
+from grasp_fmus.native.compilers import CompilerError
 from grasp_fmus.native.targets import here
 from support.both_engines import needs_compiler
 from support.oscillator import write_oscillator
@@ -23,6 +25,7 @@ from support.oscillator import write_oscillator
 pytestmark = needs_compiler
 
 SAID = "ran native FMUs; --python runs those in Python, with the same bits\n"
+ANNOUNCED = "compiling the native FMUs, which takes some seconds, once for these sources\n"
 SPRING = Path(__file__).parents[2] / "docs/spring_plant.py"
 SHORT = ("--step", "1e-3", "--stop", "0.3")
 STUDY = """case = 0
@@ -245,6 +248,48 @@ def test_where_nothing_can_be_kept_it_is_said(
     assert err.startswith("grasp-cosim: --native: no folder to keep native FMUs in; ")
 
 
+@pytest.mark.usefixtures("no_compiler")
+def test_a_full_disk_is_one_line_that_names_the_file(
+    command: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: Any, **__: Any) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "/home/of/GripperPlant.fmu")
+
+    monkeypatch.setattr(twins, "planned", lambda: None)
+    monkeypatch.setattr(twins, "build_native", full)
+    code, _, err = command("run", *SHORT, "--native")
+    assert (code, err) == (
+        2,
+        "grasp-cosim: --native: /home/of/GripperPlant.fmu: No space left on device; must have a "
+        "home, or XDG_CACHE_HOME, that can be written to\n",
+    )
+
+
+def test_what_is_kept_runs_where_nothing_can_be_written(
+    command: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    twins.shipped_twins()
+    twins.shipped_twins.cache_clear()
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    assert command("run", *SHORT, "--native")[::2] == (0, "")
+
+
+def test_the_first_compilation_is_announced_on_a_terminal(
+    command: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def slow(*_: Any, **__: Any) -> None:
+        raise CompilerError("out of patience")
+
+    monkeypatch.setenv("XDG_CACHE_HOME", str(Path("empty").absolute()))
+    monkeypatch.setattr(twins, "build_native", slow)
+    why = "grasp-cosim: --native: out of patience\n"
+    for terminal, line in ((False, ""), (True, ANNOUNCED)):
+        twins.shipped_twins.cache_clear()
+        monkeypatch.setattr("grasp_cosim.cli.frame.shows_progress", lambda: terminal)  # noqa: B023
+        assert command("run", *SHORT, "--native")[2] == line + why
+    twins.shipped_twins.cache_clear()
+
+
 # ------------------------------------------------------------------ whose FMUs, and where
 
 
@@ -283,6 +328,18 @@ def test_one_of_other_sources_stays_as_it_is(command: Run, altered: Altered) -> 
     )
     assert "native_twin_of" not in ran("a")["plant"]
     assert "native_twin_of" in ran("a")["sensor_1"]
+
+
+def test_one_that_is_native_already_is_no_exception(command: Run, tmp_path: Path) -> None:
+    twin = build_native_block(SPRING, tmp_path).path
+    assert command("run", "--swap", f"plant={twin}", *SHORT, "--native")[::2] == (0, "")
+    system = tmp_path / "native.toml"
+    text, kept = SYSTEM.read_text("utf-8"), twins.shipped_twins()
+    system.write_text(text.replace('fmu = "', f'fmu = "{kept}/'), "utf-8")
+    for option in ("--native", "--python"):
+        assert command("run", system, *SHORT, option)[::2] == (0, "")
+    qualified = command("qualify", twin, "--as", "plant", *SHORT, "--isolation", "none")
+    assert qualified[2] == SAID
 
 
 def test_a_block_of_ones_own(command: Run, tmp_path: Path) -> None:
@@ -349,10 +406,7 @@ def test_a_system_of_others_is_none_of_our_business(
     assert capsys.readouterr().err == ""
     with natively(system, True) as chosen:
         assert chosen == system
-    assert capsys.readouterr().err == (
-        "ran no native FMU: a (integrator.fmu has no native twin), b (integrator.fmu has no native "
-        "twin)\n"
-    )
+    assert capsys.readouterr().err == ""  # they need no Python anyway
 
 
 def test_nothing_is_said_of_a_run_that_failed(

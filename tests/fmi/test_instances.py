@@ -2,10 +2,12 @@
 
 import ctypes
 import math
+import re
 import tempfile
 import zipfile
 from pathlib import Path
 
+import fmpy
 import numpy as np
 import pytest
 from fmi.instances import KINDS, SAMPLES, Bound, real, running, variable
@@ -218,6 +220,24 @@ def test_the_native_call_is_the_python_call(tmp_path: Path, version: str) -> Non
             fetch.instance, fetch.references, 1, fetch.data, *tail
         ) == OK  # fmt: skip
     assert got.tolist() == [1.5]
+
+
+@both
+def test_without_a_binary_for_this_machine(
+    tmp_path: Path, version: str, isolation: Isolation
+) -> None:
+    whole, other = build(tmp_path, version=version), tmp_path / "other.fmu"
+    with zipfile.ZipFile(whole) as archive, zipfile.ZipFile(other, "w") as elsewhere:
+        for name in archive.namelist():
+            moved = re.sub("^binaries/[^/]+", "binaries/win64", name)
+            elsewhere.writestr(moved, archive.read(name))
+    ours = fmpy.platform_tuple if version == "3.0" else fmpy.platform
+    with pytest.raises(InputError) as error:
+        load(Component("part", other, {}, isolation=isolation))
+    assert str(error.value) == (
+        f"part: {other} does not load: no binary for {ours}; there is: win64; "
+        "`grasp-cosim doctor` says what helps"
+    )
 
 
 @both

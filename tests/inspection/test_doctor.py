@@ -348,7 +348,7 @@ def test_a_native_fmu_of_either_version_is_tried(version: str, tmp_path: Path) -
 
 def test_no_binary_but_sources(opened: Opened) -> None:
     fmu = opened({LINUX64: None, "sources/all.c": b""})
-    assert doctor.binary(fmu)[2] == "fmpy compile FMU"
+    assert doctor.binary(fmu)[2] == "LDFLAGS=-Wl,--no-as-needed,-lm fmpy compile FMU"
 
 
 @pytest.mark.parametrize(

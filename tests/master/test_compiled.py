@@ -105,6 +105,13 @@ def test_where_the_user_has_no_home(monkeypatch: pytest.MonkeyPatch) -> None:
     assert counts() == 3
 
 
+def test_a_relative_place_does_not_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It would be another one in each folder, and what a stranger left there would be loaded."""
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("XDG_CACHE_HOME", "here")
+    assert compiled._place().is_relative_to(tmp_path / ".cache")
+
+
 def test_processes_that_build_it_at_once_all_run(cache: Path) -> None:
     code = (
         "from grasp_cosim.master import compiled; import sys; sys.stdin.read(1)\n"
@@ -145,8 +152,9 @@ def test_a_compiler_that_fails_is_one_line_and_auto_goes_on(
 def test_the_compiler_that_is_named_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CC", "env LANG=C cc")
     assert compiled.compiler() == ["env", "LANG=C", "cc"]
-    monkeypatch.setenv("CC", "no-such-compiler")
-    assert compiled.compiler() in (["cc"], ["gcc"], ["clang"])
+    for none in ("no-such-compiler", "cc 'half a quote"):
+        monkeypatch.setenv("CC", none)
+        assert compiled.compiler() in (["cc"], ["gcc"], ["clang"])
 
 
 def test_it_compiles_without_warnings(tmp_path: Path) -> None:

@@ -14,7 +14,8 @@ import subprocess
 import sys
 import tempfile
 from collections import deque
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from hashlib import sha256
 from pathlib import Path
 from typing import NamedTuple
@@ -31,6 +32,9 @@ LIBM = (
 
 BITS = ("-std=c99", "-O2", "-ffp-contract=off")
 """What decides the bits, besides -fno-builtin-NAME for the functions in LIBM."""
+
+ZIG_CACHES = "ZIG_GLOBAL_CACHE_DIR", "ZIG_LOCAL_CACHE_DIR"
+"""Where zig keeps its libraries, and what it has compiled."""
 
 UNPREFIXED = tuple(f"FMI{fmi}_OVERRIDE_FUNCTION_PREFIX" for fmi in (2, 3))
 """What is defined for a shared library, in which functions are called as the standard does."""
@@ -97,7 +101,8 @@ def compile_binary(sources: Mapping[str, bytes], name: str, target: Target) -> b
 def compile_all(jobs: Sequence[Job]) -> list[bytes]:
     """Return the shared library of each job, made now, as many at once as there are processors.
 
-    What was made before comes from the user's folder. CompilerError where a compiler fails.
+    What was made before comes from the user's folder, if it is whole; what cannot be kept there is
+    made again the next time. CompilerError where a compiler fails.
     """
     keys = [job.key for job in jobs]
     kept = cache_folder()
@@ -107,12 +112,19 @@ def compile_all(jobs: Sequence[Job]) -> list[bytes]:
     for key, data in zip(missing, _compiled(missing.values()), strict=True):
         found[key] = data
         if folder:
-            write_file(folder / key, data)
+            with suppress(OSError):
+                write_file(folder / key, sha256(data).digest() + data)
     return [found[key] for key in keys]
 
 
 def _read(file: Path) -> bytes | None:
-    return file.read_bytes() if file.is_file() else None
+    """Return what is kept in a file, behind its check sum; None where there is none, or damaged."""
+    try:
+        content = file.read_bytes()
+    except OSError:
+        return None
+    check, data = content[: sha256().digest_size], content[sha256().digest_size :]
+    return data if check == sha256(data).digest() else None
 
 
 class _Running(NamedTuple):
@@ -125,7 +137,7 @@ def _compiled(jobs: Iterable[Job]) -> list[bytes]:
     """Return the libraries of jobs, in their order; however this ends, no compiler runs on."""
     most = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     waiting, running, done = deque(jobs), deque[_Running](), []
-    with tempfile.TemporaryDirectory(prefix="grasp_fmus_") as scratch:
+    with _scratch_folder() as scratch:
         try:
             while waiting or running:
                 while waiting and len(running) < most:
@@ -139,10 +151,36 @@ def _compiled(jobs: Iterable[Job]) -> list[bytes]:
     return done
 
 
+@contextmanager
+def _scratch_folder() -> Iterator[str]:
+    """Make a temporary folder; what a kill leaves of it, the next command of grasp-cosim removes.
+
+    That knows it by its name, and by its lock whether its process still runs.
+    """
+    if sys.platform == "win32":
+        with tempfile.TemporaryDirectory(prefix="grasp_scratch_") as folder:
+            yield folder
+        return
+    import fcntl
+
+    made = Path(tempfile.mkdtemp(prefix="grasp_fmus_"))
+    folder = str(made.with_name(made.name.replace("fmus", "scratch", 1)))
+    lock = os.open(made, os.O_RDONLY)
+    try:
+        with suppress(OSError):  # a file system without locks
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        made.rename(folder)
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        os.close(lock)
+
+
 def _started(job: Job, folder: Path) -> _Running:
     for file, data in job.sources.items():
         (folder / file).write_bytes(data)
-    environment = {**os.environ, "TMPDIR": str(folder), "LC_ALL": "C", **job.compiler.environment}
+    own = dict.fromkeys(("TMPDIR", *ZIG_CACHES), str(folder))
+    environment = {**os.environ, **own, "LC_ALL": "C", **job.compiler.environment}
     with (folder / "said").open("wb") as said:
         process = subprocess.Popen(  # noqa: S603 - the user's compiler
             job.line, cwd=folder, stdin=subprocess.DEVNULL, stdout=said, stderr=said,
@@ -194,7 +232,10 @@ def compiler_for(target: Target, asked: bool) -> Compiler:
 def _own_compiler() -> Compiler | None:
     given = os.environ.get("CC")
     if given:
-        command = shlex.split(given)
+        try:
+            command = shlex.split(given)
+        except ValueError:
+            command = []
         if not command or not shutil.which(command[0]):
             raise ValueError(f"CC={given}: no such program; must be a C compiler, or unset")
         return _identified(command)
@@ -209,9 +250,8 @@ def _zig() -> Compiler | None:
     if not program:
         return None
     kept = cache_folder()
-    folder = str(kept / "zig") if kept else ""
-    names = ("ZIG_GLOBAL_CACHE_DIR", "ZIG_LOCAL_CACHE_DIR") if kept else ()
-    return _identified([program, "cc"], dict.fromkeys(names, folder))
+    folder = str(kept / "zig") if kept and can_write(kept / "zig") else ""
+    return _identified([program, "cc"], dict.fromkeys(ZIG_CACHES if folder else (), folder))
 
 
 def _identified(command: Sequence[str], environment: Mapping[str, str] | None = None) -> Compiler:
@@ -229,14 +269,23 @@ def _identified(command: Sequence[str], environment: Mapping[str, str] | None = 
 
 
 def cache_folder() -> Path | None:
-    """Return the folder of the user for what can be made again; None where there can be none."""
-    try:
-        base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-        folder = Path(base, "grasp-cosim")
+    """Return the folder of the user for what can be made again; None where there can be none.
+
+    A relative path, which would be another folder in each, does not count, as the standard has it.
+    """
+    with suppress(RuntimeError):  # nobody's home
+        base = Path(os.environ.get("XDG_CACHE_HOME", ""))
+        base = base if base.is_absolute() else Path.home() / ".cache"
+        return base / "grasp-cosim" if base.is_absolute() else None
+    return None
+
+
+def can_write(folder: Path) -> bool:
+    """Return True if the folder is there, or can be made, and written to."""
+    with suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True)
-    except (OSError, RuntimeError):
-        return None
-    return folder if os.access(folder, os.W_OK) else None
+        return os.access(folder, os.W_OK)
+    return False
 
 
 def universal(thin: Sequence[bytes]) -> bytes:

@@ -8,14 +8,15 @@ content, in the user's folder for what can be made again.
 import sys
 import zipfile
 import zlib
+from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
 from ..folder import is_current, sources_hash, write_stamp
 from ..shipped import SCRIPTS
-from .build import build_native, chosen_names
-from .compilers import CompilerError, cache_folder
+from .build import build_native, chosen_names, planned
+from .compilers import CompilerError, cache_folder, can_write
 from .targets import here
 
 UNREADABLE = (OSError, EOFError, ValueError, RuntimeError, zipfile.BadZipFile, zlib.error)
@@ -23,6 +24,10 @@ UNREADABLE = (OSError, EOFError, ValueError, RuntimeError, zipfile.BadZipFile, z
 
 HEAD = 20
 """Bytes of a binary that say which processor it is for."""
+
+
+KEPT = "must have a home, or XDG_CACHE_HOME, that can be written to"
+"""Where native FMUs are kept."""
 
 
 class NoTwinsError(Exception):
@@ -58,23 +63,25 @@ def is_shipped(name: str) -> bool:
 
 
 @cache
-def shipped_twins() -> Path:
+def shipped_twins(announce: Callable[[str], None] = lambda _: None) -> Path:
     """The folder of the native FMUs of the blocks that come with the package, built if need be.
 
-    NoTwinsError where that cannot be.
+    Before they are, announce gets a line that says so. NoTwinsError where that cannot be.
     """
     kept = cache_folder()
-    if kept is None:
-        raise NoTwinsError(
-            "no folder to keep native FMUs in; must have a home, or XDG_CACHE_HOME, that can be "
-            "written to"
-        )
     sources = sources_hash()
-    folder = kept / "fmus" / here().tuple / sources[:16]
-    if not is_current(folder, sources):
-        try:
-            built = build_native(folder, names=chosen_names())
-            write_stamp(folder, sources, [fmu.path.name for fmu in built])
-        except (ValueError, CompilerError, OSError) as error:
-            raise NoTwinsError(str(error)) from error
+    folder = kept / "fmus" / here().tuple / sources[:16] if kept else None
+    if folder and is_current(folder, sources):
+        return folder
+    if not folder or not can_write(folder):
+        raise NoTwinsError(f"no folder to keep native FMUs in; {KEPT}")
+    try:
+        plan = planned()
+        announce("compiling the native FMUs, which takes some seconds, once for these sources")
+        built = build_native(folder, plan, chosen_names())
+        write_stamp(folder, sources, [fmu.path.name for fmu in built])
+    except (ValueError, CompilerError) as error:
+        raise NoTwinsError(str(error)) from error
+    except OSError as error:
+        raise NoTwinsError(f"{error.filename}: {error.strerror}; {KEPT}") from error
     return folder

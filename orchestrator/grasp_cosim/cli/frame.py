@@ -126,6 +126,17 @@ def say(line: str) -> None:
     click.echo(on_one_line(line), err=True)
 
 
+def announce(line: str) -> None:
+    """Print one line on standard error of what takes a while: where a progress bar is shown."""
+    if shows_progress():
+        say(line)
+
+
+def shows_progress() -> bool:
+    """True where progress is shown, on a terminal."""
+    return sys.stderr.isatty()
+
+
 def fail(message: str, code: int, debug: bool = False) -> int:
     """Print the message as one line on standard error; return the exit code."""
     if debug:

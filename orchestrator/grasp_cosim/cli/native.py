@@ -12,7 +12,7 @@ from ..errors import InputError, choices
 from ..files import NATIVE_FOLDER
 from ..system.description import System
 from ..system.parts import Component
-from .frame import Command, say
+from .frame import Command, announce, say
 
 FEW = 3
 """Components without a twin that are named at most."""
@@ -39,7 +39,7 @@ def natively(system: System, native: bool | None) -> Iterator[System]:
 
     None takes the twins that there are or can be built; which that were is said in one line at the
     end of the context. With True, InputError where those of our own blocks cannot be built. An FMU
-    without a twin stays as it is.
+    without a twin stays as it is, and one that needs no Python has none.
     """
     twins, line = ({}, "") if native is False else _twins(system, native is True)
     yield system.with_natives(twins)
@@ -55,13 +55,13 @@ def _twins(system: System, asked: bool) -> tuple[dict[str, Path], str]:
     shipped = {c.name for c in system.components if _is_shipped(c)}
     if shipped:
         try:
-            folder = shipped_twins()
+            folder = shipped_twins(announce)
         except NoTwinsError as error:
             failure = str(error)
     twins = {c.name: twin for c in system.components if (twin := _twin(c, folder))}
     if asked and failure and not twins.keys() >= shipped:
         raise InputError(f"--native: {failure}")
-    left = [c for c in system.components if c.name not in twins]
+    left = [c for c in system.components if c.name not in twins and c.interface.python]
     but = choices((f"{c.name} ({_why(c)})" for c in left), FEW)
     if twins and left:
         return twins, f"ran native FMUs, but not as {but}; {WAY_BACK}"
@@ -69,7 +69,8 @@ def _twins(system: System, asked: bool) -> tuple[dict[str, Path], str]:
         return twins, "" if asked else f"ran native FMUs; {WAY_BACK}"
     if failure:
         return twins, f"ran FMUs in Python, which takes longer: {failure}"
-    return twins, f"ran no native FMU: {but}" if asked or any(map(_is_ours, left)) else ""
+    said = left if asked else any(map(_is_ours, left))
+    return twins, f"ran no native FMU: {but}" if said else ""
 
 
 def _is_ours(component: Component) -> bool:

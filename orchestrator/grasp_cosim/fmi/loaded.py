@@ -26,7 +26,7 @@ import numpy as np
 import numpy.typing as npt
 from fmpy.fmi1 import FMICallException
 
-from ..errors import InputError, SimulationError
+from ..errors import InputError, SimulationError, choices
 from ..files import FULL
 from ..interface.interface import Interface, Value, Variable
 from ..scratch import ScratchFolder
@@ -302,6 +302,11 @@ class LoadedInstance(ABC):
         return 0.0 if self._clock is None else float(self._clock[0])
 
     def _reason(self, error: Exception) -> str:
+        there = self.interface.platforms
+        ours = fmpy.platform_tuple if self.PREFIX == "fmi3" else fmpy.platform
+        if ours not in there:
+            said = f"no binary for {ours}; there is: {choices(there)}"
+            return f"{said}; `grasp-cosim doctor` says what helps"
         return as_reason(self._messages()).removeprefix(": ") or " ".join(str(error).split())
 
     def _messages(self) -> list[str]:

@@ -265,7 +265,7 @@ def binary(fmu: Unpacked) -> Verdict:
         return "problem", f"{wanted} is {its}; must be {HERE}", f"build it again for {HERE}"
     fix = f"build it again for {ours}"
     if any(fmu.folder.glob("sources/*.c")):
-        fix = "fmpy compile FMU"
+        fix = "LDFLAGS=-Wl,--no-as-needed,-lm fmpy compile FMU"  # which links no libm by itself
     elif fmu.python:
         fix += " (pythonfmu 0.7.0 does for linux64 and win64)"
     files = choices(f"{path.parent.name}/{path.name}" for path in there)

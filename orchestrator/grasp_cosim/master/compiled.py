@@ -185,7 +185,9 @@ def is_there() -> bool:
 
 def compiler() -> list[str] | None:
     """The command of a C compiler: that of CC, cc, gcc, clang, or the package ziglang."""
-    named = shlex.split(os.environ.get("CC", ""))
+    named: list[str] = []
+    with suppress(ValueError):  # a quote without the other
+        named = shlex.split(os.environ.get("CC", ""))
     for command in (named, ["cc"], ["gcc"], ["clang"]):
         if command and shutil.which(command[0]):
             return command
@@ -226,8 +228,10 @@ def _place() -> Path:
     """Where it is kept; RuntimeError where the user has no home."""
     made_of = [SOURCE.read_text("utf-8"), *FLAGS, *_constants(), sys.platform, platform.machine()]
     name = hashlib.blake2b("\0".join(made_of).encode(), digest_size=8).hexdigest()
-    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(base, "grasp-cosim", name, "loop.so")
+    base = Path(os.environ.get("XDG_CACHE_HOME", ""))  # by its standard, relative ones do not count
+    return (
+        (base if base.is_absolute() else Path.home() / ".cache") / "grasp-cosim" / name / "loop.so"
+    )
 
 
 def _kept() -> Path | None:

@@ -6,15 +6,19 @@ import signal
 import struct
 import subprocess
 import sys
+import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from grasp_cosim import scratch
 from grasp_fmus.native import compilers
 from grasp_fmus.native.compilers import (
     Compiler,
     CompilerError,
     Job,
+    _scratch_folder,
     cache_folder,
     compile_all,
     compile_binary,
@@ -86,10 +90,51 @@ def test_nothing_is_compiled_twice_unless_something_differs(
 
 
 @needs_gcc
-def test_works_without_a_folder_to_keep_it_in(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", "/dev/null")
-    assert cache_folder() is None
+@pytest.mark.parametrize("place", ["/dev/null", "/proc"], ids=["a file", "read-only"])
+def test_works_where_nothing_can_be_kept(place: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", place)
     assert compile_binary(SOURCES, "Sum", here())[:4] == b"\x7fELF"
+
+
+@needs_zig
+@pytest.mark.slow
+def test_zig_needs_no_folder_to_keep_its_libraries_in(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Its own default is below the same folder, and it stops where that cannot be written to."""
+    monkeypatch.setenv("XDG_CACHE_HOME", "/dev/null")
+    monkeypatch.chdir(tmp_path)
+    library = compile_all([Job(SOURCES, "Sum", here(), compiler_for(here(), asked=True))])[0]
+    assert library[:4] == b"\x7fELF"
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_relative_folder_does_not_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It would be another one in each folder, and lost in that where a compiler runs."""
+    monkeypatch.setenv("XDG_CACHE_HOME", "here")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert cache_folder() == tmp_path / ".cache/grasp-cosim"
+    monkeypatch.setenv("HOME", "there")
+    assert cache_folder() is None
+
+
+@needs_gcc
+@pytest.mark.parametrize("damage", [lambda b: b[:3000], lambda b: b[:-1] + b"?", lambda b: b""])
+def test_what_is_damaged_is_made_again(tmp_path: Path, damage: Callable[[bytes], bytes]) -> None:
+    """A kill or a full disk may have cut it; nobody is to get it in an FMU."""
+    library = compile_binary(SOURCES, "Sum", here())
+    (kept,) = (tmp_path / "cache/grasp-cosim/native").iterdir()
+    whole = kept.read_bytes()
+    kept.write_bytes(damage(whole))
+    assert compile_binary(SOURCES, "Sum", here()) == library
+    assert kept.read_bytes() == whole
+
+
+@pytest.mark.parametrize("given", ["cc 'half a quote", "   "])
+def test_a_compiler_that_is_none_is_named(given: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CC", given)
+    with pytest.raises(ValueError, match=rf"^CC={given}: no such program; must be a C compiler"):
+        compiler_for(here(), asked=False)
 
 
 def test_a_missing_compiler_is_named_with_its_fix(
@@ -176,7 +221,24 @@ def test_no_compiler_outlives_us(number: signal.Signals, tmp_path: Path) -> None
     stat = Path(f"/proc/{child}/stat")
     assert not stat.exists() or stat.read_text().rpartition(")")[2].split()[0] == "Z"
     assert not (tmp_path / "out").exists()
-    assert not list(tmp_path.glob("grasp_fmus_*"))
+    assert not list(tmp_path.glob("grasp_*"))
+
+
+def test_what_a_kill_leaves_the_next_command_removes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    killed = (
+        "import os, signal\nfrom grasp_fmus.native.compilers import _scratch_folder\n"
+        "with _scratch_folder():\n    os.kill(os.getpid(), signal.SIGKILL)"
+    )
+    with _scratch_folder() as ours:
+        environment = {**os.environ, "TMPDIR": str(tmp_path)}
+        subprocess.run([sys.executable, "-c", killed], check=False, env=environment)
+        assert len(list(tmp_path.iterdir())) == 2
+        scratch.sweep(str(tmp_path))
+        assert [str(path) for path in tmp_path.iterdir()] == [ours]
+    assert not list(tmp_path.iterdir())
 
 
 def test_one_library_for_both_processors_of_macos() -> None:

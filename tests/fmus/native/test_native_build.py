@@ -183,3 +183,16 @@ def test_the_guid_is_that_of_sources_and_description(
     for name in ("modelDescription.xml", "sources/GripperPlant.c"):
         assert members(other.path)[name] == members(fmu)[name]
     assert members(other.path) != members(fmu)
+
+
+@pytest.mark.slow
+def test_what_changed_is_said_of_the_variables_of_fmi_3_too(tmp_path: Path) -> None:
+    text = SPRING.read_text("utf-8")
+    own = tmp_path / "spring_plant.py"
+    own.write_text(text, "utf-8")
+    build_native_block(own, tmp_path, planned((), 3))
+    own.write_text(text.replace("high=1e6, tunable", "high=2e6, tunable"), "utf-8")
+    changes = build_native_block(own, tmp_path, planned((), 3)).changes
+    assert "spring_stiffness: max 1000000.0 -> 2000000.0" in changes
+    other_version = build_native_block(own, tmp_path).changes
+    assert not any(line.startswith("spring_stiffness") for line in other_version)
