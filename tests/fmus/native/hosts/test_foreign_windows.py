@@ -1,21 +1,14 @@
-"""Native FMUs in programs for Windows that are not ours, under wine: ecos, and FMPy's server.
-
-Both come with the packages ecospy and FMPy, for all platforms.
-"""
+"""Native FMUs in a program for Windows that is not ours, under wine: ecos, which ecospy brings."""
 
 import csv
 import importlib.util
-import shutil
 import subprocess
-import sys
-import time
 from collections.abc import Mapping
 from pathlib import Path
 from zipfile import ZipFile
 
 import numpy as np
 import pytest
-from fmpy.util import add_remoting, read_csv
 from grasp_cosim import System, simulate
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.ssp.write import write_ssp
@@ -42,8 +35,6 @@ def extracted(archive: Path, folder: Path) -> Path:
         file.extractall(folder)
     return folder
 
-
-# ecos, with an archive of the whole grasp
 
 STEP = 1e-4
 DIGITS = 0.6e-6
@@ -97,79 +88,3 @@ def table(path: Path) -> Mapping[str, np.ndarray]:
     columns = np.array([row[2:] for row in rows], dtype=np.float64).T
     names = [name.rpartition("[")[0].replace("::", ".") for name in head[2:]]
     return dict(zip(names, columns, strict=True))
-
-
-# FMPy, which has its server load the library
-
-CROSS_CHECK = """
-import sys
-import numpy as np
-from fmpy import read_model_description
-from fmpy.fmi2 import FMU2Slave
-from fmpy.util import read_csv
-folder, inputs, out = sys.argv[1:]
-description = read_model_description(folder)
-vrs = {v.name: v.valueReference for v in description.modelVariables}
-outputs = [v for v in description.modelVariables if v.causality == "output" and v.type == "Real"]
-signals = read_csv(inputs)
-given = [n for n in signals.dtype.names if n != "time"]
-fmu = FMU2Slave(guid=description.guid, unzipDirectory=folder, instanceName="remote",
-                modelIdentifier=description.coSimulation.modelIdentifier)
-fmu.instantiate()
-fmu.setupExperiment()
-fmu.enterInitializationMode()
-rows = []
-for k, row in enumerate(signals):
-    if k:
-        h = row["time"] - signals[k - 1]["time"]
-        fmu.doStep(signals[k - 1]["time"], h)
-    else:
-        fmu.setReal([vrs[n] for n in given], [row[n] for n in given])
-        fmu.exitInitializationMode()
-    rows.append(fmu.getReal([v.valueReference for v in outputs]))
-    fmu.setReal([vrs[n] for n in given], [row[n] for n in given])
-fmu.terminate()
-fmu.freeInstance()
-np.savez(out, **dict(zip([v.name for v in outputs], np.array(rows).T)))
-"""
-
-
-def test_fmpy_runs_the_cross_check_through_its_server(
-    natives_of_windows: Path, tmp_path: Path
-) -> None:
-    """One after the other: the server has one port. The client would end it too early in wine."""
-    for name in NAMES:
-        folder = extracted(natives_of_windows / f"{name}.fmu", tmp_path / name)
-        shutil.rmtree(folder / "binaries" / "linux64")
-        add_remoting(str(folder), "linux64", "win64")
-        inputs, out = natives_of_windows / f"{name}_in.csv", tmp_path / f"{name}.npz"
-        binaries = folder / "binaries" / "win64"
-        command = [
-            *map(str, (binaries / "server_tcp.exe", binaries / f"{name}.dll")),
-            "/no/such/lock",
-        ]
-        said = tmp_path / "said"
-        with said.open("wb") as file:
-            server = subprocess.Popen(["wine", *command], env=windows(), stdout=file)
-        try:
-            wait_for("Starting RPC server", said)
-            subprocess.run(
-                [sys.executable, "-c", CROSS_CHECK, folder, inputs, out],
-                stdout=subprocess.DEVNULL, check=True, timeout=120,
-            )  # fmt: skip
-        finally:
-            server.kill()
-            server.wait()
-        reference, found = read_csv(natives_of_windows / f"{name}_ref.csv"), np.load(out)
-        assert found.files
-        for column in found.files:
-            far = np.max(np.abs(found[column] - reference[column]))
-            assert far <= (1e-10 if "force" in column else 1e-12), (name, column)
-
-
-def wait_for(text: str, file: Path) -> None:
-    end = time.monotonic() + 60.0
-    while text not in file.read_text("utf-8", "replace"):
-        assert time.monotonic() < end, file.read_text("utf-8", "replace")
-        time.sleep(0.05)
-    time.sleep(0.5)  # it says so before it listens
