@@ -203,6 +203,8 @@ class Expressions:
 
     def truth(self, node: ast.expr) -> Value:
         """An expression as a condition."""
+        if isinstance(node, ast.BoolOp):
+            return self._settled(node, self.truth)
         return self.as_truth(self.value(node), node)
 
     def as_truth(self, v: Value, node: ast.AST) -> Value:
@@ -421,6 +423,8 @@ class Expressions:
         numbers = [None if part is None else _whole_constant(part) for part in parts]
         if any(part is not None and n is None for part, n in zip(parts, numbers, strict=True)):
             raise self.error(node, f"{ast.unparse(node)}: must have constant bounds")
+        if numbers[2] == 0:
+            raise self.error(node, f"{ast.unparse(node)}: the step must not be 0")
         return self.items(self.named(base))[slice(*numbers)]
 
     def _indexed(self, node: ast.Subscript, base: Value, t: Tuple) -> Value:
@@ -676,11 +680,22 @@ class Expressions:
         )
 
     def _boolop(self, node: ast.BoolOp) -> Value:
-        values = [self.value(node.values[0])]
-        values += [self.folded(self.value(n), values[0]) for n in node.values[1:]]
-        if all(v.type == BOOLEAN for v in values):
-            return self.either(values, isinstance(node.op, ast.And))
-        return self._chosen(node, values)
+        return self._settled(node, self._condition)
+
+    def _settled(self, node: ast.BoolOp, operand: Callable[[ast.expr], Value]) -> Value:
+        first, *rest = node.values
+        value = operand(first)
+        others = [self.folded(operand(n), value) for n in rest]
+        return self.either([value, *others], isinstance(node.op, ast.And))
+
+    def _condition(self, node: ast.expr) -> Value:
+        v = self.value(node)
+        if v.type == BOOLEAN:
+            return v
+        shown = ast.unparse(node)
+        raise self.error(
+            node, f"{shown}: operands of and, or must be conditions; write a if ... else b"
+        )
 
     def either(self, values: Sequence[Value], every: bool) -> Value:
         """All of some conditions, or any of them; one after the other, until it is settled."""
@@ -695,11 +710,6 @@ class Expressions:
             level=level if rest else first.level,
             type=BOOLEAN,
             faults=faults,
-        )
-
-    def _chosen(self, node: ast.BoolOp, values: list[Value]) -> Value:
-        raise self.error(
-            node, f"{ast.unparse(node)}: operands must be conditions; write a if ... else b"
         )
 
     def _compare(self, node: ast.Compare) -> Value:
@@ -777,6 +787,7 @@ class Expressions:
             level=CONDITION,
             type=t,
             faults=test.faults | a.faults | b.faults,
+            is_address=isinstance(t, Group),
         )
 
     # Calls
@@ -995,11 +1006,11 @@ class Expressions:
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
             if node.func.id == "zip":
                 rows = zip(*(self.iterated(a) for a in node.args), strict=False)
-                return [self.row(row) for row in rows]
+                return [self.display(row, node) for row in rows]
             if node.func.id == "enumerate" and len(node.args) == 1:
                 numbered = enumerate(self.iterated(node.args[0]))
                 return [
-                    self.row((Value(names.whole(i), POSTFIX, WHOLE, number=i), v))
+                    self.display((Value(names.whole(i), POSTFIX, WHOLE, number=i), v), node)
                     for i, v in numbered
                 ]
             if node.func.id == "range":
@@ -1016,10 +1027,6 @@ class Expressions:
                 f"{ast.unparse(node)}: must be a tuple, zip or enumerate of tuples, or a range",
             )
         return self.items(self.named(v))
-
-    def row(self, values: Sequence[Value]) -> Value:
-        """Several values that are taken apart again."""
-        return Value("", POSTFIX, Tuple(tuple(v.type for v in values)), items=tuple(values))
 
     def binding(self, target: ast.expr, v: Value) -> Any:
         """Give the variables of a generator their values."""

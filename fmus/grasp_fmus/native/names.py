@@ -13,12 +13,20 @@ OVERFLOW UNDERFLOW DOMAIN SING PLOSS TLOSS FP_NAN FP_INFINITE FP_ZERO FP_SUBNORM
 CHAR INT DELETE CONST OPTIONAL Fault fault
 isnan isinf isfinite isnormal signbit fpclassify isgreater isless
 sqrt floor ceil fabs copysign fmod atan sinh asinh cbrt exp2 tanh strlen memcpy frexp round pow
+MAXFLOAT SNAN SNANF SNANL math_errhandling MATH_ERRNO MATH_ERREXCEPT SIZE_MAX RAND_MAX EXIT_SUCCESS
+EXIT_FAILURE BIG_ENDIAN LITTLE_ENDIAN PDP_ENDIAN BYTE_ORDER BLOCK_NAME BLOCK_HAS_SUBSTEPS
+N_INPUTS N_OUTPUTS N_PARAMETERS N_VARIABLES N_STATE N_REFERENCES
 atan2 ldexp log log2 log10 log1p exp expm1 sin cos tan asin acos acosh atanh cosh
 """
 RESERVED = frozenset(_WORDS.split())
 """Keywords, macros, and the functions that python_arithmetic.h and the generated C call."""
 
-_BEGINNINGS = ("py_", "__", "PY_", "FAULT_", "TEXT_", "M_PI", "M_E", "M_LN", "M_LOG", "M_SQRT")
+_STARTS = """
+py_ __ PY_ FAULT_ TEXT_ M_PI M_E M_LN M_LOG M_SQRT M_1_PI M_2_PI M_2_SQRTPI FP_
+DBL_ FLT_ LDBL_ INT8_ INT16_ INT32_ INT64_ UINT8_ UINT16_ UINT32_ UINT64_
+SLAVE_ BLAKE2B_ FMI fmi2 fmi3
+"""
+_BEGINNINGS = tuple(_STARTS.split())
 
 _HEADERS = """
 py python_arithmetic number_text text fault block slave blake2b tuples fmi2 fmi3 fmi2_interface

@@ -164,6 +164,13 @@ class Program:
         of_class = cls._fields if isinstance(t, Record) else [f.name for f in fields(cls)]
         source = self.home(cls)
         line = getattr(source.class_node(cls), "lineno", 1)
+        in_c: dict[str, str] = {}
+        for name in of_class:
+            other = in_c.setdefault(names.identifier(name), name)
+            if other != name:
+                raise source.error(
+                    line, f"{cls.__name__}: {other} and {name} are one name in C; rename one"
+                )
         return {
             name: self.of_hint(
                 hints.get(name, Any), f"{source.file}: line {line}: {cls.__name__}.{name}"
@@ -379,6 +386,10 @@ class Program:
                 f"{where}: must have keys of one type, and values of one type"
             )
         key_type, value_type = (k.pop() for k in kinds)
+        if not isinstance(key_type, Member) and key_type not in (REAL, WHOLE, BOOLEAN):
+            raise UntranslatableError(
+                f"{where}: has keys of type {said(key_type)}; must be numbers, or of an IntEnum"
+            )
         cname = self.unique(f"{source.prefix}_{names.identifier(name)}", key)
         if key not in self.items:
             before, self.needed = self.needed, set()

@@ -4,6 +4,7 @@ import ast
 import io
 import sys
 import tokenize
+from math import isinf
 from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any
@@ -93,6 +94,9 @@ class Source:
         is_decimal = bool(plain) and set(plain) <= set("0123456789.eE+-") and plain[0] != "-"
         if not isinstance(node.value, float) or not is_decimal or float(plain) != node.value:
             return None
+        digits = plain.lower().partition("e")[0]
+        if isinf(node.value) or (node.value == 0.0 and set(digits) - set("0.")):
+            return None  # beyond the range of a double, of which compilers warn
         return plain if set(plain) & set(".eE") else f"{plain}.0"
 
     def class_doc(self, cls: type[Any]) -> bool:

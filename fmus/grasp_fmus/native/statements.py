@@ -455,7 +455,7 @@ class Body(Expressions):
         if rest and not (v.is_path or v.number is not None):
             names_ = [t for t in node.targets if isinstance(t, ast.Name)]
             if not names_:
-                v = self.apart(v)
+                v = self._flushed(self.apart(v))
         self._give(first, v, node)
         for target in rest:
             known = first if isinstance(first, ast.Name) and self._is_read(first.id) else None
@@ -780,7 +780,10 @@ class Body(Expressions):
         self._indent -= 1
         self._scopes.pop()
         self._counting.pop()
-        guard = " && fault->kind == FAULT_NONE" if times is None and self.faults else ""
+        guard = ""
+        if times is None:  # a count that a fault left without meaning may be huge
+            guard = " && fault->kind == FAULT_NONE"
+            self.faults.add("a fault before the loop")
         self._lines[line:line] = wrapped(f"{'    ' * self._indent}{head}{guard}; {by}) {{{about}")
         self._emit("}")
         self.faults |= faults
@@ -820,7 +823,7 @@ class Body(Expressions):
         counter = self._counter("int", "")
         rest = iter(values)
         row = [_counted(counter) if v is None else self._item(next(rest), counter) for v in columns]
-        one = row[0] if len(row) == 1 and not _is_zip(node.iter) else self.row(row)
+        one = row[0] if len(row) == 1 and not _is_zip(node.iter) else self.display(row, node.iter)
         head = f"for ({counter} = 0; {counter} < {times}"
         self._loop(node, head, f"++{counter}", times, [(node.target, one)], counter)
 
@@ -879,6 +882,10 @@ class Body(Expressions):
                 f"{ast.unparse(inner)}: must be an exception of Python's own, as "
                 "ArithmeticError or ValueError",
             )
+        if cls is KeyError:
+            raise self.error(
+                node, "KeyError shows its text in quotes; raise another, as ValueError"
+            )
         arguments = call.args if isinstance(call, ast.Call) else []
         if len(arguments) > 1 or (isinstance(call, ast.Call) and call.keywords):
             raise self.error(node, f"{ast.unparse(call)}: must have one text")
@@ -936,7 +943,7 @@ class Body(Expressions):
             and spec.endswith("g")
             and (spec == "g" or (spec[0] == "." and spec[1:-1].isdigit()))
         ):
-            digits = 6 if spec == "g" else int(spec[1:-1])
+            digits = 6 if spec == "g" else max(1, int(spec[1:-1]))
             if v.type in NUMBERS and not how and digits <= 17:
                 return v, f"py_say_general(fault, {{0}}, {digits});"
         elif not spec and how != "?":
@@ -1091,6 +1098,10 @@ def _renamed(text: str, name: str, to: str) -> str:
             is_field = i > 0 and (text[i - 1] == "." or text[i - 2 : i] == "->")
             out += to if word == name and not is_field else word
             i = j
+        elif c == '"' or text.startswith("/*", i):
+            j = _after_said(text, i)
+            out += text[i:j]
+            i = j
         elif c.isdigit():
             j = i
             while j < len(text) and (text[j].isalnum() or text[j] in "._"):
@@ -1101,6 +1112,16 @@ def _renamed(text: str, name: str, to: str) -> str:
             out += c
             i += 1
     return out
+
+
+def _after_said(text: str, start: int) -> int:
+    """Where a text or a comment of C ends."""
+    if text[start] == "/":
+        return text.index("*/", start) + 2
+    end = start + 1
+    while text[end] != '"':
+        end += 2 if text[end] == "\\" else 1
+    return end + 1
 
 
 _STATEMENTS: dict[type[ast.stmt], str] = {

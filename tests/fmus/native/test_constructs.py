@@ -174,6 +174,22 @@ def total(w: Row) -> float:
     return found
 
 
+def weighed(pair):
+    return pair[0] * pair[1]
+
+
+def looped(n: int, a: float) -> float:
+    """After a fault n may be huge."""
+    for _ in range(n):
+        a = a + 1.0
+    return a
+
+
+def remark(a: float, b: float) -> float:
+    # a is named in a remark only, as is b there
+    return 2.0 * b  # a
+
+
 def demand(a: float) -> None:
     """Nothing but a check."""
     if a > 100.0:
@@ -182,6 +198,16 @@ def demand(a: float) -> None:
 
 CASES = """
 a + b * c - a / 3.0
+1e400 if a > b else a + 1e-400
+(p.inner if p.flag else DEFAULT).both * a
+tuple(weighed(pair) for pair in zip(p.weights, ROW))[1]
+tuple(pair for pair in enumerate(p.weights))[2][1] + a
+float(any(pair[0] > pair[1] * a for pair in zip(p.weights, ROW)))
+a if p.n and p.flag or b else c
+float(not (p.n and 1.0 / a > b))
+ROW[int(a)]
+remark(a, b)
+looped(int(1e15 * max(0.0, 1.0 - 1.0 / a)) if a == 0.0 else 3, b)
 a - (b - c)
 a - (b + c) * (a * b)
 (a / b) / c
@@ -384,6 +410,28 @@ y = x
 x, y = y + 1.0, x
 x, y = y, x
 return x * 2.0 + y
+---
+found = a
+for pair in zip(p.weights, ROW):
+    found += max(pair) / (pair[0] - pair[1] * b)
+return found
+---
+found = a
+for pair in enumerate(p.weights):
+    found += pair[0] * pair[1]
+return found
+---
+group = DEFAULT
+if p.flag:
+    group = p.inner
+return group.both * a
+---
+x, y = z, w = (a / b, c)
+return x + y - z * w
+---
+if b > a:
+    raise ValueError(f"{a:.0g} {p.n}: the c of this text is no variable")
+return b
 ---
 (x, y), z = (a, b), c
 x, (y, z) = z, (x, y)

@@ -97,6 +97,9 @@ EXPRESSIONS = {
     "a @ b": "use arithmetic",
     "float(a in u)": "u: is not defined",
     "OPEN(a)": "",
+    "p.weights[::0][0]": "the step must not be 0",
+    "BY_TEXT['a']": "BY_TEXT: has keys of type str; must be numbers, or of an IntEnum",
+    "Twice(a, b).alpha": "Twice: α and alpha are one name in C; rename one",
 }
 
 MORE = """
@@ -147,6 +150,14 @@ def dataclasses_replace(inner: Inner) -> float:
 import dataclasses
 
 TEXTS = ("a", "b")
+BY_TEXT = {"a": 1.0}
+
+
+class Twice(NamedTuple):
+    α: float
+    alpha: float
+
+
 LIST = [1.0]
 HUGE = 2**60
 OPEN = open
@@ -184,6 +195,7 @@ BODIES = {
     "raise ValueError('x') from None": (1, "raise a new one"),
     "raise ValueError(a)": (1, "must be a text, or an f-string"),
     "raise ValueError('a', 'b')": (1, "must have one text"),
+    "raise KeyError('x')": (1, "KeyError shows its text in quotes; raise another"),
     "raise Point(a, b)": (1, "must be an exception of Python's own"),
     "raise ValueError(f'{a:.2f}')": (1, "in this format; must be"),
     "raise ValueError(f'{p.mode}')": (1, "in this format; must be"),

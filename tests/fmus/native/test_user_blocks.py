@@ -160,7 +160,9 @@ def outputs(p, x, u):
         + INPUTS
         + """
 class State(NamedTuple):
-    v: float
+    N_STATE: float
+    M_1_PI: float
+    DBL_MAX: bool
 class variables(NamedTuple):
     step: float
     int: float
@@ -170,12 +172,13 @@ class variables(NamedTuple):
         + """
 def block_step(v): return v
 def step_(v, fault, Fault): return v * fault * Fault
-def initial_state(p, u): return State(0.0)
+def initial_state(p, u): return State(0.0, 1.0, True)
 def step(p, x, u, h):
     string_block_step = variables(1.0, 2.0, 3.0)
     string_step_ = step_(1.0, 2.0, 3.0)
-    return State(block_step(string_block_step.int) + string_step_ + x.v)
-def outputs(p, x, u): return Outputs(x.v, (x.v > 0.0, False))
+    v = block_step(string_block_step.int) + string_step_ + x.N_STATE
+    return State(v, x.M_1_PI + h, not x.DBL_MAX)
+def outputs(p, x, u): return Outputs(x.N_STATE, (x.M_1_PI > 0.0, x.DBL_MAX))
 """,
     ),
 }

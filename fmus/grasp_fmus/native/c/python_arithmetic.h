@@ -37,6 +37,7 @@ typedef struct {
 #define PY_INF ((double)HUGE_VAL)
 #define PY_NAN ((double)NAN)
 #define PY_WHOLE 9007199254740992.0 /* 2^53, up to which every int is a double */
+#define PY_INDEX 9223372036854775808.0 /* 2^63, below which Python takes an int as an index */
 
 /* Exceptions */
 
@@ -323,7 +324,9 @@ static inline int py_index(double n, int length, Fault *fault)
 {
     double place = n < 0.0 ? n + length : n;
     if (!(place >= 0.0 && place < length)) {
-        py_fault(fault, FAULT_OTHER, "IndexError", "tuple index out of range");
+        py_fault(fault, FAULT_OTHER, "IndexError",
+                 n >= -PY_INDEX && n < PY_INDEX ? "tuple index out of range"
+                                                : "cannot fit 'int' into an index-sized integer");
         return 0;
     }
     return (int)place;
