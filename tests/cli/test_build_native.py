@@ -8,6 +8,8 @@ import pytest
 from conftest import Run
 from grasp_cosim.interface.read import describe
 from grasp_fmus.native import compilers
+from grasp_fmus.native.compilers import CompilerError
+from grasp_fmus.native.targets import here
 from support.compilers import needs_gcc, needs_zig
 
 ROOT = Path(__file__).parents[2]
@@ -45,6 +47,18 @@ def test_one_by_name_and_one_of_ones_own(command: Run) -> None:
     assert (code, out, err) == (0, "mine/SpringPlant.fmu: new\n", "")
     found = describe(Path("mine/SpringPlant.fmu"))
     assert (found.version, found.python, found.sources) == ("3.0", False, True)
+
+
+def test_on_a_terminal_it_is_said_before_the_compiler_runs(
+    command: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def ended(*_: object) -> None:
+        raise CompilerError("out of patience")
+
+    monkeypatch.setattr("grasp_cosim.cli.frame.shows_progress", lambda: True)
+    monkeypatch.setattr("grasp_fmus.native.build.build_native", ended)
+    line = f"building for {here().tuple}\ngrasp-cosim: out of patience\n"
+    assert command("build", "--native") == (3, "", line)
 
 
 @pytest.mark.parametrize(

@@ -177,8 +177,14 @@ def _scratch_folder() -> Iterator[str]:
 
 
 def _started(job: Job, folder: Path) -> _Running:
-    for file, data in job.sources.items():
-        (folder / file).write_bytes(data)
+    try:
+        for file, data in job.sources.items():
+            (folder / file).write_bytes(data)
+    except OSError as error:
+        raise CompilerError(
+            f"{job.name}.c cannot be written to {folder}: {error.strerror}; must have room there, "
+            "or TMPDIR must be another folder"
+        ) from error
     own = dict.fromkeys(("TMPDIR", *ZIG_CACHES), str(folder))
     environment = {**os.environ, **own, "LC_ALL": "C", **job.compiler.environment}
     with (folder / "said").open("wb") as said:

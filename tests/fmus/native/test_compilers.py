@@ -1,6 +1,7 @@
 """Compilers: found or named as missing, heard when they fail, ended with us, asked once."""
 
 import ctypes
+import errno
 import os
 import signal
 import struct
@@ -135,6 +136,18 @@ def test_a_compiler_that_is_none_is_named(given: str, monkeypatch: pytest.Monkey
     monkeypatch.setenv("CC", given)
     with pytest.raises(ValueError, match=rf"^CC={given}: no such program; must be a C compiler"):
         compiler_for(here(), asked=False)
+
+
+@needs_gcc
+def test_a_full_temporary_folder_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    job = Job(SOURCES, "Sum", here(), compiler_for(here(), asked=False))
+    monkeypatch.setattr(Path, "write_bytes", full)
+    line = r"^Sum.c cannot be written to /.*grasp_scratch_.*: No space left on device; must have"
+    with pytest.raises(CompilerError, match=line):
+        compile_all([job])
 
 
 def test_a_missing_compiler_is_named_with_its_fix(

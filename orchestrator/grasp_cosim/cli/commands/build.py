@@ -8,10 +8,13 @@ import click
 
 from ...errors import InputError, SimulationError
 from ...files import FMU_FOLDER, NATIVE_FOLDER, check_folder
-from ..frame import PATH, bind_python_option, json_option, say, show
+from ..frame import PATH, announce, bind_python_option, json_option, say, show
 
 if TYPE_CHECKING:
     from grasp_fmus.folder import Built
+
+FIRST = "; zig makes its libraries first, once, which takes a minute or two"
+"""Of a first build for other platforms."""
 
 BOUND_FOLDER = Path("fmus/bound")
 """Where FMUs bound to a Python are built, below the current folder."""
@@ -103,6 +106,7 @@ def _native(
 
     plan = planned(targets(target.split(",")) if target is not None else (), fmi)
     notes = [plan.note] if plan.note else []
+    announce(f"building for {', '.join(t.tuple for t in plan.places)}{FIRST if target else ''}")
     try:
         if block is None:
             return build_native(folder, plan), [*notes, *python_only().values()]
