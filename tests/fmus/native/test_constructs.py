@@ -11,7 +11,7 @@ import pytest
 from fmus.native.c_block import CBlock, PythonBlock, library, same
 from grasp_fmus.block_build import _run
 from grasp_fmus.native.translation import translated
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 HEAD = '''
@@ -28,6 +28,7 @@ from types import MappingProxyType
 from typing import Annotated, NamedTuple, TypeAlias
 
 from block_variables import Group, Input, Output, Parameter, check
+from support.examples import examples
 
 Pair: TypeAlias = tuple[float, float]
 """Two."""
@@ -726,7 +727,7 @@ def test_a_construct_gives_the_bits_and_the_faults_of_python(
 
 
 @pytest.mark.slow
-@settings(max_examples=8_000, deadline=None, suppress_health_check=list(HealthCheck), database=None)
+@examples(8_000)
 @given(
     st.integers(0, len(NAMES) - 1),
     st.tuples(numbers, numbers, numbers),

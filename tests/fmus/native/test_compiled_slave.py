@@ -85,7 +85,7 @@ def test_two_fmus_in_one_program(tmp_path: Path) -> None:
 def instantiated(library: Path) -> tuple[bool, list[str]]:
     """Whether there is an instance, and what it says, in a process that may end."""
     script = (
-        "import sys\nfrom test_compiled import tried\nlives, said = tried(sys.argv[1])\n"
+        "import sys\nfrom test_compiled_slave import tried\nlives, said = tried(sys.argv[1])\n"
         "print(lives, *said, sep='\\n')\n"
     )
     paths = ":".join(str(Path(__file__).parents[k]) for k in (0, 2))
