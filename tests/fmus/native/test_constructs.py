@@ -13,6 +13,7 @@ from grasp_fmus.block_build import _run
 from grasp_fmus.native.translation import translated
 from hypothesis import given
 from hypothesis import strategies as st
+from support.examples import examples
 
 HEAD = '''
 """Blocks of the tests: `which` chooses one."""
@@ -28,7 +29,6 @@ from types import MappingProxyType
 from typing import Annotated, NamedTuple, TypeAlias
 
 from block_variables import Group, Input, Output, Parameter, check
-from support.examples import examples
 
 Pair: TypeAlias = tuple[float, float]
 """Two."""
