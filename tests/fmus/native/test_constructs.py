@@ -207,6 +207,7 @@ float(any(pair[0] > pair[1] * a for pair in zip(p.weights, ROW)))
 a if p.n and p.flag or b else c
 float(not (p.n and 1.0 / a > b))
 ROW[int(a)]
+(-1e300 - abs(a)) ** (2.5 + abs(b)) if a > 0.0 else b
 remark(a, b)
 looped(int(1e15 * max(0.0, 1.0 - 1.0 / a)) if a == 0.0 else 3, b)
 a - (b - c)

@@ -210,6 +210,9 @@ static inline double py_power(double a, double b, Fault *fault)
     }
     if (a < 0.0) {
         if (b != floor(b)) { /* complex in Python */
+            if (isinf(pow(-a, b))) {
+                return py_overflow(fault, "complex exponentiation");
+            }
             return py_fault(fault, FAULT_OTHER, "TypeError",
                             "a negative number to a fractional power is complex");
         }

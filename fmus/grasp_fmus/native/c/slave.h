@@ -158,6 +158,14 @@ static Status slave_refuse_variable(Slave *s, const char *name, const char *text
     return slave_refused(s);
 }
 
+/* All of it has a value: compilers do not see that type and text are read after a fault only. */
+static void slave_no_fault(Fault *fault)
+{
+    fault->kind = FAULT_NONE;
+    fault->type = "";
+    fault->text[0] = '\0';
+}
+
 /* The last line of what Python's traceback would be */
 static Status slave_refuse_fault(Slave *s, const Fault *fault)
 {
@@ -179,7 +187,7 @@ static int slave_finite(double v)
 static Status slave_read_params(Slave *s)
 {
     Fault fault;
-    fault.kind = FAULT_NONE;
+    slave_no_fault(&fault);
     block_params(s->values, &s->params);
     block_check(&s->params, &fault);
     s->params_are_read = fault.kind == FAULT_NONE;
@@ -231,7 +239,7 @@ static Status slave_refresh(Slave *s)
     if (!s->params_are_read && slave_read_params(s) != SLAVE_OK) {
         return SLAVE_ERROR;
     }
-    fault.kind = FAULT_NONE;
+    slave_no_fault(&fault);
     block_inputs(s->values, &s->inputs);
     if (s->phase < STEPPING) {
         block_initial_state(&s->params, &s->inputs, &state, &fault);
@@ -296,7 +304,7 @@ static Status slave_start(Slave *s)
     s->values[SLAVE_TIME] = 0.0;
     s->params_are_read = s->outputs_follow = 0;
     s->phase = INSTANTIATED;
-    fault.kind = FAULT_NONE;
+    slave_no_fault(&fault);
     block_params(s->values, &s->params);
     block_inputs(s->values, &s->inputs);
     block_check(&s->params, &fault);
@@ -622,7 +630,7 @@ static Status slave_end_long_step(Slave *s, double h)
 {
     double longest = 0.0, too_long = h, middle, substeps, digit = 0.0;
     Fault fault;
-    fault.kind = FAULT_NONE;
+    slave_no_fault(&fault);
     for (;;) {
         middle = 0.5 * (longest + too_long);
         if (!(longest < middle && middle < too_long)) {
@@ -682,7 +690,7 @@ static Status slave_do_step(Slave *s, double time, double h)
         }
         block_inputs(s->values, &s->inputs);
     }
-    fault.kind = FAULT_NONE;
+    slave_no_fault(&fault);
     few = slave_substeps(s, h, &fault) <= block_most_substeps;  /* one without a bound has none */
     if (fault.kind != FAULT_NONE) {
         return slave_end_step(s, h, &fault);
@@ -931,7 +939,7 @@ static Status slave_deserialise(Slave *s, const unsigned char *bytes, size_t siz
     for (i = 0; i < N_STATE; i++) {
         numbers[i] = slave_number_from_bytes(at + 8 * i);
     }
-    fault.kind = FAULT_NONE;
+    slave_no_fault(&fault);
     block_load(numbers, &state->state, &fault);
     if (fault.kind != FAULT_NONE) {
         return slave_refuse(s, fault.text);
