@@ -128,6 +128,7 @@ def test_a_compiler_that_fails_is_a_failure_on_the_way(
     assert not Path("fmus").exists()
 
 
+@pytest.mark.slow
 def test_c_alone(command: Run) -> None:
     code, out, err = command("build", "--native", "--c-only", "one", "GraspController")
     assert (code, err) == (0, "")

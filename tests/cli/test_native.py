@@ -21,6 +21,7 @@ from grasp_fmus.native.compilers import CompilerError
 from grasp_fmus.native.targets import here
 from support.both_engines import needs_compiler
 from support.oscillator import write_oscillator
+from support.slow import slow
 
 pytestmark = needs_compiler
 
@@ -115,7 +116,7 @@ def test_run_takes_the_fmus_as_they_are_named(command: Run) -> None:
     [
         ("run", "--step-study", "--step", "3.2e-3", "--stop", "0.64", "--of", "plant.gap[1]",
          "--tolerance", "1"),
-        ("sweep", "study.toml", "--workers", "1"),
+        slow(("sweep", "study.toml", "--workers", "1")),
         ("qualify", "plant.fmu", "--as", "plant", *SHORT, "--isolation", "none"),
     ],
     ids=lambda arguments: arguments[0],
@@ -142,6 +143,7 @@ def folder(arguments: tuple[str, ...], number: int) -> tuple[str, ...]:
     return ("--out", f"out_{number}") if arguments[0] == "sweep" else ()
 
 
+@pytest.mark.slow
 def test_a_sweep_goes_on_with_the_other_kind(command: Run) -> None:
     Path("study.toml").write_text(STUDY)
     for i, option in enumerate(("--python", "--native")):

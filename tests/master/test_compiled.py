@@ -184,7 +184,7 @@ def test_other_threads_run_meanwhile_unless_a_component_is_python(keeps_lock: bo
     thread = threading.Thread(target=count)
     thread.start()
     interval = sys.getswitchinterval()
-    sys.setswitchinterval(10.0)  # only who gives the lock away loses it
+    sys.setswitchinterval(1.0)  # only who gives the lock away loses it
     try:
         inside.set()
         before = during[0]

@@ -17,6 +17,7 @@ from grasp_cosim.recording.load import load_run
 from grasp_cosim.recording.result import Result
 from support.both_engines import needs_compiler
 from support.native_fmus import TYPES, build, needs_gcc
+from support.slow import slow
 
 pytestmark = [
     needs_compiler,
@@ -65,7 +66,7 @@ def same_bits(one: Result, two: Result) -> bool:
     return all(same) and one.time.tobytes() == two.time.tobytes() and list(one) == list(two)
 
 
-@pytest.mark.parametrize("version", ["2.0", "3.0"])
+@pytest.mark.parametrize("version", ["2.0", slow("3.0")])
 @pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
 def test_it_has_the_bits_of_a_free_run_and_a_timing(
     tmp_path: Path, version: str, scheme: str

@@ -65,7 +65,7 @@ def compiled(folder: Path, *options: str, compiler: str = "gcc") -> None:
 
 
 @pytest.mark.parametrize("level", ["-O0", slow("-O3")])
-@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+@pytest.mark.parametrize("compiler", ["gcc", slow("clang")])
 @pytest.mark.parametrize("name", [*map(slow, NAMES[1:]), NAMES[0], "SpringPlant"])
 def test_compiles_without_a_warning_and_calls_what_it_lists(
     name: str, compiler: str, level: str, written: Callable[[str], Path]
@@ -97,7 +97,7 @@ def test_what_is_written(name: str, written: Callable[[str], Path]) -> None:
     assert not re.search(r"\bfmi[23]", text)
 
 
-@pytest.mark.parametrize("name", [*map(slow, NAMES[1:]), NAMES[0], "SpringPlant"])
+@pytest.mark.parametrize("name", [*map(slow, NAMES[1:]), NAMES[0], slow("SpringPlant")])
 def test_the_example_runs_by_the_command_at_its_top(
     name: str, written: Callable[[str], Path]
 ) -> None:

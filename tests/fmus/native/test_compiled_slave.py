@@ -124,10 +124,10 @@ def has_fma() -> bool:
 @pytest.mark.parametrize(
     ("options", "reason"),
     [
-        (["-ffp-contract=off", "-march=native"], None),
+        slow(["-ffp-contract=off", "-march=native"], None),
         slow(["-ffp-contract=off", "-march=native", "-O3"], None),
         (["-ffp-contract=fast", "-march=native"], FUSED),
-        (["-ffp-contract=off", "-ffinite-math-only"], FAST),
+        slow(["-ffp-contract=off", "-ffinite-math-only"], FAST),
         slow(["-ffp-contract=off", "-fno-signed-zeros"], FAST),
         slow(
             ["-ffp-contract=off", "-fassociative-math", "-fno-signed-zeros", "-fno-trapping-math"],

@@ -4,6 +4,8 @@ import ast
 import math
 import textwrap
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
 from random import Random
 from typing import Any
 
@@ -664,14 +666,28 @@ def source() -> tuple[str, list[str]]:
 SOURCE, NAMES = source()
 
 
-@pytest.fixture(scope="module")
-def blocks(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[CBlock, PythonBlock]]:
-    folder = tmp_path_factory.mktemp("constructs")
+Both = tuple[CBlock, PythonBlock]
+
+
+@contextmanager
+def compiled(folder: Path, level: str) -> Iterator[Both]:
     file = folder / "constructs.py"
     file.write_text(SOURCE, "utf-8")
     with _run(file, ast.parse(SOURCE)) as block:
         files = translated("Constructs", block, file)
-        yield CBlock(library(files, folder / "c")), PythonBlock(block)
+        yield CBlock(library(files, folder / "c", "gcc", level)), PythonBlock(block)
+
+
+@pytest.fixture(scope="module")
+def blocks(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Both]:
+    with compiled(tmp_path_factory.mktemp("constructs"), "-O0") as both:
+        yield both
+
+
+@pytest.fixture(scope="module")
+def optimised(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Both]:
+    with compiled(tmp_path_factory.mktemp("constructs"), "-O2") as both:
+        yield both
 
 
 EXTREME = [0.0, -0.0, 0.5, 1.0, -1.0, 2.0, -2.0, 3.0, -8.0, 5e-324, -5e-324, 1e-300, 1e300, -1e300]
@@ -680,9 +696,7 @@ numbers = st.one_of(st.sampled_from(EXTREME), st.floats(), st.floats(-4.0, 4.0))
 
 
 @pytest.mark.parametrize("mode", range(-1, 6))
-def test_a_number_that_is_no_member_is_refused(
-    blocks: tuple[CBlock, PythonBlock], mode: int
-) -> None:
+def test_a_number_that_is_no_member_is_refused(blocks: Both, mode: int) -> None:
     in_c, in_python = blocks
     v = [float(mode) if x.name == "mode" else s for x, s in zip(*_named(in_python), strict=True)]
     assert same(in_c.check(v), in_python.check(v))
@@ -693,7 +707,7 @@ def _named(block: PythonBlock) -> tuple[list[Any], list[float]]:
 
 
 def _agree(
-    blocks: tuple[CBlock, PythonBlock],
+    blocks: Both,
     which: int,
     reals: Sequence[float],
     n: int,
@@ -716,9 +730,7 @@ def _agree(
 
 
 @pytest.mark.parametrize("which", range(len(NAMES)), ids=NAMES)
-def test_a_construct_gives_the_bits_and_the_faults_of_python(
-    blocks: tuple[CBlock, PythonBlock], which: int
-) -> None:
+def test_a_construct_gives_the_bits_and_the_faults_of_python(blocks: Both, which: int) -> None:
     random = Random(which)
     for _ in range(50):
         small = [random.uniform(-4.0, 4.0) for _ in range(3)]
@@ -737,11 +749,11 @@ def test_a_construct_gives_the_bits_and_the_faults_of_python(
     st.sampled_from([0, 2, 5, -1]),
 )
 def test_constructs_agree_with_python_on_all_numbers(
-    blocks: tuple[CBlock, PythonBlock],
+    optimised: Both,
     which: int,
     reals: tuple[float, float, float],
     n: int,
     flag: bool,
     mode: int,
 ) -> None:
-    _agree(blocks, which, reals, n, flag, mode)
+    _agree(optimised, which, reals, n, flag, mode)

@@ -99,6 +99,7 @@ def test_nothing_is_made_twice(natives: Path, tmp_path: Path) -> None:
     assert contents(tmp_path / "out") == contents(natives)
 
 
+@pytest.mark.slow
 def test_whatever_is_altered_is_made_anew(natives: Path, tmp_path: Path) -> None:
     shutil.copytree(natives, tmp_path / "out")
     fmu = tmp_path / "out/GripperPlant.fmu"

@@ -160,6 +160,7 @@ def python_block(name: str) -> PythonBlock:
         return PythonBlock(block)
 
 
+@pytest.mark.slow
 def test_the_same_sources_give_the_same_bytes() -> None:
     code = (
         "from grasp_fmus.native.translation import translated\n"
