@@ -94,6 +94,7 @@ def test_a_swapped_plant_has_its_own_twin(command: Run, fmus: Path, plant: str) 
     assert native["native_twin_of"] == python["guid"] != native["guid"]
 
 
+@pytest.mark.slow
 def test_in_processes_of_their_own(command: Run) -> None:
     asked = ("--step", "1e-3", "--stop", "0.05")
     native = recorded(command, "b", *asked, "--native", "--isolation", "process")
@@ -114,8 +115,8 @@ def test_run_takes_the_fmus_as_they_are_named(command: Run) -> None:
 @pytest.mark.parametrize(
     "arguments",
     [
-        ("run", "--step-study", "--step", "3.2e-3", "--stop", "0.64", "--of", "plant.gap[1]",
-         "--tolerance", "1"),
+        slow(("run", "--step-study", "--step", "3.2e-3", "--stop", "0.64", "--of", "plant.gap[1]",
+              "--tolerance", "1")),
         slow(("sweep", "study.toml", "--workers", "1")),
         ("qualify", "plant.fmu", "--as", "plant", *SHORT, "--isolation", "none"),
     ],
@@ -220,6 +221,7 @@ def test_without_a_compiler_native_is_refused_in_one_line(command: Run) -> None:
     assert "pip install ziglang" in err
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_compiler")
 def test_without_a_compiler_a_sweep_takes_python_and_says_why(command: Run) -> None:
     Path("study.toml").write_text(STUDY)

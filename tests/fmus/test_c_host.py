@@ -19,6 +19,7 @@ from grasp_fmus.shipped import SCRIPTS
 from support.fmi2 import ERROR, OK, Fmu, Instance
 from support.pythons import VERSIONS, python
 from support.scripted_peer import SIGNATURE, VARIABLES, ScriptedPeer
+from support.slow import slow
 
 SOURCE = Path(__file__).with_name("host.c")
 STEPS, H = 20, 1e-3
@@ -125,7 +126,7 @@ def numbers(printed: str) -> list[list[float]]:
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-@pytest.mark.parametrize("name", INPUT)
+@pytest.mark.parametrize("name", ["GripperPlant", *map(slow, sorted({*INPUT} - {"GripperPlant"}))])
 def test_a_bound_fmu_runs_in_c(host: Path, bound: Bind, name: str, version: str) -> None:
     """Also with the state saved, restored and the step taken again."""
     fmu = bound(name, version)

@@ -20,6 +20,7 @@ from fmpy.util import read_csv, read_ref_opt_file, validate_result
 from grasp_fmus.contract import declared
 from grasp_fmus.cross_check import SIGNALS, STEP_SIZE, cross_check_files
 from support.kinds import Kind, all_kinds
+from support.slow import slow
 
 BLOCKS = {
     "GripperPlant": "gripper_plant.rigid",
@@ -43,7 +44,10 @@ def block(name: str) -> ModuleType:
     return importlib.import_module(BLOCKS[name])
 
 
-@pytest.fixture(scope="module", params=sorted(BLOCKS))
+@pytest.fixture(
+    scope="module",
+    params=[slow(n) if n[12:] in ("Compliant", "Movable") else n for n in sorted(BLOCKS)],
+)
 def name(request: pytest.FixtureRequest) -> str:
     """The FMUs, one after the other."""
     return str(request.param)

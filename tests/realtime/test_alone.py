@@ -67,7 +67,7 @@ def same_bits(one: Result, two: Result) -> bool:
 
 
 @pytest.mark.parametrize("version", ["2.0", slow("3.0")])
-@pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
+@pytest.mark.parametrize("scheme", ["jacobi", slow("sequential")])
 def test_it_has_the_bits_of_a_free_run_and_a_timing(
     tmp_path: Path, version: str, scheme: str
 ) -> None:
