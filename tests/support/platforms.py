@@ -114,7 +114,7 @@ def host_of(target: Target, folder: Path, options: Sequence[str] = ()) -> Host:
 
 
 def windows() -> dict[str, str]:
-    """The environment of a program that wine runs; with a small one, such a program starts none."""
+    """The environment of a program that wine runs."""
     return {**os.environ, "WINEPREFIX": str(_wine()), "WINEDEBUG": "-all"}
 
 
