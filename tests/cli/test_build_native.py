@@ -10,7 +10,8 @@ from grasp_cosim.interface.read import describe
 from grasp_fmus.native import compilers
 from grasp_fmus.native.compilers import CompilerError
 from grasp_fmus.native.targets import here
-from support.compilers import needs_gcc, needs_zig
+from support.compilers import needs_zig
+from support.native_fmus import needs_gcc
 
 ROOT = Path(__file__).parents[2]
 SPRING = ROOT / "docs/spring_plant.py"

@@ -89,15 +89,6 @@ class Job(NamedTuple):
         return self.compiler.line(self.name, self.target)
 
 
-def compile_binary(sources: Mapping[str, bytes], name: str, target: Target) -> bytes:
-    """Return a shared library of NAME.c among sources, for a target, of this machine's compiler.
-
-    ValueError where there is no compiler, CompilerError where it fails.
-    """
-    (binary,) = compile_all([Job(sources, name, target, compiler_for(target, asked=False))])
-    return binary
-
-
 def compile_all(jobs: Sequence[Job]) -> list[bytes]:
     """Return the shared library of each job, made now, as many at once as there are processors.
 

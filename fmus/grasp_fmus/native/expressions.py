@@ -146,7 +146,6 @@ class Expressions:
     program: Program
     source: Source
     types: dict[str, Type]
-    own_class: type[Any] | None
     faults: set[str]
 
     def cname(self, name: str) -> str:

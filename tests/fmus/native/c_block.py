@@ -12,34 +12,11 @@ import pytest
 from grasp_fmus.contract import build_params, declared, packer, unpacker
 from grasp_fmus.contract import variables as scalar_variables
 from grasp_fmus.native import translation
+from grasp_fmus.native.compilers import LIBM
 from grasp_fmus.snapshot import _scalars, _shaped
 
 HERE = Path(__file__).parent
 HEADERS = Path(translation.__file__).parent / "c"
-LIBM = [
-    "sin",
-    "cos",
-    "tan",
-    "asin",
-    "acos",
-    "atan",
-    "atan2",
-    "sinh",
-    "cosh",
-    "tanh",
-    "asinh",
-    "acosh",
-    "atanh",
-    "exp",
-    "expm1",
-    "log",
-    "log2",
-    "log10",
-    "log1p",
-    "pow",
-    "fmod",
-    "ldexp",
-]
 FLAGS = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-ffp-contract=off"]
 FLAGS += [f"-fno-builtin-{name}" for name in LIBM]
 

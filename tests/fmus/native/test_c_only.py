@@ -19,7 +19,7 @@ from grasp_fmus.fmu import Model, shipped_model
 from grasp_fmus.native.c_only import called_of_libm, write_c
 from grasp_fmus.native.compilers import BITS
 from grasp_fmus.shipped import SCRIPTS, blocks
-from support.compilers import needs_gcc
+from support.native_fmus import needs_gcc
 from support.slow import slow
 
 ROOT = Path(__file__).parents[3]

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pytest
@@ -22,12 +22,12 @@ from grasp_fmus.native.compilers import (
     _scratch_folder,
     cache_folder,
     compile_all,
-    compile_binary,
     compiler_for,
     universal,
 )  # fmt: skip
 from grasp_fmus.native.targets import LINUX_ARM, LINUX_X86, MAC_ARM, MAC_X86, WINDOWS, Target, here
-from support.compilers import needs_gcc, needs_zig
+from support.compilers import needs_zig
+from support.native_fmus import needs_gcc
 
 SOURCES = {
     "Sum.c": b'#include "terms.h"\n__attribute__((visibility("default"))) int sum(void)'
@@ -56,9 +56,14 @@ def program(path: Path, text: str) -> Path:
     return path
 
 
+def library_of(sources: Mapping[str, bytes]) -> bytes:
+    (library,) = compile_all([Job(sources, "Sum", here(), compiler_for(here(), asked=False))])
+    return library
+
+
 @needs_gcc
 def test_compiles_one_file_that_includes_the_others(tmp_path: Path) -> None:
-    (tmp_path / "sum.so").write_bytes(compile_binary(SOURCES, "Sum", here()))
+    (tmp_path / "sum.so").write_bytes(library_of(SOURCES))
     assert ctypes.CDLL(str(tmp_path / "sum.so")).sum() == 42
 
 
@@ -83,10 +88,10 @@ def test_nothing_is_compiled_twice_unless_something_differs(
     monkeypatch.setenv("CC", counting(tmp_path, log))
     changed = {**SOURCES, "terms.h": SOURCES["terms.h"].replace(b"2", b"3")}
     for sources, runs in ((SOURCES, 1), (SOURCES, 1), (changed, 2), (SOURCES, 2)):
-        compile_binary(sources, "Sum", here())
+        library_of(sources)
         assert len(log.read_text().splitlines()) == runs
     monkeypatch.setenv("CC", f"{os.environ['CC']} -O1")
-    compile_binary(SOURCES, "Sum", here())
+    library_of(SOURCES)
     assert len(log.read_text().splitlines()) == 3
 
 
@@ -94,7 +99,7 @@ def test_nothing_is_compiled_twice_unless_something_differs(
 @pytest.mark.parametrize("place", ["/dev/null", "/proc"], ids=["a file", "read-only"])
 def test_works_where_nothing_can_be_kept(place: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", place)
-    assert compile_binary(SOURCES, "Sum", here())[:4] == b"\x7fELF"
+    assert library_of(SOURCES)[:4] == b"\x7fELF"
 
 
 @needs_zig
@@ -123,11 +128,11 @@ def test_a_relative_folder_does_not_count(tmp_path: Path, monkeypatch: pytest.Mo
 @pytest.mark.parametrize("damage", [lambda b: b[:3000], lambda b: b[:-1] + b"?", lambda b: b""])
 def test_what_is_damaged_is_made_again(tmp_path: Path, damage: Callable[[bytes], bytes]) -> None:
     """A kill or a full disk may have cut it; nobody is to get it in an FMU."""
-    library = compile_binary(SOURCES, "Sum", here())
+    library = library_of(SOURCES)
     (kept,) = (tmp_path / "cache/grasp-cosim/native").iterdir()
     whole = kept.read_bytes()
     kept.write_bytes(damage(whole))
-    assert compile_binary(SOURCES, "Sum", here()) == library
+    assert library_of(SOURCES) == library
     assert kept.read_bytes() == whole
 
 

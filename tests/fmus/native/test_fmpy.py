@@ -15,7 +15,7 @@ from fmpy.util import read_csv, read_ref_opt_file
 from fmpy.validation import validate_fmu
 from grasp_fmus.native.compilers import BITS, UNPREFIXED
 from grasp_fmus.shipped import blocks
-from support.compilers import needs_gcc
+from support.native_fmus import needs_gcc
 from support.slow import slow
 
 NAMES = [name for name in blocks() if name != "GripperPlantMuJoCo"]

@@ -18,7 +18,7 @@ from grasp_fmus.native.build import (
 from grasp_fmus.native.compilers import cache_folder
 from grasp_fmus.native.targets import here
 from grasp_fmus.shipped import blocks
-from support.compilers import needs_gcc
+from support.native_fmus import needs_gcc
 from support.slow import slow
 
 ROOT = Path(__file__).parents[3]

@@ -70,31 +70,8 @@ static inline void py_say_general(Fault *fault, double v, int digits)
 /* str(n) of an int, all its digits */
 static inline void py_say_whole(Fault *fault, double n)
 {
-    char text[320];
-    int digits[320], count = 1, at, carry, exponent;
-    double mantissa = frexp(fabs(n), &exponent);
-    size_t length = 0;
-    digits[0] = 0;
-    for (; exponent > 0; --exponent) { /* bit by bit, the highest first */
-        mantissa *= 2.0;
-        carry = mantissa >= 1.0;
-        mantissa -= carry;
-        for (at = 0; at < count; ++at) {
-            digits[at] = 2 * digits[at] + carry;
-            carry = digits[at] > 9;
-            digits[at] -= 10 * carry;
-        }
-        if (carry) {
-            digits[count++] = 1;
-        }
-    }
-    if (n < 0.0) {
-        text[length++] = '-';
-    }
-    while (count > 0) {
-        text[length++] = (char)('0' + digits[--count]);
-    }
-    text[length] = '\0';
+    char text[TEXT_SIZE];
+    text_general(text, n, TEXT_WHOLE);
     py_say(fault, text);
 }
 
