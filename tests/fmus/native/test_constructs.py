@@ -719,7 +719,7 @@ def _agree(
     given_ = dict(zip("abc", reals, strict=True))
     given_ |= {"which": which, "n": n, "flag": flag, "mode": mode}
     v = [
-        float(given_.get(x.name, s))
+        1.0 * given_.get(x.name, s)  # each an object, as from a host: `in` finds the same NaN
         for x, s in zip(in_python.variables, in_python.starts, strict=True)
     ]
     found, expected = in_c.step(v, [0.0], 1.0), in_python.step(v, [0.0], 1.0)
