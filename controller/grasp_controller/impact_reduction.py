@@ -4,6 +4,7 @@ Each finger has a virtual object of its own, Eq. (5) and (6); both follow the ta
 """
 
 from dataclasses import dataclass
+from math import log
 from typing import Annotated
 
 from block_variables import Group, Parameter
@@ -60,15 +61,17 @@ class Params(Group, name="impact_reduction"):
 def virtual_forces(p: Params, xi: Pair, xi_before: Pair, h: float) -> Pair:
     """f_pj in N, Eq. (5), from two samples of the intensities in V, h seconds apart.
 
-    Zero unless both samples reach the floor: xi'/xi has no meaning where xi is nothing.
+    xi'/xi is the rate of ln xi, and is sampled as the difference of two logarithms: noise then has
+    no mean in it, which it has in (xi - xi_before)/(h·xi). Zero unless both samples reach the
+    floor: where xi is nothing, xi'/xi has no meaning.
     """
     xi_1, xi_2 = xi
     was_1, was_2 = xi_before
     d_1, d_2 = p.viscosity
     floor = p.intensity_floor
     return (
-        0.0 if xi_1 < floor or was_1 < floor else d_1 * (xi_1 - was_1) / (h * xi_1),
-        0.0 if xi_2 < floor or was_2 < floor else d_2 * (xi_2 - was_2) / (h * xi_2),
+        0.0 if xi_1 < floor or was_1 < floor else d_1 * log(xi_1 / was_1) / h,
+        0.0 if xi_2 < floor or was_2 < floor else d_2 * log(xi_2 / was_2) / h,
     )
 
 

@@ -1,7 +1,7 @@
 """Each of the controller's layers by itself, Eqs. (2) to (7)."""
 
 from collections.abc import Sequence
-from math import isfinite, isnan, nan, nextafter, tanh
+from math import isfinite, isnan, log, nan, nextafter, tanh
 
 import numpy as np
 import pytest
@@ -101,10 +101,11 @@ def f_p(xi: Pair, before: Pair, h: float) -> Pair:
     return layer_2.virtual_forces(layer_2.Params(), xi, before, h)
 
 
-def test_the_virtual_viscous_force_is_a_backward_difference() -> None:
-    """0.6·((0.5 - 0.4)/0.001)/0.5 = 120 and -0.6·((0.2 - 0.25)/0.001)/0.2 = 150."""
-    assert f_p((0.5, 0.2), (0.4, 0.25), 1e-3) == pytest.approx((120.0, 150.0), rel=1e-13)
-    assert f_p((0.5, 0.2), (0.4, 0.25), 2e-3) == pytest.approx((60.0, 75.0), rel=1e-13)
+def test_the_virtual_viscous_force_is_a_difference_of_logarithms() -> None:
+    """0.6·ln(0.5/0.4)/0.001 and -0.6·ln(0.2/0.25)/0.001, which are ln(5/4) both."""
+    expected = 0.6 * (log(5.0) - log(4.0)) / 1e-3
+    assert f_p((0.5, 0.2), (0.4, 0.25), 1e-3) == pytest.approx((expected, expected), rel=1e-13)
+    assert f_p((0.5, 0.2), (0.4, 0.25), 2e-3) == pytest.approx((expected / 2,) * 2, rel=1e-13)
     assert f_p((0.5, 0.2), (0.5, 0.2), 1e-3) == (0.0, 0.0)
 
 
@@ -143,7 +144,7 @@ def test_below_the_floor_there_is_no_virtual_viscous_force(
 @pytest.mark.parametrize("xi", [0.0, nextafter(1e-6, 0.0)])
 def test_a_sensor_that_sees_nothing_does_not_disturb_the_other_finger(xi: float) -> None:
     right, left = f_p((0.5, xi), (0.4, 0.25), 1e-3)
-    assert right == pytest.approx(120.0, rel=1e-13)
+    assert right == pytest.approx(600.0 * log(1.25), rel=1e-13)
     assert left == 0.0
 
 

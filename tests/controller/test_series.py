@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
-from math import tanh
+from math import log, tanh
 from typing import Any
 
 import numpy as np
@@ -62,7 +62,9 @@ def virtual_forces(u: Inputs, before: Inputs) -> tuple[float, Pair]:
     """Eqs. (2) and (5) with the published gains."""
     xi_1, xi_2 = u.intensity
     f_s = 3.0 * tanh((xi_1 - xi_2) / (xi_1 + xi_2))
-    rates = [(xi - was) / (H * xi) for xi, was in zip(u.intensity, before.intensity, strict=True)]
+    rates = [
+        (log(xi) - log(was)) / H for xi, was in zip(u.intensity, before.intensity, strict=True)
+    ]
     return f_s, (0.6 * rates[0], -0.6 * rates[1])
 
 
