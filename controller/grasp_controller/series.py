@@ -53,44 +53,49 @@ class State(NamedTuple):
     impact_reduction_force: Pair
 
 
+Force = Annotated[
+    Pair,
+    Output(
+        "u_j, actuator force on the finger",
+        unit="N",
+        nominal=1.0,
+        depends_on={"position", "velocity[j]"},
+    ),
+]
+TargetPosition = Annotated[
+    float,
+    Output("x_v,2, target of both fingers", unit="m", nominal=0.1, depends_on={"position"}),
+]
+VirtualPosition = Annotated[
+    Pair,
+    Output("x_vj,1, virtual object of the finger", unit="m", nominal=0.1, depends_on={"position"}),
+]
+SimultaneousContactForce = Annotated[
+    float,
+    Output(
+        "f_s, virtual force of layer 3",
+        unit="N",
+        nominal=1.0,
+        depends_on=set(),
+        depends_initially_on={"intensity"},
+    ),
+]
+ImpactReductionForce = Annotated[
+    Pair, Output("f_pj, virtual force of layer 2", unit="N", nominal=1.0, depends_on=set())
+]
+
+
 class Outputs(NamedTuple):
     """The command to the fingers, and the inner signals of the layers.
 
     With layers 3 and 2 off, the middle of the fingers goes straight through to the forces.
     """
 
-    force: Annotated[
-        Pair,
-        Output(
-            "u_j, actuator force on the finger",
-            unit="N",
-            nominal=1.0,
-            depends_on={"position", "velocity[j]"},
-        ),
-    ]
-    target_position: Annotated[
-        float,
-        Output("x_v,2, target of both fingers", unit="m", nominal=0.1, depends_on={"position"}),
-    ]
-    virtual_position: Annotated[
-        Pair,
-        Output(
-            "x_vj,1, virtual object of the finger", unit="m", nominal=0.1, depends_on={"position"}
-        ),
-    ]
-    simultaneous_contact_force: Annotated[
-        float,
-        Output(
-            "f_s, virtual force of layer 3",
-            unit="N",
-            nominal=1.0,
-            depends_on=set(),
-            depends_initially_on={"intensity"},
-        ),
-    ]
-    impact_reduction_force: Annotated[
-        Pair, Output("f_pj, virtual force of layer 2", unit="N", nominal=1.0, depends_on=set())
-    ]
+    force: Force
+    target_position: TargetPosition
+    virtual_position: VirtualPosition
+    simultaneous_contact_force: SimultaneousContactForce
+    impact_reduction_force: ImpactReductionForce
 
 
 def initial_state(p: Params, u: Inputs) -> State:
@@ -102,7 +107,11 @@ def initial_state(p: Params, u: Inputs) -> State:
 
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
     """Advance the virtual objects by h seconds (h > 0), the samples u held."""
-    f_s = layer_3.virtual_force(p.simultaneous_contact, u.intensity)
+    return advance(p, x, u, layer_3.virtual_force(p.simultaneous_contact, u.intensity), h)
+
+
+def advance(p: Params, x: State, u: Inputs, f_s: float, h: float) -> State:
+    """The virtual objects h seconds later, the samples u and the virtual force f_s in N held."""
     before = after = _middle(u)
     if p.simultaneous_contact.enabled:
         before = x.target

@@ -1,0 +1,122 @@
+"""The three layers in series, with a layer 3 that learns how the faces' reflectances differ.
+
+Layers 1 and 2 and the target are those of series.py; the virtual force of layer 3 compares the
+intensities as equal faces would give them, and fades as the fingers hold:
+
+    f_s = (1 - h)·K_s·tanh((xi_1 - e^beta·xi_2)/(xi_1 + e^beta·xi_2))                  Eq. (2')
+"""
+
+from dataclasses import dataclass
+from math import exp
+from typing import Annotated, NamedTuple
+
+from block_variables import Output
+
+from . import holding, reflectance_ratio, series
+from . import simultaneous_contact as layer_3
+from .impact_reduction import Pair
+from .series import Inputs as Inputs
+
+
+@dataclass(frozen=True, slots=True)
+class Params(series.Params):
+    """The parameters of the three layers, and of what is learnt."""
+
+    reflectance: reflectance_ratio.Params = reflectance_ratio.Params()
+    hold: holding.Params = holding.Params()
+
+
+class State(NamedTuple):
+    """The virtual objects, the fingers' lines, and what they told at the last sample."""
+
+    layers: series.State
+    line_1: reflectance_ratio.Line
+    line_2: reflectance_ratio.Line
+    estimate: reflectance_ratio.Estimate
+    closing: float
+    hold: float
+
+
+class Outputs(NamedTuple):
+    """Those of the published law, and what has been learnt."""
+
+    force: series.Force
+    target_position: series.TargetPosition
+    virtual_position: series.VirtualPosition
+    simultaneous_contact_force: series.SimultaneousContactForce
+    impact_reduction_force: series.ImpactReductionForce
+    reflectance_ratio: Annotated[
+        float,
+        Output(
+            "alpha_1/alpha_2, reflectance of the right face to that of the left one, as learnt",
+            unit="1",
+            nominal=1.0,
+            depends_on=set(),
+        ),
+    ]
+    reflectance_ratio_standard_deviation: Annotated[
+        float,
+        Output("standard deviation of that ratio", unit="1", nominal=1.0, depends_on=set()),
+    ]
+    estimated_gap: Annotated[
+        Pair,
+        Output(
+            "l_j, gap as learnt",
+            unit="m",
+            nominal=0.1,
+            depends_on=set(),
+            depends_initially_on={"intensity[j]"},
+        ),
+    ]
+    hold: Annotated[
+        float,
+        Output(
+            "h, from 0 while approaching to 1 in a grasp", unit="1", nominal=1.0, depends_on=set()
+        ),
+    ]
+
+
+def initial_state(p: Params, u: Inputs) -> State:
+    """As the published law starts, with nothing learnt."""
+    floor = p.impact_reduction.intensity_floor
+    (x_1, x_2), (xi_1, xi_2) = u.position, u.intensity
+    line_1 = reflectance_ratio.first_point(p.reflectance, floor, x_1, xi_1)
+    line_2 = reflectance_ratio.first_point(p.reflectance, floor, -x_2, xi_2)
+    estimate = reflectance_ratio.ratio(p.reflectance, line_1, line_2)
+    return State(series.initial_state(p, u), line_1, line_2, estimate, 0.0, 0.0)
+
+
+def step(p: Params, x: State, u: Inputs, h: float) -> State:
+    """Advance the virtual objects by h seconds (h > 0), the samples u held, and learn from them."""
+    (x_1, x_2), (v_1, v_2) = u.position, u.velocity
+    xi_1, xi_2 = u.intensity
+    closing = holding.filtered(p.hold, x.closing, v_1 - v_2, h)
+    held = holding.hold(p.hold, series.outputs(p, x.layers, u).force, closing)
+    floor = p.impact_reduction.intensity_floor
+    line_1 = reflectance_ratio.moved(p.reflectance, x.line_1, floor, x_1, xi_1, 1.0 - held, h)
+    line_2 = reflectance_ratio.moved(p.reflectance, x.line_2, floor, -x_2, xi_2, 1.0 - held, h)
+    estimate = reflectance_ratio.ratio(p.reflectance, line_1, line_2)
+    alike = (xi_1, exp(estimate.beta) * xi_2)
+    f_s = (1.0 - held) * layer_3.virtual_force(p.simultaneous_contact, alike)
+    layers = series.advance(p, x.layers, u, f_s, h)
+    return State(layers, line_1, line_2, estimate, closing, held)
+
+
+def outputs(p: Params, x: State, u: Inputs) -> Outputs:
+    """The forces for the samples u, and what has been learnt."""
+    y = series.outputs(p, x.layers, u)
+    alike = exp(x.estimate.beta)
+    return Outputs(
+        y.force,
+        y.target_position,
+        y.virtual_position,
+        y.simultaneous_contact_force,
+        y.impact_reduction_force,
+        alike,
+        alike * x.estimate.deviation,
+        (
+            reflectance_ratio.gap(p.reflectance, x.line_1),
+            reflectance_ratio.gap(p.reflectance, x.line_2),
+        ),
+        x.hold,
+    )

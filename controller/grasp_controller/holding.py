@@ -1,0 +1,54 @@
+"""Tells a grasp from an approach: the fingers press, and no longer move towards each other.
+
+P = max(0, (u_2 - u_1)/2)         h = P^2/(P^2 + P_0^2) · w_0^2/(w_0^2 + w^2)
+"""
+
+from dataclasses import dataclass
+from math import expm1
+from typing import Annotated
+
+from block_variables import Group, Parameter
+
+MOST = 1e9
+"""Squeezes in N and speeds in m/s count as this at most, that squares of them stay numbers."""
+
+
+@dataclass(frozen=True, slots=True)
+class Params(Group, name="hold"):
+    """From which squeeze on, and below which speed, it is a grasp."""
+
+    squeeze: Annotated[
+        float,
+        Parameter(
+            "P_0, mean force that is half a grasp", unit="N", low=1e-6, high=1e12, tunable=True
+        ),
+    ] = 0.1
+    speed: Annotated[
+        float,
+        Parameter(
+            "w_0, speed of closing that is half a grasp",
+            unit="m/s",
+            low=1e-9,
+            high=1e3,
+            tunable=True,
+        ),
+    ] = 2e-3
+    time_constant: Annotated[
+        float,
+        Parameter("low-pass of the speed of closing", unit="s", low=1e-6, high=1e3, tunable=True),
+    ] = 0.02
+
+
+def filtered(p: Params, before: float, closing: float, h: float) -> float:
+    """The low-passed speed of closing in m/s, h seconds later."""
+    rest = min(max(closing, -MOST), MOST)
+    return before - expm1(-h / p.time_constant) * (rest - before)
+
+
+def hold(p: Params, u: tuple[float, float], closing: float) -> float:
+    """Return h from the forces u in N and the low-passed speed of closing in m/s: 1 is a grasp."""
+    u_1, u_2 = u
+    squeeze = min(max(0.0, 0.5 * u_2 - 0.5 * u_1), MOST)
+    pressed = squeeze * squeeze / (squeeze * squeeze + p.squeeze * p.squeeze)
+    at_rest = p.speed * p.speed / (p.speed * p.speed + closing * closing)
+    return pressed * at_rest
