@@ -7,10 +7,11 @@ Another equation in one layer, and everything else as it comes with the package.
 
 from grasp_controller import impact_reduction as layer_2
 from grasp_controller import series
-from grasp_controller.series import Inputs, Outputs, Params, State
+from grasp_controller.series import Inputs, Params, State
 
 initial_state = series.initial_state
 outputs = series.outputs
+Outputs = series.Outputs
 
 
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
