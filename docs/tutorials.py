@@ -144,6 +144,22 @@ def blind_by_equation_9(run: Result) -> float:
     return max(0.0, math.pow(gain / highest, 1.0 / 1.1506) - 0.005)
 
 
+def mean_forces(run: Result) -> list[float]:
+    """f_pj on average, N."""
+    forces = (run.signals[f"controller.impact_reduction_force[{j}]"] for j in FINGERS)
+    return [float(f[1:].mean()) for f in forces]
+
+
+def quotients(run: Result) -> list[float]:
+    """f_pj on average, N, as noise leaves it in a quotient of the sampled intensities."""
+    found = []
+    for j, d_p in zip(FINGERS, (0.6, -0.6), strict=True):
+        xi = run.signals[f"sensor_{j}.intensity"]
+        r_1 = np.corrcoef(xi[1:], xi[:-1])[0, 1]
+        found.append(-d_p * (xi.std() / xi.mean()) ** 2 * (1.0 - r_1) / (run.time[1] - run.time[0]))
+    return found
+
+
 def gap_by_equation_7(run: Result) -> float:
     """The gap in m at which friction holds a finger against layer 1; 0 where it does not."""
     stiffness = value(run, "controller.contact_force.stiffness", 98.0)
@@ -169,6 +185,8 @@ COLUMNS: Mapping[str, tuple[str | Callable[[Result], float], float, int]] = {
     "formula, mm/s": (drift_by_equation_3, 1e3, 1),
     "blind below, mm": (blind_by_equation_9, 1e3, 1),
     "formula, mm": (gap_by_equation_7, 1e3, 1),
+    "f_p on average, N": (mean_forces, 1.0, 2),
+    "formula of a quotient, N": (quotients, 1.0, 2),
 }
 """What the headings of the tables mean: a metric or a function of a run, its factor, the digits."""
 
@@ -232,7 +250,7 @@ def _label(axes: Any, x: str, y: str, title: str = "", *, legend: bool = True) -
 
 def draw_limits(tables: Sequence[Runs], folder: Path) -> None:
     """limits.png: unequal reflectances, fixed and free; a converter too small; friction."""
-    reflectances, carried, converter, _, friction, *_ = tables
+    reflectances, carried, converter, _, _, _, _, friction, *_ = tables
     figure = new_figure(9.0, 7.0)
     (top_left, top_right), (bottom_left, bottom_right) = figure.subplots(2, 2)
     reflectances, converter, friction = map(_plain, (reflectances, converter, friction))
@@ -295,10 +313,15 @@ PAGES: Mapping[str, Callable[[Sequence[Runs], Path], None]] = {
 }
 
 
+BLOCKS = ("spring_plant.py", "quotient_controller.py")
+"""What the pages build before they run it."""
+
+
 def main() -> None:
     """Update the pages and their pictures."""
-    if code := cli.main(["build", str(HERE / "spring_plant.py")]):
-        sys.exit(code)
+    for block in BLOCKS:
+        if code := cli.main(["build", str(HERE / block)]):
+            sys.exit(code)
     with TemporaryDirectory() as folder:
         do = recorder(Path(folder))
         for name, draw in PAGES.items():

@@ -7,11 +7,15 @@ import runpy
 import shlex
 import subprocess
 import zipfile
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from grasp_controller import series
+from grasp_controller.impact_reduction import Params as Layer2
+from grasp_controller.simultaneous_contact import Params as Layer3
 from grasp_cosim import System, cli
 
 ROOT = Path(__file__).parents[2]
@@ -73,7 +77,7 @@ def checked(name: str, checkout: Path) -> tuple[list[Any], Any]:
 
 
 def test_the_commands_at_the_beginnings_work(checkout: Path) -> None:
-    assert [command.split()[1] for command in INDENTED] == ["run", "run", "build", "run"]
+    assert [command.split()[1] for command in INDENTED] == ["run", "run", "build", "build", "run"]
     for command in INDENTED:
         short = ["--stop", "0.01"] if command.split()[1] == "run" else []
         assert cli.main([*shlex.split(command)[1:], *short]) == 0, command
@@ -110,14 +114,16 @@ def test_the_switch_in_a_system_file_makes_case_1(checkout: Path, grasp: System)
 
 @pytest.mark.slow
 def test_limits(checkout: Path) -> None:
+    assert cli.main(["build", "docs/quotient_controller.py"]) == 0
     tables, do = checked("limits", checkout)
-    reflectances, carried, converter, _, friction, loop, near, _ = tables
+    reflectances, carried, converter, _, *noise, friction, loop, near, _ = tables
     assert_reflectances(reflectances, do)
     assert_formulas(carried, converter, friction)
+    assert_noise(*noise)
     assert_loop(loop)
     headings = re.findall(r"^## (.*)$", page("limits"), re.MULTILINE)
-    assert "You see seven ways" in page("limits")
-    assert len(headings) == 8
+    assert "You see eight ways" in page("limits")
+    assert len(headings) == 9
     assert headings[-1] == "What is no limit"
     place = r"at (\d+) mm the nearer one has (\d+) mm to go, at (\d+) mm (\d+) mm"
     assert said("limits", place) == [
@@ -171,16 +177,61 @@ def assert_formulas(carried: Any, converter: Any, friction: Any) -> None:
     assert not friction["5"].signals["plant.contact[1]"].any()
 
 
+def assert_noise(held: Any, moving: Any, dark: Any) -> None:
+    """What noise leaves in f_p, worked out here once more, and what the fingers make of it."""
+    swap = " --swap controller=fmus/build/QuotientController.fmu"
+    for options, run in held.items():
+        h, ends = run.time[1] - run.time[0], (run.time[-1] - run.time[0])
+        for j, d_p in ((1, 0.6), (2, -0.6)):
+            xi = run.signals[f"sensor_{j}.intensity"]
+            mean = run.signals[f"controller.impact_reduction_force[{j}]"][1:].mean()
+            if not options.endswith(swap):
+                assert mean == pytest.approx(d_p * math.log(xi[-1] / xi[0]) / ends, rel=1e-9)
+                continue
+            assert mean == pytest.approx(d_p * np.mean(1.0 - xi[:-1] / xi[1:]) / h, rel=1e-9)
+            s, r_1 = xi.std() / xi.mean(), np.corrcoef(xi[1:], xi[:-1])[0, 1]
+            formula = -d_p * s**2 * (1.0 - r_1) * (1.0 + 3.0 * s**2) / h
+            assert mean == pytest.approx(formula, rel=0.1)
+    sigma, at_1, at_2 = said("limits", r"sigma = ([\d.]+) mV; .* back (\d+) mV .* start, (\d+) mV")
+    signals = held["--step 1e-3 --stop 10"].signals
+    for j, volts in ((1, at_1), (2, at_2)):
+        assert round(1e3 * signals[f"sensor_{j}.intensity"].mean()) == volts
+        assert round(1e3 * signals[f"sensor_{j}.intensity"].std(), 1) == sigma
+    fine, coarse = (moving[f"--step {h}"].metrics["time_to_contact"] for h in ("1e-4", "1e-3"))
+    assert coarse == pytest.approx(fine, abs=1e-3)
+    early = [max(moving[f"--step {h}{swap}"].metrics["time_to_contact"]) for h in ("1e-3", "1e-4")]
+    assert early[0] < early[1] < min(fine)
+    good, bad, mended = (max(run.metrics["impact_velocity"]) for run in dark.values())
+    assert max(good, mended) < 0.01 < bad
+
+
+def test_the_quotient_controller_differs_in_layer_2_alone() -> None:
+    block = runpy.run_path(str(DOCS / "quotient_controller.py"))
+    u = block["Inputs"](intensity=(0.05, 0.02))
+    later = u._replace(position=(0.1, -0.1), intensity=(0.1, 0.025))
+    for layers in product((False, True), repeat=2):
+        p = series.Params(Layer3(enabled=layers[0]), Layer2(enabled=layers[1]))
+        x = series.initial_state(p, u)
+        ours, its = series.step(p, x, later, 1e-3), block["step"](p, x, later, 1e-3)
+        assert its.impact_reduction_force == pytest.approx((300.0, -120.0), rel=1e-12)
+        assert its._replace(impact_reduction_force=(), virtual=()) == ours._replace(
+            impact_reduction_force=(), virtual=()
+        )
+        assert (its.virtual == ours.virtual) is not layers[1]
+
+
 def assert_loop(loop: Any) -> None:
-    """Steps of 30 ms go well; with 40 ms layer 2 swings; 8 ms do, delayed at each connection."""
+    """Steps of 20 ms go well; with 40 ms layer 2 swings; 8 ms do, delayed at each connection."""
 
     def swings(run: Any) -> int:
         force = run.signals["controller.impact_reduction_force[1]"]
         free = ~np.maximum.accumulate(run.signals["plant.contact[1]"].astype(bool))
         return int((force[free][1:] * force[free][:-1] < 0.0).sum())
 
-    assert said("limits", r"bears steps of (\d+) ms; at (\d+) ms") == [30.0, 40.0]
-    assert swings(loop["--step 0.03"]) == 0
+    assert said("limits", r"bears steps of (\d+) ms; at (\d+) ms") == [20.0, 30.0]
+    assert swings(loop["--step 0.02"]) == 0
+    assert max(loop["--step 0.02"].metrics["impact_velocity"]) < 0.0065
+    assert None in loop["--step 0.03"].metrics["impact_velocity"]
     assert swings(loop["--step 0.04"]) >= 3
     assert said("limits", r"and then (\d+) ms are too many") == [8.0]
     slow, fast = (loop[f"--scheme jacobi --step {h}"].metrics for h in ("8e-3", "5e-3"))
