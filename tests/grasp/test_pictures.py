@@ -69,6 +69,14 @@ def test_close_ups_of_the_contacts(
     assert width(tmp_path / "grasp.png") == int(130 * (7.2 + 2.9 * len(close_ups)))
 
 
+def test_the_picture_says_which_controller_it_was(tmp_path: Path, saved: list[Figure]) -> None:
+    run = touching_from(grasp_run(), {})
+    own = {"components": {"controller": {"fmu": "My$Law$.fmu"}}}
+    for settings, title in ((own, "My$Law$"), ({}, "")):
+        pictures.draw_grasp(replace(run, settings=settings), tmp_path / "grasp.png")
+        assert saved[-1].get_suptitle() == title
+
+
 def test_a_close_up_shows_the_samples_around_the_contact(
     tmp_path: Path, saved: list[Figure]
 ) -> None:

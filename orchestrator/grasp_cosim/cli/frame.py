@@ -91,6 +91,15 @@ def with_preset(system: System, name: str) -> System:
     return with_built_in(system, name)
 
 
+def with_controller(system: System, law: str | None) -> System:
+    """The system with one of the controllers that come with the package; None: as it is."""
+    if law is None:
+        return system
+    from ..grasp.controllers import with_controller as with_shipped
+
+    return with_shipped(system, law)
+
+
 def chosen_metrics(files: Sequence[Path]) -> tuple[Metric, ...]:
     """The metrics of the files that metrics_option names; InputError where one fails."""
     from ..metrics.metric import load_metrics

@@ -7,13 +7,21 @@ from typing import Any
 
 import click
 
+from ..errors import InputError
 from ..system.description import System
 from ..system.structure import DIVERGING, SCHEMES
-from .frame import load_system, pair, together, with_preset
+from .frame import load_system, pair, together, with_controller, with_preset
 
 set_option = click.option("--set", "settings", multiple=True, metavar="COMPONENT.VARIABLE=VALUE")
 
+controller_option = click.option(
+    "--controller",
+    type=click.Choice(("published", "adaptive")),
+    help="The controller of ours that takes the place of SYSTEM's.",
+)
+
 system_options = together(
+    controller_option,
     click.option("--preset", "presets", multiple=True, help="Values that the system file names."),
     click.option("--case", type=click.IntRange(0, 2), help="Short for --preset case_0, ..._2."),
     click.option("--bench", is_flag=True, help="Short for --preset bench."),
@@ -36,13 +44,24 @@ def set_values(settings: Sequence[str]) -> dict[str, Any]:
 
 
 def chosen_system(given: Mapping[str, Any]) -> System:
-    """The system with presets, the case last, and another experiment; without --set.
+    """The system with a controller, presets, the case last, another experiment; without --set.
 
     `given` are the values of all options of a command by name.
     """
     step, stop, case = given["step"], given["stop"], given["case"]
-    system = load_system(given["system"], step, stop)
+    system = with_controller(load_system(given["system"], step, stop), given["controller"])
     names = [*given["presets"], *(["bench"] if given["bench"] else [])]
     for name in [*names, *([] if case is None else [f"case_{case}"])]:
         system = with_preset(system, name)
     return system.with_experiment(step, stop, given["scheme"], given["diverging"])
+
+
+def check_swaps(system: System, law: str | None, fmus: Mapping[str, str]) -> None:
+    """InputError where --swap replaces what --controller does, too."""
+    if law is None:
+        return
+    from ..grasp.controllers import controller_name
+
+    name = controller_name(system)
+    if name in fmus:
+        raise InputError(f"--controller {law}: must not come with --swap {name}={fmus[name]}")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..metrics.metric import resolved
 from ..numerals import fixed
 from ..recording.result import Result
 from ..report.plot import BLUE, GREY, RED, finish, new_figure, save
@@ -45,6 +46,9 @@ def draw_grasp(run: Result, path: Path) -> None:
         _around(column, run, fingers, begin, end)
         for axes in rows[:, 0]:
             axes.axvspan(begin, end, color="#000000", alpha=0.06, linewidth=0.0)
+    controller = resolved("controller.", run.roles)[:-1]
+    fmu = run.settings.get("components", {}).get(controller, {}).get("fmu", "")
+    figure.suptitle(fmu.removesuffix(".fmu"), fontsize=10, parse_math=False)
     save(figure, path)
 
 

@@ -14,17 +14,35 @@ from ...grasp.published.store import FOLDER
 from ...grasp.published.tables import Source
 from ...numerals import fixed
 from ...sweep.store import Parts
-from ..frame import INTERRUPTED, NEGATIVE, PATH, fail, json_option, load_system, show
+from ..frame import (
+    INTERRUPTED,
+    NEGATIVE,
+    PATH,
+    fail,
+    json_option,
+    load_system,
+    show,
+    with_controller,
+)
 from ..native import many_runs_option, natively
+from ..options import controller_option
 
 
 @click.command()
 @click.option("--bench", is_flag=True, help="The experiments, with friction and electronics.")
+@controller_option
 @click.option("--out", type=PATH, default=Path("results"), show_default=True)
 @click.option("--workers", type=click.IntRange(1), default=os.cpu_count(), show_default="all cores")
 @many_runs_option
 @json_option
-def evaluate(bench: bool, out: Path, workers: int, native: bool | None, as_json: bool) -> int:
+def evaluate(
+    bench: bool,
+    controller: str | None,
+    out: Path,
+    workers: int,
+    native: bool | None,
+    as_json: bool,
+) -> int:
     """Run the published simulation table and figures and compare; --bench: the experiments.
 
     Finished grasps are kept until all are done: the same command goes on where it was ended.
@@ -33,7 +51,7 @@ def evaluate(bench: bool, out: Path, workers: int, native: bool | None, as_json:
     Example: grasp-cosim evaluate --out results
     """
     check_folder(out)
-    system = load_system()
+    system = with_controller(load_system(), controller)
     source: Source = "experiment" if bench else "simulation"
     system = with_preset(system, "bench") if bench else system
     try:

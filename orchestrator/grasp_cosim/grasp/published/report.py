@@ -9,6 +9,7 @@ from ...numerals import fixed
 from ...plain import to_cell
 from ...system.description import System
 from ...system.parts import NANOSECONDS
+from ..controllers import controller_name
 
 FIGURES = """## Figures
 
@@ -32,8 +33,8 @@ def markdown(report: Mapping[str, Any], system: System) -> str:
     rms = {key: _rounded(value, 3) for key, value in report["rms"].items()}
     return f"""# The published grasp, simulated again
 
-Cases 1 and 2 of the paper's position table against this co-simulation: four FMUs, {system.scheme}
-scheme, communication step {1e3 * step:g} ms. Times in seconds.
+Cases 1 and 2 of the paper's position table against this co-simulation, {_controller(system)}: four FMUs,
+{system.scheme} scheme, communication step {1e3 * step:g} ms. Times in seconds.
 
 The object is named by its position in m.
 
@@ -72,7 +73,7 @@ def bench_markdown(report: Mapping[str, Any], system: System) -> str:
     )
     return f"""# The published experiments on the bench preset
 
-Cases 0, 1 and 2 in the settings of both experimental tables against this co-simulation: the sensors
+Cases 0, 1 and 2 in the settings of both experimental tables against this co-simulation, {_controller(system)}: the sensors
 with their electronics, the fingers with identified friction, {system.scheme} scheme, communication
 step {1e3 * step:g} ms. Times in seconds; *difference* is simulated less published.
 
@@ -99,6 +100,11 @@ on both sides is the row of 0.03 m once more and counts once there.
 
 {_run_table(report["runs"])}
 """
+
+
+def _controller(system: System) -> str:
+    """The controller, by its FMU."""
+    return f"with {system.component(controller_name(system), system.name).fmu.stem}"
 
 
 def _table(rows: Sequence[Mapping[str, Any]]) -> str:

@@ -1,0 +1,41 @@
+"""The controllers that come with the package, by the names of their laws."""
+
+from ..checks import choice
+from ..errors import InputError
+from ..files import FMU_FOLDER
+from ..metrics.metric import resolved
+from ..system.description import System
+
+CONTROLLERS = {
+    "published": "GraspController.fmu",
+    "adaptive": "GraspControllerAdaptive.fmu",
+}
+"""The published law, and the one that learns how the reflectances of the two faces differ."""
+
+
+def with_controller(system: System, law: str) -> System:
+    """The system with the controller of that law in the place of the one that it has.
+
+    Its FMU is the one beside that of the component in the role "controller", else in FMU_FOLDER.
+    InputError where no component has the role, that FMU is in neither place, or does not fit.
+    """
+    place = f"controller {choice('controller', law, tuple(CONTROLLERS))}"
+    name = controller_name(system)
+    if name not in (c.name for c in system.components):
+        raise InputError(
+            f"{place}: {system.name} has no component {name!r}; must have one, or one that "
+            'is named under [roles]: controller = "..."'
+        )
+    folders = (system.component(name, place).fmu.parent, FMU_FOLDER)
+    fmu = next((f for folder in folders if (f := folder / CONTROLLERS[law]).is_file()), None)
+    if fmu is None:
+        raise InputError(
+            f"{place}: no {CONTROLLERS[law]} beside that of {name}, nor in {FMU_FOLDER}; must be "
+            "built: grasp-cosim build"
+        )
+    return system.revised({name: fmu}, {}, (place, place))
+
+
+def controller_name(system: System) -> str:
+    """The name of the component in the role "controller", which need not exist."""
+    return resolved("controller.", system.roles)[:-1]

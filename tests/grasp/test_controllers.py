@@ -1,0 +1,108 @@
+"""The controllers of ours by the names of their laws, in any system that has a controller."""
+
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from conftest import Run
+from grasp_cosim import InputError, System
+from grasp_cosim.grasp.controllers import CONTROLLERS, with_controller
+from grasp_cosim.grasp.presets import SYSTEM, with_preset
+from grasp_cosim.grasp.system import grasp_system
+
+ADAPTIVE = "GraspControllerAdaptive.fmu"
+
+
+def fmus_of(system: System) -> dict[str, str]:
+    return {c.name: c.fmu.name for c in system.components}
+
+
+@pytest.fixture
+def brain(fmus: Path, tmp_path: Path) -> Path:
+    """A system file in which the component brain plays the controller."""
+    text = SYSTEM.read_text("utf-8").partition("# Cases of the paper")[0]
+    for place in ('"{}.', "-> {}.", "components.{}]"):
+        text = text.replace(place.format("controller"), place.format("brain"))
+    text = text.replace('fmu = "', f'fmu = "{fmus}/')
+    path = tmp_path / "brain.toml"
+    path.write_text(f'{text}\n[roles]\ncontroller = "brain"\n', "utf-8")
+    return path
+
+
+def test_the_law_takes_the_place_of_the_controller_alone(grasp: System) -> None:
+    adaptive = with_controller(grasp, "adaptive")
+    assert fmus_of(adaptive) == {**fmus_of(grasp), "controller": ADAPTIVE}
+    assert with_controller(adaptive, "published") == grasp == with_controller(grasp, "published")
+    assert {f for law in CONTROLLERS for f in fmus_of(with_controller(grasp, law)).values()} > {
+        *CONTROLLERS.values()
+    }
+
+
+def test_what_the_system_says_of_its_controller_stays(grasp: System) -> None:
+    given = with_preset(grasp, "case_1").with_values({"controller.contact_force.stiffness": 49.0})
+    adaptive = with_controller(given, "adaptive")
+    assert adaptive.component("controller", "test").values == {
+        "simultaneous_contact.enabled": False,
+        "impact_reduction.enabled": True,
+        "contact_force.stiffness": 49.0,
+    }
+    learning = adaptive.with_values({"controller.hold.squeeze": 0.2})
+    with pytest.raises(InputError, match="has no input or parameter 'hold.squeeze'"):
+        with_controller(learning, "published")
+
+
+def test_in_python_the_grasp_is_asked_for_by_law(
+    fmus: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "fmus").mkdir()
+    shutil.copytree(fmus, "fmus/build")
+    assert fmus_of(grasp_system(controller="adaptive"))["controller"] == ADAPTIVE
+    assert fmus_of(grasp_system())["controller"] == "GraspController.fmu"
+    with pytest.raises(InputError, match="^controller = 'blind': must be one of published, adapt"):
+        grasp_system(controller="blind")
+
+
+def test_an_fmu_that_is_not_there_is_to_be_built(
+    grasp: System, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    own = grasp.component("controller", "test").fmu
+    shutil.copy(own, tmp_path / "mine.fmu")
+    mine = grasp.swap("controller", tmp_path / "mine.fmu")
+    with pytest.raises(InputError) as failure:
+        with_controller(mine, "adaptive")
+    assert str(failure.value) == (
+        f"controller adaptive: no {ADAPTIVE} beside that of controller, nor in fmus/build; must "
+        "be built: grasp-cosim build"
+    )
+    (tmp_path / "fmus/build").mkdir(parents=True)
+    shutil.copy(own.with_name(ADAPTIVE), "fmus/build")
+    assert fmus_of(with_controller(mine, "adaptive"))["controller"] == ADAPTIVE
+
+
+def test_a_system_without_a_controller_is_one_line(grasp: System) -> None:
+    plant = replace(grasp.components[0], values={"force[1]": 0.0, "force[2]": 0.0})
+    bare = replace(grasp, components=(plant,), connections=())
+    with pytest.raises(InputError, match=r"^controller adaptive: grasp.toml has no component 'con"):
+        with_controller(bare, "adaptive")
+
+
+def test_run_goes_by_the_role_and_says_which_it_was(
+    command: Run, brain: Path, tmp_path: Path
+) -> None:
+    arguments = ("--controller", "adaptive", "--case", "1", "--stop", "0.01", "--step", "1e-3")
+    assert command("run", brain, *arguments, "--out", "out")[0] == 0
+    made = json.loads((tmp_path / "out/run.json").read_text("utf-8"))["components"]
+    assert made["brain"]["fmu"] == ADAPTIVE
+    assert made["brain"]["values"]["simultaneous_contact.enabled"] is False
+
+
+def test_one_controller_is_not_replaced_twice(command: Run) -> None:
+    code, _, err = command("run", "--controller", "adaptive", "--swap", "controller=mine.fmu")
+    assert (code, err.splitlines()) == (
+        2,
+        ["grasp-cosim: --controller adaptive: must not come with --swap controller=mine.fmu"],
+    )
