@@ -7,7 +7,6 @@ intensities as equal faces would give them, and fades as the fingers hold:
 """
 
 from dataclasses import dataclass
-from math import exp
 from typing import Annotated, NamedTuple
 
 from block_variables import Output
@@ -93,10 +92,12 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     closing = holding.filtered(p.hold, x.closing, v_1 - v_2, h)
     held = holding.hold(p.hold, series.outputs(p, x.layers, u).force, closing)
     floor = p.impact_reduction.intensity_floor
-    line_1 = reflectance_ratio.moved(p.reflectance, x.line_1, floor, x_1, xi_1, 1.0 - held, h)
-    line_2 = reflectance_ratio.moved(p.reflectance, x.line_2, floor, -x_2, xi_2, 1.0 - held, h)
+    believed = (1.0 - held) / p.reflectance.travel
+    share = reflectance_ratio.low_pass(p.reflectance, h)
+    line_1 = reflectance_ratio.moved(p.reflectance, x.line_1, floor, x_1, xi_1, believed, share)
+    line_2 = reflectance_ratio.moved(p.reflectance, x.line_2, floor, -x_2, xi_2, believed, share)
     estimate = reflectance_ratio.ratio(p.reflectance, line_1, line_2)
-    alike = (xi_1, exp(estimate.beta) * xi_2)
+    alike = (xi_1, estimate.ratio * xi_2)
     f_s = (1.0 - held) * layer_3.virtual_force(p.simultaneous_contact, alike)
     layers = series.advance(p, x.layers, u, f_s, h)
     return State(layers, line_1, line_2, estimate, closing, held)
@@ -105,18 +106,14 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     """The forces for the samples u, and what has been learnt."""
     y = series.outputs(p, x.layers, u)
-    alike = exp(x.estimate.beta)
     return Outputs(
         y.force,
         y.target_position,
         y.virtual_position,
         y.simultaneous_contact_force,
         y.impact_reduction_force,
-        alike,
-        alike * x.estimate.deviation,
-        (
-            reflectance_ratio.gap(p.reflectance, x.line_1),
-            reflectance_ratio.gap(p.reflectance, x.line_2),
-        ),
+        x.estimate.ratio,
+        x.estimate.ratio * x.estimate.deviation,
+        reflectance_ratio.gaps(p.reflectance, x.line_1, x.line_2),
         x.hold,
     )

@@ -49,6 +49,6 @@ def hold(p: Params, u: tuple[float, float], closing: float) -> float:
     """Return h from the forces u in N and the low-passed speed of closing in m/s: 1 is a grasp."""
     u_1, u_2 = u
     squeeze = min(max(0.0, 0.5 * u_2 - 0.5 * u_1), MOST)
-    pressed = squeeze * squeeze / (squeeze * squeeze + p.squeeze * p.squeeze)
-    at_rest = p.speed * p.speed / (p.speed * p.speed + closing * closing)
-    return pressed * at_rest
+    pressed, slow = squeeze * squeeze, p.speed * p.speed
+    of = (pressed + p.squeeze * p.squeeze) * (slow + closing * closing)
+    return pressed * slow / of

@@ -17,6 +17,9 @@ MOST_VOLTS = 1e3
 MOST_METRES = 1e3
 """And positions as this at most, on both sides."""
 
+STEEPEST = 1e150
+"""And slopes as this at most, or as one over it at least."""
+
 
 @dataclass(frozen=True, slots=True)
 class Params(Group, name="reflectance"):
@@ -93,7 +96,11 @@ class Params(Group, name="reflectance"):
 
 
 class Line(NamedTuple):
-    """A finger's line y over s: the last point, and weighted sums over all before."""
+    """A finger's line y over s: the last point, weighted sums over all before, what they tell.
+
+    `slope` is kappa in m^-1.V^(-1/n), and `variance` that of n·ln kappa by the noise of the
+    intensity; 1 and infinite where there is no slope yet.
+    """
 
     intensity: float
     s: float
@@ -103,12 +110,14 @@ class Line(NamedTuple):
     mean_y: float
     c_ss: float
     c_sy: float
+    slope: float
+    variance: float
 
 
 class Estimate(NamedTuple):
-    """beta = ln(alpha_1/alpha_2), and the standard deviation of it."""
+    """alpha_1/alpha_2 = e^beta, and the standard deviation of beta."""
 
-    beta: float
+    ratio: float
     deviation: float
 
 
@@ -117,34 +126,44 @@ def first_point(p: Params, floor: float, s: float, xi: float) -> Line:
     seen = _clamped(xi, floor, MOST_VOLTS)
     y = exp(-log(seen) / p.diffusion_exponent)
     at = _clamped(s, -MOST_METRES, MOST_METRES)
-    return Line(seen, at, y, 0.0, at, y, 0.0, 0.0)
+    return Line(seen, at, y, 0.0, at, y, 0.0, 0.0, 1.0, inf)
+
+
+def low_pass(p: Params, h: float) -> float:
+    """The share of a new sample in what is low-passed, after h seconds."""
+    return -expm1(-h / p.time_constant)
 
 
 def moved(
-    p: Params, line: Line, floor: float, s: float, xi: float, believed: float, h: float
+    p: Params, line: Line, floor: float, s: float, xi: float, believed: float, share: float
 ) -> Line:
-    """The line h seconds later, the finger at s in m that sees xi in V.
+    """The line a step later, the finger at s in m that sees xi in V.
 
-    What is new weighs by the travel that position and light both report; `believed` is the share
-    of it that counts, from 0 to 1.
+    What is new weighs by the travel that position and light both report, each metre of it by
+    `believed`; `share` is that of low_pass.
     """
-    share = -expm1(-h / p.time_constant)
     seen = line.intensity + share * (_clamped(xi, floor, MOST_VOLTS) - line.intensity)
     seen = _clamped(seen, floor, MOST_VOLTS)
     at = line.s + share * (_clamped(s, -MOST_METRES, MOST_METRES) - line.s)
     brightness = log(seen)
     y = exp(-brightness / p.diffusion_exponent)
-    weight = believed * exp(p.weight_exponent * brightness) * _travel(line, at, y) / p.travel
+    light = exp(p.weight_exponent * brightness)
+    weight = believed * light * _travel(line, at, y)
     total = line.weight + weight
     if total <= 0.0:
-        return Line(seen, at, y, 0.0, at, y, 0.0, 0.0)
+        return Line(seen, at, y, 0.0, at, y, 0.0, 0.0, 1.0, inf)
     ds = at - line.mean_s
     dy = y - line.mean_y
     mean_s = line.mean_s + weight / total * ds
     mean_y = line.mean_y + weight / total * dy
     c_ss = line.c_ss + weight * ds * (at - mean_s)
     c_sy = line.c_sy + weight * ds * (y - mean_y)
-    return Line(seen, at, y, total, mean_s, mean_y, c_ss, c_sy)
+    if c_sy <= 0.0 or c_ss <= 0.0:
+        return Line(seen, at, y, total, mean_s, mean_y, c_ss, c_sy, 1.0, inf)
+    slope = _clamped(c_sy / c_ss, 1.0 / STEEPEST, STEEPEST)
+    relative = (p.intensity_noise / c_sy) * (y / seen)
+    variance = relative * relative * c_ss * light
+    return Line(seen, at, y, total, mean_s, mean_y, c_ss, c_sy, slope, variance)
 
 
 def _travel(line: Line, at: float, y: float) -> float:
@@ -154,44 +173,32 @@ def _travel(line: Line, at: float, y: float) -> float:
     if line.c_sy <= 0.0:
         return way
     dy = y - line.y
-    seen = (dy if ds > 0.0 else -dy) * line.c_ss / line.c_sy
+    seen = (dy if ds > 0.0 else -dy) / line.slope
     return _clamped(seen, 0.0, way)
 
 
-def log_slope(line: Line) -> float:
-    """Return ln kappa of the line, kappa in m^-1.V^(-1/n); 0 where it has none."""
-    return log(line.c_sy) - log(line.c_ss) if line.c_sy > 0.0 and line.c_ss > 0.0 else 0.0
-
-
-def variance(p: Params, line: Line) -> float:
-    """The variance of n·ln kappa by the noise of the intensity; infinite without a slope."""
-    if line.c_sy <= 0.0 or line.c_ss <= 0.0:
-        return inf
-    q, n = p.weight_exponent, p.diffusion_exponent
-    relative = p.intensity_noise / line.c_sy
-    return relative * relative * line.c_ss * exp((q - 2.0 - 2.0 / n) * log(line.intensity))
-
-
 def ratio(p: Params, line_1: Line, line_2: Line) -> Estimate:
-    """Return beta from both lines, drawn towards 0 as far as they are uncertain."""
+    """The ratio of the reflectances, its logarithm drawn towards 0 as far as they are uncertain."""
     prior = p.prior_deviation * p.prior_deviation
     if prior == 0.0:
-        return Estimate(0.0, 0.0)
-    gain = prior / (prior + variance(p, line_1) + variance(p, line_2))
-    fitted = p.diffusion_exponent * (log_slope(line_2) - log_slope(line_1))
+        return Estimate(1.0, 0.0)
+    gain = prior / (prior + line_1.variance + line_2.variance)
+    fitted = p.diffusion_exponent * log(line_2.slope / line_1.slope)
     beta = gain * _clamped(fitted, -p.limit, p.limit)
-    return Estimate(beta, p.prior_deviation * sqrt(1.0 - gain))
+    return Estimate(exp(beta), p.prior_deviation * sqrt(1.0 - gain))
 
 
-def gap(p: Params, line: Line) -> float:
-    """The gap in m that the light and the slope tell; without a slope, that to a white face."""
+def gaps(p: Params, line_1: Line, line_2: Line) -> tuple[float, float]:
+    """The gaps in m that light and slopes tell; without a slope, that to a white face."""
+    white = exp(log(p.gain) / p.diffusion_exponent)
+    return _gap(p, line_1, white), _gap(p, line_2, white)
+
+
+def _gap(p: Params, line: Line, white: float) -> float:
+    """The gap in m of a finger, 1/kappa drawn towards that of a white face as it is uncertain."""
     prior = p.prior_deviation * p.prior_deviation
-    white = -log(p.gain) / p.diffusion_exponent
-    most = p.limit / p.diffusion_exponent
-    v = variance(p, line)
-    gain = prior / (prior + v) if prior > 0.0 else 0.0
-    slope = white + gain * _clamped(log_slope(line) - white, -most, most)
-    return line.y * exp(-slope) - p.offset_distance
+    gain = prior / (prior + line.variance) if prior > 0.0 else 0.0
+    return line.y * ((1.0 - gain) * white + gain / line.slope) - p.offset_distance
 
 
 def _clamped(x: float, low: float, high: float) -> float:
