@@ -177,7 +177,7 @@ def ratio(p: Params, line_1: Line, line_2: Line) -> Estimate:
     prior = p.prior_deviation * p.prior_deviation
     if prior == 0.0:
         return Estimate(0.0, 0.0)
-    gain = prior / (prior + variance(p, line_1) + variance(p, line_2))
+    gain = prior / (prior + (variance(p, line_1) + variance(p, line_2)))
     fitted = p.diffusion_exponent * (log_slope(line_2) - log_slope(line_1))
     beta = gain * _clamped(fitted, -p.limit, p.limit)
     return Estimate(beta, p.prior_deviation * sqrt(1.0 - gain))
