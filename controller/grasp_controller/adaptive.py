@@ -7,6 +7,7 @@ intensities as equal faces would give them, and fades as the fingers hold:
 """
 
 from dataclasses import dataclass
+from math import exp
 from typing import Annotated, NamedTuple
 
 from block_variables import Output
@@ -97,7 +98,8 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     line_1 = reflectance_ratio.moved(p.reflectance, x.line_1, floor, x_1, xi_1, believed, share)
     line_2 = reflectance_ratio.moved(p.reflectance, x.line_2, floor, -x_2, xi_2, believed, share)
     estimate = reflectance_ratio.ratio(p.reflectance, line_1, line_2)
-    alike = (xi_1, estimate.ratio * xi_2)
+    beta = estimate.beta
+    alike = (exp(-max(beta, 0.0)) * xi_1, exp(min(beta, 0.0)) * xi_2)  # the brighter side is dimmed
     f_s = (1.0 - held) * layer_3.virtual_force(p.simultaneous_contact, alike)
     layers = series.advance(p, x.layers, u, f_s, h)
     return State(layers, line_1, line_2, estimate, closing, held)
@@ -106,14 +108,15 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     """The forces for the samples u, and what has been learnt."""
     y = series.outputs(p, x.layers, u)
+    ratio = exp(x.estimate.beta)
     return Outputs(
         y.force,
         y.target_position,
         y.virtual_position,
         y.simultaneous_contact_force,
         y.impact_reduction_force,
-        x.estimate.ratio,
-        x.estimate.ratio * x.estimate.deviation,
+        ratio,
+        ratio * x.estimate.deviation,
         reflectance_ratio.gaps(p.reflectance, x.line_1, x.line_2),
         x.hold,
     )

@@ -115,9 +115,9 @@ class Line(NamedTuple):
 
 
 class Estimate(NamedTuple):
-    """alpha_1/alpha_2 = e^beta, and the standard deviation of beta."""
+    """beta = ln(alpha_1/alpha_2), and its standard deviation."""
 
-    ratio: float
+    beta: float
     deviation: float
 
 
@@ -178,14 +178,14 @@ def _travel(line: Line, at: float, y: float) -> float:
 
 
 def ratio(p: Params, line_1: Line, line_2: Line) -> Estimate:
-    """The ratio of the reflectances, its logarithm drawn towards 0 as far as they are uncertain."""
+    """The logarithm of the ratio of the reflectances, drawn towards 0 as far as they are uncertain."""
     prior = p.prior_deviation * p.prior_deviation
     if prior == 0.0:
-        return Estimate(1.0, 0.0)
-    gain = prior / (prior + line_1.variance + line_2.variance)
-    fitted = p.diffusion_exponent * log(line_2.slope / line_1.slope)
+        return Estimate(0.0, 0.0)
+    gain = prior / (prior + (line_1.variance + line_2.variance))
+    fitted = p.diffusion_exponent * (log(line_2.slope) - log(line_1.slope))
     beta = gain * _clamped(fitted, -p.limit, p.limit)
-    return Estimate(exp(beta), p.prior_deviation * sqrt(1.0 - gain))
+    return Estimate(beta, p.prior_deviation * sqrt(1.0 - gain))
 
 
 def gaps(p: Params, line_1: Line, line_2: Line) -> tuple[float, float]:

@@ -3,20 +3,26 @@
 The right-hand side is Eqs. (1) to (7) and (9) as they are printed, every signal taken at the same
 moment: no sampling, no sensor or actuator step, no order of execution. Each moment at which a
 finger touches or leaves the object is located on the solution, which starts anew from there.
+With what the adaptive layer 3 learns, Eq. (2') takes the place of Eq. (2).
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import tanh
+from functools import cache
+from math import exp, tanh
 from typing import Any, NamedTuple
 
 from scipy.integrate import solve_ivp
+
+from .continuous_learning import Adaptive, Learning
 
 Pair = tuple[float, float]
 """A value per finger: right, left."""
 
 State = Sequence[float]
-"""x_1, x_1', x_2, x_2', x_v11, x_v11', x_v21, x_v21', x_v2, x_v2'."""
+"""x_1, x_1', x_2, x_2', x_v11, x_v11', x_v21, x_v21', x_v2, x_v2', and what is learnt."""
+
+LEARNT = slice(10, None)
 
 Event = Callable[[float, State], float]
 
@@ -61,6 +67,7 @@ class Grasp:
     K_i: float = 98.0
     B: Pair = (0.0, 0.0)
     """Viscous friction of the fingers, which the paper's simulation leaves out."""
+    adaptive: Adaptive | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +82,8 @@ class Solution:
     """N, along x."""
     target: float
     """m; x_v2, which is x_d without layer 3."""
+    beta: Pair = (0.0, 0.0)
+    """ln(alpha_1/alpha_2) as learnt, and its standard deviation."""
 
 
 class Motion(NamedTuple):
@@ -89,6 +98,8 @@ def solve(p: Grasp, stop: float, *, to_the_end: bool = False) -> Solution:
     """The grasp up to stop in s; unless to_the_end, only until both fingers have touched."""
     x_1, x_2 = p.x_init
     y: State = [x_1, 0.0, x_2, 0.0, x_1, 0.0, x_2, 0.0, 0.5 * (x_1 + x_2), 0.0]
+    learning = _learning(p)
+    y = [*y, *learning.start()] if learning else y
     t, touching = 0.0, (False, False)
     times: list[float | None] = [None, None]
     speeds: list[float | None] = [None, None]
@@ -99,7 +110,8 @@ def solve(p: Grasp, stop: float, *, to_the_end: bool = False) -> Solution:
                 times[j], speeds[j] = t, -_gap(p, y, j)[1]
     target, virtual = _targets(p, y, touching)
     f_1, f_2 = (_contact_force(p, y, j, virtual[j], touching[j]) for j in (0, 1))
-    return Solution((times[0], times[1]), (speeds[0], speeds[1]), (f_1, f_2), target.x)
+    beta = learning.beta(y[LEARNT]) if learning else (0.0, 0.0)
+    return Solution((times[0], times[1]), (speeds[0], speeds[1]), (f_1, f_2), target.x, beta)
 
 
 def _run_to_event(
@@ -141,7 +153,44 @@ def _slope(p: Grasp, y: State, touching: tuple[bool, bool]) -> list[float]:
     target, (virtual_1, virtual_2) = _targets(p, y, touching)
     a_1 = _acceleration(p, y, 0, virtual_1, touching[0])
     a_2 = _acceleration(p, y, 1, virtual_2, touching[1])
-    return [y[1], a_1, y[3], a_2, y[5], virtual_1.a, y[7], virtual_2.a, y[9], target.a]
+    rates = [y[1], a_1, y[3], a_2, y[5], virtual_1.a, y[7], virtual_2.a, y[9], target.a]
+    learning = _learning(p)
+    return rates if learning is None else rates + _learning_rates(p, learning, y)
+
+
+@cache
+def _learning(p: Grasp) -> Learning | None:
+    """What is learnt from the fingers' first positions on."""
+    if p.adaptive is None:
+        return None
+    (x_1, x_2), y = p.x_init, [p.x_init[0], 0.0, p.x_init[1], 0.0]
+    return Learning(p.adaptive, (_intensity(p, y, 0), _intensity(p, y, 1)), (x_1, -x_2))
+
+
+def _learning_rates(p: Grasp, learning: Learning, y: State) -> list[float]:
+    ways, seen = (y[0], -y[2]), (_intensity(p, y, 0), _intensity(p, y, 1))
+    return learning.rates(y[LEARNT], ways, seen, y[1] - y[3], _hold(p, learning, y))
+
+
+def _hold(p: Grasp, learning: Learning, y: State) -> float:
+    return learning.hold(y[LEARNT], (_command(p, y, 0), _command(p, y, 1)))
+
+
+def _command(p: Grasp, y: State, j: int) -> float:
+    """Eq. (7)."""
+    x, v, virtual, virtual_rate = y[2 * j], y[2 * j + 1], y[4 + 2 * j], y[5 + 2 * j]
+    return -p.D_i * (v - virtual_rate) - p.K_i * (x - virtual)
+
+
+def _virtual_force(p: Grasp, y: State) -> float:
+    """f_s of Eq. (2), or of Eq. (2')."""
+    xi_1, xi_2 = (_intensity(p, y, j) for j in (0, 1))
+    learning = _learning(p)
+    if learning is None:
+        return p.K_s * tanh((xi_1 - xi_2) / (xi_1 + xi_2))
+    beta, _ = learning.beta(y[LEARNT])
+    xi_2 *= exp(beta)
+    return (1.0 - _hold(p, learning, y)) * p.K_s * tanh((xi_1 - xi_2) / (xi_1 + xi_2))
 
 
 def _targets(p: Grasp, y: State, touching: tuple[bool, bool]) -> tuple[Motion, list[Motion]]:
@@ -152,10 +201,8 @@ def _targets(p: Grasp, y: State, touching: tuple[bool, bool]) -> tuple[Motion, l
     x_d = 0.5 * (y[0] + y[2])
     target = Motion(x_d, 0.0, 0.0)
     if p.case == 2:
-        xi_1, xi_2 = (_intensity(p, y, j) for j in (0, 1))
-        f_s = p.K_s * tanh((xi_1 - xi_2) / (xi_1 + xi_2))
         x, v = y[8], y[9]
-        target = Motion(x, v, (f_s - p.D_a2 * v - p.K_a2 * (x - x_d)) / p.M_a2)
+        target = Motion(x, v, (_virtual_force(p, y) - p.D_a2 * v - p.K_a2 * (x - x_d)) / p.M_a2)
     if p.case == 0:
         return target, [target, target]
     virtual = []
