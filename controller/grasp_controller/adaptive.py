@@ -98,8 +98,8 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     line_1 = reflectance_ratio.moved(p.reflectance, x.line_1, floor, x_1, xi_1, believed, share)
     line_2 = reflectance_ratio.moved(p.reflectance, x.line_2, floor, -x_2, xi_2, believed, share)
     estimate = reflectance_ratio.ratio(p.reflectance, line_1, line_2)
-    beta = estimate.beta
-    alike = (exp(-max(beta, 0.0)) * xi_1, exp(min(beta, 0.0)) * xi_2)  # the brighter side is dimmed
+    dimmed = exp(-abs(estimate.beta))  # of the brighter side, as seen from either
+    alike = (dimmed * xi_1, xi_2) if estimate.beta > 0.0 else (xi_1, dimmed * xi_2)
     f_s = (1.0 - held) * layer_3.virtual_force(p.simultaneous_contact, alike)
     layers = series.advance(p, x.layers, u, f_s, h)
     return State(layers, line_1, line_2, estimate, closing, held)

@@ -178,7 +178,7 @@ def _travel(line: Line, at: float, y: float) -> float:
 
 
 def ratio(p: Params, line_1: Line, line_2: Line) -> Estimate:
-    """The logarithm of the ratio of the reflectances, drawn towards 0 as far as they are uncertain."""
+    """The logarithm of the ratio, drawn towards 0 as far as the lines are uncertain."""
     prior = p.prior_deviation * p.prior_deviation
     if prior == 0.0:
         return Estimate(0.0, 0.0)
