@@ -74,3 +74,17 @@ def test_noise_biases_a_quotient_and_not_the_logarithms(
     assert quotient == pytest.approx(bias * (1.0 + 3.0 * s * s), abs=tolerance)
     assert logarithms == pytest.approx(0.0, abs=of_the_ends)
     assert of_the_ends < -0.1 * bias  # no room for it
+
+
+def test_on_the_move_noise_adds_its_square_to_the_logarithms() -> None:
+    """The mean of ln xi is (sigma/xi)^2/2 lower, so its rate is 1 + (sigma/xi)^2 times xi'/xi.
+
+    From a to b = 2·a that adds the integral, ((sigma/a)^2 - (sigma/b)^2)/2, whatever the step is.
+    """
+    a, b, sigma = XI, 2.0 * XI, 0.2 * XI
+    noise = np.random.default_rng(4).standard_normal((2, N)) * sigma
+    added = np.mean([f_p(b + v, a + u, 1.0) for u, v in noise.T.tolist()]) / 0.6 - log(2.0)
+    expected = 0.5 * ((sigma / a) ** 2 - (sigma / b) ** 2)
+    by_chance = SIGMAS * sqrt(((sigma / a) ** 2 + (sigma / b) ** 2) / N)
+    assert by_chance < 0.5 * expected
+    assert added == pytest.approx(expected, abs=by_chance + (sigma / a) ** 4)
