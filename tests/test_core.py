@@ -197,10 +197,10 @@ def test_a_study_is_swept(python: Python) -> None:
         from pathlib import Path
 
         from grasp_cosim import System
-        from grasp_cosim.sweep.read import read_study
+        from grasp_cosim.sweep.read import Made, read_studies
         from grasp_cosim.sweep.sweep import sweep
 
-        study = read_study(Path("study.toml"), System.load)
+        (study,) = read_studies(Path("study.toml"), Made(System.load))
         done = sweep(study, Path("out"), workers=2)
         assert done.failed == 0
         first, second = (outcome.metrics for outcome in done.outcomes)

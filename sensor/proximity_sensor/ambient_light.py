@@ -17,6 +17,10 @@ class Params(Group, name="ambient"):
     offset: Annotated[
         float, Parameter("c, offset at the calibration", unit="V", low=-10.0, high=10.0)
     ] = 0.35
+    calibration_error: Annotated[
+        float,
+        Parameter("what the calibration missed of the offset", unit="V", low=-10.0, high=10.0),
+    ] = 0.0
     drift: Annotated[
         float,
         Parameter("rate of the offset after the calibration", unit="V/s", low=-10.0, high=10.0),
@@ -24,5 +28,6 @@ class Params(Group, name="ambient"):
 
 
 def voltage(p: Params, t: float) -> float:
-    """The offset in V, t s after the calibration; before it, the calibrated one."""
-    return p.offset + p.drift * t if t > 0.0 else p.offset
+    """The offset in V, t s after the calibration; before it, the one that was there then."""
+    there = p.offset + p.calibration_error
+    return there + p.drift * t if t > 0.0 else there

@@ -184,7 +184,7 @@ def _sampled(p: Params, c: Chain, light: float) -> Chain:
 
 def _settled(p: Params, light: float) -> Chain:
     """After xi = light for ever, and the noise of WARM_UP samples."""
-    volts = light + p.ambient.offset if p.ambient.enabled else light
+    volts = light + ambient_light.voltage(p.ambient, 0.0) if p.ambient.enabled else light
     if p.adc.enabled:
         volts = converter.converted(p.adc, volts)
     memory = low_pass.settled(p.coefficients, volts) if p.filter.enabled else SILENT.memory

@@ -11,7 +11,7 @@ import pyarrow.parquet as pq  # type: ignore[import-untyped]
 import pytest
 from grasp_cosim import InputError, System, cli
 from grasp_cosim.grasp.presets import STUDIES, with_preset
-from grasp_cosim.sweep.read import read_study, study_file
+from grasp_cosim.sweep.read import Made, read_studies, study_file
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -213,7 +213,7 @@ def test_a_study_of_the_bench_is_that_of_run_bench(tmp_path: Path, grasp: System
             "[figures]", '[values]\n"sensor_1.adc.bits" = 12\n[figures]'
         )
     )
-    study = read_study(path, lambda _: grasp, with_preset)
+    (study,) = read_studies(path, Made(lambda _: grasp, with_preset))
     off = {"controller.simultaneous_contact.enabled": False, "sensor_1.adc.bits": 12}
     off |= {"controller.impact_reduction.enabled": False}
     expected = with_preset(grasp, "bench").with_values(off).with_experiment(step=1e-3, stop=0.02)
@@ -227,12 +227,12 @@ def test_a_bench_that_does_not_fit_is_one_line(tmp_path: Path, grasp: System) ->
     bare = replace(grasp, components=(plant,), connections=())
     place = r"grasp.toml: \[presets.bench\] sensor_1"
     with pytest.raises(InputError, match=rf"^study.toml: bench = true: {place}.*: no component"):
-        read_study(path, lambda _: bare, with_preset)
+        read_studies(path, Made(lambda _: bare, with_preset))
 
 
 @pytest.mark.parametrize("name", ["bench_monte_carlo", "grasp_sensitivity", "reflectance_map"])
 def test_a_built_in_study_fits_the_grasp(name: str, grasp: System) -> None:
-    study = read_study(study_file(name, STUDIES), lambda _: grasp, with_preset)
+    (study,) = read_studies(study_file(name, STUDIES), Made(lambda _: grasp, with_preset))
     assert study.runs >= 200
     for index in (0, study.runs - 1):
         study.system.with_values(study.values(index))

@@ -49,7 +49,7 @@ def test_what_the_system_says_of_its_controller_stays(grasp: System) -> None:
         "contact_force.stiffness": 49.0,
     }
     learning = adaptive.with_values({"controller.hold.squeeze": 0.2})
-    with pytest.raises(InputError, match="has no input or parameter 'hold.squeeze'"):
+    with pytest.raises(InputError, match=r"has no input or parameter 'hold.squeeze'"):
         with_controller(learning, "published")
 
 
@@ -61,7 +61,7 @@ def test_in_python_the_grasp_is_asked_for_by_law(
     shutil.copytree(fmus, "fmus/build")
     assert fmus_of(grasp_system(controller="adaptive"))["controller"] == ADAPTIVE
     assert fmus_of(grasp_system())["controller"] == "GraspController.fmu"
-    with pytest.raises(InputError, match="^controller = 'blind': must be one of published, adapt"):
+    with pytest.raises(InputError, match=r"^controller = 'blind': must be one of published, adapt"):
         grasp_system(controller="blind")
 
 

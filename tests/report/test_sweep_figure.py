@@ -38,7 +38,7 @@ def made(system: System, design: Design, pictures: Pictures, *failed: int) -> Sw
 
 
 def drawn(sweep: Sweep, folder: Path) -> list[str]:
-    paths = draw_sweep(sweep, folder)
+    paths = draw_sweep([sweep], folder)
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in paths)
     assert sorted(paths) == sorted(folder.iterdir())
     return [path.name for path in paths]
@@ -49,11 +49,11 @@ def drawn(sweep: Sweep, folder: Path) -> list[str]:
 def test_a_map_comes_out_whatever_was_found(
     grasp: System, design: Design, failed: tuple[int, ...], tmp_path: Path
 ) -> None:
-    assert drawn(made(grasp, design, Pictures(MAP), *failed), tmp_path) == ["map.png"]
+    assert drawn(made(grasp, design, Pictures((MAP,)), *failed), tmp_path) == ["map.png"]
 
 
 def test_distributions_have_axes_each(grasp: System, tmp_path: Path) -> None:
-    pictures = Pictures(None, ("time_difference", "impact_velocity[1]", "position"))
+    pictures = Pictures((), ("time_difference", "impact_velocity[1]", "position"))
     assert drawn(made(grasp, POINTS, pictures, 3), tmp_path) == ["distributions.png"]
 
 
@@ -65,12 +65,12 @@ def test_what_is_not_there_is_said(grasp: System, tmp_path: Path) -> None:
     """Before the runs, not after hours of them."""
     for pictures, message in (
         (
-            Pictures(Map("ratio", "position", "tilt")),
+            Pictures((Map("ratio", "position", "tilt"),)),
             "no column 'tilt' .* valid: ratio, position, t",
         ),
-        (Pictures(None, ("error",)), "no column 'error' in the results"),
-        (Pictures(None, ("time_to_contact",)), "no column 'time_to_contact' in the results"),
-        (Pictures(Map("ratio", "ratio", "time_difference")), "x = y = 'ratio'; must be two"),
+        (Pictures((), ("error",)), "no column 'error' in the results"),
+        (Pictures((), ("time_to_contact",)), "no column 'time_to_contact' in the results"),
+        (Pictures((Map("ratio", "ratio", "time_difference"),)), "x = y = 'ratio'; must be two"),
     ):
         with pytest.raises(InputError, match=message):
             made(grasp, GRID, pictures)
@@ -93,14 +93,14 @@ def test_a_metric_that_is_one_value_or_none_is_drawn(
     grasp: System, design: Design, values: tuple[float, ...], tmp_path: Path
 ) -> None:
     metric = "time_difference"
-    sweep = made(grasp, design, Pictures(MAP, (metric,)))
+    sweep = made(grasp, design, Pictures((MAP,), (metric,)))
     outcomes = tuple(Outcome(k, {metric: values[k % len(values)]}) for k in range(20))
     both = ["map.png", "distributions.png"]
     assert drawn(replace(sweep, outcomes=outcomes), tmp_path) == both
 
 
 def test_one_run_is_drawn(grasp: System, tmp_path: Path) -> None:
-    sweep = made(grasp, Design("random", 1, 1), Pictures(MAP, ("time_difference",)))
+    sweep = made(grasp, Design("random", 1, 1), Pictures((MAP,), ("time_difference",)))
     only = replace(sweep, outcomes=sweep.outcomes[3:4])
     assert drawn(replace(only, outcomes=(replace(only.outcomes[0], index=0),)), tmp_path) == [
         "map.png", "distributions.png",
@@ -113,7 +113,7 @@ def test_any_name_is_drawn(grasp: System, tmp_path: Path) -> None:
     parameters = tuple(
         replace(p, name=name) for p, name in zip(study.parameters, names, strict=True)
     )
-    pictures = Pictures(Map(*names, "time_difference", 0.1), names)
+    pictures = Pictures((Map(*names, "time_difference", 0.1),), names)
     named = replace(study, name="a$b$_{.toml", parameters=parameters, pictures=pictures)
     sweep = replace(made(grasp, GRID, Pictures()), study=named)
     assert drawn(sweep, tmp_path) == ["map.png", "distributions.png"]
@@ -125,6 +125,6 @@ def test_a_limit_is_named_where_a_line_is_drawn(
 ) -> None:
     figures: list[Figure] = []
     monkeypatch.setattr("grasp_cosim.report.sweep.save", lambda figure, _: figures.append(figure))
-    draw_sweep(made(grasp, GRID, Pictures(replace(MAP, limit=limit))), Path())
+    draw_sweep([made(grasp, GRID, Pictures((replace(MAP, limit=limit),)))], Path())
     legend = figures[0].axes[0].get_legend()
     assert ([text.get_text() for text in legend.get_texts()] if legend else []) == lines

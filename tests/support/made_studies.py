@@ -4,7 +4,7 @@ from pathlib import Path
 
 from grasp_cosim import System
 from grasp_cosim.interface.read import read_interface
-from grasp_cosim.sweep.read import read_study
+from grasp_cosim.sweep.read import Made, read_studies
 from grasp_cosim.sweep.study import Study
 from support.native_fmus import build
 
@@ -35,4 +35,5 @@ def load(path: Path | None) -> System:
 def native_study(folder: Path, text: str, name: str = "study.toml") -> Study:
     """The study of that text, of the system that write_native() left in folder."""
     (folder / name).write_text(text)
-    return read_study(folder / name, load)
+    (study,) = read_studies(folder / name, Made(load))
+    return study

@@ -54,7 +54,9 @@ def test_a_run_is_a_pure_function_of_its_index(study: Study) -> None:
 
 
 def test_the_identity_is_that_of_all_that_decides(study: Study, tmp_path: Path) -> None:
-    same = replace(study, name="other", pictures=Pictures(Map("ratio", "left", "time_difference")))
+    same = replace(
+        study, name="other", pictures=Pictures((Map("ratio", "left", "time_difference"),))
+    )
     assert same.identity == study.identity
     for other in (
         replace(study, design=replace(RANDOM, seed=5)),
@@ -96,12 +98,12 @@ WRONG = [
     ((MASS,), {"outputs": ("plant.force[1]",)}, r"no output 'plant.force\[1\]'"),
     ((MASS,), {"seeds": ("sensor_1.seed",)}, "has no variable 'seed'"),
     ((MASS,), {"seeds": ("plant.finger_mass[1]",)}, r"variable 'plant.finger_mass\[1\]' twice"),
-    ((MASS,), {"pictures": Pictures(Map("mass", "x", "y"))}, "'x' with numbers; valid: mass"),
+    ((MASS,), {"pictures": Pictures((Map("mass", "x", "y"),))}, "'x' with numbers; valid: mass"),
     ((replace(MASS, name="peak_contact_force[1]"),), {}, "is the name of a result or seed; must"),
     ((replace(MASS, name=SEEDS[0]),), {"seeds": SEEDS}, "noise.seed': is the name of a result or"),
     ((replace(MASS, name="proxies.plant.lost"),), {}, "is the name of a result"),
     ((MASS,), {"seeds": ("plant.object_width",)}, "object_width is of type Real; must be an Int"),
-    ((MASS,), {"pictures": Pictures(None, ("time",))}, "no column 'time' in the results; valid: m"),
+    ((MASS,), {"pictures": Pictures((), ("time",))}, "no column 'time' in the results; valid: m"),
     ((parameter("sensor_1.gain", 1.0, ratio_to="sensor_1.noise.enabled"),), {}, "of type Boolean"),
     ((parameter("sensor_1.gain", 10**400, ratio_to="sensor_2.gain"),), {}, "must be a number, and"),
     ((parameter("sensor_1.gain", 1.0, ratio_to="plant.gap[1]"),), {}, "p: ratio_to: plant.gap"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -41,9 +41,16 @@ def natively(system: System, native: bool | None) -> Iterator[System]:
     end of the context. With True, InputError where those of our own blocks cannot be built. An FMU
     without a twin stays as it is, and one that needs no Python has none.
     """
-    twins, line = ({}, "") if native is False else _twins(system, native is True)
-    yield system.with_natives(twins)
-    if line:
+    with all_natively([system], native) as (chosen,):
+        yield chosen
+
+
+@contextmanager
+def all_natively(systems: Sequence[System], native: bool | None) -> Iterator[tuple[System, ...]]:
+    """The same of several systems; what is the same of them is said once."""
+    found = [({}, "") if native is False else _twins(s, native is True) for s in systems]
+    yield tuple(s.with_natives(twins) for s, (twins, _) in zip(systems, found, strict=True))
+    for line in dict.fromkeys(line for _, line in found if line):
         say(line)
 
 

@@ -160,6 +160,13 @@ def steady_contact_force(signals: Signals, finger: int) -> float:
     return float(_last(signals, finger).mean())
 
 
+@of_grasp("force_difference", "N")
+def force_difference(signals: Signals) -> float:
+    """Difference between the steady contact forces of the two fingers."""
+    first, second = (float(_last(signals, j).mean()) for j in FINGERS)
+    return abs(second - first)
+
+
 @of_fingers("force_overshoot", "1", factor=1e2, shown_unit="%")
 def force_overshoot(signals: Signals, finger: int) -> float | None:
     """Share of the steady force by which the peak since contact exceeds it; 0 if never.
@@ -203,6 +210,16 @@ def object_shift(signals: Signals) -> float:
     """Largest displacement of the object, either way."""
     position = signals["plant.object_position"]
     return float(np.abs(position - position[0]).max())
+
+
+@of_grasp("object_drift", "m/s")
+def object_drift(signals: Signals) -> float | None:
+    """Mean speed of the object over the last STEADY_WINDOW, either way; None in a shorter run."""
+    time, position = signals.time, signals["plant.object_position"]
+    if time[-1] - time[0] < STEADY_WINDOW:
+        return None
+    before = float(np.interp(time[-1] - STEADY_WINDOW, time, position))
+    return abs(float(position[-1]) - before) / STEADY_WINDOW
 
 
 def _of_object(name: str, unit: str | None, output: str, label: str, description: str) -> None:

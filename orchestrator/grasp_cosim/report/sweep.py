@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
+COLOURS = "viridis"
+"""The colours of a map, by the name that matplotlib knows them by."""
+
 MISSING = "#cccccc"
 """The colour of runs without a value."""
 
@@ -30,73 +33,117 @@ DECADES = 1.5
 """A metric above 0 that spans more has a logarithmic colour scale."""
 
 
-def draw_sweep(sweep: Sweep, folder: Path) -> list[Path]:
-    """Draw the pictures that the study asks for, as PNGs in folder; where they are.
+def draw_sweep(sweeps: Sequence[Sweep], folder: Path) -> list[Path]:
+    """Draw the pictures that a study asks for, as PNGs in folder; where they are.
 
-    A metric that no run has is drawn as that. InputError without matplotlib.
+    The variants of a study are beside each other. A metric that no run has is drawn as that.
+    InputError without matplotlib.
     """
     drawn = []
-    pictures = sweep.study.pictures
+    pictures = sweeps[0].study.pictures
     remove_parts(folder, "map.png", "distributions.png")
-    if pictures.map:
+    if pictures.maps:
         drawn.append(folder / "map.png")
-        _draw_map(sweep, pictures.map, drawn[-1])
+        _draw_maps(sweeps, pictures.maps, drawn[-1])
     if pictures.distributions:
         drawn.append(folder / "distributions.png")
-        _draw_distributions(sweep, pictures.distributions, drawn[-1])
+        _draw_distributions(sweeps, pictures.distributions, drawn[-1])
     return drawn
 
 
-def _draw_map(sweep: Sweep, wanted: Map, path: Path) -> None:
+def _draw_maps(sweeps: Sequence[Sweep], maps: Sequence[Map], path: Path) -> None:
+    """A row for each map, with one scale of colours, a column for each variant."""
+    across, along = len(sweeps), len(maps)
+    alone = across == along == 1
+    figure = new_figure(*((7.2, 5.0) if alone else (1.6 + 3.0 * across, 0.6 + 2.9 * along)))
+    rows = figure.subplots(along, across, squeeze=False, sharex=True)
+    for wanted, row in zip(maps, rows, strict=True):
+        found = [_shown(sweep, wanted) for sweep in sweeps]
+        norm = _norm(np.concatenate([np.ma.filled(z, np.nan).ravel() for _, _, z in found]))
+        for sweep, axes, points in zip(sweeps, row, found, strict=True):
+            _draw_map(axes, sweep, wanted, points, norm)
+        if any(np.isfinite(np.ma.filled(z, np.nan)).any() for _, _, z in found):
+            label = _what_of_a_cell(sweeps[0], wanted) + _label(sweeps[0].study, wanted.of)
+            bar = figure.colorbar(_scale(norm), ax=[*row], label=label)
+            if bar.ax.get_yscale() == "log":
+                _plain_ticks(bar.ax.yaxis, (1.0, 2.0, 5.0))
+        for axes in row[1:]:
+            axes.set_ylabel("")
+    for axes, sweep in zip(rows[-1], sweeps, strict=True):
+        axes.set_xlabel(_label(sweep.study, maps[0].x))
+    for axes, sweep in zip(rows[0], sweeps, strict=True):
+        axes.set_title(_plain(sweep.study.variant or sweep.study.name), fontsize=10)
+    save(figure, path)
+
+
+def _shown(sweep: Sweep, wanted: Map) -> tuple[Floats, Floats, npt.NDArray[Any]]:
+    """Values of x, of y and of the metric over both: in cells where the design is a grid."""
+    x, y, z = (sweep.numbers(name) for name in (wanted.x, wanted.y, wanted.of))
+    return _cells(wanted, x, y, z) if sweep.study.design.kind == "grid" else (x, y, z)
+
+
+def _what_of_a_cell(sweep: Sweep, wanted: Map) -> str:
+    """Say which of the runs of a cell is shown, where there are several."""
+    cells = _shown(sweep, wanted)[2].size
+    return f"{wanted.cell} of " if len(sweep.outcomes) > cells else ""
+
+
+def _draw_map(
+    axes: Axes,
+    sweep: Sweep,
+    wanted: Map,
+    points: tuple[Floats, Floats, npt.NDArray[Any]],
+    norm: Any,
+) -> None:
     """Cells where the design is a grid, else a dot per run; grey where there is no value."""
-    x, y, z = (_numbers(sweep, name) for name in (wanted.x, wanted.y, wanted.of))
-    figure = new_figure(7.2, 5.0)
-    axes = figure.subplots()
+    study = sweep.study
+    x, y, z = points
     axes.set_axisbelow(True)
-    options = {"norm": _norm(z), "cmap": "viridis"}
-    cells = _cells(sweep.study, wanted, x, y, z)
+    cells = study.design.kind == "grid"
     if cells:
         axes.set_facecolor(MISSING)
-        shown: Any = axes.pcolormesh(*cells, shading="nearest", **options)
-        if _geometric(cells[0]):
-            axes.set_xscale("log")
-            _plain_ticks(axes.xaxis)
-        if _geometric(cells[1]):
-            axes.set_yscale("log")
-            _plain_ticks(axes.yaxis)
-        if wanted.limit is not None and _crosses(cells[2], wanted.limit):
-            axes.contour(*cells, levels=[wanted.limit], colors=RED, linewidths=1.5)
-            unit = sweep.study.unit(wanted.of) or ""
-            label = f"{_title(sweep.study, wanted.of)} = {wanted.limit:g} {unit}".rstrip()
+        axes.pcolormesh(x, y, z, shading="nearest", norm=norm, cmap=COLOURS)
+        for values, scale, axis in (
+            (x, axes.set_xscale, axes.xaxis),
+            (y, axes.set_yscale, axes.yaxis),
+        ):
+            if _geometric(values):
+                scale("log")
+                _plain_ticks(axis)
+        if wanted.limit is not None and _crosses(z, wanted.limit):
+            axes.contour(x, y, z, levels=[wanted.limit], colors=RED, linewidths=1.5)
+            unit = study.unit(wanted.of) or ""
+            label = f"{_title(study, wanted.of)} = {wanted.limit:g} {unit}".rstrip()
             axes.plot([], [], color=RED, label=label)
     else:
         there = np.isfinite(z)
         axes.scatter(x[~there], y[~there], s=14, color=MISSING)
-        shown = axes.scatter(x[there], y[there], c=z[there], s=14, **options)
-    if not np.isfinite(z).all():
-        axes.fill([], [], color=MISSING, label=f"no {_title(sweep.study, wanted.of)}")
-    if np.isfinite(z).any():
-        mean = "mean of " if cells and len(z) > cells[2].size else ""
-        bar = figure.colorbar(shown, ax=axes, label=mean + _label(sweep.study, wanted.of))
-        if bar.ax.get_yscale() == "log":
-            _plain_ticks(bar.ax.yaxis, (1.0, 2.0, 5.0))
-    axes.set_xlabel(_label(sweep.study, wanted.x))
-    finish(axes, _label(sweep.study, wanted.y), bool(axes.get_legend_handles_labels()[0]))
+        axes.scatter(x[there], y[there], c=z[there], s=14, norm=norm, cmap=COLOURS)
+    if not np.isfinite(np.ma.filled(z, np.nan)).all():
+        axes.fill([], [], color=MISSING, label=f"no {_title(study, wanted.of)}")
+    finish(axes, _label(study, wanted.y), bool(axes.get_legend_handles_labels()[0]))
     if cells:
         axes.grid(visible=False)  # which would be on top of them
-    axes.set_title(_plain(sweep.study.name), fontsize=10)
-    save(figure, path)
 
 
-def _cells(
-    study: Study, wanted: Map, x: Floats, y: Floats, z: Floats
-) -> tuple[Floats, Floats, npt.NDArray[Any]] | None:
-    """Values of x, of y and the metric over both; of runs that share a cell, the mean."""
-    if study.design.kind != "grid":
-        return None
+def _scale(norm: Any) -> Any:
+    from matplotlib.cm import ScalarMappable
+
+    return ScalarMappable(norm, COLOURS)
+
+
+def _cells(wanted: Map, x: Floats, y: Floats, z: Floats) -> tuple[Floats, Floats, npt.NDArray[Any]]:
+    """Values of x, of y and the metric over both; of runs that share a cell, the mean of those with
+    a value, or the greatest of all, which is none where one has none.
+    """
     across, column = np.unique(x, return_inverse=True)
     along, row = np.unique(y, return_inverse=True)
-    total, count = np.zeros((2, len(along), len(across)))
+    shape = len(along), len(across)
+    if wanted.cell == "greatest":
+        most = np.full(shape, -np.inf)
+        np.maximum.at(most, (row, column), np.where(np.isfinite(z), z, np.inf))
+        return across, along, np.ma.masked_invalid(most)
+    total, count = np.zeros((2, *shape))
     there = np.isfinite(z)
     np.add.at(total, (row[there], column[there]), z[there])
     np.add.at(count, (row[there], column[there]), 1.0)
@@ -128,27 +175,35 @@ def _geometric(values: Floats) -> bool:
 
 
 def _norm(values: Floats) -> Any:
-    """A logarithmic scale where values above 0 span more than DECADES, else none."""
-    from matplotlib.colors import LogNorm
+    """A logarithmic scale where values above 0 span more than DECADES, else a linear one."""
+    from matplotlib.colors import LogNorm, Normalize
 
     there = values[np.isfinite(values)]
-    if len(there) and there.min() >= 0.0 and there.max() > 0.0:
-        low = max(float(there.min()), 1e-3 * float(there.max()))
-        if np.log10(there.max() / low) > DECADES:
-            return LogNorm(low, float(there.max()), clip=True)
-    return None
+    if not len(there):
+        return Normalize()
+    least, most = float(there.min()), float(there.max())
+    if least >= 0.0 and most > 0.0:
+        low = max(least, 1e-3 * most)
+        if np.log10(most / low) > DECADES:
+            return LogNorm(low, most, clip=True)
+    return Normalize(least, most)
 
 
-def _draw_distributions(sweep: Sweep, metrics: Sequence[str], path: Path) -> None:
-    columns = min(len(metrics), 2)
-    rows = -(-len(metrics) // columns)
+def _draw_distributions(sweeps: Sequence[Sweep], metrics: Sequence[str], path: Path) -> None:
+    """Axes for each metric; with variants a row for each, and a column for each variant."""
+    panels = [(name, sweep) for name in metrics for sweep in sweeps]
+    columns = len(sweeps) if len(sweeps) > 1 else min(len(metrics), 2)
+    rows = -(-len(panels) // columns)
     figure = new_figure(4.6 * columns, 3.2 * rows)
     grid = figure.subplots(rows, columns, squeeze=False).ravel()
-    for axes, name in zip(grid, metrics, strict=False):
+    for axes, (name, sweep) in zip(grid, panels, strict=False):
         _draw_distribution(axes, sweep, name)
-    for axes in grid[len(metrics) :]:
+        axes.set_title(_plain(sweep.study.variant), fontsize=10)
+    for axes in grid[len(panels) :]:
         axes.set_visible(False)
-    figure.suptitle(f"{_plain(sweep.study.name)}, {_runs(len(sweep.outcomes))}", fontsize=10)
+    if len(sweeps) == 1:
+        name = _plain(sweeps[0].study.name)
+        figure.suptitle(f"{name}, {_runs(len(sweeps[0].outcomes))}", fontsize=10)
     save(figure, path)
 
 
@@ -156,7 +211,7 @@ def _draw_distribution(axes: Axes, sweep: Sweep, name: str) -> None:
     """A histogram, with the median and the span that 90 % of the runs are in."""
     from matplotlib.ticker import MaxNLocator
 
-    values = _numbers(sweep, name)
+    values = sweep.numbers(name)
     there = values[np.isfinite(values)]
     axes.set_xlabel(_label(sweep.study, name))
     axes.set_axisbelow(True)
@@ -185,13 +240,6 @@ def _edges(values: Floats) -> Floats:
         return np.linspace(low, high, max(10, int(np.sqrt(len(values)))) + 1)
     half = 0.005 * size or 0.005
     return np.array([low - half, high + half])
-
-
-def _numbers(sweep: Sweep, name: str) -> Floats:
-    """A column, NaN throughout where no run came to have it."""
-    if name in sweep.table.columns:
-        return sweep.table.numbers(name)
-    return np.full(len(sweep.outcomes), np.nan)
 
 
 def _runs(count: int) -> str:

@@ -1,32 +1,66 @@
 """A study from a TOML file, in the format that orchestrator/README.md describes."""
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ..checks import as_table, check_keys, number, text, toml_table, whole
+from ..checks import as_table, check_keys, choice, known, number, text, toml_table, whole
 from ..errors import InputError, choices
 from ..interface.interface import Value
 from ..metrics.metric import Metric, load_metrics
 from ..system.description import System
 from .design import Design
 from .distributions import Distribution, Listed, Normal, Uniform, spaced
-from .study import Map, Parameter, Pictures, Study
+from .study import CELLS, STATISTICS, Limit, Map, Parameter, Pictures, Study
 
-KEYS = {
-    "system", "presets", "bench", "case", "metrics", "step", "stop", "seeds", "outputs", "swap",
-    "values", "design", "parameters", "figures",
+OF_A_VARIANT = {
+    "presets", "bench", "case", "controller", "step", "stop", "swap", "values", "limits",
 }  # fmt: skip
+"""Keys that a variant may have as well: there they go before what the study says."""
 
-Made = TypeVar("Made")
+KEYS = OF_A_VARIANT | {
+    "system",
+    "metrics",
+    "seeds",
+    "outputs",
+    "design",
+    "parameters",
+    "figures",
+    "variants",
+}
+
+PLAIN = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
+"""The name of a variant, which is that of a folder, too."""
+
+T = TypeVar("T")
 Load = Callable[[Path | None], System]
 """Reads a system; None stands for the built-in one."""
 
-Preset = Callable[[System, str], System]
-"""Applies a preset of that name to a system."""
+Change = Callable[[System, str], System]
+"""Changes a system as a name says: by its preset, or to its controller."""
+
+
+def _no_controller(_: System, name: str) -> System:
+    raise InputError(f"controller {name!r}: there are none by name; must be a swap")
+
+
+@dataclass(frozen=True, slots=True)
+class Made:
+    """How the systems of studies are made.
+
+    `load` reads one, `preset` and `controller` change it. `fmus` is where FMUs under [swap] are,
+    None for beside the study.
+    """
+
+    load: Load
+    preset: Change = System.with_presets
+    controller: Change = _no_controller
+    fmus: Path | None = None
+
 
 MOST_LEVELS = 100_000
 """Values of one parameter at most."""
@@ -42,19 +76,47 @@ def study_file(name: str, folder: Path) -> Path:
     return path
 
 
-def read_study(
-    path: Path,
-    load: Load,
-    preset: Preset = System.with_presets,
-    metrics: Sequence[Metric] = (),
-) -> Study:
-    """The study of a TOML file; `load` reads its system, `preset` applies a preset to it.
+def read_studies(
+    path: Path, made: Made, metrics: Sequence[Metric] = (), seed: int | None = None
+) -> tuple[Study, ...]:
+    """The variants of the study of a TOML file, or the one that it is.
 
-    `metrics` are kept beside those that the file names. InputError where anything is wrong.
+    `metrics` are kept beside those that the file names; `seed` goes before its own. InputError
+    where anything is wrong.
     """
     table = toml_table(path, "study")
     place = path.name
     check_keys(place, table, KEYS)
+    if seed is not None:
+        table["design"] = _drawn_anew(place, table, seed)
+    if "variants" not in table:
+        return (_study(place, "", table, path.parent, made, metrics),)
+    entries = table.pop("variants")
+    if not isinstance(entries, list) or not entries:
+        raise InputError(f"{place}: variants = {entries!r}: must be [[variants]] tables")
+    names = [_variant(f"{place}: variants[{i}]", entry) for i, entry in enumerate(entries)]
+    twice = next((n for n in names if names.count(n) > 1), None)
+    if twice is not None:
+        raise InputError(f"{place}: variant {twice!r} twice; must be there once")
+    studies = tuple(
+        _study(f"{place}, {name}", name, _merged(table, entry), path.parent, made, metrics)
+        for name, entry in zip(names, entries, strict=True)
+    )
+    for study in studies:
+        for limit in study.limits:
+            if limit.reference is not None:
+                known(f"{study.name}: limits: from: no variant", limit.reference, names)
+    return studies
+
+
+def _study(
+    place: str,
+    variant: str,
+    table: Mapping[str, Any],
+    folder: Path,
+    made: Made,
+    metrics: Sequence[Metric],
+) -> Study:
     design = as_table(f"{place}: [design]", table.get("design"))
     check_keys(f"{place}: [design]", design, Design.__slots__)
     if "kind" not in design:
@@ -69,28 +131,58 @@ def read_study(
     own_metrics: tuple[Metric, ...] = ()
     if "metrics" in table:
         file = text(f"{place}: metrics", table["metrics"], "the path of a Python file")
-        own_metrics = load_metrics(path.parent / file)
+        own_metrics = load_metrics(folder / file)
     parameters = tuple(
         _parameter(f"{place}: parameters[{i}]", entry) for i, entry in enumerate(entries)
     )
     varied = {*seeds, *(v for p in parameters for v in p.variables)}
     return Study(
         place,
-        _system(place, table, path.parent, (load, preset), varied),
+        _system(place, table, folder, made, varied),
         parameters,
         _in(place, lambda: Design(**design)),
         seeds,
         _names(f"{place}: outputs", table.get("outputs", [])),
         _pictures(f"{place}: [figures]", table.get("figures", {})),
         (*own_metrics, *metrics),
+        _limits(f"{place}: [limits]", table.get("limits", {})),
+        variant,
     )
+
+
+def _drawn_anew(place: str, table: Mapping[str, Any], seed: int) -> dict[str, Any]:
+    """The design with another seed; InputError where nothing goes by it."""
+    design = as_table(f"{place}: [design]", table.get("design"))
+    if design.get("kind") == "grid" and not table.get("seeds"):
+        raise InputError(f"--seed {seed}: {place} has nothing that is random; must be left out")
+    return {**design, "seed": seed}
+
+
+def _variant(place: str, entry: Any) -> str:
+    """The name of a variant; InputError where it is none, or has what variants share."""
+    entry = as_table(place, entry)
+    check_keys(place, entry, {"name", *OF_A_VARIANT})
+    name = entry.get("name")
+    if not isinstance(name, str) or not PLAIN.fullmatch(name):
+        raise InputError(f"{place}: name = {name!r}: must be letters, digits, '-', '_' and '.'")
+    return name
+
+
+def _merged(table: Mapping[str, Any], entry: Mapping[str, Any]) -> dict[str, Any]:
+    """What a variant says goes before what the study says; tables are put together."""
+    merged = {**table, **{k: v for k, v in entry.items() if k != "name"}}
+    for key in ("swap", "values", "limits"):
+        both = [t[key] for t in (table, entry) if key in t]
+        if len(both) > 1 and all(isinstance(t, dict) for t in both):
+            merged[key] = {**both[0], **both[1]}
+    return merged
 
 
 def _system(
     place: str,
     table: Mapping[str, Any],
     folder: Path,
-    made: tuple[Load, Preset],
+    made: Made,
     varied: set[str],
 ) -> System:
     """The system with what is the same in all runs."""
@@ -99,7 +191,7 @@ def _system(
         name = folder / text(f"{place}: system", name, "the path of a .toml or .ssp file")
     presets = _presets(place, table)
     swaps = {
-        key: folder / text(f"{place}: [swap]: {key}", fmu, "the path of an FMU")
+        key: (made.fmus or folder) / text(f"{place}: [swap]: {key}", fmu, "the path of an FMU")
         for key, fmu in as_table(f"{place}: [swap]", table.get("swap", {})).items()
     }
     fixed = as_table(f"{place}: [values]", table.get("values", {}))
@@ -110,10 +202,13 @@ def _system(
                 f"{place}: [values]: {key}: is varied by [[parameters]] or seeds, too; must be in "
                 "one of them"
             )
-    load, with_preset = made
-    system = load(name)
+    system = made.load(name)
+    law = table.get("controller")
+    if law is not None:
+        law = text(f"{place}: controller", law, "the name of one")
+        system = _in(place, partial(made.controller, system, law))
     for said, preset in presets.items():
-        system = _in(f"{place}: {said}", partial(with_preset, system, preset))
+        system = _in(f"{place}: {said}", partial(made.preset, system, preset))
     revised = system.revised(swaps, fixed, (f"{place}: [swap]", f"{place}: [values]"))
     return _in(place, lambda: revised.with_experiment(table.get("step"), table.get("stop")))
 
@@ -189,15 +284,36 @@ def _pictures(place: str, table: Any) -> Pictures:
     table = as_table(place, table)
     check_keys(place, table, Pictures.__slots__)
     distributions = _names(f"{place}: distributions", table.get("distributions", []))
-    if "map" not in table:
-        return Pictures(None, distributions)
-    entry = as_table(f"{place}: map", table["map"])
-    check_keys(f"{place}: map", entry, Map.__slots__)
-    x, y, of = (text(f"{place}: map: {key}", entry.get(key), "a name") for key in ("x", "y", "of"))
+    entries = table.get("map", [])
+    entries = entries if isinstance(entries, list) else [entries]
+    return Pictures(tuple(_map(f"{place}: map", entry) for entry in entries), distributions)
+
+
+def _map(place: str, entry: Any) -> Map:
+    entry = as_table(place, entry)
+    check_keys(place, entry, Map.__slots__)
+    x, y, of = (text(f"{place}: {key}", entry.get(key), "a name") for key in ("x", "y", "of"))
     limit = entry.get("limit")
     if limit is not None:
-        limit = number(f"{place}: map: limit", limit)
-    return Pictures(Map(x, y, of, limit), distributions)
+        limit = number(f"{place}: limit", limit)
+    return Map(x, y, of, limit, choice(f"{place}: cell", entry.get("cell", "mean"), CELLS))
+
+
+def _limits(place: str, table: Any) -> tuple[Limit, ...]:
+    """The limits of a table like time_difference = { greatest = 0.03, p95 = 0.02 }."""
+    found = []
+    for metric, entry in as_table(place, table).items():
+        at = f"{place}: {metric}"
+        own = as_table(at, entry)
+        check_keys(at, own, {*STATISTICS, "from"})
+        reference = own.get("from")
+        if reference is not None:
+            reference = text(f"{at}: from", reference, "the name of a variant")
+        bounds = {s: number(f"{at}: {s}", own[s]) for s in STATISTICS if s in own}
+        if not bounds:
+            raise InputError(f"{at}: no limit; must have one of {choices(STATISTICS)}")
+        found += [Limit(metric, s, most, reference) for s, most in bounds.items()]
+    return tuple(found)
 
 
 def _numbers(place: str, entry: Any, names: Sequence[str]) -> list[float]:
@@ -219,7 +335,7 @@ def _value(place: str, value: Any) -> Value:
     return value
 
 
-def _in(place: str, make: Callable[[], Made]) -> Made:
+def _in(place: str, make: Callable[[], T]) -> T:
     """Return what `make` returns; its InputError begins with the place."""
     try:
         return make()

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -22,6 +22,12 @@ from ..system.readings import between
 from ..system.settings import settings
 from .design import MOST, Design, Points
 from .distributions import Distribution
+
+STATISTICS = ("least", "p5", "median", "p95", "greatest", "mean")
+"""The statistics of a metric, besides how many runs have one."""
+
+Cell = Literal["mean", "greatest"]
+CELLS: tuple[str, ...] = get_args(Cell)
 
 PROXIES = "proxies."
 """The beginning of the columns that a system with proxies has besides."""
@@ -43,20 +49,38 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class Map:
-    """A picture of a metric, of, over two parameters x and y; limit draws a line at that value."""
+    """A picture of a metric, of, over two parameters x and y; limit draws a line at that value.
+
+    cell says what of runs that share a cell is shown.
+    """
 
     x: str
     y: str
     of: str
     limit: float | None = None
+    cell: Cell = "mean"
 
 
 @dataclass(frozen=True, slots=True)
 class Pictures:
-    """The pictures of a study: a map, and the distributions of metrics."""
+    """The pictures of a study: maps, and the distributions of metrics."""
 
-    map: Map | None = None
+    maps: tuple[Map, ...] = ()
     distributions: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """The most that a statistic of a metric may be over all runs, in the unit of the metric.
+
+    With reference, the name of another variant, it is that of how far the metric of each run is
+    from that of the same run there.
+    """
+
+    metric: str
+    statistic: str
+    most: float
+    reference: str | None = None
 
 
 @dataclass(frozen=True)
@@ -65,7 +89,8 @@ class Study:
 
     seeds are variables that get another whole number in each run, each its own, but see _noise();
     outputs are signals whose last value is kept beside the metrics; metrics are those beside the
-    ones that every result is asked for. InputError where anything does not fit.
+    ones that every result is asked for. variant is the name of this one among several of the same
+    design. InputError where anything does not fit.
     """
 
     name: str
@@ -76,6 +101,8 @@ class Study:
     outputs: tuple[str, ...] = ()
     pictures: Pictures = field(default=Pictures(), compare=False)
     metrics: tuple[Metric, ...] = ()
+    limits: tuple[Limit, ...] = field(default=(), compare=False)
+    variant: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
         if not self.parameters:
@@ -95,6 +122,8 @@ class Study:
         for parameter in self._references_first:
             self._check_values(parameter)
         self._check_pictures()
+        for limit in self.limits:
+            self.limited(limit.metric)
         try:
             self.design.total(self._levels)
         except InputError as error:
@@ -257,15 +286,14 @@ class Study:
         ]
         results = [*(c for m in self.expected for c in m.columns), *self.outputs]
         columns = [*numeric, *self.seeds, *results]
-        picture = self.pictures.map
-        if picture:
+        for picture in self.pictures.maps:
             for name in (picture.x, picture.y):
                 known(f"{self.name}: figures.map: no parameter", name, numeric, " with numbers")
             if picture.x == picture.y:
                 raise InputError(
                     f"{self.name}: figures.map: x = y = {picture.x!r}; must be two parameters"
                 )
-        for name in (*([picture.of] if picture else ()), *self.pictures.distributions):
+        for name in (*(m.of for m in self.pictures.maps), *self.pictures.distributions):
             if not (name in columns or name.startswith(PROXIES) or self.metric_of(name)):
                 raise InputError(
                     f"{self.name}: figures: no column {name!r} in the results; valid: "
@@ -284,6 +312,21 @@ class Study:
         if found is None or column in found.columns or (bracket and not found.entries):
             return found
         return None
+
+    def limited(self, name: str) -> tuple[str, ...]:
+        """The columns that a limit of that name is for; InputError where there is no such result.
+
+        Those are all entries of a metric, one entry like impact_velocity[1], or an output.
+        """
+        for metric in self.expected:
+            if name in (metric.name, *metric.columns):
+                return metric.columns if name == metric.name else (name,)
+        known(
+            f"{self.name}: limits: no result",
+            name,
+            [*(m.name for m in self.expected), *self.outputs],
+        )
+        return (name,)
 
     def unit(self, column: str) -> str | None:
         """The unit of a parameter, metric or output; "1" for a share, None where it has none."""

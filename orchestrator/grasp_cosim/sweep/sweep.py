@@ -9,6 +9,9 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
 from ..errors import InputError
 from ..files import remove_parts, write_text
 from ..parallel import Crew, Lost, progress_bar
@@ -36,6 +39,12 @@ class Sweep:
     def table(self) -> Table:
         """A row per run."""
         return make_table(self.study, self.outcomes)
+
+    def numbers(self, column: str) -> npt.NDArray[np.float64]:
+        """A column of the table as numbers, NaN throughout where no run came to have it."""
+        if column in self.table.columns:
+            return self.table.numbers(column)
+        return np.full(len(self.outcomes), np.nan)
 
     @property
     def failed(self) -> int:

@@ -15,12 +15,9 @@ from ..checks import extra_module
 from ..errors import InputError, choices
 from ..files import in_one_piece
 from .run import Outcome
-from .study import Study
+from .study import STATISTICS, Study
 
 Column = Sequence[Any]
-
-STATISTICS = ("least", "p5", "median", "p95", "greatest", "mean")
-"""The statistics of a metric, besides how many runs have one."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +42,7 @@ class Table:
         """For each metric: how many runs have a finite one, its least and greatest, its mean, and
         the values below which 5 %, 50 % and 95 % lie.
         """
-        return {name: _summary(self.numbers(name)) for name in self.metrics}
+        return {name: summarized(self.numbers(name)) for name in self.metrics}
 
 
 def make_table(study: Study, outcomes: Sequence[Outcome]) -> Table:
@@ -96,7 +93,8 @@ def _array(arrow: Any, name: str, column: Column) -> Any:
     return arrow.array(numbers, type=arrow.float64())
 
 
-def _summary(values: npt.NDArray[np.float64]) -> dict[str, float | int | None]:
+def summarized(values: npt.NDArray[np.float64]) -> dict[str, float | int | None]:
+    """How many of the values are finite, and the STATISTICS of those."""
     there = values[np.isfinite(values)]
     if not len(there):
         return {"runs": 0, **dict.fromkeys(STATISTICS)}

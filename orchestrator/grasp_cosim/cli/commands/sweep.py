@@ -1,20 +1,24 @@
 """The command sweep."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import click
 
 from ...errors import InputError
+from ...files import FMU_FOLDER
 from ...numerals import fixed
 from ...report.sweep import draw_sweep
-from ...sweep.read import read_study, study_file
+from ...sweep.limits import Reached, reached
+from ...sweep.read import Made, read_studies, study_file
 from ...sweep.sensitivity import Sensitivity
 from ...sweep.store import Store
-from ...sweep.study import Pictures
+from ...sweep.study import STATISTICS, Pictures, Study
 from ...sweep.sweep import RUNS, Sweep
 from ...sweep.sweep import sweep as run_study
-from ...sweep.table import STATISTICS
+from ...system.description import System
 from ..frame import (
     INTERRUPTED,
     NEGATIVE,
@@ -27,13 +31,17 @@ from ..frame import (
     metrics_option,
     say,
     show,
+    with_controller,
     with_preset,
 )
-from ..native import many_runs_option, natively
+from ..native import all_natively, many_runs_option
+from ..options import controller_option
 
 
 @click.command()
 @click.argument("study")
+@controller_option
+@click.option("--seed", type=click.IntRange(0), help="Draw other runs than the study's own seed.")
 @click.option("--out", type=PATH, help="Folder of the runs; by default the study's name, here.")
 @click.option(
     "--workers", type=click.IntRange(1), help="Processes; by default one for each processor."
@@ -45,6 +53,8 @@ from ..native import many_runs_option, natively
 @json_option
 def sweep(
     study: str,
+    controller: str | None,
+    seed: int | None,
     out: Path | None,
     workers: int | None,
     scheduler: str | None,
@@ -53,9 +63,13 @@ def sweep(
     native: bool | None,
     as_json: bool,
 ) -> int:
-    """Do all runs of STUDY: a .toml file, or reflectance_map, grasp_sensitivity, bench_monte_carlo.
+    """Do all runs of STUDY: a .toml file, or the name of one that is built in.
 
-    Finished runs are kept in the folder: the same command goes on where it was ended.
+    Built in: reflectance_map, grasp_sensitivity, bench_monte_carlo, and those of the adaptive
+    controller, which docs/colour.md tells of.
+
+    Finished runs are kept in the folder: the same command goes on where it was ended. Exit code 1:
+    a limit that the study sets is missed, or every run failed.
 
     \b
     Example: grasp-cosim sweep reflectance_map --out map --plot
@@ -63,25 +77,30 @@ def sweep(
     if workers is not None and scheduler is not None:
         raise InputError("--workers: must not come with --scheduler, whose workers there are")
     path = _file(study)
-    folder = out or Path(path.stem)
-    chosen = read_study(path, load_system, with_preset, chosen_metrics(metric_files))
-    if plot and chosen.pictures == Pictures():
+    folder = out or Path(path.stem if seed is None else f"{path.stem}-{seed}")
+    made = _made(controller, path)
+    variants = read_studies(path, made, chosen_metrics(metric_files), seed)
+    if plot and variants[0].pictures == Pictures():
         raise InputError(f"--plot: {path.name} has no [figures]; must say what to draw")
     check_outputs(folder, plot)
     if scheduler is not None and native is None:  # whose machines may be others
         native = False
     try:
-        with natively(chosen.system, native) as system:
-            chosen = replace(chosen, system=system)
-            done = run_study(chosen, folder, workers, scheduler, progress=True)
+        with all_natively([v.system for v in variants], native) as systems:
+            done = [
+                run_study(replace(v, system=s), folder / v.variant, workers, scheduler, True)
+                for v, s in zip(variants, systems, strict=True)
+            ]
     except KeyboardInterrupt:
-        kept = f"{Store(folder).kept()} of {chosen.runs} runs are kept in {folder}"
-        return fail(f"interrupted; {kept}, the same command goes on", INTERRUPTED)
-    drawn = draw_sweep(done, folder) if plot else []
-    for picture in drawn:
+        kept = sum(Store(folder / v.variant).kept() for v in variants)
+        of = f"{kept} of {sum(v.runs for v in variants)} runs are kept in {folder}"
+        return fail(f"interrupted; {of}, the same command goes on", INTERRUPTED)
+    for picture in draw_sweep(done, folder) if plot else []:
         say(f"drew {picture}")
-    show(as_json, done.as_json(), _as_text(done))
-    return NEGATIVE if done.failed == chosen.runs else 0
+    limits = reached(done)
+    show(as_json, _as_json(path.name, folder, done, limits), _as_text(done, limits))
+    failed = all(d.failed == d.study.runs for d in done)
+    return NEGATIVE if failed or not all(limit.kept for limit in limits) else 0
 
 
 def _file(study: str) -> Path:
@@ -94,7 +113,54 @@ def _file(study: str) -> Path:
     return study_file(study, STUDIES)
 
 
-def _as_text(done: Sweep) -> str:
+def _made(law: str | None, path: Path) -> Made:
+    """How the systems of a study are made, those of --controller where it is given."""
+    from ...grasp.presets import STUDIES
+
+    def load(file: Path | None) -> System:
+        return with_controller(load_system(file), law)
+
+    def controller(system: System, name: str) -> System:
+        if law is not None:
+            raise InputError(f"--controller {law}: must be left out, the study names {name!r}")
+        return with_controller(system, name)
+
+    return Made(load, with_preset, controller, FMU_FOLDER if path.parent == STUDIES else None)
+
+
+def _as_json(
+    name: str, folder: Path, done: Sequence[Sweep], limits: Sequence[Reached]
+) -> dict[str, Any]:
+    """Of a study without variants, its summary; else those of the variants by name."""
+    found = [limit.as_json() for limit in limits]
+    if not done[0].study.variant:
+        return {**done[0].as_json(), "limits": found}
+    variants = {d.study.variant: d.as_json() for d in done}
+    return {"study": name, "folder": str(folder), "variants": variants, "limits": found}
+
+
+def _as_text(done: Sequence[Sweep], limits: Sequence[Reached]) -> str:
+    lines = [line for d in done for line in _head(d)]
+    wide = max(len(d.study.variant) for d in done) + 2 if len(done) > 1 else 0
+    lines.append(f"{'':28s}{'':{wide}s}" + "".join(f"{h:>11s}" for h in ("runs", *STATISTICS)))
+    summaries = [(d.study.variant, d.table.summary()) for d in done]
+    for name in dict.fromkeys(name for _, summary in summaries for name in summary):
+        for variant, summary in summaries:
+            row = summary.get(name, {"runs": 0})
+            numbers = (
+                "-" if (n := row.get(h)) is None else f"{n:.4g}" for h in ("runs", *STATISTICS)
+            )
+            lines.append(
+                f"{name:28s}{variant if wide else '':{wide}s}"
+                + "".join(f"{n:>11s}" for n in numbers)
+            )
+    for d in done:
+        for found in d.sensitivities:
+            lines += _sensitivity_lines(found)
+    return "\n".join([*lines, *(_limit_line(done[0].study, limit) for limit in limits)])
+
+
+def _head(done: Sweep) -> list[str]:
     lines = [
         f"{done.study.name}: {len(done.outcomes)} runs, {done.resumed} of them done before, "
         f"{done.failed} failed; in {done.folder / RUNS}"
@@ -102,13 +168,21 @@ def _as_text(done: Sweep) -> str:
     error = next((o for o in done.outcomes if o.error is not None), None)
     if error is not None:
         lines.append(f"the first that failed, {error.index}: {error.error}")
-    lines.append(f"{'':28s}" + "".join(f"{head:>11s}" for head in ("runs", *STATISTICS)))
-    for name, row in done.table.summary().items():
-        numbers = ("-" if number is None else f"{number:.4g}" for number in row.values())
-        lines.append(f"{name:28s}" + "".join(f"{number:>11s}" for number in numbers))
-    for found in done.sensitivities:
-        lines += _sensitivity_lines(found)
-    return "\n".join(lines)
+    return lines
+
+
+def _limit_line(study: Study, found: Reached) -> str:
+    """Like "kept    adaptive: time_difference: greatest 0.02806 s, at most 0.03"."""
+    limit = found.limit
+    of = f"{found.variant}: " if found.variant else ""
+    beside = f" from {limit.reference}" if limit.reference else ""
+    value = "none" if found.value is None else f"{found.value:.4g}"
+    unit = study.unit(found.column) or ""
+    missing = f"; {found.missing} runs have none" if found.missing else ""
+    return (
+        f"{'kept' if found.kept else 'MISSED':8s}{of}{found.column}{beside}: {limit.statistic} "
+        f"{value} {unit}, at most {limit.most:g}{missing}"
+    )
 
 
 def _sensitivity_lines(found: Sensitivity) -> list[str]:

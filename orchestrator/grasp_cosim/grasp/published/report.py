@@ -33,8 +33,8 @@ def markdown(report: Mapping[str, Any], system: System) -> str:
     rms = {key: _rounded(value, 3) for key, value in report["rms"].items()}
     return f"""# The published grasp, simulated again
 
-Cases 1 and 2 of the paper's position table against this co-simulation, {_controller(system)}: four FMUs,
-{system.scheme} scheme, communication step {1e3 * step:g} ms. Times in seconds.
+Cases 1 and 2 of the paper's position table against this co-simulation, {_controller(system)}:
+four FMUs, {system.scheme} scheme, communication step {1e3 * step:g} ms. Times in seconds.
 
 The object is named by its position in m.
 
@@ -73,9 +73,10 @@ def bench_markdown(report: Mapping[str, Any], system: System) -> str:
     )
     return f"""# The published experiments on the bench preset
 
-Cases 0, 1 and 2 in the settings of both experimental tables against this co-simulation, {_controller(system)}: the sensors
-with their electronics, the fingers with identified friction, {system.scheme} scheme, communication
-step {1e3 * step:g} ms. Times in seconds; *difference* is simulated less published.
+Cases 0, 1 and 2 in the settings of both experimental tables against this co-simulation,
+{_controller(system)}: the sensors with their electronics, the fingers with identified friction,
+{system.scheme} scheme, communication step {1e3 * step:g} ms. Times in seconds; *difference* is
+simulated less published.
 
 | root mean square of the differences, s | |
 |---|---|
