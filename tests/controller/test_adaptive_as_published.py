@@ -34,7 +34,7 @@ def published(p: adaptive.Params, samples: list[series.Inputs], h: float) -> lis
         reflectance_ratio.Params(limit=0.0),
     ],
 )
-@examples(60)
+@examples(30)
 @given(SAMPLES, st.floats(1e-5, 1e-2))
 def test_nothing_learnt_and_no_hold_is_eq_2(
     learnt: reflectance_ratio.Params, samples: list[series.Inputs], h: float
@@ -46,7 +46,7 @@ def test_nothing_learnt_and_no_hold_is_eq_2(
 
 
 @pytest.mark.parametrize("case", [0, 1])
-@examples(60)
+@examples(30)
 @given(SAMPLES, st.floats(1e-5, 1e-2))
 def test_without_layer_3_it_is_the_published_law(
     case: int, samples: list[series.Inputs], h: float

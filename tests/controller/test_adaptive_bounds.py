@@ -54,7 +54,10 @@ def assert_bounded(p: Params, x: State, y: adaptive.Outputs) -> None:
     assert 0.0 <= y.hold <= 1.0
     most = p.simultaneous_contact.gain
     assert abs(y.simultaneous_contact_force) <= most
-    assert all(isfinite(each) for each in numbers((x.line_1, x.line_2, x.estimate, x.closing)))
+    for line in (x.line_1, x.line_2):
+        assert line.variance >= 0.0  # infinite without a slope, but a number
+        assert all(isfinite(each) for each in line._replace(variance=0.0))
+    assert isfinite(x.closing)
     assert all(isfinite(each) for each in y.estimated_gap)
 
 
@@ -68,14 +71,14 @@ def published_outputs(p: Params, samples: list[Inputs], h: float) -> list[series
     return trace
 
 
-@examples(60)
+@examples(30)
 @given(LAWS, SAMPLES, STEPS)
 def test_the_estimate_is_bounded_for_any_numbers(p: Params, samples: list[Inputs], h: float) -> None:
     for x, y in run(p, samples, h):
         assert_bounded(p, x, y)
 
 
-@examples(60)
+@examples(30)
 @given(LAWS, SAMPLES, STEPS)
 def test_outputs_are_numbers_where_those_of_the_published_law_are(
     p: Params, samples: list[Inputs], h: float

@@ -46,7 +46,7 @@ def dimmed(u: Inputs, factor: float) -> Inputs:
     return u._replace(intensity=(factor * xi_1, factor * xi_2))
 
 
-@examples(60)
+@examples(30)
 @given(
     LAWS,
     ANY_SAMPLES | st.builds(approach, pairs(0.1, 2.0), pairs(0.01, 0.1)),
