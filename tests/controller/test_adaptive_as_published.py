@@ -1,0 +1,81 @@
+"""Where the adaptive law is the published one, to the last bit."""
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from grasp_controller import adaptive, holding, reflectance_ratio, series
+from grasp_controller import impact_reduction as layer_2
+from grasp_controller import simultaneous_contact as layer_3
+from hypothesis import given
+from hypothesis import strategies as st
+from support.approach import ANY_SAMPLES, H, Pair, approach, pairs, run
+from support.examples import examples
+
+SAMPLES = ANY_SAMPLES | st.builds(approach, pairs(0.1, 2.0), pairs(0.01, 0.1))
+
+NEVER_HOLDS = holding.Params(squeeze=1e12)
+
+
+def published(p: adaptive.Params, samples: list[series.Inputs], h: float) -> list[series.Outputs]:
+    three = series.Params(p.simultaneous_contact, p.impact_reduction, p.contact_force)
+    x = series.initial_state(three, samples[0])
+    trace = [series.outputs(three, x, samples[0])]
+    for u in samples[1:]:
+        x = series.step(three, x, u, h)
+        trace.append(series.outputs(three, x, u))
+    return trace
+
+
+@pytest.mark.parametrize(
+    "learnt",
+    [
+        reflectance_ratio.Params(prior_deviation=0.0),
+        reflectance_ratio.Params(limit=0.0),
+    ],
+)
+@examples(30)
+@given(SAMPLES, st.floats(1e-5, 1e-2))
+def test_nothing_learnt_and_no_hold_is_eq_2(
+    learnt: reflectance_ratio.Params, samples: list[series.Inputs], h: float
+) -> None:
+    p = adaptive.Params(reflectance=learnt, hold=NEVER_HOLDS)
+    for (_, y), z in zip(run(p, samples, h), published(p, samples, h), strict=True):
+        assert tuple(y)[: len(z)] == z
+        assert y.reflectance_ratio == 1.0
+
+
+@pytest.mark.parametrize("case", [0, 1])
+@examples(30)
+@given(SAMPLES, st.floats(1e-5, 1e-2))
+def test_without_layer_3_it_is_the_published_law(
+    case: int, samples: list[series.Inputs], h: float
+) -> None:
+    """All but f_s, which is put out though it acts on nothing; it learns nevertheless."""
+    p = adaptive.Params(layer_3.Params(enabled=False), layer_2.Params(enabled=case == 1))
+    for (_, y), z in zip(run(p, samples, h), published(p, samples, h), strict=True):
+        ours: dict[str, Any] = y._asdict()
+        for name, value in z._asdict().items():
+            assert name == "simultaneous_contact_force" or ours[name] == value
+
+
+@pytest.mark.parametrize("blind", [(0.0, 0.0), (0.0, 0.03), (0.03, 0.0)])
+def test_a_blind_sensor_teaches_nothing(blind: Pair) -> None:
+    """Without light on one side it is the published law, which then turns to the other side."""
+    dark = [
+        u._replace(intensity=tuple(a * xi for a, xi in zip(blind, u.intensity, strict=True)))
+        for u in approach((1.0, 1.0))
+    ]
+    p = adaptive.Params(hold=NEVER_HOLDS)
+    trace = run(p, dark)
+    assert all(y.reflectance_ratio == 1.0 for _, y in trace)
+    assert [tuple(y)[:5] for _, y in trace] == [tuple(z) for z in published(p, dark, H)]
+
+
+def test_with_what_is_learnt_it_is_another_law() -> None:
+    """The properties above say something."""
+    samples, p = approach((0.5, 1.0)), adaptive.Params()
+    (_, y), z = run(p, samples)[-1], published(p, samples, 1e-2)[-1]
+    assert y.simultaneous_contact_force != pytest.approx(z.simultaneous_contact_force, abs=0.1)
+    free = replace(p, hold=NEVER_HOLDS)
+    assert run(free, samples)[-1][1].reflectance_ratio == pytest.approx(0.5, rel=0.05)

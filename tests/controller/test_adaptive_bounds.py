@@ -1,0 +1,127 @@
+"""Whatever is measured, and however long a step is: what is learnt stays a number, and bounded."""
+
+from dataclasses import fields
+from math import exp, isfinite, log
+from typing import Any
+
+import pytest
+from grasp_controller import adaptive, holding, reflectance_ratio, series
+from grasp_controller.adaptive import Inputs, Params, State
+from hypothesis import given
+from hypothesis import strategies as st
+from support.approach import Pair, approach, run
+from support.declared import parameters
+from support.examples import examples
+
+HARD = [0.0, -0.0, 5e-324, 1e-308, 1e-12, 1e-6, 1.0, 1e3, 1e9, 1e154, 1e300, 1.7976931348623157e308]
+
+NUMBERS = st.sampled_from(HARD + [-x for x in HARD]) | st.floats(
+    allow_nan=False, allow_infinity=False
+)
+
+BOTH = st.tuples(NUMBERS, NUMBERS)
+
+STEPS = st.sampled_from([1e-300, 1e-9, 1e-4, 1e-3, 0.1, 1e3, 1e300]) | st.floats(1e-6, 1.0)
+
+SAMPLES = st.lists(st.builds(Inputs, BOTH, BOTH, BOTH), min_size=2, max_size=8)
+
+
+def at_the_ends(block: type[Any]) -> st.SearchStrategy[Any]:
+    """A part of the parameters, each at an end of its range or as by default."""
+    chosen = {p.name: st.sampled_from([p.low, p.default, p.high]) for p in parameters(block)}
+    return st.builds(block, **chosen)
+
+
+LAWS = st.just(Params()) | st.builds(
+    Params,
+    reflectance=at_the_ends(reflectance_ratio.Params),
+    hold=at_the_ends(holding.Params),
+)
+
+
+def numbers(values: Any) -> list[float]:
+    """All numbers of outputs or of a state."""
+    if isinstance(values, tuple):
+        return [x for value in values for x in numbers(value)]
+    return [values]
+
+
+def assert_bounded(p: Params, x: State, y: adaptive.Outputs) -> None:
+    learnt, limit = p.reflectance, p.reflectance.limit
+    assert abs(x.estimate.beta) <= limit
+    assert exp(-limit) <= y.reflectance_ratio <= exp(limit)
+    assert 0.0 <= x.estimate.deviation <= learnt.prior_deviation
+    assert 0.0 <= y.hold <= 1.0
+    most = p.simultaneous_contact.gain
+    assert abs(y.simultaneous_contact_force) <= most
+    for line in (x.line_1, x.line_2):
+        assert line.variance >= 0.0  # infinite without a slope, but a number
+        assert all(isfinite(each) for each in line._replace(variance=0.0))
+    assert isfinite(x.closing)
+    assert all(isfinite(each) for each in y.estimated_gap)
+
+
+def published_outputs(p: Params, samples: list[Inputs], h: float) -> list[series.Outputs]:
+    three = series.Params(p.simultaneous_contact, p.impact_reduction, p.contact_force)
+    x = series.initial_state(three, samples[0])
+    trace = [series.outputs(three, x, samples[0])]
+    for u in samples[1:]:
+        x = series.step(three, x, u, h)
+        trace.append(series.outputs(three, x, u))
+    return trace
+
+
+@examples(30)
+@given(LAWS, SAMPLES, STEPS)
+def test_the_estimate_is_bounded_for_any_numbers(p: Params, samples: list[Inputs], h: float) -> None:
+    for x, y in run(p, samples, h):
+        assert_bounded(p, x, y)
+
+
+@examples(30)
+@given(LAWS, SAMPLES, STEPS)
+def test_outputs_are_numbers_where_those_of_the_published_law_are(
+    p: Params, samples: list[Inputs], h: float
+) -> None:
+    finite = True
+    for (_, y), z in zip(run(p, samples, h), published_outputs(p, samples, h), strict=True):
+        finite = finite and all(isfinite(each) for each in numbers(z))
+        assert not finite or all(isfinite(each) for each in numbers(y))
+
+
+@examples(30)
+@given(LAWS, SAMPLES, STEPS)
+def test_what_was_nonsense_is_behind_after_an_approach(
+    p: Params, samples: list[Inputs], h: float
+) -> None:
+    """No number gets stuck beyond the bounds, and no step after raises."""
+    for x, y in run(p, [*samples, *approach((0.5, 1.0), count=20)], h):
+        assert_bounded(p, x, y)
+
+
+@pytest.mark.parametrize("seen", [(1e3, 1e3), (0.5, 0.5), (0.0, 0.0), (-1.0, 0.3)])
+def test_a_sensor_that_shows_one_number_teaches_nothing(seen: Pair) -> None:
+    """Saturated, blind, or stuck: the line has no slope, whatever the way."""
+    for x, y in run(Params(), [u._replace(intensity=seen) for u in approach((1.0, 1.0))]):
+        assert x.estimate == (0.0, 1.0)
+        assert y.reflectance_ratio == 1.0
+
+
+@pytest.mark.parametrize("converter", [0.1, 0.2, 0.5])
+def test_a_sensor_that_saturates_unlearns_nothing(converter: float) -> None:
+    """From there on its line does not move, but for what the low-pass still brings."""
+    seen = [
+        u._replace(intensity=tuple(min(xi, converter) for xi in u.intensity))
+        for u in approach((0.5, 1.0), end=1e-3, count=400)
+    ]
+    trace = [x.estimate for x, _ in run(Params(), seen)]
+    first = next(k for k, u in enumerate(seen) if max(u.intensity) == converter)
+    before, after = (abs(trace[k].beta - log(0.5)) for k in (first, -1))
+    assert before < trace[first].deviation
+    assert after < before + 0.02
+
+
+def test_every_parameter_of_what_is_learnt_has_a_range() -> None:
+    """So that the ends above are all of them."""
+    for block in (reflectance_ratio.Params, holding.Params):
+        assert {p.name for p in parameters(block)} == {field.name for field in fields(block)}

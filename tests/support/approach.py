@@ -1,0 +1,55 @@
+"""Samples of the adaptive controller: any, and those of an approach by Eq. (9)."""
+
+from itertools import pairwise
+
+from grasp_controller import adaptive
+from grasp_controller.adaptive import Inputs, Outputs, Params, State
+from hypothesis import strategies as st
+
+Pair = tuple[float, float]
+
+N, K, L_0 = 1.1506, 0.0024, 0.005
+"""Exponent, gain in V.m^n and offset in m of the published sensors."""
+
+
+H = 1e-2
+"""s, the step of an approach."""
+
+
+def intensity(gap: float, alpha: float, n: float = N) -> float:
+    """Eq. (9), V; K is the same at 100 mm for every n."""
+    return float(alpha * K * 0.1 ** (n - N) / (gap + L_0) ** n)
+
+
+def approach(
+    alpha: Pair, gaps: Pair = (0.08, 0.08), end: float = 5e-3, count: int = 100, n: float = N
+) -> list[Inputs]:
+    """Both fingers from their gaps in m to the gap `end`, evenly in steps of H; faces at 35 mm."""
+    v_1, v_2 = ((gap - end) / (count * H) for gap in gaps)
+    samples = []
+    for k in range(count + 1):
+        l_1, l_2 = (gap + (end - gap) * k / count for gap in gaps)
+        seen = (intensity(l_1, alpha[0], n), intensity(l_2, alpha[1], n))
+        samples.append(Inputs((0.035 + l_1, -0.035 - l_2), (-v_1, v_2), seen))
+    return samples
+
+
+def run(p: Params, samples: list[Inputs], h: float = H) -> list[tuple[State, Outputs]]:
+    """From the first sample on, the state and outputs at each."""
+    x = adaptive.initial_state(p, samples[0])
+    trace = [(x, adaptive.outputs(p, x, samples[0]))]
+    for _, u in pairwise(samples):
+        x = adaptive.step(p, x, u, h)
+        trace.append((x, adaptive.outputs(p, x, u)))
+    return trace
+
+
+def pairs(low: float, high: float) -> st.SearchStrategy[Pair]:
+    """Two numbers of a range."""
+    return st.tuples(st.floats(low, high), st.floats(low, high))
+
+
+ANY_SAMPLES = st.lists(
+    st.builds(Inputs, pairs(-0.2, 0.2), pairs(-1.0, 1.0), pairs(0.0, 2.0)), min_size=2, max_size=20
+)
+"""Of a gripper, in any order."""
