@@ -18,7 +18,7 @@ from matplotlib.patches import FancyArrow, FancyBboxPatch, Polygon
 BLUE, RED, AMBER, GREY = "#2f74c0", "#cf4434", "#e09b24", "#7d8893"
 """Finger 1 is blue and finger 2 red, as in the figures."""
 
-WHITE = "#ffffff"
+WHITE, BLACK = "#ffffff", "#22272c"
 SIZE = 256
 """Width and height in px; the pictures are drawn in these coordinates, y upwards."""
 ROUND = "round,pad=0,rounding_size=10"
@@ -86,14 +86,20 @@ def proximity_sensor(axes: Axes) -> None:
 
 def grasp_controller(axes: Axes) -> None:
     """Three layers, one after the other, each an impedance."""
-    for top in (186, 101):
-        _arrow(axes, 128, top, 0, -28, GREY, 16)
-    for bottom, color in ((184, AMBER), (99, RED), (14, BLUE)):
-        _box(axes, 24, bottom, 208, 58, color)
-        x = [46, 80, 92, 116, 140, 164, 176, 210]
-        y = [0, 0, 15, -15, 15, -15, 0, 0]
-        middle = bottom + 29
-        axes.plot(x, [middle + dy for dy in y], color=WHITE, lw=7, solid_joinstyle="round")
+    _layers(axes)
+    for bottom in (184, 99, 14):
+        _spring(axes, bottom + 29)
+
+
+def grasp_controller_adaptive(axes: Axes) -> None:
+    """The same, but to the first a white face and a black one are equal."""
+    _layers(axes)
+    for bottom in (99, 14):
+        _spring(axes, bottom + 29)
+    _box(axes, 42, 194, 58, 38, WHITE)
+    _box(axes, 156, 194, 58, 38, BLACK)
+    for y in (206, 220):
+        axes.plot([114, 142], [y, y], color=WHITE, lw=6, solid_capstyle="round")
 
 
 def proxy(axes: Axes) -> None:
@@ -112,6 +118,7 @@ ICONS: dict[str, Callable[[Axes], None]] = {
     "GripperPlantMuJoCo": gripper_plant_mujoco,
     "ProximitySensor": proximity_sensor,
     "GraspController": grasp_controller,
+    "GraspControllerAdaptive": grasp_controller_adaptive,
     "Proxy": proxy,
 }
 """The function that draws the icon of each FMU, and of all proxies."""
@@ -122,6 +129,19 @@ def _gripper(axes: Axes) -> None:
     _box(axes, 196, 16, 40, 184, BLUE)
     _box(axes, 100, 196, 56, 48, GREY)
     _box(axes, 12, 168, 232, 44, GREY)
+
+
+def _layers(axes: Axes) -> None:
+    for top in (186, 101):
+        _arrow(axes, 128, top, 0, -28, GREY, 16)
+    for bottom, color in ((184, AMBER), (99, RED), (14, BLUE)):
+        _box(axes, 24, bottom, 208, 58, color)
+
+
+def _spring(axes: Axes, middle: float) -> None:
+    x = [46, 80, 92, 116, 140, 164, 176, 210]
+    y = [0, 0, 15, -15, 15, -15, 0, 0]
+    axes.plot(x, [middle + dy for dy in y], color=WHITE, lw=7, solid_joinstyle="round")
 
 
 def _box(axes: Axes, left: float, bottom: float, width: float, height: float, color: str) -> None:

@@ -4,7 +4,6 @@ P = max(0, (u_2 - u_1)/2)         h = P^2/(P^2 + P_0^2) · w_0^2/(w_0^2 + w^2)
 """
 
 from dataclasses import dataclass
-from math import expm1
 from typing import Annotated
 
 from block_variables import Group, Parameter
@@ -42,7 +41,7 @@ class Params(Group, name="hold"):
 def filtered(p: Params, before: float, closing: float, h: float) -> float:
     """The low-passed speed of closing in m/s, h seconds later."""
     rest = min(max(closing, -MOST), MOST)
-    return before - expm1(-h / p.time_constant) * (rest - before)
+    return before + h / (p.time_constant + h) * (rest - before)
 
 
 def hold(p: Params, u: tuple[float, float], closing: float) -> float:

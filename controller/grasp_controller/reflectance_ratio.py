@@ -6,7 +6,7 @@ Derivation: controller/README.md
 """
 
 from dataclasses import dataclass
-from math import exp, expm1, inf, log, sqrt
+from math import exp, inf, log, sqrt
 from typing import Annotated, NamedTuple
 
 from block_variables import Group, Parameter
@@ -130,8 +130,8 @@ def first_point(p: Params, floor: float, s: float, xi: float) -> Line:
 
 
 def low_pass(p: Params, h: float) -> float:
-    """The share of a new sample in what is low-passed, after h seconds."""
-    return -expm1(-h / p.time_constant)
+    """The share of a sample in its low-pass after h seconds: T_f·x_f' = x - x_f, Euler backward."""
+    return h / (p.time_constant + h)
 
 
 def moved(

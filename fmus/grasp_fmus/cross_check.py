@@ -78,7 +78,7 @@ def _options(start: float, stop: float) -> bytes:
 
 def _signals(name: str, inputs: list[Variable]) -> list[Signal]:
     """Return a signal per input: that of the FMU whose name this one's begins with, or its own."""
-    known = next((s for of, s in SIGNALS.items() if name.startswith(of)), {})
+    known = SIGNALS.get(max((of for of in SIGNALS if name.startswith(of)), key=len, default=""), {})
     return [_signal(v, known.get(v.name)) for v in inputs]
 
 
@@ -108,6 +108,19 @@ def _push(t: float, stop: float) -> float:
     return math.sin(2.0 * math.pi * t / stop) if t < stop else 0.0
 
 
+def _light(reflectance: float, gap: float) -> float:
+    """Return the intensity in V that a sensor has over a gap in m."""
+    return reflectance * 0.0024 / (0.005 + gap) ** 1.1506
+
+
+APPROACH: dict[str, Signal] = {
+    "position[1]": lambda t: 0.11 - 0.045 * _rise(t, 0.0, 1.2),
+    "position[2]": lambda t: -0.11 + 0.105 * _rise(t, 0.0, 1.8),
+    "velocity[1]": lambda t: -0.045 * _rate(t, 0.0, 1.2),
+    "velocity[2]": lambda t: 0.105 * _rate(t, 0.0, 1.8),
+}
+"""Both fingers up to an object, finger 1 first."""
+
 SIGNALS: dict[str, dict[str, Signal]] = {
     # The fingers come near, touch gently one after the other, press, and let go.
     "GripperPlant": {
@@ -122,18 +135,21 @@ SIGNALS: dict[str, dict[str, Signal]] = {
     },
     # From far away until past the surface, and back.
     "ProximitySensor": {"gap": lambda t: 0.049 + 0.051 * math.cos(2.0 * math.pi * t / 3.0)},
-    # An approach, finger 1 first, and a surface that drifts away again, finger 2 more.
+    # An approach, and a surface that drifts away again, from finger 2 more.
     "GraspController": {
-        "position[1]": lambda t: 0.11 - 0.045 * _rise(t, 0.0, 1.2),
-        "position[2]": lambda t: -0.11 + 0.105 * _rise(t, 0.0, 1.8),
-        "velocity[1]": lambda t: -0.045 * _rate(t, 0.0, 1.2),
-        "velocity[2]": lambda t: 0.105 * _rate(t, 0.0, 1.8),
+        **APPROACH,
         "intensity[1]": lambda t: (
             0.075 + 0.9 * _rise(t, 0.2, 1.2) - 0.3 * _rise(t, 2.0, 3.0)
         ),
         "intensity[2]": lambda t: (
             0.03 + 0.9 * _rise(t, 0.6, 1.8) - 0.6 * _rise(t, 2.2, 3.0)
         ),
+    },
+    # An approach to faces of two colours, of which it learns, and a grasp.
+    "GraspControllerAdaptive": {
+        **APPROACH,
+        "intensity[1]": lambda t: _light(0.6, 0.045 - 0.045 * _rise(t, 0.0, 1.2)),
+        "intensity[2]": lambda t: _light(1.0, 0.105 - 0.105 * _rise(t, 0.0, 1.8)),
     },
 }  # fmt: skip
 """The signals of each FMU's inputs by name. A real input that is not here swings out and back."""

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
-from grasp_controller import series
+from grasp_controller import adaptive, series
 from gripper_plant import compliant, movable, rigid
 from proximity_sensor import channel
 from support.pythons import VERSIONS, python
@@ -24,15 +24,14 @@ class Case(NamedTuple):
     inputs: Any
 
 
+NEAR = series.Inputs(position=(0.09, -0.1), velocity=(-0.1, 0.2), intensity=(0.05, 0.04))
 CASES = {
     "GripperPlant": Case(rigid, rigid.Inputs(force=(-60.0, 45.0))),  # both fingers hit the object
     "GripperPlantCompliant": Case(compliant, compliant.Inputs(force=(-60.0, 45.0))),
     "GripperPlantMovable": Case(movable, movable.Inputs(force=(-60.0, 45.0))),
     "ProximitySensor": Case(channel, channel.Inputs(gap=0.0123)),
-    "GraspController": Case(
-        series,
-        series.Inputs(position=(0.09, -0.1), velocity=(-0.1, 0.2), intensity=(0.05, 0.04)),
-    ),
+    "GraspController": Case(series, NEAR),
+    "GraspControllerAdaptive": Case(adaptive, NEAR),
 }
 
 

@@ -32,6 +32,7 @@ INPUT = {
     "GripperPlantMovable": "force[1]",
     "ProximitySensor": "gap",
     "GraspController": "position[2]",
+    "GraspControllerAdaptive": "position[2]",
 }
 VALUE = {
     "GripperPlant": -60.0,
@@ -39,6 +40,7 @@ VALUE = {
     "GripperPlantMovable": -60.0,
     "ProximitySensor": 0.0123,
     "GraspController": -0.09,
+    "GraspControllerAdaptive": -0.09,
 }
 
 pytestmark = pytest.mark.skipif(not shutil.which("gcc"), reason="NO gcc: no host to test with")

@@ -24,6 +24,7 @@ H = 1e-3
 
 BLOCKS = {
     "GraspController": ROOT / "controller" / "grasp_controller",
+    "GraspControllerAdaptive": ROOT / "controller" / "grasp_controller",
     "GripperPlant": ROOT / "plant" / "gripper_plant",
     "GripperPlantCompliant": ROOT / "plant" / "gripper_plant",
     "GripperPlantMovable": ROOT / "plant" / "gripper_plant",
@@ -98,6 +99,11 @@ PARAMETERS: dict[str, list[dict[str, float]]] = {
         {},
         {"contact_force.stiffness": 60.0, "impact_reduction.viscosity[2]": -0.9},
         {"simultaneous_contact.gain": 0.0, "impact_reduction.mass": 2.0},
+    ],
+    "GraspControllerAdaptive": [
+        {},
+        {"contact_force.stiffness": 60.0, "reflectance.prior_deviation": 0.1},
+        {"simultaneous_contact.gain": 0.0, "hold.squeeze": 1.0},
     ],
     "GripperPlant": [
         {},
@@ -221,17 +227,17 @@ for path in fmus:
 OURS = """
 import gripper_plant.rigid, gripper_plant.contact
 import proximity_sensor.optics
-import grasp_controller.series
+import grasp_controller.series, grasp_controller.adaptive
 import grasp_fmus.slave, grasp_fmus.contract, grasp_fmus.snapshot, grasp_fmus.host_log
 sys.path.insert(0, str(Path(grasp_fmus.__file__).parent / "scripts"))
-import GraspController, GripperPlant, GripperPlantCompliant, GripperPlantMovable
-import GripperPlantMuJoCo, ProximitySensor
+import GraspController, GraspControllerAdaptive, GripperPlant, GripperPlantCompliant
+import GripperPlantMovable, GripperPlantMuJoCo, ProximitySensor
 MODULES = {
     name: module for name, module in sys.modules.items()
     if name.partition(".")[0] in (
         "gripper_plant", "proximity_sensor", "grasp_controller", "grasp_fmus", "block_variables",
-        "GraspController", "GripperPlant", "GripperPlantCompliant", "GripperPlantMovable",
-        "GripperPlantMuJoCo", "ProximitySensor",
+        "GraspController", "GraspControllerAdaptive", "GripperPlant", "GripperPlantCompliant",
+        "GripperPlantMovable", "GripperPlantMuJoCo", "ProximitySensor",
     )
 }
 assert len(MODULES) > 15

@@ -28,6 +28,7 @@ BLOCKS = {
     "GripperPlantMovable": "gripper_plant.movable",
     "ProximitySensor": "proximity_sensor.channel",
     "GraspController": "grasp_controller.series",
+    "GraspControllerAdaptive": "grasp_controller.adaptive",
 }
 STILL = {
     "GripperPlant": ["object_position"],
@@ -202,6 +203,15 @@ def test_the_sensor_sees_from_far_away_past_the_surface() -> None:
     signal = SIGNALS["ProximitySensor"]["gap"]
     assert signal(0.0) == pytest.approx(0.1)
     assert signal(1.5) == pytest.approx(-0.002)
+
+
+def test_the_adaptive_controller_learns_from_its_approach_and_holds(tmp_path: Path) -> None:
+    name = "GraspControllerAdaptive"
+    (tmp_path / "ref.csv").write_bytes(cross_check_files(name, block(name))[f"{name}_ref.csv"])
+    reference = read_csv(tmp_path / "ref.csv")
+    assert reference["reflectance_ratio"][[0, -1]] == pytest.approx([1.0, 0.6], rel=0.01)
+    assert (np.diff(reference["reflectance_ratio_standard_deviation"]) <= 0.0).mean() > 0.5
+    assert reference["hold"][[0, 300, -1]] == pytest.approx([0.0, 0.0, 1.0], abs=0.01)
 
 
 def test_a_variant_is_driven_like_the_fmu_whose_name_it_begins_with() -> None:

@@ -22,7 +22,10 @@ from support.fmi2 import ERROR, OK, Fmu, Instance
 from support.kinds import Kind, all_kinds
 from support.packages import skip_where_it_cannot_run
 
-NAMES = ("GraspController", "GripperPlant", "GripperPlantMuJoCo", "ProximitySensor")
+NAMES = (
+    "GraspController", "GraspControllerAdaptive", "GripperPlant", "GripperPlantMuJoCo",
+    "ProximitySensor",
+)  # fmt: skip
 """The other plants are GripperPlant's adapter with arithmetic that keeps nothing."""
 
 BEFORE, CYCLES = 500, 1500

@@ -24,6 +24,7 @@ NAMES = (
     "GripperPlantMovable",
     "GripperPlantMuJoCo",
     "ProximitySensor",
+    "GraspControllerAdaptive",
     "GraspController",
 )
 

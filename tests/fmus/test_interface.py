@@ -114,6 +114,25 @@ fingertip_radius              parameter  Real     m      0.005
 contact_time_constant         parameter  Real     s      0.005
 timestep                      parameter  Real     s      0.0001
 """
+ADAPTIVE = """
+reflectance_ratio             output     Real     1
+reflectance_ratio_standard_deviation  output  Real  1
+estimated_gap[1]              output     Real     m
+estimated_gap[2]              output     Real     m
+hold                          output     Real     1
+reflectance.diffusion_exponent  parameter  Real   1      1.1506
+reflectance.time_constant     parameter  Real     s      0.02
+reflectance.weight_exponent   parameter  Real     1      5.0
+reflectance.travel            parameter  Real     m      0.001
+reflectance.intensity_noise   parameter  Real     V      0.0005
+reflectance.prior_deviation   parameter  Real     1      1.0
+reflectance.limit             parameter  Real     1      2.5
+reflectance.gain              parameter  Real     V.m^n  0.0024
+reflectance.offset_distance   parameter  Real     m      0.005
+hold.squeeze                  parameter  Real     N      0.1
+hold.speed                    parameter  Real     m/s    0.002
+hold.time_constant            parameter  Real     s      0.02
+"""
 FMUS = {
     "GripperPlant": PLANT + FRICTION,
     "GripperPlantCompliant": PLANT + FRICTION + COMPLIANT,
@@ -121,6 +140,7 @@ FMUS = {
     "GripperPlantMuJoCo": PLANT + FRICTION + MOVABLE + MUJOCO,
     "ProximitySensor": SENSOR,
     "GraspController": CONTROLLER,
+    "GraspControllerAdaptive": CONTROLLER + ADAPTIVE,
 }
 
 EXTRA = ("baumgarte_", "impact_reduction.intensity_floor", "kelvin_voigt.", "hunt_crossley.")

@@ -60,7 +60,7 @@ def test_a_step_that_is_too_long_is_discarded(load: Load, name: str, size: float
             assert instance.step(1e-3, 1e-3) == OK
 
 
-@pytest.mark.parametrize("name", ["GraspController", "ProximitySensor"])
+@pytest.mark.parametrize("name", ["GraspController", "GraspControllerAdaptive", "ProximitySensor"])
 def test_a_block_without_sub_steps_takes_any_step(load: Load, name: str) -> None:
     with Instance(load(name)).initialise() as instance:
         assert instance.step(0.0, 1e300) == OK

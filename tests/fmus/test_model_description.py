@@ -22,7 +22,7 @@ import fmpy
 import pytest
 from conftest import Load
 from fmpy.validation import validate_fmu
-from grasp_controller import series
+from grasp_controller import adaptive, series
 from gripper_plant import compliant, movable, mujoco_box, rigid
 from lxml import etree  # type: ignore[import-untyped]
 from proximity_sensor import channel
@@ -33,6 +33,7 @@ from support.packages import skip_where_it_cannot_run
 
 BLOCKS: dict[str, ModuleType] = {
     "GraspController": series,
+    "GraspControllerAdaptive": adaptive,
     "GripperPlant": rigid,
     "GripperPlantCompliant": compliant,
     "GripperPlantMovable": movable,
@@ -239,6 +240,7 @@ FIXED = {
         *("adc.enabled", "filter.enabled", "filter.cutoff", "median.enabled", "sampling.rate"),
     ],
     "GraspController": [],
+    "GraspControllerAdaptive": ["reflectance.diffusion_exponent"],
 }
 """Start values, geometry, and what the state was made with; the cards say why of each."""
 
@@ -392,6 +394,26 @@ PLANT = {
     "object_width": "W",
     "initial_object_position": "x_m",
 }
+CONTROLLER = {
+    "position": "x_j",
+    "velocity": "x_j'",
+    "intensity": "xi_j",
+    "force": "u_j",
+    "target_position": "x_v,2",
+    "virtual_position": "x_vj,1",
+    "simultaneous_contact_force": "f_s",
+    "impact_reduction_force": "f_pj",
+    "simultaneous_contact.mass": "M_a2",
+    "simultaneous_contact.damping": "D_a2",
+    "simultaneous_contact.stiffness": "K_a2",
+    "simultaneous_contact.gain": "K_s",
+    "impact_reduction.mass": "M_a1",
+    "impact_reduction.damping": "D_a1",
+    "impact_reduction.stiffness": "K_a1",
+    "impact_reduction.viscosity": "D_pj",
+    "contact_force.damping": "D_i",
+    "contact_force.stiffness": "K_i",
+}
 PAPER = {
     "GripperPlant": PLANT,
     "GripperPlantCompliant": PLANT,
@@ -405,26 +427,8 @@ PAPER = {
         "diffusion_exponent": "n",
         "offset_distance": "l_0",
     },
-    "GraspController": {
-        "position": "x_j",
-        "velocity": "x_j'",
-        "intensity": "xi_j",
-        "force": "u_j",
-        "target_position": "x_v,2",
-        "virtual_position": "x_vj,1",
-        "simultaneous_contact_force": "f_s",
-        "impact_reduction_force": "f_pj",
-        "simultaneous_contact.mass": "M_a2",
-        "simultaneous_contact.damping": "D_a2",
-        "simultaneous_contact.stiffness": "K_a2",
-        "simultaneous_contact.gain": "K_s",
-        "impact_reduction.mass": "M_a1",
-        "impact_reduction.damping": "D_a1",
-        "impact_reduction.stiffness": "K_a1",
-        "impact_reduction.viscosity": "D_pj",
-        "contact_force.damping": "D_i",
-        "contact_force.stiffness": "K_i",
-    },
+    "GraspController": CONTROLLER,
+    "GraspControllerAdaptive": CONTROLLER,
 }
 
 
@@ -550,12 +554,14 @@ def params_at_random(block: Any, rng: random.Random, switches: dict[str, bool]) 
     return p
 
 
+LAYERS = [
+    {"simultaneous_contact.enabled": a, "impact_reduction.enabled": b}
+    for a in (False, True)
+    for b in (False, True)
+]
 SWITCHES: dict[str, list[dict[str, bool]]] = {
-    "GraspController": [
-        {"simultaneous_contact.enabled": a, "impact_reduction.enabled": b}
-        for a in (False, True)
-        for b in (False, True)
-    ],
+    "GraspController": LAYERS,
+    "GraspControllerAdaptive": LAYERS,
     "GripperPlant": [{}],
     "GripperPlantCompliant": [{"hunt_crossley.enabled": on} for on in (False, True)],
     "GripperPlantMovable": [{"hunt_crossley.enabled": on} for on in (False, True)],

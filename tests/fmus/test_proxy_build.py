@@ -26,7 +26,7 @@ from support.slow import slow
 Proxy = Callable[..., Path]
 Run = Callable[..., tuple[int, str, str]]
 
-BLOCKS = ("GripperPlant", "ProximitySensor", "GraspController")
+BLOCKS = ("GripperPlant", "ProximitySensor", "GraspController", "GraspControllerAdaptive")
 OWN_PARAMETERS = {
     "proxy.host": ("String", "127.0.0.1"),
     "proxy.port": ("Integer", "5501"),
@@ -193,7 +193,7 @@ def initial(fmu: Path) -> dict[str, set[str]]:
     }
 
 
-@pytest.mark.parametrize("name", [slow("GraspController"), slow("GripperPlant"), "ProximitySensor"])
+@pytest.mark.parametrize("name", [slow(n) if n != "ProximitySensor" else n for n in BLOCKS])
 def test_the_proxy_of_one_of_ours(fmus: Path, proxy: Proxy, name: str) -> None:
     original = fmus / f"{name}.fmu"
     made = proxy(original)

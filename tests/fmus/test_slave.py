@@ -10,7 +10,7 @@ from fmpy import extract, read_model_description, simulate_fmu
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
 from fmpy.fmi3 import FMU3Slave
-from grasp_controller import series
+from grasp_controller import adaptive, series
 from gripper_plant import compliant, movable, mujoco_box, rigid
 from proximity_sensor import channel
 from support.kinds import Kind, all_kinds
@@ -25,6 +25,7 @@ BLOCKS: dict[str, Any] = {
     "GripperPlantMuJoCo": mujoco_box,
     "ProximitySensor": channel,
     "GraspController": series,
+    "GraspControllerAdaptive": adaptive,
 }
 
 

@@ -28,6 +28,7 @@ CLOSED = {
     "force[1]": -1.0,
     "force[2]": 1.2,
 }
+NEAR = {"position[1]": 0.09, "velocity[1]": -0.1, "intensity[1]": 0.1}
 STARTS: dict[str, dict[str, float]] = {
     "GripperPlant": CLOSED,
     "GripperPlantCompliant": CLOSED,
@@ -36,7 +37,8 @@ STARTS: dict[str, dict[str, float]] = {
     "ProximitySensor": {
         f"{stage}.enabled": True for stage in ("ambient", "noise", "adc", "filter", "median")
     },
-    "GraspController": {"position[1]": 0.09, "velocity[1]": -0.1, "intensity[1]": 0.1},
+    "GraspController": NEAR,
+    "GraspControllerAdaptive": NEAR,
 }
 """The fingers are about to touch, the sensor samples."""
 

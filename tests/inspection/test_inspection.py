@@ -183,6 +183,7 @@ def test_our_controller(fmus: Path) -> None:
         "GripperPlantMuJoCo",
         "ProximitySensor",
         "GraspController",
+        "GraspControllerAdaptive",
     ],
 )
 def test_our_fmus_are_shown_as_fmpy_reads_them(fmus: Path, name: str) -> None:

@@ -44,7 +44,7 @@ FMI_3 = """<fmiModelDescription fmiVersion="3.0" modelName="M" instantiationToke
 
 OURS = (
     "GripperPlant", "GripperPlantCompliant", "GripperPlantMovable", "GripperPlantMuJoCo",
-    "ProximitySensor", "GraspController",
+    "ProximitySensor", "GraspController", "GraspControllerAdaptive",
 )  # fmt: skip
 Write = Callable[[str], Path]
 

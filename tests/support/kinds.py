@@ -29,6 +29,9 @@ OWN = {"SpringPlant": Path(__file__).parents[2] / "docs/spring_plant.py"}
 
 NAMES = (*blocks(), *OWN)
 
+TRANSLATED = [name for name in blocks() if name not in PACKAGES]
+"""The blocks that come with the package, of which there are native FMUs."""
+
 QUICK = "ProximitySensor"
 """It has variables of every type, and sub-steps."""
 

@@ -19,12 +19,12 @@ from grasp_fmus.fmu import Model, shipped_model
 from grasp_fmus.native.c_only import called_of_libm, write_c
 from grasp_fmus.native.compilers import BITS
 from grasp_fmus.shipped import SCRIPTS, blocks
+from support.kinds import TRANSLATED
 from support.native_fmus import needs_gcc
 from support.slow import slow
 
 ROOT = Path(__file__).parents[3]
 SPRING = ROOT / "docs/spring_plant.py"
-NAMES = [name for name in blocks() if name != "GripperPlantMuJoCo"]
 STRICT = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
 OF_THE_COMPILER = {"memcpy", "memset", "memmove", "memcmp", "strlen", "strcpy", "strcspn"}
 """Functions of string.h, which a compiler without an operating system has as well."""
@@ -66,7 +66,7 @@ def compiled(folder: Path, *options: str, compiler: str = "gcc") -> None:
 
 @pytest.mark.parametrize("level", ["-O0", slow("-O3")])
 @pytest.mark.parametrize("compiler", ["gcc", slow("clang")])
-@pytest.mark.parametrize("name", [*map(slow, NAMES[1:]), NAMES[0], "SpringPlant"])
+@pytest.mark.parametrize("name", [*map(slow, TRANSLATED[1:]), TRANSLATED[0], "SpringPlant"])
 def test_compiles_without_a_warning_and_calls_what_it_lists(
     name: str, compiler: str, level: str, written: Callable[[str], Path]
 ) -> None:
@@ -86,7 +86,7 @@ def test_compiles_without_a_warning_and_calls_what_it_lists(
     assert defined == {f"{name}_{function}" for function in functions}
 
 
-@pytest.mark.parametrize("name", [*NAMES, "SpringPlant"])
+@pytest.mark.parametrize("name", [*TRANSLATED, "SpringPlant"])
 def test_what_is_written(name: str, written: Callable[[str], Path]) -> None:
     files = {path.name: path for path in written(name).glob("*.[ch]")}
     assert {f"{name}.h", f"{name}.c", "main.c", "block.h", "python_arithmetic.h"} <= files.keys()
@@ -97,7 +97,7 @@ def test_what_is_written(name: str, written: Callable[[str], Path]) -> None:
     assert not re.search(r"\bfmi[23]", text)
 
 
-@pytest.mark.parametrize("name", [*map(slow, NAMES[1:]), NAMES[0], slow("SpringPlant")])
+@pytest.mark.parametrize("name", [*map(slow, TRANSLATED[1:]), TRANSLATED[0], slow("SpringPlant")])
 def test_the_example_runs_by_the_command_at_its_top(
     name: str, written: Callable[[str], Path]
 ) -> None:
@@ -135,12 +135,12 @@ class InC:
 CONTROLLER_INPUTS = ctypes.c_double * 6
 
 
-def controller(tmp_path: Path) -> tuple[InC, Any]:
-    """The controller, and its default parameters as its header has them."""
-    made = InC(shipped_model(SCRIPTS / "GraspController.py"), tmp_path)
+def controller(tmp_path: Path, name: str = "GraspController") -> tuple[InC, Any]:
+    """A controller, and its default parameters as its header has them."""
+    made = InC(shipped_model(SCRIPTS / f"{name}.py"), tmp_path)
     (tmp_path / "p.c").write_text(
-        '#include "GraspController.h"\n'
-        "const GraspController_Parameters defaults = GRASPCONTROLLER_PARAMETERS_DEFAULTS;\n"
+        f'#include "{name}.h"\n'
+        f"const {name}_Parameters defaults = {name.upper()}_PARAMETERS_DEFAULTS;\n"
         "int size = sizeof defaults;\n"
     )
     compiled(tmp_path, "-shared", "-fPIC", "-o", "p.so", "p.c")
@@ -149,15 +149,18 @@ def controller(tmp_path: Path) -> tuple[InC, Any]:
     return made, (ctypes.c_char * size).in_dll(library, "defaults")
 
 
-def test_the_same_bits_as_the_block_over_changing_inputs(fmus: Path, tmp_path: Path) -> None:
-    c, p = controller(tmp_path)
-    block = blocks()["GraspController"]
+@pytest.mark.parametrize("name", ["GraspController", "GraspControllerAdaptive"])
+def test_the_same_bits_as_the_block_over_changing_inputs(
+    fmus: Path, tmp_path: Path, name: str
+) -> None:
+    c, p = controller(tmp_path, name)
+    block = blocks()[name]
     fields = declared(block)
     pack, listed = packer(block.Inputs, fields), unpacker(fields)
     params = block.Params()
     y = (ctypes.c_double * 16)()
     names = [n for f in fields if f.causality == "input" for n in f.names]
-    lines = (fmus / "GraspController_in.csv").read_text().splitlines()
+    lines = (fmus / f"{name}_in.csv").read_text().splitlines()
     assert [cell.strip('"') for cell in lines[0].split(",")] == ["time", *names]
     rows = [[float(cell) for cell in line.split(",")[1:]] for line in lines[1:]]
     assert len(rows) == STEPS + 1

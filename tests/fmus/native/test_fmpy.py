@@ -14,12 +14,11 @@ from fmpy.build import build_platform_binary
 from fmpy.util import read_csv, read_ref_opt_file
 from fmpy.validation import validate_fmu
 from grasp_fmus.native.compilers import BITS, UNPREFIXED
-from grasp_fmus.shipped import blocks
+from support.kinds import TRANSLATED
 from support.native_fmus import needs_gcc
 from support.slow import slow
 
-NAMES = [name for name in blocks() if name != "GripperPlantMuJoCo"]
-BOTH = [(name, 2) for name in NAMES] + [slow(name, 3) for name in NAMES]
+BOTH = [(name, 2) for name in TRANSLATED] + [slow(name, 3) for name in TRANSLATED]
 
 PROGRAMS = os.pathsep.join([sysconfig.get_path("scripts"), os.environ["PATH"]])
 """Where they are looked for; CMake is installed with FMPy."""
@@ -64,7 +63,7 @@ def test_it_gives_the_cross_check_reference(fmu: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.skipif(not shutil.which("cmake", path=PROGRAMS), reason="NO cmake")
 @pytest.mark.parametrize("fmi", [2, 3])
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", TRANSLATED)
 def test_fmpy_compiles_its_sources(
     fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -80,7 +79,7 @@ def test_fmpy_compiles_its_sources(
 
 
 @pytest.mark.parametrize("fmi", [2, slow(3)])
-@pytest.mark.parametrize("name", ["GraspController"])
+@pytest.mark.parametrize("name", ["GraspController", slow("GraspControllerAdaptive")])
 @pytest.mark.skipif("fma" not in Path("/proc/cpuinfo").read_text(), reason="NO fma")
 def test_contraction_is_caught(fmu: Path, tmp_path: Path) -> None:
     """Compiled for this processor without a word on contraction, it refuses to be instantiated."""

@@ -17,13 +17,12 @@ from grasp_fmus.native.build import (
 )
 from grasp_fmus.native.compilers import cache_folder
 from grasp_fmus.native.targets import here
-from grasp_fmus.shipped import blocks
+from support.kinds import TRANSLATED
 from support.native_fmus import needs_gcc
 from support.slow import slow
 
 ROOT = Path(__file__).parents[3]
 SPRING = ROOT / "docs/spring_plant.py"
-NAMES = [name for name in blocks() if name != "GripperPlantMuJoCo"]
 BINARY = f"binaries/{here().folder}/{{}}{here().suffix}"
 
 pytestmark = needs_gcc
@@ -38,7 +37,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 def test_all_but_one_can_be_native() -> None:
-    assert chosen_names() == NAMES
+    assert chosen_names() == TRANSLATED
     assert python_only() == {
         "GripperPlantMuJoCo": "GripperPlantMuJoCo: stays Python only, as it needs mujoco"
     }
@@ -59,7 +58,7 @@ def test_a_name_that_cannot_be_native(name: str, said: str, tmp_path: Path) -> N
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", TRANSLATED)
 def test_what_is_in_it(natives: Path, name: str) -> None:
     found = members(natives / f"{name}.fmu")
     others = {n for n in found if not n.startswith(("sources/", "binaries/"))}
@@ -73,7 +72,7 @@ def test_what_is_in_it(natives: Path, name: str) -> None:
     assert not [n for n, data in found.items() if HASH.encode() in data or HASH in n]
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", TRANSLATED)
 def test_icon_and_cross_check_files_are_those_of_its_twin(
     natives: Path, fmus: Path, name: str
 ) -> None:
@@ -83,7 +82,7 @@ def test_icon_and_cross_check_files_are_those_of_its_twin(
         assert (natives / f"{name}{end}").read_bytes() == (fmus / f"{name}{end}").read_bytes()
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", TRANSLATED)
 def test_its_states_name_the_content_of_its_twin(natives: Path, fmus: Path, name: str) -> None:
     slave = members(fmus / f"{name}.fmu")["resources/slavemodule.txt"]
     content = slave.rpartition(b"_")[2]
@@ -93,7 +92,7 @@ def test_its_states_name_the_content_of_its_twin(natives: Path, fmus: Path, name
 def test_nothing_is_made_twice(natives: Path, tmp_path: Path) -> None:
     shutil.copytree(natives, tmp_path / "out")
     built = build_native(tmp_path / "out")
-    assert [(b.path.stem, b.status) for b in built] == [(name, "unchanged") for name in NAMES]
+    assert [(b.path.stem, b.status) for b in built] == [(name, "unchanged") for name in TRANSLATED]
     (tmp_path / "out" / STAMP).unlink()
     assert {b.status for b in build_native(tmp_path / "out")} == {"unchanged"}
     assert contents(tmp_path / "out") == contents(natives)
@@ -129,7 +128,7 @@ def test_the_same_bytes_without_a_cache(
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     build_native(tmp_path / "out")
     assert contents(tmp_path / "out") == contents(natives)
-    assert len([*(tmp_path / "cache/grasp-cosim/native").iterdir()]) == len(NAMES)
+    assert len([*(tmp_path / "cache/grasp-cosim/native").iterdir()]) == len(TRANSLATED)
 
 
 @pytest.mark.slow

@@ -13,11 +13,8 @@ from grasp_fmus.native.description import build_description, native_description
 from grasp_fmus.shipped import SCRIPTS, slave_class
 from grasp_fmus.variable import Variable
 from lxml import etree  # type: ignore[import-untyped]
+from support.kinds import TRANSLATED
 
-NAMES = (
-    "GraspController", "GripperPlant", "GripperPlantCompliant", "GripperPlantMovable",
-    "ProximitySensor",
-)  # fmt: skip
 SCHEMA = Path(fmpy.__file__).parent / "schema"
 VERSIONS: tuple[Literal[2, 3], ...] = (2, 3)
 
@@ -36,7 +33,7 @@ def valid(text: bytes, schema: str) -> None:
     etree.XMLSchema(file=str(SCHEMA / schema)).assertValid(etree.fromstring(text))
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", TRANSLATED)
 def test_in_fmi_2_it_differs_in_what_it_is_made_of(name: str) -> None:
     d = described(name)
     python, native = (
@@ -54,7 +51,7 @@ def test_in_fmi_2_it_differs_in_what_it_is_made_of(name: str) -> None:
     assert plain(native) == plain(python)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", TRANSLATED)
 def test_they_are_valid(name: str) -> None:
     d = described(name)
     valid(native_description(d, "G", 2), "fmi2/fmi2ModelDescription.xsd")
@@ -66,7 +63,7 @@ def test_they_are_valid(name: str) -> None:
 TYPES = {"Real": "Float64", "Boolean": "Boolean", "Integer": "Int32", "Enumeration": "Enumeration"}
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", TRANSLATED)
 def test_in_fmi_3_the_variables_are_the_same_and_then_the_time(name: str) -> None:
     d = described(name)
     two = fromstring(native_description(d, "G", 2)).findall("ModelVariables/ScalarVariable")
@@ -77,7 +74,7 @@ def test_in_fmi_3_the_variables_are_the_same_and_then_the_time(name: str) -> Non
     assert int(time.get("valueReference", "")) == len(two)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", TRANSLATED)
 def test_in_fmi_3_units_types_categories_and_dependencies_are_the_same(name: str) -> None:
     d = described(name)
     two, three = (fromstring(native_description(d, "G", fmi)) for fmi in VERSIONS)
@@ -101,7 +98,7 @@ def test_in_fmi_3_units_types_categories_and_dependencies_are_the_same(name: str
         assert found == known != []
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", TRANSLATED)
 @pytest.mark.parametrize("fmi", VERSIONS)
 def test_what_hosts_ask_for(name: str, fmi: Literal[2, 3]) -> None:
     root = fromstring(native_description(described(name), "G", fmi))

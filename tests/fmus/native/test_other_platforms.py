@@ -15,7 +15,6 @@ from grasp_fmus.native.compilers import compiler_for
 from grasp_fmus.native.targets import LINUX_ARM, LINUX_X86, WINDOWS, Target
 from support.compilers import needs_zig
 
-NAME = "GraspController"
 HOST = Path(__file__).with_name("platform_host.c")
 ARM = Path("/usr/aarch64-linux-gnu")
 ENDING = {LINUX_X86: "", LINUX_ARM: "", WINDOWS: ".exe"}
@@ -26,16 +25,23 @@ Ends = list[list[float]]
 """Status and two outputs at both ends."""
 
 
+@pytest.fixture(scope="module", params=["GraspController", "GraspControllerAdaptive"])
+def name(request: pytest.FixtureRequest) -> str:
+    """Both controllers, which have the same inputs and first outputs."""
+    return str(request.param)
+
+
 @pytest.fixture(scope="module")
-def fmu(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+def fmu(name: str, tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     """The files in an FMU with a binary for each."""
     plan = planned([LINUX_X86, LINUX_ARM, WINDOWS])
-    (built,) = build_native(tmp_path_factory.mktemp("fmu"), plan, [NAME])
+    (built,) = build_native(tmp_path_factory.mktemp("fmu"), plan, [name])
     return read_members(built.path.read_bytes())
 
 
 def ends(fmu: dict[str, bytes], target: Target, folder: Path, *emulator: str) -> Ends:
     """What the host prints, which is compiled for the target and run by its emulator."""
+    (name,) = {Path(file).stem for file in fmu if file.startswith("binaries/")}
     host = f"host{ENDING[target]}"
     zig = compiler_for(target, asked=True)
     headers = Path(fmpy.__file__).parent / "c-code"
@@ -43,7 +49,7 @@ def ends(fmu: dict[str, bytes], target: Target, folder: Path, *emulator: str) ->
     subprocess.run(command, cwd=folder, check=True, env={**os.environ, **zig.environment})
     place = target.tuple if target == LINUX_ARM else target.folder
     binary = folder / f"fmu{target.suffix}"
-    binary.write_bytes(fmu[f"binaries/{place}/{NAME}{target.suffix}"])
+    binary.write_bytes(fmu[f"binaries/{place}/{name}{target.suffix}"])
     guid = re.search(rb'guid="(\w+)"', fmu["modelDescription.xml"])
     assert guid
     run = [*emulator, f"./{host}", f"./{binary.name}", guid[1].decode()]

@@ -47,7 +47,7 @@ def build(
     c_only: Path | None,
     as_json: bool,
 ) -> int:
-    """Build the FMUs: the plants, GripperPlant*, then ProximitySensor and GraspController.
+    """Build the FMUs: the plants, GripperPlant*, ProximitySensor, and the GraspController*.
 
     With BLOCK, a Python file: the FMU of that block alone, spring_plant.py becomes SpringPlant.fmu.
     docs/your_plant.md shows one. With --native, BLOCK may be the name of one of ours as well.

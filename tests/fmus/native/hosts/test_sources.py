@@ -14,6 +14,7 @@ import pytest
 from grasp_fmus.native.compilers import LIBM
 from support.c_host import HEADERS, Unpacked, number, rows_in_python
 from support.hosts import Parts
+from support.kinds import TRANSLATED
 from support.platforms import MINGW
 from support.slow import slow
 
@@ -43,9 +44,8 @@ def fmu(parts: Parts, name: str) -> Unpacked:
 
 every = pytest.mark.parametrize(
     "name",
-    ["GraspController", "GripperPlant", "GripperPlantCompliant", "GripperPlantMovable",
-     "ProximitySensor"],
-)  # fmt: skip
+    TRANSLATED,
+)
 
 
 # Linked into one program

@@ -10,17 +10,16 @@ import pytest
 from support.c_host import Host as CHost
 from support.c_host import Script, Unpacked, bits
 from support.hosts import Parts
+from support.kinds import TRANSLATED
 from support.platforms import needs_programs
 
 PartsOf = Callable[[int], Parts]
 
-NAMES = ("GraspController", "GripperPlant", "GripperPlantCompliant", "GripperPlantMovable",
-         "ProximitySensor")  # fmt: skip
 
 pytestmark = needs_programs("gcc")
 
 
-@pytest.fixture(params=NAMES)
+@pytest.fixture(params=TRANSLATED)
 def fmu(request: pytest.FixtureRequest, parts: Parts) -> Unpacked:
     return parts[request.param].fmu
 
@@ -118,7 +117,7 @@ def test_both_versions_describe_the_same(parts_of: PartsOf) -> None:
     """Names, references, causality, variability, units, limits, starts; FMI 3.0 has the time."""
     keys = ("name", "valueReference", "causality", "variability", "unit", "min", "max", "start",
             "nominal", "displayUnit", "description")  # fmt: skip
-    for name in NAMES:
+    for name in TRANSLATED:
         two, three = (
             [
                 {key: v.get(key) for key in keys}
