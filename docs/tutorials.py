@@ -166,7 +166,7 @@ def gap_by_equation_7(run: Result) -> float:
     return max(0.0, value(run, "plant.friction.coulomb[1]", 0.0) / stiffness - 0.035)
 
 
-COLUMNS: Mapping[str, tuple[str | Callable[[Result], float], float, int]] = {
+COLUMNS: Mapping[str, tuple[str | Callable[[Result], float | list[float]], float, int]] = {
     "contacts, s": ("time_to_contact", 1.0, 3),
     "apart, s": ("time_difference", 1.0, 3),
     "impacts, mm/s": ("impact_velocity", 1e3, 1),

@@ -214,8 +214,9 @@ def test_the_quotient_controller_differs_in_layer_2_alone() -> None:
         x = series.initial_state(p, u)
         ours, its = series.step(p, x, later, 1e-3), block["step"](p, x, later, 1e-3)
         assert its.impact_reduction_force == pytest.approx((300.0, -120.0), rel=1e-12)
-        assert its._replace(impact_reduction_force=(), virtual=()) == ours._replace(
-            impact_reduction_force=(), virtual=()
+        assert (
+            its._replace(virtual=ours.virtual, impact_reduction_force=ours.impact_reduction_force)
+            == ours
         )
         assert (its.virtual == ours.virtual) is not layers[1]
 
