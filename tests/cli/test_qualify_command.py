@@ -50,6 +50,20 @@ def test_a_copy_is_qualified(qualify: Run, fmus: Path) -> None:
     assert "interface: no difference" in lines
 
 
+@pytest.mark.slow
+def test_the_adaptive_controller_is_another_law_behind_the_same_interface(
+    qualify: Run, fmus: Path
+) -> None:
+    fmu = fmus / "GraspControllerAdaptive.fmu"
+    code, out, err = qualify(fmu, "--as", "controller", *SHORT, "--json")
+    report = json.loads(out)
+    assert (code, err, report["qualified"], report["failure"]) == (1, "", False, None)
+    added = {d["variable"] for d in report["differences"]}
+    assert {(d["severity"], d["kind"]) for d in report["differences"]} == {("notes", "extra")}
+    assert {"reflectance_ratio", "estimated_gap[2]", "hold", "hold.squeeze"} <= added
+    assert report["uncompared"] == []
+
+
 def test_all_that_it_writes(qualify: Run, altered: Altered) -> None:
     heavy = altered(
         "GripperPlant", "gripper_plant/fingers.py", BEFORE, BEFORE.replace("0.5)", "0.6)")

@@ -1,5 +1,8 @@
 """The FMUs have the variables that other tools rely on."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import pytest
 from conftest import Folder
 from grasp_cosim.interface.interface import Variable
@@ -160,3 +163,23 @@ def test_variables_are_those_agreed(folder_of: Folder, kind: Kind, name: str, ta
     ours = {described(v) for v in found if v.causality != "independent"}
     assert agreed <= ours
     assert all(row[0].startswith(EXTRA) for row in ours - agreed)
+
+
+def test_the_adaptive_controller_takes_the_place_of_the_published_one(fmus: Path) -> None:
+    """Every variable of that, declared alike and in the same order; what it adds is its own."""
+    published, adaptive = (
+        read_interface(fmus / f"{name}.fmu")
+        for name in ("GraspController", "GraspControllerAdaptive")
+    )
+    alike = [
+        replace(theirs, reference=ours.reference, initial_dependencies=ours.initial_dependencies)
+        for ours, theirs in zip(
+            published.variables,
+            [v for v in adaptive.variables if v.name in published.by_name],
+            strict=True,
+        )
+    ]
+    assert alike == [*published.variables]
+    added = [v for v in adaptive.variables if v.name not in published.by_name]
+    assert {v.causality for v in added} == {"output", "parameter"}
+    assert all(v.dependencies == () for v in added if v.causality == "output")
