@@ -73,7 +73,9 @@ def published_outputs(p: Params, samples: list[Inputs], h: float) -> list[series
 
 @examples(30)
 @given(LAWS, SAMPLES, STEPS)
-def test_the_estimate_is_bounded_for_any_numbers(p: Params, samples: list[Inputs], h: float) -> None:
+def test_the_estimate_is_bounded_for_any_numbers(
+    p: Params, samples: list[Inputs], h: float
+) -> None:
     for x, y in run(p, samples, h):
         assert_bounded(p, x, y)
 
