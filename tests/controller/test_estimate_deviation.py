@@ -18,7 +18,7 @@ from grasp_controller import holding, reflectance_ratio
 from grasp_controller.adaptive import Inputs, Params
 from grasp_controller.reflectance_ratio import Estimate
 from scipy.stats import chi2
-from support.approach import L_0, N, Pair, approach, run
+from support.approach import L_0, N, Pair, approach, relit, run
 from support.slow import slow
 
 TRIALS = 200
@@ -45,10 +45,10 @@ def law(q: float, sigma: float, prior: float) -> Params:
 
 
 def noisy(samples: Sequence[Inputs], deviation: float, random: Random) -> list[Inputs]:
-    return [
-        u._replace(intensity=tuple(xi + random.gauss(0.0, deviation) for xi in u.intensity))
-        for u in samples
-    ]
+    def in_noise(xi: float) -> float:
+        return xi + random.gauss(0.0, deviation)
+
+    return [relit(u, in_noise, in_noise) for u in samples]
 
 
 def learnt(p: Params, alpha: Pair, gaps: Pair, count: int, random: Random) -> Estimate:
@@ -73,11 +73,13 @@ def share_of_the_bound(q: float, gaps: Pair, count: int) -> float:
     """
     start, end = gaps
     way = [start + (end - start) * k / count + L_0 for k in range(1, count + 1)]
-    weights = [l ** (-N * q) for l in way]
+    weights: list[float] = [l ** (-N * q) for l in way]
     mean = sum(w * l for w, l in zip(weights, way, strict=True)) / sum(weights)
     spread = [w * (l - mean) ** 2 for w, l in zip(weights, way, strict=True)]
     excess = q - EXACT
-    noise = [s * (l / way[-1]) ** (-N * excess) for s, l in zip(spread, way, strict=True)]
+    noise: list[float] = [
+        s * (l / way[-1]) ** (-N * excess) for s, l in zip(spread, way, strict=True)
+    ]
     return sum(noise) / sum(spread)
 
 
@@ -91,7 +93,7 @@ def test_the_variance_is_that_of_many_approaches(gaps: Pair) -> None:
 
 @pytest.mark.parametrize("q", [1.0, 5.0])
 def test_with_another_weight_it_is_off_by_as_much_as_the_light_changed(q: float) -> None:
-    """By default a bound: what is said is up to twice the deviation. With q too small, too little."""
+    """By default it is a bound, up to twice the deviation; with q too small it is too little."""
     gaps, count = (0.08, 5e-3), 40
     found = trials(q, 5e-5, gaps, count)
     said = fmean(each.deviation**2 for each in found)
@@ -102,7 +104,7 @@ def test_with_another_weight_it_is_off_by_as_much_as_the_light_changed(q: float)
 
 @pytest.mark.parametrize(("sigma", "gaps"), [(5e-4, (0.08, 0.075)), (2e-3, (0.04, 0.03))])
 def test_any_ratio_is_as_far_off_as_is_said(sigma: float, gaps: Pair) -> None:
-    """Ratios as the prior has them, little to learn from: half of it is prior, the rest is light."""
+    """Ratios as the prior has them, and little to learn from: what is known is prior and light."""
     p, random = law(EXACT, sigma, 1.0), Random(2)
     errors, deviations = [], []
     for _ in range(TRIALS):
