@@ -1,5 +1,6 @@
 """Samples of the adaptive controller: any, and those of an approach by Eq. (9)."""
 
+from collections.abc import Callable
 from itertools import pairwise
 
 from grasp_controller import adaptive
@@ -32,6 +33,12 @@ def approach(
         seen = (intensity(l_1, alpha[0], n), intensity(l_2, alpha[1], n))
         samples.append(Inputs((0.035 + l_1, -0.035 - l_2), (-v_1, v_2), seen))
     return samples
+
+
+def relit(u: Inputs, right: Callable[[float], float], left: Callable[[float], float]) -> Inputs:
+    """A sample with other intensities."""
+    xi_1, xi_2 = u.intensity
+    return u._replace(intensity=(right(xi_1), left(xi_2)))
 
 
 def run(p: Params, samples: list[Inputs], h: float = H) -> list[tuple[State, Outputs]]:
