@@ -93,10 +93,8 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     closing = holding.filtered(p.hold, x.closing, v_1 - v_2, h)
     held = holding.hold(p.hold, series.outputs(p, x.layers, u).force, closing)
     floor = p.impact_reduction.intensity_floor
-    believed = (1.0 - held) / p.reflectance.travel
-    share = reflectance_ratio.low_pass(p.reflectance, h)
-    line_1 = reflectance_ratio.moved(p.reflectance, x.line_1, floor, x_1, xi_1, believed, share)
-    line_2 = reflectance_ratio.moved(p.reflectance, x.line_2, floor, -x_2, xi_2, believed, share)
+    line_1 = reflectance_ratio.moved(p.reflectance, x.line_1, floor, x_1, xi_1, 1.0 - held, h)
+    line_2 = reflectance_ratio.moved(p.reflectance, x.line_2, floor, -x_2, xi_2, 1.0 - held, h)
     estimate = reflectance_ratio.ratio(p.reflectance, line_1, line_2)
     dimmed = exp(-abs(estimate.beta))  # of the brighter side, as seen from either
     alike = (dimmed * xi_1, xi_2) if estimate.beta > 0.0 else (xi_1, dimmed * xi_2)

@@ -3,6 +3,11 @@
 By Eq. (9) y = xi^(-1/n) is a straight line over the finger's way s, with the slope
 kappa = (K·alpha)^(-1/n). Each finger fits its line while it moves; the slopes give alpha_1/alpha_2.
 Derivation: controller/README.md
+
+    w = xi^q·travel                       weight of a point, by the travel that it stands for
+    kappa = C_sy/C_ss                     from weighted sums about the weighted means
+    V = 2·T_f·sigma^2·Q/C_sy^2,           Q = sum of (w·xi^(-1-1/n)·(s - mean of s))^2/h
+    beta = sigma_b^2/(sigma_b^2 + V_1 + V_2)·clip(n·ln(kappa_2/kappa_1), -beta_max, beta_max)
 """
 
 from dataclasses import dataclass
@@ -15,7 +20,10 @@ MOST_VOLTS = 1e3
 """Intensities count as this at most, that powers of them stay numbers."""
 
 MOST_METRES = 1e3
-"""And positions as this at most, on both sides."""
+"""And positions and gaps as this at most, on both sides."""
+
+MOST_NOISE = 1e200
+"""The noise of a point counts as this at most, that sums of it stay numbers."""
 
 STEEPEST = 1e150
 """And slopes as this at most, or as one over it at least."""
@@ -25,7 +33,8 @@ STEEPEST = 1e150
 class Params(Group, name="reflectance"):
     """The exponent of the sensors, the weights of the fits, and how far they are believed.
 
-    `intensity_noise` is that of the low-passed intensity, over a millimetre of travel.
+    `intensity_noise` is measured at rest, behind the low-pass of T_f: white noise of sigma_0, r
+    samples a second, leaves sigma_0/sqrt(2·T_f·r). It counts as white, of the density 2·T_f·sigma^2.
     """
 
     diffusion_exponent: Annotated[
@@ -41,22 +50,16 @@ class Params(Group, name="reflectance"):
         float,
         Parameter("q, the brighter the more weight", unit="1", low=0.0, high=20.0, tunable=True),
     ] = 5.0
-    travel: Annotated[
-        float,
-        Parameter(
-            "ell, travel that counts as a sample", unit="m", low=1e-9, high=1.0, tunable=True
-        ),
-    ] = 1e-3
     intensity_noise: Annotated[
         float,
         Parameter(
-            "sigma, standard deviation of the low-passed intensity",
+            "sigma, standard deviation of the low-passed intensity at rest",
             unit="V",
             low=1e-12,
             high=10.0,
             tunable=True,
         ),
-    ] = 5e-4
+    ] = 2.5e-4
     prior_deviation: Annotated[
         float,
         Parameter(
@@ -98,18 +101,24 @@ class Params(Group, name="reflectance"):
 class Line(NamedTuple):
     """A finger's line y over s: the last point, weighted sums over all before, what they tell.
 
-    `slope` is kappa in m^-1.V^(-1/n), and `variance` that of n·ln kappa by the noise of the
-    intensity; 1 and infinite where there is no slope yet.
+    `ahead` is the way in m of the finger before its low-passed place s. `q_0` to `q_2` are sums of
+    the noise of the points, by powers of their distance from the mean. `slope` is kappa in
+    m^-1.V^(-1/n), and `variance` that of n·ln kappa by the noise of the intensity; 1 and infinite
+    where there is no slope yet.
     """
 
     intensity: float
     s: float
     y: float
+    ahead: float
     weight: float
     mean_s: float
     mean_y: float
     c_ss: float
     c_sy: float
+    q_0: float
+    q_1: float
+    q_2: float
     slope: float
     variance: float
 
@@ -126,44 +135,51 @@ def first_point(p: Params, floor: float, s: float, xi: float) -> Line:
     seen = _clamped(xi, floor, MOST_VOLTS)
     y = exp(-log(seen) / p.diffusion_exponent)
     at = _clamped(s, -MOST_METRES, MOST_METRES)
-    return Line(seen, at, y, 0.0, at, y, 0.0, 0.0, 1.0, inf)
-
-
-def low_pass(p: Params, h: float) -> float:
-    """The share of a sample in its low-pass after h seconds: T_f·x_f' = x - x_f, Euler backward."""
-    return h / (p.time_constant + h)
+    return _point(seen, at, y, 0.0)
 
 
 def moved(
-    p: Params, line: Line, floor: float, s: float, xi: float, believed: float, share: float
+    p: Params, line: Line, floor: float, s: float, xi: float, believed: float, h: float
 ) -> Line:
-    """The line a step later, the finger at s in m that sees xi in V.
+    """The line h seconds later, the finger at s in m that sees xi in V.
 
-    What is new weighs by the travel that position and light both report, each metre of it by
-    `believed`; `share` is that of low_pass.
+    What is new weighs by the travel that position and light both report; `believed` is the share
+    of it that counts, from 0 to 1. Low-passes are T_f·x_f' = x - x_f by Euler backward.
     """
+    share = h / (p.time_constant + h)
     seen = line.intensity + share * (_clamped(xi, floor, MOST_VOLTS) - line.intensity)
     seen = _clamped(seen, floor, MOST_VOLTS)
-    at = line.s + share * (_clamped(s, -MOST_METRES, MOST_METRES) - line.s)
+    here = _clamped(s, -MOST_METRES, MOST_METRES)
+    at = line.s + share * (here - line.s)
     brightness = log(seen)
     y = exp(-brightness / p.diffusion_exponent)
-    light = exp(p.weight_exponent * brightness)
-    weight = believed * light * _travel(line, at, y)
+    weight = believed * exp(p.weight_exponent * brightness) * _travel(line, at, y)
     total = line.weight + weight
     if total <= 0.0:
-        return Line(seen, at, y, 0.0, at, y, 0.0, 0.0, 1.0, inf)
-    ds = at - line.mean_s
-    dy = y - line.mean_y
-    mean_s = line.mean_s + weight / total * ds
-    mean_y = line.mean_y + weight / total * dy
-    c_ss = line.c_ss + weight * ds * (at - mean_s)
-    c_sy = line.c_sy + weight * ds * (y - mean_y)
-    if c_sy <= 0.0 or c_ss <= 0.0:
-        return Line(seen, at, y, total, mean_s, mean_y, c_ss, c_sy, 1.0, inf)
-    slope = _clamped(c_sy / c_ss, 1.0 / STEEPEST, STEEPEST)
-    relative = (p.intensity_noise / c_sy) * (y / seen)
-    variance = relative * relative * c_ss * light
-    return Line(seen, at, y, total, mean_s, mean_y, c_ss, c_sy, slope, variance)
+        return _point(seen, at, y, here - at)
+    new = weight / total
+    shift = new * (at - line.mean_s)
+    mean_s = line.mean_s + shift
+    rest = at - mean_s
+    c_ss = line.c_ss + weight * (at - line.mean_s) * rest
+    c_sy = line.c_sy + weight * (y - line.mean_y) * rest
+    mean_y = line.mean_y + new * (y - line.mean_y)
+    noise = weight * y / seen
+    noise = min(noise * noise / h, MOST_NOISE)
+    q_0 = line.q_0 + noise
+    q_1 = line.q_1 - shift * line.q_0 + noise * rest
+    q_2 = line.q_2 + shift * (shift * line.q_0 - 2.0 * line.q_1) + noise * rest * rest
+    slope, variance = 1.0, inf
+    if c_ss > 0.0 and c_sy > 0.0 and q_2 > 0.0:
+        slope = _clamped(c_sy / c_ss, 1.0 / STEEPEST, STEEPEST)
+        relative = p.intensity_noise / c_sy
+        variance = 2.0 * p.time_constant * relative * relative * q_2
+    sums = (total, mean_s, mean_y, c_ss, c_sy, q_0, q_1, q_2)
+    return Line(seen, at, y, here - at, *sums, slope, variance)
+
+
+def _point(seen: float, at: float, y: float, ahead: float) -> Line:
+    return Line(seen, at, y, ahead, 0.0, at, y, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, inf)
 
 
 def _travel(line: Line, at: float, y: float) -> float:
@@ -198,7 +214,8 @@ def _gap(p: Params, line: Line, white: float) -> float:
     """The gap in m of a finger, 1/kappa drawn towards that of a white face as it is uncertain."""
     prior = p.prior_deviation * p.prior_deviation
     gain = prior / (prior + line.variance) if prior > 0.0 else 0.0
-    return line.y * ((1.0 - gain) * white + gain / line.slope) - p.offset_distance
+    way = (1.0 - gain) * white + gain / line.slope
+    return _clamped(line.y * way - p.offset_distance + line.ahead, -MOST_METRES, MOST_METRES)
 
 
 def _clamped(x: float, low: float, high: float) -> float:
