@@ -47,7 +47,7 @@ def test_a_copy_is_qualified_without_any_deviation(short: System) -> None:
     assert found.numerics == NUMERICS
     assert found.failure is None
     assert len(found.signals) >= 21
-    assert len(found.metrics) == 17
+    assert len(found.metrics) == 19
     assert {c.deviation for c in (*found.signals, *found.metrics)} == {0.0}
     assert all(c.band.source == "derived" for c in (*found.signals, *found.metrics))
     assert by_name(found.signals)["plant.gap[1]"].band.time == 0.002  # two steps
@@ -195,7 +195,7 @@ def test_metrics_of_the_object_that_only_one_of_two_plants_has(short: System, fm
     soft = short.swap("plant", fmus / "GripperPlantCompliant.fmu")
     for system, plant in ((short, "Compliant"), (soft, ""), (soft, "Movable")):
         found = qualify(system, "plant", fmus / f"GripperPlant{plant}.fmu", isolation="none")
-        assert len(found.metrics) == 17
+        assert len(found.metrics) == 19
         assert not any(c.name in OF_OBJECT for c in found.metrics)
     assert set(found.uncompared) == {"plant.squeeze", "plant.damaged"}
 
@@ -211,7 +211,7 @@ def test_damage_is_a_difference(grasp: System, fmus: Path, altered: Altered) -> 
     cup = grasp.swap("plant", fmus / "GripperPlantCompliant.fmu").with_values(dict(CASES[0]))
     found = qualify(cup.with_experiment(step=1e-3, stop=0.3), "plant", fmu, isolation="none")
     metrics = by_name(found.metrics)
-    assert len(metrics) == 19
+    assert len(metrics) == 21
     assert (metrics["damaged"].original, metrics["damaged"].candidate) == (0.0, 1.0)
     assert [c.name for c in found.outside] == ["plant.damaged", "damaged"]
 
