@@ -122,7 +122,7 @@ def test_a_sensor_that_saturates_unlearns_nothing(converter: float) -> None:
     first = next(k for k, u in enumerate(seen) if max(u.intensity) == converter)
     before, after = (abs(trace[k].beta - log(0.5)) for k in (first, -1))
     assert before < trace[first].deviation
-    assert after < before + 0.02
+    assert after < before + 0.03
 
 
 def test_every_parameter_of_what_is_learnt_has_a_range() -> None:
