@@ -71,4 +71,4 @@ def test_a_longer_low_pass_goes_on_from_where_it_was() -> None:
     slow = adaptive.step(changed("reflectance", "time_constant", 10.0), x, u, H)
     quick = adaptive.step(changed("reflectance", "time_constant", 1e-6), x, u, H)
     assert slow.line_1.intensity == pytest.approx(x.line_1.intensity, rel=1e-3)
-    assert quick.line_1.intensity == u.intensity[0]
+    assert quick.line_1.intensity == pytest.approx(u.intensity[0], rel=1e-3)

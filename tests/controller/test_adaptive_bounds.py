@@ -10,7 +10,7 @@ from grasp_controller import adaptive, holding, reflectance_ratio, series
 from grasp_controller.adaptive import Inputs, Params, State
 from hypothesis import given
 from hypothesis import strategies as st
-from support.approach import Pair, approach, relit, run
+from support.approach import Pair, approach, numbers, relit, run
 from support.declared import parameters
 from support.examples import examples
 
@@ -38,13 +38,6 @@ LAWS = st.just(Params()) | st.builds(
     reflectance=at_the_ends(reflectance_ratio.Params),
     hold=at_the_ends(holding.Params),
 )
-
-
-def numbers(values: Any) -> list[float]:
-    """All numbers of outputs or of a state."""
-    if isinstance(values, tuple):
-        return [x for value in values for x in numbers(value)]
-    return [values]
 
 
 def assert_bounded(p: Params, x: State, y: adaptive.Outputs) -> None:
@@ -122,7 +115,7 @@ def test_a_sensor_that_saturates_unlearns_nothing(converter: float) -> None:
     first = next(k for k, u in enumerate(seen) if max(u.intensity) == converter)
     before, after = (abs(trace[k].beta - log(0.5)) for k in (first, -1))
     assert before < trace[first].deviation
-    assert after < before + 0.02
+    assert after < before + 0.03
 
 
 def test_every_parameter_of_what_is_learnt_has_a_range() -> None:

@@ -77,7 +77,6 @@ def test_the_defaults_of_the_block_are_the_numbers_of_the_reference() -> None:
         p.diffusion_exponent,
         p.time_constant,
         p.weight_exponent,
-        p.travel,
         p.intensity_noise,
         p.prior_deviation,
         p.limit,

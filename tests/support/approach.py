@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from itertools import pairwise
+from typing import Any
 
 from grasp_controller import adaptive
 from grasp_controller.adaptive import Inputs, Outputs, Params, State
@@ -49,6 +50,13 @@ def run(p: Params, samples: list[Inputs], h: float = H) -> list[tuple[State, Out
         x = adaptive.step(p, x, u, h)
         trace.append((x, adaptive.outputs(p, x, u)))
     return trace
+
+
+def numbers(values: Any) -> list[float]:
+    """All numbers of samples or of outputs."""
+    if isinstance(values, tuple):
+        return [x for value in values for x in numbers(value)]
+    return [values]
 
 
 def pairs(low: float, high: float) -> st.SearchStrategy[Pair]:

@@ -26,8 +26,7 @@ class Adaptive:
     n: float = 1.1506
     T_f: float = 0.02
     q: float = 5.0
-    ell: float = 1e-3
-    sigma: float = 5e-4
+    sigma: float = 2.5e-4
     sigma_b: float = 1.0
     beta_max: float = 2.5
     P_0: float = 0.1
@@ -36,7 +35,9 @@ class Adaptive:
 
 
 class Line(NamedTuple):
-    """Intensity and way behind their low-passes, and the sums of weight, s, y, s^2 and s·y."""
+    """Intensity and way behind their low-passes, the sums of weight, s, y, s^2 and s·y, and those
+    of the noise by powers of s.
+    """
 
     xi: float
     s: float
@@ -45,6 +46,9 @@ class Line(NamedTuple):
     sum_y: float
     sum_ss: float
     sum_sy: float
+    noise: float
+    noise_s: float
+    noise_ss: float
 
 
 SIZE = len(Line._fields)
@@ -98,20 +102,22 @@ class Learning:
         xi_rate, s_rate = (xi - line.xi) / T_f, (s - line.s) / T_f
         y = line.xi ** (-1.0 / n)
         y_rate = -y / n * xi_rate / line.xi
-        travel = abs(s_rate) * MILLIMETRE / self.p.ell
+        travel = abs(s_rate)
         kappa = _fit(line)
         if kappa is not None and s_rate != 0.0:
             travel *= min(max(y_rate / (kappa * s_rate), 0.0), 1.0)
         w = believed * line.xi**self.p.q * travel
         at = line.s
-        return [xi_rate, s_rate, w, w * at, w * y, w * at * at, w * at * y]
+        noise = (w * y / line.xi) ** 2
+        sums = [w, w * at, w * y, w * at * at, w * at * y]
+        return [xi_rate, s_rate, *sums, noise, noise * at, noise * at * at]
 
     def _variance(self, line: Line, kappa: float, xi_0: float) -> float:
-        """V_j = (sigma/kappa)^2·xi^(q-2-2/n)/C_ss: a pure number, so that only sigma scales."""
-        q, n = self.p.q, self.p.n
-        relative = self.p.sigma / (xi_0 * kappa)
-        variance: float = relative**2 * line.xi ** (q - 2.0 - 2.0 / n) / _spread(line)
-        return variance
+        """V_j: white noise of the density 2·T_f·sigma^2 in what the slope is made of."""
+        mean = line.sum_s / line.weight
+        q = line.noise_ss - 2.0 * mean * line.noise_s + mean**2 * line.noise
+        relative = self.p.sigma / (xi_0 * kappa * _spread(line))
+        return 2.0 * self.p.T_f * relative**2 * q
 
 
 def _lines(z: Sequence[float]) -> tuple[Line, Line]:
