@@ -19,6 +19,7 @@ from support.cases import CASES
 METRICS = {
     "time_to_contact", "time_difference", "impact_velocity", "impact_impulse",
     "peak_contact_force", "steady_contact_force", "force_overshoot", "settling_time",
+    "force_difference", "object_drift",
     "object_shift", "target_position", "wall_time", "real_time_factor", "steps", "scheme", "step",
 }  # fmt: skip
 
@@ -44,7 +45,7 @@ def test_run_prints_a_table_with_what_the_plant_tells_of_the_object(
     code, out, _ = command("run", *arguments, "--swap", plant)
     assert code == 0
     table = {line[:22].rstrip(): line[22:] for line in out.splitlines()[1:]}
-    assert list(table)[-3:] == ["object shift", "object squeezed by", "object damaged"]
+    assert list(table)[-3:] == ["object drift", "object squeezed by", "object damaged"]
     assert table["object damaged"] == "      no"
     assert re.fullmatch(r"   0\.100      none s", table["time to contact"])
     assert re.fullmatch(r" 5\d\d\.\d{3}      none mm/s", table["impact velocity"])

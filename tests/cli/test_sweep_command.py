@@ -10,6 +10,7 @@ from pathlib import Path
 import pyarrow.parquet as pq  # type: ignore[import-untyped]
 import pytest
 from grasp_cosim import InputError, System, cli
+from grasp_cosim.grasp.controllers import with_controller
 from grasp_cosim.grasp.presets import STUDIES, with_preset
 from grasp_cosim.sweep.read import Made, read_studies, study_file
 
@@ -93,7 +94,7 @@ def test_where_every_run_fails_the_result_is_negative(command: Run) -> None:
 
 WRONG = [
     ("[design", "study.toml: not readable as TOML"),
-    ("colour = 1\n", "study.toml: unknown entry 'colour'; valid: bench, case, design"),
+    ("colour = 1\n", "study.toml: unknown entry 'colour'; valid: bench, case, controller, design"),
     (HEAD, r"study.toml: \[design\]: missing; must be a table"),
     (f"{HEAD}[design]\n", "no kind; must have one"),
     (f"{HEAD}{GRID}count = 3\n", "unknown entry 'count'; valid: kind, runs, seed"),
@@ -181,8 +182,9 @@ def test_no_such_study_names_the_built_in_ones(capsys: pytest.CaptureFixture[str
     code = cli.main(["sweep", "map"])
     assert code == 2
     assert capsys.readouterr().err == (
-        "grasp-cosim: map: no such study; must be a .toml file or bench_monte_carlo, "
-        "grasp_sensitivity, reflectance_map\n"
+        "grasp-cosim: map: no such study; must be a .toml file or bench_monte_carlo, colour_bench, "
+        "colour_equal, colour_exponent, colour_free, colour_ideal, colour_light, colour_map, "
+        "colour_map_free, colour_monte_carlo, grasp_sensitivity, reflectance_map\n"
     )
 
 
@@ -230,9 +232,81 @@ def test_a_bench_that_does_not_fit_is_one_line(tmp_path: Path, grasp: System) ->
         read_studies(path, Made(lambda _: bare, with_preset))
 
 
-@pytest.mark.parametrize("name", ["bench_monte_carlo", "grasp_sensitivity", "reflectance_map"])
-def test_a_built_in_study_fits_the_grasp(name: str, grasp: System) -> None:
-    (study,) = read_studies(study_file(name, STUDIES), Made(lambda _: grasp, with_preset))
-    assert study.runs >= 200
-    for index in (0, study.runs - 1):
-        study.system.with_values(study.values(index))
+@pytest.mark.parametrize("name", sorted(p.stem for p in STUDIES.glob("*.toml")))
+def test_a_built_in_study_fits_the_grasp(name: str, grasp: System, fmus: Path) -> None:
+    made = Made(lambda _: grasp, with_preset, with_controller, fmus)
+    for study in read_studies(study_file(name, STUDIES), made):
+        assert study.runs >= 50
+        for index in (0, study.runs - 1):
+            study.system.with_values(study.values(index))
+
+
+@pytest.mark.slow
+def test_a_limit_that_is_missed_is_a_negative_result(command: Run) -> None:
+    """The target is at 0 m at first in every run, and an object that is not touched is at rest."""
+    limits = "[limits]\nobject_shift = { greatest = 0.0 }\ntarget_position = { p95 = MOST }\n"
+    text = STUDY.replace("[figures]", limits + "[figures]")
+    code, out, _ = command(text.replace("MOST", "0.1"), "--workers", "1")
+    assert code == 0
+    assert "kept    object_shift: greatest 0 m, at most 0" in out.splitlines()
+    code, out, _ = command(text.replace("MOST", "-0.1"), "--workers", "1", "--json")
+    kept, missed = json.loads(out)["limits"]
+    assert (code, kept["kept"], missed["kept"], missed["missing"]) == (1, True, False, 0)
+    timed = text.replace("target_position = { p95 = MOST }", "time_difference = { p95 = 9.0 }")
+    code, out, _ = command(timed, "--workers", "1")
+    assert code == 1
+    assert "MISSED  time_difference: p95 none s, at most 9; 4 runs have none" in out.splitlines()
+
+
+@pytest.mark.slow
+def test_variants_are_runs_in_folders_of_their_names(command: Run, tmp_path: Path) -> None:
+    variants = (
+        '[[variants]]\nname = "light"\n'
+        '[[variants]]\nname = "heavy"\nvalues = { "plant.finger_mass[2]" = 5.0 }\n'
+        'limits = { target_position = { greatest = 1e-2, from = "light" } }\n'
+    )
+    text = STUDY.replace("[figures]", f"{variants}[figures]")
+    code, out, err = command(text, "--workers", "1", "--plot")
+    assert code == 0, out + err
+    assert "drew study/map.png" in err
+    assert sorted(p.name for p in (tmp_path / "study").iterdir()) == [
+        "distributions.png", "heavy", "light", "map.png",
+    ]  # fmt: skip
+    assert re.search(r"^target_position +light +4 .*\ntarget_position +heavy +4 ", out, re.M)
+    assert re.search(
+        r"^kept    heavy: target_position from light: greatest \S+ m, at most", out, re.M
+    )
+    code, out, _ = command(text, "--workers", "1", "--json")
+    found = json.loads(out)
+    assert {n: v["resumed"] for n, v in found["variants"].items()} == {"light": 4, "heavy": 4}
+
+
+@pytest.mark.slow
+def test_another_seed_draws_other_runs_beside_the_first(command: Run, tmp_path: Path) -> None:
+    text = STUDY.replace(GRID, '[design]\nkind = "random"\nruns = 2\nseed = 1\n')
+    for arguments in ((), ("--seed", "1"), ("--seed", "2")):
+        assert command(text, "--workers", "1", *arguments)[0] == 0
+    first, same, other = (
+        pq.read_table(tmp_path / name / "runs.parquet") for name in ("study", "study-1", "study-2")
+    )
+    assert first == same
+    assert first["plant.finger_mass[1]"] != other["plant.finger_mass[1]"] or (
+        first["width"] != other["width"]
+    )
+
+
+def test_what_is_not_drawn_has_no_seed(command: Run) -> None:
+    code, _, err = command(STUDY, "--seed", "3")
+    assert (code, err.count("\n")) == (2, 1)
+    assert "--seed 3: study.toml has nothing that is random; must be left out" in err
+
+
+def test_a_study_that_names_its_controller_takes_no_other(command: Run) -> None:
+    code, _, err = command(f'controller = "adaptive"\n{STUDY}', "--controller", "published")
+    assert (code, err.splitlines()) == (
+        2,
+        [
+            "grasp-cosim: study.toml: --controller published: must be left out, the study names "
+            "'adaptive'"
+        ],
+    )

@@ -204,6 +204,26 @@ def test_a_finger_that_never_touches() -> None:
     assert metrics["peak_contact_force"] == metrics["steady_contact_force"] == [0.0, 0.0]
 
 
+def test_unequal_forces_differ_by_their_steady_parts() -> None:
+    time, signals = impact(1e-3)
+    at_rest = np.where(time < 0.02, 9.0, 2.0)
+    held = {"plant.contact_force[1]": -at_rest, "plant.contact_force[2]": 0.0 * time + 2.5}
+    longer = {name: np.concatenate((s, np.repeat(s[-1:], 200))) for name, s in signals.items()}
+    longer |= {name: np.concatenate((s, np.repeat(s[-1:], 200))) for name, s in held.items()}
+    metrics = grasp_metrics(1e-3 * np.arange(len(time) + 200), longer)
+    assert metrics["force_difference"] == pytest.approx(0.5, rel=1e-12)
+
+
+def test_the_object_drifts_by_what_it_goes_in_the_end() -> None:
+    time = every(1e-3, 0.5)
+    _, signals = impact(1e-3)
+    longer = {name: np.resize(s, len(time)) for name, s in signals.items()}
+    longer["plant.object_position"] = np.where(time < 0.3, 0.03, 0.03 - 0.02 * (time - 0.3))
+    assert grasp_metrics(time, longer)["object_drift"] == pytest.approx(0.02, rel=1e-9)
+    short = {name: s[:90] for name, s in longer.items()}
+    assert grasp_metrics(time[:90], short)["object_drift"] is None
+
+
 def test_only_where_a_finger_never_touches_is_there_a_gap_that_remains() -> None:
     """Finger 1 comes as near as 2 mm and leaves; finger 2 touches."""
     time, signals = impact(1e-3)
@@ -387,10 +407,12 @@ def test_every_metric_has_a_unit_and_a_label() -> None:
         "impact_impulse": ("impact impulse", "N.s", 1e3, "mN.s"),
         "peak_contact_force": ("peak contact force", "N", 1.0, "N"),
         "steady_contact_force": ("steady contact force", "N", 1.0, "N"),
+        "force_difference": ("force difference", "N", 1.0, "N"),
         "force_overshoot": ("force overshoot", "1", 1e2, "%"),
         "settling_time": ("settling time", "s", 1.0, "s"),
         "target_position": ("target position", "m", 1e3, "mm"),
         "object_shift": ("object shift", "m", 1e3, "mm"),
+        "object_drift": ("object drift", "m/s", 1e3, "mm/s"),
         "object_tilt": ("object tilt", "rad", 180.0 / pi, "deg"),
         "toppled": ("object toppled", None, 1.0, ""),
         "squeeze": ("object squeezed by", "m", 1e3, "mm"),

@@ -4,9 +4,10 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from grasp_cosim import InputError, System
-from grasp_cosim.report.sweep import draw_sweep
+from grasp_cosim.report.sweep import _cells, draw_sweep
 from grasp_cosim.sweep.design import Design
 from grasp_cosim.sweep.distributions import Uniform, spaced
 from grasp_cosim.sweep.run import Outcome
@@ -74,6 +75,39 @@ def test_what_is_not_there_is_said(grasp: System, tmp_path: Path) -> None:
     ):
         with pytest.raises(InputError, match=message):
             made(grasp, GRID, pictures)
+
+
+def test_variants_and_maps_are_beside_each_other(
+    grasp: System, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    figures: list[Figure] = []
+    monkeypatch.setattr("grasp_cosim.report.sweep.save", lambda figure, _: figures.append(figure))
+    pictures = Pictures((MAP, replace(MAP, of="impact_velocity[1]")), ("time_difference",))
+    first, second = (made(grasp, GRID, pictures, *failed) for failed in ((), range(20)))
+    named = [
+        replace(sweep, study=replace(sweep.study, variant=name))
+        for sweep, name in ((first, "a"), (second, "b"))
+    ]
+    draw_sweep(named, Path())
+    maps, distributions = figures
+    panels = [axes for axes in maps.axes if axes.get_label() != "<colorbar>"]
+    assert [axes.get_title() for axes in panels] == ["a", "b", "", ""]
+    scales = [axes.collections[0].get_clim() for axes in panels]
+    assert scales[0] == scales[1] != scales[2] == scales[3]
+    (legend,) = maps.legends
+    assert [t.get_text() for t in legend.get_texts()] == [
+        "time difference = 0.1 s", "no time difference", "no impact velocity, finger 1",
+    ]  # fmt: skip
+    assert [axes.get_title() for axes in distributions.axes] == ["a", "b"]
+
+
+def test_a_cell_shows_the_mean_or_the_greatest_of_its_runs() -> None:
+    x, y = np.array([1.0, 1.0, 1.0, 2.0, 2.0]), np.zeros(5)
+    z = np.array([1.0, 3.0, np.nan, 2.0, 5.0])
+    for cell, expected in (("mean", [2.0, 3.5]), ("greatest", [None, 5.0])):
+        across, along, shown = _cells(Map("x", "y", "z", None, cell), x, y, z)  # type: ignore[arg-type]
+        assert (across.tolist(), along.tolist()) == ([1.0, 2.0], [0.0])
+        assert shown[0].tolist() == expected
 
 
 ONE = 0.03

@@ -73,6 +73,12 @@ def _draw_maps(sweeps: Sequence[Sweep], maps: Sequence[Map], path: Path) -> None
         axes.set_xlabel(_label(sweep.study, maps[0].x))
     for axes, sweep in zip(rows[0], sweeps, strict=True):
         axes.set_title(_plain(sweep.study.variant or sweep.study.name), fontsize=10)
+    named = [axes.get_legend_handles_labels() for axes in rows.flat]
+    keys = {label: handle for pair in named for handle, label in zip(*pair, strict=True)}
+    if alone and keys:
+        rows[0, 0].legend(fontsize=8, framealpha=0.9)
+    elif keys:  # beside small axes, not over their cells
+        figure.legend([*keys.values()], [*keys], loc="outside lower left", ncols=4, fontsize=8)
     save(figure, path)
 
 
@@ -121,7 +127,7 @@ def _draw_map(
         axes.scatter(x[there], y[there], c=z[there], s=14, norm=norm, cmap=COLOURS)
     if not np.isfinite(np.ma.filled(z, np.nan)).all():
         axes.fill([], [], color=MISSING, label=f"no {_title(study, wanted.of)}")
-    finish(axes, _label(study, wanted.y), bool(axes.get_legend_handles_labels()[0]))
+    finish(axes, _label(study, wanted.y), legend=False)
     if cells:
         axes.grid(visible=False)  # which would be on top of them
 

@@ -282,7 +282,7 @@ FORMS: Mapping[str, Callable[[str, Any], Distribution]] = {
 
 def _pictures(place: str, table: Any) -> Pictures:
     table = as_table(place, table)
-    check_keys(place, table, Pictures.__slots__)
+    check_keys(place, table, {"map", "distributions"})
     distributions = _names(f"{place}: distributions", table.get("distributions", []))
     entries = table.get("map", [])
     entries = entries if isinstance(entries, list) else [entries]
