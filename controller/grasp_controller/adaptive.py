@@ -55,7 +55,12 @@ class Outputs(NamedTuple):
     ]
     reflectance_ratio_standard_deviation: Annotated[
         float,
-        Output("standard deviation of that ratio", unit="1", nominal=1.0, depends_on=set()),
+        Output(
+            "standard deviation of that ratio, by noise alone",
+            unit="1",
+            nominal=1.0,
+            depends_on=set(),
+        ),
     ]
     estimated_gap: Annotated[
         Pair,
