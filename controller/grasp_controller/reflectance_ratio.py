@@ -33,8 +33,8 @@ STEEPEST = 1e150
 class Params(Group, name="reflectance"):
     """The exponent of the sensors, the weights of the fits, and how far they are believed.
 
-    `intensity_noise` is measured at rest, behind the low-pass of T_f: white noise of sigma_0, r
-    samples a second, leaves sigma_0/sqrt(2·T_f·r).
+    `intensity_noise` is measured at rest, behind the low-pass of T_f: white noise of sigma_0 in
+    samples h seconds apart leaves sigma_0/sqrt(1 + 2·T_f/h).
     """
 
     diffusion_exponent: Annotated[
