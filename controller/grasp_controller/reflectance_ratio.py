@@ -102,8 +102,8 @@ class Line(NamedTuple):
     """A finger's line y over s: the last point, weighted sums over all before, what they tell.
 
     `ahead` is the way in m of the finger before its low-passed place s. `q_0` to `q_2` are sums of
-    the noise of the points, by powers of their distance from the mean. `slope` is kappa in
-    m^-1.V^(-1/n), and `variance` that of n·ln kappa by the noise of the intensity; 1 and infinite
+    the noise of the points, by powers of their distance from the mean. `per_y` is 1/kappa in
+    m.V^(1/n), and `variance` that of n·ln kappa by the noise of the intensity; 1 and infinite
     where there is no slope yet.
     """
 
@@ -119,7 +119,7 @@ class Line(NamedTuple):
     q_0: float
     q_1: float
     q_2: float
-    slope: float
+    per_y: float
     variance: float
 
 
@@ -184,13 +184,13 @@ def moved(
     q_0 = line.q_0 + noise
     q_1 = line.q_1 - shift * line.q_0 + noise * rest
     q_2 = line.q_2 + shift * (shift * line.q_0 - 2.0 * line.q_1) + noise * rest * rest
-    slope, variance = 1.0, inf
+    per_y, variance = 1.0, inf
     if c_ss > 0.0 and c_sy > 0.0 and q_2 > 0.0:
-        slope = _clamped(c_sy / c_ss, 1.0 / STEEPEST, STEEPEST)
+        per_y = _clamped(c_ss / c_sy, 1.0 / STEEPEST, STEEPEST)
         relative = p.intensity_noise / c_sy
         variance = relative * relative * q_2
     sums = (total, mean_s, mean_y, c_ss, c_sy, q_0, q_1, q_2)
-    return Line(seen, at, y, here - at, *sums, slope, variance)
+    return Line(seen, at, y, here - at, *sums, per_y, variance)
 
 
 def _point(seen: float, at: float, y: float, ahead: float) -> Line:
@@ -204,7 +204,7 @@ def _travel(line: Line, at: float, y: float) -> float:
     if line.c_sy <= 0.0:
         return way
     dy = y - line.y
-    seen = (dy if ds > 0.0 else -dy) / line.slope
+    seen = (dy if ds > 0.0 else -dy) * line.per_y
     return _clamped(seen, 0.0, way)
 
 
@@ -214,7 +214,7 @@ def ratio(p: Params, line_1: Line, line_2: Line) -> Estimate:
     if prior == 0.0:
         return Estimate(0.0, 0.0, 1.0)
     gain = prior / (prior + (line_1.variance + line_2.variance))
-    fitted = p.diffusion_exponent * (log(line_2.slope) - log(line_1.slope))
+    fitted = p.diffusion_exponent * (log(line_1.per_y) - log(line_2.per_y))
     beta = gain * _clamped(fitted, -p.limit, p.limit)
     return Estimate(beta, p.prior_deviation * sqrt(1.0 - gain), exp(-abs(beta)))
 
@@ -229,7 +229,7 @@ def _gap(p: Params, line: Line, white: float) -> float:
     """The gap in m of a finger, 1/kappa drawn towards that of a white face as it is uncertain."""
     prior = p.prior_deviation * p.prior_deviation
     gain = prior / (prior + line.variance) if prior > 0.0 else 0.0
-    way = (1.0 - gain) * white + gain / line.slope
+    way = (1.0 - gain) * white + gain * line.per_y
     return _clamped(line.y * way - p.offset_distance + line.ahead, -MOST_METRES, MOST_METRES)
 
 
