@@ -7,7 +7,6 @@ intensities as equal faces would give them, and fades as the fingers hold:
 """
 
 from dataclasses import dataclass
-from math import exp
 from typing import Annotated, NamedTuple
 
 from block_variables import Output
@@ -56,7 +55,12 @@ class Outputs(NamedTuple):
     ]
     reflectance_ratio_standard_deviation: Annotated[
         float,
-        Output("standard deviation of that ratio", unit="1", nominal=1.0, depends_on=set()),
+        Output(
+            "standard deviation of that ratio, by noise alone",
+            unit="1",
+            nominal=1.0,
+            depends_on=set(),
+        ),
     ]
     estimated_gap: Annotated[
         Pair,
@@ -93,12 +97,13 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     closing = holding.filtered(p.hold, x.closing, v_1 - v_2, h)
     held = holding.hold(p.hold, series.outputs(p, x.layers, u).force, closing)
     floor = p.impact_reduction.intensity_floor
-    line_1 = reflectance_ratio.moved(p.reflectance, x.line_1, floor, x_1, xi_1, 1.0 - held, h)
-    line_2 = reflectance_ratio.moved(p.reflectance, x.line_2, floor, -x_2, xi_2, 1.0 - held, h)
+    free, low_pass = 1.0 - held, reflectance_ratio.low_pass(p.reflectance, h)
+    line_1 = reflectance_ratio.moved(p.reflectance, x.line_1, floor, x_1, xi_1, free, low_pass)
+    line_2 = reflectance_ratio.moved(p.reflectance, x.line_2, floor, -x_2, xi_2, free, low_pass)
     estimate = reflectance_ratio.ratio(p.reflectance, line_1, line_2)
-    dimmed = exp(-abs(estimate.beta))  # of the brighter side, as seen from either
+    dimmed = estimate.dimmed
     alike = (dimmed * xi_1, xi_2) if estimate.beta > 0.0 else (xi_1, dimmed * xi_2)
-    f_s = (1.0 - held) * layer_3.virtual_force(p.simultaneous_contact, alike)
+    f_s = free * layer_3.virtual_force(p.simultaneous_contact, alike)
     layers = series.advance(p, x.layers, u, f_s, h)
     return State(layers, line_1, line_2, estimate, closing, held)
 
@@ -106,7 +111,8 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     """The forces for the samples u, and what has been learnt."""
     y = series.outputs(p, x.layers, u)
-    ratio = exp(x.estimate.beta)
+    dimmed = x.estimate.dimmed
+    ratio = 1.0 / dimmed if x.estimate.beta > 0.0 else dimmed
     return Outputs(
         y.force,
         y.target_position,

@@ -6,7 +6,7 @@ Derivation: controller/README.md
 
     w = xi^q·travel                       weight of a point, by the travel that it stands for
     kappa = C_sy/C_ss                     from weighted sums about the weighted means
-    V = 2·T_f·sigma^2·Q/C_sy^2,           Q = sum of (w·xi^(-1-1/n)·(s - mean of s))^2/h
+    V = sigma^2·Q/C_sy^2,     Q = sum of (w·xi^(-1-1/n)·(s - mean of s))^2·(1 + 2·T_f/h)
     beta = sigma_b^2/(sigma_b^2 + V_1 + V_2)·clip(n·ln(kappa_2/kappa_1), -beta_max, beta_max)
 """
 
@@ -33,8 +33,8 @@ STEEPEST = 1e150
 class Params(Group, name="reflectance"):
     """The exponent of the sensors, the weights of the fits, and how far they are believed.
 
-    `intensity_noise` is measured at rest, behind the low-pass of T_f: white noise of sigma_0, r
-    samples a second, leaves sigma_0/sqrt(2·T_f·r). It counts as white, of the density 2·T_f·sigma^2.
+    `intensity_noise` is measured at rest, behind the low-pass of T_f: white noise of sigma_0 in
+    samples h seconds apart leaves sigma_0/sqrt(1 + 2·T_f/h).
     """
 
     diffusion_exponent: Annotated[
@@ -102,8 +102,8 @@ class Line(NamedTuple):
     """A finger's line y over s: the last point, weighted sums over all before, what they tell.
 
     `ahead` is the way in m of the finger before its low-passed place s. `q_0` to `q_2` are sums of
-    the noise of the points, by powers of their distance from the mean. `slope` is kappa in
-    m^-1.V^(-1/n), and `variance` that of n·ln kappa by the noise of the intensity; 1 and infinite
+    the noise of the points, by powers of their distance from the mean. `per_y` is 1/kappa in
+    m.V^(1/n), and `variance` that of n·ln kappa by the noise of the intensity; 1 and infinite
     where there is no slope yet.
     """
 
@@ -119,15 +119,25 @@ class Line(NamedTuple):
     q_0: float
     q_1: float
     q_2: float
-    slope: float
+    per_y: float
     variance: float
 
 
+class LowPass(NamedTuple):
+    """T_f·x_f' = x - x_f by Euler backward: the share of a sample in x_f, and how many steps white
+    noise stays alike in it, the sum of its autocorrelation.
+    """
+
+    share: float
+    alike: float
+
+
 class Estimate(NamedTuple):
-    """beta = ln(alpha_1/alpha_2), and its standard deviation."""
+    """beta = ln(alpha_1/alpha_2), its standard deviation, and the darker face to the brighter."""
 
     beta: float
     deviation: float
+    dimmed: float
 
 
 def first_point(p: Params, floor: float, s: float, xi: float) -> Line:
@@ -138,15 +148,20 @@ def first_point(p: Params, floor: float, s: float, xi: float) -> Line:
     return _point(seen, at, y, 0.0)
 
 
+def low_pass(p: Params, h: float) -> LowPass:
+    """The low-pass for a step of h seconds."""
+    return LowPass(h / (p.time_constant + h), 1.0 + 2.0 * p.time_constant / h)
+
+
 def moved(
-    p: Params, line: Line, floor: float, s: float, xi: float, believed: float, h: float
+    p: Params, line: Line, floor: float, s: float, xi: float, believed: float, low_pass: LowPass
 ) -> Line:
-    """The line h seconds later, the finger at s in m that sees xi in V.
+    """The line a step later, the finger at s in m that sees xi in V.
 
     What is new weighs by the travel that position and light both report; `believed` is the share
-    of it that counts, from 0 to 1. Low-passes are T_f·x_f' = x - x_f by Euler backward.
+    of it that counts, from 0 to 1.
     """
-    share = h / (p.time_constant + h)
+    share = low_pass.share
     seen = line.intensity + share * (_clamped(xi, floor, MOST_VOLTS) - line.intensity)
     seen = _clamped(seen, floor, MOST_VOLTS)
     here = _clamped(s, -MOST_METRES, MOST_METRES)
@@ -165,17 +180,17 @@ def moved(
     c_sy = line.c_sy + weight * (y - line.mean_y) * rest
     mean_y = line.mean_y + new * (y - line.mean_y)
     noise = weight * y / seen
-    noise = min(noise * noise / h, MOST_NOISE)
+    noise = min(noise * noise * low_pass.alike, MOST_NOISE)
     q_0 = line.q_0 + noise
     q_1 = line.q_1 - shift * line.q_0 + noise * rest
     q_2 = line.q_2 + shift * (shift * line.q_0 - 2.0 * line.q_1) + noise * rest * rest
-    slope, variance = 1.0, inf
+    per_y, variance = 1.0, inf
     if c_ss > 0.0 and c_sy > 0.0 and q_2 > 0.0:
-        slope = _clamped(c_sy / c_ss, 1.0 / STEEPEST, STEEPEST)
+        per_y = _clamped(c_ss / c_sy, 1.0 / STEEPEST, STEEPEST)
         relative = p.intensity_noise / c_sy
-        variance = 2.0 * p.time_constant * relative * relative * q_2
+        variance = relative * relative * q_2
     sums = (total, mean_s, mean_y, c_ss, c_sy, q_0, q_1, q_2)
-    return Line(seen, at, y, here - at, *sums, slope, variance)
+    return Line(seen, at, y, here - at, *sums, per_y, variance)
 
 
 def _point(seen: float, at: float, y: float, ahead: float) -> Line:
@@ -189,7 +204,7 @@ def _travel(line: Line, at: float, y: float) -> float:
     if line.c_sy <= 0.0:
         return way
     dy = y - line.y
-    seen = (dy if ds > 0.0 else -dy) / line.slope
+    seen = (dy if ds > 0.0 else -dy) * line.per_y
     return _clamped(seen, 0.0, way)
 
 
@@ -197,11 +212,11 @@ def ratio(p: Params, line_1: Line, line_2: Line) -> Estimate:
     """The logarithm of the ratio, drawn towards 0 as far as the lines are uncertain."""
     prior = p.prior_deviation * p.prior_deviation
     if prior == 0.0:
-        return Estimate(0.0, 0.0)
+        return Estimate(0.0, 0.0, 1.0)
     gain = prior / (prior + (line_1.variance + line_2.variance))
-    fitted = p.diffusion_exponent * (log(line_2.slope) - log(line_1.slope))
+    fitted = p.diffusion_exponent * (log(line_1.per_y) - log(line_2.per_y))
     beta = gain * _clamped(fitted, -p.limit, p.limit)
-    return Estimate(beta, p.prior_deviation * sqrt(1.0 - gain))
+    return Estimate(beta, p.prior_deviation * sqrt(1.0 - gain), exp(-abs(beta)))
 
 
 def gaps(p: Params, line_1: Line, line_2: Line) -> tuple[float, float]:
@@ -214,7 +229,7 @@ def _gap(p: Params, line: Line, white: float) -> float:
     """The gap in m of a finger, 1/kappa drawn towards that of a white face as it is uncertain."""
     prior = p.prior_deviation * p.prior_deviation
     gain = prior / (prior + line.variance) if prior > 0.0 else 0.0
-    way = (1.0 - gain) * white + gain / line.slope
+    way = (1.0 - gain) * white + gain * line.per_y
     return _clamped(line.y * way - p.offset_distance + line.ahead, -MOST_METRES, MOST_METRES)
 
 

@@ -99,7 +99,7 @@ def test_what_was_nonsense_is_behind_after_an_approach(
 def test_a_sensor_that_shows_one_number_teaches_nothing(seen: Pair) -> None:
     """Saturated, blind, or stuck: the line has no slope, whatever the way."""
     for x, y in run(Params(), [u._replace(intensity=seen) for u in approach((1.0, 1.0))]):
-        assert x.estimate == (0.0, 1.0)
+        assert x.estimate == (0.0, 1.0, 1.0)
         assert y.reflectance_ratio == 1.0
 
 

@@ -1,6 +1,6 @@
 """The standard deviation that the estimate says it has, against Monte Carlo.
 
-White noise of sigma_0 in samples h seconds apart is behind the low-pass sigma_0·sqrt(h/(2·T_f)),
+White noise of sigma_0 in samples h seconds apart is behind the low-pass sigma_0/sqrt(1 + 2·T_f/h),
 which is `intensity_noise`. The bounds are those of a mean of squares of normal numbers.
 """
 
@@ -35,7 +35,7 @@ def law(q: float, noise: float, prior: float) -> Params:
     learnt = reflectance_ratio.Params(
         time_constant=T_f,
         weight_exponent=q,
-        intensity_noise=noise * sqrt(H / (2.0 * T_f)),
+        intensity_noise=noise / sqrt(1.0 + 2.0 * T_f / H),
         prior_deviation=prior,
         limit=10.0,
     )
@@ -91,7 +91,7 @@ def test_any_ratio_is_as_far_off_as_is_said(noise: float, gaps: Pair) -> None:
 def test_behind_the_low_pass_it_is_the_same(count: int, end: float) -> None:
     """With the numbers of the block: noise that is no longer white counts as if it were."""
     p = replace(Params(), hold=NEVER_HOLDS)
-    noise = p.reflectance.intensity_noise * sqrt(2.0 * p.reflectance.time_constant / H)
+    noise = p.reflectance.intensity_noise * sqrt(1.0 + 2.0 * p.reflectance.time_constant / H)
     random, trials = Random(3), 60
     found = [learnt(p, noise, ALPHA, (0.08, end), count, random) for _ in range(trials)]
     squares = fmean(((each.beta - TRUTH) / each.deviation) ** 2 for each in found)
