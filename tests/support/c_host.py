@@ -192,7 +192,7 @@ class Part:
 class Grasp:
     """Scripts of the closed loop, with parts by the names of their FMUs.
 
-    `plant` is the FMU of the plant; values are by COMPONENT.VARIABLE.
+    `plant` and `controller` are the FMUs of these; values are by COMPONENT.VARIABLE.
     """
 
     def __init__(
@@ -200,8 +200,9 @@ class Grasp:
         parts: Mapping[str, Part],
         values: Mapping[str, Any] | None = None,
         plant: str = "GripperPlant",
+        controller: str = "GraspController",
     ) -> None:
-        names = {**COMPONENTS, "plant": plant}
+        names = {**COMPONENTS, "plant": plant, "controller": controller}
         self.parts = {component: parts[name] for component, name in names.items()}
         self.values = values or {}
         self.index = {component: i for i, component in enumerate(self.parts)}
@@ -313,7 +314,11 @@ class _Block:
 
 
 def rows_in_python(
-    values: Mapping[str, Any], steps: int, h: float, plant: str = "GripperPlant"
+    values: Mapping[str, Any],
+    steps: int,
+    h: float,
+    plant: str = "GripperPlant",
+    controller: str = "GraspController",
 ) -> Rows:
     """The outputs that the blocks have at each communication point, in a plain loop in Python."""
     own: dict[str, dict[str, Any]] = {component: {} for component in COMPONENTS}
@@ -322,7 +327,7 @@ def rows_in_python(
         own[component][variable] = value
     parts = {
         component: _Block(name, own[component])
-        for component, name in {**COMPONENTS, "plant": plant}.items()
+        for component, name in {**COMPONENTS, "plant": plant, "controller": controller}.items()
     }
     feeds = {
         component: [

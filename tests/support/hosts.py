@@ -1,45 +1,31 @@
 """Fixtures of the tests with hosts in C: the native FMUs, unpacked, and the hosts."""
 
-import fcntl
 import shutil
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from grasp_fmus.native.build import build_native, planned
 from grasp_fmus.native.targets import Target, here
 
 from .c_host import Host, Part, unpacked
+from .kinds import Kind
 from .platforms import Platform, host_of
+from .slow import slow
 
 Parts = dict[str, Part]
 """By the names of the FMUs."""
 
 
 @pytest.fixture(scope="session")
-def natives_3() -> Path:
-    """The folder of the native FMUs for FMI 3.0, as `natives`."""
-    if not shutil.which("gcc"):
-        pytest.skip("NO gcc")
-    folder = Path(sys.prefix, "native_fmus_3_of_the_tests")
-    folder.mkdir(exist_ok=True)
-    with (folder.parent / f"{folder.name}.lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        build_native(folder, planned(fmi=3))
-    return folder
-
-
-@pytest.fixture(scope="session")
 def parts_of(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+    folder_of: Callable[[Kind], Path], tmp_path_factory: pytest.TempPathFactory
 ) -> Callable[[int], Parts]:
     """The native FMUs for a version of FMI, unpacked once per test process."""
     known: dict[int, Parts] = {}
 
     def parts(fmi: int) -> Parts:
         if fmi not in known:
-            folder: Path = request.getfixturevalue("natives" if fmi == 2 else "natives_3")
+            folder = folder_of("native" if fmi == 2 else "native FMI 3")
             fmus = [
                 unpacked(path, tmp_path_factory.mktemp(path.stem))
                 for path in sorted(folder.glob("*.fmu"))
@@ -50,7 +36,7 @@ def parts_of(
     return parts
 
 
-@pytest.fixture(params=[2, 3], ids=["FMI 2", "FMI 3"])
+@pytest.fixture(params=[2, slow(3)], ids=["FMI 2", "FMI 3"])
 def parts(request: pytest.FixtureRequest, parts_of: Callable[[int], Parts]) -> Parts:
     """The native FMUs, of each version of FMI in turn."""
     return parts_of(request.param)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import pytest
+from conftest import Folder
 from fmpy import simulate_fmu
 from fmpy.build import build_platform_binary
 from fmpy.util import read_csv, read_ref_opt_file
@@ -27,10 +28,9 @@ pytestmark = needs_gcc
 
 
 @pytest.fixture
-def fmu(request: pytest.FixtureRequest, natives: Path, name: str, fmi: Literal[2, 3]) -> Path:
+def fmu(folder_of: Folder, name: str, fmi: Literal[2, 3]) -> Path:
     """A native FMU of one of the versions."""
-    folder = natives if fmi == 2 else request.getfixturevalue("natives_3")
-    return Path(folder) / f"{name}.fmu"
+    return folder_of("native" if fmi == 2 else "native FMI 3") / f"{name}.fmu"
 
 
 def assert_gives_the_reference(fmu: Path, folder: Path, name: str) -> None:
