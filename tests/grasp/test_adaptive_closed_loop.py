@@ -100,6 +100,15 @@ def test_the_forces_settle_at_half_the_width(
     assert last(result, "plant.velocity") == pytest.approx((0.0, 0.0), abs=1e-9)
 
 
+@pytest.mark.parametrize("alpha", [(0.1, 1.0), (1.0, 0.1)])
+def test_the_hold_alone_settles_the_forces(natives: Path, alpha: Pair) -> None:
+    """Though nothing is learnt, and f_s would do for lifting a finger off: K_a2·W/2 = 1.26 N."""
+    assert 3.0 * tanh((1.0 - 0.1) / (1.0 + 0.1)) > 1.26
+    values = {**values_of(alpha), "controller.reflectance.prior_deviation": 0.0}
+    result = run(adaptive_grasp(natives), values, 2e-3, 15.0)
+    assert last(result, "plant.contact_force") == pytest.approx((3.43, -3.43), abs=6e-3)
+
+
 @a_few
 @given(REFLECTANCES, PLACES, WIDTHS, MASSES)
 def test_there_is_no_force_before_contact(
