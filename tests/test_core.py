@@ -231,6 +231,7 @@ def test_a_swap_is_qualified(python: Python) -> None:
     )
 
 
+@pytest.mark.slow
 def test_the_step_is_studied(python: Python) -> None:
     python(
         """

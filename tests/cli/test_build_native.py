@@ -20,6 +20,7 @@ ONLY = "GripperPlantMuJoCo: stays Python only, as it needs mujoco\n"
 pytestmark = needs_gcc
 
 
+@pytest.mark.slow
 def test_builds_all_that_can_be_native_and_says_of_the_other(command: Run) -> None:
     code, out, err = command("build", "--native")
     assert (code, err) == (0, ONLY)

@@ -212,6 +212,7 @@ def test_help_has_an_example(command: Run, name: str) -> None:
     assert f"Example: grasp-cosim {name}" in out
 
 
+@pytest.mark.slow
 def test_build_names_what_it_built(command: Run, tmp_path: Path) -> None:
     code, out, _ = command("build", "--out", "here", "--json")
     built = [Path(p) for p in json.loads(out)["fmus"]]

@@ -70,6 +70,7 @@ def installed(tmp_path: Path) -> list[str]:
     return [str(program)]
 
 
+@pytest.mark.slow
 def test_a_component_in_a_process(installed: list[str], everything: Path, system: Path) -> None:
     text = system.read_text("utf-8")
     system.write_text(text.replace("[components.plant]", '[components.plant]\nisolation="process"'))

@@ -52,6 +52,7 @@ def test_the_values_fit_into_a_system(command: Run, recorded: Result, grasp: Sys
     assert grasp.with_values(values).start("plant.friction.coulomb[2]") == values[list(TRUE)[1]]
 
 
+@pytest.mark.slow
 def test_contact_times_have_a_residual_for_every_row(
     command: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -334,6 +334,7 @@ def test_one_of_other_sources_stays_as_it_is(command: Run, altered: Altered) -> 
     assert "native_twin_of" in ran("a")["sensor_1"]
 
 
+@pytest.mark.slow
 def test_one_that_is_native_already_is_no_exception(command: Run, tmp_path: Path) -> None:
     twin = build_native_block(SPRING, tmp_path).path
     assert command("run", "--swap", f"plant={twin}", *SHORT, "--native")[::2] == (0, "")

@@ -35,6 +35,7 @@ def test_the_page_and_the_picture_are_beside_the_run(
     assert not err
 
 
+@pytest.mark.slow
 def test_json_and_another_place(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -56,6 +57,7 @@ def test_a_system_that_is_no_grasp_has_a_picture_of_its_signals(tmp_path: Path) 
     }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_paced_run_has_a_picture_of_its_timing_too(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 from conftest import Run
+from support.slow import slow
 
 
 @pytest.fixture(autouse=True)
@@ -20,9 +21,9 @@ def sensor_toml(tmp_path: Path, fmus: Path) -> None:
     ("arguments", "pictures"),
     [
         (["--step", "1e-3", "--stop", "0.02"], ["grasp.png"]),
-        (["--step", "1e-3", "--stop", "0.02", "--realtime"], ["grasp.png", "timing.png"]),
+        slow(["--step", "1e-3", "--stop", "0.02", "--realtime"], ["grasp.png", "timing.png"]),
         (["sensor.toml"], ["signals.png"]),
-        (["sensor.toml", "--realtime"], ["signals.png", "timing.png"]),
+        slow(["sensor.toml", "--realtime"], ["signals.png", "timing.png"]),
     ],
 )
 def test_what_there_is_to_draw_is_drawn(

@@ -83,7 +83,7 @@ def native_system(folder: Path, **values: float) -> Path:
     return folder / "system.toml"
 
 
-@pytest.mark.parametrize("number", FIRST)
+@pytest.mark.parametrize("number", [FIRST[0], *map(slow, FIRST[1:])])
 def test_a_signal_keeps_what_a_run_recorded(
     start: Start, tmp_path: Path, fmus: Path, number: int
 ) -> None:

@@ -57,7 +57,9 @@ def test_there_is_something_to_try() -> None:
     assert len(EXAMPLES) == 1
 
 
-@pytest.mark.parametrize("command", [slow(c) if "--step-study" in c else c for c in COMMANDS])
+@pytest.mark.parametrize(
+    "command", [slow(c) if "--step-study" in c or "--fmi 3" in c else c for c in COMMANDS]
+)
 def test_command(user: Path, command: str) -> None:
     arguments = shlex.split(command)
     if "--native" in arguments and compiler() is None:

@@ -135,7 +135,7 @@ def sized(data: bytes) -> bytes:
 
 
 @pytest.mark.parametrize("define", [[], ["-DGRIPPER_PLANT_EXAMPLE_MAIN"]])
-@pytest.mark.parametrize("optimise", ["-O0", "-O3"])
+@pytest.mark.parametrize("optimise", ["-O0", slow("-O3")])
 def test_without_a_warning(tmp_path: Path, define: list[str], optimise: str) -> None:
     compile_c(
         tmp_path, c_header("GripperPlant", *plant()), "GripperPlant",

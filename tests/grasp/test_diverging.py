@@ -16,6 +16,7 @@ from grasp_cosim.ssp.write import write_ssp
 from grasp_cosim.system.parts import Port
 from grasp_cosim.system.toml import read_toml
 from support.both_engines import engines
+from support.slow import slow
 
 AWAY = r"^controller\.force\[1\] ran away: -1e\+06 N at t = 0\.413\d s, ten times as much every "
 HINT = "; look at factor = -1 of controller.force[1] -> plant.force[1]"
@@ -47,7 +48,7 @@ def as_file(folder: Path, fmus: Path, more: str = "") -> Path:
 
 
 @engines
-@pytest.mark.parametrize("every", [1, 100])
+@pytest.mark.parametrize("every", [1, slow(100)])
 def test_it_is_kept_up_to_there_the_same_bits_in_both_engines(
     grasp: System, engine: Engine, every: int
 ) -> None:

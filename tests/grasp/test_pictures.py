@@ -10,6 +10,7 @@ from grasp_cosim.grasp import pictures
 from grasp_cosim.recording.result import Result
 from matplotlib.figure import Figure
 from report.runs import TOUCH, grasp_run
+from support.slow import slow
 
 
 @pytest.fixture
@@ -43,10 +44,10 @@ def touching_from(run: Result, moments: dict[int, float]) -> Result:
     ("moments", "close_ups"),
     [
         ({}, []),
-        ({1: 1.0}, [[1]]),
-        ({1: 1.0, 2: 1.2}, [[1], [2]]),
+        slow({1: 1.0}, [[1]]),
+        slow({1: 1.0, 2: 1.2}, [[1], [2]]),
         ({1: 1.03, 2: 1.0}, [[1, 2]]),
-        ({2: 0.0}, [[2]]),
+        slow({2: 0.0}, [[2]]),
     ],
 )
 def test_close_ups_of_the_contacts(

@@ -112,6 +112,7 @@ def test_a_relative_place_does_not_count(tmp_path: Path, monkeypatch: pytest.Mon
     assert compiled._place().is_relative_to(tmp_path / ".cache")
 
 
+@pytest.mark.slow
 def test_processes_that_build_it_at_once_all_run(cache: Path) -> None:
     code = (
         "from grasp_cosim.master import compiled; import sys; sys.stdin.read(1)\n"

@@ -100,6 +100,7 @@ def test_a_session_is_paced_as_well(grasp: System, engine: Engine) -> None:
     assert Timing.from_dict("here", timing.as_dict()) == timing
 
 
+@pytest.mark.slow
 def test_the_page_of_a_paced_run_takes_its_timing_for_no_metric(grasp: System) -> None:
     result = simulate(grasp, stop=0.01, realtime=FAST)
     assert result.timing is not None
@@ -112,6 +113,7 @@ class Terminal(io.StringIO):
         return True
 
 
+@pytest.mark.slow
 def test_a_terminal_shows_how_it_goes(grasp: System, monkeypatch: pytest.MonkeyPatch) -> None:
     terminal, file = Terminal(), io.StringIO()
     for stream in (terminal, file):

@@ -82,6 +82,7 @@ def test_a_run_without_signals_is_refused(tmp_path: Path) -> None:
         MdfListener(tmp_path / "s.mf4").begin(EXPERIMENT, ())
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_the_run(tmp_path: Path) -> None:
     """asammdf writes a file in fragments of 4 MB; both runs have more than that."""
     signals = tuple(Signal(f"a.x[{i}]", "m", "Real") for i in range(64))

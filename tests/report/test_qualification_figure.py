@@ -33,7 +33,7 @@ def qualification(grasp: System, names: int, end: int = 101) -> Qualification:
     return Qualification(swap, tuple(compared), runs=(original, candidate))
 
 
-@pytest.mark.parametrize(("names", "end"), [(1, 101), (2, 40), slow(ROWS + 3, 101), slow(3, 1)])
+@pytest.mark.parametrize(("names", "end"), [(1, 101), slow(2, 40), slow(ROWS + 3, 101), slow(3, 1)])
 def test_it_is_drawn(grasp: System, tmp_path: Path, names: int, end: int) -> None:
     path = tmp_path / "qualification.png"
     draw_qualification(qualification(grasp, names, end), path)

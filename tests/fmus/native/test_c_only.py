@@ -133,27 +133,35 @@ class InC:
 
 
 CONTROLLER_INPUTS = ctypes.c_double * 6
+Controller = Callable[[str], tuple[InC, Any]]
 
 
-def controller(tmp_path: Path, name: str = "GraspController") -> tuple[InC, Any]:
-    """A controller, and its default parameters as its header has them."""
-    made = InC(shipped_model(SCRIPTS / f"{name}.py"), tmp_path)
-    (tmp_path / "p.c").write_text(
-        f'#include "{name}.h"\n'
-        f"const {name}_Parameters defaults = {name.upper()}_PARAMETERS_DEFAULTS;\n"
-        "int size = sizeof defaults;\n"
-    )
-    compiled(tmp_path, "-shared", "-fPIC", "-o", "p.so", "p.c")
-    library = ctypes.CDLL(str(tmp_path / "p.so"))
-    size = ctypes.c_int.in_dll(library, "size").value
-    return made, (ctypes.c_char * size).in_dll(library, "defaults")
+@pytest.fixture(scope="module")
+def controller(tmp_path_factory: pytest.TempPathFactory) -> Controller:
+    """A controller, and its default parameters as its header has them; made once."""
+
+    @cache
+    def made(name: str) -> tuple[InC, Any]:
+        folder = tmp_path_factory.mktemp(name)
+        c = InC(shipped_model(SCRIPTS / f"{name}.py"), folder)
+        (folder / "p.c").write_text(
+            f'#include "{name}.h"\n'
+            f"const {name}_Parameters defaults = {name.upper()}_PARAMETERS_DEFAULTS;\n"
+            "int size = sizeof defaults;\n"
+        )
+        compiled(folder, "-shared", "-fPIC", "-o", "p.so", "p.c")
+        library = ctypes.CDLL(str(folder / "p.so"))
+        size = ctypes.c_int.in_dll(library, "size").value
+        return c, (ctypes.c_char * size).in_dll(library, "defaults")
+
+    return made
 
 
-@pytest.mark.parametrize("name", ["GraspController", "GraspControllerAdaptive"])
+@pytest.mark.parametrize("name", ["GraspController", slow("GraspControllerAdaptive")])
 def test_the_same_bits_as_the_block_over_changing_inputs(
-    fmus: Path, tmp_path: Path, name: str
+    fmus: Path, controller: Controller, name: str
 ) -> None:
-    c, p = controller(tmp_path, name)
+    c, p = controller(name)
     block = blocks()[name]
     fields = declared(block)
     pack, listed = packer(block.Inputs, fields), unpacker(fields)
@@ -187,9 +195,9 @@ def test_the_same_bits_as_the_block_over_changing_inputs(
     ],
 )
 def test_what_is_refused_leaves_the_state(
-    inputs: list[float], step: float, code: int, why: str, tmp_path: Path
+    inputs: list[float], step: float, code: int, why: str, controller: Controller
 ) -> None:
-    c, p = controller(tmp_path)
+    c, p = controller("GraspController")
     zeros = CONTROLLER_INPUTS()
     assert c.call("initial_state")(p, zeros, c.state, None) == 0
     before = bytes(c.state)

@@ -78,8 +78,9 @@ def test_fmpy_compiles_its_sources(
     assert_gives_the_reference(folder, fmu.parent, fmu.stem)
 
 
-@pytest.mark.parametrize("fmi", [2, slow(3)])
-@pytest.mark.parametrize("name", ["GraspController", slow("GraspControllerAdaptive")])
+@pytest.mark.slow
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("name", ["GraspController", "GraspControllerAdaptive"])
 @pytest.mark.skipif("fma" not in Path("/proc/cpuinfo").read_text(), reason="NO fma")
 def test_contraction_is_caught(fmu: Path, tmp_path: Path) -> None:
     """Compiled for this processor without a word on contraction, it refuses to be instantiated."""

@@ -47,7 +47,10 @@ def test_all_but_one_can_be_native() -> None:
     ("name", "said"),
     [
         ("GripperPlantMuJoCo", "GripperPlantMuJoCo: stays Python only, as it needs mujoco"),
-        ("gripperplant", "gripperplant: no such block; must be of GraspController, GripperPlant, "),
+        (
+            "gripperplant",
+            "gripperplant: no such block; must be of GraspController, GraspControllerAdaptive, ",
+        ),
         ("", ": no such block; must be of "),
     ],
 )
@@ -93,6 +96,11 @@ def test_nothing_is_made_twice(natives: Path, tmp_path: Path) -> None:
     shutil.copytree(natives, tmp_path / "out")
     built = build_native(tmp_path / "out")
     assert [(b.path.stem, b.status) for b in built] == [(name, "unchanged") for name in TRANSLATED]
+
+
+@pytest.mark.slow
+def test_without_a_stamp_all_is_looked_at(natives: Path, tmp_path: Path) -> None:
+    shutil.copytree(natives, tmp_path / "out")
     (tmp_path / "out" / STAMP).unlink()
     assert {b.status for b in build_native(tmp_path / "out")} == {"unchanged"}
     assert contents(tmp_path / "out") == contents(natives)

@@ -16,7 +16,6 @@ from support.c_host import HEADERS, Unpacked, number, rows_in_python
 from support.hosts import Parts
 from support.kinds import TRANSLATED
 from support.platforms import MINGW
-from support.slow import slow
 
 LINKED = Path(__file__).with_name("linked.c")
 ROLES = {"PLANT": "GripperPlant", "SENSOR": "ProximitySensor", "CONTROLLER": "GraspController"}
@@ -71,7 +70,8 @@ def program(
     return folder / "linked"
 
 
-@pytest.mark.parametrize("given", [False, slow(True)])
+@pytest.mark.slow
+@pytest.mark.parametrize("given", [False, True])
 def test_three_fmus_in_one_program_are_the_grasp(
     given: bool, parts_of: PartsOf, tmp_path: Path
 ) -> None:
