@@ -73,7 +73,7 @@ def test_the_mirror_image_of_what_is_learnt_is_not_nothing() -> None:
     assert x.estimate.beta == pytest.approx(-0.69, abs=0.05)
 
 
-@examples(30)
+@examples(10)
 @given(pairs(0.2, 2.0), pairs(0.02, 0.1), st.floats(0.1, 10.0))
 def test_scaling_both_intensities_changes_no_force(alpha: Pair, gaps: Pair, factor: float) -> None:
     """But for rounding, above the floor, and for noise: the brighter, the sooner it is believed."""

@@ -1,9 +1,13 @@
 """What counts as a grasp: the mean squeeze, while the fingers do not close any more."""
 
+from math import sin
+
 import pytest
 from grasp_controller import contact_force, holding
+from grasp_controller.adaptive import Inputs, Params
 from hypothesis import given
 from hypothesis import strategies as st
+from support.approach import approach, run
 from support.examples import examples
 
 P = holding.Params()
@@ -59,3 +63,21 @@ def test_the_speed_is_low_passed() -> None:
     assert twice == pytest.approx(once, rel=0.2)
     assert 0.1 < once < 0.5
     assert holding.filtered(P, 0.3, 0.3, 0.01) == pytest.approx(0.3, rel=1e-12)
+
+
+def test_what_is_held_teaches_nothing() -> None:
+    """A grasp pushed to and fro by 2 mm, its light rising with it by a tenth: no approach."""
+    touching = approach((0.5, 1.0), end=0.0)
+    *_, last = touching
+    carried = [last._replace(velocity=(0.0, 0.0))] * 200
+    for k in range(50):
+        s, (x_1, x_2), (xi_1, xi_2) = 2e-3 * sin(0.3 * k), last.position, last.intensity
+        seen = (xi_1 * (1.0 - 50.0 * s), xi_2 * (1.0 + 50.0 * s))
+        carried.append(Inputs((x_1 + s, x_2 + s), (0.0, 0.0), seen))
+    changes = []
+    for hold in (holding.Params(), holding.Params(squeeze=1e12)):
+        trace = run(Params(hold=hold), [*touching, *carried])
+        held, after = (trace[k][0].estimate.beta for k in (len(touching) + 200, -1))
+        changes.append(abs(after - held))
+    with_hold, without = changes
+    assert with_hold < 0.02 * without

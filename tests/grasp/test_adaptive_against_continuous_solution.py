@@ -143,7 +143,8 @@ def test_the_force_builds_up_as_in_the_reference(natives: Path, g: Grasp) -> Non
     assert result["controller.target_position"][-1] == pytest.approx(expected.target, abs=1e-6)
 
 
-@pytest.mark.parametrize("g", [BLACK_ON_WHITE, slow(OFF_CENTRE)])
+@pytest.mark.slow
+@pytest.mark.parametrize("g", [BLACK_ON_WHITE, OFF_CENTRE])
 def test_both_settle_with_the_stiffness_over_half_the_width(natives: Path, g: Grasp) -> None:
     """What is left of f_s once the fingers hold is (P_0/P)^2 of what it would be."""
     settled = 0.5 * g.K_i * g.W
