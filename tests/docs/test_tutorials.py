@@ -25,7 +25,7 @@ BLOCKS = re.compile(r"```(console|toml|python)\n(.*?)```", re.DOTALL)
 
 INDENTED = [
     command
-    for name in ("layers", "limits", "your_plant")
+    for name in ("colour", "layers", "limits", "your_plant")
     for command in re.findall(
         r"^    (grasp-cosim .*?)(?:\s+#.*)?$",
         (DOCS / f"{name}.md").read_text("utf-8"),
