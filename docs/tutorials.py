@@ -77,7 +77,7 @@ def _study_row(first: str, heads: Sequence[str], study: Mapping[str, Any]) -> st
 def _spread(heading: str, metrics: Mapping[str, Any]) -> str:
     """The median, 95 % and the greatest of a metric."""
     quantity, factor, digits = COLUMNS[heading]
-    found = metrics[quantity]
+    found = metrics[str(quantity)]
     return " / ".join(_text(found[s], factor, digits) for s in ("median", "p95", "greatest"))
 
 
