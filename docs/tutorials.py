@@ -3,9 +3,10 @@
     .venv/bin/python docs/tutorials.py     # in the folder of the checkout; a minute or two
 
 A table below a command has a row for each value of the word that is its first heading. The other
-headings say what is taken from the run: COLUMNS.
+headings say what is taken from the run: COLUMNS. Below a study, a row may be one of its variants.
 """
 
+import json
 import math
 import re
 import shlex
@@ -32,8 +33,8 @@ HERE = Path(__file__).parent
 Runs = Mapping[str, Result]
 """The runs of a table by the values in its first column."""
 
-Do = Callable[[str], Result]
-"""What a command line recorded."""
+Do = Callable[[str], Any]
+"""What a command line recorded: a Result, or of a study what it prints with --json."""
 
 _TABLE = re.compile(r"```console\n\$ ((?:(?!```).)*)\n```\n\n((?:\|[^\n]*\n)+)", re.DOTALL)
 
@@ -51,6 +52,9 @@ def worked_out(page: str, do: Do) -> tuple[str, list[Runs]]:
         word, *heads = _cells(head)
         firsts = [_cells(row)[0] for row in rows]
         line = command.replace("\\\n", " ")
+        if line.startswith("grasp-cosim sweep "):
+            rows = [_study_row(first, heads, do(line.replace(word, first))) for first in firsts]
+            return "\n".join(["```console", f"$ {command}", "```", "", head, rule, *rows, ""])
         runs = {v: do(re.sub(rf"\b{word}\b", v, line)) for v in (f.strip("`") for f in firsts)}
         tables.append(runs)
         filled = [
@@ -62,21 +66,56 @@ def worked_out(page: str, do: Do) -> tuple[str, list[Runs]]:
     return _TABLE.sub(fill, page), tables
 
 
+def _study_row(first: str, heads: Sequence[str], study: Mapping[str, Any]) -> str:
+    """The cells of a study, or of its variant of that name."""
+    if heads == ["reached"]:
+        return f"| {first} | {_reached(study['limits'])} |"
+    metrics = study["variants"][first]["metrics"]
+    return f"| {' | '.join([first, *(_spread(heading, metrics) for heading in heads)])} |"
+
+
+def _spread(heading: str, metrics: Mapping[str, Any]) -> str:
+    """The median, 95 % and the greatest of a metric."""
+    quantity, factor, digits = COLUMNS[heading]
+    found = metrics[str(quantity)]
+    return " / ".join(_text(found[s], factor, digits) for s in ("median", "p95", "greatest"))
+
+
+def _reached(limits: Sequence[Mapping[str, Any]]) -> str:
+    """What a study reaches of each of its limits, the worst of variants and fingers."""
+    headings = {column[0]: heading for heading, column in COLUMNS.items()}
+    worst: dict[tuple[str, str, float], float] = {}
+    for found in limits:
+        limit = found["limit"]
+        key = (headings[limit["metric"]], limit["statistic"], limit["most"])
+        worst[key] = max(found["value"], worst.get(key, 0.0))
+    return "; ".join(
+        f"{heading.rpartition(', ')[0]}{', 95 %' if statistic == 'p95' else ''} "
+        f"{_text(value, factor, digits + 1)} of {factor * most:g} {heading.rpartition(', ')[2]}"
+        for (heading, statistic, most), value in worst.items()
+        for _, factor, digits in [COLUMNS[heading]]
+    )
+
+
 def _cells(line: str) -> list[str]:
     return [cell.strip() for cell in line.strip().strip("|").split("|")]
 
 
 def recorder(folder: Path) -> Do:
-    """Do each line "grasp-cosim run ..." once, in the current folder; SystemExit where it fails."""
+    """Do each line "grasp-cosim run ..." or "... sweep ..." once, in the current folder.
+
+    SystemExit where it fails.
+    """
 
     @cache
-    def run(*words: str) -> Result:
+    def run(*words: str) -> Any:
         out = folder / str(run.cache_info().misses)
-        with redirect_stdout(StringIO()):
-            code = cli.main([*words[1:], "--out", str(out)])
+        study = words[1] == "sweep"
+        with redirect_stdout(StringIO()) as printed:
+            code = cli.main([*words[1:], "--out", str(out), *(["--json"] if study else [])])
         if code:
             raise SystemExit(f"{shlex.join(words)}: exit code {code}")
-        return load_run(out)
+        return json.loads(printed.getvalue()) if study else load_run(out)
 
     return lambda line: run(*shlex.split(line))
 
@@ -166,11 +205,20 @@ def gap_by_equation_7(run: Result) -> float:
     return max(0.0, value(run, "plant.friction.coulomb[1]", 0.0) / stiffness - 0.035)
 
 
-COLUMNS: Mapping[str, tuple[str | Callable[[Result], float | list[float]], float, int]] = {
+def learnt(run: Result) -> float | None:
+    """The ratio of the reflectances at the end, as learnt; None where nothing learns."""
+    ratio = run.signals.get("controller.reflectance_ratio")
+    return None if ratio is None else float(ratio[-1])
+
+
+COLUMNS: Mapping[str, tuple[str | Callable[[Result], float | list[float] | None], float, int]] = {
     "contacts, s": ("time_to_contact", 1.0, 3),
     "apart, s": ("time_difference", 1.0, 3),
     "impacts, mm/s": ("impact_velocity", 1e3, 1),
     "peak forces, N": ("peak_contact_force", 1.0, 2),
+    "ratio learnt": (learnt, 1.0, 3),
+    "force difference, N": ("force_difference", 1.0, 3),
+    "drift, mm/s": ("object_drift", 1e3, 3),
     "steady forces, N": ("steady_contact_force", 1.0, 2),
     "target at the end, mm": ("target_position", 1e3, 1),
     "object shifted, mm": ("object_shift", 1e3, 2),
@@ -291,6 +339,31 @@ def draw_limits(tables: Sequence[Runs], folder: Path) -> None:
     save(figure, folder / "limits.png")
 
 
+def draw_colour(tables: Sequence[Runs], folder: Path) -> None:
+    """colour.png: black on the right and white on the left, under both laws."""
+    figure = new_figure(9.0, 4.8)
+    rows = figure.subplots(2, 2, sharex=True, sharey="row")
+    for (law, run), column in zip(tables[0].items(), rows.T, strict=True):
+        gaps, forces = column
+        for j, style in zip(FINGERS, ("-", "--"), strict=True):
+            face = "black" if j == 1 else "white"
+            label = f"finger {j}, at the {face} face"
+            gap = 1e3 * run.signals[f"plant.gap[{j}]"]
+            force = abs(run.signals[f"plant.contact_force[{j}]"])
+            gaps.plot(run.time, gap, style, color=COLOR[j], label=label)
+            forces.plot(run.time, force, style, color=COLOR[j], label=label)
+        finish(gaps, "gap in mm")
+        finish(forces, "contact force in N")
+        apart = run.metrics["time_difference"]
+        gaps.set_title(f"{law}: contacts {apart:.2f} s apart", fontsize=10)
+        forces.set_xlabel("time in s")
+    for axes in rows[:, 1]:
+        axes.set_ylabel("")
+    rows[0, 0].set_ylim(-0.5, 20.0)
+    rows[1, 0].set_xlim(0.5, 4.0)
+    save(figure, folder / "colour.png")
+
+
 def _plain(runs: Runs) -> Runs:
     """The rows that set a number and nothing more."""
     return {value: run for value, run in runs.items() if " " not in value}
@@ -307,6 +380,7 @@ def draw_your_plant(tables: Sequence[Runs], folder: Path) -> None:
 
 
 PAGES: Mapping[str, Callable[[Sequence[Runs], Path], None]] = {
+    "colour": draw_colour,
     "layers": draw_layers,
     "limits": draw_limits,
     "your_plant": draw_your_plant,

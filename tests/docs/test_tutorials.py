@@ -25,7 +25,7 @@ BLOCKS = re.compile(r"```(console|toml|python)\n(.*?)```", re.DOTALL)
 
 INDENTED = [
     command
-    for name in ("layers", "limits", "your_plant")
+    for name in ("colour", "layers", "limits", "your_plant")
     for command in re.findall(
         r"^    (grasp-cosim .*?)(?:\s+#.*)?$",
         (DOCS / f"{name}.md").read_text("utf-8"),
@@ -77,7 +77,14 @@ def checked(name: str, checkout: Path) -> tuple[list[Any], Any]:
 
 
 def test_the_commands_at_the_beginnings_work(checkout: Path) -> None:
-    assert [command.split()[1] for command in INDENTED] == ["run", "run", "build", "build", "run"]
+    assert [command.split()[1] for command in INDENTED] == [
+        "run",
+        "run",
+        "run",
+        "build",
+        "build",
+        "run",
+    ]
     for command in INDENTED:
         short = ["--stop", "0.01"] if command.split()[1] == "run" else []
         assert cli.main([*shlex.split(command)[1:], *short]) == 0, command
@@ -110,6 +117,43 @@ def test_the_switch_in_a_system_file_makes_case_1(checkout: Path, grasp: System)
     (checkout / "my_system.toml").write_text(head + switch, encoding="utf-8")
     system = System.load(checkout / "my_system.toml")
     assert system.component("controller", "test").values == {"simultaneous_contact.enabled": False}
+
+
+@pytest.mark.slow
+def test_colour(checkout: Path) -> None:
+    """The studies' own limits are kept, as they end with exit code 0; and what the words say."""
+    (laws, others, free, drift, _, sensors, stripes, saturated, near, dark, friction), _ = checked(
+        "colour", checkout
+    )
+    apart = said("colour", r"is there ([\d.]+) s before the other")
+    assert apart == [round(laws["published"].metrics["time_difference"], 2)]
+    for ratio in ("0.3", "0.86", "1", "1.2"):
+        learnt = others[ratio].signals["controller.reflectance_ratio"][-1]
+        assert learnt == pytest.approx(float(ratio), rel=0.01)
+    assert max(free[mass].metrics["object_shift"] for mass in ("0.05", "0.02")) < 2e-3
+    late, equal, published = list(drift.values())[2:]
+    worse = [run.metrics["time_difference"] for run in (late, equal, published)]
+    assert worse[0] > 0.1 > worse[1] > worse[2]
+    forces = [run.metrics["force_difference"] for run in (equal, published)]
+    assert forces[0] < 0.2 * forces[1]
+    both = "diffusion_exponent=1.3 --set sensor_2.diffusion_exponent=1.3"
+    one = sensors["diffusion_exponent=1.25"].metrics["time_difference"]
+    assert sensors[both].metrics["time_difference"] < 0.03 < 0.1 < one
+    by_period = {p: stripes[p].metrics["time_difference"] for p in ("0.005", "0.02", "0.1")}
+    assert max(by_period, key=lambda p: by_period[p]) == "0.02"
+    blind, blind_published = list(saturated.values())[2:]
+    assert blind.metrics["time_difference"] > blind_published.metrics["time_difference"]
+    assert min(run.metrics["impact_velocity"][1] for run in (blind, blind_published)) > 0.06
+    lost, lost_published = (list(near.values())[k].metrics["time_difference"] for k in (2, 4))
+    assert lost == pytest.approx(lost_published, abs=0.02)
+    (alpha, gap, seen, noise) = said(
+        "colour", r"At ([\d.]+) the light of a gap of (\d+) mm is (\d+) mV, .*?one sample, (\d+) mV"
+    )
+    assert seen == round(1e3 * 0.0024 * alpha / (1e-3 * gap + 0.005) ** 1.1506)
+    assert noise == 5.0
+    assert dark["0.1"].metrics["time_difference"] < 0.03 < dark["0.05"].metrics["time_difference"]
+    alike = [friction[f].metrics["time_difference"] for f in list(friction)[1::2]]
+    assert alike[0] == pytest.approx(alike[1], abs=0.01)
 
 
 @pytest.mark.slow

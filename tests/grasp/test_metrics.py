@@ -210,7 +210,7 @@ def test_unequal_forces_differ_by_their_steady_parts() -> None:
     held = {"plant.contact_force[1]": -at_rest, "plant.contact_force[2]": 0.0 * time + 2.5}
     longer = {name: np.concatenate((s, np.repeat(s[-1:], 200))) for name, s in signals.items()}
     longer |= {name: np.concatenate((s, np.repeat(s[-1:], 200))) for name, s in held.items()}
-    metrics = grasp_metrics(1e-3 * np.arange(len(time) + 200), longer)
+    metrics = grasp_metrics(every(1e-3, 1e-3 * (len(time) + 199)), longer)
     assert metrics["force_difference"] == pytest.approx(0.5, rel=1e-12)
 
 
