@@ -157,7 +157,7 @@ def test_a_change_is_reported_once(build: Build) -> None:
             ],
             [
                 "sampling.jitter: added",
-                "surface: valueReference 25 -> 26",
+                "surface: valueReference 26 -> 27",
                 DESCRIPTION,
                 f"resources/{CLOCK}: changed",
             ],

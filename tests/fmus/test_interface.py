@@ -55,6 +55,7 @@ pattern.phase                 parameter  Real     m      0.0
 pattern.edge                  parameter  Real     m      0.002
 ambient.enabled               parameter  Boolean  -      false
 ambient.offset                parameter  Real     V      0.35
+ambient.calibration_error     parameter  Real     V      0.0
 ambient.drift                 parameter  Real     V/s    0.0
 noise.enabled                 parameter  Boolean  -      false
 noise.standard_deviation      parameter  Real     V      0.005
@@ -126,8 +127,7 @@ hold                          output     Real     1
 reflectance.diffusion_exponent  parameter  Real   1      1.1506
 reflectance.time_constant     parameter  Real     s      0.02
 reflectance.weight_exponent   parameter  Real     1      5.0
-reflectance.travel            parameter  Real     m      0.001
-reflectance.intensity_noise   parameter  Real     V      0.0005
+reflectance.intensity_noise   parameter  Real     V      0.00025
 reflectance.prior_deviation   parameter  Real     1      1.0
 reflectance.limit             parameter  Real     1      2.5
 reflectance.gain              parameter  Real     V.m^n  0.0024

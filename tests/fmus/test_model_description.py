@@ -236,7 +236,8 @@ FIXED = {
         *("object_fixed", "fingertip_radius", "timestep"),
     ],
     "ProximitySensor": [
-        *("ambient.enabled", "ambient.offset", "ambient.drift", "noise.enabled", "noise.seed"),
+        *("ambient.enabled", "ambient.offset", "ambient.calibration_error", "ambient.drift"),
+        *("noise.enabled", "noise.seed"),
         *("adc.enabled", "filter.enabled", "filter.cutoff", "median.enabled", "sampling.rate"),
     ],
     "GraspController": [],

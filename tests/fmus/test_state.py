@@ -34,7 +34,7 @@ PARAMETERS = {
     "GripperPlantMuJoCo": {"object_mass": 0.04, "object_fixed": False, "friction.coulomb[2]": 0.1},
     "ProximitySensor": {"offset_distance": 0.006},
     "GraspController": {"contact_force.stiffness": 90.0, "impact_reduction.mass": 1.3},
-    "GraspControllerAdaptive": {"contact_force.stiffness": 90.0, "reflectance.travel": 2e-3},
+    "GraspControllerAdaptive": {"contact_force.stiffness": 90.0, "hold.squeeze": 0.2},
 }
 
 
