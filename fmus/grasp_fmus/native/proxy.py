@@ -36,12 +36,12 @@ def build_native_proxy(
 
     ValueError as build_proxy; CompilerError where a compiler fails.
     """
-    members = _members(target, original, plan.fmi, settings)
+    members = proxy_members(target, original, plan.fmi, settings)
     ((_, complete),) = with_binaries({target.stem: members}, plan, networked=True)
     return write_members(target, complete)
 
 
-def _members(
+def proxy_members(
     target: Path, original: Original, fmi: Version, settings: Settings
 ) -> dict[str, bytes]:
     """Return its files but for the binaries, by name."""

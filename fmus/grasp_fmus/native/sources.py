@@ -70,9 +70,7 @@ def native_sources(
         f'#include "fmi{fmi}_host.h"\n#include "python_arithmetic.h"\n#include "block.h"\n'
         '#include "block_slave.h"'
     )
-    main = _MAIN.format(
-        name=name, fmi=fmi, guid=guid, how=_BLOCK, defined="", included=included
-    )
+    main = _MAIN.format(name=name, fmi=fmi, guid=guid, how=_BLOCK, defined="", included=included)
     return {
         f"{name}.c": main.encode(),
         **{file: text.encode() for file, text in translation.items()},
