@@ -9,6 +9,7 @@ import socket
 import struct
 from pathlib import Path
 from random import Random
+from threading import Event
 from typing import Any
 
 import pytest
@@ -17,6 +18,7 @@ from grasp_fmus.base import LoggedError
 from grasp_fmus.connection import STALE
 from grasp_fmus.link.message import (
     END,
+    FAILED,
     HEAD,
     HELLO,
     INITIALISE,
@@ -27,7 +29,7 @@ from grasp_fmus.link.message import (
     Codec,
     Message,
 )
-from grasp_fmus.link.signature import Signature
+from grasp_fmus.link.signature import Kind, LinkVariable, Signature
 from support.kinds import all_kinds
 from support.scripted_peer import (
     SIGNATURE,
@@ -214,6 +216,71 @@ def test_settings_may_change_in_initialisation_mode() -> None:
     assert first.kinds() == [HELLO, INITIALISE, END]
 
 
+def drawn_signature(random: Random) -> Signature:
+    """Another one, with some lines of ours, changed or not, and others."""
+    kinds: list[Kind] = ["Real", "Integer", "Boolean", "String"]
+    found = []
+    for v in SIGNATURE.variables:
+        if random.random() < 0.7:
+            kind = random.choice(kinds) if random.random() < 0.3 else v.kind
+            unit = random.choice(["N", "Größe %d", None]) if random.random() < 0.3 else v.unit
+            found.append(LinkVariable(v.name, kind, v.causality, unit))
+    found += [LinkVariable(f"new {i}", "Real", "output") for i in range(random.randrange(3))]
+    random.shuffle(found)
+    return Signature(tuple(found))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_any_other_interface_is_named(seed: int) -> None:
+    theirs = drawn_signature(Random(seed))
+    with ScriptedPeer() as peer:
+        peer.told(HELLO, other(theirs))
+        host = Host(peer.port, peer.clock)
+        line = refused(host, host.slave.enter_initialization_mode)
+        difference = SIGNATURE.difference(theirs.text) or "unnamed"
+        assert line.endswith(f": the peer has another interface: {difference}".replace("%", "%%"))
+
+
+@pytest.mark.parametrize(
+    "reason",
+    [b"", b" hot \n\t motor\r\n", "\u2003 at\u00a0100 %\u3000".encode(), b"\xff\xe2\x80 x\xc3",
+     "Größe € 𝄞 \ufeff".encode(), b"x" * 3000],
+)  # fmt: skip
+def test_any_reason_is_one_line(reason: bytes) -> None:
+    def fail_so(peer: ScriptedPeer, m: Message) -> None:
+        peer.send(peer.pack(m, REFUSE, reason, FAILED))
+
+    with ScriptedPeer() as peer:
+        peer.told(INITIALISE, fail_so)
+        host = Host(peer.port, peer.clock)
+        host.slave.enter_initialization_mode()
+        line = refused(host, host.outputs)
+        words = " ".join(reason.decode(errors="replace").split())
+        assert line.endswith(f": the peer failed: {words}".replace("%", "%%"))
+
+
+def test_a_host_with_a_name() -> None:
+    with connected(host="localhost") as (host, peer):
+        host.step()
+        assert (host.outputs(), host.state(), len(peer.got)) == (START, 1, 3)
+
+
+def test_a_name_that_is_not_resolved_in_time() -> None:
+    """The resolver is left alone with it; what it finds in the end is of no account."""
+    over = Event()
+    host = Host(9, Clock(tick=10_000_000), host="localhost", connect_timeout=0.05)
+
+    def hang() -> None:
+        over.wait(60.0)
+
+    try:
+        with host.looking_up(hang):
+            line = refused(host, host.slave.enter_initialization_mode)
+    finally:
+        over.set()
+    assert line == ("proxy, t = 0 s: localhost:9: no connection: its name was not resolved in time")
+
+
 @pytest.mark.parametrize(
     ("setting", "reason"),
     [
@@ -239,6 +306,8 @@ def test_settings_that_are_none(setting: dict[str, Any], reason: str) -> None:
         ("proxy.misses_tolerated", -1, "proxy.misses_tolerated = -1: must be from 0 to"),
         ("proxy.state", 1, "proxy.state: output set: must be an input or a parameter"),
         ("force", math.inf, "force = inf N: must be a finite number"),
+        ("proxy.key_file", "k" * 1024, f"proxy.key_file = '{'k' * 1024}': must have 0 to 1023"),
+        ("proxy.failsafe.echo", "x" * 128, f"proxy.failsafe.echo = '{'x' * 128}': must have 0 to"),
         ("label", "ä" * 64, f"label = '{'ä' * 64}': must have 0 to 127 bytes in UTF-8"),
     ],
 )
@@ -311,6 +380,27 @@ def test_a_key_must_be_long_enough(tmp_path: Path) -> None:
     host = Host(9, Clock(), key_file=str(key))
     line = refused(host, host.slave.enter_initialization_mode)
     assert line.endswith(f"proxy.key_file = {str(key)!r}: key of 15 bytes: must have 16 or more")
+
+
+def test_a_key_file_may_be_too_long(tmp_path: Path) -> None:
+    key = tmp_path / "key"
+    key.write_bytes(bytes(4097))
+    host = Host(9, Clock(), key_file=str(key))
+    line = refused(host, host.slave.enter_initialization_mode)
+    assert line.endswith(f"proxy.key_file = {str(key)!r}: file of more than 4096 bytes: is no key")
+
+
+def test_a_key_that_others_can_read_is_said(tmp_path: Path) -> None:
+    key = tmp_path / "key"
+    key.write_bytes(b"\x000123456789abcdef\n")
+    key.chmod(0o640)
+    with ScriptedPeer(key=key.read_bytes()) as peer:
+        host = Host(peer.port, peer.clock, key_file=str(key)).initialise()
+        assert host.log() == [
+            f"proxy, t = 0 s: {key}: others have access to this key, mode 640; "
+            f"must be 600: chmod 600 {key}"
+        ]
+        host.slave.terminate()
 
 
 # Steps

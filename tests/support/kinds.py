@@ -24,6 +24,12 @@ Kind = Literal["python", "native", "native FMI 3"]
 NATIVE: dict[Kind, Version] = {"native": 2, "native FMI 3": 3}
 
 all_kinds = pytest.mark.kinds("python", "native", "native FMI 3")
+native_slowly = pytest.mark.parametrize(
+    "kind",
+    ["python", *(pytest.param(k, marks=pytest.mark.slow) for k in NATIVE)],
+    indirect=True,
+)
+"""All kinds, of which only `make test-slow` takes the native ones."""
 both_of_fmi_2 = pytest.mark.kinds("python", "native")
 python_only = pytest.mark.kinds("python")
 
@@ -67,6 +73,11 @@ def build_own(name: str, kind: Kind, out: Path) -> Path:
     if kind == "python":
         return build_block(OWN[name], out).path
     return build_native_block(OWN[name], out, plan(kind)).path
+
+
+def proxy_options(kind: Kind) -> list[str]:
+    """What the command proxy is given for one of a kind; the test is skipped without a compiler."""
+    return [] if kind == "python" else ["--native", "--fmi", str(plan(kind).fmi)]
 
 
 def build_proxy(original: Original, kind: Kind, folder: Path, settings: Settings) -> Path:

@@ -26,7 +26,9 @@ STRICT = ("-Wall", "-Wextra", "-Wpedantic", "-Werror")
 NAME = "AnyProxy"
 
 _CLOCK = ctypes.CFUNCTYPE(ctypes.c_int64)
+_LOOK_UP = ctypes.CFUNCTYPE(ctypes.c_int)
 _SEND = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_size_t)
+_HOOKS = ("clock", "send", "look_up")
 _C: dict[str, Any] = {
     "Real": ctypes.c_double, "Integer": ctypes.c_int, "Boolean": ctypes.c_int,
     "String": ctypes.c_char_p,
@@ -66,9 +68,11 @@ class NativeSlave:
         outputs = [v for v in variables if v.causality == "output"]
         self._variables = bounded([*variables, *own_variables(outputs)], len(variables))
         fmu = _fmu(tuple(variables), fmi)
-        self._hooks = _CLOCK(clock), _SEND(self._sent)
+        self._hooks = _CLOCK(clock), _SEND(self._sent), _LOOK_UP(self._looked_up)
         self.intercept: Callable[[bytes], None] = lambda datagram: None
         """Called with what is sent; it may raise an OSError instead."""
+        self.look_up: Callable[[], None] = lambda: None
+        """Called before a name is looked up, in the thread that does so."""
         self._instance = Instance(fmu, "proxy")
 
     def __del__(self) -> None:
@@ -82,9 +86,13 @@ class NativeSlave:
             return error.errno or -1
         return 0
 
+    def _looked_up(self) -> int:
+        self.look_up()
+        return 0
+
     def _call(self, function: str, *arguments: Any) -> int:
         library = self._instance.fmu.library
-        places = [ctypes.c_void_p.in_dll(library, name) for name in ("shim_clock", "shim_send")]
+        places = [ctypes.c_void_p.in_dll(library, f"shim_{name}") for name in _HOOKS]
         before = [place.value for place in places]  # one that goes may do so in another's call
         for place, hook in zip(places, self._hooks, strict=True):
             place.value = ctypes.cast(hook, ctypes.c_void_p).value

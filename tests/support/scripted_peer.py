@@ -323,6 +323,24 @@ class Host:
                 m.setattr(ours, "_socket", Intercepted(ours._socket, act))
             yield
 
+    @contextmanager
+    def looking_up(self, act: Callable[[], None]) -> Iterator[None]:
+        """Before it looks up a name it calls `act`, in the thread that does so."""
+        if KIND != "python":
+            self.slave.look_up = act
+            yield
+            return
+        real = socket.getaddrinfo
+
+        def looked_up(*arguments: Any) -> Any:
+            if not arguments[-1] & socket.AI_NUMERICHOST:
+                act()
+            return real(*arguments)
+
+        with pytest.MonkeyPatch.context() as m:
+            m.setattr(socket, "getaddrinfo", looked_up)
+            yield
+
     def _kind(self, name: str) -> str:
         return TYPES[self.slave._variables[self.references[name]].kind].lower()
 

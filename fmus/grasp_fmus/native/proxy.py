@@ -6,8 +6,8 @@ from string import Template
 
 from ..c_header import wire
 from ..documentation import OURS, framed, licences
-from ..folder import Built
 from ..fmu import HASH, hashed, write_members
+from ..folder import Built
 from ..link.message import Codec
 from ..link.signature import Signature
 from ..model_description import version

@@ -66,7 +66,8 @@ def native_sources(
     same block in Python, 16 hexadecimal digits, which is in states; `guid` is that of this FMU.
     """
     included = (
-        f'#define CONTENT "{content}" /* of the FMU in Python with which states are exchanged */\n\n'
+        f'#define CONTENT "{content}" /* of the FMU in Python with which states are exchanged */'
+        "\n\n"
         f'#include "fmi{fmi}_host.h"\n#include "python_arithmetic.h"\n#include "block.h"\n'
         '#include "block_slave.h"'
     )
