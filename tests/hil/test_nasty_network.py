@@ -14,12 +14,16 @@ from grasp_cosim.hil.served import Service
 from grasp_cosim.hil.server import Server
 from grasp_cosim.hil.traffic import Entry
 from grasp_cosim.interface.interface import Value
+from grasp_cosim.master.engine import Engine
 from grasp_cosim.recording.result import Result
 from support.kinds import Kind, native_slowly, proxy_options
 from support.proxies import build_proxy, relaying, serving, wait_until
 from support.slow import slow
 
 pytestmark = native_slowly
+
+ENGINE: Engine = "python"
+"""The peers are threads of this process: test_closed_loop.py."""
 
 STEP = 0.01
 STEPS = 300
@@ -65,7 +69,7 @@ def slow_grasp(grasp: System) -> System:
 
 def simulated(system: System, name: str) -> Result:
     """Up to a step whose answer is in time: all answers that arrive have come by then."""
-    with simulate.session(system) as session:
+    with simulate.session(system, engine=ENGINE) as session:
         session.step(STEPS)
         while session[f"{name}.proxy.consecutive_missed"]:
             assert session.step(1)
@@ -86,11 +90,8 @@ def test_with_losses_and_jitter_the_grasp_completes_and_every_datagram_is_accoun
         f"{name}.proxy.timeout": 0.1,
         f"{name}.proxy.misses_tolerated": 1000,
     }
-    with behind_a_relay(slow_grasp, name, tmp_path, network(BAD), log, kind) as (
-        system,
-        server,
-        relay,
-    ):
+    bad = network(BAD)
+    with behind_a_relay(slow_grasp, name, tmp_path, bad, log, kind) as (system, server, relay):
         result = simulated(system.with_values(values), name)
         wait_until(lambda: server.fmu.counters()["sessions"] == 1)
         peer, counters = server.fmu.counters(), relay.counters
@@ -168,7 +169,8 @@ def test_the_peer_started_anew(
         address = first.address
         options = proxy_options(kind)
         proxy = build_proxy(fmu, tmp_path / "plant_bench.fmu", address[1], *options)
-        session = simulate.session(slow_grasp.swap("plant", proxy).with_values(values))
+        system = slow_grasp.swap("plant", proxy).with_values(values)
+        session = simulate.session(system, engine=ENGINE)
         session.step(20)
     with session:
         gap = session["plant.gap[1]"]
