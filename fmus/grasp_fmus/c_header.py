@@ -1,7 +1,8 @@
 """Writes the bench side of a proxy FMU as one C99 header, for a target that is programmed in C.
 
 link.h.in is the header itself, as C for a model called model; here it gets the name and the
-variables. What it does is what link/peer.py does. Protocol: link/README.md
+variables. What it does is what link/peer.py does. wire.h.in is what it has in common with a native
+proxy: datagrams, values and keys. Protocol: link/README.md
 """
 
 import re
@@ -12,11 +13,21 @@ from pathlib import Path
 from string import Template
 from typing import NamedTuple
 
-from .link.message import HEAD, LONGEST_STEP, STRING_SIZE, TAG_SIZE, Codec, Value, check_size
+from .link.message import (
+    HEAD,
+    LARGEST_KEY,
+    LONGEST_STEP,
+    STRING_SIZE,
+    TAG_SIZE,
+    Codec,
+    Value,
+    check_size,
+)
 from .link.peer import TOO_LONG
 from .link.signature import ORDER, Causality, LinkVariable, Signature
 
 TEMPLATE = Path(__file__).with_name("link.h.in")
+WIRE = Path(__file__).with_name("wire.h.in")
 
 LARGEST_REASON = 256
 """Bytes of a REFUSE's reason in C, as in the template."""
@@ -88,22 +99,30 @@ def c_header(
     ]
     packing = [*map(_check, groups), _unpack(inputs), _unpack(parameters), _pack(outputs)]
     text_size = len(signature.text.encode())
-    lines = [_quoted(f"{line}\n") for line in signature.text.split("\n")[:-1]]
-    octets = [f"0x{octet:02x}" for octet in signature.hash]
     return Template(_named(TEMPLATE.read_text("utf-8"), prefix)).substitute(
         title=comment(name),
         structs=structs(groups, _MEANINGS, starts or {}, descriptions or {}),
-        first_half_of_the_hash=", ".join(octets[:8]),
-        second_half_of_the_hash=", ".join(octets[8:]),
-        signature_lines="".join(f"        {line},\n" for line in lines),
+        wire=wire(prefix, signature),
         packing="\n".join(packing),
-        signature_size=text_size,
-        longest_step=LONGEST_STEP,
         too_long=TOO_LONG,
         inputs_size=inputs.size,
         parameters_size=parameters.size,
         outputs_size=outputs.size,
         answer_size=HEAD.size + TAG_SIZE + max(outputs.size, text_size, LARGEST_REASON),
+    )
+
+
+def wire(prefix: str, signature: Signature) -> str:
+    """Return the part of the protocol that both sides need, in C; names begin with the prefix."""
+    lines = [quoted(f"{line}\n") for line in signature.text.split("\n")[:-1]]
+    octets = [f"0x{octet:02x}" for octet in signature.hash]
+    return Template(_named(WIRE.read_text("utf-8"), prefix)).substitute(
+        first_half_of_the_hash=", ".join(octets[:8]),
+        second_half_of_the_hash=", ".join(octets[8:]),
+        signature_lines="".join(f"        {line},\n" for line in lines),
+        signature_size=len(signature.text.encode()),
+        longest_step=LONGEST_STEP,
+        largest_key=LARGEST_KEY,
     )
 
 
@@ -186,7 +205,7 @@ def _literal(v: LinkVariable, value: Value) -> str:
         )
     [start] = packed
     if isinstance(start, str):
-        return _quoted(start)
+        return quoted(start)
     if isinstance(start, bool):
         return str(start).lower()
     return "(-2147483647 - 1)" if start == -(2**31) and v.kind == "Integer" else repr(start)
@@ -195,7 +214,7 @@ def _literal(v: LinkVariable, value: Value) -> str:
 def _check(group: Group) -> str:
     lines = [
         f"    if (!{group.prefix}_is_{v.kind.lower()}(body + {offset}))\n"
-        f"        return {_quoted(v.name)};"
+        f"        return {quoted(v.name)};"
         for v, _, offset in group.members
     ]
     head = f"const char *{group.prefix}_check_{group.causality}s(const uint8_t *body)"
@@ -234,7 +253,7 @@ def _lines(head: str, lines: list[str], none: str, end: str) -> str:
     return "\n".join([head, *(lines or [none]), end, ""])
 
 
-def _quoted(text: str) -> str:
+def quoted(text: str) -> str:
     """Return a string of C, the text in UTF-8; whatever needs it is written in octal."""
     plain = {octet: chr(octet) for octet in range(0x20, 0x7F) if octet not in b'"\\?'}
     plain |= {0x09: "\\t", 0x0A: "\\n"}

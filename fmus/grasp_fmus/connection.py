@@ -7,7 +7,9 @@ from contextlib import suppress
 from errno import ECONNREFUSED
 from secrets import randbits
 from select import select
+from threading import Thread
 from time import monotonic_ns
+from typing import Any
 
 from .link.client import Client, Refusal, Verdict
 from .link.message import BUSY, FAILED, LARGEST, UNKNOWN, Value
@@ -35,9 +37,14 @@ class Connection:
     """
 
     def __init__(
-        self, host: str, port: int, client: Client, clock: Callable[[], int] = monotonic_ns
+        self,
+        host: str,
+        port: int,
+        client: Client,
+        deadline: int,
+        clock: Callable[[], int] = monotonic_ns,
     ) -> None:
-        """OSError where there is no such host, or no socket to be had."""
+        """OSError where no such host was found until the deadline, or no socket is to be had."""
         self.client = client
         self.refusal: Refusal | None = None
         self.trouble = ""
@@ -46,7 +53,7 @@ class Connection:
         self._clock = clock
         self._stage = NEW
         self._pending = b""
-        address = socket.getaddrinfo(host, port, socket.AF_INET, socket.SOCK_DGRAM)[0][4]
+        address = _address(host, port, lambda: (deadline - clock()) * 1e-9)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             if sys.platform != "win32" and self._socket.fileno() >= DESCRIPTORS:
@@ -166,3 +173,34 @@ class Connection:
     def _note(self, error: OSError) -> None:
         if error.errno != ECONNREFUSED:  # that nobody listens is what no answer means
             self.trouble = f" ({error.strerror or error})"
+
+
+def _address(host: str, port: int, left: Callable[[], float]) -> Any:
+    """Return the address of a host; OSError where there is none, or not in the s that are left.
+
+    There is no deadline to the resolver: a thread calls it, and is left alone with it.
+    """
+    try:
+        return _found(host, port, socket.AI_NUMERICHOST)
+    except (OSError, UnicodeError):
+        pass  # it is a name
+    answer: list[Any] = []
+
+    def look_up() -> None:
+        try:
+            answer.append(_found(host, port))
+        except (OSError, UnicodeError) as error:
+            answer.append(error)
+
+    thread = Thread(target=look_up, daemon=True)
+    thread.start()
+    thread.join(max(left(), 0.0))
+    if not answer:
+        raise OSError("its name was not resolved in time")
+    if isinstance(answer[0], Exception):
+        raise answer[0]
+    return answer[0]
+
+
+def _found(host: str, port: int, flags: int = 0) -> Any:
+    return socket.getaddrinfo(host, port, socket.AF_INET, socket.SOCK_DGRAM, 0, flags)[0][4]

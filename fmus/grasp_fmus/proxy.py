@@ -23,6 +23,8 @@ NOT_CONNECTED, CONNECTED, MISSING, LOST = range(4)
 """The values of proxy.state."""
 
 MOST = 2**31 - 1
+LONGEST_TEXT = 1023
+"""Bytes that a text of the settings has at most."""
 _NANOSECONDS = 1e9
 
 
@@ -102,6 +104,28 @@ def own_variables(outputs: Sequence[Variable], settings: Settings = DEFAULTS) ->
     return own
 
 
+def shared_signature(variables: Sequence[Variable]) -> Signature:
+    """Return the signature of the variables of an original."""
+    shared = ((v.name, TYPES[v.kind], v.causality, v.unit or None) for v in variables)
+    return Signature(tuple(LinkVariable(*v) for v in shared))
+
+
+def bounded(variables: Sequence[Variable], shared: int) -> list[Variable]:
+    """Return all variables of a proxy with the limits that its slave checks.
+
+    The first ones, `shared` in number, are the original's: of those texts alone have limits, which
+    are what can be sent; the peer checks the rest.
+    """
+    found = []
+    for i, v in enumerate(variables):
+        sent = i < shared or v.name.startswith("proxy.failsafe.")
+        limits = v.limits if i >= shared else None
+        if v.kind is str:
+            limits = (0, STRING_SIZE - 1 if sent else LONGEST_TEXT)
+        found.append(replace(v, limits=limits))
+    return found
+
+
 def _refused(call: str) -> Callable[..., Any]:
     """Return a function for a call about states, all of which are refused."""
 
@@ -127,14 +151,11 @@ class Fmi2Proxy(Slave):
     clock: Callable[[], int] = staticmethod(monotonic_ns)
 
     def _prepare(self) -> None:
-        shared = ((v.name, TYPES[v.kind], v.causality, v.unit or None) for v in self.variables)
-        self._signature = exchanged = Signature(tuple(LinkVariable(*v) for v in shared))
+        self._signature = exchanged = shared_signature(self.variables)
         outputs = self.variables[len(exchanged.request) :]
-        sent = (0, STRING_SIZE - 1)  # the limits of what can be sent; the peer checks the rest
-        self._variables = [
-            *(replace(v, limits=sent) if v.kind is str else v for v in self.variables),
-            *own_variables(outputs, self.settings),
-        ]
+        self._variables = bounded(
+            [*self.variables, *own_variables(outputs, self.settings)], len(self.variables)
+        )
         self._values = [v.kind() if v.start is None else v.start for v in self._variables]
         sizes = (len(exchanged.request), n := len(outputs), len(Settings._fields), n, n)
         self._request, self._outputs, self._settings, self._holds, self._failsafes = _slices(sizes)
@@ -221,14 +242,15 @@ class Fmi2Proxy(Slave):
             return self._connection
         self._disconnect()
         client = Client(self._signature, self._key(settings.key_file))
+        deadline = self._deadline(settings.connect_timeout)
         try:
-            connection = Connection(settings.host, settings.port, client, self.clock)
+            connection = Connection(settings.host, settings.port, client, deadline, self.clock)
         except (OSError, UnicodeError) as error:
             reason = getattr(error, "strerror", None) or error
             raise RefusalError(f"{_peer(settings)}: no connection: {reason}") from error
         self._connection, self._address = connection, address
         self._close = finalize(self, connection.close)
-        if not connection.greet(self._deadline(settings.connect_timeout)):
+        if not connection.greet(deadline):
             self._give_up(connection, settings)
         self._values[self._diagnostics.start] = self._state = CONNECTED
         return connection

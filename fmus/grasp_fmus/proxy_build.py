@@ -39,6 +39,11 @@ def build_proxy(
     ValueError where the stem of `target` is no identifier of C, a setting is out of its range, or a
     name is taken.
     """
+    return write_fmu(target, proxy_model(target, original, settings), bind_python)
+
+
+def proxy_model(target: Path, original: Original, settings: Settings) -> Model:
+    """Return the model of the proxy of an FMU; ValueError as build_proxy()."""
     name = target.stem
     if not (name.isascii() and name.isidentifier()) or target.suffix != ".fmu":
         raise ValueError(
@@ -61,14 +66,13 @@ def build_proxy(
         experiment=original.experiment,
         statuses=(WARNING, ERROR),
     )
-    model = Model(
+    return Model(
         description,
         _card(own),
         {f"{name}.py": _script(name, original, settings).encode()},
         picture=icon("Proxy"),
         making=PROXY,
     )
-    return write_fmu(target, model, bind_python)
 
 
 def _script(name: str, original: Original, settings: Settings) -> str:

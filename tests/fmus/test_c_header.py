@@ -678,6 +678,8 @@ class Target:
         )
         line = self.said(self.process.stdout)
         assert line.startswith(b"listening on "), line
+        if key is None:  # once, before all else
+            assert b"take over a session that is silent for 1 s" in self.said(self.process.stderr)
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.settimeout(10.0)
         self.socket.connect(("127.0.0.1", int(line.split()[-1])))

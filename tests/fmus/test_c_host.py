@@ -4,7 +4,8 @@ import shutil
 import subprocess
 import sys
 import sysconfig
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,7 @@ from grasp_fmus.model_description import Experiment
 from grasp_fmus.proxy import Settings
 from grasp_fmus.proxy_build import Original, build_proxy
 from grasp_fmus.shipped import SCRIPTS
+from support import kinds
 from support.fmi2 import ERROR, OK, Fmu, Instance
 from support.pythons import VERSIONS, python
 from support.scripted_peer import SIGNATURE, VARIABLES, ScriptedPeer
@@ -217,9 +219,8 @@ def test_what_is_refused_in_c_is_an_error_to_go_on_from(
 @pytest.mark.parametrize("version", VERSIONS)
 def test_a_bound_proxy_runs_in_c(host: Path, tmp_path: Path, version: str) -> None:
     """Until the host asks for a state; the end is said all the same."""
-    kinds = {"force", "gain", "doubled"}
-    wire = Signature(tuple(v for v in SIGNATURE.variables if v.name in kinds))
-    variables = [v for v in VARIABLES if v.name in kinds]
+    wire = Signature(tuple(v for v in SIGNATURE.variables if v.name in NUMBERS))
+    variables = [v for v in VARIABLES if v.name in NUMBERS]
     with ScriptedPeer(signature=wire, outputs=lambda values: [values[0] * values[1]]) as peer:
         built = build_proxy(
             tmp_path / "TheProxy.fmu",
@@ -235,6 +236,45 @@ def test_a_bound_proxy_runs_in_c(host: Path, tmp_path: Path, version: str) -> No
     assert "fmi2GetFMUstate: a proxy has no state" in said
     assert (call, terminated, closed) == ("getFMUstate: 3", "terminated: 0", "closed: 0")
     assert peer.kinds() == [HELLO, INITIALISE, *[STEP] * (STEPS - 1), END]
+
+
+NUMBERS = {"force", "gain", "doubled"}
+"""What the host in C knows of the variables of the scripted peer."""
+
+
+@contextmanager
+def native_proxy(folder: Path) -> Iterator[tuple[Fmu, ScriptedPeer]]:
+    """One, and its peer."""
+    wire = Signature(tuple(v for v in SIGNATURE.variables if v.name in NUMBERS))
+    variables = [v for v in VARIABLES if v.name in NUMBERS]
+    with ScriptedPeer(signature=wire, outputs=lambda values: [values[0] * values[1]]) as peer:
+        original = Original("Original.fmu", variables, {}, Experiment(), True)
+        settings = Settings(port=peer.port, timeout=60.0, connect_timeout=60.0)
+        path = kinds.build_proxy(original, "native", folder, settings)
+        yield Fmu(path, folder / "unpacked"), peer
+
+
+def test_a_native_proxy_runs_in_c(host: Path, tmp_path: Path) -> None:
+    """Until the host asks for a state; the end is said all the same."""
+    with native_proxy(tmp_path) as (fmu, peer):
+        done = run(host, fmu, {"force": -0.1}, outputs=["doubled", "proxy.age"])
+    assert (done.returncode, done.stderr) == (ERROR, ""), done.stdout
+    *rows, said, call, terminated, closed = done.stdout.splitlines()
+    assert rows == ["-0.20000000000000001 0"] * (STEPS - 1)
+    assert "fmi2GetFMUstate: a proxy has no state" in said
+    assert (call, terminated, closed) == ("getFMUstate: 3", "terminated: 0", "closed: 0")
+    assert peer.kinds() == [HELLO, INITIALISE, *[STEP] * (STEPS - 1), END]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not shutil.which("valgrind"), reason="NO valgrind")
+def test_a_native_proxy_leaves_no_memory_behind(host: Path, tmp_path: Path) -> None:
+    valgrind = ["valgrind", "--leak-check=full", "--errors-for-leak-kinds=all", "--track-fds=yes"]
+    with native_proxy(tmp_path) as (fmu, _):
+        done = run(host, fmu, {"force": -0.1}, *valgrind, "--error-exitcode=99")
+    assert done.returncode == ERROR, done.stderr
+    assert "ERROR SUMMARY: 0 errors" in done.stderr
+    assert "Open AF_INET" not in done.stderr
 
 
 @pytest.mark.slow

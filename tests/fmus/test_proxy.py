@@ -1,12 +1,15 @@
-"""The slave of a proxy with a peer that answers as it is told."""
+"""The slave of a proxy with a peer that answers as it is told: one that Python runs, and in C."""
 
 import errno
 import gc
 import math
+import os
+import resource
 import socket
 import struct
 from pathlib import Path
 from random import Random
+from threading import Event
 from typing import Any
 
 import pytest
@@ -15,6 +18,7 @@ from grasp_fmus.base import LoggedError
 from grasp_fmus.connection import STALE
 from grasp_fmus.link.message import (
     END,
+    FAILED,
     HEAD,
     HELLO,
     INITIALISE,
@@ -25,7 +29,8 @@ from grasp_fmus.link.message import (
     Codec,
     Message,
 )
-from grasp_fmus.link.signature import Signature
+from grasp_fmus.link.signature import Kind, LinkVariable, Signature
+from support.kinds import all_kinds
 from support.scripted_peer import (
     SIGNATURE,
     VARIABLES,
@@ -40,10 +45,15 @@ from support.scripted_peer import (
     forget,
     keep,
     miss,
+    on_each_kind,
     other,
     send_kept_and_answer,
     send_kept_and_miss,
 )
+
+__all__ = ("on_each_kind",)
+
+pytestmark = all_kinds
 
 START = [3.0, 3, False, "start"]
 """The outputs to the start values."""
@@ -206,6 +216,71 @@ def test_settings_may_change_in_initialisation_mode() -> None:
     assert first.kinds() == [HELLO, INITIALISE, END]
 
 
+def drawn_signature(random: Random) -> Signature:
+    """Another one, with some lines of ours, changed or not, and others."""
+    kinds: list[Kind] = ["Real", "Integer", "Boolean", "String"]
+    found = []
+    for v in SIGNATURE.variables:
+        if random.random() < 0.7:
+            kind = random.choice(kinds) if random.random() < 0.3 else v.kind
+            unit = random.choice(["N", "Größe %d", None]) if random.random() < 0.3 else v.unit
+            found.append(LinkVariable(v.name, kind, v.causality, unit))
+    found += [LinkVariable(f"new {i}", "Real", "output") for i in range(random.randrange(3))]
+    random.shuffle(found)
+    return Signature(tuple(found))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_any_other_interface_is_named(seed: int) -> None:
+    theirs = drawn_signature(Random(seed))
+    with ScriptedPeer() as peer:
+        peer.told(HELLO, other(theirs))
+        host = Host(peer.port, peer.clock)
+        line = refused(host, host.slave.enter_initialization_mode)
+        difference = SIGNATURE.difference(theirs.text) or "unnamed"
+        assert line.endswith(f": the peer has another interface: {difference}".replace("%", "%%"))
+
+
+@pytest.mark.parametrize(
+    "reason",
+    [b"", b" hot \n\t motor\r\n", "\u2003 at\u00a0100 %\u3000".encode(), b"\xff\xe2\x80 x\xc3",
+     "Größe € 𝄞 \ufeff".encode(), b"x" * 3000],
+)  # fmt: skip
+def test_any_reason_is_one_line(reason: bytes) -> None:
+    def fail_so(peer: ScriptedPeer, m: Message) -> None:
+        peer.send(peer.pack(m, REFUSE, reason, FAILED))
+
+    with ScriptedPeer() as peer:
+        peer.told(INITIALISE, fail_so)
+        host = Host(peer.port, peer.clock)
+        host.slave.enter_initialization_mode()
+        line = refused(host, host.outputs)
+        words = " ".join(reason.decode(errors="replace").split())
+        assert line.endswith(f": the peer failed: {words}".replace("%", "%%"))
+
+
+def test_a_host_with_a_name() -> None:
+    with connected(host="localhost") as (host, peer):
+        host.step()
+        assert (host.outputs(), host.state(), len(peer.got)) == (START, 1, 3)
+
+
+def test_a_name_that_is_not_resolved_in_time() -> None:
+    """The resolver is left alone with it; what it finds in the end is of no account."""
+    over = Event()
+    host = Host(9, Clock(tick=10_000_000), host="localhost", connect_timeout=0.05)
+
+    def hang() -> None:
+        over.wait(60.0)
+
+    try:
+        with host.looking_up(hang):
+            line = refused(host, host.slave.enter_initialization_mode)
+    finally:
+        over.set()
+    assert line == ("proxy, t = 0 s: localhost:9: no connection: its name was not resolved in time")
+
+
 @pytest.mark.parametrize(
     ("setting", "reason"),
     [
@@ -231,6 +306,8 @@ def test_settings_that_are_none(setting: dict[str, Any], reason: str) -> None:
         ("proxy.misses_tolerated", -1, "proxy.misses_tolerated = -1: must be from 0 to"),
         ("proxy.state", 1, "proxy.state: output set: must be an input or a parameter"),
         ("force", math.inf, "force = inf N: must be a finite number"),
+        ("proxy.key_file", "k" * 1024, f"proxy.key_file = '{'k' * 1024}': must have 0 to 1023"),
+        ("proxy.failsafe.echo", "x" * 128, f"proxy.failsafe.echo = '{'x' * 128}': must have 0 to"),
         ("label", "ä" * 64, f"label = '{'ä' * 64}': must have 0 to 127 bytes in UTF-8"),
     ],
 )
@@ -250,11 +327,24 @@ def test_a_string_as_long_as_can_be() -> None:
         assert peer.values(peer.got[-1])[3] == host.get("echo") == text
 
 
-def test_a_host_with_more_files_open_than_can_be_watched(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(connection, "DESCRIPTORS", 3)
+def test_a_host_with_more_files_open_than_can_be_watched() -> None:
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if hard != resource.RLIM_INFINITY and hard < 1200:
+        pytest.skip(f"NO {hard} files: must be 1200")
+    resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, 1200), hard))
     host = Host(9, Clock())
-    line = refused(host, host.slave.enter_initialization_mode)
-    assert line.endswith("127.0.0.1:9: no connection: the host has 3 files open: must have fewer")
+    opened = [os.open(os.devnull, os.O_RDONLY)]
+    try:
+        while opened[-1] < connection.DESCRIPTORS:
+            opened.append(os.dup(opened[0]))
+        line = refused(host, host.slave.enter_initialization_mode)
+    finally:
+        for descriptor in opened:
+            os.close(descriptor)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+    assert line.endswith(
+        "127.0.0.1:9: no connection: the host has 1024 files open: must have fewer"
+    )
 
 
 # Keys
@@ -290,6 +380,27 @@ def test_a_key_must_be_long_enough(tmp_path: Path) -> None:
     host = Host(9, Clock(), key_file=str(key))
     line = refused(host, host.slave.enter_initialization_mode)
     assert line.endswith(f"proxy.key_file = {str(key)!r}: key of 15 bytes: must have 16 or more")
+
+
+def test_a_key_file_may_be_too_long(tmp_path: Path) -> None:
+    key = tmp_path / "key"
+    key.write_bytes(bytes(4097))
+    host = Host(9, Clock(), key_file=str(key))
+    line = refused(host, host.slave.enter_initialization_mode)
+    assert line.endswith(f"proxy.key_file = {str(key)!r}: file of more than 4096 bytes: is no key")
+
+
+def test_a_key_that_others_can_read_is_said(tmp_path: Path) -> None:
+    key = tmp_path / "key"
+    key.write_bytes(b"\x000123456789abcdef\n")
+    key.chmod(0o640)
+    with ScriptedPeer(key=key.read_bytes()) as peer:
+        host = Host(peer.port, peer.clock, key_file=str(key)).initialise()
+        assert host.log() == [
+            f"proxy, t = 0 s: {key}: others have access to this key, mode 640; "
+            f"must be 600: chmod 600 {key}"
+        ]
+        host.slave.terminate()
 
 
 # Steps
@@ -615,24 +726,14 @@ def test_what_came_before_a_step_does_not_put_off_its_deadline() -> None:
         clock.tick = 0
 
 
-class Down:
-    """A socket whose cable was pulled."""
-
-    def __init__(self, real: socket.socket) -> None:
-        self._real = real
-
-    def send(self, datagram: bytes) -> int:
-        raise OSError(errno.ENETUNREACH, "Network is unreachable")
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._real, name)
+def down(datagram: bytes) -> None:
+    """A cable was pulled."""
+    raise OSError(errno.ENETUNREACH, "Network is unreachable")
 
 
-def test_a_network_that_is_down_is_a_peer_that_is_silent(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_network_that_is_down_is_a_peer_that_is_silent() -> None:
     with connected(misses_tolerated=0, timeout=1e-3) as (host, peer):
-        ours: Any = host.slave._connection
-        with monkeypatch.context() as m:
-            m.setattr(ours, "_socket", Down(ours._socket))
+        with host.intercepted(down):
             peer.clock.tick = 400_000
             host.step()
         assert (host.state(), host.counts()) == (3, {"missed": 1, "consecutive_missed": 1})
@@ -640,48 +741,39 @@ def test_a_network_that_is_down_is_a_peer_that_is_silent(monkeypatch: pytest.Mon
 
 
 @pytest.mark.parametrize("at", ["greeting", "initialising"])
-def test_a_network_that_is_down_at_the_start_is_named(
-    monkeypatch: pytest.MonkeyPatch, at: str
-) -> None:
+def test_a_network_that_is_down_at_the_start_is_named(at: str) -> None:
     with ScriptedPeer() as peer:
         host = Host(peer.port, peer.clock, connect_timeout=0.1)
         call: Any = host.slave.enter_initialization_mode
-        real = socket.socket
-        with monkeypatch.context() as m:
-            if at == "initialising":
-                call()
-                call = host.outputs
-                ours: Any = host.slave._connection
-                m.setattr(ours, "_socket", Down(ours._socket))
-            else:
-                m.setattr(socket, "socket", lambda *which: Down(real(*which)))
+        if at == "initialising":
+            call()
+            call = host.outputs
+        with host.intercepted(down):
             peer.clock.tick = 40_000_000
             line = refused(host, call)
         assert f":{peer.port} within 0.1 s (Network is unreachable): is the peer running" in line
 
 
-class Reporting(Down):
-    """A socket whose first sends report that nobody took an earlier datagram, and send nothing."""
+class Reporting:
+    """A network that first says that nobody took an earlier datagram, and sends none."""
 
-    def __init__(self, real: socket.socket, reports: int) -> None:
-        super().__init__(real)
+    def __init__(self, reports: int) -> None:
         self.reports = reports
         self.sent: list[int] = []
 
-    def send(self, datagram: bytes) -> int:
+    def __call__(self, datagram: bytes) -> None:
         self.sent.append(datagram[6])
         if len(self.sent) <= self.reports:
             raise OSError(errno.ECONNREFUSED, "Connection refused")
-        return self._real.send(datagram)
 
 
 def test_a_step_that_only_reported_an_earlier_datagram_is_sent_again() -> None:
     """Once, as a report is of one datagram; the peer gets it once."""
     with connected(misses_tolerated=0, timeout=2.0) as (host, peer):
-        ours: Any = host.slave._connection
-        ours._socket = reporting = Reporting(ours._socket, 1)
+        reporting = Reporting(1)
         peer.clock.tick = 50_000_000  # so that it does not wait for ever in vain
-        host.step()
+        with host.intercepted(reporting):
+            host.step()
         assert (host.state(), host.counts()) == (1, {})
         assert reporting.sent == [STEP, STEP]
         assert peer.kinds() == [HELLO, INITIALISE, STEP]
@@ -689,10 +781,10 @@ def test_a_step_that_only_reported_an_earlier_datagram_is_sent_again() -> None:
 
 def test_that_nobody_listens_is_no_trouble_of_the_network() -> None:
     with connected(misses_tolerated=0, timeout=1e-3) as (host, peer):
-        ours: Any = host.slave._connection
-        ours._socket = reporting = Reporting(ours._socket, 2)
+        reporting = Reporting(2)
         peer.clock.tick = 400_000
-        host.step()
+        with host.intercepted(reporting):
+            host.step()
         assert reporting.sent == [STEP, STEP]
         assert host.state() == 3
         assert "no answer within 0.001 s; proxy.on_loss" in host.log()[0]

@@ -9,6 +9,7 @@ import json
 import subprocess
 import sys
 import zipfile
+from collections.abc import Iterator
 from ctypes.util import find_library
 from dataclasses import replace
 from pathlib import Path
@@ -18,8 +19,11 @@ import numpy.typing as npt
 import pytest
 from grasp_cosim import System, simulate
 from grasp_cosim.grasp.presets import SYSTEM
+from grasp_cosim.hil.served import Service
 from grasp_cosim.ssp.write import write_ssp
 from support.cases import CASES
+from support.proxies import build_proxy, serving
+from support.slow import slow
 
 STEP = 1e-3  # s
 GAPS = ("plant.gap[1]", "plant.gap[2]")
@@ -55,8 +59,10 @@ json.dump(rows, open(sys.argv[4], "w"))
 """
 
 
-@pytest.fixture(scope="module", params=["python", "native"])
-def jacobi(request: pytest.FixtureRequest) -> System:
+@pytest.fixture(scope="module", params=["python", "native", slow("native proxy")])
+def jacobi(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[System]:
     """A grasp that needs its values of all types and a transformation on a connection.
 
     Case 1, the object elsewhere, one side darker, the other sensor 1 mm behind its place.
@@ -70,11 +76,18 @@ def jacobi(request: pytest.FixtureRequest) -> System:
         for connection in grasp.connections
     )
     values = {**CASES[1], "plant.initial_object_position": 0.02, "sensor_1.reflectance": 0.86}
-    return (
+    system = (
         replace(grasp, connections=connections)
         .with_values(values)
         .with_experiment(STEP, scheme="jacobi")
     )
+    if request.param != "native proxy":
+        yield system
+        return
+    fmu = system.component("plant", "test").fmu
+    with serving(fmu, Service(lockstep=True)) as server:
+        target = tmp_path_factory.mktemp("proxy") / "PlantBench.fmu"
+        yield system.swap("plant", build_proxy(fmu, target, server.address[1], "--native"))
 
 
 def gaps(program: str, path: Path, system: System) -> npt.NDArray[np.float64]:
@@ -94,7 +107,7 @@ def first_contacts(rows: npt.NDArray[np.float64]) -> list[int]:
 
 
 def check(theirs: npt.NDArray[np.float64], system: System) -> None:
-    result = simulate(system)
+    result = simulate(system, engine="python")  # a peer may be a thread of this process
     ours = np.column_stack([result[name] for name in GAPS])[1:]
     assert ours.shape == theirs.shape
     pairs = zip(first_contacts(theirs), first_contacts(ours), strict=True)

@@ -78,7 +78,7 @@ class Unpacked:
 
 KINDS = {
     "Real": "real", "Boolean": "boolean", "Integer": "integer", "Enumeration": "integer",
-    "Float64": "real", "Int32": "integer",
+    "Float64": "real", "Int32": "integer", "String": "string",
 }  # fmt: skip
 
 

@@ -10,7 +10,11 @@ import pytest
 from grasp_fmus.block_build import build_block
 from grasp_fmus.fmu import build_fmu, shipped_model
 from grasp_fmus.native.build import Plan, build_native_block, build_native_model, planned
+from grasp_fmus.native.proxy import build_native_proxy
 from grasp_fmus.native.targets import Version
+from grasp_fmus.proxy import Settings
+from grasp_fmus.proxy_build import Original
+from grasp_fmus.proxy_build import build_proxy as build_python_proxy
 from grasp_fmus.shipped import SCRIPTS, blocks
 
 from .packages import PACKAGES
@@ -20,6 +24,12 @@ Kind = Literal["python", "native", "native FMI 3"]
 NATIVE: dict[Kind, Version] = {"native": 2, "native FMI 3": 3}
 
 all_kinds = pytest.mark.kinds("python", "native", "native FMI 3")
+native_slowly = pytest.mark.parametrize(
+    "kind",
+    ["python", *(pytest.param(k, marks=pytest.mark.slow) for k in NATIVE)],
+    indirect=True,
+)
+"""All kinds, of which only `make test-slow` takes the native ones."""
 both_of_fmi_2 = pytest.mark.kinds("python", "native")
 python_only = pytest.mark.kinds("python")
 
@@ -66,3 +76,16 @@ def build_own(name: str, kind: Kind, out: Path) -> Path:
     if kind == "python":
         return build_block(OWN[name], out).path
     return build_native_block(OWN[name], out, plan(kind)).path
+
+
+def proxy_options(kind: Kind) -> list[str]:
+    """What the command proxy is given for one of a kind; the test is skipped without a compiler."""
+    return [] if kind == "python" else ["--native", "--fmi", str(plan(kind).fmi)]
+
+
+def build_proxy(original: Original, kind: Kind, folder: Path, settings: Settings) -> Path:
+    """Build the proxy of an FMU."""
+    target = folder / "TheProxy.fmu"
+    if kind == "python":
+        return build_python_proxy(target, original, settings).path
+    return build_native_proxy(target, original, plan(kind), settings).path

@@ -13,6 +13,7 @@ from itertools import count
 from threading import Thread
 from typing import Any
 
+import pytest
 from grasp_fmus.link.message import (
     BUSY,
     END,
@@ -33,6 +34,9 @@ from grasp_fmus.link.message import (
 from grasp_fmus.link.signature import LinkVariable, Signature
 from grasp_fmus.proxy import Fmi2Proxy
 from grasp_fmus.variable import TYPES, Variable
+
+from .kinds import NATIVE, Kind
+from .native_proxies import NativeSlave
 
 Act = Callable[["ScriptedPeer", Message], None]
 
@@ -241,13 +245,20 @@ def datagrams(first: Iterable[bytes], then: Act = answer) -> Act:
 # The slave
 
 
-class Host:
-    """A proxy's slave as pythonfmu calls it, by variable name."""
+KIND: Kind = "python"
+"""The kind of proxy that a Host is; a test module chooses it with on_each_kind."""
 
-    def __init__(
-        self, port: int, clock: Callable[[], int], variables: Sequence[Variable] = VARIABLES,
-        **settings: Any,
-    ) -> None:  # fmt: skip
+
+@pytest.fixture(autouse=True)
+def on_each_kind(kind: Kind, monkeypatch: pytest.MonkeyPatch) -> None:
+    """To import into a test module: its hosts are of the kind that it runs on."""
+    monkeypatch.setattr("support.scripted_peer.KIND", kind)
+
+
+class PythonSlave:
+    """The slave of a proxy that Python runs, without its FMU around it."""
+
+    def __new__(cls, variables: Sequence[Variable], clock: Callable[[], int]) -> Any:
         slave_type: Any = type(Fmi2Proxy)
         slave = slave_type(
             "AnyProxy",
@@ -259,13 +270,76 @@ class Host:
                 "clock": staticmethod(clock),
             },
         )
-        self._logger = ctypes.create_string_buffer(256)  # where no instance name stands
-        self.slave: Fmi2Proxy = slave(None, "proxy", "", ctypes.addressof(self._logger), 0)
+        logger = ctypes.create_string_buffer(256)  # where no instance name stands
+        made = slave(None, "proxy", "", ctypes.addressof(logger), 0)
+        made.logger = logger
+        return made
+
+
+class Intercepted:
+    """A socket of which a test sees what is sent, and may raise an OSError instead."""
+
+    def __init__(self, real: socket.socket, act: Callable[[bytes], None]) -> None:
+        self._real, self._act = real, act
+
+    def send(self, datagram: bytes) -> int:
+        self._act(datagram)
+        return self._real.send(datagram)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._real, name)
+
+
+class Host:
+    """A proxy's slave as pythonfmu calls it, by variable name."""
+
+    def __init__(
+        self, port: int, clock: Callable[[], int], variables: Sequence[Variable] = VARIABLES,
+        **settings: Any,
+    ) -> None:  # fmt: skip
+        self.slave: Any
+        if KIND == "python":
+            self.slave = PythonSlave(variables, clock)
+        else:
+            self.slave = NativeSlave(variables, clock, NATIVE[KIND])
         self.references = {v.name: i for i, v in enumerate(self.slave._variables)}
         self.time = 0.0
         self.set(**{"proxy.port": port, "proxy.timeout": 100.0, "proxy.connect_timeout": 100.0})
         settings = {"on_loss": "failsafe", **settings}
         self.set(**{f"proxy.{name}": value for name, value in settings.items()})
+
+    @contextmanager
+    def intercepted(self, act: Callable[[bytes], None]) -> Iterator[None]:
+        """What it sends meanwhile is seen by `act`, which may raise an OSError instead."""
+        if KIND != "python":
+            before, self.slave.intercept = self.slave.intercept, act
+            yield
+            self.slave.intercept = before
+            return
+        with pytest.MonkeyPatch.context() as m:
+            real = socket.socket
+            m.setattr(socket, "socket", lambda *which: Intercepted(real(*which), act))
+            if (ours := self.slave._connection) is not None:
+                m.setattr(ours, "_socket", Intercepted(ours._socket, act))
+            yield
+
+    @contextmanager
+    def looking_up(self, act: Callable[[], None]) -> Iterator[None]:
+        """Before it looks up a name it calls `act`, in the thread that does so."""
+        if KIND != "python":
+            self.slave.look_up = act
+            yield
+            return
+        real = socket.getaddrinfo
+
+        def looked_up(*arguments: Any) -> Any:
+            if not arguments[-1] & socket.AI_NUMERICHOST:
+                act()
+            return real(*arguments)
+
+        with pytest.MonkeyPatch.context() as m:
+            m.setattr(socket, "getaddrinfo", looked_up)
+            yield
 
     def _kind(self, name: str) -> str:
         return TYPES[self.slave._variables[self.references[name]].kind].lower()

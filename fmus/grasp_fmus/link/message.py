@@ -33,6 +33,8 @@ LONGEST_STEP = 3600.0
 STRING_SIZE = 128
 SMALLEST_KEY = 16
 """Bytes of a shared key, at least."""
+LARGEST_KEY = 4096
+"""Bytes of a key file, at most."""
 
 MALFORMED, FORGED = "malformed", "forged"
 """The faults of a datagram: it is not of this protocol, or its tag is not that of the key."""
@@ -150,12 +152,15 @@ class Codec:
 
 
 def read_key(path: Path) -> bytes:
-    """Return the key in a file; ValueError where it is too short.
+    """Return the key in a file; ValueError where it is too short, or the file too long.
 
     A file of printable ASCII, tabs and line ends is text: line ends around it are not of the key.
     Of any other, such as random bytes, every byte is.
     """
-    data = path.read_bytes()
+    with path.open("rb") as file:
+        data = file.read(LARGEST_KEY + 1)
+    if len(data) > LARGEST_KEY:
+        raise ValueError(f"file of more than {LARGEST_KEY} bytes: is no key")
     is_text = all(byte in _TEXT for byte in data)
     key = data.strip(b"\r\n") if is_text else data
     Sealer(key)

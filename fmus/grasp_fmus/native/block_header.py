@@ -16,8 +16,8 @@ from .statements import function
 KINDS = {float: "KIND_REAL", bool: "KIND_BOOLEAN", int: "KIND_INTEGER"}
 
 
-_VARIABLE = """
-enum { KIND_REAL, KIND_BOOLEAN, KIND_INTEGER };
+VARIABLE = """
+enum { KIND_REAL, KIND_BOOLEAN, KIND_INTEGER, KIND_STRING };
 enum { INPUT, OUTPUT, PARAMETER };
 
 typedef struct {
@@ -32,6 +32,7 @@ typedef struct {
 } Variable;
 
 """
+"""A row of the table of variables."""
 
 
 def block_header(program: Program, name: str, block: Any) -> tuple[str, set[Key]]:
@@ -159,7 +160,7 @@ def _table(name: str, described: list[Field], states: int, has_substeps: bool) -
     }
     return (
         "".join(f"#define {n} {v}\n" for n, v in defined.items())
-        + f"{_VARIABLE}static const Variable variables[N_VARIABLES] = {{\n{''.join(rows)}}};\n"
+        + f"{VARIABLE}static const Variable variables[N_VARIABLES] = {{\n{''.join(rows)}}};\n"
     )
 
 

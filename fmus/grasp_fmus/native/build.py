@@ -73,7 +73,7 @@ def build_native(out: Path, plan: Plan | None = None, names: Sequence[str] = ())
     members = {name: native_members(model, plan.fmi) for name, model in models.items()}
     built = []
     files = []
-    for name, complete in _with_binaries(members, plan):
+    for name, complete in with_binaries(members, plan):
         built.append(write_members(out / f"{name}.fmu", complete))
         checks = cross_check_files(name, models[name].block)
         for file, data in checks.items():
@@ -101,7 +101,7 @@ def build_native_model(model: Model, out: Path, plan: Plan) -> Built:
     from .members import native_members
 
     name = model.description.name
-    ((_, complete),) = _with_binaries({name: native_members(model, plan.fmi)}, plan)
+    ((_, complete),) = with_binaries({name: native_members(model, plan.fmi)}, plan)
     return write_members(out / f"{name}.fmu", complete)
 
 
@@ -123,10 +123,15 @@ def _requirements() -> dict[str, Sequence[str]]:
     return {script.stem: slave_class(script).requires for script in sorted(SCRIPTS.glob("*.py"))}
 
 
-def _with_binaries(fmus: Mapping[str, Members], plan: Plan) -> Iterator[tuple[str, Members]]:
-    """Yield the FMUs by name with their binaries; those of one place become one for all."""
+def with_binaries(
+    fmus: Mapping[str, Members], plan: Plan, networked: bool = False
+) -> Iterator[tuple[str, Members]]:
+    """Yield the FMUs by name with their binaries; those of one place become one for all.
+
+    `networked` ones are linked with what sockets need.
+    """
     jobs = [
-        Job(_sources(files), name, target, plan.compilers[target])
+        Job(_sources(files), name, target, plan.compilers[target], networked)
         for name, files in fmus.items()
         for target in plan.places
     ]

@@ -40,6 +40,10 @@ UNPREFIXED = tuple(f"FMI{fmi}_OVERRIDE_FUNCTION_PREFIX" for fmi in (2, 3))
 """What is defined for a shared library, in which functions are called as the standard does."""
 
 
+NETWORKED = {".so": ("-lpthread", "-ldl"), ".dll": ("-lws2_32",)}
+"""The libraries of sockets and threads, by the suffix of a shared library; cl is told in the C."""
+
+
 class CompilerError(Exception):
     """A compiler failed: which, its exit code, and its first error, in one line."""
 
@@ -51,9 +55,13 @@ class Compiler(NamedTuple):
     identity: str
     environment: Mapping[str, str] = {}
 
-    def line(self, name: str, target: Target) -> list[str]:
-        """Return the command that makes NAME.c, in the current folder, a shared library."""
+    def line(self, name: str, target: Target, networked: bool = False) -> list[str]:
+        """Return the command that makes NAME.c, in the current folder, a shared library.
+
+        One that is networked is linked with what its sockets need.
+        """
         out = f"{name}{target.suffix}"
+        libraries = NETWORKED.get(target.suffix, ()) if networked else ()
         if Path(self.command[0]).stem.lower() == "cl":
             defined = [f"/D{macro}" for macro in UNPREFIXED]
             return [
@@ -64,6 +72,7 @@ class Compiler(NamedTuple):
             *self.command, *BITS, *(f"-fno-builtin-{function}" for function in LIBM),
             *(f"-D{macro}" for macro in UNPREFIXED), "-fvisibility=hidden", "-shared",
             *(() if target.suffix == ".dll" else ("-fPIC",)), "-o", out, f"{name}.c", "-lm",
+            *libraries,
         ]  # fmt: skip
 
 
@@ -74,6 +83,7 @@ class Job(NamedTuple):
     name: str
     target: Target
     compiler: Compiler
+    networked: bool = False
 
     @property
     def key(self) -> str:
@@ -86,7 +96,7 @@ class Job(NamedTuple):
     @property
     def line(self) -> list[str]:
         """The command."""
-        return self.compiler.line(self.name, self.target)
+        return self.compiler.line(self.name, self.target, self.networked)
 
 
 def compile_all(jobs: Sequence[Job]) -> list[bytes]:

@@ -20,7 +20,12 @@ from ..model_description import (
 from ..variable import Scalar, Variable
 from .compilers import BITS, LIBM
 
-TYPES: dict[type[Scalar], str] = {float: "Float64", bool: "Boolean", int: "Int32"}
+TYPES: dict[type[Scalar], str] = {
+    float: "Float64",
+    bool: "Boolean",
+    int: "Int32",
+    str: "String",
+}
 """What FMI 3.0 calls a kind of variable."""
 
 OPTIONS = " ".join((*BITS, *(f"-fno-builtin-{function}" for function in LIBM)))
@@ -48,7 +53,11 @@ def native_description(d: Description, guid: str, fmi: Literal[2, 3]) -> bytes:
     add_categories_and_experiment(root, d)
     variables = SubElement(root, "ModelVariables")
     for reference, v in enumerate(d.variables):
-        SubElement(variables, _type(v), {**role(v, reference), **attributes(v, d.units)})
+        found = {**role(v, reference), **attributes(v, d.units)}
+        start = found.pop("start", None) if v.kind is str else None
+        element = SubElement(variables, _type(v), found)
+        if start is not None:
+            SubElement(element, "Start", value=start)
     SubElement(variables, "Float64", _time(d))
     structure = SubElement(root, "ModelStructure")
     for section, listed in unknowns(d.variables, first=0).items():
@@ -57,12 +66,18 @@ def native_description(d: Description, guid: str, fmi: Literal[2, 3]) -> bytes:
     return document(root)
 
 
-def build_description(name: str, fmi: Literal[2, 3]) -> bytes:
-    """Return sources/buildDescription.xml, which FMI 2.0 takes as FMI 3.0 defines it."""
+def build_description(name: str, fmi: Literal[2, 3], networked: bool = False) -> bytes:
+    """Return sources/buildDescription.xml, which FMI 2.0 takes as FMI 3.0 defines it.
+
+    One that is networked names the library of sockets on Windows.
+    """
     root = Element("fmiBuildDescription", fmiVersion="3.0")
     configuration = SubElement(root, "BuildConfiguration", modelIdentifier=name)
     files = SubElement(configuration, "SourceFileSet", language="C99", compilerOptions=OPTIONS)
     SubElement(files, "SourceFile", name=f"{name}.c")
+    if networked:
+        said = "the sockets of Windows; elsewhere there is none to link with"
+        SubElement(configuration, "Library", name="ws2_32", description=said)
     return document(root)
 
 

@@ -4,8 +4,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal
 
+from .names import string
+
 C = Path(__file__).with_name("c")
-COMMON = ("python_arithmetic.h", "number_text.h", "blake2b.h", "slave.h")
+COMMON = ("number_text.h", "slave.h")
+"""Of every slave."""
+BLOCK = ("python_arithmetic.h", "blake2b.h", "block_slave.h")
+PROXY = ("sockets.h", "client.h", "connection.h", "proxy_slave.h")
 HEADERS = {
     2: ("fmi2TypesPlatform.h", "fmi2FunctionTypes.h", "fmi2Functions.h"),
     3: ("fmi3PlatformTypes.h", "fmi3FunctionTypes.h", "fmi3Functions.h"),
@@ -20,8 +25,7 @@ _MAIN = """\
    otherwise. For a shared library, where they are called fmi{fmi}DoStep, define
    FMI{fmi}_OVERRIDE_FUNCTION_PREFIX, as the standard says; CMake's {name}_EXPORTS does as well.
 
-   Compile as C99, without contraction (-ffp-contract=off) and never with -ffast-math: an FMU that
-   would not calculate as its Python source does makes no instance and says why in the log. */
+{how} */
 
 #if !defined(FMI{fmi}_FUNCTION_PREFIX) && !defined({name}_EXPORTS)
 #define FMI{fmi}_FUNCTION_PREFIX {name}_
@@ -30,13 +34,26 @@ _MAIN = """\
 #if defined(_MSC_VER) && !defined(_CRT_SECURE_NO_WARNINGS)
 #define _CRT_SECURE_NO_WARNINGS /* strcpy and strcat are given room for what they write */
 #endif
-
+{defined}
 #define TOKEN "{guid}"
-#define CONTENT "{content}" /* of the FMU in Python with which states are exchanged */
-
-#include "python_arithmetic.h"
-#include "block.h"
+{included}
 #include "fmi{fmi}_interface.h"
+"""
+
+_BLOCK = """\
+   Compile as C99, without contraction (-ffp-contract=off) and never with -ffast-math: an FMU that
+   would not calculate as its Python source does makes no instance and says why in the log."""
+_PROXY = """\
+   Compile as C99 and link with the sockets of the system: ws2_32 on Windows; where the C library is
+   older than glibc 2.34, pthread and dl."""
+
+_SYSTEM = """
+#if !defined(_GNU_SOURCE) && !defined(_WIN32)
+#define _GNU_SOURCE /* before the first header of the system: its sockets, threads and libraries */
+#endif
+#if defined(_WIN32) && !defined(_CRT_RAND_S)
+#define _CRT_RAND_S
+#endif
 """
 
 
@@ -48,10 +65,44 @@ def native_sources(
     `translation` is the block in C, by file name. `content` is the content hash of the FMU of the
     same block in Python, 16 hexadecimal digits, which is in states; `guid` is that of this FMU.
     """
-    files = [C / file for file in (*COMMON, f"fmi{fmi}_interface.h")]
-    files += [C / "headers" / file for file in HEADERS[fmi]]
+    included = (
+        f'#define CONTENT "{content}" /* of the FMU in Python with which states are exchanged */'
+        "\n\n"
+        f'#include "fmi{fmi}_host.h"\n#include "python_arithmetic.h"\n#include "block.h"\n'
+        '#include "block_slave.h"'
+    )
+    main = _MAIN.format(name=name, fmi=fmi, guid=guid, how=_BLOCK, defined="", included=included)
     return {
-        f"{name}.c": _MAIN.format(name=name, fmi=fmi, guid=guid, content=content).encode(),
+        f"{name}.c": main.encode(),
         **{file: text.encode() for file, text in translation.items()},
-        **{file.name: file.read_bytes() for file in files},
+        **_files(*BLOCK, fmi=fmi),
     }
+
+
+def proxy_sources(
+    name: str, original: str, own: Mapping[str, str], guid: str, fmi: Literal[2, 3]
+) -> dict[str, bytes]:
+    """Return the same of a proxy of the FMU with the file name `original`.
+
+    `own` are the files that only this proxy has: its variables, the wire with its signature.
+    """
+    included = (
+        f"#define PROXY_ORIGINAL {string(original)}\n\n"
+        f'#include "fmi{fmi}_host.h"\n#include "wire.h"\n#include "variables.h"\n'
+        '#include "proxy_slave.h"'
+    )
+    main = _MAIN.format(
+        name=name, fmi=fmi, guid=guid, how=_PROXY, defined=_SYSTEM, included=included
+    )
+    return {
+        f"{name}.c": main.encode(),
+        **{file: text.encode() for file, text in own.items()},
+        **_files(*PROXY, fmi=fmi),
+    }
+
+
+def _files(*names: str, fmi: Literal[2, 3]) -> dict[str, bytes]:
+    """Return files that are the same in every FMU, and those of every slave."""
+    files = [C / file for file in (*COMMON, *names, f"fmi{fmi}_host.h", f"fmi{fmi}_interface.h")]
+    files += [C / "headers" / file for file in HEADERS[fmi]]
+    return {file.name: file.read_bytes() for file in files}

@@ -183,6 +183,17 @@ def test_a_live_session_keeps_others_away_until_it_is_silent() -> None:
     assert first.refusal.text == "the peer does not know this session"
 
 
+def test_a_silent_session_is_taken_over_only_by_who_has_the_key() -> None:
+    bench = Bench(key=KEY[0])
+    ours = begun(bench, Client(SIGNATURE, KEY[0]), 1)
+    later = T0 + 100 * ALIVE
+    for key in (None, KEY[1]):
+        other = Client(SIGNATURE, key)
+        assert bench.answers(other.greet(2, later), later) is None
+    assert heard(bench, ours, ours.step(0.0, 0.1, VALUES, later), later) is Verdict.ANSWERED
+    begun(bench, Client(SIGNATURE, KEY[0]), 3, later + ALIVE)
+
+
 def test_a_hello_alone_does_not_disturb_a_session() -> None:
     bench = Bench()
     client = begun(bench, now=T0)

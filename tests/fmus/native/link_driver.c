@@ -168,8 +168,8 @@ static size_t mutated(uint8_t *datagram, size_t size)
 /* The datagram under the key, of which the tag is taken to be the last 32 bytes. */
 static void seal(const every_kind_link *link, uint8_t *datagram, size_t size)
 {
-    if (link->keyed && size >= 32)
-        every_kind_hmac(link->key, datagram, size - 32, datagram + size - 32);
+    if (link->sealer.keyed && size >= 32)
+        every_kind_hmac(link->sealer.key, datagram, size - 32, datagram + size - 32);
 }
 
 static void judge(every_kind_link *link, const uint8_t *datagram, size_t size, int64_t now)

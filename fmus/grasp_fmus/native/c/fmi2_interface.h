@@ -1,34 +1,6 @@
-/* FMI 2.0 for co-simulation: each function of the standard, in terms of the slave. */
+/* FMI 2.0 for co-simulation: each function of the standard, in terms of the slave, which is included before. */
 #ifndef FMI2_INTERFACE_H
 #define FMI2_INTERFACE_H
-
-#include <stdlib.h>
-
-#include "fmi2Functions.h"
-
-typedef struct {
-    fmi2CallbackLogger logger;  /* may be NULL */
-    fmi2ComponentEnvironment environment;
-    fmi2CallbackAllocateMemory allocate;
-    fmi2CallbackFreeMemory release;
-} Host;
-
-typedef fmi2Status Status;
-
-#define SLAVE_OK fmi2OK
-#define SLAVE_DISCARD fmi2Discard
-#define SLAVE_ERROR fmi2Error
-
-#define SLAVE_FMI "fmi2"
-#define SLAVE_PER_CENT "%%"  /* the logger is a printf */
-#define SLAVE_REAL "Real"
-#define SLAVE_BOOLEAN "Boolean"
-#define SLAVE_INTEGER "Integer"
-#define SLAVE_TOKEN "GUID"
-#define SLAVE_GET_STATE "GetFMUstate"
-#define N_REFERENCES N_VARIABLES
-
-#include "slave.h"
 
 static const char *const fmi2_categories[] = {"", "logStatusWarning", "logStatusDiscard",
                                               "logStatusError"};
@@ -126,6 +98,7 @@ void fmi2FreeInstance(fmi2Component c)
 {
     if (c) {
         Host host = ((Slave *)c)->host;
+        slave_end((Slave *)c);
         fmi2_release(&host, c);
     }
 }
@@ -147,7 +120,7 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component c)
     if (slave_require(s, "EnterInitializationMode", INSTANTIATED) != SLAVE_OK) {
         return fmi2Error;
     }
-    return slave_go_on(s);
+    return slave_enter_initialisation(s);
 }
 
 fmi2Status fmi2ExitInitializationMode(fmi2Component c)
@@ -162,6 +135,7 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component c)
 fmi2Status fmi2Terminate(fmi2Component c)
 {
     FMI2_INSTANCE(c)
+    slave_end(s);
     s->phase = TERMINATED;
     return fmi2OK;
 }
@@ -169,6 +143,7 @@ fmi2Status fmi2Terminate(fmi2Component c)
 fmi2Status fmi2Reset(fmi2Component c)
 {
     FMI2_INSTANCE(c)
+    slave_end(s);
     return slave_start(s);
 }
 
@@ -201,8 +176,7 @@ fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
                          fmi2String value[])
 {
     FMI2_INSTANCE(c)
-    (void)value;
-    return slave_refuse_type(s, vr, nvr, "String");
+    return slave_get_strings(s, vr, nvr, value);
 }
 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
@@ -233,11 +207,12 @@ fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
                          const fmi2String value[])
 {
     FMI2_INSTANCE(c)
-    (void)value;
-    return slave_refuse_type(s, vr, nvr, "String");
+    return slave_set_strings(s, vr, nvr, value);
 }
 
 /* States */
+
+#if SLAVE_HAS_STATES
 
 /* A state that is there already, of an earlier call, is used again */
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate)
@@ -309,6 +284,48 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedSta
     }
     return status;
 }
+
+#else
+
+fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate)
+{
+    (void)FMUstate;
+    return fmi2_not_supported(c, SLAVE_NO_STATE("GetFMUstate"));
+}
+
+fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate)
+{
+    (void)FMUstate;
+    return fmi2_not_supported(c, SLAVE_NO_STATE("SetFMUstate"));
+}
+
+fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *FMUstate)
+{
+    (void)FMUstate;
+    return c ? fmi2OK : fmi2Error;
+}
+
+fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, size_t *size)
+{
+    (void)FMUstate, (void)size;
+    return fmi2_not_supported(c, SLAVE_NO_STATE("SerializedFMUstateSize"));
+}
+
+fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate,
+        fmi2Byte serializedState[], size_t size)
+{
+    (void)FMUstate, (void)serializedState, (void)size;
+    return fmi2_not_supported(c, SLAVE_NO_STATE("SerializeFMUstate"));
+}
+
+fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedState[], size_t size,
+        fmi2FMUstate *FMUstate)
+{
+    (void)FMUstate, (void)serializedState, (void)size;
+    return fmi2_not_supported(c, SLAVE_NO_STATE("DeSerializeFMUstate"));
+}
+
+#endif
 
 /* Steps */
 

@@ -1,31 +1,6 @@
-/* FMI 3.0 for co-simulation: each function of the standard, in terms of the slave. */
+/* FMI 3.0 for co-simulation: each function of the standard, in terms of the slave, which is included before. */
 #ifndef FMI3_INTERFACE_H
 #define FMI3_INTERFACE_H
-
-#include <stdlib.h>
-
-#include "fmi3Functions.h"
-
-typedef struct {
-    fmi3LogMessageCallback logger;  /* may be NULL */
-    fmi3InstanceEnvironment environment;
-} Host;
-
-typedef fmi3Status Status;
-
-#define SLAVE_OK fmi3OK
-#define SLAVE_DISCARD fmi3Discard
-#define SLAVE_ERROR fmi3Error
-#define SLAVE_FMI "fmi3"
-#define SLAVE_PER_CENT "%"
-#define SLAVE_REAL "Float64"
-#define SLAVE_BOOLEAN "Boolean"
-#define SLAVE_INTEGER "Int32 or Int64"  /* an enumeration is Int64 */
-#define SLAVE_TOKEN "instantiation token"
-#define SLAVE_GET_STATE "GetFMUState"
-#define N_REFERENCES (N_VARIABLES + 1)  /* with the time */
-
-#include "slave.h"
 
 static const char *const fmi3_categories[] = {"", "logStatusWarning", "logStatusDiscard",
                                               "logStatusError"};
@@ -133,6 +108,9 @@ fmi3Instance fmi3InstantiateScheduledExecution(
 
 void fmi3FreeInstance(fmi3Instance instance)
 {
+    if (instance) {
+        slave_end((Slave *)instance);
+    }
     free(instance);
 }
 
@@ -147,7 +125,7 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
         || slave_begin_at(s, startTime) != SLAVE_OK) {
         return fmi3Error;
     }
-    status = slave_go_on(s);
+    status = slave_enter_initialisation(s);
     if (status != SLAVE_OK) {
         s->values[SLAVE_TIME] = 0.0;  /* as before: only this call sets it */
     }
@@ -166,6 +144,7 @@ fmi3Status fmi3ExitInitializationMode(fmi3Instance instance)
 fmi3Status fmi3Terminate(fmi3Instance instance)
 {
     FMI3_INSTANCE(instance)
+    slave_end(s);
     s->phase = TERMINATED;
     return fmi3OK;
 }
@@ -173,6 +152,7 @@ fmi3Status fmi3Terminate(fmi3Instance instance)
 fmi3Status fmi3Reset(fmi3Instance instance)
 {
     FMI3_INSTANCE(instance)
+    slave_end(s);
     return slave_start(s);
 }
 
@@ -240,7 +220,26 @@ FMI3_NONE_OF(Int16)
 FMI3_NONE_OF(UInt16)
 FMI3_NONE_OF(UInt32)
 FMI3_NONE_OF(UInt64)
-FMI3_NONE_OF(String)
+
+fmi3Status fmi3GetString(fmi3Instance instance, const fmi3ValueReference valueReferences[],
+                         size_t nValueReferences, fmi3String values[], size_t nValues)
+{
+    FMI3_INSTANCE(instance)
+    if (nValues != nValueReferences) {
+        return fmi3_refuse_count(s);
+    }
+    return slave_get_strings(s, valueReferences, nValueReferences, values);
+}
+
+fmi3Status fmi3SetString(fmi3Instance instance, const fmi3ValueReference valueReferences[],
+                         size_t nValueReferences, const fmi3String values[], size_t nValues)
+{
+    FMI3_INSTANCE(instance)
+    if (nValues != nValueReferences) {
+        return fmi3_refuse_count(s);
+    }
+    return slave_set_strings(s, valueReferences, nValueReferences, values);
+}
 
 fmi3Status fmi3GetBinary(fmi3Instance instance, const fmi3ValueReference valueReferences[],
                          size_t nValueReferences, size_t valueSizes[], fmi3Binary values[],
@@ -277,6 +276,8 @@ fmi3Status fmi3SetClock(fmi3Instance instance, const fmi3ValueReference valueRef
 }
 
 /* States */
+
+#if SLAVE_HAS_STATES
 
 /* A state that is there already, of an earlier call, is used again */
 fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *FMUState)
@@ -347,6 +348,48 @@ fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte seriali
     }
     return status;
 }
+
+#else
+
+fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *FMUState)
+{
+    (void)FMUState;
+    return fmi3_not_supported(instance, SLAVE_NO_STATE("GetFMUState"));
+}
+
+fmi3Status fmi3SetFMUState(fmi3Instance instance, fmi3FMUState FMUState)
+{
+    (void)FMUState;
+    return fmi3_not_supported(instance, SLAVE_NO_STATE("SetFMUState"));
+}
+
+fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState *FMUState)
+{
+    (void)FMUState;
+    return instance ? fmi3OK : fmi3Error;
+}
+
+fmi3Status fmi3SerializedFMUStateSize(fmi3Instance instance, fmi3FMUState FMUState, size_t *size)
+{
+    (void)FMUState, (void)size;
+    return fmi3_not_supported(instance, SLAVE_NO_STATE("SerializedFMUStateSize"));
+}
+
+fmi3Status fmi3SerializeFMUState(fmi3Instance instance, fmi3FMUState FMUState,
+        fmi3Byte serializedState[], size_t size)
+{
+    (void)FMUState, (void)serializedState, (void)size;
+    return fmi3_not_supported(instance, SLAVE_NO_STATE("SerializeFMUState"));
+}
+
+fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte serializedState[], size_t size,
+        fmi3FMUState *FMUState)
+{
+    (void)FMUState, (void)serializedState, (void)size;
+    return fmi3_not_supported(instance, SLAVE_NO_STATE("DeserializeFMUState"));
+}
+
+#endif
 
 /* Steps */
 

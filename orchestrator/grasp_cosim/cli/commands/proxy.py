@@ -11,15 +11,17 @@ from grasp_fmus.proxy import DEFAULTS, Settings
 from grasp_fmus.variable import Enumeration
 from grasp_fmus.variable import Variable as ProxyVariable
 
-from ...errors import InputError
+from ...errors import InputError, SimulationError
 from ...files import check_folder, write_text
 from ...hil.protocol import link_signature
 from ...interface.interface import Interface, Value, Variable
 from ...interface.read import read_interface
 from ...interface.units import BASE
-from ..frame import PATH, bind_python_option, json_option, say, show
+from ..frame import PATH, announce, bind_python_option, json_option, say, show
 
 if TYPE_CHECKING:
+    from grasp_fmus.folder import Built
+    from grasp_fmus.native.build import Plan
     from grasp_fmus.proxy_build import Original
 
 KINDS: Mapping[str, type[Value]] = {"Real": float, "Integer": int, "Boolean": bool, "String": str}
@@ -38,6 +40,13 @@ KINDS: Mapping[str, type[Value]] = {"Real": float, "Integer": int, "Boolean": bo
     help="Longest wait per step in s.",
 )
 @bind_python_option()
+@click.option("--native", is_flag=True, help="As C, without Python.")
+@click.option(
+    "--target",
+    metavar="NAMES",
+    help="Binaries for others too: linux64,win64,darwin64,aarch64-linux. They need ziglang.",
+)
+@click.option("--fmi", type=click.Choice(["2", "3"]), help="Of a native proxy. Default: 2")
 @click.option("--c-header", type=PATH, help="Write the peer's side as a C99 header.")
 @json_option
 def proxy(
@@ -47,6 +56,9 @@ def proxy(
     port: int,
     timeout: float,
     bind_python: str | None,
+    native: bool,
+    target: str | None,
+    fmi: str | None,
     c_header: Path | None,
     as_json: bool,
 ) -> int:
@@ -55,15 +67,17 @@ def proxy(
     It sends inputs and parameters in one UDP datagram per step and waits --timeout for the outputs.
     What happens without an answer is up to its parameters proxy.*, where --host, --port and
     --timeout are start values. The peer: grasp-cosim serve, or a bench with the header of
-    --c-header.
+    --c-header. With --native it is C, for hosts and machines without Python.
 
     \b
     Example: grasp-cosim proxy fmus/build/GripperPlant.fmu -o GripperPlantProxy.fmu --timeout 0.001
+    Native: grasp-cosim proxy vendor.fmu -o Bench.fmu --native --target linux64,win64
     """
     from grasp_fmus.c_header import c_header as header  # only here: they take time to load
-    from grasp_fmus.proxy_build import build_proxy
+    from grasp_fmus.native.compilers import CompilerError
 
     _check_paths(fmu, out, c_header)
+    _check_native(native, out, bind_python, {"--target": target, "--fmi": fmi})
     interface = read_interface(fmu)
     signature, notes = link_signature(interface)
     report: dict[str, object] = {"notes": notes}
@@ -71,7 +85,8 @@ def proxy(
     try:
         if out is not None:
             original = _original(interface, [v.name for v in signature.variables])
-            built = build_proxy(out, original, Settings(host, port, timeout), bind_python)
+            settings = Settings(host, port, timeout)
+            built = _built(out, original, settings, bind_python, _plan(native, target, fmi))
             lines += [f"{out}: {built.status}", *(f"    {change}" for change in built.changes)]
             report |= {"fmu": str(out), "status": built.status, "changes": list(built.changes)}
         if c_header is not None:
@@ -83,10 +98,53 @@ def proxy(
             report["c_header"] = str(c_header)
     except ValueError as error:
         raise InputError(f"proxy: {error}") from error
+    except CompilerError as error:
+        raise SimulationError(str(error)) from error
     for note in notes:
         say(note)
     show(as_json, report, "\n".join(lines))
     return 0
+
+
+def _check_native(
+    native: bool, out: Path | None, bind_python: str | None, only: Mapping[str, str | None]
+) -> None:
+    """InputError where options do not go together."""
+    for option, value in {**only, "--native": True if native else None}.items():
+        if value is None:
+            continue
+        if not native:
+            raise InputError(f"{option} {value}: must be with --native")
+        if out is None:
+            raise InputError(f"{option}: there is no FMU to make; must be with -o FILE.fmu")
+    if native and bind_python:
+        raise InputError("--bind-python: a native FMU needs no Python; must be without --native")
+
+
+def _plan(native: bool, target: str | None, fmi: str | None) -> "Plan | None":
+    """Which binaries a native proxy gets; None for one that Python runs."""
+    from grasp_fmus.native.build import planned
+    from grasp_fmus.native.targets import targets
+
+    if not native:
+        return None
+    plan = planned(targets(target.split(",")) if target is not None else (), 3 if fmi == "3" else 2)
+    if plan.note:
+        say(plan.note)
+    return plan
+
+
+def _built(
+    out: Path, original: "Original", settings: Settings, bind_python: str | None,
+    plan: "Plan | None",
+) -> "Built":  # fmt: skip
+    from grasp_fmus.native.proxy import build_native_proxy
+    from grasp_fmus.proxy_build import build_proxy
+
+    if plan is None:
+        return build_proxy(out, original, settings, bind_python)
+    announce(f"building for {', '.join(t.tuple for t in plan.places)}")
+    return build_native_proxy(out, original, plan, settings)
 
 
 def _check_paths(fmu: Path, out: Path | None, c_header: Path | None) -> None:

@@ -1,0 +1,118 @@
+"""Builds the native proxy of an FMU: what proxy_build builds, as C without Python."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from string import Template
+
+from ..c_header import wire
+from ..documentation import OURS, framed, licences
+from ..fmu import HASH, hashed, write_members
+from ..folder import Built
+from ..link.message import Codec
+from ..link.signature import Signature
+from ..model_description import version
+from ..proxy import DEFAULTS, Settings, bounded, shared_signature
+from ..proxy_build import Original, proxy_model
+from ..variable import Variable
+from .block_header import KINDS, VARIABLE
+from .build import Plan, with_binaries
+from .description import build_description, native_description
+from .members import ICONS
+from .names import real, string
+from .sources import proxy_sources
+from .targets import Version
+
+TEMPLATE = Path(__file__).with_name("native_proxy.html.in")
+
+_KINDS = {**KINDS, str: "KIND_STRING"}
+_WHOLE = (-(2.0**31), 2.0**31 - 1.0)
+"""What an Integer of the link holds."""
+
+
+def build_native_proxy(
+    target: Path, original: Original, plan: Plan, settings: Settings = DEFAULTS
+) -> Built:
+    """Build the native proxy of an FMU for the platforms of a plan.
+
+    ValueError as build_proxy; CompilerError where a compiler fails.
+    """
+    members = proxy_members(target, original, plan.fmi, settings)
+    ((_, complete),) = with_binaries({target.stem: members}, plan, networked=True)
+    return write_members(target, complete)
+
+
+def proxy_members(
+    target: Path, original: Original, fmi: Version, settings: Settings
+) -> dict[str, bytes]:
+    """Return its files but for the binaries, by name."""
+    model = proxy_model(target, original, settings)
+    description, name = model.description, model.description.name
+    signature = shared_signature(original.variables)
+    own = {
+        "wire.h": f"{_LICENCE}#ifndef WIRE_H\n#define WIRE_H\n\n{_INCLUDED}\n"
+        f"{wire('wire', signature)}\n#endif\n",
+        "variables.h": _table(signature, description.variables),
+    }
+    _, files = hashed(
+        {
+            "modelDescription.xml": native_description(description, HASH, fmi),
+            "sources/buildDescription.xml": build_description(name, fmi, networked=True),
+            **{
+                f"sources/{file}": data
+                for file, data in proxy_sources(name, original.file, own, HASH, fmi).items()
+            },
+        }
+    )
+    sections = Template(TEMPLATE.read_text("utf-8")).substitute(
+        name=name, fmi=fmi, override=f"FMI{fmi}_OVERRIDE_FUNCTION_PREFIX"
+    )
+    page = framed(name, description.summary, model.card, version(), f"{fmi}.0", sections)
+    return {
+        **files,
+        **({ICONS[fmi]: model.picture} if model.picture else {}),
+        "documentation/index.html": page.encode(),
+        **{f"documentation/licenses/{file}": text for file, text in licences(OURS).items()},
+    }
+
+
+_LICENCE = "/* What a proxy and its peer say to each other, in bytes: README.md of the link. */\n"
+_INCLUDED = "".join(
+    f"#include <{header}.h>\n" for header in ("stdbool", "stddef", "stdint", "string")
+)
+
+
+def _table(signature: Signature, variables: Sequence[Variable]) -> str:
+    """Return variables.h: all variables, and the texts that Strings begin with."""
+    texts: list[str] = []
+    rows = []
+    for v in bounded(variables, len(signature.variables)):
+        start: float = 0.0
+        low, high = v.limits or (_WHOLE if v.kind is int else (0.0, 0.0))
+        if v.kind is str:
+            start = len(texts)
+            texts.append(string(str(v.start or "")))
+        elif v.start is not None:
+            start = float(v.start)
+        fixed = int(v.variability == "fixed")
+        numbers = ", ".join(real(float(x)) for x in (low, high, start))
+        rows.append(
+            f"    {{{string(v.name)}, {string(v.in_unit)}, {_KINDS[v.kind]}, "
+            f"{v.causality.upper()}, {fixed},\n"
+            f"     {int(v.limits is not None or v.kind is int)}, {numbers}}},\n"
+        )
+    defined = {
+        "N_REQUEST": len(signature.request),
+        "N_ANSWER": len(signature.answer),
+        "REQUEST_SIZE": Codec(signature.request).size,
+        "ANSWER_SIZE": Codec(signature.answer).size,
+        "N_VARIABLES": len(rows),
+        "N_TEXTS": len(texts),
+    }
+    return (
+        "/* The variables of a proxy, in the order of their value references. */\n"
+        + "".join(f"#define {name} {value}\n" for name, value in defined.items())
+        + f"{VARIABLE}static const Variable variables[N_VARIABLES] = {{\n{''.join(rows)}}};\n\n"
+        + "static const char *const texts[N_TEXTS + 1] = {\n"
+        + "".join(f"    {text},\n" for text in texts)
+        + '    ""};\n'
+    )

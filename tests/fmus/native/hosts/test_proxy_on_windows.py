@@ -1,0 +1,69 @@
+"""A native proxy on Windows, under wine, in a host in C, with `serve` on the loopback."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from grasp_cosim.hil.served import Service
+from grasp_fmus.native.targets import WINDOWS, Target
+from support.c_host import Host, Script, bits, number, unpacked
+from support.compilers import needs_zig
+from support.fmi2 import Fmu, Instance
+from support.platforms import needs_programs
+from support.proxies import build_proxy, serving
+
+pytestmark = [pytest.mark.slow, needs_programs("wine"), needs_zig]
+
+STEPS, H = 50, 1e-3
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_steps_on_windows(
+    fmus: Path, host_for: Callable[[Target], Host], tmp_path: Path, fmi: int
+) -> None:
+    """To the bit what the FMU gives here; then the peer is gone, and the outputs go to failsafe."""
+    original = fmus / "ProximitySensor.fmu"
+    script = Script()
+    with serving(original, Service(lockstep=True)) as server:
+        options = ["--native", "--target", "win64", "--fmi", str(fmi)]
+        path = build_proxy(original, tmp_path / "Bench.fmu", server.address[1], *options)
+        fmu = unpacked(path, tmp_path / "unpacked")
+        place = "win64" if fmi == 2 else WINDOWS.tuple
+        gap, intensity = fmu.reference("gap"), fmu.reference("intensity")
+        script.add("load", 0, fmi, f"Z:{fmu.binary(place)}")
+        script.add("new", 0, 0, "full", "bench", fmu.token, None)
+        script.add("init", 0, bits(0.0)).add("leave", 0)
+        for k in range(STEPS):
+            script.add("set", 0, "real", gap, bits(0.01 + 1e-4 * k))
+            script.add("step", 0, bits(k * H), bits(H))
+            script.add("get", 0, "real", intensity)
+        script.add("terminate", 0).add("free", 0)
+        (answers,) = host_for(WINDOWS).run(script, folder=tmp_path)
+        counters = server.fmu.counters()
+    assert [a for a in answers if a.status] == []
+    assert (counters["steps"], counters["sessions"]) == (STEPS, 1)
+    found = [number(a.found[0]) for a in answers if a.command == "get"]
+    with Instance(Fmu(original, tmp_path / "here")) as instance:
+        instance.initialise()
+        for k in range(STEPS):
+            instance.set({"gap": 0.01 + 1e-4 * k})
+            instance.step(k * H, H)
+            assert instance.get("intensity") == [found[k]]
+
+
+def test_a_peer_that_is_gone(
+    fmus: Path, host_for: Callable[[Target], Host], tmp_path: Path
+) -> None:
+    original = fmus / "ProximitySensor.fmu"
+    with serving(original, Service(lockstep=True)) as server:
+        port = server.address[1]
+    options = ["--native", "--target", "win64"]
+    fmu = unpacked(build_proxy(original, tmp_path / "B.fmu", port, *options), tmp_path / "u")
+    script = Script().add("load", 0, 2, f"Z:{fmu.binary('win64')}")
+    script.add("new", 0, 0, "full", "bench", fmu.token, None)
+    script.add("set", 0, "real", fmu.reference("proxy.connect_timeout"), bits(0.2))
+    script.add("init", 0, bits(0.0)).add("free", 0)
+    (answers,) = host_for(WINDOWS).run(script, folder=tmp_path)
+    assert [a.status for a in answers] == [0, 0, 0, 3, 0]
+    ((_, _, _, said),) = answers[3].said
+    assert f"no answer from 127.0.0.1:{port} within 0.2 s: is the peer running there" in said

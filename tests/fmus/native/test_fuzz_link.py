@@ -1,0 +1,116 @@
+"""libFuzzer on the C of both sides of the link, with the sanitisers, from inputs that make sense.
+
+FUZZ_SECONDS=600 has it go on for that long, on each side.
+"""
+
+import os
+import shutil
+import struct
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from grasp_fmus.c_header import c_header
+from grasp_fmus.link.message import HELLO, INITIALISE, STEP
+from grasp_fmus.link.signature import Causality, Kind, LinkVariable, Signature
+from grasp_fmus.model_description import Experiment
+from grasp_fmus.native.proxy import proxy_members
+from grasp_fmus.proxy import DEFAULTS
+from grasp_fmus.proxy_build import Original
+from support.scripted_peer import SIGNATURE, VARIABLES
+
+FUZZ = Path(__file__).parent / "fuzz"
+SECONDS = os.environ.get("FUZZ_SECONDS", "15")
+FLAGS = [
+    "-std=c99",
+    "-g",
+    "-O1",
+    "-fsanitize=fuzzer,address,undefined",
+    "-fno-sanitize-recover=all",
+]
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not shutil.which("clang"), reason="NO clang"),
+]
+
+KINDS: tuple[Kind, ...] = ("Real", "Integer", "Boolean", "String")
+CAUSALITIES: tuple[tuple[Causality, str], ...] = (
+    ("input", "u"),
+    ("parameter", "p"),
+    ("output", "y"),
+)
+EVERY_KIND = Signature(
+    tuple(LinkVariable(f"{n}.{k.lower()}", k, c) for c, n in CAUSALITIES for k in KINDS)
+)
+
+
+def fuzzer(folder: Path, source: Path) -> Path:
+    program = folder / source.stem
+    command = ["clang", *FLAGS, "-I", folder, source, "-o", program, "-lm", "-lpthread", "-ldl"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    return program
+
+
+def fuzzed(program: Path, seeds: Iterator[bytes]) -> None:
+    """Nothing is found, and no more memory needed, in the time that there is."""
+    corpus, found = program.parent / "corpus", program.parent / "found"
+    for folder in (corpus, found):
+        folder.mkdir()
+    for i, seed in enumerate(seeds):
+        (corpus / f"{i}").write_bytes(seed)
+    options = [f"-max_total_time={SECONDS}", "-seed=1", "-rss_limit_mb=600", "-max_len=6000"]
+    command = [program, *options, f"-artifact_prefix={found}/", "-print_final_stats=1", corpus]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[-3000:]
+    assert not [*found.iterdir()]
+    runs = next(line for line in done.stderr.splitlines() if "number_of_executed_units" in line)
+    assert int(runs.split()[-1]) > 1000
+
+
+def sized(data: bytes) -> bytes:
+    return struct.pack("<H", len(data)) + data
+
+
+def test_a_proxy_whatever_its_peer_sends(tmp_path: Path) -> None:
+    original = Original("Original.fmu", VARIABLES, {}, Experiment(), True)
+    for file, data in proxy_members(tmp_path / "AnyProxy.fmu", original, 2, DEFAULTS).items():
+        if file.startswith("sources/"):
+            (tmp_path / file.removeprefix("sources/")).write_bytes(data)
+
+    def seeds() -> Iterator[bytes]:
+        """Sessions that begin, and go on with answers, refusals, silence and other things."""
+        welcome, outputs, silence = b"\x48\0\0\0", b"\x0a\0\0\0", b"\x10"
+        for settings in range(32):
+            begun = bytes([settings]) + silence + welcome + silence + outputs
+            yield begun + (silence + outputs) * 12
+            yield begun + (silence + outputs) * 2 + silence * 40
+            for code in range(1, 5):
+                refusal = bytes([code << 3 | 4]) + sized(SIGNATURE.text.encode()) + b"\0"
+                yield begun + silence + refusal + (silence + welcome + silence + outputs) * 4
+            yield bytes([settings]) + (silence + b"\x03" + sized(bytes(90))) * 4
+
+    fuzzed(fuzzer(tmp_path, FUZZ / "proxy.c"), seeds())
+
+
+def test_a_peer_whatever_proxies_send(tmp_path: Path) -> None:
+    (tmp_path / "every_kind.h").write_text(c_header("EveryKind", EVERY_KIND), "ascii")
+
+    def datagram(kind: int, body: bytes, step: float = 0.0) -> bytes:
+        head = struct.pack("<4sHBB16sQQQddqII", b"GRSP", 1, kind, 0, EVERY_KIND.hash, 7, 0,
+                           int(kind != HELLO), 0.0, step, 0, len(body), 0)  # fmt: skip
+        return head + body
+
+    def seeds() -> Iterator[bytes]:
+        values = bytes(2 * (3 * 8 + 128))
+        for settings in (0, 1):
+            tag = bytes(32 * settings)
+            hello = b"\x0b" + sized(datagram(HELLO, EVERY_KIND.text.encode()) + tag)
+            begin = b"\x03" + sized(datagram(INITIALISE, values) + tag)
+            step = b"\x27" + sized(datagram(STEP, values, 0.1) + tag)
+            yield bytes([settings]) + hello + begin + step * 5
+            yield bytes([settings]) + hello + begin + step + b"\x83" + hello[1:] + begin + step
+
+    fuzzed(fuzzer(tmp_path, FUZZ / "peer.c"), seeds())

@@ -1,0 +1,121 @@
+"""A native proxy beside one that Python runs: the same datagrams; its sources; its description."""
+
+import shutil
+import subprocess
+from pathlib import Path
+from random import Random
+
+import pytest
+from grasp_fmus import connection
+from grasp_fmus.link.message import END, HELLO, INITIALISE, STEP
+from grasp_fmus.model_description import Experiment
+from grasp_fmus.native.proxy import proxy_members
+from grasp_fmus.native.targets import Version
+from grasp_fmus.proxy import DEFAULTS
+from grasp_fmus.proxy_build import Original
+from support import scripted_peer
+from support.kinds import Kind
+from support.native_proxies import STRICT
+from support.scripted_peer import (
+    VARIABLES,
+    Host,
+    ScriptedPeer,
+    answer,
+    fail,
+    forget,
+    keep,
+    miss,
+    send_kept_and_miss,
+)
+from support.slow import slow
+
+ACTS = (answer, answer, answer, miss, keep, send_kept_and_miss, forget, fail)
+KEY = b"sixteen bytes of key, and some more"
+
+
+def exchanged(kind: Kind, seed: int, key: Path | None, patch: pytest.MonkeyPatch) -> list[bytes]:
+    """All that a proxy sends in a life of many kinds of answers."""
+    patch.setattr(scripted_peer, "KIND", kind)
+    random = Random(seed)
+    with ScriptedPeer(key=key.read_bytes() if key else None) as peer:
+        peer.told(HELLO, miss)
+        host = Host(
+            peer.port, peer.clock, resume=True, misses_tolerated=2, connect_timeout=3600.0,
+            key_file=str(key or ""),
+        )  # fmt: skip
+        host.initialise()
+        for _ in range(60):
+            host.set(
+                force=random.gauss(0.0, 1e3), mode=random.randrange(-(2**31), 2**31),
+                armed=random.random() < 0.5, label=random.choice(["", "Größe", "x" * 127]),
+                gain=random.uniform(0.5, 2.0),
+            )  # fmt: skip
+            peer.told(STEP, random.choice(ACTS))
+            host.step(random.uniform(1e-6, 1.0))
+            peer.clock.now += random.randrange(10**9)
+        host.slave.terminate()
+    return peer.datagrams
+
+
+@pytest.mark.parametrize("with_key", [False, True])
+@pytest.mark.parametrize(
+    ("kind", "seed"), [("native", 1), *(slow("native", s) for s in range(2, 30))]
+)
+def test_the_same_datagrams_to_the_byte(
+    kind: Kind, seed: int, with_key: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    key = tmp_path / "key" if with_key else None
+    if key:
+        key.write_bytes(KEY)
+        key.chmod(0o600)
+    theirs = exchanged(kind, seed, key, monkeypatch)
+    sessions = dict.fromkeys(int.from_bytes(d[24:32], "little") for d in theirs)
+    assert {d[6] for d in theirs} == {HELLO, INITIALISE, STEP, END}
+    drawn = iter(sessions)
+    monkeypatch.setattr(connection, "randbits", lambda bits: next(drawn))
+    assert exchanged("python", seed, key, monkeypatch) == theirs
+
+
+def write_sources(folder: Path, fmi: Version) -> None:
+    original = Original('An "original".fmu', VARIABLES, {}, Experiment(), True)
+    for file, data in proxy_members(Path("AnyProxy.fmu"), original, fmi, DEFAULTS).items():
+        if file.startswith("sources/"):
+            (folder / file.removeprefix("sources/")).write_bytes(data)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("level", ["-O0", "-O3"])
+@pytest.mark.parametrize(
+    ("compiler", "libraries"),
+    [("gcc", ""), ("clang", ""), ("x86_64-w64-mingw32-gcc", "-lws2_32")],
+)
+def test_the_sources_compile_without_a_warning(
+    tmp_path: Path, compiler: str, libraries: str, level: str, fmi: Version
+) -> None:
+    if not shutil.which(compiler):
+        pytest.skip(f"NO {compiler}")
+    write_sources(tmp_path, fmi)
+    command = [
+        compiler, "-std=c99", level, *STRICT, f"-DFMI{fmi}_OVERRIDE_FUNCTION_PREFIX", "-shared",
+        "-fPIC", "-o", "proxy.so", "AnyProxy.c", "-lm", *libraries.split(),
+    ]  # fmt: skip
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not shutil.which("gcc"), reason="NO gcc")
+def test_two_of_them_link_into_one_program(tmp_path: Path) -> None:
+    """All but the functions of FMI is static, and those have the name of the FMU before them."""
+    write_sources(tmp_path, 2)
+    text = (tmp_path / "AnyProxy.c").read_text()
+    (tmp_path / "Other.c").write_text(text.replace("AnyProxy", "Other"))
+    main = "extern int AnyProxy_fmi2Reset(void*), Other_fmi2Reset(void*);\n"
+    main += "int main(void) { return AnyProxy_fmi2Reset(0) + Other_fmi2Reset(0); }\n"
+    (tmp_path / "main.c").write_text(main)
+    files = ["AnyProxy.c", "Other.c", "main.c"]
+    command = ["gcc", "-std=c99", *files, "-o", "both", "-lm", "-lpthread", "-ldl"]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    done = subprocess.run([tmp_path / "both"])
+    assert done.returncode == 6

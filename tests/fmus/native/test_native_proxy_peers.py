@@ -1,0 +1,98 @@
+"""A native proxy with the peer in C, with a key or without: the same values, to the bit."""
+
+import shutil
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from grasp_cosim import System, cli, simulate
+from grasp_cosim.hil.served import Service
+from grasp_cosim.interface.interface import Value
+from support.proxies import build_proxy, serving
+from support.slow import slow
+
+KEY = b"sixteen bytes of key, and some more"
+STEP, STOP = 4e-3, 2.0
+
+pytestmark = pytest.mark.skipif(not shutil.which("gcc"), reason="NO gcc")
+
+
+@pytest.fixture(scope="module")
+def target(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The controller on a target, as docs/handoff.md makes it."""
+    folder = tmp_path_factory.mktemp("target")
+    assert cli.main(["build", "--native", "--c-only", str(folder), "GraspController"]) == 0
+    header = ["--c-header", str(folder / "grasp_controller.h")]
+    assert cli.main(["proxy", str(fmus / "GraspController.fmu"), *header]) == 0
+    source = Path(__file__).parents[3] / "docs/controller_target.c"
+    program = folder / "controller_target"
+    files = [str(source), str(folder / "GraspController.c")]
+    flags = ["-std=c99", "-O2", "-ffp-contract=off", "-I", str(folder)]
+    subprocess.run(["gcc", *flags, *files, "-o", str(program), "-lm"], check=True)
+    return program
+
+
+@contextmanager
+def running(target: Path, key: Path | None) -> Iterator[int]:
+    """The target, until the end; its port."""
+    words = [str(key)] if key else []
+    with subprocess.Popen([target, "0", *words], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        try:
+            yield int(process.stdout.readline().split()[-1])
+        finally:
+            process.kill()
+
+
+@pytest.mark.parametrize("scheme", [slow("sequential"), "jacobi"])
+@pytest.mark.parametrize("with_key", [slow(False), True])
+def test_with_the_peer_in_c(
+    grasp: System, target: Path, tmp_path: Path, with_key: bool, scheme: str
+) -> None:
+    key = tmp_path / "key" if with_key else None
+    values: dict[str, Value] = {"controller.proxy.key_file": str(key or "")}
+    if key:
+        key.write_bytes(KEY)
+        key.chmod(0o600)
+    system = grasp.with_experiment(step=STEP, stop=STOP, scheme=scheme)
+    fmu = system.component("controller", "test").fmu
+    with running(target, key) as port:
+        proxy = build_proxy(fmu, tmp_path / "Bench.fmu", port, "--native")
+        there = simulate(system.swap("controller", proxy).with_values(values))
+    direct = simulate(system)
+    for signal, column in direct.items():
+        np.testing.assert_array_equal(column, there[signal], signal)
+    assert not there["controller.proxy.missed"].any()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("ours", "theirs"), [(KEY, KEY), (KEY, None), (None, KEY), (KEY, b"another key of 24 bytes.")]
+)
+def test_keys_of_both_sides(
+    grasp: System, tmp_path: Path, ours: bytes | None, theirs: bytes | None
+) -> None:
+    """Only with the same key is there an answer."""
+    system = grasp.with_experiment(step=STEP, stop=0.1)
+    fmu = system.component("plant", "test").fmu
+    key = tmp_path / "key"
+    key.write_bytes(ours or b"")
+    key.chmod(0o600)
+    values: dict[str, Value] = {
+        "plant.proxy.key_file": str(key) if ours else "", "plant.proxy.connect_timeout": 0.3,
+    }  # fmt: skip
+    with serving(fmu, Service(lockstep=True, key=theirs)) as server:
+        proxy = build_proxy(fmu, tmp_path / "Bench.fmu", server.address[1], "--native")
+        there = system.swap("plant", proxy).with_values(values)
+        if ours == theirs:
+            assert simulate(there, engine="python").complete  # the server is a thread of ours
+            return
+        with pytest.raises(Exception, match="no answer from") as error:
+            simulate(there)
+        assert f"has it {'the same' if ours else 'no'} key" in str(error.value)
+        counters = server.fmu.counters()
+    assert counters["forged" if theirs else "malformed"] > 0
+    assert counters["steps"] == 0
