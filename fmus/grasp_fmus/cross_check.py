@@ -110,7 +110,7 @@ def _push(t: float, stop: float) -> float:
 
 def _light(reflectance: float, gap: float) -> float:
     """Return the intensity in V that a sensor has over a gap in m."""
-    return reflectance * 0.0024 / (0.005 + gap) ** 1.1506
+    return reflectance * 0.0024 / math.pow(0.005 + gap, 1.1506)
 
 
 APPROACH: dict[str, Signal] = {
