@@ -387,7 +387,7 @@ PAGES: Mapping[str, Callable[[Sequence[Runs], Path], None]] = {
 }
 
 
-BLOCKS = ("spring_plant.py", "quotient_controller.py")
+BLOCKS = ("spring_plant.py", "quotient_controller.py", "moving_object.py")
 """What the pages build before they run it."""
 
 

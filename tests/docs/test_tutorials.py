@@ -17,6 +17,7 @@ from grasp_controller import series
 from grasp_controller.impact_reduction import Params as Layer2
 from grasp_controller.simultaneous_contact import Params as Layer3
 from grasp_cosim import System, cli
+from gripper_plant.friction import Params as Friction
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -122,9 +123,11 @@ def test_the_switch_in_a_system_file_makes_case_1(checkout: Path, grasp: System)
 @pytest.mark.slow
 def test_colour(checkout: Path) -> None:
     """The studies' own limits are kept, as they end with exit code 0; and what the words say."""
-    (laws, others, free, drift, _, sensors, stripes, saturated, near, dark, friction), _ = checked(
-        "colour", checkout
-    )
+    assert cli.main(["build", "docs/moving_object.py"]) == 0
+    tables, _ = checked("colour", checkout)
+    laws, others, free, drift, _, sensors, stripes, saturated, near, dark, *last = tables
+    friction, moving = last
+    assert_moving(moving)
     apart = said("colour", r"is there ([\d.]+) s before the other")
     assert apart == [round(laws["published"].metrics["time_difference"], 2)]
     for ratio in ("0.3", "0.86", "1", "1.2"):
@@ -154,6 +157,39 @@ def test_colour(checkout: Path) -> None:
     assert dark["0.1"].metrics["time_difference"] < 0.03 < dark["0.05"].metrics["time_difference"]
     alike = [friction[f].metrics["time_difference"] for f in list(friction)[1::2]]
     assert alike[0] == pytest.approx(alike[1], abs=0.01)
+
+
+def assert_moving(moving: Any) -> None:
+    """Half the speed that is given keeps the fingers within 0.1 s; equal faces do not help."""
+    apart = [run.metrics["time_difference"] for run in moving.values()]
+    assert [1e3 * float(speed) for speed in list(moving)[:2]] == [0.5, 1.0]
+    assert said("colour", r"From about (\d+) mm/s on the fingers are more than 0.1") == [1.0]
+    assert apart[0] < 0.1 < apart[1] < apart[2]
+    adaptive, published = apart[-2:]
+    assert published < 0.1 < adaptive
+
+
+def test_an_object_that_moves_is_a_fixed_one_seen_from_it() -> None:
+    """Fingers that are pushed evenly, m·x'' = u, until the right one is stopped by the object."""
+    block = runpy.run_path(str(DOCS / "moving_object.py"))
+    p = block["Params"](initial_object_position=0.0, object_velocity=0.05)
+    u = block["Inputs"]((-0.5, 0.25))
+    x = block["initial_state"](p, u)
+    for _ in range(20):
+        x = block["step"](p, x, u, 0.01)
+    y = block["outputs"](p, x, u)
+    assert y.position == pytest.approx((0.11 - 0.5 * 0.2**2, -0.11 + 0.25 * 0.2**2), abs=1e-12)
+    assert y.velocity == pytest.approx((-0.2, 0.1), abs=1e-12)
+    assert y.object_position == pytest.approx(0.01, abs=1e-12)
+    assert y.gap == pytest.approx((0.045, 0.075), abs=1e-12)
+    for _ in range(200):
+        x = block["step"](p, x, u, 0.01)
+    y = block["outputs"](p, x, u)
+    assert y.contact[0]
+    assert y.velocity[0] == pytest.approx(0.05, abs=1e-6)
+    assert y.position[0] == pytest.approx(y.object_position + 0.035, abs=1e-4)
+    with pytest.raises(ValueError, match="friction: must be 0"):
+        block["Params"](friction=Friction(coulomb=(1.0, 0.0)))
 
 
 @pytest.mark.slow
