@@ -183,8 +183,8 @@ def test_no_such_study_names_the_built_in_ones(capsys: pytest.CaptureFixture[str
     assert code == 2
     assert capsys.readouterr().err == (
         "grasp-cosim: map: no such study; must be a .toml file or bench_monte_carlo, colour_bench, "
-        "colour_equal, colour_exponent, colour_free, colour_ideal, colour_light, colour_map, "
-        "colour_map_free, colour_monte_carlo, grasp_sensitivity, reflectance_map\n"
+        "colour_drift, colour_equal, colour_exponent, colour_free, colour_ideal, colour_map, "
+        "colour_map_free, colour_monte_carlo, colour_offset, grasp_sensitivity, reflectance_map\n"
     )
 
 

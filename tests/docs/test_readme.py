@@ -19,6 +19,9 @@ PAGES = f"{README}\n{GUIDE}"
 COMMANDS = sorted(
     set(re.findall(r"^    \.venv/bin/(grasp-cosim .*?)(?:\s+#.*)?$", PAGES, re.MULTILINE))
 )
+LONG = ("--step-study", "--fmi 3", "--controller")
+"""In the commands that take more than a moment."""
+
 METRICS, *EXAMPLES = re.findall(r"```python\n(.*?)```", PAGES, re.DOTALL)
 OUTPUTS = re.findall(r"```\n(\d+ steps of .*?)```", README, re.DOTALL)
 TABLES = re.findall(r"```toml\n(.*?)```", PAGES, re.DOTALL)
@@ -53,12 +56,12 @@ def user(checkout: Path, grasp: System, recorded: Path) -> Path:
 
 
 def test_there_is_something_to_try() -> None:
-    assert len(COMMANDS) == 23
+    assert len(COMMANDS) == 24
     assert len(EXAMPLES) == 1
 
 
 @pytest.mark.parametrize(
-    "command", [slow(c) if "--step-study" in c or "--fmi 3" in c else c for c in COMMANDS]
+    "command", [slow(c) if any(word in c for word in LONG) else c for c in COMMANDS]
 )
 def test_command(user: Path, command: str) -> None:
     arguments = shlex.split(command)
