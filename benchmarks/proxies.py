@@ -3,9 +3,9 @@
 Prints the cost of a step of the grasp with its plant here and behind a proxy (lockstep, loopback, a
 peer in a process of its own); the same with native FMUs, the controller behind a native proxy, and
 its peer in C, then paced at 1 kHz with priority, where the system permits; and for 200 peers killed
-at seeded moments, of either kind of proxy, the time until the outputs were at their failsafe values,
-beside what is declared: proxy.timeout for each miss that is tolerated, and one step, which waits as
-long.
+at seeded moments, for either kind of proxy, the time until the outputs were at their failsafe
+values, beside what is declared: proxy.timeout for each miss that is tolerated, and one step, which
+waits as long.
 """
 
 import os
