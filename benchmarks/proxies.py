@@ -1,21 +1,28 @@
-"""What a proxy costs, and how soon it notices that its peer is gone.
+"""What a proxy costs, how evenly it answers, and how soon it notices that its peer is gone.
 
 Prints the cost of a step of the grasp with its plant here and behind a proxy (lockstep, loopback, a
-peer in a process of its own), and for 200 peers killed at seeded moments the time until the outputs
-were at their failsafe values, beside what is declared: proxy.timeout for each miss that is
-tolerated, and one step, which waits as long.
+peer in a process of its own); the same with native FMUs, the controller behind a native proxy, and
+its peer in C, then paced at 1 kHz with priority, where the system permits; and for 200 peers killed
+at seeded moments, for either kind of proxy, the time until the outputs were at their failsafe
+values, beside what is declared: proxy.timeout for each miss that is tolerated, and one step, which
+waits as long.
 """
 
+import os
 import random
+import subprocess
 import sys
 import tempfile
 import time
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 from grasp_cosim import System, cli, simulate
+from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.grasp.system import grasp_system
 from grasp_cosim.interface.interface import Value
+from grasp_cosim.realtime.options import Realtime
 
 from benchmarks.harness import Program, by_turns, spread
 
@@ -23,6 +30,8 @@ STEPS = 2000
 ROUNDS = 5
 KILLS = 200
 TOLERATED, TIMEOUT = 3, 0.02
+PRIORITY = 80
+TARGET = Path(__file__).parent.parent / "docs/controller_target.c"
 PEERS = Path(__file__).parent.parent / "tests/hil/peers.py"
 
 
@@ -34,36 +43,70 @@ def peers(system: System, name: str) -> Program:
     return Program(sys.executable, str(PEERS), str(system.component(name, name).fmu))
 
 
-def proxied(system: System, name: str, folder: Path) -> System:
+def proxied(system: System, name: str, folder: Path, *options: str) -> System:
     """The system with a component behind a proxy."""
     fmu, proxy = system.component(name, name).fmu, folder / f"{name}_proxy.fmu"
-    if cli.main(["proxy", str(fmu), "-o", str(proxy)]):
+    if cli.main(["proxy", str(fmu), "-o", str(proxy), *options]):
         raise RuntimeError(f"{fmu}: no proxy")
     return system.swap(name, proxy).with_values(
         {f"{name}.proxy.timeout": 10.0, f"{name}.proxy.misses_tolerated": TOLERATED}
     )
 
 
-def cost(system: System, folder: Path) -> None:
-    """Print what a step costs with the plant here and there."""
+def compare(direct: System, there: System, where: str) -> None:
+    """Print what a step costs with a component here and there."""
 
     def run(system: System) -> float:
         return 1e6 * (simulate(system, step=1e-3, stop=STEPS * 1e-3).wall_time or 0.0) / STEPS
 
+    found = by_turns({"direct": lambda: run(direct), "behind a proxy": lambda: run(there)}, ROUNDS)
+    for name, times in found.items():
+        best, median, _ = spread(times)
+        print(f"macro step, {where} {name}: {best:.1f} us best, {median:.1f}")
+
+
+def cost(system: System, folder: Path) -> None:
+    """Print what a step costs in Python with the plant here and there."""
     with peers(system, "plant") as program:
         port = int(program.ask("start").split()[1])
         there = proxied(system, "plant", folder).with_values({"plant.proxy.port": port})
-        found = by_turns(
-            {"direct": lambda: run(system), "behind a proxy": lambda: run(there)}, ROUNDS
-        )
-    for name, times in found.items():
-        best, median, _ = spread(times)
-        print(f"macro step, plant {name}: {best:.1f} us best, {median:.1f}")
+        compare(system, there, "plant")
 
 
-def kills(system: System, folder: Path) -> None:
+def native_cost(folder: Path) -> None:
+    """Print the same in C, with the controller there, and how even the steps are at 1 kHz."""
+    fmus, code, target = folder / "native", folder / "c", folder / "target"
+    original = fmus / "GraspController.fmu"
+    made = [
+        cli.main(["build", "--native", "--out", str(fmus)]),
+        cli.main(["build", "--native", "--c-only", str(code), "GraspController"]),
+        cli.main(["proxy", str(original), "--c-header", str(code / "grasp_controller.h")]),
+    ]
+    sources = [str(TARGET), str(code / "GraspController.c")]
+    flags = ["-std=c99", "-O2", "-ffp-contract=off", "-I", str(code)]
+    command = ["cc", *flags, *sources, "-o", str(target), "-lm"]
+    subprocess.run(command, check=not any(made))
+    system = System.load(SYSTEM, fmus)
+    there = proxied(system, "controller", folder, "--native")
+    with subprocess.Popen([target, "0"], stdout=subprocess.PIPE, text=True) as process:
+        port = int((process.stdout or sys.stdin).readline().split()[-1])
+        there = there.with_values({"controller.proxy.port": port})
+        compare(system, there, "controller, all native,")
+        with suppress(OSError):  # both on one processor: a call to another one takes its time
+            os.sched_setaffinity(process.pid, {0})
+            os.sched_setscheduler(process.pid, os.SCHED_FIFO, os.sched_param(PRIORITY + 5))
+        paced = Realtime(priority=PRIORITY, cpu=0, lock_memory=True)
+        result = simulate(there, step=1e-3, stop=20.0, realtime=paced)
+        process.kill()
+    trips = sorted(result["controller.proxy.round_trip_time"][1:])
+    worst = {f"p{p:g}": 1e6 * trips[int(p / 100 * len(trips))] for p in (50, 99, 99.9)}
+    said = ", ".join(f"{name} {us:.0f} us" for name, us in worst.items())
+    print(f"round trip at 1 kHz: {said}, worst {1e6 * trips[-1]:.0f} us")
+
+
+def kills(system: System, folder: Path, *options: str) -> None:
     """Print how long it takes from the death of the peer to the failsafe values."""
-    whole = proxied(system, "controller", folder).with_experiment(step=1e-3, stop=0.5)
+    whole = proxied(system, "controller", folder, *options).with_experiment(step=1e-3, stop=0.5)
     part = whole.component("controller", "controller")
     values: dict[str, Value] = {
         v.name: 0.1 * (-1) ** i for i, v in enumerate(part.interface.of("input"))
@@ -88,7 +131,7 @@ def kills(system: System, folder: Path) -> None:
     declared = TIMEOUT * TOLERATED + TIMEOUT
     _, median, worst = spread(took)
     print(
-        f"{KILLS} peers killed: failsafe after {median:.1f} ms (median), "
+        f"{KILLS} peers killed {' '.join(options)}: failsafe after {median:.1f} ms (median), "
         f"{worst:.1f} ms (worst), declared {1e3 * declared:.0f} ms: "
         f"{TOLERATED} misses of {1e3 * TIMEOUT:.0f} ms and a step that waits as long, beside what "
         "the steps compute"
@@ -96,11 +139,13 @@ def kills(system: System, folder: Path) -> None:
 
 
 def main() -> None:
-    """Both, in a folder of their own."""
+    """All of it, in a folder of its own."""
     system = grasp_system()
     with tempfile.TemporaryDirectory() as folder:
         cost(system, Path(folder))
+        native_cost(Path(folder))
         kills(system, Path(folder))
+        kills(system, Path(folder), "--native")
 
 
 if __name__ == "__main__":

@@ -26,7 +26,7 @@ _BOUND = """Nothing where there is <code>$library</code>, to which this FMU is b
 along, and knows where its standard library is. On another machine build it there."""
 """The needs of a host on Linux, for an FMU bound to a libpython and for any other."""
 
-_NATIVE = "The native FMU of it, from <code>grasp-cosim build --native</code>, needs no Python."
+_NATIVE = "The native FMU of it, from <code>grasp-cosim $command --native</code>, needs no Python."
 
 
 class Making(NamedTuple):
@@ -73,7 +73,7 @@ def page(
             library=escape(str(library)), command=making.command
         ),
         packages=_packages(requires),
-        native="" if requires or making != BLOCK else _NATIVE,
+        native="" if requires else Template(_NATIVE).substitute(command=making.command),
         steps=making.steps,
         states=making.states,
     )

@@ -114,9 +114,9 @@ class Caller:
         if not self._is_proxy:
             return
         assert instance.set(dict.fromkeys(WAITS, 0.1)) == OK
-        choice = c_char_p(self.random.choice((b"stop", b"hold", b"failsafe")))
-        reference = c_uint(self.fmu.references["proxy.on_loss"])
-        assert instance.call("SetString", byref(reference), c_size_t(1), byref(choice)) == OK
+        choice = (c_char_p * 1)(self.random.choice((b"stop", b"hold", b"failsafe")))
+        reference = (c_uint * 1)(self.fmu.references["proxy.on_loss"])
+        assert instance.call("SetString", reference, c_size_t(1), choice) == OK
 
     def _call(self, name: str, *arguments: Any, on: Instance | None = None) -> int:
         self._last.seek(0)

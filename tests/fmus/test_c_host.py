@@ -254,6 +254,7 @@ def native_proxy(folder: Path) -> Iterator[tuple[Fmu, ScriptedPeer]]:
         yield Fmu(path, folder / "unpacked"), peer
 
 
+@pytest.mark.slow
 def test_a_native_proxy_runs_in_c(host: Path, tmp_path: Path) -> None:
     """Until the host asks for a state; the end is said all the same."""
     with native_proxy(tmp_path) as (fmu, peer):

@@ -142,7 +142,7 @@ def test_a_section_says_what_a_user_must_know(html: str, name: str, title: str) 
 def test_the_way_out_of_python_is_named_where_there_is_one() -> None:
     assert "grasp-cosim build --native" in page("Name", "Summary", "", "1.2.3")
     assert "--native" not in page("Name", "Summary", "", "1.2.3", requires=["mujoco"])
-    assert "--native" not in page("Name", "Summary", "", "1.2.3", making=PROXY)
+    assert "grasp-cosim proxy --native" in page("Name", "Summary", "", "1.2.3", making=PROXY)
 
 
 def test_the_sections_follow_the_card(html: str) -> None:

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 from conftest import Folder
 from grasp_cosim.hil.served import Service
-from support.kinds import Kind, all_kinds
+from support.kinds import Kind, all_kinds, native_slowly, proxy_options
 from support.packages import runnable
 from support.proxies import build_proxy, serving
 from support.slow import slow
@@ -61,8 +61,9 @@ def test_the_fmus_live(
         assert report["calls"][f"{name} 3"] > 0
 
 
+@native_slowly
 @pytest.mark.parametrize(("seeds", "calls"), [(1, 150), slow(10, 500)])
-def test_proxies_live(fmus: Path, tmp_path: Path, seeds: int, calls: int) -> None:
+def test_proxies_live(fmus: Path, kind: Kind, tmp_path: Path, seeds: int, calls: int) -> None:
     """With a peer, and one without."""
     with ExitStack() as stack:
         proxies = []
@@ -70,6 +71,7 @@ def test_proxies_live(fmus: Path, tmp_path: Path, seeds: int, calls: int) -> Non
             fmu = fmus / f"{name}.fmu"
             port = stack.enter_context(serving(fmu, Service(lockstep=True))).port_socket
             proxy = tmp_path / f"{name}Proxy.fmu"
-            proxies.append(build_proxy(fmu, proxy, port.getsockname()[1]))
-        proxies.append(build_proxy(fmus / "GraspController.fmu", tmp_path / "Alone.fmu", 9))
+            proxies.append(build_proxy(fmu, proxy, port.getsockname()[1], *proxy_options(kind)))
+        alone = tmp_path / "Alone.fmu"
+        proxies.append(build_proxy(fmus / "GraspController.fmu", alone, 9, *proxy_options(kind)))
         called(tmp_path / "host", seeds, calls, proxies)

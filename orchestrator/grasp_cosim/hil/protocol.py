@@ -5,10 +5,15 @@ from math import isfinite
 from pathlib import Path
 
 from grasp_fmus.link.message import check_size, exposed, read_key
+from grasp_fmus.link.peer import ALIVE
 from grasp_fmus.link.signature import ORDER, LinkVariable, Signature
 
 from ..errors import InputError
 from ..interface.interface import Interface, Variable
+from ..system.parts import NANOSECONDS
+
+LONGEST_SILENCE = ALIVE / NANOSECONDS
+"""s after which another proxy may take over a session."""
 
 WIDE = ("UInt32", "Int64", "UInt64")
 """Integer types that an Integer of FMI 2.0 does not hold."""

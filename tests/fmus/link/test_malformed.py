@@ -25,6 +25,7 @@ from grasp_fmus.link.message import (
     Codec,
     Message,
     Sealer,
+    Value,
 )
 from grasp_fmus.link.peer import Peer, Request
 from grasp_fmus.link.signature import Signature
@@ -37,7 +38,7 @@ from support.scripted_peer import SIGNATURE, VARIABLES, answers
 SOURCE = Path(__file__).parents[1] / "native/malformed.c"
 MILLION = 1_000_000
 KEY = b"sixteen bytes of key, and some more"
-VALUES = [1.5, 3, True, "start", 2.0, 0.5]
+VALUES: list[Value] = [1.5, 3, True, "start", 2.0, 0.5]
 SESSION, COOKIE = 99, 5
 
 Side = Literal["client", "peer"]
@@ -146,25 +147,11 @@ def test_a_million_in_c(tmp_path: Path, side: Side, key: bytes | None) -> None:
     program = tmp_path / "malformed"
     flags = ["-std=c99", "-O1", "-D_GNU_SOURCE", "-fsanitize=undefined", "-fno-sanitize-recover"]
     defined = ["-DPROXY"] if side == "client" else []
-    subprocess.run(
-        [
-            "gcc",
-            *flags,
-            *defined,
-            "-I",
-            tmp_path,
-            SOURCE,
-            "-o",
-            program,
-            "-lm",
-            "-lpthread",
-            "-ldl",
-        ],
-        check=True,
-    )
+    files = ["-I", str(tmp_path), str(SOURCE), "-o", str(program)]
+    subprocess.run(["gcc", *flags, *defined, *files, "-lm", "-lpthread", "-ldl"], check=True)
     datagrams = malformed(side, SIGNATURE, key)
     pipe = b"".join(struct.pack("=I", len(d)) + d for d in datagrams)
-    command = [program, key or b"-", str(MILLION)]
+    command = [str(program), key.decode() if key else "-", str(MILLION)]
     done = subprocess.run(command, input=pipe, capture_output=True)
     assert done.returncode == 0, (done.stdout, done.stderr)
     counted, before, after = map(int, done.stdout.split())

@@ -48,7 +48,8 @@ EVERY_KIND = Signature(
 
 def fuzzer(folder: Path, source: Path) -> Path:
     program = folder / source.stem
-    command = ["clang", *FLAGS, "-I", folder, source, "-o", program, "-lm", "-lpthread", "-ldl"]
+    files = ["-I", str(folder), str(source), "-o", str(program)]
+    command = ["clang", *FLAGS, *files, "-lm", "-lpthread", "-ldl"]
     done = subprocess.run(command, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
     return program
@@ -62,7 +63,8 @@ def fuzzed(program: Path, seeds: Iterator[bytes]) -> None:
     for i, seed in enumerate(seeds):
         (corpus / f"{i}").write_bytes(seed)
     options = [f"-max_total_time={SECONDS}", "-seed=1", "-rss_limit_mb=600", "-max_len=6000"]
-    command = [program, *options, f"-artifact_prefix={found}/", "-print_final_stats=1", corpus]
+    options += [f"-artifact_prefix={found}/", "-print_final_stats=1"]
+    command = [str(program), *options, str(corpus)]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr[-3000:]
     assert not [*found.iterdir()]

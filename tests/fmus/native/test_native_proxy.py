@@ -1,7 +1,9 @@
 """A native proxy beside one that Python runs: the same datagrams; its sources; its description."""
 
+import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 from random import Random
 
@@ -13,7 +15,8 @@ from grasp_fmus.native.proxy import proxy_members
 from grasp_fmus.native.targets import Version
 from grasp_fmus.proxy import DEFAULTS
 from grasp_fmus.proxy_build import Original
-from support import scripted_peer
+from support import kinds, scripted_peer
+from support.fmi2 import Fmu
 from support.kinds import Kind
 from support.native_proxies import STRICT
 from support.scripted_peer import (
@@ -119,3 +122,55 @@ def test_two_of_them_link_into_one_program(tmp_path: Path) -> None:
     subprocess.run(command, cwd=tmp_path, check=True)
     done = subprocess.run([tmp_path / "both"])
     assert done.returncode == 6
+
+
+SLOW_RESOLVER = """
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <netdb.h>
+#include <unistd.h>
+int getaddrinfo(const char *host, const char *service, const struct addrinfo *how,
+                struct addrinfo **found)
+{
+    int (*real)(const char *, const char *, const struct addrinfo *, struct addrinfo **);
+    *(void **)&real = dlsym(RTLD_NEXT, "getaddrinfo");
+    if (!(how->ai_flags & AI_NUMERICHOST))
+        sleep(1);
+    return real(host, service, how, found);
+}
+"""
+UNLOADED = """
+import ctypes, sys, time
+import _ctypes
+library, guid = ctypes.CDLL(sys.argv[1]), sys.argv[2].encode()
+library.fmi2Instantiate.restype = ctypes.c_void_p
+callbacks = (ctypes.c_void_p * 5)()
+c = ctypes.c_void_p(library.fmi2Instantiate(b"x", 1, guid, b"", callbacks, 0, 0))
+assert c
+vr, n = (ctypes.c_uint * 1)(int(sys.argv[3])), ctypes.c_size_t(1)
+assert library.fmi2SetString(c, vr, n, (ctypes.c_char_p * 1)(b"localhost")) == 0
+vr[0] = int(sys.argv[4])
+assert library.fmi2SetReal(c, vr, n, (ctypes.c_double * 1)(0.05)) == 0
+assert library.fmi2EnterInitializationMode(c) == 3
+library.fmi2FreeInstance(c)
+_ctypes.dlclose(library._handle)
+time.sleep(1.5)
+print("lives")
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not shutil.which("gcc"), reason="NO gcc")
+def test_the_resolver_may_come_back_when_the_fmu_is_gone(tmp_path: Path) -> None:
+    """The thread that was left alone with a name is still in the library, which a host unloads."""
+    original = Original("Original.fmu", VARIABLES, {}, Experiment(), True)
+    fmu = Fmu(kinds.build_proxy(original, "native", tmp_path, DEFAULTS), tmp_path / "unpacked")
+    (tmp_path / "slow.c").write_text(SLOW_RESOLVER)
+    shared = ["gcc", "-shared", "-fPIC", "slow.c", "-o", "slow.so", "-ldl"]
+    subprocess.run(shared, cwd=tmp_path, check=True)
+    places = [str(fmu.references[f"proxy.{name}"]) for name in ("host", "connect_timeout")]
+    done = subprocess.run(
+        [sys.executable, "-c", UNLOADED, str(fmu.binary), fmu.guid, *places],
+        env={**os.environ, "LD_PRELOAD": str(tmp_path / "slow.so")}, capture_output=True, text=True,
+    )  # fmt: skip
+    assert (done.returncode, done.stdout, done.stderr) == (0, "lives\n", "")

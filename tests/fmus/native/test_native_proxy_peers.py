@@ -12,12 +12,11 @@ from grasp_cosim import System, cli, simulate
 from grasp_cosim.hil.served import Service
 from grasp_cosim.interface.interface import Value
 from support.proxies import build_proxy, serving
-from support.slow import slow
 
 KEY = b"sixteen bytes of key, and some more"
 STEP, STOP = 4e-3, 2.0
 
-pytestmark = pytest.mark.skipif(not shutil.which("gcc"), reason="NO gcc")
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(not shutil.which("gcc"), reason="NO gcc")]
 
 
 @pytest.fixture(scope="module")
@@ -47,8 +46,8 @@ def running(target: Path, key: Path | None) -> Iterator[int]:
             process.kill()
 
 
-@pytest.mark.parametrize("scheme", [slow("sequential"), "jacobi"])
-@pytest.mark.parametrize("with_key", [slow(False), True])
+@pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
+@pytest.mark.parametrize("with_key", [False, True])
 def test_with_the_peer_in_c(
     grasp: System, target: Path, tmp_path: Path, with_key: bool, scheme: str
 ) -> None:
@@ -68,7 +67,6 @@ def test_with_the_peer_in_c(
     assert not there["controller.proxy.missed"].any()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("ours", "theirs"), [(KEY, KEY), (KEY, None), (None, KEY), (KEY, b"another key of 24 bytes.")]
 )

@@ -7,16 +7,14 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import click
-from grasp_fmus.link.peer import ALIVE
 
 from ...errors import InputError
 from ...hil.address import is_loopback, text
-from ...hil.protocol import shared_key
+from ...hil.protocol import LONGEST_SILENCE, shared_key
 from ...hil.served import ServedFmu, Service
 from ...hil.server import DEFAULT_ADDRESS, Server
 from ...interface.read import read_interface
 from ...system.description import in_nanoseconds
-from ...system.parts import NANOSECONDS
 from ..frame import FAILED, INTERRUPTED, NEGATIVE, PATH, fail, json_option, pair, say, show
 from ..signals import ended_by_signals
 
@@ -87,7 +85,7 @@ def serve(
             who = "any program here" if is_loopback(server.address) else "whoever can reach it"
             say(
                 f"{at} without a key: {who} may take part, and take over a session that is silent "
-                f"for {ALIVE / NANOSECONDS:g} s; --key-file keeps others out"
+                f"for {LONGEST_SILENCE:g} s; --key-file keeps others out"
             )
         with ended_by_signals(server.stop) as came, _ended_after(duration, fmu.name):
             server.serve(sessions, end)
