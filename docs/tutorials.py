@@ -278,6 +278,7 @@ def draw_layers(tables: Sequence[Runs], folder: Path) -> None:
     _label(middle, "time in s", "tilt of the box in °", "tall box, rough floor")
     _over_time(right, cup, "plant.squeeze", 1e3, "Case {}")
     right.axhline(8.0, color="black", ls=":", label="damaged above")
+    right.set_ylim(top=14.0)  # room for the legend
     _label(right, "time in s", "squeeze of the cup in mm", "soft cup")
     save(figure, folder / "objects.png")
 
@@ -347,15 +348,15 @@ def draw_colour(tables: Sequence[Runs], folder: Path) -> None:
         gaps, forces = column
         for j, style in zip(FINGERS, ("-", "--"), strict=True):
             face = "black" if j == 1 else "white"
-            label = f"finger {j}, at the {face} face"
+            label = f"finger {j}, {face} face"
             gap = 1e3 * run.signals[f"plant.gap[{j}]"]
             force = abs(run.signals[f"plant.contact_force[{j}]"])
             gaps.plot(run.time, gap, style, color=COLOR[j], label=label)
             forces.plot(run.time, force, style, color=COLOR[j], label=label)
         finish(gaps, "gap in mm")
-        finish(forces, "contact force in N")
+        finish(forces, "contact force in N", legend=False)
         apart = run.metrics["time_difference"]
-        gaps.set_title(f"{law}: contacts {apart:.2f} s apart", fontsize=10)
+        gaps.set_title(f"black and white, {law} law: {apart:.2f} s apart", fontsize=10)
         forces.set_xlabel("time in s")
     for axes in rows[:, 1]:
         axes.set_ylabel("")

@@ -37,8 +37,8 @@ def variable_tables(blocks: Mapping[str, Block]) -> str:
     common = [row for row in first if all(row in other for other in others)]
     tables = [f"What all have:\n\n{_table(common)}"]
     for name, own in rows.items():
-        added = _table([row for row in own if row not in common])
-        tables.append(f"What `{name}` adds:\n\n{added}")
+        if added := [row for row in own if row not in common]:
+            tables.append(f"What `{name}` adds:\n\n{_table(added)}")
     return "\n".join(tables)
 
 

@@ -9,22 +9,12 @@ from grasp_controller import impact_reduction as layer_2
 from grasp_controller import simultaneous_contact as layer_3
 from hypothesis import given
 from hypothesis import strategies as st
-from support.approach import ANY_SAMPLES, H, Pair, approach, pairs, run
+from support.approach import ANY_SAMPLES, H, Pair, approach, pairs, published, run
 from support.examples import examples
 
 SAMPLES = ANY_SAMPLES | st.builds(approach, pairs(0.1, 2.0), pairs(0.01, 0.1))
 
 NEVER_HOLDS = holding.Params(squeeze=1e12)
-
-
-def published(p: adaptive.Params, samples: list[series.Inputs], h: float) -> list[series.Outputs]:
-    three = series.Params(p.simultaneous_contact, p.impact_reduction, p.contact_force)
-    x = series.initial_state(three, samples[0])
-    trace = [series.outputs(three, x, samples[0])]
-    for u in samples[1:]:
-        x = series.step(three, x, u, h)
-        trace.append(series.outputs(three, x, u))
-    return trace
 
 
 @pytest.mark.parametrize(

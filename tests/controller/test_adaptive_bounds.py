@@ -6,11 +6,11 @@ from math import exp, isfinite, log
 from typing import Any
 
 import pytest
-from grasp_controller import adaptive, holding, reflectance_ratio, series
+from grasp_controller import adaptive, holding, reflectance_ratio
 from grasp_controller.adaptive import Inputs, Params, State
 from hypothesis import given
 from hypothesis import strategies as st
-from support.approach import Pair, approach, numbers, relit, run
+from support.approach import Pair, approach, numbers, published, relit, run
 from support.declared import parameters
 from support.examples import examples
 
@@ -55,16 +55,6 @@ def assert_bounded(p: Params, x: State, y: adaptive.Outputs) -> None:
     assert all(isfinite(each) for each in y.estimated_gap)
 
 
-def published_outputs(p: Params, samples: list[Inputs], h: float) -> list[series.Outputs]:
-    three = series.Params(p.simultaneous_contact, p.impact_reduction, p.contact_force)
-    x = series.initial_state(three, samples[0])
-    trace = [series.outputs(three, x, samples[0])]
-    for u in samples[1:]:
-        x = series.step(three, x, u, h)
-        trace.append(series.outputs(three, x, u))
-    return trace
-
-
 @examples(30)
 @given(LAWS, SAMPLES, STEPS)
 def test_the_estimate_is_bounded_for_any_numbers(
@@ -80,7 +70,7 @@ def test_outputs_are_numbers_where_those_of_the_published_law_are(
     p: Params, samples: list[Inputs], h: float
 ) -> None:
     finite = True
-    for (_, y), z in zip(run(p, samples, h), published_outputs(p, samples, h), strict=True):
+    for (_, y), z in zip(run(p, samples, h), published(p, samples, h), strict=True):
         finite = finite and all(isfinite(each) for each in numbers(z))
         assert not finite or all(isfinite(each) for each in numbers(y))
 

@@ -16,6 +16,7 @@ from grasp_controller.series import Inputs, Outputs, Pair, Params, State
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
+from support.approach import ANY_SAMPLES, assert_mirrored, mirrored
 from support.declared import Parameter, parameters
 from support.examples import examples
 
@@ -248,23 +249,6 @@ def test_the_first_sample_is_no_approach() -> None:
 # -------------------------------------------------------------------------- the symmetry
 
 
-def swapped(pair: Pair) -> Pair:
-    first, second = pair
-    return -second, -first
-
-
-def mirrored(u: Inputs) -> Inputs:
-    """What is measured from behind the gripper."""
-    return Inputs(swapped(u.position), swapped(u.velocity), u.intensity[::-1])
-
-
-def pairs(low: float, high: float) -> st.SearchStrategy[Pair]:
-    return st.tuples(st.floats(low, high), st.floats(low, high))
-
-
-INPUTS = st.builds(Inputs, pairs(-0.2, 0.2), pairs(-1.0, 1.0), pairs(0.0, 2.0))
-
-
 @st.composite
 def controllers(draw: st.DrawFn) -> Params:
     """Any of the cases; the viscosities +D_p and -D_p map onto each other."""
@@ -288,7 +272,7 @@ def controllers(draw: st.DrawFn) -> Params:
 @QUICK
 @given(
     st.sampled_from([CASE_0, CASE_1, CASE_2]) | controllers(),
-    st.lists(INPUTS, min_size=2, max_size=20),
+    ANY_SAMPLES,
     st.floats(1e-5, 1e-2),
 )
 def test_the_mirrored_controller_does_exactly_the_mirrored_thing(
@@ -296,11 +280,7 @@ def test_the_mirrored_controller_does_exactly_the_mirrored_thing(
 ) -> None:
     images = run(p, [mirrored(u) for u in samples], h)
     for (_, y), (_, z) in zip(run(p, samples, h), images, strict=True):
-        assert z.force == swapped(y.force)
-        assert z.target_position == -y.target_position
-        assert z.virtual_position == swapped(y.virtual_position)
-        assert z.simultaneous_contact_force == -y.simultaneous_contact_force
-        assert z.impact_reduction_force == swapped(y.impact_reduction_force)
+        assert_mirrored(y, z)
 
 
 # ------------------------------------------------------------------------ the parameters

@@ -78,14 +78,7 @@ def checked(name: str, checkout: Path) -> tuple[list[Any], Any]:
 
 
 def test_the_commands_at_the_beginnings_work(checkout: Path) -> None:
-    assert [command.split()[1] for command in INDENTED] == [
-        "run",
-        "run",
-        "run",
-        "build",
-        "build",
-        "run",
-    ]
+    assert {command.split()[1] for command in INDENTED} == {"build", "run"}
     for command in INDENTED:
         short = ["--stop", "0.01"] if command.split()[1] == "run" else []
         assert cli.main([*shlex.split(command)[1:], *short]) == 0, command

@@ -216,9 +216,18 @@ def test_what_is_refused_in_c_is_an_error_to_go_on_from(
     assert (call, terminated, closed) == ("setReal: 3", "terminated: 0", "closed: 0")
 
 
+def assert_a_proxy_ran(done: subprocess.CompletedProcess[str], peer: ScriptedPeer) -> None:
+    """Until the host asks for a state; the end is said all the same."""
+    assert (done.returncode, done.stderr) == (ERROR, ""), done.stdout
+    *rows, said, call, terminated, closed = done.stdout.splitlines()
+    assert rows == ["-0.20000000000000001 0"] * (STEPS - 1)
+    assert "fmi2GetFMUstate: a proxy has no state" in said
+    assert (call, terminated, closed) == ("getFMUstate: 3", "terminated: 0", "closed: 0")
+    assert peer.kinds() == [HELLO, INITIALISE, *[STEP] * (STEPS - 1), END]
+
+
 @pytest.mark.parametrize("version", VERSIONS)
 def test_a_bound_proxy_runs_in_c(host: Path, tmp_path: Path, version: str) -> None:
-    """Until the host asks for a state; the end is said all the same."""
     wire = Signature(tuple(v for v in SIGNATURE.variables if v.name in NUMBERS))
     variables = [v for v in VARIABLES if v.name in NUMBERS]
     with ScriptedPeer(signature=wire, outputs=lambda values: [values[0] * values[1]]) as peer:
@@ -230,12 +239,7 @@ def test_a_bound_proxy_runs_in_c(host: Path, tmp_path: Path, version: str) -> No
         )
         fmu = Fmu(built.path, tmp_path / "unpacked")
         done = run(host, fmu, {"force": -0.1}, outputs=["doubled", "proxy.age"])
-    assert (done.returncode, done.stderr) == (ERROR, ""), done.stdout
-    *rows, said, call, terminated, closed = done.stdout.splitlines()
-    assert rows == ["-0.20000000000000001 0"] * (STEPS - 1)
-    assert "fmi2GetFMUstate: a proxy has no state" in said
-    assert (call, terminated, closed) == ("getFMUstate: 3", "terminated: 0", "closed: 0")
-    assert peer.kinds() == [HELLO, INITIALISE, *[STEP] * (STEPS - 1), END]
+    assert_a_proxy_ran(done, peer)
 
 
 NUMBERS = {"force", "gain", "doubled"}
@@ -256,15 +260,9 @@ def native_proxy(folder: Path) -> Iterator[tuple[Fmu, ScriptedPeer]]:
 
 @pytest.mark.slow
 def test_a_native_proxy_runs_in_c(host: Path, tmp_path: Path) -> None:
-    """Until the host asks for a state; the end is said all the same."""
     with native_proxy(tmp_path) as (fmu, peer):
         done = run(host, fmu, {"force": -0.1}, outputs=["doubled", "proxy.age"])
-    assert (done.returncode, done.stderr) == (ERROR, ""), done.stdout
-    *rows, said, call, terminated, closed = done.stdout.splitlines()
-    assert rows == ["-0.20000000000000001 0"] * (STEPS - 1)
-    assert "fmi2GetFMUstate: a proxy has no state" in said
-    assert (call, terminated, closed) == ("getFMUstate: 3", "terminated: 0", "closed: 0")
-    assert peer.kinds() == [HELLO, INITIALISE, *[STEP] * (STEPS - 1), END]
+    assert_a_proxy_ran(done, peer)
 
 
 @pytest.mark.slow

@@ -15,6 +15,7 @@ from grasp_cosim.recording.result import Result
 from hypothesis import Phase, assume, given
 from hypothesis import strategies as st
 from support.adaptive import Pair, adaptive_grasp, last, run, values_of
+from support.approach import pairs
 from support.continuous import Grasp, Solution, solve
 from support.continuous_learning import Adaptive
 from support.examples import examples
@@ -155,16 +156,12 @@ def test_both_settle_with_the_stiffness_over_half_the_width(natives: Path, g: Gr
     )
 
 
-def _pair(low: float, high: float) -> st.SearchStrategy[Pair]:
-    return st.tuples(st.floats(low, high), st.floats(low, high))
-
-
 GRASPS = st.builds(
     Grasp,
     x_m=st.floats(-0.05, 0.05),
     W=st.floats(0.05, 0.1),
-    m=_pair(0.25, 1.0),
-    reflectance=_pair(0.3, 1.2),
+    m=pairs(0.25, 1.0),
+    reflectance=pairs(0.3, 1.2),
     K_i=st.floats(60.0, 200.0),
     adaptive=st.just(Adaptive()),
 )

@@ -13,6 +13,7 @@ from grasp_cosim.recording.result import Result
 from hypothesis import Phase, given
 from hypothesis import strategies as st
 from support.adaptive import Pair, adaptive_grasp, last, run, values_of
+from support.approach import pairs
 from support.examples import examples
 
 STEP = 1e-3
@@ -22,10 +23,6 @@ FINGER = (1, 2)
 
 P_0 = 0.1
 """N, hold.squeeze."""
-
-
-def pairs(low: float, high: float) -> st.SearchStrategy[Pair]:
-    return st.tuples(st.floats(low, high), st.floats(low, high))
 
 
 REFLECTANCES = pairs(0.3, 1.2)

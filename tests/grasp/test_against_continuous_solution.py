@@ -14,6 +14,7 @@ from gripper_plant import rigid
 from hypothesis import Phase, assume, given
 from hypothesis import strategies as st
 from proximity_sensor import optics
+from support.approach import pairs
 from support.continuous import Grasp, Solution, solve
 from support.direct import Sensors, closed_loop
 from support.examples import examples
@@ -165,16 +166,12 @@ def test_the_contact_is_nearly_rigid(case: int) -> None:
     assert hard.contact_force == pytest.approx(soft.contact_force, abs=1e-3)
 
 
-def _pair(low: float, high: float) -> st.SearchStrategy[tuple[float, float]]:
-    return st.tuples(st.floats(low, high), st.floats(low, high))
-
-
 GRASPS = st.builds(
     Grasp,
     x_m=st.floats(-0.05, 0.05),
     W=st.floats(0.05, 0.1),
-    m=_pair(0.25, 1.0),
-    reflectance=_pair(0.9, 1.0),
+    m=pairs(0.25, 1.0),
+    reflectance=pairs(0.9, 1.0),
     M_a2=st.floats(0.5, 2.0),
     D_a2=st.floats(8.0, 20.0),
     K_a2=st.floats(30.0, 60.0),

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
 
-from grasp_controller import adaptive
+from grasp_controller import adaptive, series
 from grasp_controller.adaptive import Inputs, Outputs, Params, State
 from hypothesis import strategies as st
 
@@ -50,6 +50,37 @@ def run(p: Params, samples: list[Inputs], h: float = H) -> list[tuple[State, Out
         x = adaptive.step(p, x, u, h)
         trace.append((x, adaptive.outputs(p, x, u)))
     return trace
+
+
+def published(p: Params, samples: list[Inputs], h: float = H) -> list[series.Outputs]:
+    """The outputs at each sample of the published law with the same layers."""
+    three = series.Params(p.simultaneous_contact, p.impact_reduction, p.contact_force)
+    x = series.initial_state(three, samples[0])
+    trace = [series.outputs(three, x, samples[0])]
+    for u in samples[1:]:
+        x = series.step(three, x, u, h)
+        trace.append(series.outputs(three, x, u))
+    return trace
+
+
+def swapped(pair: Pair) -> Pair:
+    """A signal of both fingers, seen from behind the gripper."""
+    first, second = pair
+    return -second, -first
+
+
+def mirrored(u: Inputs) -> Inputs:
+    """What is measured from behind the gripper."""
+    return Inputs(swapped(u.position), swapped(u.velocity), u.intensity[::-1])
+
+
+def assert_mirrored(y: series.Outputs | Outputs, z: series.Outputs | Outputs) -> None:
+    """The one is exactly the other from behind the gripper, in all that both laws put out."""
+    assert z.force == swapped(y.force)
+    assert z.target_position == -y.target_position
+    assert z.virtual_position == swapped(y.virtual_position)
+    assert z.simultaneous_contact_force == -y.simultaneous_contact_force
+    assert z.impact_reduction_force == swapped(y.impact_reduction_force)
 
 
 def numbers(values: Any) -> list[float]:

@@ -113,6 +113,7 @@ def test_every_compiled_file_is_listed_once(root: Element, fmu: Unpacked) -> Non
         assert listed == [f"{fmu.name}.c"]
 
 
+@pytest.mark.slow
 def test_both_versions_describe_the_same(parts_of: PartsOf) -> None:
     """Names, references, causality, variability, units, limits, starts; FMI 3.0 has the time."""
     keys = ("name", "valueReference", "causality", "variability", "unit", "min", "max", "start",
