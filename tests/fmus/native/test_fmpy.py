@@ -14,9 +14,13 @@ from fmpy import simulate_fmu
 from fmpy.build import build_platform_binary
 from fmpy.util import read_csv, read_ref_opt_file
 from fmpy.validation import validate_fmu
+from grasp_fmus.model_description import Experiment
 from grasp_fmus.native.compilers import BITS, UNPREFIXED
-from support.kinds import TRANSLATED
+from grasp_fmus.proxy import Settings
+from grasp_fmus.proxy_build import Original
+from support.kinds import TRANSLATED, Kind, build_proxy
 from support.native_fmus import needs_gcc
+from support.scripted_peer import VARIABLES, ScriptedPeer
 from support.slow import slow
 
 BOTH = [(name, 2) for name in TRANSLATED] + [slow(name, 3) for name in TRANSLATED]
@@ -76,6 +80,29 @@ def test_fmpy_compiles_its_sources(
     build_platform_binary(folder, made)
     assert [*folder.glob("binaries/*/*")]
     assert_gives_the_reference(folder, fmu.parent, fmu.stem)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not shutil.which("cmake", path=PROGRAMS), reason="NO cmake")
+@pytest.mark.parametrize("kind", ["native", "native FMI 3"])
+def test_fmpy_compiles_the_sources_of_a_proxy(
+    kind: Kind, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PATH", PROGRAMS)
+    folder, made = tmp_path / "fmu", tmp_path / "made"
+    made.mkdir()
+    with ScriptedPeer() as peer:
+        original = Original("Original.fmu", VARIABLES, {}, Experiment(), True)
+        fmu = build_proxy(original, kind, tmp_path, Settings(port=peer.port, timeout=60.0))
+        shutil.unpack_archive(fmu, folder, "zip")
+        shutil.rmtree(folder / "binaries")
+        build_platform_binary(folder, made)
+        result: Any = simulate_fmu(
+            folder, stop_time=1.0, output_interval=0.125, start_values={"force": 3.0},
+            output=["doubled"],
+        )  # fmt: skip
+    assert set(result["doubled"]) == {6.0}
+    assert len(result) == 9
 
 
 @pytest.mark.slow

@@ -82,6 +82,8 @@ def test_a_proxy_whatever_its_peer_sends(tmp_path: Path) -> None:
         if file.startswith("sources/"):
             (tmp_path / file.removeprefix("sources/")).write_bytes(data)
 
+    text = SIGNATURE.text.encode()
+
     def seeds() -> Iterator[bytes]:
         """Sessions that begin, and go on with answers, refusals, silence and other things."""
         welcome, outputs, silence = b"\x48\0\0\0", b"\x0a\0\0\0", b"\x10"
@@ -89,8 +91,15 @@ def test_a_proxy_whatever_its_peer_sends(tmp_path: Path) -> None:
             begun = bytes([settings]) + silence + welcome + silence + outputs
             yield begun + (silence + outputs) * 12
             yield begun + (silence + outputs) * 2 + silence * 40
+            for other in (
+                b"",
+                b"input\tReal\tm\tforce\n" * 9,
+                text[30:],
+                text.replace(b"Real", b"X"),
+            ):
+                yield bytes([settings]) + silence + b"\x0c" + sized(other) + b"\0"
             for code in range(1, 5):
-                refusal = bytes([code << 3 | 4]) + sized(SIGNATURE.text.encode()) + b"\0"
+                refusal = bytes([code << 3 | 4]) + sized(text) + b"\0"
                 yield begun + silence + refusal + (silence + welcome + silence + outputs) * 4
             yield bytes([settings]) + (silence + b"\x03" + sized(bytes(90))) * 4
 

@@ -419,6 +419,8 @@ static Status proxy_open(Slave *s, int64_t deadline)
     }
     m->connection.stage = CONNECTION_NEW;
     m->connection.sessions = 0;
+    m->connection.refused = 0;
+    m->connection.trouble[0] = '\0';
     m->is_connected = 1;
     return SLAVE_OK;
 }

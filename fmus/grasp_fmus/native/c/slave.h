@@ -493,7 +493,7 @@ static Status slave_check_string(Slave *s, uint32_t vr, const char *text)
 
 static void slave_take_string(Slave *s, uint32_t vr, const char *text)
 {
-    strcpy(s->texts[(int)s->values[vr]], text);
+    memmove(s->texts[(int)s->values[vr]], text, strlen(text) + 1);  /* it may be that very one */
     s->params_are_read &= variables[vr].causality != PARAMETER;
     s->outputs_follow = 0;
 }

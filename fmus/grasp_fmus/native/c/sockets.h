@@ -63,7 +63,7 @@ typedef pthread_mutex_t NetLock;
 #define NET_TEXT_SIZE 160
 #define NET_SECOND INT64_C(1000000000)
 #define NET_DESCRIPTORS 1024  /* those that select() can watch, but on Windows */
-#define NET_HOST_SIZE 1024    /* bytes of a name, with its NUL */
+#define NET_HOST_SIZE 1024    /* bytes of a name or a path, with its NUL */
 
 enum { NET_NOTHING = -1, NET_FAILED = -2 };  /* in the place of a size */
 
@@ -494,10 +494,23 @@ static int net_wait(Socket at, int64_t ns)
 
 /* Key files */
 
+/* The path is in UTF-8, which Windows does not know for files */
+static FILE *net_file(const char *path)
+{
+#ifdef _WIN32
+    wchar_t wide[NET_HOST_SIZE];
+    errno = ENOENT;
+    return MultiByteToWideChar(CP_UTF8, 0, path, -1, wide, NET_HOST_SIZE) ? _wfopen(wide, L"rb")
+                                                                          : NULL;
+#else
+    return fopen(path, "rb");
+#endif
+}
+
 /* Read a file of `size` bytes at most; its size, or -1 with the reason in the text */
 static long net_read(const char *path, uint8_t *data, size_t size, char *text)
 {
-    FILE *file = fopen(path, "rb");
+    FILE *file = net_file(path);
     size_t n;
     int error = errno;
     if (!file) {

@@ -18,10 +18,10 @@ from ...interface.interface import Interface, Value, Variable
 from ...interface.read import read_interface
 from ...interface.units import BASE
 from ..frame import PATH, announce, bind_python_option, json_option, say, show
+from .build import FIRST
 
 if TYPE_CHECKING:
     from grasp_fmus.folder import Built
-    from grasp_fmus.native.build import Plan
     from grasp_fmus.proxy_build import Original
 
 KINDS: Mapping[str, type[Value]] = {"Real": float, "Integer": int, "Boolean": bool, "String": str}
@@ -75,6 +75,7 @@ def proxy(
     """
     from grasp_fmus.c_header import c_header as header  # only here: they take time to load
     from grasp_fmus.native.compilers import CompilerError
+    from grasp_fmus.proxy_build import build_proxy
 
     _check_paths(fmu, out, c_header)
     _check_native(native, out, bind_python, {"--target": target, "--fmi": fmi})
@@ -86,7 +87,11 @@ def proxy(
         if out is not None:
             original = _original(interface, [v.name for v in signature.variables])
             settings = Settings(host, port, timeout)
-            built = _built(out, original, settings, bind_python, _plan(native, target, fmi))
+            if native:
+                built, said_of = _built_native(out, original, settings, target, fmi)
+                notes += said_of
+            else:
+                built = build_proxy(out, original, settings, bind_python)
             lines += [f"{out}: {built.status}", *(f"    {change}" for change in built.changes)]
             report |= {"fmu": str(out), "status": built.status, "changes": list(built.changes)}
         if c_header is not None:
@@ -121,30 +126,19 @@ def _check_native(
         raise InputError("--bind-python: a native FMU needs no Python; must be without --native")
 
 
-def _plan(native: bool, target: str | None, fmi: str | None) -> "Plan | None":
-    """Which binaries a native proxy gets; None for one that Python runs."""
+def _built_native(
+    out: Path, original: "Original", settings: Settings, target: str | None, fmi: str | None
+) -> "tuple[Built, list[str]]":
+    """The native proxy, and what is to be said of it."""
     from grasp_fmus.native.build import planned
+    from grasp_fmus.native.proxy import build_native_proxy
     from grasp_fmus.native.targets import targets
 
-    if not native:
-        return None
     plan = planned(targets(target.split(",")) if target is not None else (), 3 if fmi == "3" else 2)
-    if plan.note:
-        say(plan.note)
-    return plan
-
-
-def _built(
-    out: Path, original: "Original", settings: Settings, bind_python: str | None,
-    plan: "Plan | None",
-) -> "Built":  # fmt: skip
-    from grasp_fmus.native.proxy import build_native_proxy
-    from grasp_fmus.proxy_build import build_proxy
-
-    if plan is None:
-        return build_proxy(out, original, settings, bind_python)
-    announce(f"building for {', '.join(t.tuple for t in plan.places)}")
-    return build_native_proxy(out, original, plan, settings)
+    first = FIRST if target else ""
+    announce(f"building for {', '.join(t.tuple for t in plan.places)}{first}")
+    built = build_native_proxy(out, original, plan, settings)
+    return built, [plan.note] if plan.note else []
 
 
 def _check_paths(fmu: Path, out: Path | None, c_header: Path | None) -> None:

@@ -101,6 +101,14 @@ static size_t plausible(unsigned what, uint8_t *datagram)
         wire_put(datagram + WIRE_AT_SEQUENCE, 8,
                  wire_get(datagram + WIRE_AT_SEQUENCE, 8) - (spoilt >> 1 & 3));
     }
+    if (datagram[WIRE_AT_CODE] == WIRE_OTHER_INTERFACE && !(spoilt & 8)) {  /* all of it is here */
+        wire_sha256 sha;
+        uint8_t digest[32];
+        wire_sha256_begin(&sha);
+        wire_sha256_add(&sha, datagram + WIRE_HEAD_SIZE, body);
+        wire_sha256_end(&sha, digest);
+        memcpy(datagram + WIRE_AT_INTERFACE, digest, 16);
+    }
     if (spoilt > 0xf0) {
         datagram[take() % WIRE_HEAD_SIZE] = (uint8_t)take();
     }

@@ -1,36 +1,46 @@
-"""A native proxy on Windows, under wine, in a host in C, with `serve` on the loopback."""
+"""A native proxy on Windows, under wine, and on ARM, under qemu, with `serve` on the loopback."""
 
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from grasp_cosim.hil.served import Service
-from grasp_fmus.native.targets import WINDOWS, Target
+from grasp_fmus.native.targets import LINUX_ARM, WINDOWS, Target
 from support.c_host import Host, Script, bits, number, unpacked
 from support.compilers import needs_zig
 from support.fmi2 import Fmu, Instance
 from support.platforms import needs_programs
 from support.proxies import build_proxy, serving
 
-pytestmark = [pytest.mark.slow, needs_programs("wine"), needs_zig]
+pytestmark = [pytest.mark.slow, needs_zig]
+
+ON_WINDOWS = needs_programs("wine")
+ON_ARM = needs_programs("qemu-aarch64", "aarch64-linux-gnu-gcc")
 
 STEPS, H = 50, 1e-3
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
-def test_steps_on_windows(
-    fmus: Path, host_for: Callable[[Target], Host], tmp_path: Path, fmi: int
-) -> None:
-    """To the bit what the FMU gives here; then the peer is gone, and the outputs go to failsafe."""
+@pytest.mark.parametrize(
+    ("target", "fmi", "place"),
+    [
+        pytest.param(WINDOWS, 2, "win64", marks=ON_WINDOWS),
+        pytest.param(WINDOWS, 3, WINDOWS.tuple, marks=ON_WINDOWS),
+        pytest.param(LINUX_ARM, 3, LINUX_ARM.tuple, marks=ON_ARM),
+    ],
+)
+def test_steps(
+    fmus: Path, host_for: Callable[[Target], Host], tmp_path: Path, target: Target, fmi: int,
+    place: str,
+) -> None:  # fmt: skip
+    """To the bit what the FMU gives here."""
     original = fmus / "ProximitySensor.fmu"
     script = Script()
     with serving(original, Service(lockstep=True)) as server:
-        options = ["--native", "--target", "win64", "--fmi", str(fmi)]
+        options = ["--native", "--target", target.tuple, "--fmi", str(fmi)]
         path = build_proxy(original, tmp_path / "Bench.fmu", server.address[1], *options)
         fmu = unpacked(path, tmp_path / "unpacked")
-        place = "win64" if fmi == 2 else WINDOWS.tuple
         gap, intensity = fmu.reference("gap"), fmu.reference("intensity")
-        script.add("load", 0, fmi, f"Z:{fmu.binary(place)}")
+        script.add("load", 0, fmi, f"{'Z:' if target == WINDOWS else ''}{fmu.binary(place)}")
         script.add("new", 0, 0, "full", "bench", fmu.token, None)
         script.add("init", 0, bits(0.0)).add("leave", 0)
         for k in range(STEPS):
@@ -38,7 +48,7 @@ def test_steps_on_windows(
             script.add("step", 0, bits(k * H), bits(H))
             script.add("get", 0, "real", intensity)
         script.add("terminate", 0).add("free", 0)
-        (answers,) = host_for(WINDOWS).run(script, folder=tmp_path)
+        (answers,) = host_for(target).run(script, folder=tmp_path)
         counters = server.fmu.counters()
     assert [a for a in answers if a.status] == []
     assert (counters["steps"], counters["sessions"]) == (STEPS, 1)
@@ -51,7 +61,8 @@ def test_steps_on_windows(
             assert instance.get("intensity") == [found[k]]
 
 
-def test_a_peer_that_is_gone(
+@ON_WINDOWS
+def test_a_peer_that_is_gone_on_windows(
     fmus: Path, host_for: Callable[[Target], Host], tmp_path: Path
 ) -> None:
     original = fmus / "ProximitySensor.fmu"
