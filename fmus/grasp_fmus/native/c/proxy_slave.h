@@ -270,7 +270,8 @@ static void proxy_put_refusal(Slave *s)
 
 static int64_t proxy_deadline(const Slave *s, int timeout)
 {
-    return net_now() + (int64_t)rint(s->values[timeout] * 1e9);
+    double ns = rint(s->values[timeout] * 1e9);
+    return net_now() + (int64_t)ns;
 }
 
 static Status proxy_read_settings(Slave *s)

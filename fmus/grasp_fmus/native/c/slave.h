@@ -135,17 +135,18 @@ static void slave_put_shown(Slave *s, const char *character, size_t n, char quot
 {
     static const char digits[] = "0123456789abcdef";
     unsigned char first = (unsigned char)character[0], c = first;
-    char text[5];
+    char text[5] = "\\";
     if (n == 2 && first == 0xc2) {
         c = (unsigned char)character[1];
     }
     if (first == '\\' || first == (unsigned char)quote) {
-        text[0] = '\\', text[1] = character[0], text[2] = '\0';
+        text[1] = character[0];
     } else if (first == '\t' || first == '\n' || first == '\r') {
-        text[0] = '\\', text[1] = first == '\t' ? 't' : first == '\n' ? 'n' : 'r', text[2] = '\0';
+        text[1] = first == '\t' ? 't' : first == '\n' ? 'n' : 'r';
     } else if (n == 1 ? c < 0x20 || c == 0x7f : first == 0xc2 && (c <= 0xa0 || c == 0xad)) {
-        text[0] = '\\', text[1] = 'x', text[2] = digits[c >> 4], text[3] = digits[c & 15];
-        text[4] = '\0';
+        text[1] = 'x';
+        text[2] = digits[c >> 4];
+        text[3] = digits[c & 15];
     } else {
         memcpy(text, character, n);
         text[n] = '\0';
@@ -473,8 +474,8 @@ static int slave_is_utf8(const char *text)
 static Status slave_check_string(Slave *s, uint32_t vr, const char *text)
 {
     const Variable *v = &variables[vr];
-    int is_text = text && slave_is_utf8(text);
-    if (is_text && (double)strlen(text) <= v->high) {
+    size_t most = (size_t)v->high;
+    if (text && strlen(text) <= most && slave_is_utf8(text)) {
         return SLAVE_OK;
     }
     slave_begin_text(s);
