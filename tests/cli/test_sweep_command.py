@@ -301,6 +301,15 @@ def test_what_is_not_drawn_has_no_seed(command: Run) -> None:
     assert "--seed 3: study.toml has nothing that is random; must be left out" in err
 
 
+def test_a_controller_that_the_study_swaps_takes_no_other(command: Run) -> None:
+    swap = 'swap = { controller = "mine.fmu" }\n'
+    code, _, err = command(f"{swap}{STUDY}", "--controller", "adaptive")
+    assert (code, err.splitlines()) == (
+        2,
+        ["grasp-cosim: study.toml: controller adaptive: must not come with a swap of controller"],
+    )
+
+
 def test_a_study_that_names_its_controller_takes_no_other(command: Run) -> None:
     code, _, err = command(f'controller = "adaptive"\n{STUDY}', "--controller", "published")
     assert (code, err.splitlines()) == (

@@ -85,6 +85,14 @@ def test_a_seed_goes_before_that_of_the_study(read: Read) -> None:
         (BODY + TWO + "[[variants]]\nname = 'learning'\n", "variant 'learning' twice"),
         (BODY + TWO.replace('"adaptive"', '"blind"'), "study.toml, learning: controller = 'blind'"),
         (BODY + TWO.replace('= "as-it-is" }', '= "x" }'), "no variant 'x'; valid: as-it-is, lea"),
+        (
+            BODY + LIMITS.replace("p95 = 1.5", "from = 'x'"),
+            "limits: from: no variant 'x'; valid: n",
+        ),
+        (
+            BODY + TWO.replace("step = 1e-3", "swap = { controller = 'other.fmu' }"),
+            "learning: controller adaptive: must not come with a swap of controller",
+        ),
         (BODY + "[limits]\nspeed = { greatest = 1 }\n", "limits: no result 'speed'; valid: time_"),
         (BODY + "[limits]\ntime_difference = {}\n", "no limit; must have one of least, p5, medi"),
         (BODY + "[limits]\ntime_difference = { max = 1 }\n", "unknown entry 'max'; valid: from,"),

@@ -135,7 +135,7 @@ WRONG_EVENTS = [
         "sensor_1.gap",
         r"set\.sensor_1\.gap: has a connection, from plant\.gap\[1\]; put a fault of kind 'stuck'",
     ),
-    ("= 0.6", "= 11", "reflectance = 11: must be a finite number from 0 to 10 1"),
+    ("= 0.6", "= 11", "reflectance = 11: must be a finite number from 0 to 10$"),
     ("= 0.6", "= true", "reflectance = True: must be a finite number"),
     ("= 0.6", "= nan", "reflectance = nan: must be a finite number"),
     ("= 0.6", "= '0.6'", "reflectance = '0.6': must be a finite number"),

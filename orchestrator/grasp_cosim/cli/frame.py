@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -91,13 +91,13 @@ def with_preset(system: System, name: str) -> System:
     return with_built_in(system, name)
 
 
-def with_controller(system: System, law: str | None) -> System:
+def with_controller(system: System, law: str | None, swapped: Collection[str] = ()) -> System:
     """The system with one of the controllers that come with the package; None: as it is."""
     if law is None:
         return system
     from ..grasp.controllers import with_controller as with_shipped
 
-    return with_shipped(system, law)
+    return with_shipped(system, law, swapped)
 
 
 def chosen_metrics(files: Sequence[Path]) -> tuple[Metric, ...]:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import click
 
-from ..errors import InputError
 from ..system.description import System
 from ..system.structure import DIVERGING, SCHEMES
 from .frame import load_system, pair, together, with_controller, with_preset
@@ -17,7 +16,7 @@ set_option = click.option("--set", "settings", multiple=True, metavar="COMPONENT
 controller_option = click.option(
     "--controller",
     type=click.Choice(("published", "adaptive")),
-    help="The controller of ours that takes the place of SYSTEM's.",
+    help="The published controller or the adaptive one, in the place of the system's.",
 )
 
 system_options = together(
@@ -43,25 +42,16 @@ def set_values(settings: Sequence[str]) -> dict[str, Any]:
     return dict(pair("--set", text, "COMPONENT.VARIABLE=VALUE") for text in settings)
 
 
-def chosen_system(given: Mapping[str, Any]) -> System:
+def chosen_system(given: Mapping[str, Any], swapped: Collection[str] = ()) -> System:
     """The system with a controller, presets, the case last, another experiment; without --set.
 
-    `given` are the values of all options of a command by name.
+    `given` are the values of all options of a command by name, `swapped` the components that get
+    another FMU, of which the controller must be none.
     """
     step, stop, case = given["step"], given["stop"], given["case"]
-    system = with_controller(load_system(given["system"], step, stop), given["controller"])
+    loaded = load_system(given["system"], step, stop)
+    system = with_controller(loaded, given["controller"], swapped)
     names = [*given["presets"], *(["bench"] if given["bench"] else [])]
     for name in [*names, *([] if case is None else [f"case_{case}"])]:
         system = with_preset(system, name)
     return system.with_experiment(step, stop, given["scheme"], given["diverging"])
-
-
-def check_swaps(system: System, law: str | None, fmus: Mapping[str, str]) -> None:
-    """InputError where --swap replaces what --controller does, too."""
-    if law is None:
-        return
-    from ..grasp.controllers import controller_name
-
-    name = controller_name(system)
-    if name in fmus:
-        raise InputError(f"--controller {law}: must not come with --swap {name}={fmus[name]}")

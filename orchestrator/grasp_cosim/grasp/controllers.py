@@ -1,5 +1,7 @@
 """The controllers that come with the package, by the names of their laws."""
 
+from collections.abc import Collection
+
 from ..checks import choice
 from ..errors import InputError
 from ..files import FMU_FOLDER
@@ -13,11 +15,12 @@ CONTROLLERS = {
 """The published law, and the one that learns how the reflectances of the two faces differ."""
 
 
-def with_controller(system: System, law: str) -> System:
+def with_controller(system: System, law: str, swapped: Collection[str] = ()) -> System:
     """The system with the controller of that law in the place of the one that it has.
 
     Its FMU is the one beside that of the component in the role "controller", else in FMU_FOLDER.
-    InputError where no component has the role, that FMU is in neither place, or does not fit.
+    `swapped` are the components that get another FMU. InputError where it is one of them, where no
+    component has the role, and where that FMU is in neither place, or does not fit.
     """
     place = f"controller {choice('controller', law, tuple(CONTROLLERS))}"
     name = controller_name(system)
@@ -26,6 +29,8 @@ def with_controller(system: System, law: str) -> System:
             f"{place}: {system.name} has no component {name!r}; must have one, or one that "
             'is named under [roles]: controller = "..."'
         )
+    if name in swapped:
+        raise InputError(f"{place}: must not come with a swap of {name}")
     folders = (system.component(name, place).fmu.parent, FMU_FOLDER)
     fmu = next((f for folder in folders if (f := folder / CONTROLLERS[law]).is_file()), None)
     if fmu is None:

@@ -365,8 +365,7 @@ def _expected(variable: Variable) -> str:
     noun = "a whole number" if variable.kind == "Integer" else "a finite number"
     if variable.type not in ("Real", "Float64", "Integer"):
         noun = f"{noun} of type {variable.type}"
+    unit = variable.unit if variable.unit != "1" else None
     if not (math.isinf(variable.low) and math.isinf(variable.high)):
-        return " ".join(
-            filter(None, [f"{noun} from {variable.low:g} to {variable.high:g}", variable.unit])
-        )
-    return f"{noun} in {variable.unit}" if variable.unit else noun
+        return " ".join(filter(None, [f"{noun} from {variable.low:g} to {variable.high:g}", unit]))
+    return f"{noun} in {unit}" if unit else noun

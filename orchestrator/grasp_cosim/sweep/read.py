@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import partial
 from pathlib import Path
@@ -41,10 +41,10 @@ Load = Callable[[Path | None], System]
 """Reads a system; None stands for the built-in one."""
 
 Change = Callable[[System, str], System]
-"""Changes a system as a name says: by its preset, or to its controller."""
+"""Changes a system as the name of a preset says."""
 
 
-def _no_controller(_: System, name: str) -> System:
+def _no_controller(_: System, name: str, __: Collection[str]) -> System:
     raise InputError(f"controller {name!r}: there are none by name; must be a swap")
 
 
@@ -52,14 +52,16 @@ def _no_controller(_: System, name: str) -> System:
 class Made:
     """How the systems of studies are made.
 
-    `load` reads one, `preset` and `controller` change it. `fmus` is where FMUs under [swap] are,
-    None for beside the study.
+    `load` reads one, `preset` and `controller` change it, the latter with the names of what [swap]
+    replaces. `fmus` is where FMUs under [swap] are, None for beside the study. `law` is the
+    controller for a study that names none.
     """
 
     load: Load
     preset: Change = System.with_presets
-    controller: Change = _no_controller
+    controller: Callable[[System, str, Collection[str]], System] = _no_controller
     fmus: Path | None = None
+    law: str | None = None
 
 
 MOST_LEVELS = 100_000
@@ -90,7 +92,9 @@ def read_studies(
     if seed is not None:
         table["design"] = _drawn_anew(place, table, seed)
     if "variants" not in table:
-        return (_study(place, "", table, path.parent, made, metrics),)
+        alone = _study(place, "", table, path.parent, made, metrics)
+        _check_references([alone])
+        return (alone,)
     entries = table.pop("variants")
     if not isinstance(entries, list) or not entries:
         raise InputError(f"{place}: variants = {entries!r}: must be [[variants]] tables")
@@ -102,11 +106,17 @@ def read_studies(
         _study(f"{place}, {name}", name, _merged(table, entry), path.parent, made, metrics)
         for name, entry in zip(names, entries, strict=True)
     )
+    _check_references(studies)
+    return studies
+
+
+def _check_references(studies: Sequence[Study]) -> None:
+    """InputError where a limit is from a variant that is not there."""
+    names = [study.variant for study in studies if study.variant]
     for study in studies:
         for limit in study.limits:
             if limit.reference is not None:
                 known(f"{study.name}: limits: from: no variant", limit.reference, names)
-    return studies
 
 
 def _study(
@@ -203,14 +213,25 @@ def _system(
                 "one of them"
             )
     system = made.load(name)
-    law = table.get("controller")
+    law = _law(place, table, made)
     if law is not None:
-        law = text(f"{place}: controller", law, "the name of one")
-        system = _in(place, partial(made.controller, system, law))
+        system = _in(place, partial(made.controller, system, law, swaps))
     for said, preset in presets.items():
         system = _in(f"{place}: {said}", partial(made.preset, system, preset))
     revised = system.revised(swaps, fixed, (f"{place}: [swap]", f"{place}: [values]"))
     return _in(place, lambda: revised.with_experiment(table.get("step"), table.get("stop")))
+
+
+def _law(place: str, table: Mapping[str, Any], made: Made) -> str | None:
+    """The name of the controller, if one is asked for; InputError where it is so twice."""
+    own = table.get("controller")
+    if own is None:
+        return made.law
+    if made.law is not None:
+        raise InputError(
+            f"{place}: --controller {made.law}: must be left out, the study names {own!r}"
+        )
+    return text(f"{place}: controller", own, "the name of one")
 
 
 def _presets(place: str, table: Mapping[str, Any]) -> dict[str, str]:

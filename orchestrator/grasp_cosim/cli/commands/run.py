@@ -29,7 +29,7 @@ from ..frame import (
     show,
 )
 from ..native import native_option, natively
-from ..options import check_swaps, chosen_system, set_values, system_options
+from ..options import chosen_system, set_values, system_options
 from ..realtime import chosen_realtime, realtime_options, timing_lines
 from ..step_study import check_step_study, step_study_options, study_step
 
@@ -78,8 +78,7 @@ def run(
     check_step_study(given, paced is not None)
     fmus = dict(pair("--swap", text, "COMPONENT=FMU") for text in swaps)
     values = set_values(given["settings"])
-    system = chosen_system(given).with_isolation(given["isolation"])
-    check_swaps(system, given["controller"], fmus)
+    system = chosen_system(given, fmus).with_isolation(given["isolation"])
     system = system.revised(fmus, values, ("--swap", "--set"))
     metrics = chosen_metrics(metric_files)
     if given["step_study"]:

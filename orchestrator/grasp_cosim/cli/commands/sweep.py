@@ -18,7 +18,6 @@ from ...sweep.store import Store
 from ...sweep.study import STATISTICS, Pictures, Study
 from ...sweep.sweep import RUNS, Sweep
 from ...sweep.sweep import sweep as run_study
-from ...system.description import System
 from ..frame import (
     INTERRUPTED,
     NEGATIVE,
@@ -78,7 +77,8 @@ def sweep(
         raise InputError("--workers: must not come with --scheduler, whose workers there are")
     path = _file(study)
     folder = out or Path(path.stem if seed is None else f"{path.stem}-{seed}")
-    made = _made(controller, path)
+    fmus = FMU_FOLDER if path.parent == _built_in() else None
+    made = Made(load_system, with_preset, with_controller, fmus, controller)
     variants = read_studies(path, made, chosen_metrics(metric_files), seed)
     if plot and variants[0].pictures == Pictures():
         raise InputError(f"--plot: {path.name} has no [figures]; must say what to draw")
@@ -108,24 +108,14 @@ def _file(study: str) -> Path:
     path = Path(study)
     if path.suffix == ".toml" and path.is_file():
         return path
+    return study_file(study, _built_in())
+
+
+def _built_in() -> Path:
+    """The folder of the built-in studies."""
     from ...grasp.presets import STUDIES
 
-    return study_file(study, STUDIES)
-
-
-def _made(law: str | None, path: Path) -> Made:
-    """How the systems of a study are made, those of --controller where it is given."""
-    from ...grasp.presets import STUDIES
-
-    def load(file: Path | None) -> System:
-        return with_controller(load_system(file), law)
-
-    def controller(system: System, name: str) -> System:
-        if law is not None:
-            raise InputError(f"--controller {law}: must be left out, the study names {name!r}")
-        return with_controller(system, name)
-
-    return Made(load, with_preset, controller, FMU_FOLDER if path.parent == STUDIES else None)
+    return STUDIES
 
 
 def _as_json(
