@@ -86,7 +86,7 @@ def test_at_the_published_step_with_all_electronics(command: Run) -> None:
     assert recorded(command, "a", *asked) == recorded(command, "b", *asked, "--native")
 
 
-@pytest.mark.parametrize("plant", ["GripperPlantCompliant", "GripperPlantMovable"])
+@pytest.mark.parametrize("plant", [slow("GripperPlantCompliant"), "GripperPlantMovable"])
 def test_a_swapped_plant_has_its_own_twin(command: Run, fmus: Path, plant: str) -> None:
     asked = ("--swap", f"plant={fmus / plant}.fmu", *SHORT, "--case", "0")
     assert recorded(command, "a", *asked) == recorded(command, "b", *asked, "--native")

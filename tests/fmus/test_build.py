@@ -214,6 +214,7 @@ def test_a_damaged_fmu_is_built_again(fmus: Path, tmp_path: Path) -> None:
     assert [name for name in FILES if before[name] != after[name]] == ["ProximitySensor.fmu"]
 
 
+@pytest.mark.slow
 def test_cross_check_files_are_written_again_where_they_differ(fmus: Path, tmp_path: Path) -> None:
     for path in fmus.iterdir():
         shutil.copy(path, tmp_path)

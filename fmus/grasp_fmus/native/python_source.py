@@ -2,6 +2,7 @@
 
 import ast
 import io
+import re
 import sys
 import tokenize
 from math import isinf
@@ -23,7 +24,7 @@ class Source:
         self.name, self.names, self.file = name, names, file
         self.tree = ast.parse(text)
         self.comments, self.own_line = _comments(text)
-        self.text = text
+        self._lines = re.split("\r\n?|\n", text)
         self._imports: set[str] | None = None
         self._functions = dict(_functions(self.tree.body, ""))
         self.assigned = {target.id: node for node in self.tree.body for target in _targets(node)}
@@ -89,10 +90,12 @@ class Source:
 
     def digits(self, node: ast.Constant) -> str | None:
         """A float as it is written, where C reads the same."""
-        text = ast.get_source_segment(self.text, node) or ""
-        plain = text.replace("_", "")
+        if not isinstance(node.value, float):
+            return None
+        line = self._lines[node.lineno - 1].encode()
+        plain = line[node.col_offset : node.end_col_offset].decode().replace("_", "")
         is_decimal = bool(plain) and set(plain) <= set("0123456789.eE+-") and plain[0] != "-"
-        if not isinstance(node.value, float) or not is_decimal or float(plain) != node.value:
+        if not is_decimal or float(plain) != node.value:
             return None
         digits = plain.lower().partition("e")[0]
         if isinf(node.value) or (node.value == 0.0 and set(digits) - set("0.")):

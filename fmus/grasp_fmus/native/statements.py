@@ -1087,42 +1087,13 @@ def _with(v: Value, name: str, to: str) -> Value:
 
 def _renamed(text: str, name: str, to: str) -> str:
     """A text of C with a variable called otherwise; not a field of the same name."""
-    out, i = "", 0
-    while i < len(text):
-        c = text[i]
-        if c.isalpha() or c == "_":
-            j = i
-            while j < len(text) and (text[j].isalnum() or text[j] == "_"):
-                j += 1
-            word = text[i:j]
-            is_field = i > 0 and (text[i - 1] == "." or text[i - 2 : i] == "->")
-            out += to if word == name and not is_field else word
-            i = j
-        elif c == '"' or text.startswith("/*", i):
-            j = _after_said(text, i)
-            out += text[i:j]
-            i = j
-        elif c.isdigit():
-            j = i
-            while j < len(text) and (text[j].isalnum() or text[j] in "._"):
-                j += 1
-            out += text[i:j]
-            i = j
-        else:
-            out += c
-            i += 1
-    return out
+    if name not in text:
+        return text
+    return _TOKEN.sub(lambda found: to if found[0] == name else found[0], text)
 
 
-def _after_said(text: str, start: int) -> int:
-    """Where a text or a comment of C ends."""
-    if text[start] == "/":
-        return text.index("*/", start) + 2
-    end = start + 1
-    while text[end] != '"':
-        end += 2 if text[end] == "\\" else 1
-    return end + 1
-
+_TOKEN = re.compile(r'/\*.*?\*/|"(?:\\.|[^"\\])*"|\d[\w.]*|(?:\.|->)?[^\W\d]\w*', re.DOTALL)
+"""A comment, a text, a number, or a name with what makes it a field."""
 
 _STATEMENTS: dict[type[ast.stmt], str] = {
     ast.While: "while is not in the subset, as a step must end; use for ... in range(n) with break",
