@@ -74,6 +74,29 @@ def test_a_signal_at_the_end_of_a_process_is_no_traceback() -> None:
     assert (run.returncode, run.stderr) == (0, b"")
 
 
+class _Cleared:
+    def __init__(self, error: type[BaseException]) -> None:
+        self.error = error
+
+    def __del__(self) -> None:
+        if self.error is KeyboardInterrupt:
+            signal.raise_signal(signal.SIGINT)
+        raise self.error
+
+
+def _clear(error: type[BaseException]) -> None:
+    _Cleared(error)
+
+
+def test_ctrl_c_while_a_process_clears_away_is_no_traceback(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    run_all(_clear, [KeyboardInterrupt], 1, progress=False, what="runs")
+    assert capfd.readouterr().err == ""
+    run_all(_clear, [ValueError], 1, progress=False, what="runs")
+    assert "ValueError" in capfd.readouterr().err
+
+
 def test_ctrl_c_while_a_process_starts_is_not_lost(monkeypatch: pytest.MonkeyPatch) -> None:
     start = SpawnProcess.start
 

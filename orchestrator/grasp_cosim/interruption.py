@@ -9,6 +9,7 @@ import ctypes
 import fcntl
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -41,11 +42,21 @@ def command() -> None:
 
 
 def worker() -> None:
-    """Have Ctrl-C end this process once, and nothing else: whoever started it will kill it."""
+    """Have Ctrl-C end this process once, and nothing else: whoever started it will kill it.
+
+    Where it comes while an object is cleared away, Python tells of it and goes on; it is not told.
+    """
     global _afterwards
     _afterwards = signal.SIG_IGN
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     _handle(signal.SIGINT, _interrupt)
+    sys.unraisablehook = _told
+
+
+def _told(unraisable: "sys.UnraisableHookArgs") -> None:
+    """Tell of an error that cannot be raised, but not of Ctrl-C."""
+    if not isinstance(unraisable.exc_value, KeyboardInterrupt):
+        sys.__unraisablehook__(unraisable)
 
 
 def end_with(lifeline: int) -> None:

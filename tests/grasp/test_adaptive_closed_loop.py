@@ -21,6 +21,8 @@ STEP = 1e-3
 
 FINGER = (1, 2)
 
+CARD = Path(__file__).parents[2] / "controller/README.md"
+
 P_0 = 0.1
 """N, hold.squeeze."""
 
@@ -158,3 +160,12 @@ def test_a_start_within_millimetres_of_a_face(natives: Path, alpha: Pair, gap: f
     assert max(result.metrics["impact_velocity"]) < 8e-3
     assert last(result, "plant.contact_force") == pytest.approx((3.43, -3.43), abs=5e-3)
     assert np.all(np.abs(np.log(result["controller.reflectance_ratio"])) <= 2.5)
+
+
+def test_the_card_says_what_is_learnt_of_black_and_white(natives: Path) -> None:
+    result = run(adaptive_grasp(natives), values_of((0.57, 1.0)), STEP, 2.0)
+    first = int(min(result.metrics["time_to_contact"]) / STEP)
+    learnt = result["controller.reflectance_ratio"][first]
+    deviation = result["controller.reflectance_ratio_standard_deviation"][first]
+    said = f"Black on white at the first contact: {learnt:.3f} with {deviation:.4f}."
+    assert said in " ".join(CARD.read_text("utf-8").split())
