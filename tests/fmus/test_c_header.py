@@ -17,6 +17,7 @@ from time import monotonic, sleep
 from typing import IO, NamedTuple
 
 import pytest
+from conftest import MadeOnce
 from grasp_cosim.hil.driven import MOST_LOST
 from grasp_fmus.c_header import c_header, c_prefix
 from grasp_fmus.contract import Field, declared
@@ -113,11 +114,14 @@ def compile_c(
 
 
 @pytest.fixture(scope="session")
-def driver(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def driver(made_once: MadeOnce) -> Path:
     """The header for every kind behind a pipe, with all the compiler can check at run time."""
-    header = c_header("EveryKind", EVERY_KIND)
-    folder = tmp_path_factory.mktemp("driver")
-    return compile_c(folder, header, "EveryKind", NATIVE / "link_driver.c", *SANITISED)
+
+    def fill(folder: Path) -> None:
+        header = c_header("EveryKind", EVERY_KIND)
+        compile_c(folder, header, "EveryKind", NATIVE / "link_driver.c", *SANITISED)
+
+    return made_once("driver", fill) / "program"
 
 
 def driven(driver: Path, *words: str, pipe: bytes = b"") -> bytes:
@@ -663,10 +667,12 @@ def test_nothing_that_is_received_does_harm(driver: Path, key: bytes | None) -> 
 
 
 @pytest.fixture(scope="session")
-def target(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    header = c_header("GripperPlant", *plant())
-    folder = tmp_path_factory.mktemp("target")
-    return compile_c(folder, header, "GripperPlant", NATIVE / "plant_target.c", *SANITISED)
+def target(made_once: MadeOnce) -> Path:
+    def fill(folder: Path) -> None:
+        header = c_header("GripperPlant", *plant())
+        compile_c(folder, header, "GripperPlant", NATIVE / "plant_target.c", *SANITISED)
+
+    return made_once("target", fill) / "program"
 
 
 class Target:
