@@ -75,9 +75,9 @@ def sweep(
     """
     if workers is not None and scheduler is not None:
         raise InputError("--workers: must not come with --scheduler, whose workers there are")
-    path = _file(study)
+    path, built_in = _file(study)
     folder = out or Path(path.stem if seed is None else f"{path.stem}-{seed}")
-    fmus = FMU_FOLDER if path.parent == _built_in() else None
+    fmus = FMU_FOLDER if built_in else None
     made = Made(load_system, with_preset, with_controller, fmus, controller)
     variants = read_studies(path, made, chosen_metrics(metric_files), seed)
     if plot and variants[0].pictures == Pictures():
@@ -103,19 +103,14 @@ def sweep(
     return NEGATIVE if failed or not all(limit.kept for limit in limits) else 0
 
 
-def _file(study: str) -> Path:
-    """The file of a study, given by its path or by the name of a built-in one."""
+def _file(study: str) -> tuple[Path, bool]:
+    """The file of a study, given by its path or by its name, where it is a built-in one."""
     path = Path(study)
     if path.suffix == ".toml" and path.is_file():
-        return path
-    return study_file(study, _built_in())
-
-
-def _built_in() -> Path:
-    """The folder of the built-in studies."""
+        return path, False
     from ...grasp.presets import STUDIES
 
-    return STUDIES
+    return study_file(study, STUDIES), True
 
 
 def _as_json(
