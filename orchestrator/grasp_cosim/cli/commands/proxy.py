@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
-from grasp_fmus.link.signature import Signature
 from grasp_fmus.model_description import Experiment, Unit
 from grasp_fmus.proxy import DEFAULTS, Settings
 from grasp_fmus.variable import Enumeration
@@ -84,7 +83,7 @@ def proxy(
     report: dict[str, object] = {"notes": notes}
     lines = []
     try:
-        text = _header(interface, signature) if c_header is not None else ""
+        text = _header(interface) if c_header is not None else ""
         if out is not None:
             original = _original(interface, [v.name for v in signature.variables])
             settings = Settings(host, port, timeout)
@@ -109,10 +108,11 @@ def proxy(
     return 0
 
 
-def _header(interface: Interface, signature: Signature) -> str:
+def _header(interface: Interface) -> str:
     """The C header of the peer."""
     from grasp_fmus.c_header import c_header
 
+    signature, _ = link_signature(interface)
     starts = {v.name: _start(interface.by_name[v.name]) for v in signature.request}
     known = {name: start for name, start in starts.items() if start is not None}
     said = {v.name: v.description or "" for v in interface.variables}
