@@ -14,8 +14,9 @@ import subprocess
 import sys
 import tempfile
 import time
-from contextlib import suppress
+from contextlib import redirect_stdout, suppress
 from dataclasses import replace
+from io import StringIO
 from pathlib import Path
 
 from grasp_cosim import System, cli, simulate
@@ -35,6 +36,12 @@ TARGET = Path(__file__).parent.parent / "docs/controller_target.c"
 PEERS = Path(__file__).parent.parent / "tests/hil/peers.py"
 
 
+def _made(command: list[str]) -> int:
+    """The exit code of a command that prints nothing: figures alone are printed."""
+    with redirect_stdout(StringIO()):
+        return cli.main(command)
+
+
 def peers(system: System, name: str) -> Program:
     """A program that starts processes which serve a component in lockstep, and kills them.
 
@@ -46,7 +53,7 @@ def peers(system: System, name: str) -> Program:
 def proxied(system: System, name: str, folder: Path, *options: str) -> System:
     """The system with a component behind a proxy."""
     fmu, proxy = system.component(name, name).fmu, folder / f"{name}_proxy.fmu"
-    if cli.main(["proxy", str(fmu), "-o", str(proxy), *options]):
+    if _made(["proxy", str(fmu), "-o", str(proxy), *options]):
         raise RuntimeError(f"{fmu}: no proxy")
     return system.swap(name, proxy).with_values(
         {f"{name}.proxy.timeout": 10.0, f"{name}.proxy.misses_tolerated": TOLERATED}
@@ -78,9 +85,9 @@ def native_cost(folder: Path) -> None:
     fmus, code, target = folder / "native", folder / "c", folder / "target"
     original = fmus / "GraspController.fmu"
     made = [
-        cli.main(["build", "--native", "--out", str(fmus)]),
-        cli.main(["build", "--native", "--c-only", str(code), "GraspController"]),
-        cli.main(["proxy", str(original), "--c-header", str(code / "grasp_controller.h")]),
+        _made(["build", "--native", "--out", str(fmus)]),
+        _made(["build", "--native", "--c-only", str(code), "GraspController"]),
+        _made(["proxy", str(original), "--c-header", str(code / "grasp_controller.h")]),
     ]
     sources = [str(TARGET), str(code / "GraspController.c")]
     flags = ["-std=c99", "-O2", "-ffp-contract=off", "-I", str(code)]

@@ -182,14 +182,14 @@ def _address(host: str, port: int, left: Callable[[], float]) -> Any:
     """
     try:
         return _found(host, port, socket.AI_NUMERICHOST)
-    except (OSError, UnicodeError):
+    except OSError:
         pass  # it is a name
     answer: list[Any] = []
 
     def look_up() -> None:
         try:
             answer.append(_found(host, port))
-        except (OSError, UnicodeError) as error:
+        except OSError as error:
             answer.append(error)
 
     thread = Thread(target=look_up, daemon=True)
@@ -203,4 +203,5 @@ def _address(host: str, port: int, left: Callable[[], float]) -> Any:
 
 
 def _found(host: str, port: int, flags: int = 0) -> Any:
-    return socket.getaddrinfo(host, port, socket.AF_INET, socket.SOCK_DGRAM, 0, flags)[0][4]
+    name = host.encode()  # as it is: a text would be in IDNA, or refused where it cannot be
+    return socket.getaddrinfo(name, port, socket.AF_INET, socket.SOCK_DGRAM, 0, flags)[0][4]

@@ -245,8 +245,8 @@ class Fmi2Proxy(Slave):
         deadline = self._deadline(settings.connect_timeout)
         try:
             connection = Connection(settings.host, settings.port, client, deadline, self.clock)
-        except (OSError, UnicodeError) as error:
-            reason = getattr(error, "strerror", None) or error
+        except OSError as error:
+            reason = error.strerror or error
             raise RefusalError(f"{_peer(settings)}: no connection: {reason}") from error
         self._connection, self._address = connection, address
         self._close = finalize(self, connection.close)

@@ -9,7 +9,7 @@ from .fmu import Model, write_fmu
 from .folder import Built
 from .host_log import ERROR, WARNING
 from .model_description import UNITS, Description, Experiment, Unit
-from .proxy import DEFAULTS, Settings, own_variables
+from .proxy import DEFAULTS, Settings, bounded, own_variables
 from .variable import Variable
 
 
@@ -36,8 +36,8 @@ def build_proxy(
     """Build the proxy of an FMU; its own parameters start at `settings`.
 
     `bind_python` is as in build(). A proxy that is there with the same content is left alone.
-    ValueError where the stem of `target` is no identifier of C, a setting is out of its range, or a
-    name is taken.
+    ValueError where the stem of `target` is no identifier of C, a setting is out of its range, a
+    text is too long to be sent, or a name is taken.
     """
     return write_fmu(target, proxy_model(target, original, settings), bind_python)
 
@@ -53,7 +53,7 @@ def proxy_model(target: Path, original: Original, settings: Settings) -> Model:
     if taken:
         raise ValueError(f"{original.file}: {taken[0]}: proxy. begins the names of a proxy's own")
     own = own_variables([v for v in original.variables if v.causality == "output"], settings)
-    for v in own:
+    for v in bounded([*original.variables, *own], len(original.variables)):
         if v.start is not None:
             v.check(v.start)
     description = Description(

@@ -287,13 +287,22 @@ def test_a_name_that_is_not_resolved_in_time() -> None:
         ({"on_loss": "panic"}, "proxy.on_loss = 'panic': must be hold, failsafe, stop"),
         ({"key_file": "/no/such"}, "proxy.key_file = '/no/such': No such file or directory"),
         ({"host": "no such host"}, "no such host:PORT: no connection: "),
-        ({"host": "."}, ".:PORT: no connection: "),
     ],
 )
 def test_settings_that_are_none(setting: dict[str, Any], reason: str) -> None:
     host = Host(9, Clock(), **setting)
     line = refused(host, host.slave.enter_initialization_mode)
     assert line.startswith(f"proxy, t = 0 s: {reason.replace('PORT', '9')}")
+
+
+@pytest.mark.parametrize("name", [".", "a..b", "ä.invalid", "h" * 64])
+def test_a_name_is_given_to_the_resolver_as_it_is(name: str) -> None:
+    """So that both kinds of proxy say the same of one that there cannot be."""
+    with pytest.raises(socket.gaierror) as known:
+        socket.getaddrinfo(name.encode(), 9, socket.AF_INET, socket.SOCK_DGRAM)
+    host = Host(9, Clock(), host=name)
+    line = refused(host, host.slave.enter_initialization_mode)
+    assert line == f"proxy, t = 0 s: {name}:9: no connection: {known.value.strerror}"
 
 
 @pytest.mark.parametrize(

@@ -384,6 +384,26 @@ def test_start_values_that_no_datagram_holds(tmp_path: Path, run: Run) -> None:
     assert "input u_Real is INF at the start" in err
 
 
+@native_fmus.needs_gcc
+@pytest.mark.parametrize("options", [["-o", "P.fmu"], ["--c-header", "p.h", "-o", "P.fmu"]])
+@pytest.mark.parametrize("native", [[], ["--native"]])
+def test_a_text_that_is_too_long_to_be_sent(
+    tmp_path: Path, run: Run, options: list[str], native: list[str]
+) -> None:
+    """Neither the header nor the FMU is written; in C such a start would be written over others."""
+
+    def wordy(root: Element) -> None:
+        for v in root.iter("ScalarVariable"):
+            if v.get("name") == "u_String":
+                v[0].set("start", "x" * 128)
+
+    original = rewritten(native_fmus.build(tmp_path, version="2.0"), wordy)
+    code, _, err = run(original, *options, *native)
+    assert (code, err.count("\n"), list(Path().iterdir())) == (2, 1, [])
+    assert "u_String = 'xxx" in err
+    assert "bytes in UTF-8" in err
+
+
 def test_a_proxy_of_a_proxy_has_no_names_left(fmus: Path, proxy: Proxy, run: Run) -> None:
     made = proxy(fmus / "ProximitySensor.fmu")
     code, _, err = run(made, "-o", "Second.fmu")
@@ -518,6 +538,9 @@ def test_the_peers_side_as_a_c_header(fmus: Path, run: Run) -> None:
         (["ProximitySensor.fmu", "-o", "P.fmu", "--timeout", "nan"],
          "proxy.timeout = nan s: must be from 1e-06 to 3600 s"),
         (["ProximitySensor.fmu", "-o", "P.fmu", "--port", "0"], "0 is not in the range"),
+        (["ProximitySensor.fmu", "-o", "P.fmu", "--host", "h" * 1024], "must have 0 to 1023 bytes"),
+        (["ProximitySensor.fmu", "-o", "P.fmu", "--native", "--host", "h" * 1024],
+         "must have 0 to 1023 bytes"),
         (["ProximitySensor.fmu", "-o", "P.fmu", "--bind-python", ""], "--bind-python ''"),
         (["ProximitySensor.fmu", "-o", "P.fmu", "--fmi", "3"], "--fmi 3: must be with --native"),
         (["ProximitySensor.fmu", "-o", "P.fmu", "--native", "--target", "vax"], "--target 'vax'"),

@@ -73,8 +73,7 @@ def proxy(
     Example: grasp-cosim proxy fmus/build/GripperPlant.fmu -o GripperPlantProxy.fmu --timeout 0.001
     Native: grasp-cosim proxy vendor.fmu -o Bench.fmu --native --target linux64,win64
     """
-    from grasp_fmus.c_header import c_header as header  # only here: they take time to load
-    from grasp_fmus.native.compilers import CompilerError
+    from grasp_fmus.native.compilers import CompilerError  # only here: they take time to load
     from grasp_fmus.proxy_build import build_proxy
 
     _check_paths(fmu, out, c_header)
@@ -84,6 +83,7 @@ def proxy(
     report: dict[str, object] = {"notes": notes}
     lines = []
     try:
+        text = _header(interface) if c_header is not None else ""
         if out is not None:
             original = _original(interface, [v.name for v in signature.variables])
             settings = Settings(host, port, timeout)
@@ -95,10 +95,7 @@ def proxy(
             lines += [f"{out}: {built.status}", *(f"    {change}" for change in built.changes)]
             report |= {"fmu": str(out), "status": built.status, "changes": list(built.changes)}
         if c_header is not None:
-            starts = {v.name: _start(interface.by_name[v.name]) for v in signature.request}
-            known = {name: start for name, start in starts.items() if start is not None}
-            said = {v.name: v.description or "" for v in interface.variables}
-            write_text(c_header, header(interface.identifier, signature, known, said))
+            write_text(c_header, text)
             lines.append(f"{c_header}: written")
             report["c_header"] = str(c_header)
     except ValueError as error:
@@ -109,6 +106,17 @@ def proxy(
         say(note)
     show(as_json, report, "\n".join(lines))
     return 0
+
+
+def _header(interface: Interface) -> str:
+    """The C header of the peer."""
+    from grasp_fmus.c_header import c_header
+
+    signature, _ = link_signature(interface)
+    starts = {v.name: _start(interface.by_name[v.name]) for v in signature.request}
+    known = {name: start for name, start in starts.items() if start is not None}
+    said = {v.name: v.description or "" for v in interface.variables}
+    return c_header(interface.identifier, signature, known, said)
 
 
 def _check_native(
