@@ -69,16 +69,22 @@ def native_description(d: Description, guid: str, fmi: Literal[2, 3]) -> bytes:
 def build_description(name: str, fmi: Literal[2, 3], networked: bool = False) -> bytes:
     """Return sources/buildDescription.xml, which FMI 2.0 takes as FMI 3.0 defines it.
 
-    One that is networked names the library of sockets on Windows.
+    One that is networked has a configuration of its own for Windows, with the library of sockets;
+    hosts that read a single one take the first, which links everywhere else.
     """
     root = Element("fmiBuildDescription", fmiVersion="3.0")
-    configuration = SubElement(root, "BuildConfiguration", modelIdentifier=name)
+    _add_configuration(root, name, modelIdentifier=name)
+    if networked:
+        windows = _add_configuration(root, name, modelIdentifier=name, platform="x86_64-windows")
+        SubElement(windows, "Library", name="ws2_32", description="the sockets of Windows")
+    return document(root)
+
+
+def _add_configuration(root: Element, name: str, **attributes: str) -> Element:
+    configuration = SubElement(root, "BuildConfiguration", attributes)
     files = SubElement(configuration, "SourceFileSet", language="C99", compilerOptions=OPTIONS)
     SubElement(files, "SourceFile", name=f"{name}.c")
-    if networked:
-        said = "the sockets of Windows; elsewhere there is none to link with"
-        SubElement(configuration, "Library", name="ws2_32", description=said)
-    return document(root)
+    return configuration
 
 
 def _type(v: Variable) -> str:

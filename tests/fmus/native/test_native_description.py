@@ -132,3 +132,12 @@ def test_the_time_has_a_name_of_its_own() -> None:
              for name in ("time", "time_")]  # fmt: skip
     root = fromstring(native_description(Description("Mass", "", taken), "G", 3))
     assert [v.get("name") for v in root.findall("ModelVariables/*")] == ["time", "time_", "time__"]
+
+
+def test_the_sockets_of_windows_are_linked_on_windows_alone() -> None:
+    first, windows = fromstring(build_description("P", 3, networked=True))
+    assert first.get("platform") is None
+    assert first.find("Library") is None
+    assert windows.get("platform") == "x86_64-windows"
+    assert [library.get("name") for library in windows.iter("Library")] == ["ws2_32"]
+    assert [f.get("name") for f in windows.iter("SourceFile")] == ["P.c"]
