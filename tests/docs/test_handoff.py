@@ -29,7 +29,7 @@ class Bench:
     """The terminal bench$: what it starts goes on in the background."""
 
     def __init__(self) -> None:
-        self._processes: list[subprocess.Popen[str]] = []
+        self._processes: list[subprocess.Popen[bytes]] = []
 
     def __enter__(self) -> Self:
         return self
@@ -44,13 +44,13 @@ class Bench:
             env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
-            text=True,
+            bufsize=0,  # a line that was read ahead is one that select() does not know of
         )
         self._processes.append(process)
         assert process.stdout is not None
         end = monotonic() + 60.0
         while select([process.stdout], [], [], end - monotonic())[0]:
-            line = process.stdout.readline()
+            line = process.stdout.readline().decode()
             assert line, words
             if READY.match(line):
                 return

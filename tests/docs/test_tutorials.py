@@ -58,7 +58,8 @@ def checked(name: str, checkout: Path) -> tuple[list[Any], Any]:
     """The runs of the tables of a page, whose cells and pictures must be those of the runs.
 
     The cells must be the same to the printed digit: the runs are deterministic. Of the pictures a
-    few pixels may be others, as another processor rounds.
+    few pixels may be others, as another processor rounds. Maps of studies, which take minutes, have
+    the name of the study whose command on the page draws them.
     """
     image = pytest.importorskip("matplotlib.image")
     tutorials = load_tutorials()
@@ -68,8 +69,9 @@ def checked(name: str, checkout: Path) -> tuple[list[Any], Any]:
     drawn = checkout / "drawn"
     drawn.mkdir()
     tutorials.PAGES[name](tables, drawn)
-    pictures = re.findall(r"!\[.*?\]\((.*?)\)", page(name))
-    assert sorted(p.name for p in drawn.iterdir()) == sorted(pictures)
+    pictures = [p.name for p in drawn.iterdir()]
+    maps = [f"{study}.png" for study in re.findall(r"grasp-cosim sweep (\w+) --plot", page(name))]
+    assert sorted([*pictures, *maps]) == sorted(re.findall(r"!\[.*?\]\((.*?)\)", page(name)))
     for picture in pictures:
         new, kept = (image.imread(folder / picture) for folder in (drawn, DOCS))
         assert new.shape == kept.shape

@@ -29,7 +29,9 @@ TIMEOUT = 0.01
 PATIENCE = 0.2
 """s that a proxy waits for a peer that is killed before the run has begun."""
 
-STEPS = 150
+STEPS = 3000
+"""More than a peer on this machine answers within the longest time after which it is killed."""
+
 FAILSAFE = {"force[1]": -0.125, "force[2]": 0.25}
 
 HELD = ("proxy.hold.target_position", "proxy.hold.virtual_position[1]")
