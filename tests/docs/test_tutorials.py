@@ -142,8 +142,12 @@ def test_colour(checkout: Path) -> None:
     blind, blind_published = list(saturated.values())[2:]
     assert blind.metrics["time_difference"] > blind_published.metrics["time_difference"]
     assert min(run.metrics["impact_velocity"][1] for run in (blind, blind_published)) > 0.06
-    lost, lost_published = (list(near.values())[k].metrics["time_difference"] for k in (2, 4))
-    assert lost == pytest.approx(lost_published, abs=0.02)
+    published = " --set sensor_1.reflectance=1 --controller published"
+    for place in ("0.07", "0.05 --set plant.object_width=0.08"):
+        late, late_published = (near[f"{place}{law}"] for law in ("", published))
+        assert late.metrics["time_difference"] == pytest.approx(
+            late_published.metrics["time_difference"], abs=0.02
+        )
     (alpha, gap, seen, noise) = said(
         "colour", r"At ([\d.]+) the light of a gap of (\d+) mm is (\d+) mV, .*?one sample, (\d+) mV"
     )
