@@ -159,7 +159,7 @@ static void slave_put_quoted(Slave *s, const char *text)
 {
     char quote[2] = "'";
     const char *end = text + SLAVE_LARGEST_SHOWN;
-    quote[0] = strchr(text, '\'') && !strchr(text, '"') ? '"' : '\'';
+    quote[0] = text[strcspn(text, "'")] && !text[strcspn(text, "\"")] ? '"' : '\'';
     slave_put(s, quote);
     while (*text && text < end) {
         int is_one;
