@@ -1,0 +1,160 @@
+/* What a model file defines, and what fmi2.c and fmi3.c make an FMU of.
+ *
+ * A model file has an enum of its variables, which are also the value references, TIME first and
+ * VARIABLES last; the number of its STATES and INDICATORS; the two lists of states and their
+ * derivatives; which variables are inputs or tunable; and four functions. It includes this header
+ * between the numbers and the functions, and FMI (fmi2.c or fmi3.c) at its end.
+ *
+ * Model exchange integrates nothing here. Co-simulation takes Runge-Kutta steps of SUBSTEP at most,
+ * and halves them at an event.
+ */
+#ifndef MODEL_H
+#define MODEL_H
+
+#include <math.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define SUBSTEP 1e-3 /* s */
+#define ROOM (STATES + INDICATORS + 1)
+
+typedef union { /* of any type of FMI; in FMI 2.0 Float64, Int32, Boolean, String */
+    double Float64;
+    float Float32;
+    int8_t Int8;
+    uint8_t UInt8;
+    int16_t Int16;
+    uint16_t UInt16;
+    int32_t Int32;
+    uint32_t UInt32;
+    int64_t Int64;
+    uint64_t UInt64;
+    bool Boolean;
+    char String[128];
+} Value;
+
+typedef enum { INSTANTIATED, INITIALIZATION, EVENT, CONTINUOUS, STEP, TERMINATED } Mode;
+
+typedef struct {
+    Value v[VARIABLES];
+    double time, next;                /* s; of the next time event, INFINITY where there is none */
+    bool again;                       /* the event needs another iteration */
+    bool states_changed, nominals_changed, ended;
+    double nominal[ROOM];             /* of the states */
+    Mode mode;
+    bool exchange;                    /* model exchange, else co-simulation */
+    size_t binary;                    /* bytes of a Binary, which is in a String */
+    void *host;
+    void *log;
+    char name[128];
+} Model;
+
+/* Of the model file. */
+static void start(Model *m);                        /* start values */
+static void equations(Model *m);                    /* what follows from time, states, inputs */
+static void indicators(const Model *m, double z[]); /* an event is where one leaves z > 0, or enters */
+static void event(Model *m);                        /* one iteration of an event */
+static bool completed(Model *m);                    /* a step of the solver; true for an event there */
+
+static double *real(Model *m, int variable) { return &m->v[variable].Float64; }
+
+static void set_time(Model *m, double time) { m->time = *real(m, TIME) = time; }
+
+static void put_states(Model *m, const double x[]) {
+    for (int i = 0; i < STATES; i++) *real(m, state[i]) = x[i];
+}
+
+static void get_states(Model *m, double x[]) {
+    for (int i = 0; i < STATES; i++) x[i] = *real(m, state[i]);
+}
+
+static void slopes(Model *m, double dx[]) {
+    equations(m);
+    for (int i = 0; i < STATES; i++) dx[i] = *real(m, derivative[i]);
+}
+
+/* Iterate an event at the current time until nothing changes. */
+static void settle(Model *m) {
+    do {
+        m->again = false;
+        event(m);
+    } while (m->again);
+    equations(m);
+}
+
+/* From the states x at a time over a step of h seconds, by the classical Runge-Kutta method. */
+static void integrate(Model *m, double time, const double x[], double h) {
+    static const double at[4] = {0.0, 0.5, 0.5, 1.0}, weight[4] = {1.0, 2.0, 2.0, 1.0};
+    double dx[ROOM] = {0.0}, mean[ROOM] = {0.0}, y[ROOM];
+
+    for (int k = 0; k < 4; k++) {
+        for (int i = 0; i < STATES; i++) y[i] = x[i] + at[k] * h * dx[i];
+        put_states(m, y);
+        set_time(m, time + at[k] * h);
+        slopes(m, dx);
+        for (int i = 0; i < STATES; i++) mean[i] += weight[k] * dx[i] / 6.0;
+    }
+    for (int i = 0; i < STATES; i++) y[i] = x[i] + h * mean[i];
+    put_states(m, y);
+    set_time(m, time + h);
+    equations(m);
+}
+
+/* True if an indicator is on another side of 0 than in z. */
+static bool crossed(const Model *m, const double z[]) {
+    double now[ROOM];
+
+    indicators(m, now);
+    for (int i = 0; i < INDICATORS; i++)
+        if ((now[i] > 0.0) != (z[i] > 0.0)) return true;
+    return false;
+}
+
+/* Co-simulation: go on to a time, or to where the model asks for the end. */
+static void advance(Model *m, double end) {
+    double x[ROOM], z[ROOM];
+
+    while (m->time < end && !m->ended) {
+        double begin = m->time, stop = fmin(fmin(end, m->next), begin + SUBSTEP);
+        double low = 0.0, high = stop - begin;
+        bool at_event;
+
+        get_states(m, x);
+        indicators(m, z);
+        integrate(m, begin, x, high);
+        at_event = crossed(m, z);
+        for (int i = 0; i < 60 && at_event; i++) {
+            double middle = 0.5 * (low + high);
+            integrate(m, begin, x, middle);
+            if (crossed(m, z)) high = middle;
+            else low = middle;
+        }
+        if (at_event) integrate(m, begin, x, high);
+        else set_time(m, stop);
+        if (at_event || m->time >= m->next) settle(m);
+    }
+}
+
+static Model *made(const char *name, bool exchange) {
+    Model *m = calloc(1, sizeof(Model));
+
+    snprintf(m->name, sizeof m->name, "%s", name);
+    m->exchange = exchange;
+    m->next = INFINITY;
+    for (int i = 0; i < ROOM; i++) m->nominal[i] = 1.0;
+    start(m);
+    return m;
+}
+
+/* True if a variable may be set now. */
+static bool may_set(const Model *m, unsigned variable, bool continuous) {
+    if (variable == TIME || variable >= VARIABLES) return false;
+    if (m->mode == INSTANTIATED || m->mode == INITIALIZATION) return true;
+    if (m->mode == CONTINUOUS) return INPUT(variable) && continuous;
+    return (m->mode == EVENT || m->mode == STEP) && (INPUT(variable) || TUNABLE(variable));
+}
+
+#endif
