@@ -139,7 +139,10 @@ WRONG = [
     (["GripperPlant.fmu"], "Missing option '--as'"),
     (["none.fmu", "--as", "plant"], "none.fmu: no such FMU file"),
     (["GripperPlant.fmu", "--as", "hand"], "--as hand: no component 'hand'; valid: plant, se"),
-    (["GripperPlant.fmu", "--as", "plant", "--rename", "gap"], "VARIABLE=CANDIDATES_VARIABLE"),
+    (
+        ["GripperPlant.fmu", "--as", "plant", "--rename", "gap"],
+        "[COMPONENT.]VARIABLE=FMUS_VARIABLE",
+    ),
     (["GripperPlant.fmu", "--as", "plant", "--rename", "a=b"], "'a' = 'b': GripperPlant.fmu has"),
     (["GripperPlant.fmu", "--as", "plant", "--set", "plant.x=1"], "no input or parameter 'x'"),
     (["GripperPlant.fmu", "--as", "plant", "--bands", "no.toml"], "no.toml: no such file of bands"),

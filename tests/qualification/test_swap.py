@@ -57,7 +57,11 @@ ONE: list[tuple[dict[str, str], tuple[str, str, str], str]] = [
         r"output is connected .*; its outputs: touching, s",
     ),
     (without("force"), ("blocks", "missing", "force"), r"input is connected .*missing.*: none"),
-    (without("width"), ("blocks", "missing", "width"), r"parameter is set in the system, but miss"),
+    (
+        without("width"),
+        ("warns", "missing", "width"),
+        r"parameter is set to 0.07 in .*left out",
+    ),
     (without("spare"), ("warns", "missing", "spare"), r"^output is missing$"),
     (without("mass"), ("notes", "missing", "mass"), r"^parameter is missing$"),
     (without("inner"), ("", "", ""), ""),
@@ -172,8 +176,8 @@ def test_all_differences_are_found_at_once_the_worst_first(system: System, tmp_p
     result = of_variables(system, tmp_path, variables)
     assert found(result) == [
         ("blocks", "missing", "gap"),
-        ("blocks", "missing", "width"),
         ("warns", "type", "spare"),
+        ("warns", "missing", "width"),
         ("notes", "missing", "mass"),
     ]
 

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import click
 
+from ..errors import InputError, choices
 from ..system.description import System
+from ..system.parts import ISOLATIONS
 from ..system.structure import DIVERGING, SCHEMES
+from ..system.swap import Replacement
 from .frame import load_system, pair, together, with_controller, with_preset
 
 set_option = click.option("--set", "settings", multiple=True, metavar="COMPONENT.VARIABLE=VALUE")
@@ -35,6 +39,79 @@ system_options = together(
     ),
 )
 """How the system of a command, in its `system`, is changed."""
+
+names_options = together(
+    click.option(
+        "--rename",
+        "renames",
+        multiple=True,
+        metavar="[COMPONENT.]VARIABLE=FMUS_VARIABLE",
+        help="What the new FMU calls a variable of the system.",
+    ),
+    click.option(
+        "--units",
+        "named",
+        multiple=True,
+        metavar="[COMPONENT.]VARIABLE=UNIT",
+        help="Of the new FMU, where it declares none or a wrong one.",
+    ),
+)
+"""What an FMU in the place of another calls things, in its `renames` and `named`."""
+
+_FORMS = {
+    "--rename": "[COMPONENT.]VARIABLE=FMUS_VARIABLE",
+    "--units": "[COMPONENT.]VARIABLE=UNIT",
+    "--isolation": "none, process, or COMPONENT=none, COMPONENT=process",
+}
+
+
+def replacements(given: Mapping[str, Any], fmus: Mapping[str, Path]) -> dict[str, Replacement]:
+    """The FMUs for components by name, with what names_options say of each.
+
+    InputError where that is of another component, or of one of several that is not named.
+    """
+    rename, units = (
+        _by_component(option, given[key], tuple(fmus))
+        for option, key in (("--rename", "renames"), ("--units", "named"))
+    )
+    return {name: Replacement(fmu, rename[name], units[name]) for name, fmu in fmus.items()}
+
+
+def _by_component(
+    option: str, texts: Sequence[str], components: Sequence[str]
+) -> dict[str, dict[str, str]]:
+    """The pairs of an option by component, which a text may leave out where there is one only."""
+    found: dict[str, dict[str, str]] = {name: {} for name in components}
+    for text in texts:
+        left, right = pair(option, text, _FORMS[option])
+        name, _, variable = left.partition(".")
+        if not components:
+            raise InputError(f"{option} {text!r}: must come with --swap COMPONENT=FMU")
+        if name not in found or not variable:
+            name, variable = components[0], left
+            if len(components) > 1:
+                raise InputError(
+                    f"{option} {text!r}: several components are swapped; must begin with one of "
+                    f"{choices(f'{c}.' for c in components)}"
+                )
+        found[name][variable] = right
+    return found
+
+
+def isolations(system: System, texts: Sequence[str]) -> System:
+    """The system with its components in processes of their own or not, as texts say, in order.
+
+    Each is of all components, "process", or of one, "plant=process".
+    """
+    for text in texts:
+        name, equals, last = text.rpartition("=")
+        where: Any = last
+        if where not in ISOLATIONS or bool(name) != bool(equals):
+            raise InputError(f"--isolation {text!r}: must be {_FORMS['--isolation']}")
+        if name:
+            system.component(name, f"--isolation {text}")
+        system = system.with_isolation(where, name)
+    return system
 
 
 def set_values(settings: Sequence[str]) -> dict[str, Any]:

@@ -18,7 +18,8 @@ KINDS: tuple[str, ...] = get_args(Kind)
 SUPPORTED = ("Real", "Integer", "Boolean", "String")
 """The kinds a master can set, connection and record; it leaves the others alone."""
 
-SETTABLE = ("input", "parameter", "structuralParameter")
+PARAMETERS = ("parameter", "structuralParameter")
+SETTABLE = ("input", *PARAMETERS)
 _WHOLE = {
     **{f"Int{bits}": (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for bits in (8, 16, 32, 64)},
     **{f"UInt{bits}": (0, 2**bits - 1) for bits in (8, 16, 32, 64)},

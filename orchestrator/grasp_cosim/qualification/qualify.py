@@ -21,7 +21,7 @@ from ..metrics.metric import Metric, Signals, measure, registered
 from ..metrics.units import in_si
 from ..recording.result import Result
 from ..system.description import System
-from ..system.parts import NANOSECONDS, Isolation
+from ..system.parts import NANOSECONDS, Component, Isolation
 from ..system.structure import SCHEMES
 from .bands import SHARE, Band, Bands, Given, check_patterns, entry_for, metric_band, signal_band
 from .interface_difference import Difference
@@ -110,7 +110,7 @@ class Qualification:
 def qualify(
     system: System,
     component: str,
-    candidate: str | Path,
+    candidate: str | Path | Component,
     *,
     rename: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
@@ -122,8 +122,10 @@ def qualify(
 ) -> Qualification:
     """Compare a candidate FMU with that of a component, as declared and in the closed loop.
 
-    rename maps the system's names to the candidate's, units variables of the candidate to the names
-    of their units, where it declares none or a wrong one. values like {'plant.object_width': 0.06}
+    The candidate may be a component of another system, with its names, units and values. An FMU has
+    the names and units of the component it is to replace, as far as they fit it; rename maps the
+    system's names to the candidate's, units variables of the candidate to the names of their units,
+    where it declares none or a wrong one. values like {'plant.object_width': 0.06}
     are set in both systems, in the unit of the original, or in the one that has such a variable.
     bands are derived where they are not given. The candidate runs in a process of its own, which a
     crash does not leave, unless isolation says otherwise. metrics are compared beside those that
@@ -131,9 +133,8 @@ def qualify(
     SimulationError where the original fails, KeyboardInterrupt at Ctrl-C.
     """
     bands = bands or Bands()
-    swap = prepare_swap(
-        system, component, Path(candidate), rename or {}, values or {}, isolation, units
-    )
+    new = candidate if isinstance(candidate, Component) else Path(candidate)
+    swap = prepare_swap(system, component, new, rename or {}, values or {}, isolation, units)
     if swap.swapped is None:
         return Qualification(swap)
     asked = tuple(m for m in registered(metrics) if not m.reason)

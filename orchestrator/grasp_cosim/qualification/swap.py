@@ -12,9 +12,9 @@ from ..interface.interface import Value
 from ..interface.read import describe
 from ..interface.units import Conversion, conversion
 from ..system.description import System
-from ..system.parts import Isolation
+from ..system.parts import Component, Isolation
 from ..system.readings import readings
-from ..system.swap import converted
+from ..system.swap import Replacement, converted, replaced
 from .feedthrough import feedthrough_differences
 from .interface_difference import SEVERITIES, Difference, interface_differences, use_of
 
@@ -44,7 +44,7 @@ class Swap:
 def prepare_swap(
     system: System,
     component: str,
-    candidate: Path,
+    candidate: Path | Component,
     rename: Mapping[str, str],
     values: Mapping[str, Value],
     isolation: Isolation,
@@ -56,11 +56,15 @@ def prepare_swap(
         c.name: describe(c.fmu).renamed(c.rename).in_units(c.units) for c in system.components
     }
     ours = interfaces[component]
-    theirs = describe(candidate).renamed(rename, "--rename").in_units(units or {}, "--units")
+    was = candidate if isinstance(candidate, Component) else replace(place, values={})
+    fmu = was.fmu if isinstance(candidate, Component) else candidate
+    now = replaced(was, Replacement(fmu, rename, units or {}), "--")
+    theirs = describe(fmu).renamed(now.rename, "--rename").in_units(now.units, "--units")
     for new, name in rename.items():
         known(f"--rename: {new!r} = {name!r}: the original has no variable", new, ours.by_name)
     extra = {f"{component}.{name}": name for name in theirs.by_name if name not in ours.by_name}
-    own = {extra[key]: value for key, value in values.items() if key in extra}
+    own = {n: v for n, v in now.values.items() if n not in ours.by_name}
+    own |= {extra[key]: value for key, value in values.items() if key in extra}
     common = {key: value for key, value in values.items() if key not in extra}
     system = system.revised({}, common, ("--as", "--set"))
     use = use_of(system, component)
@@ -70,19 +74,12 @@ def prepare_swap(
     ]
     swapped = None
     if not any(d.severity == "blocks" for d in differences):
-        given = converted(use.values, ours, theirs)
+        given = {n: v for n, v in use.values.items() if n in theirs.by_name}
+        given = converted(given, ours, theirs) | dict(now.values)
         for name, value in own.items():
             text = f"--set {component}.{name}"
             given[name] = theirs.parse(text, name, value, text=True)
-        place = replace(
-            place,
-            fmu=candidate,
-            native=None,
-            rename=rename,
-            values=given,
-            isolation=isolation,
-            units=units or {},
-        )
+        place = replace(now, name=component, values=given, isolation=isolation)
         components = tuple(place if c.name == component else c for c in system.components)
         try:
             swapped = replace(system, components=components)
@@ -91,7 +88,7 @@ def prepare_swap(
     return Swap(
         system,
         component,
-        candidate,
+        fmu,
         tuple(sorted(differences, key=lambda d: SEVERITIES.index(d.severity))),
         swapped,
         {

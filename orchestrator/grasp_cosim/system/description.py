@@ -19,7 +19,7 @@ from .checks import (
 from .parts import LONGEST, NANOSECONDS, Isolation
 from .scenario_checks import check_scenario
 from .structure import DIVERGING, SCHEMES, Diverging, Scheme, Structure
-from .swap import with_fmu
+from .swap import Replacement, with_fmu
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,25 +72,38 @@ class System(Structure):
         """A copy with start values changed; the keys are like 'plant.object_width'."""
         return self.revised({}, values, ("swap", "with_values"))
 
-    def swap(self, component: str, fmu: str | Path) -> "System":
+    def swap(
+        self,
+        component: str,
+        fmu: str | Path,
+        *,
+        rename: Mapping[str, str] | None = None,
+        units: Mapping[str, str] | None = None,
+    ) -> "System":
         """A copy with the FMU of one component replaced by another with the same variables.
 
-        Its values are converted where that has them in other units.
+        Its values are converted where that has them in other units. rename and units are those of a
+        Component, and go before its own.
         """
-        return self.revised({component: fmu}, {}, ("swap", "with_values"))
+        new = Replacement(Path(fmu), rename or {}, units or {})
+        return self.revised({component: new}, {}, ("swap", "with_values"))
 
     def revised(
         self,
-        fmus: Mapping[str, str | Path],
+        fmus: Mapping[str, str | Path | Replacement],
         values: Mapping[str, Value],
         places: tuple[str, str],
     ) -> "System":
         """A copy with FMUs replaced, then values changed; places name the two, for messages."""
         components = {c.name: c for c in self.components}
+        notes = [*self.notes]
         for name, fmu in fmus.items():
             place = f"{places[0]} {name}"
             anew = [key.partition(".")[2] for key in values if key.partition(".")[0] == name]
-            components[name] = with_fmu(self, self.component(name, place), Path(fmu), anew, place)
+            new = fmu if isinstance(fmu, Replacement) else Replacement(Path(fmu))
+            was = self.component(name, place)
+            components[name], more = with_fmu(self, was, new, anew, place)
+            notes += more
         for key, value in values.items():
             name, _, variable = key.partition(".")
             place = f"{places[1]} {key}"
@@ -101,7 +114,7 @@ class System(Structure):
         for name in fmus:
             kept = [v for v in components[name].values if f"{name}.{v}" not in values]
             check_items(self.component(name, name), components[name], kept, f"{places[0]} {name}")
-        return replace(self, components=tuple(components.values()))
+        return replace(self, components=tuple(components.values()), notes=tuple(notes))
 
     def with_presets(self, *names: str) -> "System":
         """A copy with the values of presets, a later one before an earlier one."""
@@ -116,11 +129,12 @@ class System(Structure):
             system = system.revised({}, self.presets[name], (place, place))
         return system
 
-    def with_isolation(self, isolation: Isolation | None) -> "System":
-        """A copy with all components in processes of their own, or in this one; None: as it is."""
-        if isolation is None:
-            return self
-        components = tuple(replace(c, isolation=isolation) for c in self.components)
+    def with_isolation(self, isolation: Isolation, component: str = "") -> "System":
+        """A copy with all components, or one, in processes of their own or in this one."""
+        components = tuple(
+            replace(c, isolation=isolation) if component in ("", c.name) else c
+            for c in self.components
+        )
         return replace(self, components=components)
 
     def with_natives(self, natives: Mapping[str, Path]) -> "System":

@@ -3,42 +3,82 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ..errors import InputError
-from ..interface.interface import Interface, Value
-from ..interface.read import read_interface
+from ..interface.interface import PARAMETERS, Interface, Value
+from ..interface.read import describe
 from ..interface.units import IDENTITY
-from .parts import Component, Port
+from .parts import Component, Port, literal
 from .readings import unit_of
 from .structure import Structure
 
 
-def with_fmu(
-    system: Structure, was: Component, fmu: Path, anew: Collection[str], place: str
-) -> Component:
-    """The component with another FMU, its values converted to the units of that.
+@dataclass(frozen=True, slots=True)
+class Replacement:
+    """An FMU for a component, with names and units of its variables as a Component has them.
 
-    A name for a unit stays where the FMUs declare the same one, or the new FMU none. `anew` are
-    variables that get another value. InputError where a value, or another number that the system
-    states, has no meaning in the new unit.
+    They go before those that the component has already. isolation None is the component's own.
     """
-    ours, theirs = (read_interface(f).renamed(was.rename) for f in (was.fmu, fmu))
-    units = {
-        name: unit
-        for name, unit in was.units.items()
-        if name not in theirs.by_name
-        or theirs.by_name[name].unit in (None, ours.by_name[name].unit)
-    }
-    now = replace(was, fmu=fmu, native=None, units=units)
+
+    fmu: Path
+    rename: Mapping[str, str] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+
+
+def with_fmu(
+    system: Structure, was: Component, new: Replacement, anew: Collection[str], place: str
+) -> tuple[Component, list[str]]:
+    """The component with another FMU, its values converted to the units of that; and notes.
+
+    `anew` are variables that get another value. A value of a parameter that the new FMU lacks is
+    left out, which a note says. InputError where a value, or another number that the system states,
+    has no meaning in the new unit.
+    """
+    now = replaced(was, new, f"{place}: ")
     before, after = was.interface, now.interface
-    kept = {name: value for name, value in was.values.items() if name not in anew}
+    given = {n: v for n, v in was.values.items() if n in after.by_name or not _free(before, n)}
+    kept = {name: value for name, value in given.items() if name not in anew}
     for name in [*kept, *sorted(stated(system, was.name))]:
         reason = _lost(before, after, name, name in kept)
         if reason:
             raise InputError(f"{place}: {name} {reason}")
-    return replace(now, values={**was.values, **converted(kept, before, after)})
+    notes = [
+        f"{place}: {new.fmu.name} has no parameter {name}: its value {literal(value)} is left out"
+        for name, value in was.values.items()
+        if name not in given
+    ]
+    return replace(now, values={**given, **converted(kept, before, after)}), notes
+
+
+def replaced(was: Component, new: Replacement, place: str) -> Component:
+    """The component with another FMU, without a look at its values; place begins its errors.
+
+    Of the names and units that it has, those stay that fit: an FMU's name that the new one has,
+    too; a unit where the FMUs declare the same one, or the new FMU none.
+    """
+    ours, theirs = describe(was.fmu).renamed(was.rename).by_name, describe(new.fmu)
+    rename = {
+        name: own
+        for name, own in was.rename.items()
+        if own in theirs.by_name and name not in new.rename and own not in new.rename.values()
+    } | dict(new.rename)
+    while taken := (rename.keys() & theirs.by_name) - {*new.rename, *rename.values()}:
+        rename = {name: own for name, own in rename.items() if name not in taken}
+    found = theirs.renamed(rename, f"{place}rename").by_name
+    units = {
+        name: unit
+        for name, unit in was.units.items()
+        if name in found and found[name].unit in (None, ours[name].unit)
+    }
+    units |= new.units
+    return replace(was, fmu=new.fmu, native=None, rename=rename, units=units)
+
+
+def _free(interface: Interface, name: str) -> bool:
+    """True for a variable that nothing in a system depends on, but what has a value for it."""
+    return name in interface.by_name and interface.by_name[name].causality in PARAMETERS
 
 
 def stated(system: Structure, name: str) -> frozenset[str]:

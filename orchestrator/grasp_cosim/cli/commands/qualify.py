@@ -5,6 +5,7 @@ from typing import Any
 
 import click
 
+from ...extensions import readers
 from ...files import remove, write_json, write_text
 from ...qualification import verdict
 from ...qualification.bands import read_bands
@@ -18,13 +19,13 @@ from ..frame import (
     check_outputs,
     chosen_metrics,
     json_option,
+    load_system,
     metrics_option,
-    pair,
     say,
     show,
 )
 from ..native import many_runs_option, natively
-from ..options import chosen_system, set_values, system_options
+from ..options import chosen_system, names_options, replacements, set_values, system_options
 
 
 @click.command()
@@ -33,14 +34,7 @@ from ..options import chosen_system, set_values, system_options
 @click.option("--system", type=PATH, help="Default: the built-in grasp.")
 @system_options
 @click.option("--bands", type=PATH, help="TOML; default: derived.")
-@click.option("--rename", "renames", multiple=True, metavar="VARIABLE=CANDIDATES_VARIABLE")
-@click.option(
-    "--units",
-    "named",
-    multiple=True,
-    metavar="VARIABLE=UNIT",
-    help="Of the candidate, where it declares none or a wrong one.",
-)
+@names_options
 @click.option(
     "--isolation",
     type=click.Choice(ISOLATIONS),
@@ -60,8 +54,6 @@ def qualify(
     candidate: Path,
     component: str,
     bands: Path | None,
-    renames: tuple[str, ...],
-    named: tuple[str, ...],
     isolation: Isolation,
     native: bool | None,
     metric_files: tuple[Path, ...],
@@ -69,7 +61,9 @@ def qualify(
     as_json: bool,
     **given: Any,
 ) -> int:
-    """Find out whether CANDIDATE, an FMU, may take the place of COMPONENT.
+    """Find out whether CANDIDATE, an FMU or a system file with it, may take the place of COMPONENT.
+
+    Of a system file it is the FMU of the component of that name, as it is there.
 
     Compares the interfaces, then the closed loops with the original and with the candidate, signal
     by signal and metric by metric. Exit code 0: qualified; 1: not.
@@ -78,13 +72,15 @@ def qualify(
     Example: grasp-cosim qualify vendor_plant.fmu --as plant --out qualification
     """
     check_outputs(out, plot=bool(out))
+    new = replacements(given, {component: candidate})[component]
+    is_file = candidate.suffix.lower() in readers
     with natively(chosen_system(given), native) as system:
         found = run_qualification(
             system,
             component,
-            candidate,
-            rename=dict(pair("--rename", text, "VARIABLE=CANDIDATES_VARIABLE") for text in renames),
-            units=dict(pair("--units", text, "VARIABLE=UNIT") for text in named),
+            load_system(candidate).component(component, str(candidate)) if is_file else candidate,
+            rename=new.rename,
+            units=new.units,
             values=set_values(given["settings"]),
             bands=read_bands(bands) if bands else None,
             isolation=isolation,

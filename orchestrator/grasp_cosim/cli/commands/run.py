@@ -14,7 +14,7 @@ from ...recording.folder import RunFolder
 from ...recording.mdf import check_mdf
 from ...recording.result import Result
 from ...report.timing import draw_result
-from ...system.parts import ISOLATIONS
+from ...system.description import System
 from ..frame import (
     INTERRUPTED,
     NEGATIVE,
@@ -29,7 +29,14 @@ from ..frame import (
     show,
 )
 from ..native import native_option, natively
-from ..options import chosen_system, set_values, system_options
+from ..options import (
+    chosen_system,
+    isolations,
+    names_options,
+    replacements,
+    set_values,
+    system_options,
+)
 from ..realtime import chosen_realtime, realtime_options, timing_lines
 from ..step_study import check_step_study, step_study_options, study_step
 
@@ -38,6 +45,7 @@ from ..step_study import check_step_study, step_study_options, study_step
 @click.argument("system", required=False, type=PATH)
 @system_options
 @click.option("--swap", "swaps", multiple=True, metavar="COMPONENT=FMU")
+@names_options
 @click.option("--out", type=PATH, help="Folder for signals.csv and run.json.")
 @click.option(
     "--plot",
@@ -50,8 +58,10 @@ from ..step_study import check_step_study, step_study_options, study_step
 )
 @click.option(
     "--isolation",
-    type=click.Choice(ISOLATIONS),
-    help="Where all FMUs run: each in a process of its own, or none. Default: as SYSTEM says.",
+    "isolation",
+    multiple=True,
+    metavar="[COMPONENT=]none|process",
+    help="Where all FMUs run, or one: in a process of its own, or none. Default: as SYSTEM says.",
 )
 @native_option("as SYSTEM names them; with --step-study, native where there is a C compiler.")
 @click.option("--engine", type=click.Choice(ENGINES), default="auto", show_default=True)
@@ -76,10 +86,7 @@ def run(
     """
     paced, out = chosen_realtime(given), given["out"]
     check_step_study(given, paced is not None)
-    fmus = dict(pair("--swap", text, "COMPONENT=FMU") for text in swaps)
-    values = set_values(given["settings"])
-    system = chosen_system(given, fmus).with_isolation(given["isolation"])
-    system = system.revised(fmus, values, ("--swap", "--set"))
+    system = _chosen(given, swaps)
     metrics = chosen_metrics(metric_files)
     if given["step_study"]:
         return study_step(system, metrics, given, as_json)
@@ -116,6 +123,17 @@ def run(
         message = f"interrupted at t = {result.time[-1]:.6g} s; kept what was recorded"
         return fail(message, INTERRUPTED)
     return 0 if result.signals else NEGATIVE  # as the log says
+
+
+def _chosen(given: dict[str, Any], swaps: tuple[str, ...]) -> System:
+    """The system with the FMUs and values of the command line; what is left out is said."""
+    fmus = {name: Path(fmu) for name, fmu in (pair("--swap", t, "COMPONENT=FMU") for t in swaps)}
+    system = chosen_system(given, fmus)
+    new = replacements(given, fmus)
+    swapped = system.revised(new, set_values(given["settings"]), ("--swap", "--set"))
+    for note in swapped.notes[len(system.notes) :]:
+        say(note)
+    return isolations(swapped, given["isolation"])
 
 
 def _write(
