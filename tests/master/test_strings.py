@@ -162,10 +162,10 @@ def test_a_run_that_records_nothing_is_no_success(
     assert '"steps": 10,' in said.out
     lines = [line for line in said.err.splitlines() if "record" in line]
     assert lines == [
-        "a.y_array is of type array of Float64: not recorded",
+        "a.y_array is of type array of String: not recorded",
         "a.y_clock is of type Clock: not recorded",
         "arrays.toml: nothing is recorded; must have an output that is a Real, Integer, Boolean "
-        "or String, no array",
+        "or String",
     ]
     assert [path.name for path in out.iterdir()] == ["run.json"]
     assert "nothing is recorded" in (out / "run.json").read_text("utf-8")

@@ -206,7 +206,7 @@ REFUSED = [
     (connected("Float64", "Int32"), "must be both Real, both Integer, both Boolean or both String"),
     (connected("Boolean", "Int32"), "a.y_Boolean is Boolean and b.u_Int32 is Int32; must be both"),
     (connected("String", "Float64"), "must be both Real"),
-    ('"a.y_array -> b.u_Float64"', "a.y_array is of type array of Float64, which is not supp"),
+    ('"a.y_array -> b.u_Float64"', "a.y_array is of type array of String, which is not supp"),
     ('"a.y_clock -> b.u_Boolean"', "a.y_clock is of type Clock, which is not supported; must be"),
     ('"a.y_Float64 -> b.u_Binary"', "b.u_Binary is of type Binary, which is not supported"),
     ('{ from = "a.y_Int8", to = "b.u_Int8", factor = 2 }', "must be Real to be scaled"),
@@ -282,7 +282,7 @@ def test_what_cannot_be_set_is_named(tmp_path: Path) -> None:
 def test_what_is_left_alone_is_named(tmp_path: Path) -> None:
     lines = remarks(pair(tmp_path, connected("Float64", "Float64")))
     assert "a.u_Binary is of type Binary: keeps its start value" in lines
-    assert "b.y_array is of type array of Float64: not recorded" in lines
+    assert "b.y_array is of type array of String: not recorded" in lines
     assert "b.y_clock is of type Clock: not recorded" in lines
 
 

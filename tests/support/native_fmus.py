@@ -188,8 +188,8 @@ def _description_3(units: Mapping[str, str], capabilities: Mapping[str, str], st
     variables += (
         '<Binary name="u_Binary" valueReference="150" causality="input"><Start value="00"/>'
         "</Binary>"
-        '<Float64 name="y_array" valueReference="151" causality="output"><Dimension start="3"/>'
-        '</Float64><Clock name="y_clock" valueReference="152" causality="output" '
+        '<String name="y_array" valueReference="151" causality="output"><Dimension start="3"/>'
+        '</String><Clock name="y_clock" valueReference="152" causality="output" '
         'intervalVariability="triggered"/><Float64 name="time" valueReference="153" '
         'causality="independent" variability="continuous"/>'
     )

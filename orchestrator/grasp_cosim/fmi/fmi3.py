@@ -1,8 +1,7 @@
 """An instance of an FMI 3.0 co-simulation FMU.
 
 Without event mode and intermediate update. A step may end early where the FMU declares that it
-might and that its step may vary; the master then does the rest. Clocks, binaries and arrays are
-left alone.
+might and that its step may vary; the master then does the rest. Clocks and binaries are left alone.
 """
 
 import ctypes
@@ -15,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from fmpy.fmi3 import FMU3Slave
 
-from ..interface.interface import Interface, Value
+from ..interface.interface import Interface, Value, Variable
 from .instance import EARLY, STEP_3, TRANSFER_3, WARNING, Call, Native
 from .loaded import KEPT, LoadedInstance, keep_message, know_signatures
 
@@ -78,15 +77,17 @@ class Fmi3Instance(LoadedInstance):
         return said
 
     def _start(self, values: Mapping[str, Value], stop: float | None, start: float) -> None:
-        variables = {self.interface.by_name[name]: value for name, value in values.items()}
-        structural = [v for v in variables if v.causality == "structuralParameter"]
+        structural: list[tuple[Variable, Value]] = []
+        others: list[tuple[Variable, Value]] = []
+        for name, value in values.items():
+            variable = self.interface.by_name[name]
+            sizing = variable.causality == "structuralParameter"
+            (structural if sizing else others).append((variable, value))
         if structural:
             self._slave.enterConfigurationMode()
-            for variable in structural:
-                self._set(variable, variables.pop(variable))
+            self._assign(structural, fetch=False)
             self._slave.exitConfigurationMode()
-        for variable, value in variables.items():
-            self._set(variable, value)
+        self._assign(others, fetch=False)
         self._slave.enterInitializationMode(startTime=start, stopTime=stop)
 
     def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:

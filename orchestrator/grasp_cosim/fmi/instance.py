@@ -24,7 +24,8 @@ TRANSFER_2, TRANSFER_3, STEP_2, STEP_3, PYTHON, CLOCK, PACE = range(7)
 class Native(NamedTuple):
     """A C function with its arguments, all of them addresses or sizes but for the time.
 
-    TRANSFER_2: f(instance, references, n, data). TRANSFER_3: the same and n again.
+    TRANSFER_2: f(instance, references, size, data). TRANSFER_3: the same and, last, how many values
+    there are: more than references where some are of arrays.
     STEP_2: f(instance, time, step, 1). STEP_3: f(instance, time, step, 1, &event, &terminate,
     &early, &last), where flags is the address of three bytes for the first three, last that of a
     double for the last. CLOCK: time.monotonic_ns(), less size, goes to data, a double. PACE: wait
@@ -40,6 +41,7 @@ class Native(NamedTuple):
     step: float = 0.0
     flags: int = 0
     last: int = 0
+    values: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,12 +87,16 @@ class Instance(Protocol):
         """
 
     def set(self, variables: Sequence[Variable], values: Sequence[Value]) -> None:
-        """Set inputs or tunable parameters. For use outside the loop."""
+        """Set inputs or tunable parameters. For use outside the loop.
+
+        Of an array that is set in part, the other elements keep what they were set to last.
+        """
 
     def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:
         """The call that passes data to inputs ("set") or fetches outputs into it ("get").
 
-        The variables are all of one FMI type; data has that of dtype() and their order.
+        The variables are all of one FMI type; data has that of dtype() and their order. Of an array
+        they are all elements, row by row.
         """
 
     def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:

@@ -14,7 +14,7 @@ import sys
 import warnings
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache, partial
 from pathlib import Path
@@ -28,6 +28,7 @@ from fmpy.fmi1 import FMICallException
 
 from ..errors import InputError, SimulationError, choices
 from ..files import FULL
+from ..interface.arrays import Element
 from ..interface.interface import Interface, Value, Variable
 from ..scratch import ScratchFolder
 from .inputs import Inputs
@@ -82,6 +83,7 @@ class LoadedInstance(ABC):
         self._worst = FATAL  # until it is instantiated
         self._keep: list[Any] = []
         self._inputs = Inputs()
+        self._arrays: dict[int, list[Any]] = {}
         self._running = False
         self._clock: npt.NDArray[np.float64] | None = None
         self._unread: deque[str] = deque(maxlen=KEPT)
@@ -189,35 +191,43 @@ class LoadedInstance(ABC):
 
     def get(self, variables: Sequence[Variable]) -> list[Value]:
         """The values of the variables now, one by one. For use outside the loop."""
+        whole: dict[int, list[Any]] = {}
         with self._failures():
-            return [self._get(variable) for variable in variables]
+            for v in variables:
+                if v.element and v.reference not in whole:
+                    whole[v.reference] = self._get_array(v)
+            return [
+                _OF_KIND[v.kind](whole[v.reference][v.element.place]) if v.element else self._get(v)
+                for v in variables
+            ]
 
     def set(self, variables: Sequence[Variable], values: Sequence[Value]) -> None:
         """Set inputs or tunable parameters. For use outside the loop."""
         with self._failures():
-            for variable, value in zip(variables, values, strict=True):
-                self._set(variable, value)
+            self._assign(zip(variables, values, strict=True))
 
     def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:
         """The call that passes data to inputs ("set") or fetches outputs into it ("get").
 
-        The variables are all of one FMI type; data is contiguous, in their order and of dtype().
+        The variables are all of one FMI type; data is contiguous, in their order and of dtype(). Of
+        an array they are all elements.
         """
-        count, place = len(variables), data.ctypes.data
-        references = (ctypes.c_uint * count)(*(v.reference for v in variables))
+        listed = [v.reference for v in variables if not (v.element and v.element.place)]
+        count, size, place = len(listed), len(variables), data.ctypes.data
+        references = (ctypes.c_uint * count)(*listed)
         self._keep += [references, data]
         if action == "set":
             self._inputs.bind(variables, data)
-        again = [ctypes.c_size_t(count)] if self.SHAPE == TRANSFER_3 else []
+        sizes = [ctypes.c_size_t(size)] if self.SHAPE == TRANSFER_3 else []
         bound, address = self._function(
             action.capitalize() + self._suffix(variables[0].type),
             ctypes.byref(references),
             ctypes.c_size_t(count),
             ctypes.c_void_p(place),
-            *again,
+            *sizes,
         )
         instance, first = self._slave.component, ctypes.addressof(references)
-        native = Native(self.SHAPE, address, instance, first, count, place)
+        native = Native(self.SHAPE, address, instance, first, count, place, values=size)
         return Call(bound, native, self._python)
 
     def _suffix(self, fmi_type: str) -> str:
@@ -232,6 +242,42 @@ class LoadedInstance(ABC):
         self._inputs.set(variable, value)
         setter = getattr(self._slave, f"set{self._suffix(variable.type)}")
         setter([variable.reference], [_OF_KIND[variable.kind](value)])
+
+    def _assign(self, given: Iterable[tuple[Variable, Value]], fetch: bool = True) -> None:
+        """Set values of variables, then of arrays, each whole.
+
+        Elements that are not given keep what they were set to, at first their start value or, with
+        fetch, what the FMU has: before the initialisation it does not tell.
+        """
+        arrays: dict[int, tuple[Variable, list[Any]]] = {}
+        for variable, value in given:
+            if variable.element is None:
+                self._set(variable, value)
+                continue
+            self._inputs.set(variable, value)
+            elements = self._elements(variable, variable.element, fetch)
+            elements[variable.element.place] = _OF_KIND[variable.kind](value)
+            arrays[variable.reference] = variable, elements
+        for reference, (variable, elements) in arrays.items():
+            getattr(self._slave, f"set{self._suffix(variable.type)}")([reference], elements)
+
+    def _elements(self, variable: Variable, element: Element, fetch: bool) -> list[Any]:
+        """The elements of an array that the variable is in, as they were set last."""
+        if variable.reference not in self._arrays:
+            starts: list[Any] = [None] * element.size
+            for v in self.interface.variables:
+                if v.element and v.reference == variable.reference and v.start is not None:
+                    starts[v.element.place] = _OF_KIND[v.kind](v.start_value)
+            if None in starts and fetch:
+                starts = self._get_array(variable)
+            self._arrays[variable.reference] = [0 if start is None else start for start in starts]
+        return self._arrays[variable.reference]
+
+    def _get_array(self, variable: Variable) -> list[Any]:
+        """The elements of the array that a variable is in."""
+        getter = getattr(self._slave, f"get{self._suffix(variable.type)}")
+        size = variable.element.size if variable.element else 1
+        return list(getter([variable.reference], size))
 
     def last_successful_time(self) -> float | None:
         """Return the end of a discarded or shortened step in s, None if the FMU does not say.

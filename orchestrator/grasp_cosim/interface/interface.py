@@ -1,7 +1,7 @@
 """The interface that an FMU declares: its variables, units and capabilities."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -10,9 +10,13 @@ from typing import Literal, get_args
 
 from ..checks import known
 from ..errors import InputError, choices
+from .arrays import MOST_ELEMENTS, Array, Element, element_names, size_of
 from .units import IDENTITY, Conversion, Unit, conversion, known_unit
 
 Value = float | int | bool | str
+Given = Value | Sequence["Given"]
+"""What is given for a variable: a value, or those of an array as lists of lists."""
+
 Kind = Literal["Real", "Integer", "Boolean", "String", "Binary", "Clock"]
 KINDS: tuple[str, ...] = get_args(Kind)
 SUPPORTED = ("Real", "Integer", "Boolean", "String")
@@ -84,9 +88,11 @@ class Variable:
     text, of an array that of all elements or, in starts, of each. minimum, maximum and magnitude,
     the nominal value, are as typed() gives them. dependencies are the variables an output depends
     on directly, None where that is not declared, which means all inputs; initial_dependencies the
-    same in initialisation mode. shape is () but for an array. relative says that it is a
-    difference, to which the offset of a unit does not apply. enumeration is the type of an
-    Enumeration. alias says that it is another name of a variable that comes before.
+    same in initialisation mode. shape is () but for an array, and sizes then names by dimension the
+    variable that holds its length, None where that is fixed. element is its place in an array that
+    was taken apart. relative says that it is a difference, to which the offset of a unit does not
+    apply. enumeration is the type of an Enumeration. alias says that it is another name of a
+    variable that comes before.
     """
 
     name: str
@@ -110,6 +116,8 @@ class Variable:
     display_unit: str | None = None
     starts: tuple[str, ...] = ()
     alias: bool = False
+    sizes: tuple[str | None, ...] = ()
+    element: Element | None = None
 
     @property
     def low(self) -> float:
@@ -131,7 +139,7 @@ class Variable:
         """The start value as typed() gives it, a list for an array."""
         if not self.shape or self.start is None:
             return typed(self.type, self.start)
-        return [typed(self.type, text) for text in self.starts or self.start.split()]
+        return [typed(self.type, text) for text in self.texts]
 
     @property
     def items(self) -> dict[str, int]:
@@ -154,9 +162,21 @@ class Variable:
         return self.supported and self.kind != "String"
 
     @property
+    def is_array_of_numbers(self) -> bool:
+        """True if it is an array of Reals, Integers or Booleans that was not taken apart."""
+        return bool(self.shape) and self.kind in SUPPORTED[:3]
+
+    @property
     def nature(self) -> str:
         """Its type in words, as of what is not supported: array of Float64, Binary, Clock."""
+        if size_of(self.shape) > MOST_ELEMENTS:
+            return f"array of {self.type} with more than {MOST_ELEMENTS} elements"
         return f"array of {self.type}" if self.shape else self.type
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """Of an array, its start values as they are declared: of each element, or one for all."""
+        return self.starts or tuple((self.start or "").split())
 
 
 @dataclass(frozen=True)
@@ -167,7 +187,8 @@ class Interface:
     kind and, where a later kind has another value, of that kind, 'FLAG (model exchange)'.
     experiment is the default one: start_time, stop_time, tolerance and step_size, as typed() gives
     them. platforms are those it has a binary for, sources says that it has C. flaw is the first
-    number that could not be read, for which no master takes the FMU.
+    number that could not be read, for which no master takes the FMU. arrays are those that were
+    taken apart, by name: see expansion.py.
     """
 
     path: Path
@@ -186,11 +207,22 @@ class Interface:
     model_name: str | None = None
     tool: str | None = None
     flaw: str = ""
+    arrays: Mapping[str, Array] = field(default_factory=dict)
+
+    @cached_property
+    def expansions(self) -> dict[tuple[int | None, ...], "Interface"]:
+        """What expansion.py has made of this one, by the sizes that arrays may have."""
+        return {}
 
     @cached_property
     def by_name(self) -> dict[str, Variable]:
         """The variables by their names."""
         return {v.name: v for v in self.variables}
+
+    def sample(self, name: str) -> Variable | None:
+        """The variable of a name; of an array its first element. None where there is none."""
+        names = self.arrays[name].names if name in self.arrays else (name,)
+        return self.by_name.get(names[0]) if names else None
 
     def capability(self, flag: str) -> Value | None:
         """The value of a capability, under the name that FMI 2.0 or 3.0 has for it."""
@@ -232,10 +264,12 @@ class Interface:
         """The same under other names: rename maps a new name to the FMU's own.
 
         place says where the table comes from. InputError where an own name does not exist or is
-        renamed twice, or a new one is taken.
+        renamed twice, or a new one is taken. An array is renamed whole, or by elements.
         """
         if not rename:
             return self
+        whole = {own: new for new, own in rename.items() if own in self.arrays}
+        rename = dict(_by_element(rename, self.arrays))
         names: dict[str, str] = {}
         for new, own in rename.items():
             entry = f"{place}: {new!r} = {own!r}"
@@ -261,10 +295,16 @@ class Interface:
                 name=names.get(v.name, v.name),
                 dependencies=new_names(v.dependencies),
                 initial_dependencies=new_names(v.initial_dependencies),
+                element=v.element
+                and replace(v.element, array=whole.get(v.element.array, v.element.array)),
             )
             for v in self.variables
         )
-        return replace(self, variables=tuple(variables))
+        arrays = {
+            whole.get(name, name): Array(a.shape, tuple(names.get(n, n) for n in a.names))
+            for name, a in self.arrays.items()
+        }
+        return replace(self, variables=tuple(variables), arrays=arrays)
 
     def in_units(self, units: Mapping[str, str], place: str = "units") -> "Interface":
         """The same with other units: `units` maps a variable to the name of its unit.
@@ -275,6 +315,11 @@ class Interface:
         if not units:
             return self
         defined = dict(self.units)
+        units = {
+            element: unit
+            for name, unit in units.items()
+            for element in (self.arrays[name].names if name in self.arrays else [name])
+        }
         for name, unit in units.items():
             entry = f"{place}: {name!r} = {unit!r}"
             known(f"{entry}: {self.path.name} has no variable", name, self.by_name)
@@ -302,9 +347,14 @@ class Interface:
         place names where the value comes from. An item of an enumeration may be given by its name.
         With text, a string may stand for a number or a boolean, as on a command line.
         """
-        settable = [v.name for v in self.variables if v.settable]
-        known(f"{place}: {self.path.name} has no input or parameter", name, settable)
-        variable = self.by_name[name]
+        variable = self.by_name.get(name)
+        if variable is None or not variable.settable:
+            settable = [v.name for v in self.variables if v.settable]
+            if name in self.arrays:
+                first = choices(self.arrays[name].names[:1])
+                raise InputError(f"{place}: {name} is an array; must be an element of it: {first}")
+            known(f"{place}: {self.path.name} has no input or parameter", name, settable)
+            raise AssertionError(name)  # pragma: no cover
         if not variable.supported:
             raise InputError(
                 f"{place}: {name} = {value!r}: {name} is of type {variable.nature}, which cannot "
@@ -318,6 +368,18 @@ class Interface:
         if converted is None:
             raise InputError(f"{place}: {name} = {given!r}: must be {_expected(variable)}")
         return converted
+
+
+def _by_element(
+    rename: Mapping[str, str], arrays: Mapping[str, Array]
+) -> Iterator[tuple[str, str]]:
+    """The same names, of elements in the place of whole arrays."""
+    for new, own in rename.items():
+        array = arrays.get(own)
+        if array is None:
+            yield new, own
+        else:
+            yield from zip(element_names(new, array.shape), array.names, strict=True)
 
 
 def _plain(flag: str) -> str:

@@ -290,9 +290,10 @@ class _Reader:
         start = value.get("start")
         if self.major == "3" and kind in ("String", "Binary"):
             start = starts[0] if starts else None
-        if kind in NUMERIC and start is not None and not element.findall("Dimension"):
+        if kind in NUMERIC and start is not None:
             with self.tolerated():
-                self.check_start(f"{place}: start", value.tag, start)
+                for text in start.split() if element.find("Dimension") is not None else [start]:
+                    self.check_start(f"{place}: start", value.tag, text)
         initial = {} if self.major == "1" else INITIAL.get(variability, {})
         is_enumeration = value.tag == "Enumeration"
         return Variable(
@@ -309,6 +310,7 @@ class _Reader:
             dependencies=now,
             initial_dependencies=initially,
             shape=tuple(self.size(place, e) for e in element.iterfind("Dimension")),
+            sizes=tuple(self.holder(e) for e in element.iterfind("Dimension")),
             description=element.get("description"),
             magnitude=typed(value.tag, bounds.get("nominal")),
             relative=said.get("relativeQuantity") in ("true", "1"),
@@ -340,6 +342,11 @@ class _Reader:
         if causality in PARAMETERS:
             return causality, "fixed"
         return causality, "continuous" if kind == "Real" else "discrete"
+
+    def holder(self, dimension: Element) -> str | None:
+        """The name of the variable that holds the size in a dimension; None where it is fixed."""
+        reference = dimension.get("valueReference") if dimension.get("start") is None else None
+        return None if reference is None else _name(self.places[_whole("Dimension", reference)])
 
     def size(self, place: str, dimension: Element) -> int:
         """The size of an array in a dimension, at the start where a variable holds it."""

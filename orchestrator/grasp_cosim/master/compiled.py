@@ -74,6 +74,7 @@ class _Call(ctypes.Structure):
         ("data", ctypes.c_void_p),
         ("step", ctypes.c_double),
         *((n, ctypes.c_void_p) for n in ("flags", "last")),
+        ("values", ctypes.c_int64),
     ]
 
 

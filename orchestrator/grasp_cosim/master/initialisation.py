@@ -6,6 +6,7 @@ it is entered by, and the values of the inputs that were cut are found by Newton
 
 from collections.abc import Callable, Mapping, Sequence
 from graphlib import CycleError, TopologicalSorter
+from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
@@ -71,14 +72,17 @@ def _graph(system: System, instances: Sequence[Instance]) -> dict[Port, list[Por
     sources = {connection.target: connection.source for connection in system.connections}
     graph: dict[Port, list[Port]] = {}
     for instance in instances:
-        inputs = [v.name for v in instance.interface.of("input")]
+        inputs = tuple(v.name for v in instance.interface.of("input"))
+        ports_of: dict[tuple[str, ...], list[Port]] = {}  # the elements of an array share theirs
         connected = [p for name in inputs if (p := Port(instance.name, name)) in sources]
         graph |= {port: [sources[port]] for port in connected}
         for v in instance.interface.of("output"):
             declared = v.dependencies if v.initial_dependencies is None else v.initial_dependencies
             needed = inputs if declared is None else declared
-            ports = [Port(instance.name, name) for name in needed]
-            graph[Port(instance.name, v.name)] = [port for port in ports if port in sources]
+            if needed not in ports_of:
+                ports = (Port(instance.name, name) for name in needed)
+                ports_of[needed] = [port for port in ports if port in sources]
+            graph[Port(instance.name, v.name)] = ports_of[needed]
     return graph
 
 
@@ -167,16 +171,23 @@ class Propagation:
         return np.array([self._arriving(self._connections[port]) for port in cuts], np.float64)
 
     def _pass_on(self, given: Mapping[Port, Value]) -> None:
-        for port in self.order.ports:
-            instance, variable = self._instances[port.component], self._variable(port)
-            if port in self._connections:
-                value = given[port] if port in given else self._arriving(self._connections[port])
-                instance.set([variable], [value])
-            elif variable.supported:
-                value = instance.get([variable])[0]
+        for (component, arriving), group in groupby(self.order.ports, self._end):
+            instance, ports = self._instances[component], list(group)
+            variables = [self._variable(port) for port in ports]
+            if arriving:
+                values = [
+                    given[p] if p in given else self._arriving(self._connections[p]) for p in ports
+                ]
+                instance.set(variables, values)
             else:
-                continue
-            self.values[port] = value
+                taken = [(p, v) for p, v in zip(ports, variables, strict=True) if v.supported]
+                ports = [port for port, _ in taken]
+                values = instance.get([variable for _, variable in taken])
+            self.values |= zip(ports, values, strict=True)
+
+    def _end(self, port: Port) -> tuple[str, bool]:
+        """Of ports that follow one another, those with the same are passed on in one call."""
+        return port.component, port in self._connections
 
     def _arriving(self, connection: Connection) -> Value:
         value = self.values[connection.source]

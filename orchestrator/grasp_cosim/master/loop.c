@@ -41,6 +41,7 @@ typedef struct { /* of fmi/instance.py, Native */
     double step;
     uint8_t *flags;
     double *last;
+    int64_t values; /* of all references, where some are of arrays */
 } Call;
 
 typedef struct {
@@ -142,7 +143,7 @@ static int invoke(const Call *call, const double *clock, const Shared *shared) {
         return ((Step2 *)call->function)(call->instance, time, call->step, 1);
     case TRANSFER_3:
         return ((Transfer3 *)call->function)(call->instance, call->references, (size_t)call->size,
-                                             call->data, (size_t)call->size);
+                                             call->data, (size_t)call->values);
     case STEP_3:
         status = ((Step3 *)call->function)(call->instance, time, call->step, true, said, said + 1,
                                            said + 2, call->last);

@@ -5,7 +5,7 @@ The schemes, components with a longer step and time are in the README of the orc
 
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from ..errors import InputError, SimulationError
 from ..fmi.instance import DISCARD, EARLY, Instance
+from ..interface.interface import Value
 from ..realtime.pacer import HaltError, OverrunError, Pacer
 from ..recording.listener import Texts
 from ..recording.result import Rejection
@@ -99,8 +100,9 @@ class Master:
             raise InputError(str(error)) from error
         for instance in self.instances:
             instance.exit_initialization()
+        kept = self._kept(propagation.values)
         for port, slot in self.slots.items():
-            value = propagation.values[port]
+            value = propagation.values[port] if port in propagation.values else kept[port]
             if port in self.texts:
                 value = self.texts[port].number(str(value))
             if isinstance(value, int) and abs(value) >= loop.EXACT:
@@ -108,6 +110,15 @@ class Master:
             self.values[slot] = float(value)
         self._receive(np.zeros(1, np.int64), self.values[np.newaxis])
         self._handed_on_at = time.monotonic()
+
+    def _kept(self, values: Mapping[Port, Value]) -> dict[Port, Value]:
+        """The elements of connected arrays that have no connection themselves."""
+        found: dict[Port, Value] = {}
+        for instance in self.instances:
+            ports = [p for p in self.slots if p.component == instance.name and p not in values]
+            variables = [instance.interface.by_name[port.variable] for port in ports]
+            found |= zip(ports, instance.get(variables) if ports else (), strict=True)
+        return found
 
     @property
     def runs_alone(self) -> bool:

@@ -49,8 +49,16 @@ class Plan:
 
 
 def slots_of(system: System, instances: Sequence[Instance]) -> dict[Port, int]:
-    """The place of each output, and of each connected input that is a number; Strings come last."""
+    """The place of each output, and of each connected input that is a number; Strings come last.
+
+    With an element of an array all others have one, too: an array is passed whole.
+    """
     connected = {connection.target for connection in system.connections}
+    for instance in instances:
+        for array in instance.interface.arrays.values():
+            elements = {Port(instance.name, name) for name in array.names}
+            if not connected.isdisjoint(elements):
+                connected |= elements
     ports = [
         Port(instance.name, v.name)
         for causality in ("output", "input")

@@ -11,7 +11,7 @@ from ..fmi.instance import Instance
 from ..interface.interface import Value, Variable
 from ..system.description import System
 from ..system.parts import Condition, Event, Port, first_step, literal, seconds
-from ..system.scenario_checks import check_setting
+from ..system.scenario_checks import check_exact, check_setting
 from .faults import Window, fault_functions
 
 _COMPARE: Mapping[str, Callable[[float, float], bool]] = {
@@ -43,7 +43,7 @@ class Scenario:
         self._system, self._instances = system, instances
         self._slots, self._values = slots, values
         self._events = [
-            _PendingEvent(f"events[{i}]", event, system, instances)
+            _PendingEvent(f"events[{i}]", event, system, instances, slots, values)
             for i, event in enumerate(system.events)
         ]
         self._windows = [
@@ -84,7 +84,14 @@ class Scenario:
         if port not in self._settable:
             check_setting(self._system, port, value, place)
             self._settable.add(port)
-        event = _PendingEvent(place, Event({port: value}), self._system, self._instances)
+        event = _PendingEvent(
+            place,
+            Event({port: value}),
+            self._system,
+            self._instances,
+            self._slots,
+            self._values,
+        )
         self._note(step, event.happen())
 
     def next_step(self, step: int) -> int | None:
@@ -116,19 +123,33 @@ class _PendingEvent:
     """An event that has not happened yet, with the calls that it makes."""
 
     def __init__(
-        self, name: str, event: Event, system: System, instances: Sequence[Instance]
+        self,
+        name: str,
+        event: Event,
+        system: System,
+        instances: Sequence[Instance],
+        slots: Mapping[Port, int],
+        values: npt.NDArray[np.float64],
     ) -> None:
+        """An element of an array that is connected in part has a slot, and is passed on from it."""
         self.name = name
         self.event = event
         self._period = math.lcm(*(system.period(port.component) for port in event.set))
         self._first = first_step(event.at_ns or 0, system.step_ns)
         self._calls: dict[str, tuple[Instance, list[Variable], list[Value]]] = {}
+        self._placed: dict[int, float] = {}
+        self._values = values
         by_name = {instance.name: instance for instance in instances}
         for port, value in event.set.items():
             instance = by_name[port.component]
-            _, variables, values = self._calls.setdefault(port.component, (instance, [], []))
+            if port in slots:
+                number = instance.interface.parse(name, port.variable, value)
+                check_exact(f"{name}: {port}", number)
+                self._placed[slots[port]] = float(number)
+                continue
+            _, variables, given = self._calls.setdefault(port.component, (instance, [], []))
             variables.append(instance.interface.by_name[port.variable])
-            values.append(instance.interface.parse(name, port.variable, value))
+            given.append(instance.interface.parse(name, port.variable, value))
 
     def next_step(self, step: int) -> int:
         """The first step from this one on at which it can happen."""
@@ -138,6 +159,8 @@ class _PendingEvent:
         """Set what it sets; lines for the log that say so."""
         for instance, variables, values in self._calls.values():
             instance.set(variables, values)
+        for slot, number in self._placed.items():
+            self._values[slot] = number
         reason = f" ({self.event.when})" if self.event.when else ""
         return [f"{port} = {literal(value)}{reason}" for port, value in self.event.set.items()]
 

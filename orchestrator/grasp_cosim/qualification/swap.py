@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ..checks import known
 from ..errors import InputError
+from ..interface.expansion import values_of
 from ..interface.interface import Value
 from ..interface.read import describe
 from ..interface.units import Conversion, conversion
@@ -53,16 +54,21 @@ def prepare_swap(
     """The swap that qualify() describes; InputError where its arguments are wrong."""
     place = system.component(component, f"--as {component}")
     interfaces = {
-        c.name: describe(c.fmu).renamed(c.rename).in_units(c.units) for c in system.components
+        c.name: c.sized(describe(c.fmu)).renamed(c.rename).in_units(c.units)
+        for c in system.components
     }
     ours = interfaces[component]
     was = candidate if isinstance(candidate, Component) else replace(place, values={})
     fmu = was.fmu if isinstance(candidate, Component) else candidate
     now = replaced(was, Replacement(fmu, rename, units or {}), "--")
-    theirs = describe(fmu).renamed(now.rename, "--rename").in_units(now.units, "--units")
+    theirs = now.sized(describe(fmu)).renamed(now.rename, "--rename")
+    theirs = theirs.in_units(now.units, "--units")
     for new, name in rename.items():
-        known(f"--rename: {new!r} = {name!r}: the original has no variable", new, ours.by_name)
-    extra = {f"{component}.{name}": name for name in theirs.by_name if name not in ours.by_name}
+        for called in theirs.arrays[new].names if new in theirs.arrays else (new,):
+            entry = f"--rename: {new!r} = {name!r}"
+            known(f"{entry}: the original has no variable", called, ours.by_name)
+    names = (*theirs.by_name, *(n for n in theirs.arrays if n not in ours.arrays))
+    extra = {f"{component}.{name}": name for name in names if name not in ours.by_name}
     own = {n: v for n, v in now.values.items() if n not in ours.by_name}
     own |= {extra[key]: value for key, value in values.items() if key in extra}
     common = {key: value for key, value in values.items() if key not in extra}
@@ -78,7 +84,7 @@ def prepare_swap(
         given = converted(given, ours, theirs) | dict(now.values)
         for name, value in own.items():
             text = f"--set {component}.{name}"
-            given[name] = theirs.parse(text, name, value, text=True)
+            given |= values_of(theirs, text, name, value, text=True)
         place = replace(now, name=component, values=given, isolation=isolation)
         components = tuple(place if c.name == component else c for c in system.components)
         try:

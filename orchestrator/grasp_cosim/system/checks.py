@@ -10,8 +10,8 @@ from typing import NamedTuple
 from ..checks import choice, known, number, whole
 from ..errors import InputError, choices
 from ..interface.interface import SUPPORTED, Interface, Variable, limits
-from ..interface.read import read_interface
 from ..interface.units import conversion
+from .arrays import as_written, unsourced
 from .parts import LOOPS, Component, Connection, Port, seconds
 from .structure import Structure
 
@@ -61,9 +61,9 @@ def check_connections(system: Structure) -> None:
     """InputError at the first connection or input that is not as it must be."""
     sources: dict[Port, Port] = {}
     for connection in system.connections:
-        place, source, target = _place(system, connection), connection.source, connection.target
+        place, source, target = _Place(system, connection), connection.source, connection.target
         connection_transform(system, connection)
-        if target.variable in system.component(target.component, place).values:
+        if target.variable in system.component(target.component, "").values:
             raise InputError(
                 f"{place}: {target} has two sources, the connection and a value; must have one"
             )
@@ -76,7 +76,7 @@ def check_connections(system: Structure) -> None:
         port
         for component in system.components
         for v in component.interface.of("input")
-        if v.supported and v.name not in component.values
+        if v.supported and not v.element and v.name not in component.values
         if (port := Port(component.name, v.name)) not in sources
     ]
     if missing:
@@ -97,7 +97,7 @@ def connection_transform(system: Structure, connection: Connection) -> tuple[flo
     What the connection declares, or else the conversion between the units of its ends. InputError
     where an end does not exist, and where values cannot be passed from one end to the other.
     """
-    place = _place(system, connection)
+    place = _Place(system, connection)
     source, target = _ends(system, connection)
     _check_types(place, source, target)
     if connection.factor is not None or connection.offset is not None:
@@ -143,12 +143,12 @@ def remarks(system: Structure) -> tuple[str, ...]:
     """
     lines = []
     for component in system.components:
-        declared = read_interface(component.fmu).renamed(component.rename).by_name
+        declared = component.declared
         lines += [
-            f"{Port(component.name, name)} is declared in {declared[name].unit}, but named in "
-            f"{unit}: taken to be in that"
+            f"{Port(component.name, name)} is declared in {v.unit}, but named in {unit}: taken to "
+            "be in that"
             for name, unit in component.units.items()
-            if declared[name].unit not in (None, unit)
+            if (v := declared.sample(name)) and v.unit not in (None, unit)
         ]
     for connection in system.connections:
         ends = _ends(system, connection)
@@ -166,38 +166,50 @@ def remarks(system: Structure) -> tuple[str, ...]:
                 port = Port(component.name, variable.name)
                 left = "keeps its start value" if variable.causality == "input" else "not recorded"
                 lines.append(f"{port} is of type {variable.nature}: {left}")
+        lines += unsourced(system, component)
     if not system.recorded:
         lines.append(
             f"{system.name}: nothing is recorded; must have an output that is a Real, Integer, "
-            "Boolean or String, no array"
+            "Boolean or String"
         )
     return tuple(lines)
 
 
-def _place(system: Structure, connection: Connection) -> str:
-    return f"{system.name}: connections[{system.connections.index(connection)}] '{connection}'"
+class _Place:
+    """Where a connection is, as text once it is needed: a system may have thousands."""
+
+    def __init__(self, system: Structure, connection: Connection) -> None:
+        self._system, self._connection = system, connection
+
+    def __str__(self) -> str:
+        written = as_written(self._system)
+        number = written.index(self._connection.whole or self._connection)
+        return f"{self._system.name}: connections[{number}] '{self._connection}'"
 
 
 def _ends(system: Structure, connection: Connection) -> tuple[_End, _End]:
     """Source and target of a connection; InputError where one does not exist."""
-    place = _place(system, connection)
 
     def end(port: Port, causality: str) -> _End:
-        interface = system.component(port.component, place).interface
-        valid = [v.name for v in interface.of(causality)]
-        known(f"{place}: {port.component} has no {causality}", port.variable, valid)
-        return _End(port, interface, interface.by_name[port.variable])
+        interface = system.component(port.component, _Place(system, connection)).interface
+        found = interface.by_name.get(port.variable)
+        if found is None or found.causality != causality:
+            valid = [v.name for v in interface.of(causality)]
+            place = _Place(system, connection)
+            known(f"{place}: {port.component} has no {causality}", port.variable, valid)
+            raise AssertionError(port)  # pragma: no cover
+        return _End(port, interface, found)
 
     return end(connection.source, "output"), end(connection.target, "input")
 
 
-def _check_types(place: str, source: _End, target: _End) -> None:
+def _check_types(place: _Place, source: _End, target: _End) -> None:
     """InputError where the target's type does not hold what the source puts out."""
     for port, _, variable in (source, target):
         if not variable.supported:
             raise InputError(
                 f"{place}: {port} is of type {variable.nature}, which is not supported; "
-                f"must be {choices(SUPPORTED)}, no array"
+                f"must be {choices(SUPPORTED)}"
             )
     given, taken = source.variable, target.variable
     types = f"{place}: {source.port} is {given.type} and {target.port} is {taken.type}"
@@ -218,7 +230,7 @@ def _check_types(place: str, source: _End, target: _End) -> None:
         )
 
 
-def _declared(place: str, connection: Connection, target: Variable) -> tuple[float, float]:
+def _declared(place: _Place, connection: Connection, target: Variable) -> tuple[float, float]:
     factor = 1.0 if connection.factor is None else float(connection.factor)
     offset = 0.0 if connection.offset is None else float(connection.offset)
     if not factor or not math.isfinite(factor):

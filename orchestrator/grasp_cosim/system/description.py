@@ -8,7 +8,8 @@ from typing import Any
 from .. import extensions
 from ..checks import choice, is_number, number
 from ..errors import InputError, choices
-from ..interface.interface import Value
+from ..interface.interface import Given
+from .arrays import as_written, by_element, check_arrays
 from .checks import (
     check_components,
     check_connections,
@@ -20,6 +21,7 @@ from .parts import LONGEST, NANOSECONDS, Isolation
 from .scenario_checks import check_scenario
 from .structure import DIVERGING, SCHEMES, Diverging, Scheme, Structure
 from .swap import Replacement, with_fmu
+from .values import with_given
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,10 +30,12 @@ class System(Structure):
 
     def __post_init__(self) -> None:
         check_steps(self)
+        object.__setattr__(self, "connections", by_element(self))
         for component in self.components:
             for name, value in component.values.items():
                 component.interface.parse(f"{self.name}: {component.name}.{name}", name, value)
         check_components(self)
+        check_arrays(self)
         check_connections(self)
         check_scenario(self)
         check_initialisation(self)
@@ -68,8 +72,11 @@ class System(Structure):
             raise InputError(f"{key}: {component.fmu.name} declares no such start value")
         return float(component.values.get(variable, declared.start))
 
-    def with_values(self, values: Mapping[str, Value]) -> "System":
-        """A copy with start values changed; the keys are like 'plant.object_width'."""
+    def with_values(self, values: Mapping[str, Given]) -> "System":
+        """A copy with start values changed; the keys are like 'plant.object_width'.
+
+        Of a whole array the value is a list of lists, a NumPy array, or one for all elements.
+        """
         return self.revised({}, values, ("swap", "with_values"))
 
     def swap(
@@ -91,30 +98,36 @@ class System(Structure):
     def revised(
         self,
         fmus: Mapping[str, str | Path | Replacement],
-        values: Mapping[str, Value],
+        values: Mapping[str, Given],
         places: tuple[str, str],
     ) -> "System":
         """A copy with FMUs replaced, then values changed; places name the two, for messages."""
-        components = {c.name: c for c in self.components}
-        notes = [*self.notes]
-        for name, fmu in fmus.items():
-            place = f"{places[0]} {name}"
-            anew = [key.partition(".")[2] for key in values if key.partition(".")[0] == name]
-            new = fmu if isinstance(fmu, Replacement) else Replacement(Path(fmu))
-            was = self.component(name, place)
-            components[name], more = with_fmu(self, was, new, anew, place)
-            notes += more
+        components, notes = {c.name: c for c in self.components}, [*self.notes]
+        given: dict[str, dict[str, Given]] = {}
         for key, value in values.items():
             name, _, variable = key.partition(".")
-            place = f"{places[1]} {key}"
-            self.component(name, place)
-            component = components[name]
-            parsed = component.interface.parse(place, variable, value, text=True)
-            components[name] = replace(component, values={**component.values, variable: parsed})
-        for name in fmus:
-            kept = [v for v in components[name].values if f"{name}.{v}" not in values]
-            check_items(self.component(name, name), components[name], kept, f"{places[0]} {name}")
-        return replace(self, components=tuple(components.values()), notes=tuple(notes))
+            self.component(name, f"{places[1]} {key}")
+            given.setdefault(name, {})[variable] = value
+        for name, fmu in fmus.items():
+            place = f"{places[0]} {name}"
+            new = fmu if isinstance(fmu, Replacement) else Replacement(Path(fmu))
+            was, anew = self.component(name, place), given.get(name, {})
+            arrays = was.interface.arrays
+            parts = (arrays[key].names if key in arrays else (key,) for key in anew)
+            fresh = {variable for part in parts for variable in part}
+            components[name], more = with_fmu(self, was, new, fresh, place)
+            notes += more
+            kept = [v for v in components[name].values if v not in fresh]
+            check_items(was, components[name], kept, place)
+        for name, more_values in given.items():
+            place = f"{places[1]} {name}."
+            components[name] = with_given(components[name], place.__add__, more_values, text=True)
+        return replace(
+            self,
+            components=tuple(components.values()),
+            connections=as_written(self),
+            notes=tuple(notes),
+        )
 
     def with_presets(self, *names: str) -> "System":
         """A copy with the values of presets, a later one before an earlier one."""

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal, get_args
 
-from ..interface.interface import Interface, Value
+from ..interface.expansion import expanded
+from ..interface.interface import Interface, Value, Variable
 from ..interface.read import read_interface
 
 Isolation = Literal["none", "process"]
@@ -42,7 +43,8 @@ def literal(value: Value) -> str:
 class Component:
     """An instance of an FMU and what it is given: the system's names, values, step and process.
 
-    values differ from the FMU's own start values, by the system's names. rename maps the system's
+    values differ from the FMU's own start values, by the system's names, of arrays by elements, of
+    which there are as many as values of structural parameters say. rename maps the system's
     name of a variable to the FMU's, where they differ. step_ns is the component's own communication
     step in nanoseconds, None for the system's. With isolation "process" it runs in a process of its
     own. units name the units of variables that the FMU declares without one, or wrongly, by the
@@ -61,17 +63,32 @@ class Component:
 
     @property
     def interface(self) -> Interface:
-        """The declared interface of the FMU, under the system's names and with its units."""
-        return self._interface(self.fmu)
+        """The declared interface of the FMU, under the system's names and with its units.
+
+        Arrays of numbers are taken apart: each element is a variable.
+        """
+        return self.declared.in_units(self.units, f"{self.name}: units")
+
+    @property
+    def declared(self) -> Interface:
+        """The same with the units that the FMU declares."""
+        return self.sized(read_interface(self.fmu)).renamed(self.rename, f"{self.name}: rename")
 
     @property
     def loaded(self) -> Interface:
-        """The same of the FMU that runs: of its native twin, where it has one."""
-        return self._interface(self.native or self.fmu)
+        """The interface of the FMU that runs: of its native twin, where it has one."""
+        return replace(self, fmu=self.native or self.fmu).interface
 
-    def _interface(self, fmu: Path) -> Interface:
-        declared = read_interface(fmu).renamed(self.rename, f"{self.name}: rename")
-        return declared.in_units(self.units, f"{self.name}: units")
+    def names_unit(self, variable: Variable) -> bool:
+        """True if units name the one of a variable, or of the array that it is in."""
+        array = variable.element.array if variable.element else variable.name
+        return variable.name in self.units or array in self.units
+
+    def sized(self, interface: Interface) -> Interface:
+        """The interface of an FMU, with its arrays taken apart, of the sizes that values give."""
+        if not any(v.shape for v in interface.variables):
+            return interface
+        return expanded(interface, {self.rename.get(n, n): v for n, v in self.values.items()})
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,12 +107,14 @@ class Connection:
     """From an output to an input: target = factor * source + offset.
 
     factor and offset are None where the units decide: the identity, or the conversion between them.
+    whole is the connection of arrays that this one is an element of, if it is one.
     """
 
     source: Port
     target: Port
     factor: float | None = None
     offset: float | None = None
+    whole: Connection | None = field(default=None, compare=False)
 
     def __str__(self) -> str:
         return f"{self.source} -> {self.target}"

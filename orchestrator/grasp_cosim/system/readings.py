@@ -44,7 +44,7 @@ def readings(system: Structure) -> dict[Port, Reading]:
         unit = unit_of(interface, interface.by_name[connection.target.variable])
         taken.setdefault(connection.source, []).append(_Taken(connection, unit))
     return {
-        port: _reading(interfaces[c.name], v, v.name in c.units, taken.get(port, ()))
+        port: _reading(interfaces[c.name], v, c.names_unit(v), taken.get(port, ()))
         for c in system.components
         for v in interfaces[c.name].of("output")
         if v.supported and v.kind in ("Real", "Integer") and (port := Port(c.name, v.name))

@@ -65,6 +65,14 @@ def check_setting(system: Structure, port: Port, value: Value, place: str) -> No
     interface.parse(place, port.variable, value)
 
 
+def check_exact(place: str, value: Value) -> None:
+    """InputError where an integer is none that a float64 holds exactly."""
+    if isinstance(value, int) and abs(value) >= 2**53:
+        raise InputError(
+            f"{place} = {value}: must be smaller than 2**53 in magnitude, to be exact as a float64"
+        )
+
+
 def _check_condition(system: Structure, condition: Condition, place: str) -> None:
     interface = system.component(condition.port.component, place).interface
     valid = [v.name for v in interface.of("output") if v.is_number]
@@ -125,4 +133,5 @@ def _check_parameters(fault: Fault, interface: Interface, place: str) -> None:
         if valid is not None and (valid.needed or name in fault.parameters):
             valid.check(f"{place}: {name}", fault.parameters.get(name))
         elif valid is None and name in fault.parameters:
-            interface.parse(f"{place}: {name}", fault.target.variable, fault.parameters[name])
+            at, given = f"{place}: {name}", fault.parameters[name]
+            check_exact(at, interface.parse(at, fault.target.variable, given))

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 from ..errors import InputError, choices
-from ..interface.interface import Value, Variable
+from ..interface.interface import Given, Variable
 from .parts import Component, Connection, Event, Fault, Initialisation, Port
 
 Scheme = Literal["sequential", "jacobi"]
@@ -37,7 +37,7 @@ class Structure:
     initialisation: Initialisation = Initialisation()
     notes: tuple[str, ...] = field(default=(), compare=False)
     roles: Mapping[str, str] = field(default_factory=dict)
-    presets: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
+    presets: Mapping[str, Mapping[str, Given]] = field(default_factory=dict)
     diverging: Diverging = "stop"
 
     @property
@@ -60,7 +60,7 @@ class Structure:
         own = self.component(name, name).step_ns
         return 1 if own is None else own // self.step_ns
 
-    def component(self, name: str, place: str) -> Component:
+    def component(self, name: str, place: object) -> Component:
         """The component of that name; place says who asks, for the error message."""
         for component in self.components:
             if component.name == name:

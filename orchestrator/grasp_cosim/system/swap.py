@@ -58,19 +58,20 @@ def replaced(was: Component, new: Replacement, place: str) -> Component:
     Of the names and units that it has, those stay that fit: an FMU's name that the new one has,
     too; a unit where the FMUs declare the same one, or the new FMU none.
     """
-    ours, theirs = describe(was.fmu).renamed(was.rename).by_name, describe(new.fmu)
+    ours = was.sized(describe(was.fmu)).renamed(was.rename)
+    theirs = was.sized(describe(new.fmu))
     rename = {
         name: own
         for name, own in was.rename.items()
-        if own in theirs.by_name and name not in new.rename and own not in new.rename.values()
+        if theirs.sample(own) and name not in new.rename and own not in new.rename.values()
     } | dict(new.rename)
     while taken := (rename.keys() & theirs.by_name) - {*new.rename, *rename.values()}:
         rename = {name: own for name, own in rename.items() if name not in taken}
-    found = theirs.renamed(rename, f"{place}rename").by_name
+    found = theirs.renamed(rename, f"{place}rename")
     units = {
         name: unit
         for name, unit in was.units.items()
-        if name in found and found[name].unit in (None, ours[name].unit)
+        if (now := found.sample(name)) and now.unit in (None, getattr(ours.sample(name), "unit", 0))
     }
     units |= new.units
     return replace(was, fmu=new.fmu, native=None, rename=rename, units=units)

@@ -6,11 +6,12 @@ from typing import Any
 
 from ..checks import as_table, check_keys, check_values, choice, is_number, text, toml_table
 from ..errors import InputError
-from ..interface.interface import Value
+from ..interface.interface import Given
 from ..interface.read import read_interface
 from .description import System, as_diverging, as_scheme, in_nanoseconds
 from .parts import ISOLATIONS, Component, Connection, Initialisation, Port
 from .scenario import read_events, read_faults
+from .values import with_given
 
 KEYS = (
     "experiment", "components", "connections", "initialisation", "events", "faults", "roles",
@@ -37,7 +38,7 @@ def read_toml(path: Path, fmus: Path | None = None) -> System:
     connections = tuple(
         _connection(f"{place}: connections[{i}]", entry) for i, entry in enumerate(entries)
     )
-    return System(
+    system = System(
         place,
         tuple(_component(place, name, entry, folder) for name, entry in components.items()),
         connections,
@@ -45,7 +46,7 @@ def read_toml(path: Path, fmus: Path | None = None) -> System:
         in_nanoseconds(f"{place}: experiment.stop", experiment.get("stop")),
         as_scheme(f"{place}: experiment.scheme", experiment.get("scheme", "sequential")),
         read_events(place, table.get("events", [])),
-        read_faults(place, table.get("faults", []), connections),
+        (),
         _initialisation(f"{place}: [initialisation]", part("initialisation", {})),
         roles={
             role: text(f"{place}: [roles]: {role}", name, "the name of a component")
@@ -59,6 +60,8 @@ def read_toml(path: Path, fmus: Path | None = None) -> System:
             f"{place}: experiment.diverging", experiment.get("diverging", "stop")
         ),
     )
+    faults = read_faults(place, table.get("faults", []), system.connections)
+    return replace(system, faults=faults) if faults else system
 
 
 def _initialisation(place: str, table: dict[str, Any]) -> Initialisation:
@@ -66,7 +69,7 @@ def _initialisation(place: str, table: dict[str, Any]) -> Initialisation:
     return Initialisation(**table)
 
 
-def _values(place: str, table: Any) -> dict[str, Value]:
+def _values(place: str, table: Any) -> dict[str, Given]:
     """A table of values; if they fit their variables is checked where it is used."""
     values = as_table(place, table)
     check_values(place, values)
@@ -82,8 +85,6 @@ def _component(place: str, name: str, entry: Any, folder: Path) -> Component:
     own = entry.get("step")
     rename = _names(f"{place}: rename", entry.get("rename", {}), "a variable of the FMU, a string")
     units = _names(f"{place}: units", entry.get("units", {}), "the name of a unit, like 'mm'")
-    renamed = read_interface(fmu).renamed(rename, f"{place}: rename")
-    renamed.in_units(units, f"{place}: units")
     component = Component(
         name,
         fmu,
@@ -93,8 +94,9 @@ def _component(place: str, name: str, entry: Any, folder: Path) -> Component:
         choice(f"{place}: isolation", entry.get("isolation", "none"), ISOLATIONS),
         units,
     )
-    parsed = {k: component.interface.parse(f"{place}: values", k, v) for k, v in values.items()}
-    return replace(component, values=parsed)
+    sized = component.sized(read_interface(fmu)).renamed(rename, f"{place}: rename")
+    sized.in_units(units, f"{place}: units")
+    return with_given(component, lambda _: f"{place}: values", values)
 
 
 def _names(place: str, table: Any, must: str) -> dict[str, str]:

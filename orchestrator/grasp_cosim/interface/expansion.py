@@ -1,0 +1,128 @@
+"""Arrays of numbers taken apart: an interface with a variable for each element."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from ..errors import InputError
+from .arrays import (
+    MOST_ELEMENTS,
+    Array,
+    Element,
+    element_names,
+    flattened,
+    from_text,
+    shape_text,
+    size_of,
+)
+from .interface import SETTABLE, Given, Interface, Value, Variable
+
+TAKEN_APART = (*SETTABLE, "output")
+"""The causalities of arrays that a master does something with."""
+
+Names = tuple[str, ...] | None
+
+
+def expanded(interface: Interface, values: Mapping[str, Value]) -> Interface:
+    """The interface with elements in the place of arrays of numbers, sized by the given values.
+
+    values are by the FMU's own names; of a variable that holds a size and is not among them, its
+    start counts. An array is left as it is where it would be too many elements, or where the FMU
+    has a variable by the name of one.
+    """
+    sizes = dict.fromkeys(name for v in interface.variables for name in v.sizes if name)
+    if not any(v.shape for v in interface.variables):
+        return interface
+    given = tuple(_length(values.get(name)) for name in sizes)
+    if given not in interface.expansions:
+        lengths = {n: g for n, g in zip(sizes, given, strict=True) if g is not None}
+        interface.expansions[given] = _expanded(interface, lengths)
+    return interface.expansions[given]
+
+
+def values_of(
+    interface: Interface, place: str, name: str, given: Given, text: bool = False
+) -> dict[str, Value]:
+    """The values by variable of what is given for a variable or for a whole array, checked.
+
+    As of Interface.parse(); for an array nested lists of its shape, a list of all elements row by
+    row, or one value for all.
+    """
+    array: Array | None = interface.arrays.get(name)
+    if array is None:
+        if not isinstance(given, float | int | bool | str):
+            raise InputError(f"{place}: {name} = {given!r}: is no array; must be one value")
+        return {name: interface.parse(place, name, given, text)}
+    try:
+        found: Any = from_text(given) if text and isinstance(given, str) else given
+        flat = flattened(found, array.shape)
+    except ValueError as error:
+        raise InputError(
+            f"{place}: {name} = {given!r}: {error}; must be {shape_text(array.shape)}, all "
+            f"{len(array.names)} row by row, or one value for all"
+        ) from error
+    return {
+        element: interface.parse(place, element, value, text)
+        for element, value in zip(array.names, flat, strict=True)
+    }
+
+
+def _length(value: Value | None) -> int | None:
+    return value if isinstance(value, int) and value >= 0 else None
+
+
+def _expanded(interface: Interface, lengths: Mapping[str, int]) -> Interface:
+    variables: list[Variable] = []
+    arrays: dict[str, Array] = {}
+    room = MOST_ELEMENTS
+    for v in interface.variables:
+        shape = tuple(
+            lengths.get(name or "", length) for name, length in zip(v.sizes, v.shape, strict=True)
+        )
+        size = size_of(shape)
+        apart = v.is_array_of_numbers and v.causality in TAKEN_APART
+        names = element_names(v.name, shape) if apart and size <= room else ()
+        if not apart or size > room or not interface.by_name.keys().isdisjoint(names):
+            variables.append(replace(v, shape=shape) if shape != v.shape else v)
+            continue
+        room -= size
+        arrays[v.name] = Array(shape, names)
+        variables += _elements(v, shape, names)
+    named = _Named(arrays)
+    variables = [
+        replace(
+            v,
+            dependencies=named(v.dependencies),
+            initial_dependencies=named(v.initial_dependencies),
+        )
+        for v in variables
+    ]
+    return replace(interface, variables=tuple(variables), arrays=arrays)
+
+
+def _elements(v: Variable, shape: tuple[int, ...], names: tuple[str, ...]) -> list[Variable]:
+    """The elements; they have no start value where it is not declared for their number."""
+    starts: tuple[str | None, ...] = v.texts
+    if len(starts) == 1:
+        starts *= len(names)
+    elif shape != v.shape or len(starts) != len(names):
+        starts = (None,) * len(names)
+    plain = replace(v, shape=(), sizes=(), starts=())
+    return [
+        replace(plain, name=name, start=start, element=Element(v.name, place, len(names)))
+        for place, (name, start) in enumerate(zip(names, starts, strict=True))
+    ]
+
+
+class _Named:
+    """The elements in the place of arrays in what a variable depends on, each tuple made once."""
+
+    def __init__(self, arrays: Mapping[str, Array]) -> None:
+        self._arrays = arrays
+        self._made: dict[Names, Names] = {}
+
+    def __call__(self, names: Names) -> Names:
+        if names is not None and names not in self._made:
+            parts = (self._arrays[n].names if n in self._arrays else (n,) for n in names)
+            self._made[names] = tuple(name for part in parts for name in part)
+        return self._made.get(names)

@@ -1,0 +1,95 @@
+"""Connections and values of whole arrays, as those of their elements."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from ..errors import InputError, choices
+from ..interface.arrays import shape_text
+from .parts import Component, Connection, Port
+from .structure import Structure
+
+
+def as_written(system: Structure) -> tuple[Connection, ...]:
+    """The connections as they were given: of whole arrays one."""
+    return tuple(dict.fromkeys(c.whole or c for c in system.connections))
+
+
+def by_element(system: Structure) -> tuple[Connection, ...]:
+    """The connections, with one for each element in the place of one between whole arrays.
+
+    InputError where the shapes differ.
+    """
+    arrays = {c.name: c.interface.arrays for c in system.components}
+    if not any(arrays.values()):
+        return system.connections
+    made: list[Connection] = []
+    for i, connection in enumerate(system.connections):
+        ends = (connection.source, connection.target)
+        found = [arrays.get(port.component, {}).get(port.variable) for port in ends]
+        source, target = found
+        if source is None and target is None:
+            made.append(connection)
+            continue
+        if source is None or target is None or source.shape != target.shape:
+            has = [
+                f"{p} is {shape_text(a.shape if a else ())}"
+                for p, a in zip(ends, found, strict=True)
+            ]
+            raise InputError(
+                f"{system.name}: connections[{i}] '{connection}': {' and '.join(has)}; must have "
+                "equal shapes, or be of elements, like u[1]"
+            )
+        made += (
+            replace(
+                connection,
+                source=Port(connection.source.component, start),
+                target=Port(connection.target.component, end),
+                whole=connection,
+            )
+            for start, end in zip(source.names, target.names, strict=True)
+        )
+    return tuple(made)
+
+
+def check_arrays(system: Structure) -> None:
+    """InputError where only a part of an array is given, and nothing is known of the rest.
+
+    The rest of what is given keeps its start value, which must be declared for the size it has.
+    """
+    connected = {connection.target for connection in system.connections}
+    for component in system.components:
+        for name, unknown in _incomplete(component):
+            missing = [n for n in unknown if Port(component.name, n) not in connected]
+            if missing:
+                raise InputError(
+                    f"{system.name}: {component.name}.{name}: no value for {choices(missing, 6)}, "
+                    "and no start value for this size; must be given, too"
+                )
+
+
+def _incomplete(component: Component) -> Iterator[tuple[str, list[str]]]:
+    """Arrays that are given in part, each with its elements that have no value at all."""
+    interface = component.interface
+    for name, array in interface.arrays.items():
+        if not component.values.keys().isdisjoint(array.names):
+            unknown = [
+                n
+                for n in array.names
+                if n not in component.values and interface.by_name[n].start is None
+            ]
+            yield name, unknown
+
+
+def unsourced(system: Structure, component: Component) -> Iterator[str]:
+    """A line for each input array with elements that have neither a connection nor a value."""
+    targets = {
+        c.target.variable for c in system.connections if c.target.component == component.name
+    }
+    interface = component.interface
+    for name, array in interface.arrays.items():
+        free = [n for n in array.names if n not in targets and n not in component.values]
+        if free and interface.by_name[free[0]].causality == "input":
+            what = name if len(free) == len(array.names) else choices(free, 6)
+            yield f"{Port(component.name, what)}: no source, keeps the start value of its FMU"
