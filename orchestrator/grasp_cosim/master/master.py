@@ -21,6 +21,7 @@ from ..system.parts import NANOSECONDS, Port
 from . import loop
 from .aside import Aside
 from .compiled import CompiledLoop
+from .drive import at_start, drives_of
 from .engine import Engine, make_loop
 from .initialisation import Propagation
 from .plan import Planner, slots_of
@@ -70,11 +71,19 @@ class Master:
         if pacer:
             pacer.bind(self.values[len(self.slots) :], self._hand_on_until)
         self.scenario = Scenario(system, instances, self.slots, self.values)
+        self._drives = drives_of(system, self.slots)
         self._receive = receive
         self.meanwhile: Callable[[], None] = lambda: None
         """Called while the loop of a run in real time goes on without Python's lock."""
         self.plan = Planner(
-            system, instances, self.slots, self.values, self.scenario, self.texts, pacer
+            system,
+            instances,
+            self.slots,
+            self.values,
+            self.scenario,
+            self.texts,
+            self._drives,
+            pacer,
         ).plan()
         self._pacer = pacer
         self._loop = make_loop(self.plan, engine, None if pacer else self.total_steps)
@@ -91,7 +100,8 @@ class Master:
         """Start values in, then outputs at t = 0 that agree with the inputs at t = 0."""
         stop = self.system.stop_ns / NANOSECONDS
         for component, instance in zip(self.system.components, self.instances, strict=True):
-            instance.enter_initialization(component.values, stop)
+            driven = at_start(self.system, self._drives, component.name)
+            instance.enter_initialization({**component.values, **driven}, stop)
         propagation = Propagation(self.system, self.instances, self.scenario.fault_functions)
         try:
             self.log += propagation.run()
@@ -100,7 +110,8 @@ class Master:
         for instance in self.instances:
             instance.exit_initialization()
         for port, slot in self.slots.items():
-            value = propagation.values[port]
+            drive = self._drives.get(port)
+            value = drive.at(0) if drive else propagation.values[port]
             if port in self.texts:
                 value = self.texts[port].number(str(value))
             if isinstance(value, int) and abs(value) >= loop.EXACT:
