@@ -8,7 +8,7 @@ a string.
 
 import json
 from array import array
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
@@ -120,7 +120,7 @@ def _typed(kind: Any, value: Any) -> Any:
             _typed(arguments[0], key): _typed(arguments[1], entry)
             for key, entry in _typed(dict, value).items()
         }
-    if origin is array:
+    if origin is Sequence:
         return array("d" if arguments[0] is float else "q", _typed(list, value))
     if origin is tuple:
         return tuple(_typed(arguments[0], entry) for entry in _typed(list, value))

@@ -40,10 +40,11 @@ _UNIT = re.compile(r"(.*\S)\s+\[([^\[\]]*)\]")
 class Column:
     """The samples of one input, in its unit or in the one named.
 
-    With texts, such as the names of an enumeration, they are their places among these.
+    With texts, such as the names of an enumeration, they are their places among these. Sequences
+    are arrays, which take 8 bytes a number.
     """
 
-    samples: array[float]
+    samples: Sequence[float]
     unit: str | None = None
     texts: tuple[str, ...] = ()
 
@@ -77,10 +78,10 @@ class Stimuli:
     """
 
     file: str
-    times: array[int]
+    times: Sequence[int]
     columns: Mapping[Port, Column]
     interpolation: Interpolation = "linear"
-    lines: array[int] = field(default_factory=lambda: array("q"))
+    lines: Sequence[int] = field(default_factory=lambda: array("q"))
     partial: bool = field(default=False, compare=False)
 
     def place(self, port: Port, row: int | None = None) -> str:
@@ -208,10 +209,10 @@ def _times(column: _Cells, factor: float, lines: Sequence[int]) -> array[int]:
 
 def input_entry(stimuli: Stimuli) -> dict[str, str]:
     """What drives inputs, for run.json: the file, how, and a hash of the samples."""
-    made_of = hashlib.sha256(stimuli.times.tobytes())
+    made_of = hashlib.sha256(array("q", stimuli.times))
     for port, column in stimuli.columns.items():
         made_of.update(f"\0{port}\0{column.unit}\0{column.texts}\0".encode())
-        made_of.update(column.samples.tobytes())
+        made_of.update(array("d", column.samples))
     return {
         "file": stimuli.file,
         "interpolation": stimuli.interpolation,

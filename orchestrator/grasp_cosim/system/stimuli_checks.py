@@ -63,7 +63,8 @@ def samples_of(system: Structure, port: Port) -> array[float]:
         values = [float(_value(system.input, port, interface, r)) for r in column.distinct]
         return array("d", (values[int(i)] for i in column.samples))
     change = _conversion(system.input.place(port), interface, port, column)
-    return column.samples if change == IDENTITY else array("d", (change(x) for x in column.samples))
+    same = change == IDENTITY
+    return array("d", column.samples if same else (change(x) for x in column.samples))
 
 
 def is_linear(stimuli: Stimuli, variable: Variable) -> bool:
