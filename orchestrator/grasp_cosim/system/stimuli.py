@@ -239,7 +239,9 @@ class _Cells:
                 numbers = [repr(x).removesuffix(".0") for x in self.samples]
                 self.samples = array("d", map(self._text, numbers))
             else:
-                self._check(lines, map(math.isfinite, self.samples[before:]), cells)
+                new = self.samples[before:]
+                if not math.isfinite(sum(new)):
+                    self._check(lines, map(math.isfinite, new), cells)
                 return
         self._check(lines, map(str.strip, cells), cells)
         self.samples.extend(self._text(cell.strip()) for cell in cells)
