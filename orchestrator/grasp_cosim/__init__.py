@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from .recording.result import Result
     from .report.page import Scene
     from .system.description import System
+    from .system.stimuli import Stimuli
 
 __all__ = [
     "InputError",
@@ -58,18 +59,30 @@ def __getattr__(name: str) -> Any:
     return value
 
 
-def _read_toml(path: Path, fmus: Path | None, step: float | None, stop: float | None) -> System:
+def _read_toml(
+    path: Path,
+    fmus: Path | None,
+    step: float | None,
+    stop: float | None,
+    stimuli: Stimuli | None,
+) -> System:
     from .system.toml import read_toml
 
-    return read_toml(path, fmus).with_experiment(step, stop)
+    return read_toml(path, fmus, stimuli).with_experiment(step, stop)
 
 
-def _read_ssp(path: Path, fmus: Path | None, step: float | None, stop: float | None) -> System:
+def _read_ssp(
+    path: Path,
+    fmus: Path | None,
+    step: float | None,
+    stop: float | None,
+    stimuli: Stimuli | None,
+) -> System:
     from .ssp.read import read_ssp
 
     if fmus is not None:
         raise InputError(f"{path}: has its own FMUs; those in {fmus} cannot take their place")
-    return read_ssp(path, step, stop)
+    return read_ssp(path, step, stop, stimuli)
 
 
 def _grasp_metrics() -> tuple[Metric, ...]:

@@ -11,8 +11,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
     from pathlib import Path
 
-readers: dict[str, Callable[[Path, Path | None, float | None, float | None], Any]] = {}
-"""Readers of system files by suffix: `path`, folder of the FMUs, step and stop in s to a System."""
+readers: dict[str, Callable[[Path, Path | None, float | None, float | None, Any], Any]] = {}
+"""Readers of system files by suffix: `path`, folder of the FMUs, step and stop in s, and stimuli
+(`system.stimuli.Stimuli`) or None, to a System."""
 
 metrics: list[Callable[[], Iterable[Any]]] = []
 """Sources of metrics (`metrics.metric.Metric`) that every result is asked for."""

@@ -6,9 +6,8 @@ from pathlib import Path
 import fmpy
 import pytest
 from fmpy.validation import validate_fmu
-
-from tests.support.models import KINDS, MODELS, build_model
-from tests.support.native_fmus import needs_gcc
+from support.models import KINDS, MODELS, build_model
+from support.native_fmus import needs_gcc
 
 pytestmark = needs_gcc
 VERSIONS = ("2.0", "3.0")

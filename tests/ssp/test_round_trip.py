@@ -24,6 +24,8 @@ from grasp_cosim.system.parts import (
 )
 from lxml import etree  # type: ignore[import-untyped]
 from ssp.hand_made import archive, changed, component, connect, fmu, structure, system
+from support.native_fmus import needs_gcc
+from support.stimuli import driven
 
 
 def round_trip(original: System, folder: Path) -> System:
@@ -52,6 +54,20 @@ def test_the_grasp_runs_the_same_to_the_bit(grasp: System, tmp_path: Path) -> No
     assert np.array_equal(again.time, ours.time)
     for name in ours:
         assert again[name].tobytes() == ours[name].tobytes(), name
+
+
+@needs_gcc
+def test_what_drives_inputs_comes_back_with_its_values(tmp_path: Path) -> None:
+    text = "time,a.u_Real [kN],a.u_Enumeration\n0,0,one\n0.3,1e-3,two\n\n0.3,0.1,two\n"
+    original = System.load(driven(tmp_path, text, more='[input]\nfile = "drive.csv"\n'))
+    (tmp_path / "drive.csv").unlink()
+    again = round_trip(original, tmp_path)
+    assert again == original
+    assert again.input is not None
+    assert again.input.place(Port("a", "u_Real"), 2).startswith("drive.csv: line 5")
+    ours, theirs = simulate(original), simulate(System.load(tmp_path / "again.ssp"))
+    assert all(ours[name].tobytes() == theirs[name].tobytes() for name in ours)
+    assert ours["a.y_Real"].tolist()[-1] == 100.0
 
 
 def test_units_that_the_system_names_come_back(grasp: System, tmp_path: Path) -> None:

@@ -19,6 +19,7 @@ from ..plain import on_one_line
 if TYPE_CHECKING:
     from ..metrics.metric import Metric
     from ..system.description import System
+    from ..system.stimuli import Stimuli
 
 NEGATIVE, WRONG, FAILED, INTERRUPTED, TERMINATED = 1, 2, 3, 130, 143
 """Exit codes beside 0: result negative, input wrong, failure on the way, Ctrl-C, SIGTERM."""
@@ -67,16 +68,22 @@ def bind_python_option(more: str = "") -> Command:
 
 
 def load_system(
-    path: Path | None = None, step: float | None = None, stop: float | None = None
+    path: Path | None = None,
+    step: float | None = None,
+    stop: float | None = None,
+    stimuli: Stimuli | None = None,
 ) -> System:
-    """The system of a file, by default the built-in grasp; what its reader notes is printed."""
+    """The system of a file, by default the built-in grasp; what its reader notes is printed.
+
+    stimuli go before those that it names.
+    """
     from ..system.description import System
 
     if path is None:
         from ..grasp.system import grasp_system
 
-        return grasp_system()
-    system = System.load(path, step=step, stop=stop)
+        return grasp_system().with_input(stimuli)
+    system = System.load(path, step=step, stop=stop, input=stimuli)
     for note in system.notes:
         say(note)
     return system

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +12,10 @@ import click
 from ..errors import InputError, choices
 from ..system.description import System
 from ..system.parts import ISOLATIONS
+from ..system.stimuli import INTERPOLATIONS, Stimuli, read_stimuli
 from ..system.structure import DIVERGING, SCHEMES
 from ..system.swap import Replacement
-from .frame import load_system, pair, together, with_controller, with_preset
+from .frame import PATH, load_system, pair, together, with_controller, with_preset
 
 set_option = click.option("--set", "settings", multiple=True, metavar="COMPONENT.VARIABLE=VALUE")
 
@@ -114,19 +116,43 @@ def isolations(system: System, texts: Sequence[str]) -> System:
     return system
 
 
+input_options = together(
+    click.option(
+        "--input", type=PATH, help="A CSV file: time, then inputs like plant.force, driven by it."
+    ),
+    click.option(
+        "--interpolation",
+        type=click.Choice(INTERPOLATIONS),
+        help="Of --input, between two rows: linear (default; of continuous Reals) or held.",
+    ),
+)
+
+
+def chosen_stimuli(given: Mapping[str, Any]) -> Stimuli | None:
+    """What --input drives, of FMUs that may yet be swapped."""
+    if not given["input"]:
+        if given["interpolation"]:
+            raise InputError("--interpolation: must come with --input, the file that it is for")
+        return None
+    stimuli = read_stimuli(given["input"], given["interpolation"] or "linear")
+    return replace(stimuli, partial=True)
+
+
 def set_values(settings: Sequence[str]) -> dict[str, Any]:
     """The values of --set by the names of their variables."""
     return dict(pair("--set", text, "COMPONENT.VARIABLE=VALUE") for text in settings)
 
 
-def chosen_system(given: Mapping[str, Any], swapped: Collection[str] = ()) -> System:
+def chosen_system(
+    given: Mapping[str, Any], swapped: Collection[str] = (), stimuli: Stimuli | None = None
+) -> System:
     """The system with a controller, presets, the case last, another experiment; without --set.
 
     `given` are the values of all options of a command by name, `swapped` the components that get
     another FMU, of which the controller must be none.
     """
     step, stop, case = given["step"], given["stop"], given["case"]
-    loaded = load_system(given["system"], step, stop)
+    loaded = load_system(given["system"], step, stop, stimuli)
     system = with_controller(loaded, given["controller"], swapped)
     names = [*given["presets"], *(["bench"] if given["bench"] else [])]
     for name in [*names, *([] if case is None else [f"case_{case}"])]:

@@ -66,6 +66,13 @@ class _Buffer(ctypes.Structure):
     _fields_ = [("element", ctypes.c_int64), ("data", ctypes.c_void_p)]
 
 
+class _Drive(ctypes.Structure):
+    _fields_ = [
+        *((n, ctypes.c_int64) for n in ("slot", "linear", "rows", "row")),
+        *((n, ctypes.c_void_p) for n in ("times", "samples")),
+    ]
+
+
 class _Call(ctypes.Structure):
     _fields_ = [
         ("shape", ctypes.c_int64),
@@ -85,6 +92,7 @@ class _Plan(ctypes.Structure):
         ("connections", ctypes.POINTER(_Connection)),
         ("casts", ctypes.POINTER(_Cast)),
         ("buffers", ctypes.POINTER(_Buffer)),
+        ("drives", ctypes.POINTER(_Drive)),
         ("calls", ctypes.POINTER(_Call)),
         ("values", ctypes.c_void_p),
         ("width", ctypes.c_int64),
@@ -115,11 +123,22 @@ class CompiledLoop:
             for call, callback in zip(plan.calls, self._callbacks, strict=True)
         ]
         buffers = [(ELEMENTS.index(b.dtype.name), b.ctypes.data) for b in plan.buffers]
+        drives = [
+            (
+                d.slot,
+                d.linear,
+                len(d.times),
+                0,
+                d.times.buffer_info()[0],
+                d.samples.buffer_info()[0],
+            )
+            for d in plan.drives
+        ]
         self._plan = plan
         self._tables = _Plan(
             _table(_Operation, plan.operations), len(plan.operations),
             _table(_Connection, plan.connections), _table(_Cast, plan.casts),
-            _table(_Buffer, buffers), _table(_Call, calls),
+            _table(_Buffer, buffers), _table(_Drive, drives), _table(_Call, calls),
             plan.values.ctypes.data, len(plan.values), plan.clock.ctypes.data,
         )  # fmt: skip
         self.shared = _Shared()
@@ -212,7 +231,7 @@ def _build(out: Path) -> None:
 def _constants() -> list[str]:
     """The numbers that the source shares with the other modules, as options of a compiler."""
     shared = {
-        **{n: getattr(loop, n) for n in ("COPY", "SCALE", "STORE", "LOAD", "LOAD_LONG")},
+        **{n: getattr(loop, n) for n in ("COPY", "SCALE", "STORE", "LOAD", "LOAD_LONG", "DRIVE")},
         **{n: getattr(loop, n) for n in ("CALL", "STEP", "TOO_LONG", "EXACT", "WORST")},
         **{n: getattr(loop, n) for n in ("FULL", "HALTED", "OVERRUN")},
         **{n: getattr(instance, n) for n in ("TRANSFER_2", "TRANSFER_3", "STEP_2", "STEP_3")},

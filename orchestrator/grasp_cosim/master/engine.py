@@ -67,7 +67,7 @@ def _interpreted(plan: Plan) -> Loop:
     calls = [call.python for call in plan.calls]
     buffers = [memoryview(b) for b in plan.buffers]  # type: ignore[arg-type]
     values, clock = memoryview(plan.values), memoryview(plan.clock)  # type: ignore[arg-type]
-    tables = program, connections, casts, calls, buffers, values, clock
+    tables = program, connections, casts, plan.drives, calls, buffers, values, clock
 
     def run(rows: Any, operation: int, start: int, stop: int, step_ns: int) -> tuple[int, int, int]:
         flat = memoryview(rows.reshape(-1))

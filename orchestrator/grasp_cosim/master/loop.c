@@ -31,6 +31,12 @@ typedef struct {
     void *data;
 } Buffer;
 
+typedef struct { /* of drive.py; row is the last one until now */
+    int64_t slot, linear, rows, row;
+    const int64_t *times;
+    const double *samples;
+} Drive;
+
 typedef struct { /* of fmi/instance.py, Native */
     int64_t shape;
     void (*function)(void);
@@ -50,6 +56,7 @@ typedef struct {
     const Connection *connections;
     const Cast *casts;
     const Buffer *buffers;
+    Drive *drives;
     const Call *calls;
     double *values;
     int64_t width;
@@ -190,6 +197,20 @@ static void store(const Buffer *buffer, int64_t i, double value) {
     }
 }
 
+/* The value at a time in ns, which is not before that of the last call. */
+static double drive(Drive *d, int64_t time) {
+    const int64_t *times = d->times;
+    const double *samples = d->samples;
+    int64_t row = d->row;
+    double share;
+
+    while (row + 1 < d->rows && times[row + 1] <= time) row++;
+    d->row = row;
+    if (!d->linear || time <= times[row] || row + 1 == d->rows) return samples[row];
+    share = (double)(times[row + 1] - time) / (double)(times[row + 1] - times[row]);
+    return share * samples[row] + (1.0 - share) * samples[row + 1];
+}
+
 /* Do one operation in step k; 0, or the status that ends the loop. */
 static int operate(const Plan *plan, const Operation *operation, int64_t k, int64_t step_ns,
                    const Shared *shared) {
@@ -220,6 +241,12 @@ static int operate(const Plan *plan, const Operation *operation, int64_t k, int6
         for (i = begin; i < end; i++) {
             const Cast *c = &plan->casts[i];
             store(&plan->buffers[c->buffer], c->index, values[c->slot]);
+        }
+        return 0;
+    case DRIVE:
+        for (i = begin; i < end; i++) {
+            Drive *d = &plan->drives[i];
+            values[d->slot] = drive(d, (k - operation->phase) * step_ns);
         }
         return 0;
     default: /* LOAD and LOAD_LONG */

@@ -3,16 +3,17 @@
 The plan turns a system into a program, a short list of operations that make up one macro step. The
 loop knows nothing of components or FMI; it moves numbers in one vector and makes calls. The same
 source is interpreted on lists and memory views, and compiled on arrays (compiled.py), where the
-three functions below it have counterparts of the same meaning. Keep it in that subset.
+four functions below it have counterparts of the same meaning. Keep it in that subset.
 """
 
 from collections.abc import Sequence
 from ctypes import c_float
 from typing import Any, NamedTuple
 
-COPY, SCALE, STORE, LOAD, LOAD_LONG, CALL, STEP = range(7)  # calls last
+COPY, SCALE, STORE, LOAD, LOAD_LONG, DRIVE, CALL, STEP = range(8)  # calls last
 """Operations: over connections COPY and SCALE; over casts STORE into a buffer of another type, LOAD
-from one, LOAD_LONG with a check; over calls CALL and STEP, which sets the clock before it.
+from one, LOAD_LONG with a check; over drives DRIVE; over calls CALL and STEP, which sets the clock
+before it.
 """
 
 TOO_LONG = 100
@@ -62,6 +63,7 @@ def run(
     program: Program,
     connections: Connections,
     casts: Casts,
+    drives: Any,
     calls: Any,
     buffers: Any,
     values: Any,
@@ -102,12 +104,16 @@ def run(
                 elif what == STORE:
                     for i in range(begin, last[operation]):
                         store(buffers, buffer[i], index[i], values[slot[i]])
-                else:
+                elif what != DRIVE:
                     for i in range(begin, last[operation]):
                         value = load(buffers, buffer[i], index[i])
                         if what == LOAD_LONG and (value >= EXACT or value <= -EXACT):
                             return k, operation, TOO_LONG
                         values[slot[i]] = value
+                else:
+                    time = (k - phase[operation]) * step_ns
+                    for i in range(begin, last[operation]):
+                        drive(drives, i, time, values)
             operation += 1
         operation = 0
         row = (k - start) * width
@@ -118,6 +124,11 @@ def run(
 def invoke(calls: Sequence[Any], i: int, clock: Any) -> int:
     """Make call i; its FMI status."""
     return calls[i]()  # type: ignore[no-any-return]
+
+
+def drive(drives: Sequence[Any], i: int, time: int, values: Any) -> None:
+    """Put the value that drive i has at a time in ns into its place."""
+    values[drives[i].slot] = drives[i].at(time)
 
 
 def load(buffers: Sequence[Any], i: int, index: int) -> float:

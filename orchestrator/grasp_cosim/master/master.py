@@ -22,6 +22,7 @@ from ..system.parts import NANOSECONDS, Port
 from . import loop
 from .aside import Aside
 from .compiled import CompiledLoop
+from .drive import at_start, drives_of
 from .engine import Engine, make_loop
 from .initialisation import Propagation
 from .plan import Planner, slots_of
@@ -71,11 +72,19 @@ class Master:
         if pacer:
             pacer.bind(self.values[len(self.slots) :], self._hand_on_until)
         self.scenario = Scenario(system, instances, self.slots, self.values)
+        self._drives = drives_of(system, self.slots)
         self._receive = receive
         self.meanwhile: Callable[[], None] = lambda: None
         """Called while the loop of a run in real time goes on without Python's lock."""
         self.plan = Planner(
-            system, instances, self.slots, self.values, self.scenario, self.texts, pacer
+            system,
+            instances,
+            self.slots,
+            self.values,
+            self.scenario,
+            self.texts,
+            self._drives,
+            pacer,
         ).plan()
         self._pacer = pacer
         self._loop = make_loop(self.plan, engine, None if pacer else self.total_steps)
@@ -92,7 +101,8 @@ class Master:
         """Start values in, then outputs at t = 0 that agree with the inputs at t = 0."""
         stop = self.system.stop_ns / NANOSECONDS
         for component, instance in zip(self.system.components, self.instances, strict=True):
-            instance.enter_initialization(component.values, stop)
+            driven = at_start(self.system, self._drives, component.name)
+            instance.enter_initialization({**component.values, **driven}, stop)
         propagation = Propagation(self.system, self.instances, self.scenario.fault_functions)
         try:
             self.log += propagation.run()
@@ -103,6 +113,8 @@ class Master:
         kept = self._kept(propagation.values)
         for port, slot in self.slots.items():
             value = propagation.values[port] if port in propagation.values else kept[port]
+            if drive := self._drives.get(port):
+                value = drive.at(0)
             if port in self.texts:
                 value = self.texts[port].number(str(value))
             if isinstance(value, int) and abs(value) >= loop.EXACT:

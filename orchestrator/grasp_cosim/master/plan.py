@@ -20,7 +20,9 @@ from ..recording.listener import Texts
 from ..system.checks import transforms
 from ..system.description import System
 from ..system.parts import NANOSECONDS, Connection, Port
-from .loop import CALL, COPY, LOAD, LOAD_LONG, RAISED, SCALE, STEP, STORE
+from ..system.stimuli_checks import driven
+from .drive import Drive
+from .loop import CALL, COPY, DRIVE, LOAD, LOAD_LONG, RAISED, SCALE, STEP, STORE
 from .scenario import Scenario
 
 Operation = tuple[int, int, int, int, int]
@@ -31,8 +33,8 @@ Operation = tuple[int, int, int, int, int]
 class Plan:
     """Everything the loop works on.
 
-    operations refer to connections (source, target, factor, offset), casts (buffer, index, slot)
-    and calls. clock is the loop's.
+    operations refer to connections (source, target, factor, offset), casts (buffer, index, slot),
+    drives and calls. clock is the loop's.
     """
 
     values: npt.NDArray[np.float64]
@@ -41,6 +43,7 @@ class Plan:
     connections: list[tuple[int, int, float, float]] = field(default_factory=list)
     casts: list[tuple[int, int, int]] = field(default_factory=list)
     buffers: list[npt.NDArray[Any]] = field(default_factory=list)
+    drives: list[Drive] = field(default_factory=list)
     calls: list[Call] = field(default_factory=list)
     owners: list[Instance | None] = field(default_factory=list)
     """By call, the instance that it is made to; None for a call of the master's own."""
@@ -49,11 +52,11 @@ class Plan:
 
 
 def slots_of(system: System, instances: Sequence[Instance]) -> dict[Port, int]:
-    """The place of each output, and of each connected input that is a number; Strings come last.
+    """The place of each output, and of each number that is an input with a source; Strings last.
 
     With an element of an array all others have one, too: an array is passed whole.
     """
-    connected = {connection.target for connection in system.connections}
+    connected = {*(connection.target for connection in system.connections), *driven(system)}
     for instance in instances:
         for array in instance.interface.arrays.values():
             elements = {Port(instance.name, name) for name in array.names}
@@ -82,6 +85,7 @@ class Planner:
         values: npt.NDArray[np.float64],
         scenario: Scenario,
         texts: Mapping[Port, Texts],
+        drives: Mapping[Port, Drive],
         pacer: Pacer | None = None,
     ) -> None:
         """Over the given vector of values; slots are those of slots_of(), texts by String output.
@@ -94,6 +98,7 @@ class Planner:
         self.slots = slots
         self.scenario = scenario
         self.texts = texts
+        self.drives = drives
         self.pacer = pacer
         self.stamps = 0
         self.transforms = transforms(system)
@@ -131,8 +136,10 @@ class Planner:
         return self.made
 
     def _move(self, name: str, phase: int) -> None:
-        """The connections that end at a component, then their faults."""
-        period = self.system.period(name)
+        """What drives a component, the connections that end there, then their faults."""
+        period, first = self.system.period(name), len(self.made.drives)
+        self.made.drives.extend(d for port, d in self.drives.items() if port.component == name)
+        self._operation(DRIVE, first, len(self.made.drives), period, phase)
         connections = [c for c in self.system.connections if c.target.component == name]
         numbers = [connection for connection in connections if connection.target in self.slots]
         for kind in (COPY, SCALE):

@@ -45,7 +45,7 @@ ORIGIN_KEYS: Mapping[str, Any] = {"date": str, "versions": dict, "fmus": dict, "
 
 MORE_KEYS: Mapping[str, Any] = {
     "roles": dict, "types": dict, "descriptions": dict, "metric_units": dict, "to_si": dict,
-    **ORIGIN_KEYS,
+    "input": dict, **ORIGIN_KEYS,
 }  # fmt: skip
 """Entries that may be there."""
 
@@ -98,7 +98,7 @@ def _result(
 ) -> Result:
     realtime, types = written.get("realtime"), written.get("types", {})
     return Result(
-        settings={key: written[key] for key in (*SETTING_KEYS, "roles") if key in written},
+        settings={key: written[key] for key in (*SETTING_KEYS, "roles", "input") if key in written},
         time=time,
         signals={
             name: _typed(f"{path}: type of {name}", column, types.get(name, "float64"))

@@ -1,13 +1,14 @@
 """The annotation of an archive with all that SSP 1.0 has no form for, so that our run is the same.
 
 The communication step, the scheme, the components' own steps, processes, renamed variables and
-units, the initialisation, events, faults, roles and presets. Where it is, the elements are in the
-order of execution. Its content is JSON: the dataclasses of the system as objects, a port as a
-string.
+units, the initialisation, events, faults, roles, presets and stimuli. Where it is, the elements are
+in the order of execution. Its content is JSON: the dataclasses of the system as objects, a port as
+a string.
 """
 
 import json
-from collections.abc import Iterable, Mapping
+from array import array
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
@@ -18,6 +19,7 @@ from ..errors import InputError, choices
 from ..interface.interface import Value
 from ..system.description import System
 from ..system.parts import Event, Fault, Initialisation, Isolation, Port
+from ..system.stimuli import Stimuli
 from ..system.structure import Diverging, Scheme
 from .document import add
 
@@ -41,7 +43,7 @@ class Beside:
 
 @dataclass(frozen=True, slots=True)
 class Extras:
-    """The attributes of a system that SSP has no form for; earlier archives lack the last three."""
+    """The attributes of a system that SSP has no form for; earlier archives lack the last four."""
 
     step_ns: int
     scheme: Scheme
@@ -52,6 +54,7 @@ class Extras:
     roles: Mapping[str, str] = field(default_factory=dict)
     presets: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
     diverging: Diverging = "stop"
+    input: Stimuli | None = None
 
 
 def no_extras(components: Iterable[str]) -> Extras:
@@ -96,7 +99,7 @@ def _plain(value: Any) -> Any:
         return {f.name: _plain(getattr(value, f.name)) for f in fields(value)}
     if isinstance(value, Mapping):
         return {_plain(key): _plain(entry) for key, entry in value.items()}
-    if isinstance(value, tuple | list):
+    if isinstance(value, tuple | list | array):
         return [_plain(entry) for entry in value]
     return value
 
@@ -117,6 +120,8 @@ def _typed(kind: Any, value: Any) -> Any:
             _typed(arguments[0], key): _typed(arguments[1], entry)
             for key, entry in _typed(dict, value).items()
         }
+    if origin is Sequence:
+        return array("d" if arguments[0] is float else "q", _typed(list, value))
     if origin is tuple:
         return tuple(_typed(arguments[0], entry) for entry in _typed(list, value))
     if origin in (Union, UnionType):

@@ -17,6 +17,7 @@ from ..interface.read import read_interface
 from ..interface.units import known_unit
 from ..system.description import System, in_nanoseconds
 from ..system.parts import NANOSECONDS, Component, Connection, Port
+from ..system.stimuli import Stimuli
 from .annotation import TYPE, Beside, Extras, no_extras, read_extras
 from .archive import STRUCTURE, Archive
 from .document import at, child, children, parse, qualified
@@ -27,8 +28,13 @@ from .tree import Element, Hop, Path, read_system
 from .units import read_units, same
 
 
-def read_ssp(path: FilePath, step: float | None = None, stop: float | None = None) -> System:
-    """The system of an archive; step and stop in s go before what it names."""
+def read_ssp(
+    path: FilePath,
+    step: float | None = None,
+    stop: float | None = None,
+    stimuli: Stimuli | None = None,
+) -> System:
+    """The system of an archive; step and stop in s, and stimuli, go before what it names."""
     archive = Archive(path)
     file = f"{archive.place}: {STRUCTURE}"
     root = parse(file, archive.read(STRUCTURE), "ssd")
@@ -55,7 +61,9 @@ def read_ssp(path: FilePath, step: float | None = None, stop: float | None = Non
         in_units = {beside.new(name): unit for name, unit in named[at_path].items()}
         more = asdict(beside) | {"units": in_units}
         given.append(Component(names[at_path], part.interface.path, own, **more))
-    components = tuple(_keep_starts(file, given, connections, notes))
+    stimuli = stimuli or extras.input
+    driven = stimuli.columns if stimuli else ()
+    components = tuple(_keep_starts(file, given, connections, driven, notes))
     if annotated is None:
         components = flow_order(components, connections)
         notes.append(f"order of execution: {', '.join(c.name for c in components)}")
@@ -75,6 +83,7 @@ def read_ssp(path: FilePath, step: float | None = None, stop: float | None = Non
         extras.roles,
         extras.presets,
         extras.diverging,
+        stimuli,
     )
 
 
@@ -176,10 +185,14 @@ def _carried(network: Network, hops: list[Hop]) -> Carried:
 
 
 def _keep_starts(
-    file: str, components: Iterable[Component], connections: Iterable[Connection], notes: list[str]
+    file: str,
+    components: Iterable[Component],
+    connections: Iterable[Connection],
+    driven: Iterable[Port],
+    notes: list[str],
 ) -> Iterator[Component]:
-    """The components, with the start values of inputs that are not connected as values."""
-    connected = {connection.target for connection in connections}
+    """The components, with the start values of inputs that have no source as values."""
+    connected = {*(connection.target for connection in connections), *driven}
     for component in components:
         starts: dict[str, Value] = {}
         for variable in component.interface.of("input"):

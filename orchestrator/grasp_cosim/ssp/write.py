@@ -66,6 +66,8 @@ def _notes(system: System) -> Iterable[str]:
     for parts, what in ((system.events, "events"), (system.faults, "faults")):
         if parts:
             yield f"only in the annotation: {len(parts)} {what}"
+    if system.input:
+        yield f"only in the annotation: what {system.input.file} drives"
 
 
 def _fmu_entry(fmu: Path, entries: dict[str, bytes]) -> str:

@@ -8,6 +8,7 @@ from dataclasses import replace
 from ..errors import InputError, choices
 from ..interface.arrays import shape_text
 from .parts import Component, Connection, Port
+from .stimuli_checks import driven
 from .structure import Structure
 
 
@@ -58,10 +59,10 @@ def check_arrays(system: Structure) -> None:
 
     The rest of what is given keeps its start value, which must be declared for the size it has.
     """
-    connected = {connection.target for connection in system.connections}
+    sourced = {*(connection.target for connection in system.connections), *driven(system)}
     for component in system.components:
         for name, unknown in _incomplete(component):
-            missing = [n for n in unknown if Port(component.name, n) not in connected]
+            missing = [n for n in unknown if Port(component.name, n) not in sourced]
             if missing:
                 raise InputError(
                     f"{system.name}: {component.name}.{name}: no value for {choices(missing, 6)}, "
@@ -84,9 +85,8 @@ def _incomplete(component: Component) -> Iterator[tuple[str, list[str]]]:
 
 def unsourced(system: Structure, component: Component) -> Iterator[str]:
     """A line for each input array with elements that have neither a connection nor a value."""
-    targets = {
-        c.target.variable for c in system.connections if c.target.component == component.name
-    }
+    ports = (*(connection.target for connection in system.connections), *driven(system))
+    targets = {port.variable for port in ports if port.component == component.name}
     interface = component.interface
     for name, array in interface.arrays.items():
         free = [n for n in array.names if n not in targets and n not in component.values]

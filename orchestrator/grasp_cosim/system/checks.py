@@ -13,6 +13,7 @@ from ..interface.interface import SUPPORTED, Interface, Variable, limits
 from ..interface.units import conversion
 from .arrays import as_written, unsourced
 from .parts import LOOPS, Component, Connection, Port, seconds
+from .stimuli_checks import driven, stimuli_remarks
 from .structure import Structure
 
 
@@ -72,12 +73,13 @@ def check_connections(system: Structure) -> None:
                 f"{place}: {target} has two sources, {sources[target]} and {source}; must have one"
             )
         sources[target] = source
+    others = driven(system)
     missing = [
         port
         for component in system.components
         for v in component.interface.of("input")
         if v.supported and not v.element and v.name not in component.values
-        if (port := Port(component.name, v.name)) not in sources
+        if (port := Port(component.name, v.name)) not in sources and port not in others
     ]
     if missing:
         outputs = [
@@ -87,7 +89,8 @@ def check_connections(system: Structure) -> None:
         raise InputError(
             f"{system.name}: input{'s' * plural} {choices(missing)} {'have' if plural else 'has'} "
             f"no source; connect one of {choices(outputs)} to {'each' if plural else 'it'}, or "
-            f"give it a value: --set {missing[0]}=VALUE, or in the system file"
+            f"give it a value: --set {missing[0]}=VALUE, or in the system file; or drive it with "
+            "--input"
         )
 
 
@@ -167,6 +170,7 @@ def remarks(system: Structure) -> tuple[str, ...]:
                 left = "keeps its start value" if variable.causality == "input" else "not recorded"
                 lines.append(f"{port} is of type {variable.nature}: {left}")
         lines += unsourced(system, component)
+    lines += stimuli_remarks(system)
     if not system.recorded:
         lines.append(
             f"{system.name}: nothing is recorded; must have an output that is a Real, Integer, "

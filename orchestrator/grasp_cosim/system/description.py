@@ -19,6 +19,8 @@ from .checks import (
 )
 from .parts import LONGEST, NANOSECONDS, Isolation
 from .scenario_checks import check_scenario
+from .stimuli import Stimuli, read_stimuli
+from .stimuli_checks import check_stimuli
 from .structure import DIVERGING, SCHEMES, Diverging, Scheme, Structure
 from .swap import Replacement, with_fmu
 from .values import with_given
@@ -36,6 +38,7 @@ class System(Structure):
                 component.interface.parse(f"{self.name}: {component.name}.{name}", name, value)
         check_components(self)
         check_arrays(self)
+        check_stimuli(self)
         check_connections(self)
         check_scenario(self)
         check_initialisation(self)
@@ -50,14 +53,18 @@ class System(Structure):
         *,
         step: float | None = None,
         stop: float | None = None,
+        input: str | Path | Stimuli | None = None,  # noqa: A002 - as in the file and on the command line
     ) -> "System":
-        """The system of a TOML file or SSP archive; step and stop in s go before what it says.
+        """The system of a TOML file or SSP archive.
+
+        step and stop in s, and a CSV file of inputs, go before what it says.
 
         fmus is where the FMUs of a TOML file are, by default beside it; an archive has its own.
         """
         path = Path(path)
         reader = extensions.readers.get(path.suffix.lower(), extensions.readers[".toml"])
-        system: System = reader(path, Path(fmus) if fmus else None, step, stop)
+        stimuli = _stimuli(input)
+        system: System = reader(path, Path(fmus) if fmus else None, step, stop, stimuli)
         return system
 
     def start(self, key: str) -> float:
@@ -150,6 +157,13 @@ class System(Structure):
         )
         return replace(self, components=components)
 
+    def with_input(self, input: str | Path | Stimuli | None) -> "System":  # noqa: A002
+        """A copy whose inputs without a connection or value are driven by a CSV file, or by none.
+
+        Held instead of linear: `read_stimuli(path, "held")`.
+        """
+        return replace(self, input=_stimuli(input))
+
     def with_natives(self, natives: Mapping[str, Path]) -> "System":
         """A copy in which components of these names run native twins of their FMUs."""
         components = tuple(
@@ -175,6 +189,10 @@ class System(Structure):
             scheme=self.scheme if scheme is None else as_scheme("scheme", scheme),
             diverging=self.diverging if diverging is None else as_diverging("diverging", diverging),
         )
+
+
+def _stimuli(given: str | Path | Stimuli | None) -> Stimuli | None:
+    return read_stimuli(given) if isinstance(given, str | Path) else given
 
 
 def in_nanoseconds(place: str, seconds: Any, zero: bool = False) -> int:

@@ -9,6 +9,7 @@ from ..errors import InputError, choices
 from ..interface.interface import Interface, Value
 from .faults import FAULTS
 from .parts import RELATIONS, Condition, Event, Fault, Port, first_step, seconds
+from .stimuli_checks import driven
 from .structure import Structure
 
 
@@ -32,8 +33,8 @@ def _check_event(system: Structure, event: Event, place: str) -> None:
 
 
 def _settable(system: Structure) -> list[Port]:
-    """Return the ports an event may set: tunable parameters and inputs without a connection."""
-    connected = {connection.target for connection in system.connections}
+    """Return the ports an event may set: tunable parameters and inputs without a source."""
+    connected = {*(connection.target for connection in system.connections), *driven(system)}
     return [
         port
         for component in system.components
@@ -53,6 +54,8 @@ def check_setting(system: Structure, port: Port, value: Value, place: str) -> No
                 f"{place}: has a connection, from {connection.source}; put a fault of kind 'stuck' "
                 "on it, with a value"
             )
+    if system.input and port in driven(system):
+        raise InputError(f"{place}: has a column in {system.input.file}; must have one source")
     settable = _settable(system)
     if port not in settable:
         variable = interface.by_name.get(port.variable)

@@ -6,6 +6,7 @@ from typing import Any
 from .description import System
 from .parts import NANOSECONDS
 from .scenario import event_entry, fault_entry
+from .stimuli import input_entry
 
 
 def settings(system: System) -> dict[str, Any]:
@@ -43,4 +44,5 @@ def settings(system: System) -> dict[str, Any]:
         ],
         "events": [event_entry(e) for e in system.events],
         "faults": [fault_entry(f) for f in system.faults],
+        **({"input": input_entry(system.input)} if system.input else {}),
     }

@@ -7,6 +7,7 @@ from typing import Literal, get_args
 from ..errors import InputError, choices
 from ..interface.interface import Given, Variable
 from .parts import Component, Connection, Event, Fault, Initialisation, Port
+from .stimuli import Stimuli
 
 Scheme = Literal["sequential", "jacobi"]
 SCHEMES: tuple[str, ...] = get_args(Scheme)
@@ -23,7 +24,7 @@ class Structure:
     step of each component. notes are what its reader decided or did not use, one line each. roles
     name the component that plays a role, such as plant; where they do not, the component of that
     name plays it. presets are values under a name, like {"bench": {"sensor_1.noise.seed": 1}}.
-    diverging is what a run does where a signal runs away.
+    diverging is what a run does where a signal runs away. input drives inputs without a connection.
     """
 
     name: str
@@ -39,6 +40,7 @@ class Structure:
     roles: Mapping[str, str] = field(default_factory=dict)
     presets: Mapping[str, Mapping[str, Given]] = field(default_factory=dict)
     diverging: Diverging = "stop"
+    input: Stimuli | None = None
 
     @property
     def total_steps(self) -> int:

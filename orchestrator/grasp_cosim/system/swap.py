@@ -85,7 +85,7 @@ def _free(interface: Interface, name: str) -> bool:
 def stated(system: Structure, name: str) -> frozenset[str]:
     """The variables of a component for which the system states numbers, beside its values.
 
-    In events, conditions, faults and factors of connections.
+    In events, conditions, faults, factors of connections and columns without a unit.
     """
     ends = [(port, c) for c in system.connections for port in (c.source, c.target)]
     scaled = [port for port, c in ends if (c.factor, c.offset) != (None, None)]
@@ -94,7 +94,9 @@ def stated(system: Structure, name: str) -> frozenset[str]:
     tuned = [port for event in system.events for port in event.set]
     conditions = [*(e.when for e in system.events), *(f.when for f in system.faults)]
     asked = [condition.port for condition in conditions if condition]
-    ports: list[Port] = [*scaled, *through, *tuned, *asked]
+    columns = system.input.columns.items() if system.input else ()
+    driven = [port for port, column in columns if column.unit is None]
+    ports: list[Port] = [*scaled, *through, *tuned, *asked, *driven]
     return frozenset(port.variable for port in ports if port.component == name)
 
 
@@ -123,7 +125,7 @@ def _lost(before: Interface, after: Interface, name: str, value: bool) -> str:
         )
     if change != IDENTITY and not value:
         return (
-            f"is in {now.unit}, but an event, a fault or the factor of a connection is meant in "
-            f"{was.unit}; must be in that"
+            f"is in {now.unit}, but an event, a fault or the factor of a connection, or an input "
+            f"file, is meant in {was.unit}; must be in that"
         )
     return ""

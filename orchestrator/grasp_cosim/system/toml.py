@@ -11,17 +11,21 @@ from ..interface.read import read_interface
 from .description import System, as_diverging, as_scheme, in_nanoseconds
 from .parts import ISOLATIONS, Component, Connection, Initialisation, Port
 from .scenario import read_events, read_faults
+from .stimuli import Stimuli, read_stimuli
 from .values import with_given
 
 KEYS = (
     "experiment", "components", "connections", "initialisation", "events", "faults", "roles",
-    "presets",
+    "presets", "input",
 )  # fmt: skip
 """The entries of a system file."""
 
 
-def read_toml(path: Path, fmus: Path | None = None) -> System:
-    """The system of a TOML file; fmus is where its FMUs are, by default beside the file."""
+def read_toml(path: Path, fmus: Path | None = None, stimuli: Stimuli | None = None) -> System:
+    """The system of a TOML file; fmus is where its FMUs are, by default beside the file.
+
+    stimuli go before those that it names.
+    """
     place, folder = path.name, fmus or path.parent
     table = toml_table(path, "system file")
     check_keys(place, table, KEYS)
@@ -59,9 +63,19 @@ def read_toml(path: Path, fmus: Path | None = None) -> System:
         diverging=as_diverging(
             f"{place}: experiment.diverging", experiment.get("diverging", "stop")
         ),
+        input=stimuli or _input(f"{place}: [input]", table.get("input"), path.parent),
     )
     faults = read_faults(place, table.get("faults", []), system.connections)
     return replace(system, faults=faults) if faults else system
+
+
+def _input(place: str, entry: Any, folder: Path) -> Stimuli | None:
+    if entry is None:
+        return None
+    check_keys(place, as_table(place, entry), {"file", "interpolation"})
+    file = text(f"{place}: file", entry.get("file"), "the path of a CSV file, as a string")
+    way = entry.get("interpolation", "linear")
+    return read_stimuli(folder / file, way, f"{place}: interpolation")
 
 
 def _initialisation(place: str, table: dict[str, Any]) -> Initialisation:

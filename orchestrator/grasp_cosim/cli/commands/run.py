@@ -1,6 +1,7 @@
 """The command run."""
 
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +31,9 @@ from ..frame import (
 )
 from ..native import native_option, natively
 from ..options import (
+    chosen_stimuli,
     chosen_system,
+    input_options,
     isolations,
     names_options,
     replacements,
@@ -46,6 +49,7 @@ from ..step_study import check_step_study, step_study_options, study_step
 @system_options
 @click.option("--swap", "swaps", multiple=True, metavar="COMPONENT=FMU")
 @names_options
+@input_options
 @click.option("--out", type=PATH, help="Folder for signals.csv and run.json.")
 @click.option(
     "--plot",
@@ -128,11 +132,14 @@ def run(
 def _chosen(given: dict[str, Any], swaps: tuple[str, ...]) -> System:
     """The system with the FMUs and values of the command line; what is left out is said."""
     fmus = {name: Path(fmu) for name, fmu in (pair("--swap", t, "COMPONENT=FMU") for t in swaps)}
-    system = chosen_system(given, fmus)
+    stimuli = chosen_stimuli(given)
+    system = chosen_system(given, fmus, stimuli)
     new = replacements(given, fmus)
     swapped = system.revised(new, set_values(given["settings"]), ("--swap", "--set"))
     for note in swapped.notes[len(system.notes) :]:
         say(note)
+    if stimuli:
+        swapped = swapped.with_input(replace(stimuli, partial=False))  # all FMUs are there now
     return isolations(swapped, given["isolation"])
 
 

@@ -1,0 +1,264 @@
+"""Stimuli: columns of numbers over time that drive inputs, read from a CSV file.
+
+The file is as FMPy and fmusim take it: names in the first line, the time in the first column, two
+rows of one time for a jump. A column is `component.variable`, with a unit in brackets if it is in
+another one than the variable: `plant.force [kN]`.
+"""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import math
+import re
+from array import array
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import islice
+from operator import le
+from pathlib import Path
+from typing import Literal, get_args
+
+from ..checks import choice
+from ..errors import InputError
+from ..interface.units import conversion, known_unit
+from ..plain import from_cell
+from .parts import LONGEST, NANOSECONDS, Port
+
+Interpolation = Literal["linear", "held"]
+INTERPOLATIONS: tuple[str, ...] = get_args(Interpolation)
+
+_Reader = Iterator[list[str]]
+PIECE = 4096
+"""Rows that are read at once."""
+
+_UNIT = re.compile(r"(.*\S)\s+\[([^\[\]]*)\]")
+
+
+@dataclass(frozen=True)
+class Column:
+    """The samples of one input, in its unit or in the one named.
+
+    With texts, such as the names of an enumeration, they are their places among these. Sequences
+    are arrays, which take 8 bytes a number.
+    """
+
+    samples: Sequence[float]
+    unit: str | None = None
+    texts: tuple[str, ...] = ()
+
+    def text(self, row: int) -> str:
+        """The sample of a row as a text."""
+        sample = self.samples[row]
+        return self.texts[int(sample)] if self.texts else repr(sample).removesuffix(".0")
+
+    @cached_property
+    def extremes(self) -> tuple[int, ...]:
+        """The first rows with the smallest and the largest sample."""
+        return tuple(self.samples.index(find(self.samples)) for find in (min, max))
+
+    @cached_property
+    def distinct(self) -> tuple[int, ...]:
+        """The first row of each sample that differs from all before it."""
+        first: dict[float, int] = {}
+        for row, sample in enumerate(self.samples):
+            first.setdefault(sample, row)
+        return tuple(first.values())
+
+
+@dataclass(frozen=True)
+class Stimuli:
+    """What drives inputs: their columns, and the times of the rows in ns, which do not fall.
+
+    "linear" interpolates continuous Reals and holds all others from row to row; "held" holds all.
+    Before the first row and after the last one their values are held. lines are those of the rows
+    in the file where they are not simply one after the other. partial says that FMUs may yet be
+    swapped, so that a column may be of a variable which is not there.
+    """
+
+    file: str
+    times: Sequence[int]
+    columns: Mapping[Port, Column]
+    interpolation: Interpolation = "linear"
+    lines: Sequence[int] = field(default_factory=lambda: array("q"))
+    partial: bool = field(default=False, compare=False)
+
+    def place(self, port: Port, row: int | None = None) -> str:
+        """A column, and in it a row, for messages."""
+        line = 1 if row is None else self.lines[row] if self.lines else row + 2
+        return _place(self.file, line, [*self.columns].index(port) + 2, str(port))
+
+
+def read_stimuli(
+    path: str | Path, interpolation: str = "linear", place: str = "interpolation"
+) -> Stimuli:
+    """The stimuli of a CSV file; place says where the interpolation comes from.
+
+    InputError where there is none, or at the first cell that is not as it must be, but for what
+    depends on the variables: see stimuli_checks.py.
+    """
+    path = Path(path)
+    chosen: Interpolation = choice(place, interpolation, INTERPOLATIONS)
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            return _read(path, csv.reader(file, strict=True, skipinitialspace=True), chosen)
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such input file; must be a CSV file") from None
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror}; must be a CSV file") from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: no UTF-8 text: {error.reason}; must be a CSV file") from error
+
+
+def _read(path: Path, reader: _Reader, interpolation: Interpolation) -> Stimuli:
+    file, rows = path.name, _rows(path.name, reader)
+    _, names = next(rows, (0, []))
+    if not names:
+        raise InputError(f"{file}: is empty; must begin with names: time,component.variable")
+    names = [from_cell(name.strip()) for name in names]
+    ports, units, factor = _header(file, names)
+    columns = [_Cells(file, i, name) for i, name in enumerate(names, 1)]
+    lines: array[int] = array("q")
+    while piece := [*islice(rows, PIECE)]:
+        here = [line for line, _ in piece]
+        lines.extend(here)
+        for column, cells in zip(
+            columns, zip(*(row for _, row in piece), strict=True), strict=True
+        ):
+            column.extend(here, cells)
+    if not lines:
+        raise InputError(f"{file}: has no row after the names; must have one at least")
+    return Stimuli(
+        file,
+        _times(columns[0], factor, lines),
+        {
+            port: Column(column.samples, unit, tuple(column.texts))
+            for port, unit, column in zip(ports, units, columns[1:], strict=True)
+        },
+        interpolation,
+        array("q") if lines[-1] == len(lines) + 1 else lines,
+    )
+
+
+def _rows(file: str, reader: _Reader) -> Iterator[tuple[int, list[str]]]:
+    """The rows that are not empty, each with its line; InputError where one is not as long."""
+    width = 0
+    try:
+        for row in reader:
+            line: int = reader.line_num  # type: ignore[attr-defined]
+            if not row:
+                continue
+            width = width or len(row)
+            if len(row) < width:
+                raise InputError(f"{_place(file, line, len(row) + 1)}: missing; must be a value")
+            if len(row) > width:
+                raise InputError(
+                    f"{_place(file, line, width + 1)} = {row[width]!r}: has no name; must have "
+                    f"{width} cells"
+                )
+            yield line, row
+    except csv.Error as error:
+        line = reader.line_num  # type: ignore[attr-defined]
+        raise InputError(f"{file}: line {line}: no CSV: {error}") from error
+
+
+def _header(file: str, names: Sequence[str]) -> tuple[list[Port], list[str | None], float]:
+    """The ports of the columns after the time, their units, and the time's in s."""
+    found = [_UNIT.fullmatch(name) for name in names]
+    split = [(m[1], m[2]) if m else (name, None) for m, name in zip(found, names, strict=True)]
+    (time, unit), *others = split
+    if time != "time":
+        raise InputError(f"{_place(file, 1, 1)} = {names[0]!r}: must be time, then inputs")
+    if not others:
+        raise InputError(f"{file}: line 1: drives nothing; must have columns component.variable")
+    ports: list[Port] = []
+    for i, (name, _) in enumerate(others, 2):
+        component, dot, variable = name.partition(".")
+        port = Port(component, variable)
+        if not (component and dot and variable):
+            raise InputError(f"{_place(file, 1, i)} = {name!r}: must be component.variable")
+        if port in ports:
+            raise InputError(f"{_place(file, 1, i)} = {name!r}: is there twice; must be once")
+        ports.append(port)
+    second, given = known_unit("s"), known_unit(unit or "s")
+    change = conversion(given, second) if given and second else None
+    if change is None:
+        raise InputError(f"{_place(file, 1, 1)} = {names[0]!r}: must be in a unit of time, like ms")
+    return ports, [unit for _, unit in others], change.factor
+
+
+def _times(column: _Cells, factor: float, lines: Sequence[int]) -> array[int]:
+    """The times in ns."""
+    for i, text in enumerate(column.texts):
+        line = lines[column.samples.index(i)]
+        raise InputError(f"{_place(column.file, line, 1, 'time')} = {text!r}: must be a number")
+    span = max(map(abs, column.samples)) * factor
+    if span > LONGEST:
+        raise InputError(f"{column.file}: time to {span:g} s; must be at most {LONGEST:g} s")
+    scale = factor * NANOSECONDS
+    times = array("q", (round(scale * t) for t in column.samples))
+    if not all(map(le, times, islice(times, 1, None))):
+        row = next(i for i in range(1, len(times)) if times[i] < times[i - 1])
+        raise InputError(
+            f"{_place(column.file, lines[row], 1, 'time')} = {column.samples[row]!r}: is before "
+            f"{column.samples[row - 1]!r} of line {lines[row - 1]}; must not fall"
+        )
+    return times
+
+
+def input_entry(stimuli: Stimuli) -> dict[str, str]:
+    """What drives inputs, for run.json: the file, how, and a hash of the samples."""
+    made_of = hashlib.sha256(array("q", stimuli.times))
+    for port, column in stimuli.columns.items():
+        made_of.update(f"\0{port}\0{column.unit}\0{column.texts}\0".encode())
+        made_of.update(array("d", column.samples))
+    return {
+        "file": stimuli.file,
+        "interpolation": stimuli.interpolation,
+        "sha256": made_of.hexdigest(),
+    }
+
+
+class _Cells:
+    """A column as far as it is read: numbers, or from its first text on texts."""
+
+    def __init__(self, file: str, number: int, name: str) -> None:
+        self.file, self.number, self.name = file, number, name
+        self.samples: array[float] = array("d")
+        self.texts: dict[str, int] = {}
+
+    def extend(self, lines: Sequence[int], cells: Sequence[str]) -> None:
+        """Take more cells, of these lines; InputError at one without a value."""
+        before = len(self.samples)
+        if not self.texts:
+            try:
+                self.samples.extend(map(float, cells))
+            except ValueError:
+                del self.samples[before:]
+                numbers = [repr(x).removesuffix(".0") for x in self.samples]
+                self.samples = array("d", map(self._text, numbers))
+            else:
+                new = self.samples[before:]
+                if not math.isfinite(sum(new)):
+                    self._check(lines, map(math.isfinite, new), cells)
+                return
+        self._check(lines, map(str.strip, cells), cells)
+        self.samples.extend(self._text(cell.strip()) for cell in cells)
+
+    def _text(self, text: str) -> int:
+        return self.texts.setdefault(text, len(self.texts))
+
+    def _check(self, lines: Sequence[int], good: Iterator[object], cells: Sequence[str]) -> None:
+        """InputError at the first cell that is not good."""
+        for line, fine, cell in zip(lines, good, cells, strict=True):
+            if not fine:
+                place = _place(self.file, line, self.number, self.name)
+                what = (
+                    f" = {cell.strip()}: must be a finite number" if cell.strip() else ": missing"
+                )
+                raise InputError(f"{place}{what}{'' if cell.strip() else '; must be a value'}")
+
+
+def _place(file: str, line: int, column: int, name: str = "") -> str:
+    return f"{file}: line {line}, column {column}{name and f', {name}'}"
