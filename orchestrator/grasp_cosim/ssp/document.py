@@ -1,6 +1,7 @@
 """XML of SSP: read without entities and network, checked against the official schemas."""
 
 import re
+from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -137,10 +138,10 @@ def to_bytes(root: Any) -> bytes:
     return bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8") + b"\n")
 
 
-def new(name: str, /, **attributes: str) -> Any:
-    """A root element; the prefixes are those of the standard."""
+def new(name: str, /, more: Mapping[str, str] | None = None, **attributes: str) -> Any:
+    """A root element; the prefixes are those of the standard, and more."""
     prefixes = {prefix: NAMESPACES[prefix] for prefix in sorted({"ssc", name.partition(":")[0]})}
-    return etree.Element(qualified(name), attributes, nsmap=prefixes)
+    return etree.Element(qualified(name), attributes, nsmap={**prefixes, **(more or {})})
 
 
 def add(parent: Any, name: str, /, **attributes: str) -> Any:

@@ -1,9 +1,9 @@
 """Annotations in which other tools keep the step: read, and written for them to run our archives.
 
-OSP (libcosim, ecos): com.opensimulationplatform in the default experiment, and a hint on components
-with a step of their own. It knows no namespaces, so that the prefix must be osp. OMSimulator:
-org.openmodelica on the top system, which its command line needs; the first annotation there must be
-its own. Both let all components take a step at once.
+OSP (libcosim): com.opensimulationplatform in the default experiment, and a hint on components with
+a step of their own. It takes prefixes for names and their declarations for content, so that they
+must be osp, and declared by the root. OMSimulator: org.openmodelica on the top system, which its
+command line needs, first of the annotations there. Both let all components take a step at once.
 """
 
 import math
@@ -20,6 +20,7 @@ from .document import add, at, children
 
 _OSP = "http://opensimulationplatform.com/SSP/OSPAnnotations"
 _OMS = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd"
+PREFIXES = {"osp": _OSP, "oms": _OMS}
 _OSP_TYPE, _OMS_TYPE = "com.opensimulationplatform", "org.openmodelica"
 FOREIGN = (_OSP_TYPE, "org.open-simulation-platform", _OMS_TYPE)
 """The types of the annotations that are read here; the second is an earlier one of OSP."""
@@ -71,30 +72,22 @@ def read_steps(file: str, root: Any, given_ns: int | None) -> Steps:
 def write_steps(experiment: Any, system: Any, step_ns: int) -> None:
     """Name the step in annotations of the default experiment and of the top system."""
     step = repr(step_ns / NANOSECONDS)
-    algorithm = _annotation(experiment, _OSP_TYPE, _OSP, "osp", "Algorithm")
-    etree.SubElement(algorithm, f"{{{_OSP}}}FixedStepAlgorithm", baseStepSize=step)
-    tool = _annotation(system, _OMS_TYPE, _OMS, "oms", "Annotations")
-    information = etree.SubElement(tool, f"{{{_OMS}}}SimulationInformation")
-    etree.SubElement(
-        information,
-        f"{{{_OMS}}}FixedStepMaster",
-        description="oms-ma",
-        stepSize=step,
-        relativeTolerance="0.0001",
-    )
+    algorithm = _add(add(experiment, "ssc:Annotation", type=_OSP_TYPE), _OSP, "Algorithm")
+    _add(algorithm, _OSP, "FixedStepAlgorithm", baseStepSize=step)
+    tool = _add(add(system, "ssc:Annotation", type=_OMS_TYPE), _OMS, "Annotations")
+    information = _add(tool, _OMS, "SimulationInformation")
+    master = {"description": "oms-ma", "stepSize": step, "relativeTolerance": "1e-4"}
+    _add(information, _OMS, "FixedStepMaster", **master)
 
 
 def write_hint(component: Any, step_ns: int) -> None:
     """Name the step of a component of its own."""
-    annotations = add(component, "ssd:Annotations")
-    hint = _annotation(annotations, _OSP_TYPE, _OSP, "osp", "StepSizeHint")
-    hint.set("value", repr(step_ns / NANOSECONDS))
+    annotation = add(add(component, "ssd:Annotations"), "ssc:Annotation", type=_OSP_TYPE)
+    _add(annotation, _OSP, "StepSizeHint", value=repr(step_ns / NANOSECONDS))
 
 
-def _annotation(annotations: Any, kind: str, namespace: str, prefix: str, name: str) -> Any:
-    """Add an annotation of a type with one element, which is returned."""
-    annotation = add(annotations, "ssc:Annotation", type=kind)
-    return etree.SubElement(annotation, f"{{{namespace}}}{name}", nsmap={prefix: namespace})
+def _add(parent: Any, namespace: str, name: str, **attributes: str) -> Any:
+    return etree.SubElement(parent, f"{{{namespace}}}{name}", attributes)
 
 
 def _time(place: str, text: str | None) -> int:

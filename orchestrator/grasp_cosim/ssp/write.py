@@ -19,7 +19,7 @@ from ..system.parts import NANOSECONDS, Component, Connection, Port
 from .annotation import extras_of, write_extras
 from .archive import RESOURCES, STRUCTURE, write_archive
 from .document import VERSION, add, new, to_bytes
-from .foreign import write_hint, write_steps
+from .foreign import PREFIXES, write_hint, write_steps
 from .tree import FMU
 from .units import change, same, write_units
 
@@ -119,7 +119,8 @@ def _added(entries: dict[str, bytes], stem: str, suffix: str, data: bytes) -> st
 
 def _structure(system: System, sources: Mapping[str, str], bindings: Mapping[str, str]) -> Any:
     name = Path(system.name).stem
-    root = new("ssd:SystemStructureDescription", version=VERSION, name=name, generationTool=_TOOL)
+    attributes = {"version": VERSION, "name": name, "generationTool": _TOOL}
+    root = new("ssd:SystemStructureDescription", PREFIXES, **attributes)
     top = add(root, "ssd:System", name=name)
     units = _units(system.components)
     elements = add(top, "ssd:Elements")
