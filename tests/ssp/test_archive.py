@@ -49,7 +49,10 @@ DICTIONARY = (
     "</ssd:SignalDictionaries></ssd:System>"
 )
 REFUSED = [
-    (structure(TOP, version="2.0"), "SystemStructure.ssd:2: SSP version '2.0'; must be '1.0'"),
+    (
+        structure(TOP, version="3.0"),
+        "SystemStructure.ssd:2: SSP version '3.0'; must be '1.0' or '2.0'",
+    ),
     (structure(TOP).replace("ssd:Elements", "ssd:Element"), "against the schema: Element 'ssd:El"),
     (structure(TOP)[:-9], "SystemStructure.ssd: not readable as XML: "),
     (structure(TOP).replace("?>\n", "?>\n<!DOCTYPE x []>"), "has a document type; SSP has none"),
@@ -57,15 +60,15 @@ REFUSED = [
     (structure('<ssd:System name="top"/>'), "system 'top' has no components; must have some"),
     (
         structure(TOP.replace("</ssd:System>", DICTIONARY)),
-        "system 'top': signal dictionaries are not supported; connect the components directly",
+        "'d': source 'resources/d.ssb': not in the archive; valid: none",
     ),
     (
         structure(system("top", '<ssd:SignalDictionaryReference name="r" dictionary="d"/>')),
-        "ssd:SignalDictionaryReference 'r' is not supported; must be a Component or System",
+        "'r': no signal dictionary 'd'; valid: none",
     ),
     (
-        structure(system("top", component("a", type="application/x-ssp-package"))),
-        "component 'a': type 'application/x-ssp-package' is not supported; must be application/x-f",
+        structure(system("top", component("a", type="text/x-modelica"))),
+        "component 'a': type 'text/x-modelica' is not supported; valid: application/x-fmu-shared",
     ),
     (
         structure(system("top", component("a", implementation="ModelExchange"))),

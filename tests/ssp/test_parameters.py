@@ -200,6 +200,70 @@ def test_an_input_that_is_not_connected_keeps_its_start_value(tmp_path: Path) ->
     assert "input a.u is not connected; keeps its start value 0.5" in loaded.notes
 
 
+def passed_on(folder: Path, outer: str, inner: str, unit: str = "") -> System:
+    """Of the component a, `length` is twice the system's parameter p, by a connection."""
+    top = system(
+        "top",
+        component("a", "parameter length", inner),
+        connect("p", "a/length", linear(2.0)),
+        f"parameter p Real {unit}" if unit else "parameter p",
+        outer,
+    )
+    return System.load(archive(folder, structure(top), {"a": FMU}))
+
+
+@pytest.mark.parametrize(
+    ("outer", "inner"),
+    [
+        (given("p Real 3"), given("length Real 7")),
+        (given("p Real 3; a.length Real 8"), given("length Real 7")),
+        (given("p Real 3") + given("a.length Real 8"), ""),
+        (given("p Real 3000 mm"), given("length Real 7")),
+    ],
+)
+def test_a_value_by_a_connection_goes_before_all_bindings(
+    tmp_path: Path, outer: str, inner: str
+) -> None:
+    """SSP 1.0.1, 5.3.2: the data flow decides; 5.2.3 ranks bindings among each other only."""
+    loaded = passed_on(tmp_path, outer, inner, "m")
+    assert loaded.components[0].values["length"] == 6.0
+    said = "a.length has the value of p by a connection, which goes before it; not used"
+    assert sum(said in note for note in loaded.notes) == 1
+
+
+def test_a_connection_that_brings_no_value_leaves_the_own(tmp_path: Path) -> None:
+    loaded = passed_on(tmp_path, "", given("length Real 7"))
+    assert loaded.components[0].values["length"] == 7.0
+    assert not any("connection" in note for note in loaded.notes)
+
+
+def test_the_first_value_on_the_way_through_systems_holds(tmp_path: Path) -> None:
+    sub = system(
+        "sub",
+        component("a", "parameter length", given("length Real 7")),
+        connect("q", "a/length"),
+        "parameter q",
+        given("q Real 5"),
+    )
+    for outer, expected in ((given("p Real 3"), 3.0), ("", 5.0), (given("sub.q Real 4"), 4.0)):
+        top = system("top", sub, connect("p", "sub/q"), "parameter p", outer)
+        loaded = System.load(archive(tmp_path, structure(top), {"a": FMU}))
+        assert loaded.components[0].values["length"] == expected
+
+
+def test_a_name_that_is_given_twice_matters_only_where_it_is_used(tmp_path: Path) -> None:
+    mapped = mapping(("L", "length", ""))
+    found = values(tmp_path, given("L Real 3; x Real 1; x Real 2", mapped))
+    assert found["length"] == 3.0
+    assert values(tmp_path, given("length Real 3; length Real 3"))["length"] == 3.0
+
+
+def test_many_mappings_from_nothing_are_one_note(tmp_path: Path) -> None:
+    mapped = mapping(("L", "length", ""), ("", "ratio", ""), ("", "count", ""), ("", "count", ""))
+    notes = load(tmp_path, given("L Real 3", mapped)).notes
+    assert sum("no parameter ''; not used (2 such)" in note for note in notes) == 1
+
+
 TABLE = "<ssc:BooleanMappingTransformation>{}</ssc:BooleanMappingTransformation>".format(
     '<ssc:MapEntry source="true" target="false"/>'
 )

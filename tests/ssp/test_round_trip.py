@@ -11,6 +11,7 @@ from grasp_cosim import InputError, System, simulate
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.interface.interface import Value
 from grasp_cosim.ssp.document import parse
+from grasp_cosim.ssp.notes import Notes
 from grasp_cosim.ssp.write import SET, write_ssp
 from grasp_cosim.system.checks import transforms
 from grasp_cosim.system.parts import (
@@ -201,7 +202,7 @@ def test_an_enumeration_is_written_by_name(tmp_path: Path) -> None:
     with zipfile.ZipFile(tmp_path / "hand.ssp") as file:
         text = file.read("resources/a.ssv").decode()
         assert '<ssv:Parameter name="start">\n      <ssv:Enumeration value="on"/>' in text
-        (connector,) = parse("ssd", file.read("SystemStructure.ssd"), "ssd").findall(
+        (connector,) = parse("ssd", file.read("SystemStructure.ssd"), "ssd", Notes()).findall(
             ".//{*}Component[@name='a']//{*}Connector[@name='mode']"
         )
     assert len(connector) == 0  # the type is that of the FMU
@@ -237,8 +238,10 @@ def test_what_is_in_the_archive(grasp: System, tmp_path: Path) -> None:
             "resources/plant.ssv",
             "resources/sensor_2.ssv",
         )
-        structure = parse("ssd", file.read("SystemStructure.ssd"), "ssd")  # valid by the schema
-        values = parse("ssv", file.read("resources/sensor_2.ssv"), "ssv")
+        structure = parse(
+            "ssd", file.read("SystemStructure.ssd"), "ssd", Notes()
+        )  # valid by the schema
+        values = parse("ssv", file.read("resources/sensor_2.ssv"), "ssv", Notes())
     assert values.get("name") == SET
     ((reflectance,),) = values[0]
     assert (reflectance.get("value"), reflectance.get("unit")) == ("0.8", "1")

@@ -22,6 +22,7 @@ from ..system.parts import Event, Fault, Initialisation, Isolation, Port
 from ..system.stimuli import Stimuli
 from ..system.structure import Diverging, Scheme
 from .document import add
+from .foreign import Steps
 
 TYPE = "grasp-cosim"
 _TAG = "{grasp-cosim:system}System"
@@ -57,10 +58,14 @@ class Extras:
     input: Stimuli | None = None
 
 
-def no_extras(components: Iterable[str]) -> Extras:
-    """The extras of an archive without our annotation, which names no step."""
-    beside = {name: Beside({}, None, "none") for name in components}
-    return Extras(0, "sequential", beside, Initialisation(), (), ())
+def no_extras(components: Iterable[str], steps: Steps) -> Extras:
+    """The extras of an archive without our annotation; steps are those of other tools.
+
+    Who names a step means that all components take it at once.
+    """
+    beside = {name: Beside({}, steps.own_ns.get(name), "none") for name in components}
+    scheme: Scheme = "jacobi" if steps.base_ns else "sequential"
+    return Extras(steps.base_ns, scheme, beside, Initialisation(), (), ())
 
 
 def extras_of(system: System) -> Extras:

@@ -9,7 +9,7 @@ an archive read twice is extracted once.
 import hashlib
 import posixpath
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
 from threading import Lock
@@ -19,6 +19,7 @@ from ..errors import InputError, choices
 from ..files import in_one_piece
 from ..interface.document import check_size
 from ..scratch import ScratchFolder
+from .notes import Notes
 
 STRUCTURE = "SystemStructure.ssd"
 RESOURCES = "resources/"
@@ -27,41 +28,54 @@ _extracting = Lock()
 
 
 class Archive:
-    """The entries of an .ssp file; InputError where it is none."""
+    """The entries of an .ssp file, or of an FMU, by paths with slashes.
 
-    def __init__(self, path: Path) -> None:
-        self.place = path.name
+    InputError where it is none. place names it in messages, by default the name of the file.
+    """
+
+    def __init__(self, path: Path, notes: Notes, place: str = "", needs: str = STRUCTURE) -> None:
+        self.place = place or path.name
+        said = place or str(path)
         if path.is_dir():
-            raise InputError(f"{path}: is a folder; must be an .ssp file")
+            raise InputError(f"{said}: is a folder; must be an .ssp file")
         try:
             with zipfile.ZipFile(path) as file:
-                self.names = tuple(file.namelist())
+                names = file.namelist()
                 check_size(file, path)
         except FileNotFoundError:
-            raise InputError(f"{path}: no such system file") from None
+            raise InputError(f"{said}: no such system file") from None
         except Exception as error:  # zipfile raises whatever it likes
-            raise InputError(f"{path}: not readable as an SSP archive: {error}") from error
-        self._path = path
-        if STRUCTURE not in self.names:
-            raise InputError(f"{path}: no {STRUCTURE} in it; must be an SSP archive")
+            raise InputError(f"{said}: not readable as an SSP archive: {error}") from error
+        self._path, self._said = path, said
+        self._entries = _entries(names, needs, self.place, notes)
+        if needs not in self._entries:
+            raise InputError(f"{said}: no {needs} in it; must be an SSP archive")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The paths of all entries."""
+        return tuple(self._entries)
 
     def read(self, entry: str) -> bytes:
         """The content of an entry; InputError where it is damaged."""
         try:
             with zipfile.ZipFile(self._path) as file:
-                return file.read(entry)
+                return file.read(self._entries[entry])
         except Exception as error:  # its decompressors, too
             reason = " ".join(str(error).split()) or type(error).__name__
-            raise InputError(f"{self._path}: {entry}: not readable: {reason}") from error
+            raise InputError(f"{self._said}: {entry}: not readable: {reason}") from error
 
-    def resolve(self, place: str, uri: str) -> str:
-        """The entry that a source names, a relative path; InputError where there is none."""
+    def resolve(self, place: str, uri: str, base: str = "") -> str:
+        """The entry that a source names, a path relative to the folder `base` in the archive.
+
+        InputError where there is none.
+        """
         parts = urlsplit(uri)  # a valid URI by the schema
         if tuple(parts) != ("", "", parts.path, "", "") or not parts.path:
             raise InputError(f"{place}: source {uri!r}: must be the path of a file in the archive")
-        for name in (unquote(parts.path), uri):
-            entry = posixpath.normpath(name)
-            if entry in self.names:
+        for name in (unquote(parts.path), uri, uri.replace("\\", "/")):
+            entry = posixpath.normpath(posixpath.join(base, name))
+            if entry in self._entries:
                 return entry
         suffix = posixpath.splitext(parts.path)[1]
         valid = [n for n in self.names if n.endswith(suffix) and not n.endswith("/")]
@@ -76,6 +90,22 @@ class Archive:
                 with in_one_piece(path) as part:
                     part.write_bytes(data)
         return path
+
+
+def _entries(names: Iterable[str], needs: str, place: str, notes: Notes) -> dict[str, str]:
+    """The names in the file by the paths that they mean.
+
+    Some tools write backslashes, and zipping a folder puts all into one.
+    """
+    entries = {name.replace("\\", "/"): name for name in names}
+    if any("\\" in name for name in entries.values()):
+        notes.add(place, "its entries have backslashes, which are read as slashes")
+    folders = {n.removesuffix(needs) for n in entries if n.endswith(f"/{needs}")}
+    if needs in entries or len(folders) != 1:
+        return entries
+    folder = folders.pop()
+    notes.add(place, f"all of it is in {folder}, which is read as the top")
+    return {n.removeprefix(folder): name for n, name in entries.items() if n.startswith(folder)}
 
 
 def write_archive(path: Path, entries: Mapping[str, bytes]) -> None:

@@ -1,6 +1,7 @@
 """XML of SSP: read without entities and network, checked against the official schemas."""
 
 import re
+from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,8 @@ import fmpy
 from lxml import etree  # type: ignore[import-untyped]
 
 from ..errors import InputError
+from .notes import Notes
+from .version2 import as_version_1
 
 _BASE = "http://ssp-standard.org/SSP1/SystemStructure"
 NAMESPACES = {
@@ -16,15 +19,28 @@ NAMESPACES = {
     "ssd": f"{_BASE}Description",
     "ssv": f"{_BASE}ParameterValues",
     "ssm": f"{_BASE}ParameterMapping",
+    "ssb": f"{_BASE}SignalDictionary",
 }
 ROOTS = {
     "ssd": "ssd:SystemStructureDescription",
     "ssv": "ssv:ParameterSet",
     "ssm": "ssm:ParameterMapping",
+    "ssb": "ssb:SignalDictionary",
 }
 """The root element of each format."""
 
 VERSION = "1.0"
+_VERSION_1 = re.compile(r"1\.\d+(\.\d+)?(-.*)?")
+_LAST = (
+    "Connectors", "ConnectorGeometry", "ConnectionGeometry", "ElementGeometry",
+    "ParameterBindings", "ParameterValues", "ParameterMapping", "Elements", "Connections",
+    "SignalDictionaries", "SystemGeometry", "GraphicalElements", "Parameters", "Enumerations",
+    "Units", "DefaultExperiment", "Annotations",
+)  # fmt: skip
+"""Of the elements below one parent, those that come last in the schemas, in their order."""
+
+_LISTS = ("Connectors", "ParameterBindings", "Elements", "Connections", "Annotations", "Units")
+"""Elements that the schemas want either to have content or to be left out."""
 
 
 def qualified(name: str) -> str:
@@ -40,7 +56,7 @@ def short(name: str) -> str:
     return name
 
 
-def parse(place: str, data: bytes, form: str) -> Any:
+def parse(place: str, data: bytes, form: str, notes: Notes) -> Any:
     """The root of a document of the given form, valid by its schema.
 
     InputError where it is not; place names the file.
@@ -55,21 +71,45 @@ def parse(place: str, data: bytes, form: str) -> Any:
         raise InputError(f"{place}: not readable as XML: {reason}") from error
     if root.getroottree().docinfo.doctype:
         raise InputError(f"{place}: has a document type; SSP has none")
-    return checked(place, root, form)
+    return checked(place, root, form, notes)
 
 
-def checked(place: str, root: Any, form: str) -> Any:
-    """The root, valid by the schema of its form; InputError with the line where it is not."""
+def checked(place: str, root: Any, form: str, notes: Notes) -> Any:
+    """The root, valid by the schema of its form; InputError with the line where it is not.
+
+    What SSP 2.0 shares with 1.0 is valid as well, and what is in another order or an empty list.
+    """
     if root.tag != qualified(ROOTS[form]):
         raise InputError(f"{at(place, root)}: {short(root.tag)}: must be {ROOTS[form]}")
-    version = root.get("version")
-    if version != VERSION:
-        raise InputError(f"{at(place, root)}: SSP version {version!r}; must be {VERSION!r}")
+    version = root.get("version", "").strip()
+    if version == "2.0":
+        as_version_1(place, root, notes)
+    elif not _VERSION_1.fullmatch(version):
+        raise InputError(f"{at(place, root)}: SSP version {version!r}; must be '1.0' or '2.0'")
+    root.set("version", VERSION)
     schema = _schema(form)
     if not schema.validate(root):
         error = schema.error_log[0]
-        raise InputError(f"{place}:{error.line}: against the schema: {short(error.message)}")
+        _tidy(root)
+        if not schema.validate(root):
+            raise InputError(f"{place}:{error.line}: against the schema: {short(error.message)}")
+        notes.add(place, "elements are not in the order of the schema, or are empty lists")
     return root
+
+
+def _tidy(root: Any) -> None:
+    """Put the elements into the order of the schema, without empty lists."""
+    for element in list(root.iter()):
+        name = etree.QName(element).localname
+        if name in _LISTS and len(element) == 0 and element.getparent() is not None:
+            element.getparent().remove(element)
+        else:
+            element[:] = sorted(element, key=_place)
+
+
+def _place(element: Any) -> int:
+    name = etree.QName(element).localname
+    return _LAST.index(name) if name in _LAST else -1
 
 
 def at(place: str, element: Any) -> str:
@@ -98,10 +138,10 @@ def to_bytes(root: Any) -> bytes:
     return bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8") + b"\n")
 
 
-def new(name: str, /, **attributes: str) -> Any:
-    """A root element; the prefixes are those of the standard."""
+def new(name: str, /, more: Mapping[str, str] | None = None, **attributes: str) -> Any:
+    """A root element; the prefixes are those of the standard, and more."""
     prefixes = {prefix: NAMESPACES[prefix] for prefix in sorted({"ssc", name.partition(":")[0]})}
-    return etree.Element(qualified(name), attributes, nsmap=prefixes)
+    return etree.Element(qualified(name), attributes, nsmap={**prefixes, **(more or {})})
 
 
 def add(parent: Any, name: str, /, **attributes: str) -> Any:

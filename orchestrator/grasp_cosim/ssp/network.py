@@ -102,6 +102,13 @@ class Network:
         connector = part.element.connectors.get(node.name)
         return part.interface.unit(self.variable(node)) or (connector.unit if connector else None)
 
+    def unit_name(self, node: Node) -> str | None:
+        """What the unit of a node is called."""
+        if node.path in self.parts and self.variable(node).unit:
+            return self.variable(node).unit
+        unit = self.unit(node)
+        return unit.name if unit else None
+
     def variable(self, node: Node) -> Variable:
         """The variable of a node of a component."""
         return self.parts[node.path].interface.by_name[node.name]
@@ -159,7 +166,12 @@ def _check_connectors(part: Part) -> None:
         if kind is not None and kind != variable.kind:
             raise InputError(f"{place}: {connector.type}; the FMU has {variable.kind}")
         declared = part.interface.unit(variable)
-        if declared and connector.unit and not same(declared, connector.unit):
+        if not declared or not connector.unit or same(declared, connector.unit):
+            continue
+        if connector.unit.name == variable.unit:
+            text = f"unit {variable.unit!r} is not defined as by the FMU, whose it is taken to be"
+            part.element.origin.notes.add(place, text)
+        else:
             raise InputError(
                 f"{place}: unit {connector.unit.name} is not what the FMU declares, "
                 f"{declared.name}; must mean the same"

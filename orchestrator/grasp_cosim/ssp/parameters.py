@@ -5,6 +5,11 @@ are in and a dot, or those of connectors of a system, from which the value follo
 With a mapping only what is mapped is applied. Later bindings go before earlier ones, those of an
 outer system before those of an inner one. What fits nothing is not applied, and said.
 
+A connection that brings a value goes before all bindings at where it leads to. SSP 1.0.1 says that
+bindings set start values (5.2.3, ParameterBindings), and that of the data flow along connections
+there must be one source at most (5.3.2, Connections): it ranks bindings among each other only, and
+a connector has the value of what it is connected to. OMSimulator does the same.
+
 A value is converted to the unit of its target, then transformed, as on a connection. Types must be
 the same, but a whole number may be given to a Real, and an enumeration by number.
 """
@@ -16,11 +21,11 @@ from typing import Any
 from ..errors import InputError, choices
 from ..interface.interface import SETTABLE, Value
 from ..interface.units import Unit
-from .archive import Archive
-from .document import ROOTS, at, checked, child, children, is_true, parse, short
+from .document import at, child, children, is_true, short
 from .network import Carried, Network
-from .tree import Element, Node, Path, linear, transformation
-from .units import change, named, read_units
+from .origin import Origin
+from .tree import Element, Hop, Node, Path, linear, transformation
+from .units import change, same
 
 _READERS: Mapping[str, Callable[[str], Value]] = {
     "Real": float,
@@ -31,19 +36,23 @@ _READERS: Mapping[str, Callable[[str], Value]] = {
 }
 """From the text of a value to the value, by SSP type; an enumeration by name."""
 
-_KINDS = {"ssv": "parameter-set", "ssm": "parameter-mapping"}
-Units = Mapping[str, Unit]
-
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """A value of a set with its SSP type; place says where it is from."""
+    """A value of a set with its SSP type; place says where it is from, in the document of origin.
+
+    named is the name of its unit in the set; unit is what it is in at a connector or variable.
+    With twice, the set has another value under the same name.
+    """
 
     place: str
+    origin: Origin
     type: str
     value: Value
-    unit: Unit | None
+    named: str | None
+    unit: Unit | None = None
     settled: bool = True
+    twice: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,143 +64,154 @@ class Given:
 
     name: str
     parameter: Parameter
-    suppress: bool
-    transformation: Any
+    suppress: bool = False
+    transformation: Any = None
 
 
-def read_settings(
-    archive: Archive, file: str, network: Network, units: Units
-) -> tuple[dict[Path, dict[str, Value]], list[str]]:
-    """The value that holds for each variable that is given one; what was not used.
+def read_settings(network: Network) -> dict[Path, dict[str, Value]]:
+    """The value that holds for each variable that is given one.
 
     By the path of the component and the FMU's name of the variable.
     """
+    given: dict[Node, Parameter] = {}
+    for element, origin, binding in _bindings(network):
+        place = f"{at(origin.place, binding)}: {element.name!r}"
+        for entry in _given(origin, place, binding):
+            nodes = list(_nodes(network, element, entry.name))
+            for node in nodes:
+                given[node] = _adapted(network, node, entry)
+            if not nodes:
+                text = f"no {entry.name!r} to give it to; not used"
+                origin.notes.add(entry.parameter.place, text)
     values: dict[Path, dict[str, Value]] = {}
-    notes: list[str] = []
-    for element, binding in _bindings(network):
-        place = f"{at(file, binding)}: {element.name!r}"
-        for given in _given(archive, file, place, binding, units, notes):
-            ends = [
-                arrived
-                for node in _nodes(network, element.path, given.name)
-                for arrived in _spread(network, node, _adapted(network, node, given))
-            ]
-            if not ends:
-                notes.append(f"{given.parameter.place}: no {given.name!r} to give it to; not used")
-            for end, parameter in ends:
-                value, source = _value(network, end, parameter), network.output(end)
-                if source:
-                    notes.append(f"{parameter.place}: {end} is connected to {source}; not used")
-                else:
-                    values.setdefault(end.path, {})[end.name] = value
-    return values, notes
+    for node in given:
+        network.trace(node)  # refuses circles, in which there are no ends
+        for end in _ends(network, node):
+            parameter = _arriving(network, end, given)
+            value, source = _value(network, end, parameter), network.output(end)
+            if source:
+                text = f"{end} is connected to {source}; not used"
+                parameter.origin.notes.add(parameter.place, text)
+            else:
+                values.setdefault(end.path, {})[end.name] = value
+    return values
 
 
-def _bindings(network: Network) -> Iterator[tuple[Element, Any]]:
+def _bindings(network: Network) -> Iterator[tuple[Element, Origin, Any]]:
     """All bindings with what they are at; who goes before another comes after it."""
     components = (part.element for part in network.parts.values())
     inner_first = sorted(network.systems.values(), key=lambda e: len(e.path), reverse=True)
     for element in (*components, *inner_first):
-        for binding in element.bindings:
-            yield element, binding
+        for origin, binding in element.bindings:
+            yield element, origin, binding
 
 
-def _given(
-    archive: Archive, file: str, place: str, binding: Any, units: Units, notes: list[str]
-) -> Iterator[Given]:
-    """Yield what a binding gives; `notes` get what is not mapped."""
+def _given(origin: Origin, place: str, binding: Any) -> Iterator[Given]:
+    """Yield what a binding gives."""
     holder = child(binding, "ssd:ParameterValues")
-    place_of_set, root = _document(archive, file, place, binding, holder, "ssv")
-    inherited = units if place_of_set == file else {}
-    parameters = _set(place_of_set, root, binding.get("prefix", ""), inherited)
+    parameters = _set(*origin.inner(place, binding, "ssv", holder), binding.get("prefix", ""))
     mapping = child(binding, "ssd:ParameterMapping")
     if mapping is None:
         for name, parameter in parameters.items():
-            yield Given(name, parameter, False, None)
+            yield Given(name, parameter)
         return
-    place, root = _document(archive, file, place, mapping, mapping, "ssm")
+    inner, root = origin.inner(place, mapping, "ssm", mapping)
     unmapped = dict(parameters)
     targets: set[str] = set()
     for element in children(root, "ssm:MappingEntry"):
         source, target = element.get("source"), element.get("target")
-        where = f"{at(place, element)}: mapping '{source} -> {target}'"
+        where = f"{at(inner.place, element)}: mapping '{source} -> {target}'"
+        unmapped.pop(source, None)
+        if source not in parameters:
+            origin.notes.add(where, f"no parameter {source!r}; not used")
+            continue
         if target in targets:
             raise InputError(f"{where}: {target!r} has two sources; must have one")
         targets.add(target)
-        unmapped.pop(source, None)
-        if source in parameters:
-            suppress = is_true(element, "suppressUnitConversion")
-            yield Given(target, parameters[source], suppress, transformation(element))
-        else:
-            notes.append(f"{where}: no parameter {source!r}; not used")
-    notes += [f"{p.place}: not in the mapping; not used" for p in unmapped.values()]
+        suppress = is_true(element, "suppressUnitConversion")
+        yield Given(target, parameters[source], suppress, transformation(element))
+    for parameter in unmapped.values():
+        origin.notes.add(parameter.place, "not in the mapping; not used")
 
 
-def _set(place: str, root: Any, prefix: str, inherited: Units) -> dict[str, Parameter]:
-    known = {**inherited, **read_units(place, root, "ssv")}
+def _set(origin: Origin, root: Any, prefix: str) -> dict[str, Parameter]:
     parameters: dict[str, Parameter] = {}
     for element in children(root, "ssv:Parameters", "ssv:Parameter"):
         name = element.get("name")
-        where = f"{at(place, element)}: parameter {name!r}"
-        if prefix + name in parameters:
-            raise InputError(f"{where}: there are two; must be one")
-        parameters[prefix + name] = _parameter(where, element[0], known)
+        where = f"{at(origin.place, element)}: parameter {name!r}"
+        parameter = _parameter(where, origin, element[0])
+        before = parameters.get(prefix + name)
+        twice = before is not None and (before.value, before.named) != (
+            parameter.value,
+            parameter.named,
+        )
+        parameters[prefix + name] = replace(parameter, twice=twice)
     return parameters
 
 
-def _document(
-    archive: Archive, file: str, place: str, entry: Any, holder: Any, form: str
-) -> tuple[str, Any]:
-    """The name and the root of a set or mapping: of a file that `entry` names, or inline in holder.
-
-    The name of what is inline is `file`.
-    """
-    kind = _KINDS[form]
-    named_type = entry.get("type", f"application/x-ssp-{kind}")
-    if named_type != f"application/x-ssp-{kind}":
-        raise InputError(
-            f"{place}: type {named_type!r} is not supported; must be application/x-ssp-{kind}"
-        )
-    if entry.get("sourceBase", "SSD") != "SSD":
-        raise InputError(
-            f"{place}: sourceBase 'component' is not supported; put the file into resources/"
-        )
-    source, inline = entry.get("source"), None if holder is None else child(holder, ROOTS[form])
-    if (source is None) == (inline is None):
-        raise InputError(f"{place}: {kind}: must have either a source or an inline {ROOTS[form]}")
-    if source is None:
-        return file, checked(file, inline, form)
-    found = archive.resolve(place, source)
-    name = f"{archive.place}: {found}"
-    return name, parse(name, archive.read(found), form)
-
-
-def _parameter(place: str, element: Any, units: Units) -> Parameter:
+def _parameter(place: str, origin: Origin, element: Any) -> Parameter:
     kind, text = short(element.tag).removeprefix("ssv:"), element.get("value")
     if kind not in _READERS:
         raise InputError(f"{place}: type {kind} is not supported; valid: {choices(_READERS)}")
-    return Parameter(place, kind, _READERS[kind](text), named(place, element.get("unit"), units))
+    return Parameter(place, origin, kind, _READERS[kind](text), element.get("unit"))
 
 
-def _nodes(network: Network, path: Path, name: str) -> Iterator[Node]:
+def _nodes(network: Network, element: Element, name: str) -> Iterator[Node]:
     """Yield the variables and connectors that a name means at a system or component."""
-    part = network.parts.get(path)
-    if part is not None:
-        if name in part.interface.by_name:
-            yield Node(path, name)
+    if element.path in network.parts:
+        if name in network.parts[element.path].interface.by_name:
+            yield Node(element.path, name)
         return
-    system = network.systems[path]
-    if name in system.connectors:
-        yield Node(path, name)
-    for element in system.elements:
-        if name.startswith(f"{element}."):
-            yield from _nodes(network, (*path, element), name[len(element) + 1 :])
+    if name in element.connectors:
+        yield Node(element.path, name)
+    for inner in element.elements.values():
+        if name.startswith(f"{inner.name}."):
+            yield from _nodes(network, inner, name[len(inner.name) + 1 :])
 
 
-def _spread(network: Network, node: Node, given: Parameter) -> Iterator[tuple[Node, Parameter]]:
-    """Yield the variables of components that get a value at a node, there or passed on to."""
+def _ends(network: Network, node: Node) -> Iterator[Node]:
+    """Yield the variables of components that a value at a node is for, there or passed on to."""
     if node.path in network.parts:
-        yield node, given
+        yield node
+        return
+    for hop in network.out_of.get(node, ()):
+        yield from _ends(network, hop.target)
+
+
+def _arriving(network: Network, node: Node, given: Mapping[Node, Parameter]) -> Parameter:
+    """The value that holds at a node: of what it is connected to, else its own."""
+    hops = network.trace(node)
+    start = next((k for k, hop in enumerate(hops) if hop.source in given), None)
+    if start is None:
+        return given[node]
+    parameter = given[hops[start].source]
+    for hop in hops[start:]:
+        beaten = given.get(hop.target)
+        if beaten is not None:
+            beaten.origin.notes.add(
+                beaten.place,
+                f"{hop.target} has the value of {hop.source} by a connection, which goes before "
+                "it; not used",
+            )
+        parameter = _passed(network, hop, parameter)
+    return parameter
+
+
+def _passed(network: Network, hop: Hop, given: Parameter) -> Parameter:
+    """The parameter after one more hop."""
+    if given.type in ("Real", "Integer"):
+        carried = network.carry(hop, Carried(given.unit, settled=given.settled))
+        number = _linear(given.value, carried.factor, carried.offset)
+        given = replace(given, value=number, unit=carried.unit, settled=carried.settled)
+    elif hop.transformation:
+        raise InputError(f"{hop.place}: transforms a {given.type}; must be Real")
+    _check_type(network, hop.target, given)
+    return given
+
+
+def _check_type(network: Network, node: Node, given: Parameter) -> None:
+    """InputError where a connector of a system is of another type."""
+    if node.path in network.parts:
         return
     connector = network.systems[node.path].connectors[node.name]
     if connector.value_kind not in (None, given.type) and (connector.type, given.type) != (
@@ -199,28 +219,44 @@ def _spread(network: Network, node: Node, given: Parameter) -> Iterator[tuple[No
         "Integer",
     ):
         raise InputError(f"{given.place}: {given.type}; {node} is {connector.type}")
-    for hop in network.out_of.get(node, ()):
-        if given.type in ("Real", "Integer"):
-            carried = network.carry(hop, Carried(given.unit, settled=given.settled))
-            number = _linear(given.value, carried.factor, carried.offset)
-            passed = replace(given, value=number, unit=carried.unit, settled=carried.settled)
-        elif hop.transformation:
-            raise InputError(f"{hop.place}: transforms a {given.type}; must be Real")
-        else:
-            passed = given
-        yield from _spread(network, hop.target, passed)
 
 
 def _adapted(network: Network, node: Node, given: Given) -> Parameter:
     """The parameter in the unit of the node, transformed."""
     unit, parameter = network.unit(node), given.parameter
-    if parameter.unit and unit and not given.suppress:
-        factor, offset = change(parameter.place, parameter.unit, unit)
+    if parameter.twice:
+        raise InputError(f"{parameter.place}: there are two; must be one")
+    own = None if given.suppress else _own_unit(network, node, parameter)
+    if own and unit:
+        factor, offset = change(parameter.place, own, unit)
         parameter = replace(parameter, value=_linear(parameter.value, factor, offset))
     if given.transformation is not None:
         parameter = _transformed(parameter, given.transformation)
     settled = unit is not None or given.transformation is None
-    return replace(parameter, unit=unit or parameter.unit, settled=settled)
+    parameter = replace(parameter, unit=unit or own, settled=settled)
+    _check_type(network, node, parameter)
+    return parameter
+
+
+def _own_unit(network: Network, node: Node, parameter: Parameter) -> Unit | None:
+    """The unit of a value for a node; None where it is that of the node, or has no meaning there.
+
+    A unit of the name that the FMU gives it is the FMU's, however the set defines it.
+    """
+    name, origin, place = parameter.named, parameter.origin, parameter.place
+    unit, wanted = network.unit(node), network.unit_name(node)
+    defined = origin.units.get(name or "")
+    if name and node.path in network.parts and name == wanted:
+        if defined and unit and not same(defined, unit):
+            text = f"unit {name!r} is not defined as by the FMU, whose it is taken to be"
+            origin.notes.add(place, text)
+        if defined:
+            return unit
+    if name and not defined and node.path in network.parts and wanted is None:
+        text = f"unit {name!r} is not defined, and {node} has none; taken as it is"
+        origin.notes.add(place, text)
+        return None
+    return origin.unit(place, name, wanted)
 
 
 def _transformed(given: Parameter, element: Any) -> Parameter:

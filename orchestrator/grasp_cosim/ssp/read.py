@@ -13,19 +13,21 @@ from typing import Any
 
 from ..errors import InputError, choices
 from ..interface.interface import Value
-from ..interface.read import read_interface
 from ..interface.units import known_unit
 from ..system.description import System, in_nanoseconds
 from ..system.parts import NANOSECONDS, Component, Connection, Port
 from ..system.stimuli import Stimuli
 from .annotation import TYPE, Beside, Extras, no_extras, read_extras
 from .archive import STRUCTURE, Archive
-from .document import at, child, children, parse, qualified
+from .document import at, child, children, qualified
+from .foreign import FOREIGN, Steps, read_steps
 from .network import Carried, Network, Part
+from .notes import Notes
 from .order import flow_order
+from .origin import open_structure
 from .parameters import read_settings
-from .tree import Element, Hop, Path, read_system
-from .units import read_units, same
+from .tree import Hop, Path, read_system
+from .units import same
 
 
 def read_ssp(
@@ -35,25 +37,27 @@ def read_ssp(
     stimuli: Stimuli | None = None,
 ) -> System:
     """The system of an archive; step and stop in s, and stimuli, go before what it names."""
-    archive = Archive(path)
-    file = f"{archive.place}: {STRUCTURE}"
-    root = parse(file, archive.read(STRUCTURE), "ssd")
-    units = read_units(file, root, "ssd")
-    top = read_system(file, child(root, "ssd:System"), units)
-    parts = {e.path: _part(archive, e, e.source) for e in top.within() if e.source is not None}
+    notes = Notes()
+    archive = Archive(path, notes)
+    origin, root = open_structure(archive, notes)
+    file = origin.place
+    top = read_system(origin, child(root, "ssd:System"))
+    parts = {e.path: Part(e, e.interface) for e in top.within() if e.interface is not None}
     if not parts:
         raise InputError(f"{top.place}: system {top.name!r} has no components; must have some")
     names = _names(file, parts)
     annotated = _annotated(file, root, names.values())
-    extras = annotated or no_extras(names.values())
+    given_ns = None if step is None else in_nanoseconds("step", step)
+    steps = Steps() if annotated else read_steps(file, root, given_ns)
+    extras = annotated or no_extras(names.values(), steps)
     named = {at: _units(part, extras.components[names[at]]) for at, part in parts.items()}
     parts = {
         at: replace(part, interface=part.interface.in_units(named[at], f"{file}: {names[at]}"))
         for at, part in parts.items()
     }
-    network = Network({e.path: e for e in top.within() if e.source is None}, parts)
+    network = Network({e.path: e for e in top.within() if e.interface is None}, parts)
     connections = tuple(_connections(network, names, extras))
-    values, notes = read_settings(archive, file, network, units)
+    values = read_settings(network)
     given = []
     for at_path, part in parts.items():
         beside = extras.components[names[at_path]]
@@ -63,12 +67,13 @@ def read_ssp(
         given.append(Component(names[at_path], part.interface.path, own, **more))
     stimuli = stimuli or extras.input
     driven = stimuli.columns if stimuli else ()
-    components = tuple(_keep_starts(file, given, connections, driven, notes))
+    decided: list[str] = []
+    components = tuple(_keep_starts(file, given, connections, driven, decided))
     if annotated is None:
         components = flow_order(components, connections)
-        notes.append(f"order of execution: {', '.join(c.name for c in components)}")
-    stop_ns = _stop(file, root, stop)
-    step_ns = _step(file, parts.values(), stop_ns, step, annotated, notes)
+        decided.append(f"order of execution: {', '.join(c.name for c in components)}")
+    stop_ns = _stop(file, root, parts.values(), stop, decided)
+    step_ns = _step(file, parts.values(), stop_ns, given_ns, annotated, steps, decided)
     return System(
         archive.place,
         components,
@@ -79,23 +84,12 @@ def read_ssp(
         extras.events,
         extras.faults,
         extras.initialisation,
-        (*_unused(archive, root), *_renamed(names), *notes),
+        (*_unused(archive, root), *_renamed(names), *notes.lines(), *decided),
         extras.roles,
         extras.presets,
         extras.diverging,
         stimuli,
     )
-
-
-def _part(archive: Archive, element: Element, source: str) -> Part:
-    place = f"{element.place}: component {element.name!r}"
-    path = archive.extract(archive.resolve(place, source))
-    try:
-        interface = read_interface(path)
-    except InputError as error:
-        reason = str(error).removeprefix(f"{path}: ")
-        raise InputError(f"{place}: {source}: {reason}") from error
-    return Part(element, interface)
 
 
 def _units(part: Part, beside: Beside) -> dict[str, str]:
@@ -116,8 +110,12 @@ def _units(part: Part, beside: Beside) -> dict[str, str]:
 
 
 def _annotated(file: str, root: Any, names: Collection[str]) -> Extras | None:
-    """The extras of our annotation, if there is one; `names` are those of the components."""
-    for annotation in children(root, "ssd:Annotations", "ssc:Annotation"):
+    """The extras of our annotation, if there is one; `names` are those of the components.
+
+    It is in the default experiment, in earlier archives below the root.
+    """
+    experiment = children(root, "ssd:DefaultExperiment", "ssd:Annotations", "ssc:Annotation")
+    for annotation in (*experiment, *children(root, "ssd:Annotations", "ssc:Annotation")):
         if annotation.get("type") == TYPE:
             extras = read_extras(at(file, annotation), annotation)
             if set(extras.components) != set(names):
@@ -207,8 +205,10 @@ def _keep_starts(
         yield replace(component, values={**component.values, **starts})
 
 
-def _stop(file: str, root: Any, given: float | None) -> int:
-    """The stop time in ns."""
+def _stop(
+    file: str, root: Any, parts: Iterable[Part], given: float | None, notes: list[str]
+) -> int:
+    """The stop time in ns: given, or of the archive, or the longest that its FMUs name."""
     experiment = child(root, "ssd:DefaultExperiment")
     attributes = {} if experiment is None else experiment.attrib
     start = float(attributes.get("startTime", "0"))
@@ -218,24 +218,33 @@ def _stop(file: str, root: Any, given: float | None) -> int:
         )
     if given is not None:
         return in_nanoseconds("stop", given)
-    if "stopTime" not in attributes:
+    if "stopTime" in attributes:
+        return in_nanoseconds(f"{at(file, experiment)}: stopTime", float(attributes["stopTime"]))
+    declared = [part.interface.experiment.get("stop_time") for part in parts]
+    stop = max((float(time) for time in declared if time is not None), default=0.0)
+    if not 0.0 < stop < math.inf:
         raise InputError(f"{file}: no stopTime in a DefaultExperiment; give one: --stop")
-    return in_nanoseconds(f"{at(file, experiment)}: stopTime", float(attributes["stopTime"]))
+    notes.append(f"stop = {stop:g} s, the longest that its FMUs name; the archive names none")
+    return in_nanoseconds(f"{file}: stop time of its FMUs", stop)
 
 
 def _step(
     file: str,
     parts: Iterable[Part],
     stop_ns: int,
-    given: float | None,
+    given_ns: int | None,
     annotated: Extras | None,
+    steps: Steps,
     notes: list[str],
 ) -> int:
-    """The step in ns: given, or ours, or the smallest of the FMUs that divides the stop."""
-    if given is not None:
-        return in_nanoseconds("step", given)
+    """The step in ns: given, ours, another tool's, or the FMUs' smallest that divides the stop."""
+    if given_ns is not None:
+        return given_ns
     if annotated:
         return annotated.step_ns
+    if steps.base_ns:
+        notes.append(f"step = {steps.base_ns / NANOSECONDS:g} s, scheme jacobi, by {steps.said}")
+        return steps.base_ns
     declared_steps = sorted({part.interface.step for part in parts if part.interface.step})
     for step in declared_steps:
         if not 0.0 < step * NANOSECONDS <= stop_ns:
@@ -257,7 +266,7 @@ def _unused(archive: Archive, root: Any) -> Iterator[str]:
         if name.endswith(".ssd") and "/" not in name and name != STRUCTURE:
             yield f"variant {name} is not used; {STRUCTURE} is"
     types = Counter(annotation.get("type") for annotation in root.iter(qualified("ssc:Annotation")))
-    for kind in sorted(set(types) - {TYPE}):
+    for kind in sorted(set(types) - {TYPE, *FOREIGN}):
         yield f"annotations of type {kind!r} are not used ({types[kind]})"
 
 

@@ -1,7 +1,8 @@
 """An SSD as it stands: systems, components, connectors, connections, parameter bindings.
 
 What this master cannot run is refused here by its name and line. Geometry and notes only draw and
-are passed over.
+are passed over. A nested archive is a system in the place of its component, a signal dictionary one
+that has only connectors: who is connected to an entry gives it its value, or takes it.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -10,12 +11,18 @@ from typing import Any, TypeVar
 
 from ..checks import known
 from ..errors import InputError
+from ..interface.interface import Interface, Variable
+from ..interface.read import read_interface
 from ..interface.units import Unit
+from .archive import STRUCTURE, Archive
 from .document import at, child, children, is_true, qualified, short
-from .units import named
+from .origin import Origin, open_structure
+from .units import same
 
 FMU = "application/x-fmu-sharedlibrary"
+_DEFINITION, _PACKAGE = "application/x-ssp-definition", "application/x-ssp-package"
 _SOURCES = ("output", "calculatedParameter")
+_CAUSALITIES = ("input", "parameter", *_SOURCES)
 _TYPES = ("Real", "Integer", "Boolean", "String", "Enumeration")
 _SIDES = ("start", "end")
 _BINDING = ("ssd:ParameterBindings", "ssd:ParameterBinding")
@@ -42,8 +49,8 @@ class Connector:
     place: str
     name: str
     kind: str
-    type: str | None
-    unit: Unit | None
+    type: str | None = None
+    unit: Unit | None = None
 
     @property
     def value_kind(self) -> str | None:
@@ -67,51 +74,62 @@ class Hop:
 
 @dataclass(frozen=True, slots=True)
 class Element:
-    """A component, the source of whose FMU is in the archive, or a system, which has no source.
+    """A component with the interface of its FMU, or a system, which has none.
 
-    The elements of a system are by name and in the order of the file; bindings are the elements of
-    its parameter bindings as they stand.
+    The elements of a system are by name and in the order of the file. bindings are the elements of
+    its parameter bindings with the documents that they stand in. refers is True for a reference to
+    a signal dictionary, whose path it has.
     """
 
     place: str
     path: Path
     name: str
+    origin: Origin
     connectors: Mapping[str, Connector]
-    bindings: Sequence[Any]
-    source: str | None = None
+    bindings: Sequence[tuple[Origin, Any]] = ()
+    interface: Interface | None = None
     elements: Mapping[str, "Element"] = field(default_factory=dict)
     hops: tuple[Hop, ...] = ()
+    dictionaries: Mapping[str, "Element"] = field(default_factory=dict)
+    refers: bool = False
 
     def within(self) -> Iterator["Element"]:
-        """Yield the element and all in it, in the order of the file."""
-        yield self
-        for inner in self.elements.values():
+        """Yield the element and all in it, in the order of the file, without references."""
+        if not self.refers:
+            yield self
+        for inner in (*self.elements.values(), *self.dictionaries.values()):
             yield from inner.within()
 
 
 Part = TypeVar("Part", Connector, Element)
+Dictionaries = Mapping[str, Element]
 
 
-def read_system(file: str, element: Any, units: Mapping[str, Unit], path: Path = ()) -> Element:
-    """The system of an element; file names the document, for the error messages."""
-    name = element.get("name")
-    if (unsupported := child(element, "ssd:SignalDictionaries")) is not None:
-        raise InputError(
-            f"{at(file, unsupported)}: system {name!r}: signal dictionaries are not supported; "
-            "connect the components directly"
-        )
-    entries = element.iterfind(f"{qualified('ssd:Elements')}/*")
-    elements = [_element(file, entry, units, path) for entry in entries]
+def read_system(
+    origin: Origin, element: Any, path: Path = (), around: Dictionaries | None = None
+) -> Element:
+    """The system of an element; around are the signal dictionaries of the systems around it."""
+    name, place = element.get("name"), at(origin.place, element)
+    entries = children(element, "ssd:SignalDictionaries", "ssd:SignalDictionary")
+    dictionaries = [_dictionary(origin, entry, path) for entry in entries]
+    own = _by_name(dictionaries, f"system {name!r}: two signal dictionaries")
+    reachable = {**(around or {}), **own}
+    elements = [
+        _element(origin, entry, path, reachable)
+        for entry in element.iterfind(f"{qualified('ssd:Elements')}/*")
+    ]
     system = Element(
-        at(file, element),
+        place,
         path,
         name,
-        _connectors(file, element, units),
-        children(element, *_BINDING),
+        origin,
+        _connectors(origin, element),
+        _bindings(origin, element),
         elements=_by_name(elements, f"system {name!r}: two elements"),
+        dictionaries=own,
     )
     connections = children(element, "ssd:Connections", "ssd:Connection")
-    return replace(system, hops=tuple(_hop(file, entry, system) for entry in connections))
+    return replace(system, hops=tuple(_hop(origin, entry, system) for entry in connections))
 
 
 def transformation(element: Any) -> Any:
@@ -138,55 +156,131 @@ def _by_name(parts: Iterable[Part], twice: str) -> dict[str, Part]:
     return found
 
 
-def _element(file: str, entry: Any, units: Mapping[str, Unit], parent: Path) -> Element:
-    tag, name, place = short(entry.tag), entry.get("name"), at(file, entry)
+def _bindings(origin: Origin, entry: Any) -> tuple[tuple[Origin, Any], ...]:
+    return tuple((origin, binding) for binding in children(entry, *_BINDING))
+
+
+def _element(origin: Origin, entry: Any, parent: Path, reachable: Dictionaries) -> Element:
+    tag, name, place = short(entry.tag), entry.get("name"), at(origin.place, entry)
+    path = (*parent, name)
     if tag == "ssd:System":
-        return read_system(file, entry, units, (*parent, name))
-    if tag != "ssd:Component":
-        raise InputError(f"{place}: {tag} {name!r} is not supported; must be a Component or System")
-    kind = entry.get("type", FMU)
+        return read_system(origin, entry, path, reachable)
+    if tag == "ssd:SignalDictionaryReference":
+        return _reference(origin, entry, reachable)
+    kind, place = entry.get("type", FMU), f"{place}: component {name!r}"
+    known(f"{place}: type", kind, (FMU, _PACKAGE, _DEFINITION), " is not supported")
     if kind != FMU:
-        raise InputError(
-            f"{place}: component {name!r}: type {kind!r} is not supported; must be {FMU}"
-        )
+        return _nested(origin, entry, path, place)
     if entry.get("implementation") == "ModelExchange":
         raise InputError(
-            f"{place}: component {name!r}: implementation 'ModelExchange' is not supported; "
-            "must be CoSimulation or any"
+            f"{place}: implementation 'ModelExchange' is not supported; must be CoSimulation or any"
         )
-    return Element(
-        place,
-        (*parent, name),
-        name,
-        _connectors(file, entry, units),
-        children(entry, *_BINDING),
-        entry.get("source"),
+    interface = _interface(origin, place, entry.get("source"))
+    connectors = _connectors(origin, entry, interface)
+    element = Element(at(origin.place, entry), path, name, origin, connectors)
+    return replace(element, bindings=_bindings(origin, entry), interface=interface)
+
+
+def _interface(origin: Origin, place: str, source: str) -> Interface:
+    """The interface of the FMU of a component."""
+    path = origin.archive.extract(origin.resolve(place, source))
+    try:
+        return read_interface(path)
+    except InputError as error:
+        reason = str(error).removeprefix(f"{path}: ")
+        raise InputError(f"{place}: {source}: {reason}") from error
+
+
+def _nested(origin: Origin, entry: Any, path: Path, place: str) -> Element:
+    """The top system of another archive or SSD, as if it stood in the place of the component.
+
+    The component's parameter bindings come after its own and so go before them.
+    """
+    source, _, variant = entry.get("source").partition("#")
+    found = origin.resolve(place, source)
+    if entry.get("type") == _DEFINITION:
+        archive, structure = origin.archive, found
+    else:
+        inside = f"{origin.archive.place}: {found}"
+        archive = Archive(origin.archive.extract(found), origin.notes, inside)
+        structure = archive.resolve(place, variant or STRUCTURE)
+    inner, root = open_structure(archive, origin.notes, structure, origin.around)
+    system = read_system(inner, child(root, "ssd:System"), path)
+    connectors = dict(system.connectors)
+    for name, outer in _connectors(origin, entry).items():
+        known(f"{outer.place}: {system.name} has no connector", name, connectors)
+        unit = connectors[name].unit or outer.unit
+        if outer.unit and unit and not same(outer.unit, unit):
+            raise InputError(
+                f"{outer.place}: connector {name!r}: unit {outer.unit.name} is not that of "
+                f"{source}, {unit.name}; must mean the same"
+            )
+        connectors[name] = replace(connectors[name], unit=unit)
+    bindings = (*system.bindings, *_bindings(origin, entry))
+    return replace(system, name=entry.get("name"), connectors=connectors, bindings=bindings)
+
+
+def _dictionary(origin: Origin, entry: Any, path: Path) -> Element:
+    """A signal dictionary, as a system with a connector for each entry."""
+    name, place = entry.get("name"), at(origin.place, entry)
+    inner, root = origin.inner(f"{place}: {name!r}", entry, "ssb", entry)
+    signals = [
+        _connector(inner, at(inner.place, signal), signal, "inout", None)
+        for signal in children(root, "ssb:DictionaryEntry")
+    ]
+    connectors = _by_name(signals, f"{name}: two entries")
+    return Element(place, (*path, f"<{name}>"), name, inner, connectors)
+
+
+def _reference(origin: Origin, entry: Any, reachable: Dictionaries) -> Element:
+    """A reference to a signal dictionary: its connectors are the dictionary's entries."""
+    name, place = entry.get("name"), at(origin.place, entry)
+    known(f"{place}: {name!r}: no signal dictionary", entry.get("dictionary"), reachable)
+    dictionary = reachable[entry.get("dictionary")]
+    listed = children(entry, "ssd:Connectors", "ssd:Connector")
+    connectors = _by_name(
+        [_connector(origin, at(origin.place, e), e, e.get("kind"), None) for e in listed],
+        f"{name}: two connectors",
     )
+    for connector in connectors.values():
+        said = f"{connector.place}: signal dictionary {dictionary.name} has no entry"
+        known(said, connector.name, dictionary.connectors)
+    return replace(dictionary, place=place, name=name, connectors=connectors, refers=True)
 
 
-def _connectors(file: str, element: Any, units: Mapping[str, Unit]) -> dict[str, Connector]:
-    entries = children(element, "ssd:Connectors", "ssd:Connector")
-    connectors = [_connector(at(file, entry), entry, units) for entry in entries]
+def _connectors(
+    origin: Origin, element: Any, interface: Interface | None = None
+) -> dict[str, Connector]:
+    """The connectors of an element; of a component with the interface of its FMU."""
+    connectors = []
+    for entry in children(element, "ssd:Connectors", "ssd:Connector"):
+        place, name, kind = at(origin.place, entry), entry.get("name"), entry.get("kind")
+        if kind == "inout":
+            raise InputError(f"{place}: connector {name!r}: kind 'inout' is not supported")
+        variable = interface.by_name.get(name) if interface else None
+        connectors.append(_connector(origin, place, entry, kind, variable))
     return _by_name(connectors, f"{element.get('name')}: two connectors")
 
 
-def _connector(place: str, entry: Any, units: Mapping[str, Unit]) -> Connector:
-    name, kind = entry.get("name"), entry.get("kind")
-    if kind == "inout":
-        raise InputError(f"{place}: connector {name!r}: kind 'inout' is not supported")
+def _connector(
+    origin: Origin, place: str, entry: Any, kind: str, variable: Variable | None
+) -> Connector:
+    """A connector, of that variable of its FMU, or the entry of a signal dictionary."""
+    name = entry.get("name")
     types = [short(e.tag).removeprefix("ssc:") for e in entry if short(e.tag).startswith("ssc:")]
     declared = types[0] if types else None
     if declared is not None:
         known(f"{place}: connector {name!r}: type", declared, _TYPES, " is not supported")
     unit = child(entry, "ssc:Real").get("unit") if declared == "Real" else None
-    return Connector(place, name, kind, declared, named(f"{place}: {name!r}", unit, units))
+    own = variable.unit if variable else None
+    return Connector(place, name, kind, declared, origin.unit(f"{place}: {name!r}", unit, own))
 
 
-def _hop(file: str, entry: Any, system: Element) -> Hop:
+def _hop(origin: Origin, entry: Any, system: Element) -> Hop:
     """A connection of a system, from the end that gives a value there to the one that takes it."""
     ends = [(entry.get(f"{side}Element"), entry.get(f"{side}Connector")) for side in _SIDES]
     said = " - ".join(".".join(filter(None, end)) for end in ends)
-    place = f"{at(file, entry)}: connection '{said}'"
+    place = f"{at(origin.place, entry)}: connection '{said}'"
     change = transformation(entry)
     if change is not None and not short(change.tag).endswith("LinearTransformation"):
         raise InputError(
@@ -194,10 +288,12 @@ def _hop(file: str, entry: Any, system: Element) -> Hop:
             "must be linear, or in the mapping of a parameter"
         )
     (a, gives_a), (b, gives_b) = (_end(place, system, *end) for end in ends)
+    if gives_a is None:
+        gives_a = None if gives_b is None else not gives_b
     if gives_a == gives_b:
+        does = {True: "give", False: "take", None: "may give or take"}[gives_a]
         raise InputError(
-            f"{place}: both {'give' if gives_a else 'take'} a value; "
-            "must lead from one that gives to one that takes"
+            f"{place}: both {does} a value; must lead from one that gives to one that takes"
         )
     return Hop(
         place,
@@ -208,12 +304,21 @@ def _hop(file: str, entry: Any, system: Element) -> Hop:
     )
 
 
-def _end(place: str, system: Element, element: str | None, name: str) -> tuple[Node, bool]:
-    """The node of an end, and whether it gives a value in the system."""
+def _end(place: str, system: Element, element: str | None, name: str) -> tuple[Node, bool | None]:
+    """The node of an end, and whether it gives a value in the system; None for either."""
     owner = system
     if element:
         known(f"{place}: no element", element, system.elements)
         owner = system.elements[element]
-    known(f"{place}: {owner.name} has no connector", name, owner.connectors)
-    gives_outside = owner.connectors[name].kind in _SOURCES
-    return Node(owner.path, name), gives_outside != (owner is system)
+    variable = owner.interface.by_name.get(name) if owner.interface else None
+    if name not in owner.connectors and variable and variable.causality in _CAUSALITIES:
+        system.origin.notes.add(
+            place, f"{owner.name} has no connector {name!r}; its FMU has a variable of that name"
+        )
+        kind: str = variable.causality
+    else:
+        known(f"{place}: {owner.name} has no connector", name, owner.connectors)
+        kind = owner.connectors[name].kind
+    if kind == "inout":
+        return Node(owner.path, name), None
+    return Node(owner.path, name), (kind in _SOURCES) != (owner is system)

@@ -4,7 +4,6 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from ..checks import known
 from ..errors import InputError
 from ..interface.units import BASE, Unit, conversion
 from .document import add, at, child, children
@@ -16,14 +15,6 @@ def read_units(file: str, parent: Any, prefix: str) -> Mapping[str, Unit]:
         unit.get("name"): _unit(file, unit)
         for unit in children(parent, f"{prefix}:Units", "ssc:Unit")
     }
-
-
-def named(place: str, name: str | None, units: Mapping[str, Unit]) -> Unit | None:
-    """Return the unit of that name, None for None; InputError where it is not defined."""
-    if name is None:
-        return None
-    known(f"{place}: unit", name, units, " is not defined")
-    return units[name]
 
 
 def write_units(parent: Any, prefix: str, units: Iterable[Unit]) -> None:

@@ -19,6 +19,7 @@ from ..system.parts import NANOSECONDS, Component, Connection, Port
 from .annotation import extras_of, write_extras
 from .archive import RESOURCES, STRUCTURE, write_archive
 from .document import VERSION, add, new, to_bytes
+from .foreign import PREFIXES, write_hint, write_steps
 from .tree import FMU
 from .units import change, same, write_units
 
@@ -52,12 +53,17 @@ def write_ssp(system: System, path: Path) -> Written:
 
 def _notes(system: System) -> Iterable[str]:
     yield (
-        f"SSP has no form for the step, {system.step_ns / NANOSECONDS:g} s, and the scheme, "
-        f"{system.scheme}: they are in an annotation that other tools do not read"
+        f"SSP has no form for the step, {system.step_ns / NANOSECONDS:g} s: OSP and OMSimulator "
+        "read it from annotations of their own"
     )
+    if system.scheme != "jacobi":
+        yield (
+            f"SSP has no form for the scheme, {system.scheme}: it is in an annotation that other "
+            "tools do not read; most step all components at once, as jacobi does"
+        )
     own = [c.name for c in system.components if c.step_ns is not None]
     if own:
-        yield f"only in the annotation: steps of {', '.join(own)}"
+        yield f"only OSP reads the steps of {', '.join(own)}"
     for component in system.components:
         for variable in read_interface(component.fmu).of(*_CAUSALITIES):
             if not variable.supported:
@@ -115,7 +121,8 @@ def _added(entries: dict[str, bytes], stem: str, suffix: str, data: bytes) -> st
 
 def _structure(system: System, sources: Mapping[str, str], bindings: Mapping[str, str]) -> Any:
     name = Path(system.name).stem
-    root = new("ssd:SystemStructureDescription", version=VERSION, name=name, generationTool=_TOOL)
+    attributes = {"version": VERSION, "name": name, "generationTool": _TOOL}
+    root = new("ssd:SystemStructureDescription", PREFIXES, **attributes)
     top = add(root, "ssd:System", name=name)
     units = _units(system.components)
     elements = add(top, "ssd:Elements")
@@ -127,10 +134,13 @@ def _structure(system: System, sources: Mapping[str, str], bindings: Mapping[str
         connections = add(top, "ssd:Connections")
         for connection in system.connections:
             _write_connection(connections, system, connection)
+    for_oms = add(top, "ssd:Annotations")
     write_units(root, "ssd", units.values())
-    stop = system.stop_ns / NANOSECONDS
-    add(root, "ssd:DefaultExperiment", startTime="0.0", stopTime=repr(stop))
-    write_extras(add(root, "ssd:Annotations"), extras_of(system))
+    stop = repr(system.stop_ns / NANOSECONDS)
+    experiment = add(root, "ssd:DefaultExperiment", startTime="0.0", stopTime=stop)
+    annotations = add(experiment, "ssd:Annotations")
+    write_steps(annotations, for_oms, system.step_ns)
+    write_extras(annotations, extras_of(system))
     return root
 
 
@@ -159,6 +169,8 @@ def _write_component(
         add(connector, f"ssc:{variable.kind}", **({"unit": unit.name} if unit else {}))
     if values:
         add(add(element, "ssd:ParameterBindings"), "ssd:ParameterBinding", source=values)
+    if component.step_ns is not None:
+        write_hint(element, component.step_ns)
 
 
 def _connected(component: Component) -> list[Variable]:

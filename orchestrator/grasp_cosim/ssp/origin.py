@@ -1,0 +1,97 @@
+"""Where an element stands: the document, its archive, and what its sources and units refer to."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from posixpath import dirname
+from typing import Any
+
+from ..checks import known
+from ..errors import InputError
+from ..interface.units import Unit, known_unit
+from .archive import STRUCTURE, Archive
+from .document import ROOTS, checked, child, parse
+from .notes import Notes
+from .units import read_units
+
+_KINDS = {
+    "ssv": "parameter-set",
+    "ssm": "parameter-mapping",
+    "ssb": "signal-dictionary",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """A document, an entry of an archive, with its units and the documents that it is nested in."""
+
+    archive: Archive
+    entry: str
+    notes: Notes
+    units: Mapping[str, Unit] = field(default_factory=dict)
+    around: tuple[str, ...] = ()
+
+    @property
+    def place(self) -> str:
+        """The name of the document in messages."""
+        return f"{self.archive.place}: {self.entry}"
+
+    def resolve(self, place: str, uri: str) -> str:
+        """The entry of a source, relative to the document."""
+        return self.archive.resolve(place, uri, dirname(self.entry))
+
+    def unit(self, place: str, name: str | None, own: str | None) -> Unit | None:
+        """The unit of that name, None for none; own is how the FMU names it, if it does.
+
+        InputError where nothing says what it is.
+        """
+        if name == "":
+            self.notes.add(place, "unit '' is taken as no unit")
+        if not name or name in self.units:
+            return self.units.get(name or "")
+        if own == name:
+            self.notes.add(place, f"unit {name!r} is not defined; taken as the FMU's")
+            return None
+        meant = known_unit(name) if own is None else None
+        if meant is None:
+            known(f"{place}: unit", name, self.units, " is not defined")
+        self.notes.add(place, f"unit {name!r} is not defined; known by its name")
+        return meant
+
+    def inner(self, place: str, entry: Any, form: str, holder: Any) -> tuple["Origin", Any]:
+        """A set, mapping or dictionary: the file that `entry` names, or inline in `holder`.
+
+        With what its units refer to.
+        """
+        kind = _KINDS[form]
+        named_type = entry.get("type", f"application/x-ssp-{kind}")
+        if named_type != f"application/x-ssp-{kind}":
+            raise InputError(
+                f"{place}: type {named_type!r} is not supported; must be application/x-ssp-{kind}"
+            )
+        if entry.get("sourceBase", "SSD") != "SSD":
+            raise InputError(
+                f"{place}: sourceBase 'component' is not supported; put the file into resources/"
+            )
+        source, inline = entry.get("source"), None if holder is None else child(holder, ROOTS[form])
+        if (source is None) == (inline is None):
+            raise InputError(
+                f"{place}: {kind}: must have either a source or an inline {ROOTS[form]}"
+            )
+        if source is None:
+            root = checked(self.place, inline, form, self.notes)
+            return replace(self, units={**self.units, **read_units(self.place, root, form)}), root
+        found = replace(self, entry=self.resolve(place, source), units={})
+        root = parse(found.place, self.archive.read(found.entry), form, self.notes)
+        return replace(found, units=read_units(found.place, root, form)), root
+
+
+def open_structure(
+    archive: Archive, notes: Notes, entry: str = STRUCTURE, around: tuple[str, ...] = ()
+) -> tuple[Origin, Any]:
+    """The structure of an archive: where its elements stand, and its root."""
+    origin = Origin(archive, entry, notes)
+    if origin.place in around:
+        raise InputError(f"{origin.place}: contains itself; must not")
+    root = parse(origin.place, archive.read(entry), "ssd", notes)
+    units = read_units(origin.place, root, "ssd")
+    return replace(origin, units=units, around=(*around, origin.place)), root

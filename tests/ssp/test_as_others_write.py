@@ -1,0 +1,176 @@
+"""Forms of archives and documents in circulation, which mean the same as those by the book."""
+
+import zipfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import pytest
+from grasp_cosim import InputError, System, simulate
+from grasp_cosim.ssp.write import write_ssp
+from grasp_cosim.system.parts import Connection, Port
+from ssp.hand_made import archive, bind, component, connect, fmu, parameter_set, structure, system
+
+FMU = fmu("input Real u 0.5 m", "output Real y - m", "parameter Real k 1.0 m", "output Boolean b -")
+PARTS = component("a", "output y Real") + component("b", "input u Real")
+TOP = system("top", PARTS, connect("a/y", "b/u"))
+Y_TO_U = (Connection(Port("a", "y"), Port("b", "u")),)
+
+
+def load(folder: Path, ssd: str | bytes, files: Mapping[str, str | bytes] | None = None) -> System:
+    path = archive(folder, structure(TOP), {"a": FMU, "b": FMU}, files)
+    return rewritten(path, lambda name, data: (name, of_bytes(ssd) if ".ssd" in name else data))
+
+
+def of_bytes(text: str | bytes) -> bytes:
+    return text if isinstance(text, bytes) else text.encode()
+
+
+def rewritten(path: Path, edit: Callable[[str, bytes], tuple[str, bytes]]) -> System:
+    """The archive loaded with its entries edited, names and content."""
+    with zipfile.ZipFile(path) as file:
+        entries = dict(edit(name, file.read(name)) for name in file.namelist())
+    with zipfile.ZipFile(path, "w") as file:
+        for name, data in entries.items():
+            file.writestr(name, data)
+    return System.load(path)
+
+
+def other_prefixes(text: str) -> str:
+    return text.replace("ssd:", "ns0:").replace("xmlns:ssd", "xmlns:ns0").replace("ssc:", "q:")
+
+
+DOCUMENTS: dict[str, Callable[[str], str | bytes]] = {
+    "BOM": lambda text: b"\xef\xbb\xbf" + text.encode(),
+    "CRLF": lambda text: text.replace(">", ">\r\n"),
+    "UTF-16": lambda text: text.replace("UTF-8", "UTF-16").encode("utf-16"),
+    "prefixes": lambda text: other_prefixes(text).replace("xmlns:ssc", "xmlns:q"),
+    "default namespace": lambda text: (
+        text.replace("<ssd:", "<").replace("</ssd:", "</").replace("xmlns:ssd", "xmlns")
+    ),
+    "comments": lambda text: text.replace("<ssd:E", "<!-- x --><?y z?><ssd:E"),
+    "version 1.0.1": lambda text: text.replace('"hand" version="1.0"', '"hand" version="1.0.1"'),
+    "ids": lambda text: text.replace("<ssd:Connection ", '<ssd:Connection id="c1" '),
+    "no DefaultExperiment attributes but the stop": lambda text: text.replace('startTime="0" ', ""),
+}
+
+
+@pytest.mark.parametrize("form", DOCUMENTS)
+def test_forms_of_xml(tmp_path: Path, form: str) -> None:
+    loaded = load(tmp_path, DOCUMENTS[form](structure(TOP)))
+    assert loaded.connections == Y_TO_U
+    assert loaded.stop_ns == 1_000_000_000
+    assert loaded.notes == load(tmp_path, structure(TOP)).notes
+
+
+def test_elements_in_another_order_and_empty_lists_are_said(tmp_path: Path) -> None:
+    """As OMSimulator's own test archives have them."""
+    annotations = '<ssd:Annotations><ssc:Annotation type="x"/></ssd:Annotations><ssd:Connectors/>'
+    ssd = structure(TOP.replace('name="top">', f'name="top">{annotations}'))
+    loaded = load(tmp_path, ssd)
+    assert loaded.connections == Y_TO_U
+    assert (
+        "hand.ssp: SystemStructure.ssd: elements are not in the order of the schema, or are empty "
+        "lists" in loaded.notes
+    )
+
+
+def test_two_lists_where_there_may_be_one_are_refused(tmp_path: Path) -> None:
+    two = bind(parameter_set("b.k Real 1"))
+    lists = f"<ssd:ParameterBindings>{two}</ssd:ParameterBindings>" * 2
+    with pytest.raises(InputError, match="against the schema: Element 'ssd:ParameterBindings'"):
+        load(tmp_path, structure(TOP.replace("<ssd:Elements>", f"{lists}<ssd:Elements>", 1)))
+
+
+def test_a_connection_to_a_variable_without_a_connector(tmp_path: Path) -> None:
+    """As OSP's test archives have it."""
+    parts = component("a") + component("b")
+    loaded = load(tmp_path, structure(system("top", parts, connect("a/y", "b/u"))))
+    assert loaded.connections == Y_TO_U
+    assert any(
+        "connection 'a.y - b.u': b has no connector 'u'; its FMU has a variable" in note
+        for note in loaded.notes
+    )
+
+
+def test_names_that_are_not_ascii(tmp_path: Path) -> None:
+    parts = PARTS.replace('"a"', '"Größe 1"').replace("resources/a.fmu", "resources/gr%C3%B6.fmu")
+    path = archive(
+        tmp_path,
+        structure(system("Übersicht", parts, connect("Größe 1/y", "b/u"))),
+        {"grö": FMU, "b": FMU},
+    )
+    assert System.load(path).connections == (Connection(Port("Größe 1", "y"), Port("b", "u")),)
+
+
+def test_no_stop_time_is_the_longest_of_the_fmus(tmp_path: Path) -> None:
+    ssd = structure(TOP, "")
+    longer = FMU.replace(b"<DefaultExperiment ", b'<DefaultExperiment stopTime="2.5" ')
+    shorter = FMU.replace(b"<DefaultExperiment ", b'<DefaultExperiment stopTime="1.5" ')
+    loaded = System.load(archive(tmp_path, ssd, {"a": shorter, "b": longer}))
+    assert loaded.stop_ns == 2_500_000_000
+    assert "stop = 2.5 s, the longest that its FMUs name; the archive names none" in loaded.notes
+
+
+def in_folder(name: str) -> str:
+    return f"My system/{name}"
+
+
+ARCHIVES: dict[str, tuple[Callable[[str], str], str]] = {
+    "folder": (in_folder, "all of it is in My system/, which is read as the top"),
+    "backslashes": (
+        lambda name: name.replace("/", "\\"),
+        "its entries have backslashes, which are read as slashes",
+    ),
+    "both": (
+        lambda name: in_folder(name).replace("/", "\\"),
+        "all of it is in My system/, which is read as the top",
+    ),
+}
+
+
+@pytest.mark.parametrize("form", ARCHIVES)
+def test_forms_of_archives(tmp_path: Path, form: str) -> None:
+    rename, said = ARCHIVES[form]
+    files = {"extra/org.other/a.xml": "<a/>", "documentation/index.html": "<p>"}
+    path = archive(tmp_path, structure(TOP), {"a": FMU, "b": FMU}, files)
+    loaded = rewritten(path, lambda name, data: (rename(name), data))
+    assert loaded.connections == Y_TO_U
+    assert f"hand.ssp: {said}" in loaded.notes
+
+
+def test_two_folders_with_a_structure_are_no_archive(tmp_path: Path) -> None:
+    path = archive(tmp_path, structure(TOP), {"a": FMU, "b": FMU}, {"x/SystemStructure.ssd": ""})
+    with pytest.raises(InputError, match=r"no SystemStructure.ssd in it; must be an SSP archive"):
+        rewritten(path, lambda name, data: (name if "/" in name else f"y/{name}", data))
+
+
+def test_sources_in_folders_and_above_are_of_the_archive(tmp_path: Path) -> None:
+    parts = component("a", source="fmus/x y.fmu") + component("b", source="c.fmu")
+    files = {"fmus/x y.fmu": "", "c.fmu": ""}
+    path = archive(tmp_path, structure(system("top", parts)), {"a": FMU}, files)
+    with zipfile.ZipFile(path) as file:
+        data = file.read("resources/a.fmu")
+    loaded = rewritten(path, lambda name, old: (name, data if name in files else old))
+    assert [c.fmu.name for c in loaded.components] == ["x y.fmu", "c.fmu"]
+
+
+def test_the_grasp_in_all_these_forms_runs_the_same_to_the_bit(
+    grasp: System, tmp_path: Path
+) -> None:
+    short = grasp.with_experiment(1e-3, 0.5)
+    path = tmp_path / "grasp.ssp"
+    write_ssp(short, path)
+
+    def spoiled(name: str, data: bytes) -> tuple[str, bytes]:
+        if name.endswith(".ssd"):
+            text = data.decode().replace('version="1.0"', 'version="2.0"', 1)
+            text = text.replace("<ssc:Real ", "<ssc:Float64 ").replace("ssd:", "ns0:")
+            text = text.replace("xmlns:ssd", "xmlns:ns0").replace("\n", "\r\n")
+            data = b"\xef\xbb\xbf" + text.encode()
+        return in_folder(name).replace("/", "\\"), data
+
+    again = rewritten(path, spoiled)
+    assert again.notes
+    ours, theirs = simulate(short), simulate(again)
+    for name in ours:
+        assert theirs[name].tobytes() == ours[name].tobytes(), name
