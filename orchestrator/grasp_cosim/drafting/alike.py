@@ -36,8 +36,8 @@ _SAME = {
     "gap": "distance dist clearance separation spacing proximity",
     "position": "pos x displacement location coordinate",
     "velocity": "vel speed v xd xdot dx vx",
-    "force": "frc f effort thrust",
-    "contact": "touch touching touches touched contacting collision",
+    "force": "frc f effort thrust load",
+    "contact": "touch touching touches touched contacting collision normal reaction",
     "object": "obj workpiece part item",
     "width": "w thickness",
     "initial": "init start x0",
@@ -111,32 +111,43 @@ class _Group:
 def matches(ours: Interface, wanted: Collection[str], theirs: Interface) -> dict[str, Match]:
     """For variables of ours, by name, those of another FMU that are meant; each at most once.
 
-    The most alike first; where two are as much alike as each other, none.
+    The most alike first, where two are as much alike as each other, none; of what is then left,
+    those that are the only ones of their type, size and unit.
     """
-    groups = [g for g in _apart(_groups(ours)) if g.names & {*wanted}]
-    pairs = [(g, o) for o in _groups(theirs) for g in groups if g.fits(o)]
-    found = sorted(((*_likeness(g, o, pairs), g, o) for g, o in pairs), key=lambda f: -f[0])
+    left = [g for g in _apart(_groups(ours)) if g.names & {*wanted}]
+    others, result = _groups(theirs), dict[str, Match]()
+    for what_is_left in (False, True):
+        pairs = [(g, o) for o in others for g in left if g.fits(o)]
+        likely = [(*_likeness(g, o, pairs, what_is_left), g, o) for g, o in pairs]
+        done, taken = _settle(sorted(likely, key=lambda f: -f[0]), result)
+        left = [g for g in left if g not in done]
+        others = [o for o in others if not o.names & taken]
+    return {name: match for name, match in result.items() if name in wanted}
+
+
+def _settle(
+    found: Sequence[tuple[float, str, _Group, _Group]], result: dict[str, Match]
+) -> tuple[set[_Group], set[str]]:
+    """Add the matches of the most alike; what of ours, and of the other FMU, is settled by that."""
     done: set[_Group] = set()
     taken: set[str] = set()
-    result: dict[str, Match] = {}
     for likeness, reason, group, other in found:
         if likeness < LEAST or group in done or other.names & taken:
             continue
-        equals = [
-            (g, o)
+        equals = any(
+            same == likeness
+            and g not in done
+            and not o.names & taken
+            and (g is group) != (o.names == other.names)
             for same, _, g, o in found
-            if same == likeness and g not in done and not o.names & taken
-            if (g is group) != (o.names == other.names)
-        ]
+        )
         done.add(group)
         taken |= other.names
-        if equals:
-            continue
-        doubt = reason if likeness < CERTAIN else "" if other.certain else "which is 1, which 2"
-        for number, variable in group.members.items():
-            if variable.name in wanted:
+        if not equals:
+            doubt = reason if likeness < CERTAIN else "" if other.certain else "which is 1, which 2"
+            for number, variable in group.members.items():
                 result[variable.name] = Match(other.members[number], doubt)
-    return result
+    return done, taken
 
 
 def candidates(
@@ -154,9 +165,12 @@ def candidates(
 
 
 def _likeness(
-    group: _Group, other: _Group, pairs: Sequence[tuple[_Group, _Group]]
+    group: _Group, other: _Group, pairs: Sequence[tuple[_Group, _Group]], what_is_left: bool
 ) -> tuple[float, str]:
-    """How much a group of another FMU is like one of ours, from 0 to about 1, and by what."""
+    """How much a group of another FMU is like one of ours, from 0 to about 1, and by what.
+
+    pairs are all that there are; of what is left, it counts to be the only one.
+    """
     if group.words == other.words or _plural(group.words) == _plural(other.words):
         return 1.1, ""
     if group.meaning == other.meaning:
@@ -164,8 +178,8 @@ def _likeness(
     unit = group.interface.unit(group.first), other.interface.unit(other.first)
     if other.joined == _symbol(group.first) and None not in unit:
         return 0.95, ""
-    alone = sum(g is group for g, _ in pairs) == 1 == sum(o is other for _, o in pairs)
-    alone = alone and (None not in unit or group.first.kind != "Real")
+    alone = what_is_left and (None not in unit or group.first.kind != "Real")
+    alone = alone and sum(g is group for g, _ in pairs) == 1 == sum(o is other for _, o in pairs)
     said = _meaning(_words(other.first.description or ""))
     by_name = 0.7 * len(group.meaning & other.meaning) / len(group.meaning | other.meaning)
     by_text = 0.3 + 0.1 * len(group.meaning) if group.meaning <= said else 0.0

@@ -24,6 +24,9 @@ step = {step}  # s, communication step
 stop = {stop}  # s, a whole number of steps
 scheme = "sequential"  # in the order of the components below; or "jacobi", all at once
 """
+MOST = 100
+"""Parameters and outputs that are listed."""
+
 STEPS = 1000
 """Steps of an experiment for which no FMU recommends one."""
 
@@ -39,15 +42,16 @@ def alone(fmus: Mapping[str, tuple[Path, str]]) -> tuple[str, list[str]]:
 
 def _component(name: str, interface: Interface, path: str) -> str:
     variables = [v for v in interface.variables if v.supported]
-    rows = [
-        *(Row(v.name, number(start(v)), told(v)) for v in variables if v.causality == "input"),
-        *(
-            Row("", "", f"{key(v.name)} = {number(start(v))}  # {told(v)}")
-            for v in variables
-            if v.causality in PARAMETERS
-        ),
-        *(Row("", "", f"{told(v)} -> {v.name}") for v in variables if v.causality == "output"),
+    rows = [Row(v.name, number(start(v)), told(v)) for v in variables if v.causality == "input"]
+    said = [
+        f"{key(v.name)} = {number(start(v))}  # {told(v)}"
+        for v in variables
+        if v.causality in PARAMETERS
     ]
+    said += [f"{v.name}, recorded: {told(v)}" for v in variables if v.causality == "output"]
+    rows += [Row("", "", text) for text in said[:MOST]]
+    if len(said) > MOST:
+        rows.append(Row("", "", f"and {len(said) - MOST} more: grasp-cosim inspect {path}"))
     tables = component_table(name, path), table(f"[components.{name}.values]", rows)
     return "".join(f"{text}\n\n" for text in tables if text)[:-1]
 

@@ -138,7 +138,6 @@ def _units(ours: Interface, theirs: Interface, names: Iterable[str]) -> Iterator
 def _values(draft: Draft, was: Component) -> Iterator[Row]:
     """The values of the component in the units of the FMU, and inputs that have no source."""
     found = draft.found
-    own = [m.variable.name for m in found.values()]
     for name, value in was.values.items():
         before = draft.ours.by_name[name]
         meant = f"{number(value)}{f' {before.unit}' if before.unit else ''}"
@@ -149,11 +148,10 @@ def _values(draft: Draft, was: Component) -> Iterator[Row]:
             new = converted({name: value}, draft.ours, draft.theirs)[name]
             yield Row(name, number(neat(new)), told(now))
         else:
-            there = [v.name for v in candidates(draft.ours, name, draft.theirs, own)]
-            could = f"one of {choices(there, FEW)}, " if there else ""
-            text = f"TODO {key(name)}, {meant} in the system: not found in the FMU; {could}"
-            yield Row("", "", f"{text}or its own affair")
+            there = [v.name for v in candidates(draft.ours, name, draft.theirs, found)]
+            meant = f"TODO {key(name)} = {meant} in the system: not found in the FMU, left out"
+            yield Row("", "", f"{meant}; it has {choices(there, FEW)}" if there else meant)
     for v in draft.theirs.of("input"):
         if v.supported and v.name not in found:
-            what = f"a value, or no line here and a connection; {told(v)}; starts with"
-            yield Row(v.name, todo(f"{what} {number(start(v))}"))
+            what = f"{number(start(v))} or another value, or a connection and no line here"
+            yield Row(v.name, todo(f"{what}; {told(v)}"))

@@ -68,7 +68,7 @@ def quoted(text: str) -> str:
 
 def todo(what: str, names: Collection[str] = ()) -> str:
     """The value that says what is to be put in its place, and names what that may be."""
-    return quoted(f"TODO: {what}{': ' if names else ''}{choices(names, FEW)}")
+    return quoted(f"TODO: {what}: {choices(names, FEW)}" if names else f"TODO: {what}")
 
 
 def number(value: Value) -> str:
@@ -91,11 +91,11 @@ def start(variable: Variable) -> Value:
     return value if isinstance(value, type(zero)) else zero
 
 
-def told(variable: Variable, what: str = "") -> str:
-    """What a comment says of a variable: what it is, its unit, its items, its description."""
+def told(variable: Variable) -> str:
+    """What a comment says of a variable: its causality, unit, items and description."""
     unit = "" if variable.unit in (None, "1") else str(variable.unit)
-    items = choices(f"{n} {name}" for name, n in variable.items.items())
-    parts = [what or variable.causality, unit, items]
+    items = [f"{number} {name}" for name, number in variable.items.items()]
+    parts = [variable.causality, unit, choices(items, FEW) if items else ""]
     said = on_one_line(" ".join((variable.description or "").split()))
     return f"{', '.join(p for p in parts if p)}{said and f': {said}'}"
 

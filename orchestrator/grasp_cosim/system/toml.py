@@ -74,7 +74,7 @@ def check_filled_in(path: Path) -> None:
     left = to_do(path.read_text("utf-8"))
     if left:
         (number, line), *more = left.items()
-        others = f", and so must line {', '.join(map(str, more))}" if more else ""
+        others = f", as is line {', '.join(str(n) for n, _ in more)}" if more else ""
         raise InputError(f"{path.name}: line {number}: {line}: must be filled in{others}")
 
 
