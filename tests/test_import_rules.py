@@ -181,7 +181,7 @@ FLOORS = (
     ("realtime",),
     ("metrics",),
     ("recording",),
-    ("ssp", "inspection"),
+    ("ssp", "inspection", "drafting"),
     ("master",),
     ("convergence", "sweep", "qualification", "hil"),
     ("report",),

@@ -1,5 +1,6 @@
 """The system file: a system in TOML. Its entries are in the README of the orchestrator."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,9 @@ KEYS = (
 )  # fmt: skip
 """The entries of a system file."""
 
+TODO = re.compile(r"""[^#]*["']TODO\b""")
+"""A line with a value that is left to do."""
+
 
 def read_toml(path: Path, fmus: Path | None = None, stimuli: Stimuli | None = None) -> System:
     """The system of a TOML file; fmus is where its FMUs are, by default beside the file.
@@ -28,6 +32,7 @@ def read_toml(path: Path, fmus: Path | None = None, stimuli: Stimuli | None = No
     """
     place, folder = path.name, fmus or path.parent
     table = toml_table(path, "system file")
+    check_filled_in(path)
     check_keys(place, table, KEYS)
 
     def part(name: str, default: Any = None) -> dict[str, Any]:
@@ -76,6 +81,21 @@ def _input(place: str, entry: Any, folder: Path) -> Stimuli | None:
     file = text(f"{place}: file", entry.get("file"), "the path of a CSV file, as a string")
     way = entry.get("interpolation", "linear")
     return read_stimuli(folder / file, way, f"{place}: interpolation")
+
+
+def check_filled_in(path: Path) -> None:
+    """InputError at the first value of a system file that is a TODO, as `init` writes it."""
+    left = to_do(path.read_text("utf-8"))
+    if left:
+        (number, line), *more = left.items()
+        others = f", as is line {', '.join(str(n) for n, _ in more)}" if more else ""
+        raise InputError(f"{path.name}: line {number}: {line}: must be filled in{others}")
+
+
+def to_do(text: str) -> dict[int, str]:
+    """The lines of a system file, by their numbers, with values that are a TODO."""
+    lines = enumerate(text.split("\n"), 1)
+    return {number: line.strip() for number, line in lines if TODO.match(line)}
 
 
 def _initialisation(place: str, table: dict[str, Any]) -> Initialisation:

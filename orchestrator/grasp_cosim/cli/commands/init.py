@@ -1,0 +1,192 @@
+"""The command init."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ...drafting.text import with_paths
+from ...errors import InputError, SimulationError
+from ...files import NATIVE_FOLDER, check_fmu_file, check_folder, write_text
+from ...system.description import System
+from ...system.toml import to_do
+from ..frame import PATH, json_option, pair, say, show
+
+if TYPE_CHECKING:
+    from ...drafting.component import Draft
+
+NAME = re.compile(r"[A-Za-z0-9_-]+")
+
+
+@click.command()
+@click.argument("file", type=PATH)
+@click.option(
+    "--as",
+    "candidates",
+    multiple=True,
+    metavar="COMPONENT=FMU",
+    help="A foreign FMU in the place of a component of the grasp: its names, units and values.",
+)
+@click.option(
+    "--fmu", "fmus", multiple=True, metavar="NAME=FMU", help="A system of these FMUs alone."
+)
+@click.option(
+    "--controller",
+    type=click.Choice(("published", "adaptive")),
+    default="published",
+    show_default=True,
+)
+@click.option("--native", is_flag=True, help="Our FMUs as C, which need no Python.")
+@click.option("--force", is_flag=True, help="Write over a file that is there already.")
+@json_option
+def init(
+    file: Path,
+    candidates: tuple[str, ...],
+    fmus: tuple[str, ...],
+    controller: str,
+    native: bool,
+    force: bool,
+    as_json: bool,
+) -> int:
+    """Write FILE, a system file to start from: the grasp, its FMUs in fmus/build beside FILE.
+
+    With --as, one of its components is filled in for an FMU of another vendor. What cannot be told
+    is a TODO there; a run names it.
+
+    \b
+    Example: grasp-cosim init my_system.toml --as plant=vendor.fmu
+    An FMU alone: grasp-cosim init my_system.toml --fmu ball=BouncingBall.fmu
+    """
+    _check_file(file, force)
+    foreign = _paired("--as", candidates)
+    own = _paired("--fmu", fmus)
+    if own and (foreign or native or controller != "published"):
+        raise InputError(
+            "--fmu: a system of these FMUs alone; must be without --as, --controller and --native"
+        )
+    drafts: dict[str, Draft] = {}
+    notes: list[str] = []
+    if own:
+        from ...drafting.alone import alone
+
+        text, notes = alone({name: (fmu, shown(fmu, file.parent)) for name, fmu in own.items()})
+    else:
+        text, drafts = _grasp(file.parent, foreign, controller, native)
+    write_text(file, text)
+    open_lines = to_do(text)
+    if not open_lines:
+        System.load(file)
+    report = {
+        "file": str(file),
+        "components": {name: _found(draft) for name, draft in drafts.items()},
+        "todo": [{"line": number, "text": line} for number, line in open_lines.items()],
+        "notes": notes,
+    }
+    show(as_json, report, "\n    ".join(_lines(file, drafts, open_lines)))
+    for note in notes if not as_json else ():
+        say(note)
+    return 0
+
+
+def shown(fmu: Path, folder: Path) -> str:
+    """The path of an FMU in a file of a folder: relative to that where it is below or beside it.
+
+    So the two can be moved together; one from elsewhere has an absolute path.
+    """
+    here = folder.resolve()
+    there = fmu.parent.resolve() / fmu.name
+    near = there.is_relative_to(here) or (
+        there.is_relative_to(here.parent) and here.parent != Path(here.anchor)
+    )
+    return Path(os.path.relpath(there, here) if near else there).as_posix()
+
+
+def _check_file(file: Path, force: bool) -> None:
+    if file.suffix.lower() != ".toml":
+        raise InputError(f"{file}: must end in .toml, a system file")
+    if file.is_dir():
+        raise InputError(f"{file}: is a folder; must be a file")
+    if file.exists() and not force:
+        raise InputError(f"{file}: is there already; must be another name, or with --force")
+    check_folder(file.parent)
+
+
+def _paired(option: str, texts: tuple[str, ...]) -> dict[str, Path]:
+    """The FMUs of an option by component."""
+    fmus: dict[str, Path] = {}
+    for text in texts:
+        name, path = pair(option, text, "COMPONENT=FMU")
+        if not NAME.fullmatch(name) or name in fmus:
+            raise InputError(f"{option} {text!r}: must be a name of its own, letters, digits, _, -")
+        fmus[name] = Path(path)
+        check_fmu_file(fmus[name])
+    return fmus
+
+
+def _grasp(
+    folder: Path, foreign: Mapping[str, Path], controller: str, native: bool
+) -> tuple[str, dict[str, Draft]]:
+    """The text of the built-in grasp, with foreign FMUs in the place of components."""
+    from ...drafting.component import replacing
+    from ...grasp.controllers import CONTROLLERS
+    from ...grasp.presets import SYSTEM, built_in_presets
+    from ...grasp.system import built
+
+    if "controller" in foreign and controller != "published":
+        raise InputError(f"--controller {controller}: must not come with --as controller")
+    fmus = _natives(folder) if native else built(folder)
+    built_in = System.load(SYSTEM, fmus)
+    names = {c.fmu.name: c.fmu.name for c in built_in.components}
+    names[CONTROLLERS["published"]] = CONTROLLERS[controller]
+    below = fmus.relative_to(folder)
+    paths = {old: (below / new).as_posix() for old, new in names.items()}
+    text = with_paths(SYSTEM.read_text("utf-8"), paths)
+    drafts = {}
+    for name, fmu in foreign.items():
+        built_in.component(name, f"--as {name}")
+        keys = [key.partition(".") for preset in built_in_presets().values() for key in preset]
+        preset = [variable for component, _, variable in keys if component == name]
+        drafts[name] = replacing(built_in, name, fmu, shown(fmu, folder), preset)
+        text = drafts[name].put_into(text)
+    return text, drafts
+
+
+def _natives(folder: Path) -> Path:
+    """Where native FMUs are below a folder, built first."""
+    from grasp_fmus.native.build import build_native
+    from grasp_fmus.native.compilers import CompilerError
+
+    try:
+        build_native(folder / NATIVE_FOLDER)
+    except ValueError as error:
+        raise InputError(f"--native: {error}") from error
+    except CompilerError as error:
+        raise SimulationError(str(error)) from error
+    return folder / NATIVE_FOLDER
+
+
+def _found(draft: Draft) -> dict[str, Any]:
+    """What is known of a component that was filled in, for JSON."""
+    return {
+        "found": {name: match.variable.name for name, match in draft.found.items()},
+        "to_check": {name: match.doubt for name, match in draft.found.items() if match.doubt},
+        "units": {name: draft.theirs.by_name[name].unit for name in draft.found},
+    }
+
+
+def _lines(file: Path, drafts: Mapping[str, Draft], left: Mapping[int, str]) -> list[str]:
+    lines = [f"{file}: written"]
+    for name, draft in drafts.items():
+        doubtful = sum(bool(match.doubt) for match in draft.found.values())
+        lines.append(
+            f"{name}: {len(draft.found)} of the FMU's variables found"
+            + (f", {doubtful} of them to check: CHECK" if doubtful else "")
+        )
+    lines += [f"line {number}: {line}" for number, line in left.items()]
+    then = "when no TODO is left" if left else "then"
+    return [*lines, f"{then}: grasp-cosim run {file}"]
