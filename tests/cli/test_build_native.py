@@ -105,7 +105,7 @@ def test_what_cannot_be_translated_is_named_with_its_line(command: Run, tmp_path
 def test_no_compiler_is_one_line_with_its_fix(
     command: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(compilers, "_zig", lambda: None)
+    monkeypatch.setattr(compilers, "zig_compiler", lambda: None)
     code, _, err = command("build", "--native", "--target", "win64")
     assert (code, err.count("\n")) == (2, 1)
     fix = f"must be zig; {sys.executable} -m pip install ziglang\n"

@@ -46,7 +46,7 @@ def no_compiler(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Non
     """A machine without a compiler, on which nothing was built yet."""
     monkeypatch.setenv("PATH", str(tmp_path / "nothing"))
     monkeypatch.delenv("CC", raising=False)
-    monkeypatch.setattr(compilers, "_zig", lambda: None)
+    monkeypatch.setattr(compilers, "zig_compiler", lambda: None)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     twins.shipped_twins.cache_clear()
     yield

@@ -27,7 +27,7 @@ _ACT = """
   const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
   const work = () => { let x = 0; for (let i = 0; i < 1e7; i++) x += i; return x; };
   const frame = async () => {
-    await Promise.all([...recording.loaded.values()]);
+    await Promise.all([...(recording.loaded?.values() ?? [])]);
     await new Promise(requestAnimationFrame);
     await sleep(50);
   };

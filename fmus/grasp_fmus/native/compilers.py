@@ -228,7 +228,7 @@ def compiler_for(target: Target, asked: bool) -> Compiler:
         own = _own_compiler()
         if own:
             return own
-    zig = _zig()
+    zig = zig_compiler()
     if zig and target.zig:
         return zig._replace(command=(*zig.command, "-target", target.zig, "-s"))
     install = f"{sys.executable} -m pip install ziglang"
@@ -250,7 +250,8 @@ def _own_compiler() -> Compiler | None:
     return _identified([found]) if found else None
 
 
-def _zig() -> Compiler | None:
+def zig_compiler() -> Compiler | None:
+    """Return zig of the package ziglang, with its own folder for what it makes; None without."""
     spec = importlib.util.find_spec("ziglang")
     places = spec.submodule_search_locations if spec else None
     program = shutil.which("zig", path=places[0]) if places else None

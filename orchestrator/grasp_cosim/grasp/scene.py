@@ -43,8 +43,8 @@ def grasp_scene(result: Result) -> Scene | None:
     return Scene(
         title="Grasp",
         html=_html(named, contacts),
-        style=_text("grasp.css"),
-        scripts=_text("grasp.js"),
+        style=scene_style(),
+        scripts=scene_script(),
         state={
             **named,
             "target": target,
@@ -57,6 +57,16 @@ def grasp_scene(result: Result) -> Scene | None:
         marks=[(c["t"], f"--finger{c['finger']}") for c in contacts],
         zooms=_zooms(contacts),
     )
+
+
+def scene_style() -> str:
+    """Return the style of a scene."""
+    return _text("grasp.css")
+
+
+def scene_script() -> str:
+    """Return the script that draws a scene and plays it."""
+    return _text("grasp.js")
 
 
 def _text(name: str) -> str:

@@ -92,10 +92,10 @@ def page_html(result: Result, title: str, *, scene: Scene | None = None, limit: 
         "settings": ("Settings", settings_html(result)),
     }
     there = {name: section for name, section in sections.items() if section}
-    scripts = [_text("data.js"), _text("traces.js"), _text("main.js"), _text("hands.js")]
+    scene_script = scene.scripts if scene else ""
     return Template(_text("page.html")).substitute(
         title=escape(title),
-        style=_text("page.css") + (scene.style if scene else ""),
+        style=page_style() + (scene.style if scene else ""),
         summary=summary(result.metrics),
         contents="".join(f'<a href="#{name}">{head}</a>' for name, (head, _) in there.items()),
         sections="\n".join(
@@ -105,8 +105,18 @@ def page_html(result: Result, title: str, *, scene: Scene | None = None, limit: 
         version=escape(version("grasp-cosim")),
         page=_json(_state(result, shown, scene)),
         data=_data(shown),
-        script="\n".join([*scripts[:-1], scene.scripts if scene else "", scripts[-1]]),
+        script="\n".join([traces_script(), _text("main.js"), scene_script, _text("start.js")]),
     )
+
+
+def traces_script() -> str:
+    """Return the scripts that draw traces and take what a hand does to them."""
+    return "\n".join(_text(f"{name}.js") for name in ("data", "traces", "view", "hands"))
+
+
+def page_style() -> str:
+    """Return the style of a page."""
+    return _text("page.css")
 
 
 def _state(result: Result, shown: Shown, scene: Scene | None) -> dict[str, Any]:

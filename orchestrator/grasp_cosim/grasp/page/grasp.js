@@ -3,6 +3,7 @@
 
 const THICK = 24, TALL = 96, MIDDLE = 92, FLOOR = 168; // px of the side view
 const LENS = 2e-3; // m across a magnified contact
+const LENSES = 300; // px of height from which there is room for the magnified contacts
 const FLASH = 0.25; // s of real time that a new contact glows
 const SLOW = 0.02, AROUND = [0.015, 0.06]; // simulated s per s, and s before and after a contact
 const SIDE = { 1: 1, 2: -1 }; // where the finger is, seen from the object
@@ -58,7 +59,7 @@ class Grasp {
           this.at(plan.actuator[j], t), j, "outer");
       }
       this.arrow(pen, x(face[j]), MIDDLE + 22, this.at(plan.contact_force[j], t), j, "inner");
-      this.lens(pen, width, height, j, t, face[j] - surface[j], glow);
+      if (height >= LENSES) this.lens(pen, width, height, j, face[j] - surface[j], glow);
       this.canvas.dataset[`finger${j}`] = face[j];
       this.canvas.dataset[`surface${j}`] = surface[j];
     }
@@ -153,7 +154,7 @@ class Grasp {
     pen.lineWidth = 1;
   }
 
-  lens(pen, width, height, j, t, apart, glow) {
+  lens(pen, width, height, j, apart, glow) {
     const wide = Math.min(220, width / 2 - 24), tall = 92, top = height - tall - 22;
     const left = j === 2 ? width / 2 - wide - 12 : width / 2 + 12, scale = wide / LENS;
     const middle = left + wide / 2;
@@ -221,12 +222,7 @@ function advance(now) {
   else requestAnimationFrame(advance);
 }
 
-async function startScene(plan) {
-  const names = plan.signals;
-  const series = await Promise.all(names.map((name) => recording.series(name)));
-  const grasp = new Grasp(recording, plan, new Map(series.map((one) => [one.name, one])));
-  find("scrub").min = recording.first;
-  find("scrub").max = recording.last;
+function connectScene() {
   find("scrub").addEventListener("input", () => {
     play(false);
     seek(Number(find("scrub").value));
@@ -239,6 +235,13 @@ async function startScene(plan) {
       seek(Number(button.dataset.at));
     });
   }
+}
+
+// What draws a grasp at the time of the cursor, and plays it.
+function sceneOf(plan, series) {
+  const grasp = new Grasp(recording, plan, new Map(series.map((one) => [one.name, one])));
+  find("scrub").min = recording.first;
+  find("scrub").max = recording.last;
   const draw = () => {
     grasp.draw(cursor, chosenSpeed() || SLOW);
     find("scrub").value = cursor;
@@ -246,4 +249,10 @@ async function startScene(plan) {
     find("pace").textContent = chosenSpeed() ? "" : `${speed()} × real time`;
   };
   return { draw, toggle: () => play(!playing) };
+}
+
+async function startScene(plan) {
+  connectScene();
+  const series = await Promise.all(plan.signals.map((name) => recording.series(name)));
+  return sceneOf(plan, series);
 }

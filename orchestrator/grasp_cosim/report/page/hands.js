@@ -1,4 +1,4 @@
-// What a hand does to the page: wheel, drag, double click, keys, buttons. And the start.
+// What a hand does to the traces: wheel, drag, double click.
 "use strict";
 
 const inside = (event) => event.target.closest("#plots canvas");
@@ -66,24 +66,7 @@ function slide(event) { // over the strip: the part in view follows the pointer
   zoom(t - half, t + half);
 }
 
-function key(event) {
-  if (event.target.closest("input, select, textarea, button, summary")) return;
-  if (event.ctrlKey || event.metaKey || event.altKey) return;
-  const span = view.to - view.from, middle = (view.from + view.to) / 2;
-  const does = {
-    ArrowLeft: () => zoom(view.from - 0.2 * span, view.to - 0.2 * span),
-    ArrowRight: () => zoom(view.from + 0.2 * span, view.to + 0.2 * span),
-    "+": () => zoom(middle - 0.25 * span, middle + 0.25 * span),
-    "-": () => zoom(middle - span, middle + span),
-    0: () => zoom(recording.first, recording.last),
-    " ": () => scene && scene.toggle(),
-  }[event.key];
-  if (!does) return;
-  event.preventDefault();
-  does();
-}
-
-function connect() {
+function gestures() {
   const plots = find("plots");
   plots.addEventListener("wheel", wheel, { passive: false });
   plots.addEventListener("pointerdown", drag);
@@ -98,38 +81,4 @@ function connect() {
     redraw();
   });
   for (const name of ["pointerdown", "pointermove"]) find("overview").addEventListener(name, slide);
-  document.addEventListener("keydown", key);
-  find("by").addEventListener("change", show);
-  find("signals").addEventListener("change", (event) => {
-    const boxes = [...find("signals").querySelectorAll("input[data-signal]")];
-    if (event.target.dataset.component) {
-      for (const box of boxes) {
-        if (box.dataset.of === event.target.dataset.component) box.checked = event.target.checked;
-      }
-    }
-    const ticked = boxes.filter((box) => box.checked).map((box) => box.dataset.signal);
-    const kept = chosen.filter((name) => ticked.includes(name));
-    choose([...kept, ...ticked.filter((name) => !kept.includes(name))]); // new ones come last
-  });
-  for (const button of document.querySelectorAll("button[data-from]")) {
-    button.addEventListener("click", () => zoom(Number(button.dataset.from), Number(button.dataset.to)));
-  }
-  find("all").addEventListener("click", () => zoom(recording.first, recording.last));
-  window.addEventListener("hashchange", recall);
-  window.addEventListener("resize", redraw);
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
 }
-
-async function begin() {
-  await recording.start();
-  cursor = recording.first;
-  view = whole();
-  if (page.scene) scene = await startScene(page.scene);
-  connect();
-  find("signals").open = innerWidth > 760;
-  await recall();
-  draw();
-  state.ready = "yes";
-}
-
-begin();

@@ -51,7 +51,7 @@ function fitted(canvas) { // the context of a canvas, cleared, in CSS pixels
 class Panel {
   constructor(recording, title, series, parent) {
     this.recording = recording;
-    this.series = series; // each with values, levels, and style: {color, dash}
+    this.series = series; // each with values, levels, style: {color, dash}, and scale if it is fixed
     this.root = document.createElement("section");
     this.root.className = "panel";
     this.root.innerHTML = "<header><h3></h3><ul></ul></header><canvas></canvas>";
@@ -93,7 +93,8 @@ class Panel {
       for (const v of highs) if (v > high) high = v;
     }
     if (!(low <= high)) [low, high] = [0, 1];
-    const { factor, unit } = scaled(this.series[0].unit, Math.max(Math.abs(low), Math.abs(high)));
+    const { factor, unit } = this.series[0].scale
+      || scaled(this.series[0].unit, Math.max(Math.abs(low), Math.abs(high)));
     const least = 1e-12 * Math.max(Math.abs(low), Math.abs(high)) || 1e-12;
     const margin = high - low > least ? 0.07 * (high - low) : 0.5 * Math.abs(high) || 1;
     const x = (t) => plot.left + (t - view.from) / (view.to - view.from) * (plot.right - plot.left);

@@ -1,0 +1,64 @@
+"""Puts the page together: what it shows, its scripts, and the components in WebAssembly."""
+
+from __future__ import annotations
+
+import base64
+import json
+import zlib
+from html import escape
+from importlib.metadata import version
+from importlib.resources import files
+from pathlib import Path
+from string import Template
+from typing import Any
+
+from ...files import write_text
+from ...report.page import page_style, traces_script
+from ..metrics import FINGERS, METRICS
+from ..scene import scene_script, scene_style
+from .system import page_system, shipped
+
+
+def write_playground(path: Path) -> None:
+    """Write the page, one file that needs no network."""
+    write_text(path, playground_html())
+
+
+def playground_html() -> str:
+    """Return the page as text: the same for the same package, to the byte."""
+    wasm = shipped()
+    state = {
+        "system": page_system(),
+        "metrics": [
+            {
+                "name": m.name, "title": m.title, "unit": m.display_unit, "factor": m.factor,
+                "text": m.description, "reason": m.reason,
+            }
+            for m in METRICS
+        ],
+        "scene": _scene(),
+        "marks": [],
+    }  # fmt: skip
+    scripts = [traces_script(), scene_script(), *(map(_text, ("model.js", "metrics.js", "play.js")))]
+    return Template(_text("play.html")).substitute(
+        style=page_style() + scene_style() + _text("play.css"),
+        version=escape(version("grasp-cosim")),
+        size=len(zlib.decompress(wasm)) // 1000,
+        page=json.dumps(state, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c"),
+        wasm=base64.b64encode(wasm).decode("ascii"),
+        script="\n".join(scripts),
+    )
+
+
+def _scene() -> dict[str, Any]:
+    """The signals that the hand is drawn from, as grasp.js has them; contacts come with a run."""
+    drawn = {q: {j: f"plant.{q}[{j}]" for j in FINGERS} for q in ("position", "gap")}
+    drawn["contact_force"] = {j: f"plant.contact_force[{j}]" for j in FINGERS}
+    drawn["actuator"] = {j: f"controller.force[{j}]" for j in FINGERS}
+    target = "controller.target_position"
+    signals = [*(name for of in drawn.values() for name in of.values()), target]
+    return {**drawn, "target": target, "signals": signals, "toSi": {}, "contacts": []}
+
+
+def _text(name: str) -> str:
+    return (files(__package__) / "page" / name).read_text("utf-8")

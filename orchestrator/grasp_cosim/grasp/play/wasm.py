@@ -1,0 +1,118 @@
+"""Makes play.wasm.z, which the page carries: the C of our native FMUs, and the loop over them.
+
+    python -m grasp_cosim.grasp.play.wasm
+
+writes it anew, with the zig that ZIG names, which makes the same bytes on every machine. It comes
+with the package, so that a page needs no compiler. It names the sources that it was made from, so
+that it can be told without zig if they are those at hand.
+"""
+
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import zlib
+from collections.abc import Mapping
+from hashlib import sha256
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from grasp_fmus.folder import write_file
+from grasp_fmus.native.compilers import BITS, LIBM, zig_compiler
+from grasp_fmus.native.sources import native_sources
+from grasp_fmus.native.translation import translated
+
+from ...errors import InputError
+from .system import MODELS, WASM, model, shipped
+
+ZIG = "0.17.1"
+GUID = "playground"
+CONTENT = "0" * 16
+"""Of an FMU in Python with which states are exchanged: none are."""
+
+MARK = b"sources sha256 "
+"""Before the hash of the sources, in the wasm."""
+
+EXPORTS = (
+    "play_begin", "play_columns", "play_component", "play_connect", "play_record", "play_run",
+    "play_set", "play_sources", "play_text",
+)  # fmt: skip
+
+OPTIONS = (
+    *BITS, "-Os", *(f"-fno-builtin-{function}" for function in LIBM), "-target", "wasm32-wasi",
+    "-mexec-model=reactor", "-Wl,--strip-all", *(f"-Wl,--export={name}" for name in EXPORTS),
+    "-o", "play.wasm", "play.c", *(f"{name}/{name}.c" for name in MODELS), f"-I{MODELS[0]}",
+)  # fmt: skip
+"""Of the compiler. The last folder has the headers of FMI, which are the same in all."""
+
+_UNSEEN = re.compile(rb"/\*.*?\*/|\s+", re.DOTALL)
+"""What no C compiler minds."""
+
+
+def sources() -> dict[str, bytes]:
+    """Return all files of C by name, those of each FMU in a folder of its name."""
+    found = {"play.c": WASM.with_name("play.c").read_bytes()}
+    for name in MODELS:
+        translation = translated(name, model(name).block)
+        of_fmu = native_sources(name, translation, CONTENT, GUID, 2)
+        found |= {f"{name}/{file}": data for file, data in of_fmu.items()}
+    kinds = " ".join(f"EACH({name})" for name in MODELS)
+    found["kinds.h"] = f'#define GUID "{GUID}"\n#define KINDS(EACH) {kinds}\n'.encode()
+    found["kinds.h"] += f'#define SOURCES "{_hash(found)}"\n'.encode()
+    return found
+
+
+def _hash(found: Mapping[str, bytes]) -> str:
+    """Return a hash of all that decides the wasm, so not of comments."""
+    digest = sha256(repr((ZIG, OPTIONS)).encode())
+    for name, data in sorted(found.items()):
+        digest.update(f"\0{name}\0".encode() + _UNSEEN.sub(b" ", data))
+    return digest.hexdigest()[:32]
+
+
+def made_from(wasm: bytes) -> str:
+    """Return the hash of the sources that a wasm was made from; empty where it does not say."""
+    return wasm.partition(MARK)[2][:32].decode("ascii", "replace")
+
+
+def hash_at_hand() -> str:
+    """Return the hash of the sources as they are now."""
+    return sources()["kinds.h"].rpartition(b"SOURCES")[2].strip().strip(b'"').decode()
+
+
+def made() -> bytes:
+    """Return the wasm, made now; InputError where zig is missing, another version, or fails."""
+    try:
+        found = version("ziglang")
+    except PackageNotFoundError:
+        found = "missing"
+    zig = zig_compiler()
+    if zig is None or found != ZIG:
+        raise InputError(
+            f"ziglang: {found}; must be {ZIG}, which makes the same bytes everywhere: "
+            f"{sys.executable} -m pip install ziglang=={ZIG}"
+        )
+    with tempfile.TemporaryDirectory() as folder:
+        for name, data in sources().items():
+            file = Path(folder, name)
+            file.parent.mkdir(exist_ok=True)
+            file.write_bytes(data)
+        done = subprocess.run(  # noqa: S603 - zig of its package
+            [*zig.command, *OPTIONS], cwd=folder, env={**os.environ, **zig.environment},
+            stdin=subprocess.DEVNULL, capture_output=True, check=False,
+        )  # fmt: skip
+        if done.returncode:
+            said = done.stderr.decode("utf-8", "replace").strip().splitlines() or ["no message"]
+            raise InputError(f"zig: exit code {done.returncode}: {said[0]}")
+        return Path(folder, "play.wasm").read_bytes()
+
+
+def main() -> None:
+    """Write play.wasm.z anew where it is not of the sources at hand."""
+    if not WASM.is_file() or made_from(zlib.decompress(shipped())) != hash_at_hand():
+        write_file(WASM, zlib.compress(made(), 9))
+
+
+if __name__ == "__main__":
+    main()
