@@ -58,8 +58,8 @@ def values_of(
         flat = flattened(found, array.shape)
     except ValueError as error:
         raise InputError(
-            f"{place}: {name} = {given!r}: {error}; must be {shape_text(array.shape)}, all "
-            f"{len(array.names)} row by row, or one value for all"
+            f"{place}: {name} = {given!r}: {error}; must be {shape_text(array.shape)}, or "
+            "a list of all elements row by row, or one value for all"
         ) from error
     return {
         element: interface.parse(place, element, value, text)

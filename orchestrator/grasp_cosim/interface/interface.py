@@ -405,7 +405,10 @@ def _convert(variable: Variable, value: Value, version: str) -> Value | None:
 
 
 def _number(value: Value, whole: bool) -> float | int | None:
-    """A finite number; a whole one is exact where a float is not, 3.0 and "3.0" are whole, too."""
+    """A finite number; a whole one is exact where a float is not, 3.0 and "3.0" are whole, too.
+
+    None for a whole one written as a float that cannot tell it from the next.
+    """
     if isinstance(value, bool):
         return None
     if whole and not isinstance(value, float):
@@ -413,8 +416,10 @@ def _number(value: Value, whole: bool) -> float | int | None:
             return int(value)
     with suppress(ValueError, OverflowError):
         number = float(value)
-        if math.isfinite(number) and (number.is_integer() or not whole):
-            return int(number) if whole else number
+        if math.isfinite(number) and not whole:
+            return number
+        if number.is_integer() and abs(number) < 2.0**53:
+            return int(number)
     return None
 
 

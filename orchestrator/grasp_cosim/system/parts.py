@@ -124,15 +124,19 @@ class Connection:
 class Condition:
     """An output compared with a constant, like plant.gap[1] < 0.01 or plant.contact[1] == true.
 
-    value is in the output's unit. It holds or not at a communication point, by the outputs there.
+    value is in the output's unit; of an Enumeration it may be the name of an item. It holds or not
+    at a communication point, by the outputs there.
     """
 
     port: Port
     relation: Relation
-    value: float | bool
+    value: float | bool | str
 
     def __str__(self) -> str:
-        return f"{self.port} {self.relation} {literal(self.value)}"
+        value = literal(self.value)
+        if isinstance(self.value, str):
+            value = f'"{self.value}"' if "'" in self.value else f"'{self.value}'"
+        return f"{self.port} {self.relation} {value}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,7 +164,7 @@ class Fault:
 
     target: Port
     kind: str
-    parameters: Mapping[str, float | bool]
+    parameters: Mapping[str, float | bool | str]
     start_ns: int = 0
     end_ns: int | None = None
     seed: int = 0
