@@ -86,9 +86,11 @@ class Component:
 
     def sized(self, interface: Interface) -> Interface:
         """The interface of an FMU, with its arrays taken apart, of the sizes that values give."""
-        if not any(v.shape for v in interface.variables):
+        if interface.sized_by is None:
             return interface
-        return expanded(interface, {self.rename.get(n, n): v for n, v in self.values.items()})
+        names = {own: name for name, own in self.rename.items()}
+        lengths = {own: self.values.get(names.get(own, own)) for own in interface.sized_by}
+        return expanded(interface, lengths)
 
 
 @dataclass(frozen=True, slots=True)
