@@ -99,13 +99,20 @@ def check_keys(place: str, table: Mapping[str, Any], valid: Iterable[str]) -> No
 
 
 def check_values(place: str, values: Mapping[str, Any]) -> None:
-    """InputError at the first value that is no number, boolean or string."""
+    """InputError at the first value that is no number, boolean or string, or list of such."""
     for name, value in values.items():
-        if not isinstance(value, float | int | bool | str):
+        if not is_value(value):
             raise InputError(
                 f"{place}: {name} = {value!r}: must be a number, boolean or string; a name with a "
                 'dot stands in quotes, like "sensor_1.reflectance" = 0.6'
             )
+
+
+def is_value(value: Any) -> bool:
+    """Return True for a number, a boolean, a string, or a list of such or of lists."""
+    if isinstance(value, list):
+        return all(map(is_value, value))
+    return isinstance(value, float | int | bool | str)
 
 
 def extra_module(name: str, purpose: str, extra: str) -> Any:

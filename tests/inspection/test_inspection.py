@@ -214,7 +214,7 @@ def test_the_keys_of_the_report(valve: Report) -> None:
         "variables",
     ]  # fmt: skip
     assert set(valve["variables"][0]) == {
-        "name", "causality", "variability", "initial", "type", "dimensions", "unit",
+        "name", "causality", "variability", "initial", "type", "dimensions", "sizes", "unit",
         "display_unit", "start", "min", "max", "nominal", "items", "dependencies", "description",
     }  # fmt: skip
 
@@ -260,7 +260,7 @@ def test_every_column(valve: Report) -> None:
     }  # fmt: skip
     assert rows["mode"] == {
         "name": "mode", "causality": "parameter", "variability": "tunable",
-        "type": "Enumeration", "unit": "", "start": "2", "range": "open, shut",
+        "type": "Enumeration", "unit": "", "start": "shut", "range": "open, shut",
         "dependencies": "", "description": "",
     }  # fmt: skip
     assert [rows[name]["range"] for name in ("p_out", "flow", "state", "stages")] == [
@@ -355,7 +355,7 @@ def test_fmi_3(archive: Archive) -> None:
         "raw": "ff00", "tick": None, "cloud": points,
     }  # fmt: skip
     rows = table(as_text(report))
-    assert rows["points"]["type"] == "Float64[3, 2]"
+    assert rows["points"]["type"] == "Float64[n=3, 2]"
     assert rows["points"]["start"] == "1, 2, 3, 4, 5, 6"
     assert rows["n"]["range"] == "1 to 9"
     assert rows["points"]["dependencies"] == rows["cloud"]["dependencies"] == "gain, n"

@@ -67,8 +67,8 @@ def test_roles_are_those_of_the_file_and_in_the_settings(load_with: Load) -> Non
         ("[[presets]]\n", "eye.toml: [presets]: [{}]; must be a table"),
         ("[presets]\ndim = 3\n", "eye.toml: [presets.dim]: 3; must be a table"),
         (
-            '[presets.dim]\n"eye.gain" = [1]\n',
-            "eye.toml: [presets.dim]: eye.gain = [1]: must be a number, boolean or string",
+            '[presets.dim]\n"eye.gain" = [{}]\n',
+            "eye.toml: [presets.dim]: eye.gain = [{}]: must be a number, boolean or string",
         ),
         (
             "[presets.dim]\neye.gain = 1\n",

@@ -22,7 +22,8 @@ WIDEST = 32
 def inspect_fmu(path: Path) -> dict[str, Any]:
     """Return the declarations of the FMU at path, ready for JSON; InputError where there is no FMU.
 
-    `dependencies` is null where an output declares none, which means all inputs in FMI.
+    `dependencies` is null where an output declares none, which means all inputs in FMI. `sizes`
+    name by dimension the variable that holds the length, null where that is fixed.
     """
     found = describe(path)
     return {
@@ -89,6 +90,7 @@ def _variable(v: Variable) -> dict[str, Any]:
         "initial": v.initial,
         "type": v.type,
         "dimensions": list(v.shape),
+        "sizes": list(v.sizes),
         "unit": v.unit,
         "display_unit": v.display_unit,
         "start": v.start_value,
@@ -105,13 +107,25 @@ def _row(v: Mapping[str, Any]) -> list[str]:
     low, high = _shown(v["min"]), _shown(v["max"])
     range_ = f"{low} to {high}" if low and high else f"from {low}" if low else f"up to {high}"
     declared = "not declared" if v["dependencies"] is None else choices(v["dependencies"])
+    names = {number: name for name, number in (v["items"] or {}).items()}
+    start = v["start"] if isinstance(v["start"], list) else names.get(v["start"], v["start"])
     cells = {
         **v,
-        "type": v["type"] + (f"{v['dimensions']}" if v["dimensions"] else ""),
+        "type": v["type"] + _shape(v),
+        "start": [names.get(x, x) for x in start] if isinstance(start, list) else start,
         "range": ", ".join(v["items"]) if v["items"] else range_ if low or high else "",
         "dependencies": declared if v["causality"] == "output" else "",
     }
     return [_shown(cells[column]) for column in COLUMNS]
+
+
+def _shape(v: Mapping[str, Any]) -> str:
+    """The shape of an array, like [3, 3] or, where variables hold the lengths, [n=3, m=2]."""
+    lengths = [
+        f"{name}={length}" if name else str(length)
+        for name, length in zip(v["sizes"], v["dimensions"], strict=True)
+    ]
+    return f"[{', '.join(lengths)}]" if lengths else ""
 
 
 def _shown(value: Any) -> str:

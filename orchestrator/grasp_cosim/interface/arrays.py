@@ -42,8 +42,8 @@ def element_names(name: str, shape: Sequence[int]) -> tuple[str, ...]:
 
 
 def shape_text(shape: Sequence[int]) -> str:
-    """A shape in words, like '3' or '2 x 3'."""
-    return " x ".join(map(str, shape)) or "one value"
+    """A shape as messages have it, like '[2, 3]'."""
+    return f"[{', '.join(map(str, shape))}]"
 
 
 def from_text(text: str) -> Any:

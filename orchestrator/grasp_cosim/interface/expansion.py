@@ -23,21 +23,18 @@ TAKEN_APART = (*SETTABLE, "output")
 Names = tuple[str, ...] | None
 
 
-def expanded(interface: Interface, values: Mapping[str, Value]) -> Interface:
-    """The interface with elements in the place of arrays of numbers, sized by the given values.
+def expanded(interface: Interface, lengths: Mapping[str, Value | None]) -> Interface:
+    """An interface of arrays with elements in the place of arrays of numbers.
 
-    values are by the FMU's own names; of a variable that holds a size and is not among them, its
-    start counts. An array is left as it is where it would be too many elements, or where the FMU
-    has a variable by the name of one.
+    lengths are values of the variables of sized_by; where one is None, its start counts. An array
+    is left as it is where it would be too many elements, or where the FMU has a variable by the
+    name of one.
     """
-    sizes = dict.fromkeys(name for v in interface.variables for name in v.sizes if name)
-    if not any(v.shape for v in interface.variables):
-        return interface
-    given = tuple(_length(values.get(name)) for name in sizes)
-    if given not in interface.expansions:
-        lengths = {n: g for n, g in zip(sizes, given, strict=True) if g is not None}
-        interface.expansions[given] = _expanded(interface, lengths)
-    return interface.expansions[given]
+    given = {n: v for n, v in lengths.items() if isinstance(v, int) and v >= 0}
+    key = ("sizes", *given.items())
+    if key not in interface.made:
+        interface.made[key] = _expanded(interface, given)
+    return interface.made[key]
 
 
 def values_of(
@@ -58,17 +55,13 @@ def values_of(
         flat = flattened(found, array.shape)
     except ValueError as error:
         raise InputError(
-            f"{place}: {name} = {given!r}: {error}; must be {shape_text(array.shape)}, all "
-            f"{len(array.names)} row by row, or one value for all"
+            f"{place}: {name} = {given!r}: {error}; must be {shape_text(array.shape)}, or "
+            "a list of all elements row by row, or one value for all"
         ) from error
     return {
         element: interface.parse(place, element, value, text)
         for element, value in zip(array.names, flat, strict=True)
     }
-
-
-def _length(value: Value | None) -> int | None:
-    return value if isinstance(value, int) and value >= 0 else None
 
 
 def _expanded(interface: Interface, lengths: Mapping[str, int]) -> Interface:

@@ -6,7 +6,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 from ..checks import known
 from ..errors import InputError, choices
@@ -210,9 +210,16 @@ class Interface:
     arrays: Mapping[str, Array] = field(default_factory=dict)
 
     @cached_property
-    def expansions(self) -> dict[tuple[int | None, ...], "Interface"]:
-        """What expansion.py has made of this one, by the sizes that arrays may have."""
+    def made(self) -> dict[tuple[Any, ...], "Interface"]:
+        """What was made of this one by elements, names or units, which is asked for again."""
         return {}
+
+    @cached_property
+    def sized_by(self) -> tuple[str, ...] | None:
+        """The variables that hold lengths of arrays; None where there are no arrays."""
+        if not any(v.shape for v in self.variables):
+            return None
+        return tuple(dict.fromkeys(name for v in self.variables for name in v.sizes if name))
 
     @cached_property
     def by_name(self) -> dict[str, Variable]:
@@ -266,8 +273,12 @@ class Interface:
         place says where the table comes from. InputError where an own name does not exist or is
         renamed twice, or a new one is taken. An array is renamed whole, or by elements.
         """
-        if not rename:
-            return self
+        key = ("rename", *rename.items())
+        if rename and key not in self.made:
+            self.made[key] = self._renamed(rename, place)
+        return self.made[key] if rename else self
+
+    def _renamed(self, rename: Mapping[str, str], place: str) -> "Interface":
         whole = {own: new for new, own in rename.items() if own in self.arrays}
         rename = dict(_by_element(rename, self.arrays))
         names: dict[str, str] = {}
@@ -312,8 +323,12 @@ class Interface:
         That is one of the FMU's own definitions, or else a known one. place says where the table
         comes from. InputError where there is no such variable, or no such unit.
         """
-        if not units:
-            return self
+        key = ("units", *units.items())
+        if units and key not in self.made:
+            self.made[key] = self._in_units(units, place)
+        return self.made[key] if units else self
+
+    def _in_units(self, units: Mapping[str, str], place: str) -> "Interface":
         defined = dict(self.units)
         units = {
             element: unit
@@ -405,7 +420,10 @@ def _convert(variable: Variable, value: Value, version: str) -> Value | None:
 
 
 def _number(value: Value, whole: bool) -> float | int | None:
-    """A finite number; a whole one is exact where a float is not, 3.0 and "3.0" are whole, too."""
+    """A finite number; a whole one is exact where a float is not, 3.0 and "3.0" are whole, too.
+
+    None for a whole one written as a float that cannot tell it from the next.
+    """
     if isinstance(value, bool):
         return None
     if whole and not isinstance(value, float):
@@ -413,8 +431,10 @@ def _number(value: Value, whole: bool) -> float | int | None:
             return int(value)
     with suppress(ValueError, OverflowError):
         number = float(value)
-        if math.isfinite(number) and (number.is_integer() or not whole):
-            return int(number) if whole else number
+        if math.isfinite(number) and not whole:
+            return number
+        if number.is_integer() and abs(number) < 2.0**53:
+            return int(number)
     return None
 
 

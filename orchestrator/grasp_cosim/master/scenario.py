@@ -3,6 +3,7 @@
 import math
 import operator
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -10,7 +11,7 @@ import numpy.typing as npt
 from ..fmi.instance import Instance
 from ..interface.interface import Value, Variable
 from ..system.description import System
-from ..system.parts import Condition, Event, Port, first_step, literal, seconds
+from ..system.parts import Condition, Event, Fault, Port, first_step, literal, seconds
 from ..system.scenario_checks import check_exact, check_setting
 from .faults import Window, fault_functions
 
@@ -47,7 +48,8 @@ class Scenario:
             for i, event in enumerate(system.events)
         ]
         self._windows = [
-            Window(f"faults[{i}]", fault, system.step_ns) for i, fault in enumerate(system.faults)
+            Window(f"faults[{i}]", self._in_numbers(fault), system.step_ns)
+            for i, fault in enumerate(system.faults)
         ]
         self.fault_functions = fault_functions(self._windows, system.step_ns)
         self._due = self.next_step(0)
@@ -116,7 +118,19 @@ class Scenario:
         if condition is None:
             return True
         value = float(self._values[self._slots[condition.port]])
-        return _COMPARE[condition.relation](value, condition.value)
+        return _COMPARE[condition.relation](value, self._number(condition.port, condition.value))
+
+    def _number(self, port: Port, value: Value) -> float:
+        """The number of a constant for a port, which may be the name of an item."""
+        if not isinstance(value, str):
+            return value
+        interface = next(i.interface for i in self._instances if i.name == port.component)
+        return interface.by_name[port.variable].items[value]
+
+    def _in_numbers(self, fault: Fault) -> Fault:
+        """The fault with numbers in the place of names of items."""
+        given = {n: self._number(fault.target, v) for n, v in fault.parameters.items()}
+        return replace(fault, parameters=given)
 
 
 class _PendingEvent:

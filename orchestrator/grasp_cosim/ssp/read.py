@@ -196,7 +196,7 @@ def _keep_starts(
         for variable in component.interface.of("input"):
             port, start = Port(component.name, variable.name), variable.start
             given = port in connected or variable.name in component.values
-            if variable.supported and not given and start is not None:
+            if variable.supported and not variable.element and not given and start is not None:
                 place = f"{file}: start value of {port}"
                 starts[variable.name] = component.interface.parse(
                     place, variable.name, start, text=True

@@ -8,7 +8,17 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ..checks import as_table, check_keys, choice, known, number, text, toml_table, whole
+from ..checks import (
+    as_table,
+    check_keys,
+    check_values,
+    choice,
+    known,
+    number,
+    text,
+    toml_table,
+    whole,
+)
 from ..errors import InputError, choices
 from ..interface.interface import Value
 from ..metrics.metric import Metric, load_metrics
@@ -205,8 +215,8 @@ def _system(
         for key, fmu in as_table(f"{place}: [swap]", table.get("swap", {})).items()
     }
     fixed = as_table(f"{place}: [values]", table.get("values", {}))
-    for key, value in fixed.items():
-        _value(f"{place}: [values]: {key}", value)
+    check_values(f"{place}: [values]", fixed)
+    for key in fixed:
         if key in varied:
             raise InputError(
                 f"{place}: [values]: {key}: is varied by [[parameters]] or seeds, too; must be in "

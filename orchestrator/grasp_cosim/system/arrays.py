@@ -34,10 +34,8 @@ def by_element(system: Structure) -> tuple[Connection, ...]:
             made.append(connection)
             continue
         if source is None or target is None or source.shape != target.shape:
-            has = [
-                f"{p} is {shape_text(a.shape if a else ())}"
-                for p, a in zip(ends, found, strict=True)
-            ]
+            shapes = [shape_text(a.shape) if a else "no array" for a in found]
+            has = [f"{port} is {shape}" for port, shape in zip(ends, shapes, strict=True)]
             raise InputError(
                 f"{system.name}: connections[{i}] '{connection}': {' and '.join(has)}; must have "
                 "equal shapes, or be of elements, like u[1]"
@@ -84,12 +82,14 @@ def _incomplete(component: Component) -> Iterator[tuple[str, list[str]]]:
 
 
 def unsourced(system: Structure, component: Component) -> Iterator[str]:
-    """A line for each input array with elements that have neither a connection nor a value."""
+    """A line on the elements of input arrays that have neither a connection nor a value."""
     ports = (*(connection.target for connection in system.connections), *driven(system))
     targets = {port.variable for port in ports if port.component == component.name}
     interface = component.interface
+    free: list[str] = []
     for name, array in interface.arrays.items():
-        free = [n for n in array.names if n not in targets and n not in component.values]
-        if free and interface.by_name[free[0]].causality == "input":
-            what = name if len(free) == len(array.names) else choices(free, 6)
-            yield f"{Port(component.name, what)}: no source, keeps the start value of its FMU"
+        without = [n for n in array.names if n not in targets and n not in component.values]
+        if without and interface.by_name[without[0]].causality == "input":
+            free += [name] if len(without) == len(array.names) else without
+    if free:
+        yield f"{component.name}: no source for {choices(free, 6)}: kept as the FMU starts with"

@@ -34,8 +34,9 @@ class System(Structure):
         check_steps(self)
         object.__setattr__(self, "connections", by_element(self))
         for component in self.components:
+            interface = component.interface
             for name, value in component.values.items():
-                component.interface.parse(f"{self.name}: {component.name}.{name}", name, value)
+                interface.parse(f"{self.name}: {component.name}.{name}", name, value)
         check_components(self)
         check_arrays(self)
         check_stimuli(self)

@@ -86,9 +86,11 @@ class Component:
 
     def sized(self, interface: Interface) -> Interface:
         """The interface of an FMU, with its arrays taken apart, of the sizes that values give."""
-        if not any(v.shape for v in interface.variables):
+        if interface.sized_by is None:
             return interface
-        return expanded(interface, {self.rename.get(n, n): v for n, v in self.values.items()})
+        names = {own: name for name, own in self.rename.items()}
+        lengths = {own: self.values.get(names.get(own, own)) for own in interface.sized_by}
+        return expanded(interface, lengths)
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,15 +126,19 @@ class Connection:
 class Condition:
     """An output compared with a constant, like plant.gap[1] < 0.01 or plant.contact[1] == true.
 
-    value is in the output's unit. It holds or not at a communication point, by the outputs there.
+    value is in the output's unit; of an Enumeration it may be the name of an item. It holds or not
+    at a communication point, by the outputs there.
     """
 
     port: Port
     relation: Relation
-    value: float | bool
+    value: float | bool | str
 
     def __str__(self) -> str:
-        return f"{self.port} {self.relation} {literal(self.value)}"
+        value = literal(self.value)
+        if isinstance(self.value, str):
+            value = f'"{self.value}"' if "'" in self.value else f"'{self.value}'"
+        return f"{self.port} {self.relation} {value}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,7 +166,7 @@ class Fault:
 
     target: Port
     kind: str
-    parameters: Mapping[str, float | bool]
+    parameters: Mapping[str, float | bool | str]
     start_ns: int = 0
     end_ns: int | None = None
     seed: int = 0

@@ -10,7 +10,7 @@ from .description import in_nanoseconds
 from .faults import RANDOM
 from .parts import NANOSECONDS, Condition, Connection, Event, Fault, Port
 
-_CONDITION = re.compile(r"(.+?\S)\s*(<=|>=|==|!=|<|>)\s*([^<>=!\s]+)")
+_CONDITION = re.compile(r"""(.+?\S)\s*(<=|>=|==|!=|<|>)\s*('[^']*'|"[^"]*"|[^<>=!\s]+)""")
 
 
 def read_events(place: str, entries: Any) -> tuple[Event, ...]:
@@ -109,16 +109,18 @@ def _condition(place: str, text: Any) -> Condition | None:
     if text is None:
         return None
     found = _CONDITION.fullmatch(text.strip()) if isinstance(text, str) else None
-    value = _number(found[3]) if found else None
+    value = _constant(found[3]) if found else None
     if found is None or value is None:
         raise InputError(
-            f"{place}: when = {text!r}: must be like 'plant.gap[1] < 0.01' or "
-            "'plant.contact[1] == true'"
+            f"{place}: when = {text!r}: must be like 'plant.gap[1] < 0.01', "
+            "'plant.contact[1] == true' or, of an Enumeration, \"plant.mode == 'fast'\""
         )
     return Condition(_port(f"{place}: when", found[1]), found[2], value)  # type: ignore[arg-type]
 
 
-def _number(text: str) -> float | None:
+def _constant(text: str) -> float | str | None:
+    if text[0] in "'\"":
+        return text[1:-1] if len(text) > 1 and text[-1] == text[0] else None
     if text in ("true", "false"):
         return text == "true"
     try:

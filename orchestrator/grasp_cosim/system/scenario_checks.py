@@ -61,6 +61,9 @@ def check_setting(system: Structure, port: Port, value: Value, place: str) -> No
         variable = interface.by_name.get(port.variable)
         found = f"is a {variable.variability} {variable.causality}" if variable else "not there"
         own = [p for p in settable if p.component == port.component]
+        if port.variable in interface.arrays:
+            found, names = "is an array", interface.arrays[port.variable].names
+            own = [p for p in own if p.variable in names]
         raise InputError(
             f"{place}: {found}; must be a tunable parameter or an input without a connection; "
             f"valid: {choices(own or settable)}"
@@ -81,12 +84,18 @@ def _check_condition(system: Structure, condition: Condition, place: str) -> Non
     valid = [v.name for v in interface.of("output") if v.is_number]
     component, variable = condition.port.component, condition.port.variable
     known(f"{place}: {component} has no numeric output", variable, valid)
-    kind = interface.by_name[variable].kind
+    kind, items = interface.by_name[variable].kind, interface.by_name[variable].items
     relations = {"Real": RELATIONS[:4], "Boolean": RELATIONS[4:]}.get(kind, RELATIONS)
     if condition.relation not in relations:
         raise InputError(
             f"{place}: {condition.port} is {kind}; must be compared with {choices(relations)}"
         )
+    if isinstance(condition.value, str):
+        said = f"{place}: {condition.port} is {kind} and has no item"
+        known(said, condition.value, items)
+        return
+    if kind == "Integer" and abs(condition.value) >= 2**53:
+        raise InputError(f"{place}: must be smaller than 2**53 in magnitude, as what is recorded")
     boolean = isinstance(condition.value, bool)
     if boolean != (kind == "Boolean") or not math.isfinite(condition.value):
         expected = "true or false" if kind == "Boolean" else "a finite number"

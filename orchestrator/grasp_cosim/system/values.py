@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
+from ..errors import InputError
 from ..interface.expansion import values_of
 from ..interface.interface import Given, Value
 from .parts import Component
@@ -29,11 +30,19 @@ def with_given(
         values = {**component.values, **values_of(interface, place(name), name, value, text)}
         component = replace(component, values=values)
     before, interface = interface, component.interface
-    kept = dict(component.values)
+    anew = [before.arrays[name].names for name in given if name in before.arrays]
+    dropped = {element for names in anew for element in names}
+    kept = {name: value for name, value in component.values.items() if name not in dropped}
+    lost = next((n for n in kept if n in before.by_name and n not in interface.by_name), None)
+    if lost is not None:
+        array = next(name for name, a in before.arrays.items() if lost in a.names)
+        name, value = next(iter(sizes.items()))
+        raise InputError(
+            f"{place(name)} = {value!r}: there is then no {lost}, which has a value; {array} must "
+            "be given anew, too"
+        )
     parsed: dict[str, Value] = {}
     for name, value in given.items():
         if name not in sizes:
-            for element in before.arrays[name].names if name in before.arrays else ():
-                kept.pop(element, None)
             parsed |= values_of(interface, place(name), name, value, text)
     return replace(component, values={**kept, **parsed})

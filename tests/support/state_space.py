@@ -1,0 +1,93 @@
+"""Builds the FMU of tests/support/models/state_space.c: arrays, sized by parameters."""
+
+import subprocess
+import tempfile
+import zipfile
+from functools import lru_cache
+from pathlib import Path
+
+import fmpy
+
+SOURCE = Path(__file__).parent / "models" / "state_space.c"
+TYPES = (
+    "Float64", "Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64",
+    "UInt64", "Boolean", "Enumeration",
+)  # fmt: skip
+"""The types of the arrays u_T and y_T = u_T, of 2 x k."""
+
+_UNIT = "1 0 0 0 1 0 0 0 1"
+
+
+def state_space(folder: Path, name: str = "ss", types: bool = False, more: str = "") -> Path:
+    """The FMU name.fmu in folder: m inputs u, n states x, r outputs y, 3 of each at the start.
+
+    With types it has u_T and y_T for all types; more are further variables of its description.
+    """
+    path = folder / f"{name}.fmu"
+    library = f"binaries/{fmpy.platform_tuple}/state_space{fmpy.sharedLibraryExtension}"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("modelDescription.xml", _description(types, more))
+        archive.writestr(library, _library())
+    return path
+
+
+@lru_cache
+def _library() -> bytes:
+    headers = Path(fmpy.__file__).parent / "c-code"
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder, "state_space.so")
+        command = ["gcc", "-shared", "-fPIC", "-O2", f"-I{headers}", str(SOURCE), "-lm"]
+        subprocess.run([*command, "-o", str(out)], check=True)
+        return out.read_bytes()
+
+
+def _variable(
+    kind: str, name: str, reference: int, causality: str, sizes: str, start: str = "", own: str = ""
+) -> str:
+    """sizes are references of sizes like "2 1", or "=2" for a fixed one."""
+    dimensions = "".join(
+        f'<Dimension start="{s[1:]}"/>' if s[0] == "=" else f'<Dimension valueReference="{s}"/>'
+        for s in sizes.split()
+    )
+    given = f' start="{start}"' if start else ""
+    return (
+        f'<{kind} name="{name}" valueReference="{reference}" causality="{causality}"{given}{own}>'
+        f"{dimensions}</{kind}>"
+    )
+
+
+def _description(types: bool, more: str) -> str:
+    tunable = ' variability="tunable"'
+    variables = [
+        '<Float64 name="time" valueReference="0" causality="independent"/>',
+        *(
+            _variable("UInt64", name, reference, "structuralParameter", "", "3", tunable)
+            for reference, name in enumerate("mnrk", 1)
+        ),
+        _variable("Float64", "A", 5, "parameter", "2 2", _UNIT, tunable),
+        _variable("Float64", "B", 6, "parameter", "2 1", _UNIT, tunable),
+        _variable("Float64", "C", 7, "parameter", "3 2", _UNIT, tunable),
+        _variable("Float64", "D", 8, "parameter", "3 1", _UNIT, tunable),
+        _variable("Float64", "x0", 9, "parameter", "2", "0", ' variability="fixed"'),
+        _variable("Float64", "u", 10, "input", "1", "1 2 3"),
+        _variable("Float64", "y", 11, "output", "3"),
+        _variable("Float64", "x", 12, "local", "2"),
+    ]
+    outputs = '<Output valueReference="11" dependencies="7 8 10 12"/>'
+    for number, kind in enumerate(TYPES) if types else ():
+        start = "false" if kind == "Boolean" else "1" if kind == "Enumeration" else "0"
+        own = ' variability="discrete"' if "Float" not in kind else ""
+        own += ' declaredType="Choice"' if kind == "Enumeration" else ""
+        variables.append(_variable(kind, f"u_{kind}", 100 + number, "input", "=2 4", start, own))
+        variables.append(_variable(kind, f"y_{kind}", 200 + number, "output", "=2 4", "", own))
+        outputs += f'<Output valueReference="{200 + number}" dependencies="{100 + number}"/>'
+    return (
+        '<?xml version="1.0"?><fmiModelDescription fmiVersion="3.0" modelName="StateSpace" '
+        'instantiationToken="{state space}"><CoSimulation modelIdentifier="state_space" '
+        'canHandleVariableCommunicationStepSize="true"/><TypeDefinitions>'
+        '<EnumerationType name="Choice"><Item name="slow" value="1"/><Item name="fast" value="2"/>'
+        f"</EnumerationType></TypeDefinitions><ModelVariables>{''.join(variables)}{more}"
+        f"</ModelVariables><ModelStructure>{outputs}"
+        '<InitialUnknown valueReference="11" dependencies="7 8 9 10"/></ModelStructure>'
+        "</fmiModelDescription>"
+    )
