@@ -210,9 +210,8 @@ class ModelInstance(LoadedInstance):
         self._count(near)
         self._slave.enterEventMode()
         waiting, self._waiting = self._waiting, {}
-        for variable, value in waiting.items():
-            self._given[variable] = value
-            self._set(variable, value)
+        self._given |= waiting
+        self._assign(waiting.items())
         for buffer in self._buffers:
             if buffer.changed():
                 self._check(buffer.pass_on())
