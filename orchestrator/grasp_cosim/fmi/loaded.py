@@ -309,12 +309,12 @@ class LoadedInstance(ABC):
             return self._error("ended a step early", time)
         return self._error(f"returned {STATUS[status] if status < len(STATUS) else status}", time)
 
-    def _error(self, what: str, time: float) -> SimulationError:
+    def _error(self, what: str, time: float, must: str = "") -> SimulationError:
         """The error for what the FMU did, with what it said of it, and its inputs."""
         said = self._messages()
         reason = as_reason(said[self._said_before :] or said)
         error = SimulationError(
-            f"{self.name}: {self.interface.path.name} {what} at t = {time:.9g} s{reason}"
+            f"{self.name}: {self.interface.path.name} {what} at t = {time:.9g} s{must}{reason}"
             f"{self._inputs}"
         )
         for text in said:

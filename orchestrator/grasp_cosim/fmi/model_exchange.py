@@ -177,6 +177,8 @@ class ModelInstance(LoadedInstance):
             self._now = max(self._now, stop)
             self._check(self._set_time(self._now))
         else:
+            if self._zero is not None:
+                stop = min(stop, self._now + max(AT_POINT, 4.0 * ROUNDED * math.ulp(self._now)))
             try:
                 self._now, event = self._solver.step(stop)
             except CvodeError as error:
@@ -193,14 +195,13 @@ class ModelInstance(LoadedInstance):
         return event
 
     def _left_zero(self) -> bool:
-        """True where an indicator was 0 as the solver began and is negative now.
-
-        CVode takes it to have been negative then.
+        """True where an indicator was 0 as the solver began and is not now, which CVode leaves
+        out; the solver has gone a tiny step then.
         """
         if self._zero is None:
             return False
         zero, self._zero = self._zero, None
-        return bool((zero & (self._indicators_now() < 0.0)).any())
+        return bool((zero & (self._indicators_now() != 0.0)).any())
 
     def _event(self, near: float = AT_POINT) -> None:
         """Event mode, now: what was set arrives, and the discrete states settle.
@@ -229,9 +230,7 @@ class ModelInstance(LoadedInstance):
             if not again:
                 break
         else:
-            raise self._error(
-                f"has an event that is not settled after {ITERATIONS} iterations", self._now
-            )
+            raise self._error(f"does not settle an event in {ITERATIONS} iterations", self._now)
         self._next = time if defined else math.inf
         self._slave.enterContinuousTimeMode()
         if self._solver:
@@ -256,10 +255,10 @@ class ModelInstance(LoadedInstance):
         self._last_event = self._now
         if self._dense >= MOST_DENSE:
             raise self._error(
-                f"has {MOST_DENSE} events in a row, each within {DENSE:g} of the step of "
-                f"{self._step:g} s after the one before: it chatters, or comes to no rest; must "
-                "have a hysteresis, or a shorter communication step",
+                f"chatters, or comes to no rest ({MOST_DENSE} events in a row, each within "
+                f"{DENSE:.0%} of the step after the one before)",
                 self._now,
+                f"; must have a hysteresis, or a shorter step than {self._step:g} s",
             )
 
     def _bind(self) -> None:
