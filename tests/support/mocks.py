@@ -62,6 +62,7 @@ class Mock:
         self.u: Any = {"Integer": 0, "Boolean": False, "String": ""}.get(kind, 0.0)
         self.p = 1.0
         self.time = 0.0
+        self.ended: float | None = None
         self.calls: list[str] = []
         self.statuses = {"send": 0, "step": 0, "receive": 0}
         self.path = folder / f"{name}.fmu"
@@ -127,6 +128,9 @@ class Mock:
 
     def last_successful_time(self) -> float | None:
         return self.time
+
+    def the_end(self) -> float | None:
+        return self.ended
 
     def failure(self, status: int, time: float) -> SimulationError:
         return SimulationError(f"{self.name}: status {status} at {time!r}")

@@ -126,6 +126,21 @@ MODELS = {
         stop=10.0,
         step=0.2,
     ),
+    "odd": Model(
+        (
+            *_state("x", 0.0),
+            Variable("rate", start=1.0),
+            _parameter("kind", 0, type_="Int32"),
+            Variable("events", "Int32", "output", "discrete", 0),
+            Variable("u", "Boolean", "input", "discrete", False),
+        ),
+        indicators=("x",),
+        completed=True,
+    ),
+    "sine": Model(
+        (Variable("count", "Int32", "output", "discrete", -1), _parameter("f", 1.0)),
+        indicators=("count",),
+    ),
     "feedthrough": Model(()),
 }
 """By the name of their C file; the feedthrough has u_T and y_T for each type T of its version."""

@@ -5,7 +5,7 @@ from collections import defaultdict, deque
 from collections.abc import Callable, Mapping
 from copy import copy
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import fmpy
 import numpy as np
@@ -43,11 +43,14 @@ addLoggerProxy(ctypes.byref(_callbacks))
 
 
 class FmuInstance(LoadedInstance):
-    """One instance of an FMI 2.0 co-simulation FMU."""
+    """One instance of an FMI 2.0 FMU, for co-simulation."""
 
     PREFIX = "fmi2"
     SHAPE = TRANSFER_2
     ENUMERATION = "Integer"
+
+    SLAVE: ClassVar[type] = FMU2Slave
+    """FMPy's class."""
 
     def _instantiate(self, folder: Path) -> FMU2Slave:
         slave = self._opened(folder)
@@ -56,10 +59,10 @@ class FmuInstance(LoadedInstance):
 
     def _opened(self, folder: Path) -> FMU2Slave:
         """FMPy's slave with the library from the folder, not instantiated yet."""
-        return know_signatures(FMU2Slave)(
+        return know_signatures(self.SLAVE)(
             guid=self.interface.guid,
             unzipDirectory=folder,
-            modelIdentifier=self.interface.identifier,
+            modelIdentifier=self._identifier,
             instanceName=self.name,
         )
 
@@ -69,7 +72,7 @@ class FmuInstance(LoadedInstance):
     def _start(self, values: Mapping[str, Value], stop: float | None, start: float) -> None:
         for name, value in values.items():
             self._set(self.interface.by_name[name], value)
-        self._slave.setupExperiment(startTime=start, stopTime=stop)
+        self._slave.setupExperiment(self.tolerance, startTime=start, stopTime=stop)
         self._slave.enterInitializationMode()
 
     def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from fmpy.fmi3 import FMU3Slave
+from fmpy.fmi3 import _FMU3, FMU3Slave
 
 from ..interface.interface import Interface, Value, Variable
 from .instance import EARLY, STEP_3, TRANSFER_3, WARNING, Call, Native
@@ -22,7 +22,7 @@ TERMINATE, SHORT = 1, 2
 """Places in the flags of a step, after that of an event."""
 
 
-class _Slave(FMU3Slave):  # type: ignore[misc]  # FMPy has no types
+class Lenient(_FMU3):  # type: ignore[misc]  # FMPy has no types
     """FMPy's, but for an FMU without the functions of other kinds of FMUs."""
 
     def __dir__(self) -> Iterable[str]:
@@ -37,6 +37,10 @@ class _Slave(FMU3Slave):  # type: ignore[misc]  # FMPy has no types
             self.component, (ctypes.c_uint * count)(*references), count, texts, count
         )
         return list(texts)
+
+
+class _Slave(Lenient, FMU3Slave):  # type: ignore[misc]
+    pass
 
 
 class Fmi3Instance(LoadedInstance):
@@ -57,7 +61,7 @@ class Fmi3Instance(LoadedInstance):
         slave = know_signatures(_Slave)(
             guid=self.interface.guid,
             unzipDirectory=str(folder),
-            modelIdentifier=self.interface.identifier,
+            modelIdentifier=self._identifier,
             instanceName=self.name,
         )
         early_return = self.interface.capability("mightReturnEarlyFromDoStep") is True
@@ -88,7 +92,7 @@ class Fmi3Instance(LoadedInstance):
             self._assign(structural, fetch=False)
             self._slave.exitConfigurationMode()
         self._assign(others, fetch=False)
-        self._slave.enterInitializationMode(startTime=start, stopTime=stop)
+        self._slave.enterInitializationMode(self.tolerance, startTime=start, stopTime=stop)
 
     def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
         """The call that advances by step seconds from the time in clock[0]; EARLY is a status."""
@@ -109,4 +113,5 @@ class Fmi3Instance(LoadedInstance):
 
     def _reached(self) -> float | None:
         """A step that was discarded did nothing; what the flags say is then of an earlier one."""
-        return float(self._last[0]) if self._flags[SHORT] else self._time()
+        said = self._flags[SHORT] or self._flags[TERMINATE]
+        return float(self._last[0]) if said else self._time()

@@ -105,6 +105,12 @@ class Instance(Protocol):
     def last_successful_time(self) -> float | None:
         """Return the end of a discarded or shortened step in s, None if the FMU does not say."""
 
+    def the_end(self) -> float | None:
+        """Return the time in s at which the FMU asked for the end of the simulation.
+
+        In a step that it rejected, or in its initialisation; None if it did not.
+        """
+
     def failure(self, status: int, time: float) -> SimulationError:
         """The error for a call that returned a bad status at time in s."""
 

@@ -32,7 +32,7 @@ from ..interface.arrays import Element
 from ..interface.interface import Interface, Value, Variable
 from ..scratch import ScratchFolder
 from .inputs import Inputs
-from .instance import DISCARD, EARLY, ERROR, FATAL, OK, STATUS, TRANSFER_3, Call, Native
+from .instance import EARLY, ERROR, FATAL, OK, STATUS, TRANSFER_3, Call, Native
 
 _PYTHON_FUNCTION = ctypes.PYFUNCTYPE(ctypes.c_int)
 _NATIVE_FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int)
@@ -65,7 +65,10 @@ KEPT = 12
 
 
 class LoadedInstance(ABC):
-    """One instance of a co-simulation FMU in this process."""
+    """One instance of an FMU in this process."""
+
+    tolerance: float | None = None
+    """The relative tolerance of the solver, where the FMU has none of its own."""
 
     PREFIX: ClassVar[str]
     """The first letters of its FMI functions."""
@@ -119,6 +122,11 @@ class LoadedInstance(ABC):
     @abstractmethod
     def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
         """The call that advances by step seconds from the time in clock[0]."""
+
+    @property
+    def _identifier(self) -> str:
+        """The name of the binary."""
+        return self.interface.identifier
 
     def _unpacked(self) -> Path:
         """The folder with what an instance here may need of the FMU; InputError if that fails."""
@@ -280,29 +288,34 @@ class LoadedInstance(ABC):
         return list(getter([variable.reference], size))
 
     def last_successful_time(self) -> float | None:
-        """Return the end of a discarded or shortened step in s, None if the FMU does not say.
+        """Return the end of a discarded or shortened step in s, None if the FMU does not say."""
+        return self._reached()
 
-        SimulationError where the FMU asks for the end of the simulation.
+    def the_end(self) -> float | None:
+        """Return the time in s at which the FMU asked for the end of the simulation.
+
+        In a step that it rejected, or in its initialisation; None if it did not.
         """
         self._said_before = len(self._unread)
-        if self._wants_the_end():
-            raise self.failure(DISCARD, self._time())
-        return self._reached()
+        if not self._wants_the_end():
+            return None
+        reached = self._reached()
+        return self._time() if reached is None else reached
 
     def failure(self, status: int, time: float) -> SimulationError:
         """The error for a call that returned status at time in s. The FMU is not used again."""
         self._worst = OK if status == EARLY else status
-        inputs = str(self._inputs)
-        if status in (DISCARD, EARLY) and self._wants_the_end():
-            what, inputs = "asked for the end of the simulation", ""
-        elif status == EARLY:
-            what = "ended a step early"
-        else:
-            what = f"returned {STATUS[status] if status < len(STATUS) else status}"
+        if status == EARLY:
+            return self._error("ended a step early", time)
+        return self._error(f"returned {STATUS[status] if status < len(STATUS) else status}", time)
+
+    def _error(self, what: str, time: float, must: str = "") -> SimulationError:
+        """The error for what the FMU did, with what it said of it, and its inputs."""
         said = self._messages()
         reason = as_reason(said[self._said_before :] or said)
         error = SimulationError(
-            f"{self.name}: {self.interface.path.name} {what} at t = {time:.9g} s{reason}{inputs}"
+            f"{self.name}: {self.interface.path.name} {what} at t = {time:.9g} s{must}{reason}"
+            f"{self._inputs}"
         )
         for text in said:
             error.add_note(text)

@@ -25,6 +25,7 @@ import numpy.typing as npt
 from ..errors import InputError, SimulationError
 from ..interface.interface import Interface, Value, Variable
 from ..scratch import ScratchFolder
+from ..system.parts import Solver
 from .exchange import ANSWER, CALL, FETCH, LOGGED, SIZE, STEP, Exchange
 from .inputs import Inputs
 from .instance import EARLY, WARNING, Call
@@ -49,12 +50,12 @@ LINES = 40
 
 
 class ProcessInstance:
-    """One instance of a co-simulation FMU in a process of its own, which runs worker.py.
+    """One instance of an FMU in a process of its own, which runs worker.py.
 
     The process ends with this one, however this one ends.
     """
 
-    def __init__(self, name: str, interface: Interface) -> None:
+    def __init__(self, name: str, interface: Interface, solver: Solver | None = None) -> None:
         """Start the process and instantiate; InputError where the FMU does not load."""
         self.name = name
         self.interface = interface
@@ -95,7 +96,7 @@ class ProcessInstance:
         self._reader = threading.Thread(target=self._read_output, daemon=True)
         self._reader.start()
         try:
-            self._prepare("load", name, interface)
+            self._prepare("load", name, interface, solver)
         except BaseException:
             self._end()
             raise
@@ -178,6 +179,11 @@ class ProcessInstance:
     def last_successful_time(self) -> float | None:
         """Return the end of a discarded or shortened step in s, None if the FMU does not say."""
         time: float | None = self._ask("last_successful_time")
+        return time
+
+    def the_end(self) -> float | None:
+        """Return the time in s at which the FMU asked for the end; None if it did not."""
+        time: float | None = self._ask("the_end")
         return time
 
     def failure(self, status: int, time: float) -> SimulationError:

@@ -92,7 +92,12 @@ class DrivenFmu:
         self._clock[0] = time
         status = self._stepper(step)()
         if status in (DISCARD, EARLY):
-            finish_step(instance, status, time, time + step, over)
+            ended = finish_step(instance, status, time, time + step, over)
+            if ended is not None:
+                raise SimulationError(
+                    f"{self.interface.path.name} asked for the end of the simulation at "
+                    f"t = {ended:.9g} s"
+                )
         elif status > WARNING:
             raise instance.failure(status, time)
         self.time = time + step

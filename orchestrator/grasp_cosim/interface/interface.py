@@ -180,6 +180,17 @@ class Variable:
 
 
 @dataclass(frozen=True)
+class Exchange:
+    """What model exchange needs: the name of the binary, in FMI 2.0 the numbers of states and event
+    indicators. Of FMI 3.0 the instance says these.
+    """
+
+    identifier: str
+    states: int = 0
+    indicators: int = 0
+
+
+@dataclass(frozen=True)
 class Interface:
     """The interface of an FMU; guid is the instantiation token, tool what it was made with.
 
@@ -188,7 +199,7 @@ class Interface:
     experiment is the default one: start_time, stop_time, tolerance and step_size, as typed() gives
     them. platforms are those it has a binary for, sources says that it has C. flaw is the first
     number that could not be read, for which no master takes the FMU. arrays are those that were
-    taken apart, by name: see expansion.py.
+    taken apart, by name: see expansion.py. exchange is there where it is for model exchange, too.
     """
 
     path: Path
@@ -208,6 +219,7 @@ class Interface:
     tool: str | None = None
     flaw: str = ""
     arrays: Mapping[str, Array] = field(default_factory=dict)
+    exchange: Exchange | None = None
 
     @cached_property
     def made(self) -> dict[tuple[Any, ...], "Interface"]:

@@ -22,6 +22,7 @@ from .interface import (
     TYPES,
     TYPES_3,
     Enumeration,
+    Exchange,
     Interface,
     Variable,
     kind_of,
@@ -38,6 +39,8 @@ LONGEST_NAME = 2000
 """Characters; those of the largest FMUs have some hundreds."""
 MOST_DEPENDENCIES = 5_000_000
 """In all: of 2,000 outputs on 2,000 inputs, and some."""
+MOST_INDICATORS = 1_000_000
+"""Event indicators of an FMU."""
 EXPERIMENT = {
     "start_time": "startTime", "stop_time": "stopTime", "tolerance": "tolerance",
     "step_size": "stepSize",
@@ -75,9 +78,9 @@ def _for_master(path: Path, identity: tuple[int, ...]) -> Interface:
     found = describe(path)
     if found.version == "1.0":
         raise InputError(f"{path}: FMI 1.0; must be an FMI 2.0 or 3.0 co-simulation FMU")
-    if "CoSimulation" not in found.kinds:
-        kind = KINDS[next(iter(found.kinds), "ScheduledExecution")]
-        raise InputError(f"{path}: for {kind} only; must be a co-simulation FMU")
+    if not {"CoSimulation", "ModelExchange"} & set(found.kinds):
+        kind = KINDS["ScheduledExecution"]
+        raise InputError(f"{path}: for {kind} only; must be for co-simulation or model exchange")
     if found.flaw:
         raise unreadable(path, found.flaw)
     sources = tuple(v for v in found.variables if not (v.alias and v.causality == "input"))
@@ -101,6 +104,7 @@ def describe(path: Path) -> Interface:
         identifier = identified.get("modelIdentifier", "")
         with reader.tolerated():
             _check_identifier(identifier)
+        exchange = reader.exchange(kinds)
         experiment = {} if (e := root.find("DefaultExperiment")) is None else e.attrib
         with reader.tolerated():
             _real("DefaultExperiment: stepSize", experiment.get("stepSize", "0"))
@@ -122,6 +126,7 @@ def describe(path: Path) -> Interface:
         model_name=root.get("modelName"),
         tool=root.get("generationTool"),
         flaw=reader.flaws[0] if reader.flaws else "",
+        exchange=exchange,
     )
 
 
@@ -347,6 +352,18 @@ class _Reader:
         """The name of the variable that holds the size in a dimension; None where it is fixed."""
         reference = dimension.get("valueReference") if dimension.get("start") is None else None
         return None if reference is None else _name(self.places[_whole("Dimension", reference)])
+
+    def exchange(self, kinds: Mapping[str, Element]) -> Exchange | None:
+        """What model exchange needs; None where the FMU is not for that."""
+        if "ModelExchange" not in kinds:
+            return None
+        identifier, indicators = kinds["ModelExchange"].get("modelIdentifier", ""), 0
+        with self.tolerated():
+            _check_identifier(identifier)
+            key = "numberOfEventIndicators"
+            indicators = _whole(key, self.root.get(key, "0"), MOST_INDICATORS)
+        states = len(self.root.findall("ModelStructure/Derivatives/Unknown"))
+        return Exchange(identifier, states, indicators)
 
     def size(self, place: str, dimension: Element) -> int:
         """The size of an array in a dimension, at the start where a variable holds it."""

@@ -18,7 +18,7 @@ from ..realtime.pacer import HaltError, OverrunError, Pacer
 from ..recording.listener import Texts
 from ..recording.result import Rejection
 from ..system.description import System
-from ..system.parts import NANOSECONDS, Port
+from ..system.parts import NANOSECONDS, Port, seconds
 from . import loop
 from .aside import Aside
 from .compiled import CompiledLoop
@@ -65,6 +65,8 @@ class Master:
         self.steps_done = 0
         self.rejections: dict[str, Rejection] = {}
         self.log: list[str] = []
+        self.ends: list[str] = []
+        """What asked for the end of the simulation, before the stop time, a line each."""
         self.slots = slots_of(system, instances)
         strings = (port for port, v in system.recorded.items() if v.kind == "String")
         self.texts = {port: Texts() for port in strings}
@@ -108,8 +110,10 @@ class Master:
             self.log += propagation.run()
         except SimulationError as error:
             raise InputError(str(error)) from error
-        for instance in self.instances:
+        for component, instance in zip(self.system.components, self.instances, strict=True):
             instance.exit_initialization()
+            if component.integrated:
+                self._settled(instance, propagation.values)
         kept = self._kept(propagation.values)
         for port, slot in self.slots.items():
             value = propagation.values[port] if port in propagation.values else kept[port]
@@ -132,6 +136,26 @@ class Master:
             found |= zip(ports, instance.get(variables) if ports else (), strict=True)
         return found
 
+    def _settled(self, instance: Instance, values: dict[Port, Value]) -> None:
+        """Take the outputs of a model anew: its initialisation has ended with an event."""
+        outputs = [v for v in instance.interface.of("output") if v.supported]
+        ports = [Port(instance.name, v.name) for v in outputs]
+        values |= zip(ports, instance.get(outputs), strict=True)
+        if (ended := instance.the_end()) is not None:
+            self._end(instance, ended, 0)
+
+    def _end(self, instance: Instance, time: float, step: int) -> None:
+        """Have the run end with the row of a step, as an FMU asked for at a time in s.
+
+        What is still to be done in this step is done: all components are then at its end.
+        """
+        self.total_steps = step
+        line = f"{instance.name} asked for the end of the simulation at t = {time:.9g} s"
+        row = step * self.system.step_ns
+        if abs(row / NANOSECONDS - time) * NANOSECONDS > 1.0:
+            line += f"; its values there are in the last row, that of t = {seconds(row)}"
+        self.ends.append(line)
+
     @property
     def runs_alone(self) -> bool:
         """True if the loop of a run in real time needs nothing of Python's until it ends."""
@@ -145,9 +169,8 @@ class Master:
         until then have been handed on.
         """
         first = self.steps_done
-        end = min(first + steps, self.total_steps)
         try:
-            while self.steps_done < end:
+            while self.steps_done < (end := min(first + steps, self.total_steps)):
                 self._chunk(end if self._alone else min(self._base + CHUNK, end))
         except HaltError:
             pass
@@ -212,10 +235,10 @@ class Master:
     def _run(self, stop: int) -> None:
         step, operation = self.steps_done, 0
         try:
-            while step < stop:
+            while step < (until := min(stop, self.total_steps)):
                 rows = self._rows[step - self._base :]
                 step, operation, status = self._loop(
-                    rows, operation, step, stop, self.system.step_ns
+                    rows, operation, step, until, self.system.step_ns
                 )
                 if status:
                     self.steps_done = step
@@ -244,10 +267,10 @@ class Master:
         pacer.hand_over()
         try:
             with Aside(hand_on, halt, self._cpus) as aside:
-                while step < stop:
+                while step < (until := min(stop, self.total_steps)):
                     row = (step - self._base) % len(self._rows)
                     step, operation, status = compiled(
-                        self._rows, operation, step, stop, self.system.step_ns, row
+                        self._rows, operation, step, until, self.system.step_ns, row
                     )
                     if status == loop.OVERRUN:
                         raise OverrunError
@@ -277,7 +300,10 @@ class Master:
         if kind != loop.STEP or status not in (DISCARD, EARLY):
             raise instance.failure(status, begin)
         end = (step + 1) * self.system.step_ns / NANOSECONDS
-        finish_step(instance, status, begin, end)
+        ended = finish_step(instance, status, begin, end)
+        if ended is not None:
+            self._end(instance, ended, step + 1)
+            return
         known = self.rejections.get(instance.name, Rejection(0, begin))
         self.rejections[instance.name] = Rejection(known.count + 1, known.first)
 

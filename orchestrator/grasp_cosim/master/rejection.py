@@ -17,13 +17,15 @@ def finish_step(
     begin: float,
     end: float,
     over: Callable[[], bool] = lambda: False,
-) -> None:
+) -> float | None:
     """Bring an instance to end, in s, that rejected the step from begin to there.
 
     Goes on from where the step got to. Where it got nowhere, the rest is halved, at most down to
-    1/1024 of the step. SimulationError where that does not help, or `over` says that there is no
-    time left for it.
+    1/1024 of the step. The time in s where the FMU asked for the end of the simulation, else None.
+    SimulationError where that does not help, or `over` says that there is no time left for it.
     """
+    if (ended := instance.the_end()) is not None:
+        return ended
     if not instance.interface.can_vary_step:
         raise instance.failure(status, begin)
     clock = np.array([begin])
@@ -50,7 +52,9 @@ def finish_step(
                 break
             clock[0] = end if clock[0] + length >= end - smallest / 2 else clock[0] + length
         else:
-            return
+            return None
         if status not in (DISCARD, EARLY):
             raise instance.failure(status, float(clock[0]))
+        if (ended := instance.the_end()) is not None:
+            return ended
     raise instance.failure(status, float(clock[0]))

@@ -160,13 +160,14 @@ class Session:
 
     @property
     def complete(self) -> bool:
-        """True if the stop time is reached, without a failure."""
+        """True if the stop time is reached without a failure, or the end that an FMU asked for."""
         return self._master.steps_done == self._master.total_steps and not self._failed
 
     def step(self, steps: int = 1) -> bool:
         """Do a number of communication steps, fewer at the end; False if none was done.
 
-        None is where the stop time was reached before, or where halt ended the wait for the first.
+        None is where the end was reached before, be it the stop time or one that an FMU asked for,
+        or where halt ended the wait for the first.
 
         SimulationError, with what was recorded as its result, where an FMU fails. After that, and
         after an interruption such as Ctrl-C, the FMUs are not at one time: InputError.
@@ -287,6 +288,7 @@ class Session:
             *(self._dispatch.still_growing(master.steps_done) if self.complete else ()),
             *master.scenario.log,
             *rejected,
+            *master.ends,
             *pending,
             *proxy_lines(memory.time, memory.signals, step),
         )

@@ -266,9 +266,9 @@ def capability_differences(
     if versions[0] != versions[1]:
         text = f"FMI {versions[1]} instead of {versions[0]}"
         yield Difference("notes", "capability", "fmiVersion", text, *versions)
-    if "CoSimulation" not in candidate.kinds:
+    if not {"CoSimulation", "ModelExchange"} & set(candidate.kinds):
         was, now = ([KINDS[kind] for kind in fmu.kinds] for fmu in (original, candidate))
-        text = f"is for {choices(now)}; must be for co-simulation"
+        text = f"is for {choices(now)}; must be for co-simulation or model exchange"
         yield Difference("blocks", "capability", "kind", text, was, now)
         return
     for flag, (severity, lost, text) in RESTRICTIONS.items():
@@ -279,6 +279,8 @@ def capability_differences(
 
 
 def _steps(original: Interface, candidate: Interface, step: float) -> Iterator[Difference]:
+    if "CoSimulation" not in candidate.kinds:
+        return  # the solver's steps are of any size
     flag = "canHandleVariableCommunicationStepSize"
     if original.capability(flag) and not candidate.capability(flag):
         default = candidate.experiment.get("step_size")

@@ -7,7 +7,7 @@ the original and with the candidate, and each signal and metric of the two is co
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
 
@@ -30,6 +30,11 @@ from .tube import Curve, curve, deviation
 
 FEWEST_STEPS = 2
 """The least shift in time a derived band allows, in steps: one for the step, one for the scheme."""
+
+END = Metric(
+    "end_of_run", lambda run: float(run.time[-1]), "s", "where an FMU asked for the end, else stop"
+)
+"""Compared where one of the runs ends before the stop time."""
 
 Curves = Mapping[str, Curve]
 Entries = Mapping[str, Given | None]
@@ -141,6 +146,7 @@ def qualify(
     more = _conversions_of_candidate(swap.swapped, asked)
     reference = _run(swap.system, progress)
     to_si = {n: c for n, c in more.items() if n not in reference} | dict(reference.to_si)
+    asked += (END,) if _ended_early(reference) else ()
     original = _Original(swap, _curves(reference), reference.units, asked, to_si)
     signals, singles = original.entries(bands)
     result, failure = None, None
@@ -155,6 +161,9 @@ def qualify(
     if not all(entry and entry.wide for entry in (*signals.values(), *singles.values())):
         again, numerics = _other_numerics(swap.system, original.curves, progress)
     theirs = _converted(_curves(result), swap) if result else {}
+    if result and _ended_early(result) and END not in asked:
+        original = replace(original, asked=(*asked, END))
+        singles = {**singles, END.name: entry_for(bands.metrics, END.name)}
     return Qualification(
         swap,
         original.signals(theirs, again, signals),
@@ -181,6 +190,11 @@ def _run(system: System, progress: bool) -> Result:
     if not result.complete:
         raise KeyboardInterrupt
     return result
+
+
+def _ended_early(result: Result) -> bool:
+    """True if an FMU asked for the end before the stop time."""
+    return result.complete and bool(result.time[-1] < result.settings["stop"])
 
 
 def _other_numerics(
@@ -246,7 +260,7 @@ class _Original:
         """Each signal and each metric with its entry; InputError where an entry is for nothing."""
         names = self._values(self.curves)
         check_patterns(f"{bands.place}: [signals]", bands.signals, tuple(self.curves))
-        metrics = [n for name in names for n in dict.fromkeys((_plain(name), name))]
+        metrics = [n for name in names for n in dict.fromkeys((_plain(name), name))] + [END.name]
         check_patterns(f"{bands.place}: [metrics]", bands.metrics, metrics)
         return (
             {name: entry_for(bands.signals, name) for name in self.curves},
@@ -256,7 +270,7 @@ class _Original:
     def signals(
         self, candidate: Curves, again: Sequence[Curves], given: Entries
     ) -> tuple[Compared, ...]:
-        """All signals that both have, up to the end of the candidate's run.
+        """All signals that both have, up to the end of the run that ends first.
 
         again are the original's runs with other numerics.
         """
@@ -264,8 +278,8 @@ class _Original:
         for name, reference in self.curves.items():
             if name not in candidate:
                 continue
-            theirs, nominal = candidate[name], self.swap.nominals.get(name)
-            others = [run[name] for run in again]
+            theirs = candidate[name].until(float(reference.time[-1]))
+            nominal, others = self.swap.nominals.get(name), [run[name] for run in again]
             band = signal_band(reference, others, nominal, self._shift, given[name])
             apart = deviation(reference.until(float(theirs.time[-1])), theirs, band.time)
             worst = apart.values.argmax()

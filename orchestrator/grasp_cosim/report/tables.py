@@ -175,6 +175,8 @@ def _how(component: Mapping[str, Any]) -> str:
         parts.append(f"step {number(1e3 * component['step'])} ms")
     if component["isolation"] != "none":
         parts.append(f"isolation: {component['isolation']}")
+    if solver := component.get("solver"):
+        parts.append(f"integrated by CVode to {number(solver['relative_tolerance'])}")
     if component["rename"]:
         parts.append("renamed: " + ", ".join(f"{k} is {v}" for k, v in component["rename"].items()))
     return "; ".join(parts)

@@ -18,7 +18,7 @@ from lxml import etree  # type: ignore[import-untyped]
 from ..errors import InputError, choices
 from ..interface.interface import Value
 from ..system.description import System
-from ..system.parts import Event, Fault, Initialisation, Isolation, Port
+from ..system.parts import Event, Fault, Initialisation, Isolation, Port, Solver
 from ..system.stimuli import Stimuli
 from ..system.structure import Diverging, Scheme
 from .document import add
@@ -30,12 +30,13 @@ _TAG = "{grasp-cosim:system}System"
 
 @dataclass(frozen=True, slots=True)
 class Beside:
-    """The attributes of a component that SSP has no form for; earlier archives lack the last."""
+    """The attributes of a component that SSP has no form for; earlier ones lack the last two."""
 
     rename: Mapping[str, str]
     step_ns: int | None
     isolation: Isolation
     units: Mapping[str, str] = field(default_factory=dict)
+    solver: Solver | None = None
 
     def new(self, own: str) -> str:
         """Return the system's name of a variable of the FMU."""
@@ -72,7 +73,7 @@ def extras_of(system: System) -> Extras:
     """The extras of a system."""
     shared = {f.name: getattr(system, f.name) for f in fields(Extras)}
     beside = {
-        c.name: Beside(dict(c.rename), c.step_ns, c.isolation, dict(c.units))
+        c.name: Beside(dict(c.rename), c.step_ns, c.isolation, dict(c.units), c.solver)
         for c in system.components
     }
     return Extras(**{**shared, "components": beside})

@@ -7,7 +7,7 @@ here, as orchestrator/README.md describes, and said in the notes of the system.
 import math
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import asdict, replace
+from dataclasses import fields, replace
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -15,7 +15,7 @@ from ..errors import InputError, choices
 from ..interface.interface import Value
 from ..interface.units import known_unit
 from ..system.description import System, in_nanoseconds
-from ..system.parts import NANOSECONDS, Component, Connection, Port
+from ..system.parts import NANOSECONDS, Component, Connection, Port, Solver
 from ..system.stimuli import Stimuli
 from .annotation import TYPE, Beside, Extras, no_extras, read_extras
 from .archive import STRUCTURE, Archive
@@ -63,7 +63,9 @@ def read_ssp(
         beside = extras.components[names[at_path]]
         own = {beside.new(name): value for name, value in values.get(at_path, {}).items()}
         in_units = {beside.new(name): unit for name, unit in named[at_path].items()}
-        more = asdict(beside) | {"units": in_units}
+        more = {f.name: getattr(beside, f.name) for f in fields(beside)} | {"units": in_units}
+        if part.element.exchange and "CoSimulation" in part.interface.kinds:
+            more["solver"] = beside.solver or Solver()
         given.append(Component(names[at_path], part.interface.path, own, **more))
     stimuli = stimuli or extras.input
     driven = stimuli.columns if stimuli else ()

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 from ..checks import known
-from ..errors import InputError
+from ..errors import InputError, choices
 from ..interface.interface import Interface, Variable
 from ..interface.read import read_interface
 from ..interface.units import Unit
@@ -78,7 +78,7 @@ class Element:
 
     The elements of a system are by name and in the order of the file. bindings are the elements of
     its parameter bindings with the documents that they stand in. refers is True for a reference to
-    a signal dictionary, whose path it has.
+    a signal dictionary, whose path it has. exchange is True where it is to run by model exchange.
     """
 
     place: str
@@ -92,6 +92,7 @@ class Element:
     hops: tuple[Hop, ...] = ()
     dictionaries: Mapping[str, "Element"] = field(default_factory=dict)
     refers: bool = False
+    exchange: bool = False
 
     def within(self) -> Iterator["Element"]:
         """Yield the element and all in it, in the order of the file, without references."""
@@ -171,14 +172,18 @@ def _element(origin: Origin, entry: Any, parent: Path, reachable: Dictionaries) 
     known(f"{place}: type", kind, (FMU, _PACKAGE, _DEFINITION), " is not supported")
     if kind != FMU:
         return _nested(origin, entry, path, place)
-    if entry.get("implementation") == "ModelExchange":
-        raise InputError(
-            f"{place}: implementation 'ModelExchange' is not supported; must be CoSimulation or any"
-        )
     interface = _interface(origin, place, entry.get("source"))
+    asked = entry.get("implementation", "any")
+    if asked != "any" and asked not in interface.kinds:
+        raise InputError(
+            f"{place}: implementation {asked!r}: {entry.get('source')} has none; must be "
+            f"{choices(interface.kinds)}, or any"
+        )
     connectors = _connectors(origin, entry, interface)
     element = Element(at(origin.place, entry), path, name, origin, connectors)
-    return replace(element, bindings=_bindings(origin, entry), interface=interface)
+    exchange = asked == "ModelExchange"
+    bindings = _bindings(origin, entry)
+    return replace(element, bindings=bindings, interface=interface, exchange=exchange)
 
 
 def _interface(origin: Origin, place: str, source: str) -> Interface:

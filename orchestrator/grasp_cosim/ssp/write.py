@@ -173,7 +173,7 @@ def _write_component(
         name=component.name,
         type=FMU,
         source=source,
-        implementation="CoSimulation",
+        implementation="ModelExchange" if component.integrated else "CoSimulation",
     )
     variables = _connected(component)
     connectors = add(element, "ssd:Connectors") if variables else None

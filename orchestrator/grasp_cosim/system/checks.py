@@ -9,12 +9,16 @@ from typing import NamedTuple
 
 from ..checks import choice, known, number, whole
 from ..errors import InputError, choices
+from ..interface.capabilities import KINDS
 from ..interface.interface import SUPPORTED, Interface, Variable, limits
 from ..interface.units import conversion
 from .arrays import as_written, unsourced
 from .parts import LOOPS, Component, Connection, Port, seconds
 from .stimuli_checks import driven, stimuli_remarks
 from .structure import Structure
+
+FINEST, COARSEST = 1e-13, 0.1
+"""Relative tolerances of a solver: beyond the first one there is rounding alone."""
 
 
 class _End(NamedTuple):
@@ -41,6 +45,30 @@ def check_components(system: Structure) -> None:
                     'of which a process can have one only; must have isolation = "process" but '
                     "for one"
                 )
+
+
+def check_solvers(system: Structure) -> None:
+    """InputError where a component cannot be integrated as it says."""
+    for component in system.components:
+        place, chosen = f"{system.name}: {component.name}: solver", component.solver
+        if chosen is None:
+            continue
+        fmu = component.loaded
+        if fmu.exchange is None:
+            raise InputError(
+                f"{place}: {fmu.path.name} is for {choices(KINDS[k] for k in fmu.kinds)} alone; "
+                "must be left out"
+            )
+        relative, absolute = chosen.relative_tolerance, chosen.absolute_tolerance
+        must = f"a number from {FINEST:g} to {COARSEST:g}"
+        number(f"{place}: relative_tolerance", relative, FINEST, COARSEST, must=must)
+        if absolute is not None:
+            must = "a number greater than 0, at most 1"
+            number(f"{place}: absolute_tolerance", absolute, 0.0, 1.0, above=True, must=must)
+        if chosen.maximum_step is not None:
+            must = "a number greater than 0"
+            longest = chosen.maximum_step
+            number(f"{place}: maximum_step", longest, 0.0, above=True, must=must, unit="s")
 
 
 def check_items(was: Component, now: Component, variables: Sequence[str], place: str) -> None:
@@ -144,7 +172,12 @@ def remarks(system: Structure) -> tuple[str, ...]:
     Units other than the declared ones, values that lose digits, units that cannot be compared,
     variables that are left alone.
     """
-    lines = []
+    lines = [
+        f"{component.name}: {component.fmu.name} runs by model exchange, integrated by CVode with "
+        f"a relative tolerance of {chosen.relative_tolerance:g}"
+        for component in system.components
+        if (chosen := component.integrated)
+    ]
     for component in system.components:
         declared = component.declared
         lines += [

@@ -15,6 +15,7 @@ from .checks import (
     check_connections,
     check_initialisation,
     check_items,
+    check_solvers,
     check_steps,
 )
 from .parts import LONGEST, NANOSECONDS, Isolation
@@ -38,6 +39,7 @@ class System(Structure):
             for name, value in component.values.items():
                 interface.parse(f"{self.name}: {component.name}.{name}", name, value)
         check_components(self)
+        check_solvers(self)
         check_arrays(self)
         check_stimuli(self)
         check_connections(self)

@@ -40,6 +40,20 @@ def literal(value: Value) -> str:
 
 
 @dataclass(frozen=True, slots=True)
+class Solver:
+    """What CVode keeps to where it integrates an FMU of model exchange.
+
+    The local error of a state in a step of the solver is below relative_tolerance times the state
+    plus absolute_tolerance times its nominal value, by default a hundredth of the former.
+    maximum_step is in s; no step of the solver goes beyond a communication point.
+    """
+
+    relative_tolerance: float = 1e-10
+    absolute_tolerance: float | None = None
+    maximum_step: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Component:
     """An instance of an FMU and what it is given: the system's names, values, step and process.
 
@@ -49,7 +63,8 @@ class Component:
     step in nanoseconds, None for the system's. With isolation "process" it runs in a process of its
     own. units name the units of variables that the FMU declares without one, or wrongly, by the
     system's names. native is the FMU that runs in the place of fmu, its native twin: with the same
-    variables and the same bits, so that all else goes by fmu.
+    variables and the same bits, so that all else goes by fmu. With a solver its equations are
+    integrated here, by model exchange, though it may have a co-simulation of its own.
     """
 
     name: str
@@ -60,6 +75,14 @@ class Component:
     isolation: Isolation = "none"
     units: Mapping[str, str] = field(default_factory=dict)
     native: Path | None = None
+    solver: Solver | None = None
+
+    @property
+    def integrated(self) -> Solver | None:
+        """What its equations are integrated with; None where it runs by co-simulation."""
+        if self.solver is None and "CoSimulation" in self.loaded.kinds:
+            return None
+        return self.solver or Solver()
 
     @property
     def interface(self) -> Interface:

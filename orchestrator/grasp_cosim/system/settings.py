@@ -29,6 +29,7 @@ def settings(system: System) -> dict[str, Any]:
                 "isolation": component.isolation,
                 "rename": dict(component.rename),
                 "units": dict(component.units),
+                **({"solver": asdict(solver)} if (solver := component.integrated) else {}),
             }
             for component in system.components
         },

@@ -74,7 +74,8 @@ def replaced(was: Component, new: Replacement, place: str) -> Component:
         if (now := found.sample(name)) and now.unit in (None, getattr(ours.sample(name), "unit", 0))
     }
     units |= new.units
-    return replace(was, fmu=new.fmu, native=None, rename=rename, units=units)
+    solver = was.solver if theirs.exchange else None
+    return replace(was, fmu=new.fmu, native=None, rename=rename, units=units, solver=solver)
 
 
 def _free(interface: Interface, name: str) -> bool:

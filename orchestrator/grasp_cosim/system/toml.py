@@ -10,7 +10,7 @@ from ..errors import InputError
 from ..interface.interface import Given
 from ..interface.read import read_interface
 from .description import System, as_diverging, as_scheme, in_nanoseconds
-from .parts import ISOLATIONS, Component, Connection, Initialisation, Port
+from .parts import ISOLATIONS, Component, Connection, Initialisation, Port, Solver
 from .scenario import read_events, read_faults
 from .stimuli import Stimuli, read_stimuli
 from .values import with_given
@@ -103,6 +103,12 @@ def _initialisation(place: str, table: dict[str, Any]) -> Initialisation:
     return Initialisation(**table)
 
 
+def _solver(place: str, table: Any) -> Solver:
+    given = as_table(place, table)
+    check_keys(place, given, Solver.__slots__)
+    return Solver(**given)
+
+
 def _values(place: str, table: Any) -> dict[str, Given]:
     """A table of values; if they fit their variables is checked where it is used."""
     values = as_table(place, table)
@@ -113,7 +119,7 @@ def _values(place: str, table: Any) -> dict[str, Given]:
 def _component(place: str, name: str, entry: Any, folder: Path) -> Component:
     place = f"{place}: [components.{name}]"
     entry = as_table(place, entry)
-    check_keys(place, entry, {"fmu", "values", "step", "rename", "units", "isolation"})
+    check_keys(place, entry, {"fmu", "values", "step", "rename", "units", "isolation", "solver"})
     fmu = folder / text(f"{place}: fmu", entry.get("fmu"), "the path of an FMU, as a string")
     values = _values(f"{place}: values", entry.get("values", {}))
     own = entry.get("step")
@@ -127,6 +133,7 @@ def _component(place: str, name: str, entry: Any, folder: Path) -> Component:
         None if own is None else in_nanoseconds(f"{place}: step", own),
         choice(f"{place}: isolation", entry.get("isolation", "none"), ISOLATIONS),
         units,
+        solver=_solver(f"{place}: solver", entry["solver"]) if "solver" in entry else None,
     )
     sized = component.sized(read_interface(fmu)).renamed(rename, f"{place}: rename")
     sized.in_units(units, f"{place}: units")

@@ -186,7 +186,7 @@ fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t n
         if (n != count) return fail(m, fmi2Error, "another number of values"); \
         equations(m); \
         fill; \
-        return fmi2OK; \
+        return (fmi2Status)m->status; \
     }
 #define LATER (IN(EVENT) | IN(CONTINUOUS))
 

@@ -230,7 +230,7 @@ fmi3Status fmi3SetContinuousStates(fmi3Instance c, const fmi3Float64 x[], size_t
         if (n != count) return fail(m, fmi3Error, "another number of values"); \
         equations(m); \
         fill; \
-        return fmi3OK; \
+        return (fmi3Status)m->status; \
     }
 
 VECTOR(ContinuousStateDerivatives, STATES, slopes(m, v))

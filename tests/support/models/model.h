@@ -44,6 +44,8 @@ typedef struct {
     bool again;                       /* the event needs another iteration */
     bool states_changed, nominals_changed, ended;
     double nominal[ROOM];             /* of the states */
+    int status;                       /* of the equations, as FMI has it */
+    int steps;                        /* of the solver */
     Mode mode;
     bool exchange;                    /* model exchange, else co-simulation */
     size_t binary;                    /* bytes of a Binary, which is in a String */

@@ -1,0 +1,395 @@
+"""An instance of an FMU for model exchange: its equations, integrated by CVode between two
+communication points.
+
+At a communication point inputs may jump, so what was set is handed over in event mode and the
+solver begins anew; where nothing changed it goes on. It stops at each event, be it that an
+indicator leaves or enters z > 0, that the FMU has named the time, or that it wants one after a step
+of the solver; the discrete states are then iterated until they settle.
+"""
+
+import ctypes
+import math
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from fmpy.fmi2 import FMU2Model
+from fmpy.fmi3 import FMU3Model
+
+from ..errors import InputError, SimulationError
+from ..interface.interface import Interface, Value, Variable
+from ..system.parts import NANOSECONDS, Solver
+from .cvode import Cvode, CvodeError
+from .fmi2 import FmuInstance
+from .fmi3 import Fmi3Instance, Lenient
+from .instance import DISCARD, EARLY, OK, WARNING, Call
+from .loaded import LoadedInstance, know_signatures
+
+AT_POINT = 1e-10
+"""s, a tenth of the unit of time: an event so near to a communication point is at that."""
+
+ROUNDED = 16
+"""The smallest numbers in which a time can change, over which nothing is integrated."""
+
+ITERATIONS = 1000
+"""The most iterations of one event."""
+
+DENSE, MOST_DENSE = 0.01, 1000
+"""So many events, each within this part of a communication step after the one before, end a run."""
+
+MOST_STATES = 20_000
+"""The solver has a matrix of their square."""
+
+
+class ModelInstance(LoadedInstance):
+    """One instance of an FMU for model exchange, the parts that FMI 2.0 and 3.0 have in common."""
+
+    SLOPES: str
+    """The function that evaluates the derivatives."""
+
+    def __init__(self, name: str, interface: Interface, chosen: Solver) -> None:
+        """Extract and instantiate; InputError where the FMU does not load."""
+        self._chosen, self.tolerance = chosen, chosen.relative_tolerance
+        self._solver: Cvode | None = None
+        self._now = 0.0
+        self._next = math.inf
+        self._ended: float | None = None
+        self._failed = OK
+        self._given: dict[Variable, Value] = {}
+        self._waiting: dict[Variable, Value] = {}
+        self._buffers: list[_Buffer] = []
+        self._dense, self._last_event = 0, -math.inf
+        self._step = 0.0
+        self._zero: npt.NDArray[np.bool_] | None = None
+        super().__init__(name, interface)
+
+    @property
+    def _identifier(self) -> str:
+        assert self.interface.exchange is not None  # noqa: S101 - else it is not loaded as this
+        return self.interface.exchange.identifier
+
+    @abstractmethod
+    def _sizes(self) -> tuple[int, int]:
+        """The numbers of continuous states and of event indicators."""
+
+    @abstractmethod
+    def _update(self) -> tuple[bool, bool, bool, bool, bool, float]:
+        """One iteration of an event.
+
+        Again, the end of the simulation, new nominals, new states, a next event, and its time in s.
+        """
+
+    @property
+    @abstractmethod
+    def _tells_steps(self) -> bool:
+        """True if the FMU has to know of each step of the solver."""
+
+    def _wants_the_end(self) -> bool:
+        return self._ended is not None
+
+    def _reached(self) -> float | None:
+        return self._ended
+
+    def _time(self) -> float:
+        return self._now
+
+    def close(self) -> None:
+        """Free the solver, then the FMU as far as it permits."""
+        if self._solver:
+            self._solver.close()
+            self._solver = None
+        super().close()
+
+    def enter_initialization(
+        self, values: Mapping[str, Value], stop: float | None, start: float = 0.0
+    ) -> None:
+        """Set start values, set up the experiment (times in s) and enter initialisation mode."""
+        self._now = start
+        super().enter_initialization(values, stop, start)
+
+    def exit_initialization(self) -> None:
+        """Leave initialisation mode; settle the discrete states, and prepare the solver."""
+        super().exit_initialization()
+        try:
+            with self._refusals():
+                self._bind()
+                self._settle(first=True)
+        except (SimulationError, CvodeError) as error:
+            raise InputError(str(error)) from error
+
+    def set(self, variables: Sequence[Variable], values: Sequence[Value]) -> None:
+        """Set inputs or tunable parameters; in the run they change as the next step begins."""
+        given = dict(zip(variables, values, strict=True))
+        if self._running:
+            self._waiting |= given
+        else:
+            super().set(variables, values)
+            self._given |= given
+
+    def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:
+        """The call that passes data to inputs ("set") or fetches outputs into it ("get").
+
+        Inputs arrive as the next step begins.
+        """
+        call = super().transfer(action, variables, data)
+        if action == "get":
+            return call
+        self._buffers.append(_Buffer(data, call))
+        return Call(lambda: OK)
+
+    def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
+        """The call that advances by step seconds from the time in clock[0].
+
+        EARLY where the FMU asks for the end of the simulation.
+        """
+        time: Any = memoryview(clock)  # type: ignore[arg-type]  # numpy's 3.11 stubs
+
+        def advance() -> int:
+            self._step = step
+            self._advance(round((time[0] + step) * NANOSECONDS) / NANOSECONDS)
+            return OK if self._ended is None else EARLY
+
+        return Call(advance)
+
+    def _advance(self, end: float) -> None:
+        with self._failures():
+            if self._changed():
+                self._event()
+            while self._now < end and self._ended is None:
+                stop = self._next if self._next <= end + AT_POINT else end
+                found = self._go_on(stop)
+                if self._ended is None and (found or self._now >= self._next):
+                    self._event(DENSE * self._step if found else AT_POINT)
+
+    def _changed(self) -> bool:
+        """True where an input is to change, or a parameter."""
+        self._waiting = {v: x for v, x in self._waiting.items() if self._given.get(v) != x}
+        return bool(self._waiting) or any(buffer.changed() for buffer in self._buffers)
+
+    def _go_on(self, stop: float) -> bool:
+        """Take one step of the solver, to `stop` at most; True where there is an event."""
+        event = False
+        if self._solver is None or stop - self._now <= ROUNDED * math.ulp(stop):
+            self._now = max(self._now, stop)
+            self._check(self._set_time(self._now))
+        else:
+            if self._zero is not None:
+                stop = min(stop, self._now + max(AT_POINT, 4.0 * ROUNDED * math.ulp(self._now)))
+            try:
+                self._now, event = self._solver.step(stop)
+            except CvodeError as error:
+                raise self._stuck(error) from None
+            self._check(self._set_time(self._now))
+            if self._states:
+                self._check(self._set_states(self._x, self._states))
+            event = event or self._left_zero()
+        if self._tells_steps:
+            wants, ended = self._slave.completedIntegratorStep()
+            event = event or wants
+            if ended:
+                self._ended = self._now
+        return event
+
+    def _left_zero(self) -> bool:
+        """True where an indicator was 0 as the solver began and is not now, which CVode leaves
+        out; the solver has gone a tiny step then.
+        """
+        if self._zero is None:
+            return False
+        zero, self._zero = self._zero, None
+        return bool((zero & (self._indicators_now() != 0.0)).any())
+
+    def _event(self, near: float = AT_POINT) -> None:
+        """Event mode, now: what was set arrives, and the discrete states settle.
+
+        It counts as close upon another event that was less than `near` s before.
+        """
+        self._count(near)
+        self._slave.enterEventMode()
+        waiting, self._waiting = self._waiting, {}
+        self._given |= waiting
+        self._assign(waiting.items())
+        for buffer in self._buffers:
+            if buffer.changed():
+                self._check(buffer.pass_on())
+        self._settle()
+
+    def _settle(self, first: bool = False) -> None:
+        """Iterate an event until nothing changes, and begin the continuous time after it."""
+        nominals = first
+        for _ in range(ITERATIONS):
+            again, ended, renominated, _, defined, time = self._update()
+            nominals = nominals or renominated
+            if ended:
+                self._ended = self._now
+                return
+            if not again:
+                break
+        else:
+            raise self._error(f"does not settle an event in {ITERATIONS} iterations", self._now)
+        self._next = time if defined else math.inf
+        self._slave.enterContinuousTimeMode()
+        if self._solver:
+            self._begin(self._solver, nominals)
+
+    def _begin(self, solver: Cvode, nominals: bool) -> None:
+        """Have the solver begin anew with the states that the FMU has now."""
+        new = None
+        if self._states:
+            self._check(self._get_states(self._x, self._states))
+            if nominals:
+                new = np.ones(self._states)
+                self._check(self._get_nominals(new.ctypes.data, self._states))
+                new = np.where(np.isfinite(new) & (new > 0.0), new, 1.0)
+        solver.restart(self._now, new)
+        zero = self._indicators_now() == 0.0
+        self._zero = zero if zero.any() else None
+
+    def _count(self, near: float) -> None:
+        """Count events that come close upon each other; SimulationError where they do not end."""
+        self._dense = self._dense + 1 if self._now - self._last_event <= near else 0
+        self._last_event = self._now
+        if self._dense >= MOST_DENSE:
+            raise self._error(
+                f"chatters, or comes to no rest ({MOST_DENSE} events in a row, each within "
+                f"{DENSE:.0%} of the step after the one before)",
+                self._now,
+                f"; must have a hysteresis, or a shorter step than {self._step:g} s",
+            )
+
+    def _bind(self) -> None:
+        """Bind the functions that are called in the steps of the solver, and make that."""
+        number, place, size = ctypes.c_double, ctypes.c_void_p, ctypes.c_size_t
+        self._set_time = self._bound("SetTime", number)
+        self._set_states = self._bound("SetContinuousStates", place, size)
+        self._get_states = self._bound("GetContinuousStates", place, size)
+        self._get_nominals = self._bound("GetNominalsOfContinuousStates", place, size)
+        self._get_slopes = self._bound(self.SLOPES, place, size)
+        self._get_indicators = self._bound("GetEventIndicators", place, size)
+        self._states, self._indicators = self._sizes()
+        if self._states > MOST_STATES:
+            raise InputError(
+                f"{self.name}: {self.interface.path.name} has {self._states} continuous states; "
+                f"must have {MOST_STATES} at most"
+            )
+        if self._states or self._indicators:
+            sizes = max(self._states, 1), self._indicators  # CVode needs a state; it stays 0
+            self._solver = Cvode(*sizes, self._slopes_at, self._indicators_at, self._chosen)
+            self._x = self._solver.x.ctypes.data
+
+    def _bound(self, name: str, *kinds: Any) -> Any:
+        """A function of the FMU, for its instance."""
+        prototype = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, *kinds)
+        return partial(prototype((self.PREFIX + name, self._slave.dll)), self._slave.component)
+
+    def _slopes_at(self, time: float, states: int, slopes: int) -> int:
+        """The derivatives, for the solver."""
+        status = self._set_time(time)
+        if self._states and status <= WARNING:
+            status = self._set_states(states, self._states)
+            if status <= WARNING:
+                status = self._get_slopes(slopes, self._states)
+        elif status <= WARNING:
+            ctypes.c_double.from_address(slopes).value = 0.0
+        return self._answer(status)
+
+    def _indicators_at(self, time: float, states: int, values: int) -> int:
+        """The event indicators, for the solver."""
+        status = self._set_time(time)
+        if self._states and status <= WARNING:
+            status = self._set_states(states, self._states)
+        if status <= WARNING:
+            status = self._get_indicators(values, self._indicators)
+        return self._answer(status)
+
+    def _answer(self, status: int) -> int:
+        """What a status means to the solver: go on, try a shorter step, or give up."""
+        if status <= WARNING:
+            return 0
+        if status == DISCARD:
+            return 1
+        self._failed = status
+        return -1
+
+    def _indicators_now(self) -> npt.NDArray[np.float64]:
+        values = np.zeros(self._indicators)
+        if self._indicators:
+            self._check(self._get_indicators(values.ctypes.data, self._indicators))
+        return values
+
+    def _check(self, status: int) -> None:
+        if status > WARNING:
+            raise self.failure(status, self._now)
+
+    def _stuck(self, error: CvodeError) -> SimulationError:
+        """The error for a step that the solver could not take."""
+        if self._failed:
+            return self.failure(self._failed, self._now)
+        return self._error(f"cannot be integrated by CVode ({error})", self._now)
+
+
+class _Buffer:
+    """Values of connected inputs: those that the FMU has, and those that are to come."""
+
+    def __init__(self, data: npt.NDArray[Any], call: Call) -> None:
+        self._data, self._call = data, call
+        self._passed = b""
+
+    def changed(self) -> bool:
+        return self._data.tobytes() != self._passed
+
+    def pass_on(self) -> int:
+        self._passed = self._data.tobytes()
+        return self._call.python()
+
+
+class Fmi2Model(ModelInstance, FmuInstance):
+    """One instance of an FMI 2.0 FMU for model exchange."""
+
+    SLAVE = FMU2Model
+    SLOPES = "GetDerivatives"
+
+    def _sizes(self) -> tuple[int, int]:
+        assert self.interface.exchange is not None  # noqa: S101
+        return self.interface.exchange.states, self.interface.exchange.indicators
+
+    def _update(self) -> tuple[bool, bool, bool, bool, bool, float]:
+        return self._slave.newDiscreteStates()  # type: ignore[no-any-return]
+
+    @property
+    def _tells_steps(self) -> bool:
+        return self.interface.capability("completedIntegratorStepNotNeeded") is not True
+
+
+class _Model(Lenient, FMU3Model):  # type: ignore[misc]  # FMPy has no types
+    pass
+
+
+class Fmi3Model(ModelInstance, Fmi3Instance):
+    """One instance of an FMI 3.0 FMU for model exchange."""
+
+    SLOPES = "GetContinuousStateDerivatives"
+
+    def _instantiate(self, folder: Path) -> FMU3Model:
+        model = know_signatures(_Model)(
+            guid=self.interface.guid,
+            unzipDirectory=str(folder),
+            modelIdentifier=self._identifier,
+            instanceName=self.name,
+        )
+        model.instantiate(loggingOn=True, logMessage=self._log)
+        return model
+
+    def _sizes(self) -> tuple[int, int]:
+        return self._slave.getNumberOfContinuousStates(), self._slave.getNumberOfEventIndicators()
+
+    def _update(self) -> tuple[bool, bool, bool, bool, bool, float]:
+        return self._slave.updateDiscreteStates()  # type: ignore[no-any-return]
+
+    @property
+    def _tells_steps(self) -> bool:
+        return self.interface.capability("needsCompletedIntegratorStep") is True

@@ -1,0 +1,51 @@
+/* x' = rate, with one oddity, by the parameter `kind`.
+ *
+ * RELAY: the rate is against x, so that it comes to 0 and chatters there. STEPS: an event after the
+ * fifth step of the solver adds 1 to x. ENDLESS: an event at 0.5 s that never settles. ITERATES: one
+ * there that adds 1 to x in each of three iterations, the first of which alone says so. STANDS: each
+ * event names the next one for now. FAILS, DISCARDS: no slope from x = 0.5 on. NO_NUMBER: it is
+ * none from there.
+ */
+enum { TIME, X, DER_X, RATE, KIND, EVENTS, U, VARIABLES };
+enum { RELAY = 1, STEPS, ENDLESS, ITERATES, STANDS, FAILS, DISCARDS, NO_NUMBER };
+#define STATES 1
+#define INDICATORS 1
+#define INPUT(r) ((r) == U)
+#define TUNABLE(r) false
+static const int state[] = {X}, derivative[] = {DER_X};
+#include "model.h"
+
+static int kind(const Model *m) { return m->v[KIND].Int32; }
+
+static void start(Model *m) {
+    *real(m, RATE) = 1.0;
+    m->v[U].Boolean = false;
+}
+
+static void equations(Model *m) {
+    bool beyond = *real(m, X) > 0.5;
+
+    m->status = beyond && kind(m) == FAILS ? 3 : beyond && kind(m) == DISCARDS ? 2 : 0;
+    *real(m, DER_X) = beyond && kind(m) == NO_NUMBER ? NAN : *real(m, RATE);
+}
+
+static void indicators(const Model *m, double z[]) {
+    z[0] = kind(m) == RELAY ? m->v[X].Float64 : 1.0;
+}
+
+static void event(Model *m) {
+    bool half = m->time == 0.5;
+
+    m->v[EVENTS].Int32++;
+    if (kind(m) == RELAY) *real(m, RATE) = *real(m, X) > 0.0 ? -1.0 : 1.0;
+    if (kind(m) == STANDS) m->next = m->time;
+    if (kind(m) == STEPS && m->steps == 5) *real(m, X) += 1.0;
+    if (kind(m) == ENDLESS || kind(m) == ITERATES) m->next = half ? INFINITY : 0.5;
+    m->again = half && (kind(m) == ENDLESS || (kind(m) == ITERATES && m->v[EVENTS].Int32 < 4));
+    if (half && kind(m) == ITERATES) *real(m, X) += 1.0;
+    m->states_changed = m->again;
+}
+
+static bool completed(Model *m) { return ++m->steps == 5 && kind(m) == STEPS; }
+
+#include FMI
