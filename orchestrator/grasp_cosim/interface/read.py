@@ -15,7 +15,7 @@ from xml.etree.ElementTree import Element
 
 from ..errors import InputError
 from ..files import check_fmu_file
-from .capabilities import KINDS, capabilities_of, kinds_of
+from .capabilities import capabilities_of, kinds_of
 from .document import read_document, unreadable
 from .interface import (
     SETTABLE,
@@ -28,6 +28,7 @@ from .interface import (
     limits,
     typed,
 )
+from .obstacles import of_kind
 from .units import BASE, Unit, known_unit
 
 NUMERIC = ("Real", "Integer")
@@ -71,17 +72,13 @@ def read_interface(path: Path) -> Interface:
 
 @lru_cache(maxsize=64)
 def _for_master(path: Path, identity: tuple[int, ...]) -> Interface:
-    path = path.resolve()
     found = describe(path)
-    if found.version == "1.0":
-        raise InputError(f"{path}: FMI 1.0; must be an FMI 2.0 or 3.0 co-simulation FMU")
-    if "CoSimulation" not in found.kinds:
-        kind = KINDS[next(iter(found.kinds), "ScheduledExecution")]
-        raise InputError(f"{path}: for {kind} only; must be a co-simulation FMU")
+    if obstacle := of_kind(found):
+        raise InputError(f"{path}: {obstacle}")
     if found.flaw:
         raise unreadable(path, found.flaw)
     sources = tuple(v for v in found.variables if not (v.alias and v.causality == "input"))
-    return replace(found, variables=sources)
+    return replace(found, variables=sources, path=path.resolve(), given=path)
 
 
 def describe(path: Path) -> Interface:
