@@ -28,7 +28,7 @@ from .interface import (
     limits,
     typed,
 )
-from .obstacles import of_kind
+from .obstacles import of_binary, of_kind
 from .units import BASE, Unit, known_unit
 
 NUMERIC = ("Real", "Integer")
@@ -79,6 +79,13 @@ def _for_master(path: Path, identity: tuple[int, ...]) -> Interface:
         raise unreadable(path, found.flaw)
     sources = tuple(v for v in found.variables if not (v.alias and v.causality == "input"))
     return replace(found, variables=sources, path=path.resolve(), given=path)
+
+
+def check_runs(path: Path) -> None:
+    """InputError where the FMU at `path` is not for this master, or this machine."""
+    found = describe(path)
+    if obstacle := of_kind(found) or of_binary(found):
+        raise InputError(f"{path}: {obstacle}")
 
 
 def describe(path: Path) -> Interface:
