@@ -4,13 +4,15 @@ import errno
 import json
 import os
 import tempfile
+import zipfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from glob import escape
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
-from .errors import InputError
+from .errors import InputError, choices
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 """Errors of a disk, not of the input."""
@@ -34,10 +36,83 @@ def check_folder(folder: Path) -> None:
         raise InputError(f"--out {folder}: cannot write to {nearest}: {error.strerror}") from error
 
 
-def check_fmu_file(path: Path) -> None:
-    """InputError where there is no file at path."""
+WANTED = {
+    "fmu": "an FMU, a file",
+    "system": "a system, a .toml or .ssp file",
+    "study": "a study, a .toml file, or the name of one that is built in",
+    "run": "a folder that `grasp-cosim run --out` wrote",
+}
+"""What a command may want, in words."""
+
+_SUFFIXES = {"fmu": (".fmu",), "system": (".toml", ".ssp"), "study": (".toml",)}
+_IN_A_RUN = {"run.json", "signals.csv"}
+_IN_AN_ARCHIVE = {"modelDescription.xml": "an FMU", "SystemStructure.ssd": "an SSP archive"}
+
+
+def check_nature(path: Path, wanted: str) -> None:
+    """InputError where there is plainly something else than is wanted, which says what to do then.
+
+    wanted is a key of WANTED. A file of its suffix, or of an unknown content, is not looked into.
+    """
+    found, advice = _nature(path, wanted)
+    if found not in ("", {"fmu": "an FMU", "run": WANTED["run"]}.get(wanted)):
+        raise InputError(f"{path}: is {found}; must be {WANTED[wanted]}{advice and f'; {advice}'}")
+
+
+def _nature(path: Path, wanted: str) -> tuple[str, str]:
+    """What is at a path, and what to do with it; empty where that is not plain."""
+    name, parent = quote(str(path)), quote(str(path.parent))
     if path.is_dir():
-        raise InputError(f"{path}: is a folder; must be an FMU, a file")
+        return _folder_nature(path, wanted)
+    if path.name in _IN_A_RUN and (path.parent / "run.json").is_file():
+        return "a file of a run", f"`grasp-cosim report {parent}` shows the run"
+    found = _archive_nature(path)
+    if found == "an FMU" and wanted == "system":
+        return found, (
+            f"`grasp-cosim init my_system.toml --as NAME={name}` makes a system of it, "
+            f"`grasp-cosim run --swap COMPONENT={name}` puts it into one"
+        )
+    if found == "an FMU":
+        return found, f"`grasp-cosim inspect {name}` shows it"
+    if found and wanted == "system":
+        return ("", "") if path.suffix.lower() == ".ssp" else (found, "its name must end in .ssp")
+    if found:
+        return found, f"`grasp-cosim run {name}` runs it; its FMUs are in it, below resources/"
+    if path.suffix.lower() == ".toml" and path.is_file() and wanted in ("fmu", "run"):
+        return "a TOML file", f"`grasp-cosim run {name}` runs it, if it is a system"
+    return "", ""
+
+
+def _folder_nature(path: Path, wanted: str) -> tuple[str, str]:
+    name = quote(str(path))
+    if (path / "run.json").is_file():
+        return WANTED["run"], f"`grasp-cosim report {name}` shows the run"
+    for file, what in _IN_AN_ARCHIVE.items():
+        if (path / file).is_file():
+            archive = quote(f"{path.resolve().name}.{'fmu' if what == 'an FMU' else 'ssp'}")
+            return (
+                f"a folder, unpacked from {what}",
+                f"`(cd {name} && zip -r - .) > {archive}` packs it again",
+            )
+    suffixes = _SUFFIXES.get(wanted, ())
+    inside = sorted(str(p) for p in path.iterdir() if p.suffix.lower() in suffixes)
+    inside += sorted(str(p.parent) for p in path.glob("*/run.json")) if wanted == "run" else []
+    return "a folder", f"there is: {choices(inside, 6)}" if inside else ""
+
+
+def _archive_nature(path: Path) -> str:
+    """What an archive is by its content; empty for any other file, or one that is damaged."""
+    with suppress(OSError, ValueError, RuntimeError, NotImplementedError, zipfile.BadZipFile):
+        if path.is_file() and zipfile.is_zipfile(path):
+            with zipfile.ZipFile(path) as archive:
+                names = set(archive.namelist())
+            return next((what for file, what in _IN_AN_ARCHIVE.items() if file in names), "")
+    return ""
+
+
+def check_fmu_file(path: Path) -> None:
+    """InputError where there is no file at path, or plainly another one than an FMU."""
+    check_nature(path, "fmu")
     if not path.is_file():
         raise InputError(f"{path}: no such FMU file")
 

@@ -6,6 +6,7 @@ behind by a kill, and the next process that needs one removes it.
 
 import fcntl
 import os
+import re
 import shutil
 import tempfile
 import weakref
@@ -18,6 +19,12 @@ PREFIX = "grasp_scratch_"
 """So the names of our folders begin."""
 
 _OPEN = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
+
+
+def without_scratch(text: str) -> str:
+    """The text without the paths of our temporary folders: files are named as in their archive."""
+    folder = re.escape(tempfile.gettempdir())
+    return re.sub(rf"(file://)?{folder}/({PREFIX}[^/\s]+/)+([0-9a-f]{{64}}/)?", "", text)
 
 
 class ScratchFolder:

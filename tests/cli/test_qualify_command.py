@@ -128,6 +128,7 @@ def test_a_candidate_that_does_not_load_is_no_wrong_input(
     bare = tmp_path / "bare.fmu"
     with zipfile.ZipFile(fmus / "GripperPlant.fmu") as whole, zipfile.ZipFile(bare, "w") as file:
         file.writestr("modelDescription.xml", whole.read("modelDescription.xml"))
+        file.writestr("binaries/linux64/GripperPlant.so", b"no library")
     code, out, _ = qualify(bare, "--as", "plant", *SHORT)
     assert code == 1
     lines = out.splitlines()

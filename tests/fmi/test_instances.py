@@ -235,8 +235,8 @@ def test_without_a_binary_for_this_machine(
     with pytest.raises(InputError) as error:
         load(Component("part", other, {}, isolation=isolation))
     assert str(error.value) == (
-        f"part: {other} does not load: no binary for {ours}; there is: win64; "
-        "`grasp-cosim doctor` says what helps"
+        f"part: {other} has a binary for win64 only; this machine: {ours}; ask the vendor for an "
+        f"FMU with a binary for {ours}"
     )
 
 

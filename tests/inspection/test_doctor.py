@@ -275,7 +275,7 @@ def test_an_fmu_of_another_kind_is_not_loaded(version: str, kinds: str, tmp_path
     found = {f.check: f for f in examine(tmp_path / "n.fmu")}
     assert found["fmu"].status == "problem"
     assert f"FMI {version}" in found["fmu"].text
-    assert "must be FMI 2.0 or 3.0, CoSimulation" in found["fmu"].text
+    assert "ask the vendor for an export as FMI 2.0 or 3.0" in (found["fmu"].fix or "")
     assert found["binary"].status == ("ok" if version == "3.0" else "problem")
     assert found["trial"].status == "warning"
     assert "not loaded" in found["trial"].text
@@ -305,7 +305,7 @@ def test_no_binary_for_this_system(stock: Path, tmp_path: Path) -> None:
     fmu = altered(stock, tmp_path / "windows.fmu", {LINUX64: None})
     found = {f.check: f for f in examine(fmu)}
     assert found["binary"].status == "problem"
-    assert found["binary"].text == f"no {LINUX64}; there is: win64/Stock.dll; this machine: linux64"
+    assert found["binary"].text == "has a binary for win64 only; this machine: linux64"
     assert "pythonfmu 0.7.0" in (found["binary"].fix or "")
     assert "host" not in found
     assert "libraries" not in found
@@ -348,7 +348,7 @@ def test_a_native_fmu_of_either_version_is_tried(version: str, tmp_path: Path) -
 
 def test_no_binary_but_sources(opened: Opened) -> None:
     fmu = opened({LINUX64: None, "sources/all.c": b""})
-    assert doctor.binary(fmu)[2] == "LDFLAGS=-Wl,--no-as-needed,-lm fmpy compile FMU"
+    assert "LDFLAGS=-Wl,--no-as-needed,-lm fmpy compile FMU" in (doctor.binary(fmu)[2] or "")
 
 
 @pytest.mark.parametrize(
@@ -541,7 +541,7 @@ def test_a_temporary_folder_that_crashes_is_predicted_and_found(
     folder = unpack_in("a#b")
     found = {f.check: f for f in examine(stock)}
     assert found["temp folder"].status == found["trial"].status == "problem"
-    assert "crashes with SIGSEGV when instantiated" in found["trial"].text
+    assert "a Python FMU crashes on its characters" in found["trial"].text
     assert list(folder.iterdir()) == []
 
 

@@ -215,9 +215,13 @@ def test_what_makes_no_sense_to_anybody(
 @pytest.mark.parametrize(
     ("before", "after", "message"),
     [
-        ("<CoSimulation", "<ModelExchange", "for model exchange only; must be a co-simulation FMU"),
-        ("<CoSimulation", "<ScheduledExecution", "for scheduled execution only; must be a co-sim"),
-        ('"2.0"', '"1.0"', "FMI 1.0; must be an FMI 2.0 or 3.0 co-simulation FMU"),
+        ("<CoSimulation", "<ModelExchange", "is for model exchange only; ask the vendor for an"),
+        ("<CoSimulation", "<ScheduledExecution", "is for scheduled execution only; ask the vendor"),
+        (
+            '"2.0"',
+            '"1.0"',
+            "is FMI 1.0, for model exchange; ask the vendor for an export as FMI 2.0 or 3.0",
+        ),
     ],
 )
 def test_what_no_master_runs_can_be_described(

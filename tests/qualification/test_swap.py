@@ -407,7 +407,7 @@ def test_what_the_system_refuses_blocks_in_its_words(system: System, tmp_path: P
     result = swap(system, tmp_path / "old.fmu")
     assert result.swapped is None
     assert found(result)[0] == ("blocks", "system", "plant")
-    assert "old.fmu: FMI 1.0; must be" in result.differences[0].text
+    assert "old.fmu: is FMI 1.0, for co-simulation" in result.differences[0].text
     assert {("notes", "missing", "mass"), ("warns", "unit", "gap")} <= set(found(result))
 
 

@@ -26,11 +26,12 @@ import numpy as np
 import numpy.typing as npt
 from fmpy.fmi1 import FMICallException
 
-from ..errors import InputError, SimulationError, choices
+from ..errors import InputError, SimulationError
 from ..files import FULL
 from ..interface.arrays import Element
 from ..interface.interface import Interface, Value, Variable
-from ..scratch import ScratchFolder
+from ..interface.obstacles import of_binary, of_loading
+from ..scratch import ScratchFolder, without_scratch
 from .inputs import Inputs
 from .instance import EARLY, ERROR, FATAL, OK, STATUS, TRANSFER_3, Call, Native
 
@@ -93,6 +94,8 @@ class LoadedInstance(ABC):
         self._said_before = 0  # of these, on longer parts of a step that is divided
         self._read_log()  # forgets what an earlier instance of this name said
         self._folder: ScratchFolder | None = None
+        if obstacle := of_binary(interface):
+            raise InputError(f"{name}: {interface.called} {obstacle}")
         try:
             self._slave = self._load(self._unpacked())
         except BaseException:
@@ -137,10 +140,10 @@ class LoadedInstance(ABC):
         except Exception as error:  # FMPy and zipfile raise whatever they like
             if isinstance(error, OSError) and error.errno in FULL:
                 raise InputError(
-                    f"{self.name}: {self.interface.path} cannot be extracted to {folder}: "
+                    f"{self.name}: {self.interface.called} cannot be extracted to {folder}: "
                     f"{error.strerror}; must have room there, or TMPDIR must be another folder"
                 ) from error
-            raise InputError(f"{self.name}: {self.interface.path} is damaged: {error}") from error
+            raise InputError(f"{self.name}: {self.interface.called} is damaged: {error}") from error
         return folder
 
     def _load(self, folder: Path) -> Any:
@@ -155,8 +158,11 @@ class LoadedInstance(ABC):
         try:
             slave = self._instantiate(folder)
         except Exception as error:  # FMPy raises plain Exception
+            reason = self._reason(error)
+            obstacle = of_loading(self.interface, reason)
             raise InputError(
-                f"{self.name}: {self.interface.path} does not load: {self._reason(error)}"
+                f"{self.name}: {self.interface.called} does not load: {reason}"
+                f"{f'; it {obstacle}' if obstacle else ''}"
             ) from error
         finally:
             os.chdir(here)  # where loading fails, FMPy stays in the library's folder
@@ -361,17 +367,14 @@ class LoadedInstance(ABC):
         return 0.0 if self._clock is None else float(self._clock[0])
 
     def _reason(self, error: Exception) -> str:
-        there = self.interface.platforms
-        ours = fmpy.platform_tuple if self.PREFIX == "fmi3" else fmpy.platform
-        if ours not in there:
-            said = f"no binary for {ours}; there is: {choices(there)}"
-            return f"{said}; `grasp-cosim doctor` says what helps"
-        return as_reason(self._messages()).removeprefix(": ") or " ".join(str(error).split())
+        said = as_reason(self._messages()).removeprefix(": ")
+        return said or without_scratch(" ".join(str(error).split()))
 
     def _messages(self) -> list[str]:
         """Return the logged messages that have not been read yet."""
         own = re.compile(rf"\A{re.escape(self.name)}, t = \S+ s: ")  # so our FMUs begin
         said = [own.sub("", text, count=1) for text in (*self._unread, *self._read_log())]
+        said = [without_scratch(text) for text in said]
         self._unread.clear()
         return [text for text in said if not _PYTHONFMU_PREFIX.match(text)] or said
 

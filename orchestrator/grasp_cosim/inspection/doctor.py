@@ -8,7 +8,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.machinery import ModuleSpec
 from pathlib import Path
 from shlex import quote
@@ -20,6 +20,8 @@ import fmpy
 
 from ..errors import choices
 from ..interface.document import unreadable
+from ..interface.interface import Interface
+from ..interface.obstacles import of_binary, of_kind, of_loading
 from ..interface.read import describe
 from ..scratch import ScratchFolder
 from .packed_imports import imports
@@ -39,16 +41,13 @@ _PACKAGES = {"cv2": "opencv-python", "sklearn": "scikit-learn", "yaml": "pyyaml"
 
 _TRIAL = """
 import sys
-from fmpy.fmi2 import FMU2Slave
-from fmpy.fmi3 import FMU3Slave
-folder, guid, identifier, major = sys.argv[1:]
-slave = FMU3Slave if major == "3" else FMU2Slave
+from pathlib import Path
+from grasp_cosim.fmi.load import load_here
+from grasp_cosim.interface.read import read_interface
 try:
-    fmu = slave(guid=guid, unzipDirectory=folder, modelIdentifier=identifier)
-    fmu.instantiate(loggingOn=True)
+    load_here("trial", read_interface(Path(sys.argv[1]))).close()
 except Exception as error:
     sys.exit(str(error))
-fmu.freeInstance()
 print("freed")
 """
 
@@ -76,7 +75,9 @@ def examine(fmu: Path | None) -> list[Finding]:
         return list(_machine(python=True))
     with ScratchFolder() as scratch:
         unpacked = unpack(fmu, Path(scratch.name))
-        verdicts = {name: check(unpacked) for name, check in CHECKS.items()}
+        tried = trial(unpacked)
+        unpacked = replace(unpacked, loads=tried[0] == "ok")
+        verdicts = {name: check(unpacked) for name, check in CHECKS.items()} | {"trial": tried}
         found = [Finding(name, *verdict) for name, verdict in verdicts.items() if verdict]
         return [*_machine(unpacked.python), *found]
 
@@ -182,16 +183,19 @@ def _processor(path: Path) -> str:
 
 
 HERE = _processor(Path(sys.executable))
-RUNS = re.compile(r"FMI (2\.0|3\.\S+), CoSimulation")
-"""The processor of this Python, and what the master runs."""
+"""The processor of this Python."""
 
 
 def _run(*command: str, timeout: float = 20.0, cwd: Path | None = None) -> tuple[int | None, str]:
-    """Exit code, None where it does not start or end in time, and output of a program."""
+    """Exit code, None where it does not start or end in time, and output of a program.
+
+    In a folder of its own it has its temporary files there, too.
+    """
     try:
         done = subprocess.run(  # noqa: S603  an FMU's code runs: that is the trial
             command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
             encoding="utf-8", errors="replace", cwd=cwd, timeout=timeout, check=False,
+            env=os.environ | ({"TMPDIR": str(cwd)} if cwd else {}),
         )  # fmt: skip
     except (OSError, subprocess.TimeoutExpired):
         return None, ""
@@ -202,17 +206,21 @@ def _run(*command: str, timeout: float = 20.0, cwd: Path | None = None) -> tuple
 class Unpacked:
     """An unpacked FMU: what its description says, and the binary it would have to have here."""
 
+    path: Path
     folder: Path
-    kind: str
-    major: str
-    """Its version of FMI, without the minor one."""
-    tool: str
-    guid: str
+    declared: Interface
     binary: Path
     linked: str
     """Words of the dynamic linker on the binary outside of Python; empty if it cannot tell."""
     python: bool
     """True if pythonfmu made it, in any version."""
+    loads: bool = False
+    """True if the trial has loaded it."""
+
+    @property
+    def tool(self) -> str:
+        """What made it."""
+        return self.declared.tool or "an unknown tool"
 
 
 def unpack(fmu: Path, folder: Path) -> Unpacked:
@@ -226,11 +234,9 @@ def unpack(fmu: Path, folder: Path) -> Unpacked:
     binary = folder / "binaries" / system / f"{found.identifier}{fmpy.sharedLibraryExtension}"
     made = [folder / "resources" / name for name in ("slavemodule.txt", "pythonfmu")]
     return Unpacked(
+        fmu,
         folder,
-        kind=", ".join([f"FMI {found.version}", *found.kinds]),
-        major=found.version[0],
-        tool=found.tool or "an unknown tool",
-        guid=found.guid,
+        found,
         binary=binary,
         linked=_run("env", "LC_ALL=C", "ldd", "-r", str(binary))[1] if LINUX else "",
         python=any(p.exists() for p in made)
@@ -241,15 +247,19 @@ def unpack(fmu: Path, folder: Path) -> Unpacked:
 def description(fmu: Unpacked) -> Verdict:
     """FMI version and kind, and whether FMPy accepts the description."""
     source = "needs Python" if fmu.python else "native, needs no Python"
-    text = f"{fmu.kind}, made by {fmu.tool}; {source}"
-    if not RUNS.match(fmu.kind):
-        text += "; must be FMI 2.0 or 3.0, CoSimulation"
-        return "problem", text, "export it again as FMI 2.0 for co-simulation"
+    kind = ", ".join([f"FMI {fmu.declared.version}", *fmu.declared.kinds])
+    text = f"{kind}, made by {fmu.tool}; {source}"
+    if obstacle := of_kind(fmu.declared):
+        return "problem", f"{text}; {obstacle.what}", obstacle.remedy
     try:
         fmpy.read_model_description(fmu.folder)
     except Exception as error:  # FMPy raises whatever it likes
         text = f"FMPy refuses modelDescription.xml: {' '.join(str(error).split())}"
         return "problem", text, "correct the description where the FMU is made"
+    if "CoSimulation" not in fmu.declared.kinds:
+        text += "; run here by a solver, elsewhere ask the vendor for an export for co-simulation"
+    if tied := of_loading(fmu.declared, ""):
+        return "warning", f"{text}; {tied.what}", tied.remedy
     return "ok", text, None
 
 
@@ -264,10 +274,10 @@ def binary(fmu: Unpacked) -> Verdict:
     if its:
         return "problem", f"{wanted} is {its}; must be {HERE}", f"build it again for {HERE}"
     fix = f"build it again for {ours}"
-    if any(fmu.folder.glob("sources/*.c")):
-        fix = "LDFLAGS=-Wl,--no-as-needed,-lm fmpy compile FMU"  # which links no libm by itself
-    elif fmu.python:
+    if obstacle := of_binary(fmu.declared):
+        again = fmu.python and not fmu.declared.sources
         fix += " (pythonfmu 0.7.0 does for linux64 and win64)"
+        return "problem", obstacle.what, fix if again else obstacle.remedy
     files = choices(f"{path.parent.name}/{path.name}" for path in there)
     return "problem", f"no {wanted}; there is: {files}; this machine: {ours}", fix
 
@@ -331,8 +341,13 @@ def libraries(fmu: Unpacked) -> Verdict | None:
     if newer:
         return "problem", f"not on this system: {choices(newer)}", "build it again on this system"
     if symbols and not missing:
-        fix = "link the binary with the libraries that define them"
-        return "problem", f"undefined symbols: {choices(symbols, 5)}", fix
+        fix, text = (
+            "link the binary with the libraries that define them",
+            f"undefined symbols: {choices(symbols, 5)}",
+        )
+        if fmu.loads:  # a host that has libm, say, has them
+            return "warning", f"{text}; this host has them, others may not", fix
+        return "problem", text, fix
     return "ok", f"the dynamic linker finds all{' others' if missing else ''}", None
 
 
@@ -374,12 +389,12 @@ def modules(fmu: Unpacked) -> Verdict | None:
 
 def trial(fmu: Unpacked, timeout: float = 60.0) -> Verdict:
     """Load, instantiate and free the FMU in a child process, which gets timeout in s."""
-    if not RUNS.match(fmu.kind) or _processor(fmu.binary) != HERE:
-        return "warning", "not loaded: of another kind than this master, or without a binary", None
+    if of_kind(fmu.declared) or _processor(fmu.binary) != HERE:
+        return "warning", "not loaded: of a kind that is not run here, or without a binary", None
     started = time.monotonic()
-    arguments = ["-P", "-u", "-c", _TRIAL, str(fmu.folder), fmu.guid, fmu.binary.stem, fmu.major]
+    arguments = ["-P", "-u", "-c", _TRIAL, str(fmu.path.absolute())]
     code, said = _run(sys.executable, *arguments, timeout=timeout, cwd=fmu.folder)
-    said = said.replace(f"{fmu.folder}/", "").replace("Failed to instantiate model\n", "")
+    said = said.replace(f"{fmu.folder}/", "").replace(f"trial: {fmu.path.absolute()} ", "")
     said = _REPEATED.sub("", said)
     last = ["", *filter(None, map(str.strip, said.splitlines()))][-1]
     if code is None:
@@ -390,15 +405,17 @@ def trial(fmu: Unpacked, timeout: float = 60.0) -> Verdict:
             when = "after it was freed"
         return "problem", f"crashes with {signal.Signals(-code).name} {when}", None
     if code or last != "freed":
-        return "problem", f"does not instantiate: {last or 'no reason given'}", None
+        last = last.removeprefix("does not load: ") or "no reason given"
+        tied = of_loading(fmu.declared, last)
+        return "problem", f"does not instantiate: {last}", tied.remedy if tied else None
     return "ok", f"loads, instantiates and frees in {time.monotonic() - started:.1f} s", None
 
 
 CHECKS: dict[str, Callable[[Unpacked], Verdict | None]] = {
     "fmu": description, "binary": binary, "sources": sources, "host": host, "libraries": libraries,
-    "script": script, "modules": modules, "trial": trial,
+    "script": script, "modules": modules,
 }  # fmt: skip
-"""The checks of an FMU; None where one does not apply."""
+"""The checks of an FMU before or after the trial; None where one does not apply."""
 
 
 def _spec(name: str) -> ModuleSpec | None:

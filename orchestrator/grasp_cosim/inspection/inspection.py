@@ -1,7 +1,5 @@
 """The self-description of any FMU: FMI 1.0, 2.0 or 3.0, from whichever tool."""
 
-import platform
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -9,6 +7,7 @@ from typing import Any
 from ..errors import choices
 from ..interface.capabilities import KINDS
 from ..interface.interface import Variable
+from ..interface.obstacles import this_machine
 from ..interface.read import describe
 
 COLUMNS = (
@@ -70,15 +69,6 @@ def as_text(report: Mapping[str, Any], width: int | None = None) -> str:
     }
     lines = [f"{label:20s}{text}" for label, text in head.items()]
     return "\n".join([*lines, "", *_table([_row(v) for v in report["variables"]], width)])
-
-
-def this_machine(version: str) -> str:
-    """The folder for binaries of this machine in an FMU of that version of FMI."""
-    if not version.startswith("3"):
-        return f"{'win' if sys.platform == 'win32' else sys.platform}{sys.maxsize.bit_length() + 1}"
-    processor = platform.machine().lower()
-    processor = {"amd64": "x86_64", "arm64": "aarch64"}.get(processor, processor)
-    return f"{processor}-{platform.system().lower()}"
 
 
 def _variable(v: Variable) -> dict[str, Any]:

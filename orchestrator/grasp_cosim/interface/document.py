@@ -33,6 +33,9 @@ def read_document(path: Path) -> tuple[ElementTree.Element, tuple[str, ...]]:
     check_fmu_file(path)
     try:
         with zipfile.ZipFile(path) as archive:
+            locked = next((i.filename for i in archive.infolist() if i.flag_bits & 1), None)
+            if locked:
+                raise ValueError(f"{locked} is encrypted; ask the vendor for it without a password")
             entries = {i.filename.replace("\\", "/"): i for i in archive.infolist()}
             if NAME not in entries:
                 raise ValueError(f"no {NAME} at the top of the archive")

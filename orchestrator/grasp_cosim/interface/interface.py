@@ -10,6 +10,7 @@ from typing import Any, Literal, get_args
 
 from ..checks import known
 from ..errors import InputError, choices
+from ..scratch import without_scratch
 from .arrays import MOST_ELEMENTS, Array, Element, element_names, size_of
 from .units import IDENTITY, Conversion, Unit, conversion, known_unit
 
@@ -220,6 +221,13 @@ class Interface:
     flaw: str = ""
     arrays: Mapping[str, Array] = field(default_factory=dict)
     exchange: Exchange | None = None
+    given: Path | None = None
+    """The path by which the user knows it, where that is not `path`."""
+
+    @property
+    def called(self) -> str:
+        """The FMU as messages name it."""
+        return without_scratch(str(self.given or self.path))
 
     @cached_property
     def made(self) -> dict[tuple[Any, ...], "Interface"]:

@@ -15,7 +15,7 @@ from xml.etree.ElementTree import Element
 
 from ..errors import InputError
 from ..files import check_fmu_file
-from .capabilities import KINDS, capabilities_of, kinds_of
+from .capabilities import capabilities_of, kinds_of
 from .document import read_document, unreadable
 from .interface import (
     SETTABLE,
@@ -29,6 +29,7 @@ from .interface import (
     limits,
     typed,
 )
+from .obstacles import of_binary, of_kind
 from .units import BASE, Unit, known_unit
 
 NUMERIC = ("Real", "Integer")
@@ -74,17 +75,20 @@ def read_interface(path: Path) -> Interface:
 
 @lru_cache(maxsize=64)
 def _for_master(path: Path, identity: tuple[int, ...]) -> Interface:
-    path = path.resolve()
     found = describe(path)
-    if found.version == "1.0":
-        raise InputError(f"{path}: FMI 1.0; must be an FMI 2.0 or 3.0 co-simulation FMU")
-    if not {"CoSimulation", "ModelExchange"} & set(found.kinds):
-        kind = KINDS["ScheduledExecution"]
-        raise InputError(f"{path}: for {kind} only; must be for co-simulation or model exchange")
+    if obstacle := of_kind(found):
+        raise InputError(f"{path}: {obstacle}")
     if found.flaw:
         raise unreadable(path, found.flaw)
     sources = tuple(v for v in found.variables if not (v.alias and v.causality == "input"))
-    return replace(found, variables=sources)
+    return replace(found, variables=sources, path=path.resolve(), given=path)
+
+
+def check_runs(path: Path) -> None:
+    """InputError where the FMU at `path` is not for this master, or this machine."""
+    found = describe(path)
+    if obstacle := of_kind(found) or of_binary(found):
+        raise InputError(f"{path}: {obstacle}")
 
 
 def describe(path: Path) -> Interface:

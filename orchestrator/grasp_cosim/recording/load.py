@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from ..checks import choice, is_number
 from ..errors import InputError, choices
+from ..files import check_nature
 from ..interface.units import Conversion, known_unit
 from ..metrics.metric import Metric, Signals, registered
 from ..plain import from_cell
@@ -60,13 +61,23 @@ FORMS = {
 """Types of entries in words; the others are JSON objects."""
 
 
+def run_folder(path: Path) -> Path:
+    """The folder of a run, which one of its files names as well; InputError where it is none."""
+    if path.name in (SIGNALS, SETTINGS) and path.is_file():
+        return path.parent
+    check_nature(path, "run")
+    return path
+
+
 def load_run(folder: str | Path) -> Result:
     """The result in a folder that `run --out` wrote, or is writing: then as far as it got.
+
+    One of its files stands for it.
 
     Metrics are worked out anew from the signals; those of a user's file are as they were recorded.
     InputError where a file is missing or damaged, or the two files are not of the same run.
     """
-    folder = Path(folder)
+    folder = run_folder(Path(folder))
     path = folder / SETTINGS
     written = _settings(path)
     units, types = written["units"], written.get("types", {})

@@ -12,6 +12,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..interface.interface import Value, Variable
+from ..interface.obstacles import of_binary
 from ..interface.read import read_interface
 from ..interface.units import Unit
 from ..system.description import System
@@ -81,6 +82,8 @@ def _notes(system: System) -> Iterable[str]:
     if own:
         yield f"only OSP reads the steps of {', '.join(own)}"
     for component in system.components:
+        if obstacle := of_binary(component.interface):
+            yield f"{component.name}: {component.interface.called} {obstacle.what}"
         for variable in read_interface(component.fmu).of(*_CAUSALITIES):
             if not variable.supported:
                 port = Port(component.name, variable.name)

@@ -8,6 +8,7 @@ from typing import Any
 from .. import extensions
 from ..checks import choice, is_number, number
 from ..errors import InputError, choices
+from ..files import check_nature
 from ..interface.interface import Given
 from .arrays import as_written, by_element, check_arrays
 from .checks import (
@@ -65,6 +66,7 @@ class System(Structure):
         fmus is where the FMUs of a TOML file are, by default beside it; an archive has its own.
         """
         path = Path(path)
+        check_nature(path, "system")
         reader = extensions.readers.get(path.suffix.lower(), extensions.readers[".toml"])
         stimuli = _stimuli(input)
         system: System = reader(path, Path(fmus) if fmus else None, step, stop, stimuli)

@@ -7,6 +7,7 @@ import click
 
 from ...extensions import readers
 from ...files import remove, write_json, write_text
+from ...interface.read import check_runs
 from ...qualification import verdict
 from ...qualification.bands import read_bands
 from ...qualification.qualify import Qualification
@@ -74,6 +75,8 @@ def qualify(
     check_outputs(out, plot=bool(out))
     new = replacements(given, {component: candidate})[component]
     is_file = candidate.suffix.lower() in readers
+    if not is_file:
+        check_runs(candidate)
     with natively(chosen_system(given), native) as system:
         found = run_qualification(
             system,

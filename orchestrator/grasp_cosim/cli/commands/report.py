@@ -6,7 +6,7 @@ import click
 
 from ...errors import InputError
 from ...files import check_folder, remove_parts
-from ...recording.load import load_run
+from ...recording.load import load_run, run_folder
 from ...report.page import write_page
 from ...report.timing import TIMING, draw_result
 from ..frame import PATH, json_option, say, show
@@ -26,6 +26,7 @@ def report(run: Path, out: Path | None, as_json: bool) -> int:
     \b
     Example: grasp-cosim report results
     """
+    run = run_folder(run)
     recorded = load_run(run)
     if recorded.wall_time is None:
         say(f"{run}: unfinished, to t = {recorded.time[-1]:.6g} s")

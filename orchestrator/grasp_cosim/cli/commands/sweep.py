@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from ...errors import InputError
-from ...files import FMU_FOLDER
+from ...files import FMU_FOLDER, check_nature
 from ...numerals import fixed
 from ...report.sweep import draw_sweep
 from ...sweep.limits import Reached, reached
@@ -106,6 +106,7 @@ def sweep(
 def _file(study: str) -> tuple[Path, bool]:
     """The file of a study, given by its path or by its name, where it is a built-in one."""
     path = Path(study)
+    check_nature(path, "study")
     if path.suffix == ".toml" and path.is_file():
         return path, False
     from ...grasp.presets import STUDIES

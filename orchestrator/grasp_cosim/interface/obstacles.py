@@ -1,0 +1,79 @@
+"""What keeps an FMU from running here, by what it declares, and what to ask its vendor for.
+
+The one place that says so: reading a system, loading an instance and `doctor` ask it.
+"""
+
+import platform
+import re
+import sys
+from typing import NamedTuple
+
+from ..errors import choices
+from .capabilities import KINDS
+from .interface import Interface
+
+RUN = ("CoSimulation", "ModelExchange")
+"""The kinds that the master runs, the one it prefers first."""
+
+_LICENCE = re.compile(r"licen[cs]|dongle|flexlm|activation|not activated", re.IGNORECASE)
+
+
+class Obstacle(NamedTuple):
+    """What an FMU is that does not run here, and what would."""
+
+    what: str
+    remedy: str
+
+    def __str__(self) -> str:
+        return f"{self.what}; {self.remedy}"
+
+
+def this_machine(version: str) -> str:
+    """The folder for binaries of this machine in an FMU of that version of FMI."""
+    if not version.startswith("3"):
+        return f"{'win' if sys.platform == 'win32' else sys.platform}{sys.maxsize.bit_length() + 1}"
+    processor = platform.machine().lower()
+    processor = {"amd64": "x86_64", "arm64": "aarch64"}.get(processor, processor)
+    return f"{processor}-{platform.system().lower()}"
+
+
+def of_kind(fmu: Interface) -> Obstacle | None:
+    """The obstacle that no machine removes: a version of FMI or a kind that no master here runs."""
+    wanted = " or ".join(KINDS[kind] for kind in RUN)
+    wanted = f"ask the vendor for an export as FMI 2.0 or 3.0, for {wanted}"
+    kinds = " and ".join(KINDS[kind] for kind in fmu.kinds)
+    if fmu.version == "1.0":
+        return Obstacle(f"is FMI 1.0, for {kinds}", wanted)
+    if not set(RUN) & set(fmu.kinds):
+        return Obstacle(f"is for {kinds} only" if kinds else "declares no kind of FMU", wanted)
+    return None
+
+
+def of_binary(fmu: Interface) -> Obstacle | None:
+    """The obstacle on this machine: the FMU has no binary for it."""
+    here = this_machine(fmu.version)
+    if here in fmu.platforms:
+        return None
+    what = f"has a binary for {choices(fmu.platforms)} only"
+    if not fmu.platforms:
+        what = "is source-only, C without a binary" if fmu.sources else "has no binary at all"
+    remedy = f"ask the vendor for an FMU with a binary for {here}"
+    if fmu.sources:
+        remedy += ", or compile its sources: LDFLAGS=-Wl,--no-as-needed,-lm fmpy compile FMU"
+    return Obstacle(f"{what}; this machine: {here}", remedy)
+
+
+def of_loading(fmu: Interface, said: str) -> Obstacle | None:
+    """What may be the reason where the FMU does not instantiate and says something or nothing."""
+    tool = fmu.tool or "the tool that made it"
+    if _LICENCE.search(said):
+        return Obstacle(
+            "needs a licence on this machine",
+            f"have that of {tool} found here, or ask the vendor for an export that needs none",
+        )
+    if fmu.capability("needsExecutionTool") is True and not fmu.python:  # which always says so
+        return Obstacle(
+            f"is a link to {tool} and needs it here (needsExecutionTool)",
+            "install that and its licence, or ask the vendor for an export that runs by itself",
+        )
+    return None

@@ -1,0 +1,189 @@
+"""FMUs that do not run here: each command says in one line what they are and what to ask for."""
+
+import zipfile
+from pathlib import Path
+
+import pytest
+from conftest import Run
+from grasp_cosim.inspection.doctor import Finding, examine
+from support.native_fmus import build, needs_gcc
+from support.refused import BINARIES, KINDS, changed, linked, refused
+
+SYSTEM = """connections = []
+[experiment]
+step = 0.1
+stop = 1.0
+[components.a]
+fmu = "x.fmu"
+values = { u_Real = 0, u_Integer = 0, u_Boolean = false, u_Enumeration = 1, u_String = "" }
+"""
+NUMBERS = (
+    "Float64",
+    "Float32",
+    "Int8",
+    "UInt8",
+    "Int16",
+    "UInt16",
+    "Int32",
+    "UInt32",
+    "Int64",
+    "UInt64",
+)
+VALUES_3 = ", ".join(f"u_{name} = 0" for name in NUMBERS)
+SYSTEM_3 = SYSTEM.replace("u_Real = 0, u_Integer = 0", VALUES_3)
+
+
+def found(fmu: Path) -> dict[str, Finding]:
+    return {finding.check: finding for finding in examine(fmu)}
+
+
+def one_line(run: tuple[int, str, str], what: str, ask: str) -> None:
+    """It is wrong input, said of x.fmu as it was given, in one line, without a folder of ours."""
+    code, out, err = run
+    assert (code, out) == (2, ""), err
+    line = err.splitlines()[-1]
+    assert "x.fmu" in line
+    assert what in line
+    assert ask in line
+    assert "grasp_scratch" not in err
+    assert "Traceback" not in err
+
+
+@needs_gcc
+@pytest.mark.parametrize("name", KINDS)
+def test_a_kind_that_no_machine_runs(name: str, command: Run, tmp_path: Path) -> None:
+    _, _, what, ask = KINDS[name]
+    fmu = refused(tmp_path, name)
+    verdict = found(fmu)["fmu"]
+    assert verdict.status == "problem"
+    assert what in verdict.text
+    assert ask in (verdict.fix or "")
+    (tmp_path / "s.toml").write_text(SYSTEM)
+    for arguments in (
+        ("run", "s.toml"),
+        ("run", "--swap", "plant=x.fmu"),
+        ("qualify", "x.fmu", "--as", "plant"),
+        ("ssp", "s.toml", "-o", "s.ssp"),
+        ("proxy", "x.fmu", "-o", "p.fmu"),
+        ("serve", "x.fmu", "--port", "0", "--duration", "0.1"),
+    ):
+        one_line(command(*arguments), f"x.fmu: {what}", ask)
+    assert command("inspect", "x.fmu")[0] == 0
+
+
+@pytest.mark.slow
+@needs_gcc
+@pytest.mark.parametrize("name", BINARIES)
+def test_a_binary_for_others(name: str, command: Run, tmp_path: Path) -> None:
+    version, _, what, ask = BINARIES[name]
+    fmu = refused(tmp_path, name)
+    verdict = found(fmu)["binary"]
+    assert verdict.status == "problem"
+    assert what in verdict.text
+    assert ask in (verdict.fix or "")
+    assert ("fmpy compile" in (verdict.fix or "")) == (name == "sources")
+    (tmp_path / "s.toml").write_text(SYSTEM if version == "2.0" else SYSTEM_3)
+    one_line(command("run", "s.toml"), f"a: x.fmu {what}" if name != "windows" else what, ask)
+    one_line(command("run", "s.toml", "--isolation", "process"), what, ask)
+    code, _, err = command("ssp", "s.toml", "-o", "s.ssp")  # which may be for another machine
+    assert code == 0
+    assert what in err
+    one_line(command("run", "s.ssp"), what, ask)
+
+
+@pytest.mark.slow
+def test_a_candidate_with_a_binary_for_others(command: Run, fmus: Path, tmp_path: Path) -> None:
+    changed(
+        fmus / "GripperPlant.fmu",
+        tmp_path / "x.fmu",
+        lambda files: {n: d for n, d in files.items() if "linux" not in n},
+    )
+    for isolation in ("none", "process"):
+        run = command("qualify", "x.fmu", "--as", "plant", "--isolation", isolation, "--python")
+        one_line(run, "x.fmu: has a binary for win64 only", "ask the vendor for an FMU with a bin")
+
+
+@needs_gcc
+def test_what_an_fmu_lacks_is_a_warning_where_this_host_has_it(
+    command: Run, tmp_path: Path
+) -> None:
+    findings = found(linked(tmp_path))
+    assert findings["trial"].status == "ok", findings
+    libraries = findings["libraries"]
+    assert libraries.status == "warning"
+    assert "tanh" in libraries.text
+    assert "this host has them" in libraries.text
+    assert command("doctor", "x.fmu")[0] == 0
+    (tmp_path / "s.toml").write_text(SYSTEM)
+    assert command("run", "s.toml")[0] == 0
+
+
+@pytest.mark.slow
+@needs_gcc
+def test_what_an_fmu_lacks_is_a_problem_where_nobody_has_it(command: Run, tmp_path: Path) -> None:
+    findings = found(linked(tmp_path, missing=True))
+    assert findings["libraries"].status == findings["trial"].status == "problem"
+    assert "no_such_function" in findings["trial"].text
+    (tmp_path / "s.toml").write_text(SYSTEM)
+    for more in ((), ("--isolation", "process")):
+        one_line(command("run", "s.toml", *more), "undefined symbol: no_such_function", "linux64/")
+
+
+@pytest.mark.slow
+@needs_gcc
+def test_an_fmu_of_3_0_for_co_simulation_is_fine(command: Run, tmp_path: Path) -> None:
+    """Also one without the functions of the other kinds, as run takes it."""
+    findings = found(build(tmp_path, "x", "3.0"))
+    assert {findings[check].status for check in ("fmu", "binary", "libraries", "trial")} == {"ok"}
+    assert command("doctor", "x.fmu")[0] == 0
+
+
+@pytest.mark.slow
+@needs_gcc
+def test_one_that_needs_its_tool(command: Run, tmp_path: Path) -> None:
+    capable = {"needsExecutionTool": "true"}
+    build(tmp_path, "x", "2.0", capabilities=capable)
+    verdict = found(tmp_path / "x.fmu")["fmu"]
+    assert verdict.status == "warning"
+    assert "needs it here (needsExecutionTool)" in verdict.text
+    assert "an export that runs by itself" in (verdict.fix or "")
+    changed(
+        tmp_path / "x.fmu",
+        tmp_path / "y.fmu",
+        lambda f: (
+            {n: d.replace(b"{native}", b"{other}") for n, d in f.items() if "/" not in n}
+            | {n: d for n, d in f.items() if "/" in n}
+        ),
+    ).replace(tmp_path / "x.fmu")
+    (tmp_path / "s.toml").write_text(SYSTEM)
+    run = command("run", "s.toml")
+    one_line(run, "x.fmu does not load", "ask the vendor for an export that runs by itself")
+
+
+@pytest.mark.slow
+@needs_gcc
+@pytest.mark.parametrize("isolation", ["none", "process"])
+def test_one_without_its_licence(isolation: str, command: Run, tmp_path: Path) -> None:
+    from support.refused import licensed
+
+    licensed(tmp_path)
+    trial = found(tmp_path / "x.fmu")["trial"]
+    assert trial.status == "problem"
+    assert "No license" in trial.text
+    assert "ask the vendor for an export that needs none" in (trial.fix or "")
+    (tmp_path / "s.toml").write_text(SYSTEM)
+    run = command("run", "s.toml", "--isolation", isolation)
+    one_line(run, "No license for feature X; it needs a licence on this machine", "needs none")
+
+
+def test_one_that_is_encrypted(command: Run, tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "x.fmu", "w") as archive:
+        archive.writestr("modelDescription.xml", "<x/>")
+    data = bytearray((tmp_path / "x.fmu").read_bytes())
+    for mark, place in ((b"PK\x03\x04", 6), (b"PK\x01\x02", 8)):
+        data[data.index(mark) + place] |= 1
+    (tmp_path / "x.fmu").write_bytes(data)
+    (tmp_path / "s.toml").write_text(SYSTEM)
+    for arguments in (("run", "s.toml"), ("doctor", "x.fmu"), ("inspect", "x.fmu")):
+        run = command(*arguments)
+        one_line(run, "modelDescription.xml is encrypted", "ask the vendor for it without a pass")

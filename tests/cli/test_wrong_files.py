@@ -1,0 +1,112 @@
+"""A file of another kind than a command takes: it says what that is and what to do with it."""
+
+import zipfile
+from pathlib import Path
+
+import pytest
+from conftest import Run
+from grasp_cosim import InputError, System, load_run, simulate
+from grasp_cosim.ssp.write import write_ssp
+
+FMU = ("inspect", "{}"), ("doctor", "{}"), ("proxy", "{}", "-o", "p.fmu"), ("serve", "{}")
+FMU = (*FMU, ("run", "--swap", "plant={}"), ("qualify", "{}", "--as", "plant"))
+SYSTEM = ("run", "{}"), ("ssp", "{}", "-o", "out.ssp"), ("qualify", "p.fmu", "--as", "a")
+SYSTEM = (*SYSTEM[:2], (*SYSTEM[2], "--system", "{}"))
+
+
+@pytest.fixture
+def things(grasp: System, fmus: Path, tmp_path: Path) -> Path:
+    """One of each: plant.fmu and my.zip, the same; the folder unpacked; a.ssp; a.toml; run/."""
+    plant = tmp_path / "plant.fmu"
+    plant.write_bytes((fmus / "GripperPlant.fmu").read_bytes())
+    (tmp_path / "my.zip").write_bytes(plant.read_bytes())
+    (tmp_path / "p.fmu").write_bytes(plant.read_bytes())
+    with zipfile.ZipFile(plant) as archive:
+        archive.extractall(tmp_path / "unpacked")
+    write_ssp(grasp, tmp_path / "a.ssp")
+    (tmp_path / "b.zip").write_bytes((tmp_path / "a.ssp").read_bytes())
+    with zipfile.ZipFile(tmp_path / "a.ssp") as archive:
+        archive.extractall(tmp_path / "structure")
+    (tmp_path / "a.toml").write_text("connections = []\n")
+    result = simulate(grasp, step=1e-3, stop=0.002)
+    (tmp_path / "run").mkdir()
+    result.to_json(tmp_path / "run" / "run.json")
+    result.to_csv(tmp_path / "run" / "signals.csv")
+    return tmp_path
+
+
+def refused(run: tuple[int, str, str], given: str, what: str, advice: str) -> None:
+    code, out, err = run
+    assert (code, out) == (2, ""), err
+    line = err.splitlines()[-1]
+    assert line.startswith(f"grasp-cosim: {given}: is {what}; must be "), line
+    assert advice in line
+
+
+@pytest.mark.parametrize("arguments", SYSTEM, ids=" ".join)
+def test_in_the_place_of_a_system(arguments: tuple[str, ...], command: Run, things: Path) -> None:
+    report = "`grasp-cosim report run` shows the run"
+    for given, what, advice in (
+        ("plant.fmu", "an FMU", "`grasp-cosim init my_system.toml --as NAME=plant.fmu` makes a"),
+        ("plant.fmu", "an FMU", "`grasp-cosim run --swap COMPONENT=plant.fmu` puts it into one"),
+        ("my.zip", "an FMU", "--as NAME=my.zip`"),
+        ("b.zip", "an SSP archive", "its name must end in .ssp"),
+        ("unpacked", "a folder, unpacked from an FMU", "zip -r - .) > unpacked.fmu` packs it"),
+        ("structure", "a folder, unpacked from an SSP archive", "> structure.ssp` packs it"),
+        ("run", "a folder that `grasp-cosim run --out` wrote", report),
+        ("run/run.json", "a file of a run", report),
+        ("run/signals.csv", "a file of a run", report),
+        (".", "a folder", "there is: a.ssp, a.toml"),
+    ):
+        run = command(*(part.format(given) for part in arguments))
+        refused(run, given, what, advice)
+
+
+@pytest.mark.parametrize("arguments", FMU, ids=" ".join)
+def test_in_the_place_of_an_fmu(arguments: tuple[str, ...], command: Run, things: Path) -> None:
+    for given, what, advice in (
+        ("unpacked", "a folder, unpacked from an FMU", "zip -r - .) > unpacked.fmu` packs it"),
+        ("run", "a folder that `grasp-cosim run --out` wrote", "`grasp-cosim report run`"),
+        ("run/signals.csv", "a file of a run", "`grasp-cosim report run` shows the run"),
+        (".", "a folder", "there is: p.fmu, plant.fmu"),
+        *(
+            (("a.ssp", "an SSP archive", "`grasp-cosim run a.ssp` runs it; its FMUs are in it"),
+             ("a.toml", "a TOML file", "`grasp-cosim run a.toml` runs it, if it is a system"))
+            if arguments[0] != "qualify" else ()  # which takes a system file with the candidate
+        ),
+    ):  # fmt: skip
+        run = command(*(part.format(given) for part in arguments))
+        refused(run, given, what, advice)
+    assert command("inspect", "my.zip")[0] == 0
+
+
+@pytest.mark.slow
+def test_in_the_place_of_a_run(command: Run, things: Path) -> None:
+    for given in ("run/run.json", "run/signals.csv"):
+        assert command("report", given)[0] == 0
+        assert Path("run/report.html").is_file()
+        Path("run/report.html").unlink()
+        assert load_run(given).metrics["steps"] == 2
+    for given, what, advice in (
+        ("plant.fmu", "an FMU", "`grasp-cosim inspect plant.fmu` shows it"),
+        ("a.ssp", "an SSP archive", "`grasp-cosim run a.ssp` runs it"),
+        ("a.toml", "a TOML file", "`grasp-cosim run a.toml` runs it"),
+        (".", "a folder", "there is: run"),
+    ):
+        refused(command("report", given), given, what, advice)
+    with pytest.raises(InputError, match=r"plant.fmu: is an FMU; must be a folder that"):
+        load_run("plant.fmu")
+
+
+def test_in_the_place_of_a_study(command: Run, things: Path) -> None:
+    refused(command("sweep", "plant.fmu"), "plant.fmu", "an FMU", "`grasp-cosim inspect plant.fmu`")
+    refused(command("sweep", "run"), "run", "a folder that `grasp-cosim run --out` wrote", "report")
+
+
+def test_what_is_damaged_or_unknown_is_said_as_before(command: Run, tmp_path: Path) -> None:
+    (tmp_path / "x.fmu").write_bytes(b"PK\x03\x04")
+    assert "x.fmu: not a readable FMU" in command("inspect", "x.fmu")[2]
+    (tmp_path / "x.toml").write_text("x")
+    assert "x.toml: not readable as TOML" in command("run", "x.toml")[2]
+    assert "none.toml: no such system file" in command("run", "none.toml")[2]
+    assert "none.fmu: no such FMU file" in command("inspect", "none.fmu")[2]

@@ -1,0 +1,136 @@
+"""FMUs that do not run here, each made of one that does by a change of its files."""
+
+import re
+import shutil
+import subprocess
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import fmpy
+
+from .native_fmus import build
+
+Files = dict[str, bytes]
+
+CODE = """
+double ceil(double), atan2(double, double), tanh(double), no_such_function(double);
+double of_libm(double x) { return ceil(x) + atan2(x, 2.0) + tanh(x); }
+#ifdef MISSING
+double missing(double x) { return no_such_function(x); }
+#endif
+"""
+
+
+def _described(before: str, after: str) -> Callable[[Files], Files]:
+    def change(files: Files) -> Files:
+        xml = files["modelDescription.xml"].decode()
+        assert before in xml
+        return files | {"modelDescription.xml": xml.replace(before, after).encode()}
+
+    return change
+
+
+def _moved(folder: str) -> Callable[[Files], Files]:
+    """The binaries for another machine, or as sources."""
+    to = f"binaries/{folder}/native.{'dll' if folder.startswith('win') else 'so'}"
+    to = "sources/native.c" if folder == "sources" else to
+    return lambda files: {re.sub("^binaries/.*", to, name): data for name, data in files.items()}
+
+
+def _without_binary(files: Files) -> Files:
+    return {name: data for name, data in files.items() if not name.startswith("binaries/")}
+
+
+def _one(files: Files) -> Files:
+    """FMI 1.0, which has its kind in an element of its own; of ours that is enough to tell."""
+    xml = files["modelDescription.xml"].decode().replace('fmiVersion="2.0"', 'fmiVersion="1.0"')
+    xml = re.sub("<CoSimulation([^>]*)/>", "", xml)
+    return files | {"modelDescription.xml": xml.encode()}
+
+
+def _one_stepping(files: Files) -> Files:
+    xml = _one(files)["modelDescription.xml"].decode()
+    tool = "<Implementation><CoSimulation_StandAlone><Capabilities/></CoSimulation_StandAlone>"
+    xml = xml.replace("</fmiModelDescription>", f"{tool}</Implementation></fmiModelDescription>")
+    return files | {"modelDescription.xml": xml.encode()}
+
+
+ASK = "ask the vendor for an export as FMI 2.0 or 3.0, for co-simulation"
+HERE, HERE_3 = fmpy.platform, fmpy.platform_tuple
+BINARY, BINARY_3 = (f"ask the vendor for an FMU with a binary for {p}" for p in (HERE, HERE_3))
+
+KINDS: dict[str, tuple[str, Callable[[Files], Files], str, str]] = {
+    "fmi 1.0": ("2.0", _one, "is FMI 1.0, for model exchange", ASK),
+    "fmi 1.0 stepping": ("2.0", _one_stepping, "is FMI 1.0, for co-simulation", ASK),
+    "scheduled": (
+        "3.0",
+        _described("<CoSimulation", "<ScheduledExecution"),
+        "is for scheduled execution only",
+        ASK,
+    ),
+}
+"""What no machine runs: the version, the change, what is said of it, and what to ask for."""
+
+BINARIES: dict[str, tuple[str, Callable[[Files], Files], str, str]] = {
+    "windows": ("2.0", _moved("win64"), f"for win64 only; this machine: {HERE}", BINARY),
+    "arm": ("3.0", _moved("aarch64-linux"), "has a binary for aarch64-linux only", BINARY_3),
+    "sources": ("2.0", _moved("sources"), "is source-only, C without a binary", BINARY),
+    "nothing": ("3.0", _without_binary, "has no binary at all", BINARY_3),
+}
+"""What this machine does not run."""
+
+
+def refused(folder: Path, name: str) -> Path:
+    """The FMU x.fmu of that kind in a folder."""
+    version, change, *_ = (KINDS | BINARIES)[name]
+    return changed(build(folder, "whole", version), folder / "x.fmu", change)
+
+
+def changed(fmu: Path, out: Path, change: Callable[[Files], Files]) -> Path:
+    """A copy of an FMU with its files changed."""
+    with zipfile.ZipFile(fmu) as archive:
+        files = {n: archive.read(n) for n in archive.namelist() if not n.endswith("/")}
+    with zipfile.ZipFile(out, "w") as archive:
+        for name, data in change(files).items():
+            archive.writestr(name, data)
+    return out
+
+
+def linked(folder: Path, missing: bool = False) -> Path:
+    """An FMU whose binary leaves libm undefined, as Dymola's do; or also what is nowhere."""
+    code, binary = folder / "more.c", folder / "linked.so"
+    code.write_text(CODE, "utf-8")
+    sources = Path(__file__).parents[1] / "fmi" / "native" / "fmi2.c"
+    headers = Path(fmpy.__file__).parent / "c-code"
+    gcc = shutil.which("gcc")
+    assert gcc
+    command = [gcc, "-shared", "-fPIC", "-w", "-fno-builtin", f"-I{headers}"]
+    command += ["-DMISSING"] * missing + ["-nostdlib", "-Wl,--unresolved-symbols=ignore-all"]
+    subprocess.run([*command, str(sources), str(code), "-o", str(binary), "-lc"], check=True)
+    place = f"binaries/{HERE}/native{fmpy.sharedLibraryExtension}"
+    whole = build(folder, "whole", "2.0")
+    return changed(whole, folder / "x.fmu", lambda files: files | {place: binary.read_bytes()})
+
+
+def licensed(folder: Path) -> Path:
+    """An FMU that logs that it finds no licence, with the path of its resources, and gives up."""
+    sources = Path(__file__).parents[1] / "fmi" / "native" / "fmi2.c"
+    text = sources.read_text("utf-8")
+    found = re.search(r"fmi2Component fmi2Instantiate\((.*?)\)\s*\{", text, re.DOTALL)
+    assert found
+    names = [part.split()[-1].lstrip("*") for part in found[1].split(",")]
+    refusal = f"""
+    char said[4096];
+    strcpy(said, "No license for feature X");
+    {names[4]}->logger(0, {names[0]}, fmi2Error, "error", said);
+    return 0;
+    """
+    code, binary = folder / "licensed.c", folder / "licensed.so"
+    code.write_text("#include <string.h>\n" + text.replace(found[0], found[0] + refusal), "utf-8")
+    headers = Path(fmpy.__file__).parent / "c-code"
+    command = ["gcc", "-shared", "-fPIC", "-w", f"-I{headers}", str(code), "-o", str(binary)]
+    subprocess.run(command, check=True)
+    place = f"binaries/{HERE}/native{fmpy.sharedLibraryExtension}"
+    whole = build(folder, "whole", "2.0")
+    return changed(whole, folder / "x.fmu", lambda files: files | {place: binary.read_bytes()})
