@@ -12,6 +12,7 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from ..errors import InputError, choices
+from ..interface.expansion import expanded
 from ..interface.interface import Value
 from ..interface.units import known_unit
 from ..system.description import System, in_nanoseconds
@@ -25,8 +26,8 @@ from .network import Carried, Network, Part
 from .notes import Notes
 from .order import flow_order
 from .origin import open_structure
-from .parameters import read_settings
-from .tree import Hop, Path, read_system
+from .parameters import read_settings, read_sizes
+from .tree import Element, Hop, Path, read_system
 from .units import same
 
 
@@ -45,26 +46,25 @@ def read_ssp(
     parts = {e.path: Part(e, e.interface) for e in top.within() if e.interface is not None}
     if not parts:
         raise InputError(f"{top.place}: system {top.name!r} has no components; must have some")
+    systems = {e.path: e for e in top.within() if e.interface is None}
     names = _names(file, parts)
     annotated = _annotated(file, root, names.values())
     given_ns = None if step is None else in_nanoseconds("step", step)
     steps = Steps() if annotated else read_steps(file, root, given_ns)
     extras = annotated or no_extras(names.values(), steps)
-    named = {at: _units(part, extras.components[names[at]]) for at, part in parts.items()}
-    parts = {
-        at: replace(part, interface=part.interface.in_units(named[at], f"{file}: {names[at]}"))
+    parts = _sized(systems, parts, notes)
+    called = {
+        at: _Called(f"{file}: {names[at]}", part, extras.components[names[at]])
         for at, part in parts.items()
     }
-    network = Network({e.path: e for e in top.within() if e.interface is None}, parts)
-    connections = tuple(_connections(network, names, extras))
+    parts = {at: called[at].in_units() for at in parts}
+    network = Network(systems, parts)
+    network.check()
+    connections = tuple(_connections(network, names, called))
     values = read_settings(network)
-    given = []
-    for at_path, part in parts.items():
-        beside = extras.components[names[at_path]]
-        own = {beside.new(name): value for name, value in values.get(at_path, {}).items()}
-        in_units = {beside.new(name): unit for name, unit in named[at_path].items()}
-        more = asdict(beside) | {"units": in_units}
-        given.append(Component(names[at_path], part.interface.path, own, **more))
+    given = [
+        called[at].component(names[at], part, values.get(at, {})) for at, part in parts.items()
+    ]
     stimuli = stimuli or extras.input
     driven = stimuli.columns if stimuli else ()
     decided: list[str] = []
@@ -92,10 +92,55 @@ def read_ssp(
     )
 
 
-def _units(part: Part, beside: Beside) -> dict[str, str]:
-    """The units that are named for variables: by our annotation, or by connectors where the FMU
-    declares none, by the FMU's names.
-    """
+def _sized(
+    systems: Mapping[Path, Element], parts: Mapping[Path, Part], notes: Notes
+) -> dict[Path, Part]:
+    """The parts with their arrays taken apart, of as many elements as the archive's values say."""
+    if not any(v.shape for part in parts.values() for v in part.interface.variables):
+        return dict(parts)
+    with notes.off():  # of the values of elements that are not there yet
+        sizes = read_sizes(Network(systems, parts))
+    return {
+        at: replace(part, interface=expanded(part.interface, sizes.get(at, {})))
+        for at, part in parts.items()
+    }
+
+
+class _Called:
+    """The names of a component's variables, its FMU's and the system's, and units by the latter."""
+
+    def __init__(self, place: str, part: Part, beside: Beside) -> None:
+        self._place, self._part, self._beside = place, part, beside
+        renamed = part.interface.renamed(beside.rename, f"{place}: rename").variables
+        pairs = zip(part.interface.variables, renamed, strict=True)
+        self._new = {own: new for new, own in beside.rename.items()}  # of whole arrays, too
+        self._new |= {own.name: new.name for own, new in pairs}
+        own = {new: own for own, new in self._new.items()}
+        self._units = {
+            **_units(part),
+            **{own.get(name, name): unit for name, unit in beside.units.items()},
+        }
+
+    def new(self, own: str) -> str:
+        """The system's name of a variable of the FMU."""
+        return self._new.get(own, own)
+
+    def in_units(self) -> Part:
+        """The part with the units that the archive names."""
+        return replace(
+            self._part, interface=self._part.interface.in_units(self._units, self._place)
+        )
+
+    def component(self, name: str, part: Part, values: Mapping[str, Value]) -> Component:
+        """The component with these values, by the FMU's names."""
+        own = {self.new(variable): value for variable, value in values.items()}
+        units = {self.new(variable): unit for variable, unit in self._units.items()}
+        more = asdict(self._beside) | {"units": units}
+        return Component(name, part.interface.path, own, **more)
+
+
+def _units(part: Part) -> dict[str, str]:
+    """The units that connectors name for variables that have none in the FMU."""
     variables = part.interface.by_name
     connectors = {
         c.name: c.unit
@@ -103,10 +148,7 @@ def _units(part: Part, beside: Beside) -> dict[str, str]:
         if c.unit and (v := variables.get(c.name)) and v.kind == "Real" and v.unit is None
     }
     meant = {n: (unit, known_unit(unit.name)) for n, unit in connectors.items()}
-    return {
-        **{n: unit.name for n, (unit, known) in meant.items() if known and same(unit, known)},
-        **{beside.rename.get(name, name): unit for name, unit in beside.units.items()},
-    }
+    return {n: unit.name for n, (unit, known) in meant.items() if known and same(unit, known)}
 
 
 def _annotated(file: str, root: Any, names: Collection[str]) -> Extras | None:
@@ -138,7 +180,7 @@ def _names(file: str, parts: Iterable[Path]) -> dict[Path, str]:
 
 
 def _connections(
-    network: Network, names: Mapping[Path, str], extras: Extras
+    network: Network, names: Mapping[Path, str], called: Mapping[Path, _Called]
 ) -> Iterator[Connection]:
     """The connections, in the order of the connections that reach the inputs."""
     for target in network.into:
@@ -147,7 +189,7 @@ def _connections(
         hops = network.trace(target)
         carried = _carried(network, hops)
         source, sink = (
-            Port(names[node.path], extras.components[names[node.path]].new(node.name))
+            Port(names[node.path], called[node.path].new(node.name))
             for node in (hops[0].source, target)
         )
         if network.decided_by_units(hops, carried):
