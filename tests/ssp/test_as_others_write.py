@@ -68,10 +68,15 @@ def test_elements_in_another_order_and_empty_lists_are_said(tmp_path: Path) -> N
     ssd = structure(TOP.replace('name="top">', f'name="top">{annotations}'))
     loaded = load(tmp_path, ssd)
     assert loaded.connections == Y_TO_U
-    assert (
-        "hand.ssp: SystemStructure.ssd: elements are not in the order of the schema, or are empty "
-        "lists" in loaded.notes
-    )
+    said = "elements are not in the order of the schema, or empty where it wants more"
+    assert f"hand.ssp: SystemStructure.ssd: {said}" in loaded.notes
+
+
+def test_an_enumeration_without_a_name_is_that_of_the_fmu(tmp_path: Path) -> None:
+    modes = fmu("output Enumeration y -", "input Enumeration u 1")
+    top = TOP.replace("<ssc:Real/>", "<ssc:Enumeration/>")
+    loaded = System.load(archive(tmp_path, structure(top), {"a": modes, "b": modes}))
+    assert loaded.connections == Y_TO_U
 
 
 def test_two_lists_where_there_may_be_one_are_refused(tmp_path: Path) -> None:

@@ -93,16 +93,19 @@ def checked(place: str, root: Any, form: str, notes: Notes) -> Any:
         _tidy(root)
         if not schema.validate(root):
             raise InputError(f"{place}:{error.line}: against the schema: {short(error.message)}")
-        notes.add(place, "elements are not in the order of the schema, or are empty lists")
+        notes.add(
+            place, "elements are not in the order of the schema, or empty where it wants more"
+        )
     return root
 
 
 def _tidy(root: Any) -> None:
-    """Put the elements into the order of the schema, without empty lists."""
+    """Put the elements into the order of the schema, without what is empty and must not be."""
     for element in list(root.iter()):
-        name = etree.QName(element).localname
-        if name in _LISTS and len(element) == 0 and element.getparent() is not None:
-            element.getparent().remove(element)
+        name, parent = etree.QName(element).localname, element.getparent()
+        nameless = name == "Enumeration" and not element.attrib
+        if parent is not None and len(element) == 0 and (name in _LISTS or nameless):
+            parent.remove(element)
         else:
             element[:] = sorted(element, key=_place)
 
