@@ -7,7 +7,7 @@ here, as orchestrator/README.md describes, and said in the notes of the system.
 import math
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import asdict, replace
+from dataclasses import fields, replace
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -135,7 +135,7 @@ class _Called:
         """The component with these values, by the FMU's names."""
         own = {self.new(variable): value for variable, value in values.items()}
         units = {self.new(variable): unit for variable, unit in self._units.items()}
-        more = asdict(self._beside) | {"units": units}
+        more = {f.name: getattr(self._beside, f.name) for f in fields(Beside)} | {"units": units}
         return Component(name, part.interface.path, own, **more)
 
 
