@@ -83,6 +83,7 @@ def checked(place: str, root: Any, form: str, notes: Notes) -> Any:
         raise InputError(f"{at(place, root)}: {short(root.tag)}: must be {ROOTS[form]}")
     version = root.get("version", "").strip()
     if version == "2.0":
+        notes.add(place, "of SSP 2.0, read as far as it is shared with 1.0")
         as_version_1(place, root, notes)
     elif not _VERSION_1.fullmatch(version):
         raise InputError(f"{at(place, root)}: SSP version {version!r}; must be '1.0' or '2.0'")
@@ -90,12 +91,11 @@ def checked(place: str, root: Any, form: str, notes: Notes) -> Any:
     schema = _schema(form)
     if not schema.validate(root):
         error = schema.error_log[0]
+        as_version_1(place, root, notes)
         _tidy(root)
         if not schema.validate(root):
             raise InputError(f"{place}:{error.line}: against the schema: {short(error.message)}")
-        notes.add(
-            place, "elements are not in the order of the schema, or empty where it wants more"
-        )
+        notes.add(place, f"taken although not as the schema has it: {short(error.message)}")
     return root
 
 

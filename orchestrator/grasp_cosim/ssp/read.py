@@ -74,6 +74,7 @@ def read_ssp(
         decided.append(f"order of execution: {', '.join(c.name for c in components)}")
     stop_ns = _stop(file, root, parts.values(), stop, decided)
     step_ns = _step(file, parts.values(), stop_ns, given_ns, annotated, steps, decided)
+    used = {TYPE, *FOREIGN} if annotated or steps.base_ns else {TYPE}
     return System(
         archive.place,
         components,
@@ -84,7 +85,7 @@ def read_ssp(
         extras.events,
         extras.faults,
         extras.initialisation,
-        (*_unused(archive, root), *_renamed(names), *notes.lines(), *decided),
+        (*_unused(archive, root, used), *_renamed(names), *notes.lines(), *decided),
         extras.roles,
         extras.presets,
         extras.diverging,
@@ -302,13 +303,16 @@ def _step(
     )
 
 
-def _unused(archive: Archive, root: Any) -> Iterator[str]:
-    """Yield a note for each part of the archive that has no bearing on the run."""
+def _unused(archive: Archive, root: Any, used: Collection[str]) -> Iterator[str]:
+    """Yield a note for each part of the archive that has no bearing on the run.
+
+    used are the types of the annotations that were read.
+    """
     for name in archive.names:
         if name.endswith(".ssd") and "/" not in name and name != STRUCTURE:
             yield f"variant {name} is not used; {STRUCTURE} is"
     types = Counter(annotation.get("type") for annotation in root.iter(qualified("ssc:Annotation")))
-    for kind in sorted(set(types) - {TYPE, *FOREIGN}):
+    for kind in sorted(set(types) - set(used)):
         yield f"annotations of type {kind!r} are not used ({types[kind]})"
 
 

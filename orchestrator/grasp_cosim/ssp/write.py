@@ -119,7 +119,7 @@ def _added(entries: dict[str, bytes], stem: str, suffix: str, data: bytes) -> st
 
 
 def _structure(system: System, sources: Mapping[str, str], bindings: Mapping[str, str]) -> Any:
-    name = Path(system.name).stem
+    name = re.sub(r"\W|^(?=\d)", "_", Path(system.name).stem, flags=re.ASCII)  # as OMSimulator asks
     attributes = {"version": VERSION, "name": name, "generationTool": _TOOL}
     root = new("ssd:SystemStructureDescription", PREFIXES, **attributes)
     top = add(root, "ssd:System", name=name)
