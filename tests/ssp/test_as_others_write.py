@@ -68,10 +68,25 @@ def test_elements_in_another_order_and_empty_lists_are_said(tmp_path: Path) -> N
     ssd = structure(TOP.replace('name="top">', f'name="top">{annotations}'))
     loaded = load(tmp_path, ssd)
     assert loaded.connections == Y_TO_U
-    assert (
-        "hand.ssp: SystemStructure.ssd: elements are not in the order of the schema, or are empty "
-        "lists" in loaded.notes
+    (said,) = (note for note in loaded.notes if "schema" in note)
+    assert said.startswith(
+        "hand.ssp: SystemStructure.ssd: taken although not as the schema has it: Element 'ssd:Conn"
     )
+    assert "\n" not in said
+
+
+def test_parts_of_2_in_an_archive_of_1(tmp_path: Path) -> None:
+    """They are as in SSP 2.0, and refused as there."""
+    assert load(tmp_path, structure(TOP.replace("ssc:Real", "ssc:Float64"))).connections == Y_TO_U
+    with pytest.raises(InputError, match="'y': Dimension: arrays of SSP 2"):
+        load(tmp_path, structure(TOP.replace("<ssc:Real/>", "<ssc:Real/><ssc:Dimension/>", 1)))
+
+
+def test_an_enumeration_without_a_name_is_that_of_the_fmu(tmp_path: Path) -> None:
+    modes = fmu("output Enumeration y -", "input Enumeration u 1")
+    top = TOP.replace("<ssc:Real/>", "<ssc:Enumeration/>")
+    loaded = System.load(archive(tmp_path, structure(top), {"a": modes, "b": modes}))
+    assert loaded.connections == Y_TO_U
 
 
 def test_two_lists_where_there_may_be_one_are_refused(tmp_path: Path) -> None:

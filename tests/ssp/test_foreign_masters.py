@@ -124,12 +124,32 @@ def test_ecos_finds_the_same_contacts(jacobi: System, tmp_path: Path) -> None:
     check(gaps(ECOS, path, jacobi), jacobi)
 
 
+def unpacked(system: System, folder: Path) -> Path:
+    """The archive as libcosim takes it."""
+    write_ssp(system, folder / "grasp.ssp")
+    with zipfile.ZipFile(folder / "grasp.ssp") as file:
+        file.extractall(folder / "unpacked")
+    return folder / "unpacked"
+
+
+needs_libcosim = pytest.mark.skipif(
+    not importlib.util.find_spec("libcosimpy"), reason="libcosimpy is missing"
+)
+
+
 @pytest.mark.slow
-@pytest.mark.skipif(not importlib.util.find_spec("libcosimpy"), reason="libcosimpy is missing")
+@needs_libcosim
 def test_libcosim_finds_the_same_contacts(jacobi: System, tmp_path: Path) -> None:
-    path = tmp_path / "grasp.ssp"
-    write_ssp(jacobi, path)
-    folder = tmp_path / "unpacked"
-    with zipfile.ZipFile(path) as file:
-        file.extractall(folder)
-    check(gaps(COSIM, folder, jacobi), jacobi)  # in the step that our archive names for it
+    """In the step that our archive names for it."""
+    check(gaps(COSIM, unpacked(jacobi, tmp_path), jacobi), jacobi)
+
+
+@pytest.mark.slow
+@needs_libcosim
+def test_libcosim_takes_the_step_of_a_component(fmus: Path, tmp_path: Path) -> None:
+    grasp = System.load(SYSTEM, fmus).with_experiment(STEP, 2.5, scheme="jacobi")
+    parts = (
+        replace(c, step_ns=5_000_000) if c.name == "controller" else c for c in grasp.components
+    )
+    own = replace(grasp, components=tuple(parts))
+    check(gaps(COSIM, unpacked(own, tmp_path), own), own)

@@ -121,6 +121,26 @@ def test_what_we_write_is_where_the_two_look_for_it(grasp: System, tmp_path: Pat
     assert hint.get("value") == "0.001"
 
 
+def test_a_step_that_varies_is_not_taken_and_said(tmp_path: Path) -> None:
+    varies = annotation("org.openmodelica", '<oms:VariableStepMaster description="oms-mav"/>')
+    loaded = load(tmp_path, top=varies)
+    assert (loaded.step_ns, loaded.scheme) == (10_000_000, "sequential")
+    assert "annotations of type 'org.openmodelica' are not used (1)" in loaded.notes
+
+
+@pytest.mark.parametrize(
+    ("file", "name"), [("my-2nd grasp.toml", "my_2nd_grasp"), ("3.toml", "_3")]
+)
+def test_names_of_systems_are_identifiers(
+    grasp: System, tmp_path: Path, file: str, name: str
+) -> None:
+    """Else OMSimulator refuses them."""
+    write_ssp(replace(grasp, name=file), tmp_path / "a.ssp")
+    with zipfile.ZipFile(tmp_path / "a.ssp") as archived:
+        root = etree.fromstring(archived.read("SystemStructure.ssd"))
+    assert (root.get("name"), root[0].get("name")) == (name, name)
+
+
 def test_our_annotation_is_read_where_earlier_archives_have_it(
     grasp: System, tmp_path: Path
 ) -> None:

@@ -108,3 +108,35 @@ def test_what_contains_itself_is_refused(tmp_path: Path) -> None:
     loop = structure(system("s", component("b", type=DEFINITION, source="x.ssd")))
     with pytest.raises(InputError, match=r"^hand\.ssp: resources/x\.ssd: contains itself; must no"):
         load(tmp_path, "resources/x.ssd", {"resources/x.ssd": loop.replace("input in", "")})
+
+
+def again(inside: str = "") -> str:
+    """A system with the id S, and a component that is another one like it."""
+    shared = system("first", component("b", "input u") + inside, connect("in", "b/u"), "input in")
+    shared = shared.replace('name="first"', 'name="first" id="S"')
+    more = component("second", "input in", type=DEFINITION, source="#S")
+    return system("top", component("a", "output y") + shared + more, connect("a/y", "second/in"))
+
+
+def test_a_system_of_the_same_document_by_its_id(tmp_path: Path) -> None:
+    loaded = System.load(archive(tmp_path, structure(again()), {"a": GIVES, "b": TAKES}))
+    assert [c.name for c in loaded.components] == ["a", "first_b", "second_b"]
+    assert loaded.connections == (Connection(Port("a", "y"), Port("second_b", "u")),)
+
+
+@pytest.mark.parametrize(
+    ("inside", "source", "message"),
+    [
+        ("", "#T", "component 'second': source '#T': no system of the id 'T'; valid: S"),
+        (
+            component("loop", type=DEFINITION, source="#S"),
+            "#S",
+            "SystemStructure.ssd#S: contains itself; must not",
+        ),
+    ],
+)
+def test_ids_that_are_refused(tmp_path: Path, inside: str, source: str, message: str) -> None:
+    ssd = structure(again(inside).replace('"#S"', f'"{source}"'))
+    with pytest.raises(InputError, match=r"^hand\.ssp: ") as error:
+        System.load(archive(tmp_path, ssd, {"a": GIVES, "b": TAKES}))
+    assert message in str(error.value)

@@ -24,7 +24,17 @@ from grasp_cosim.system.parts import (
     Port,
 )
 from lxml import etree  # type: ignore[import-untyped]
-from ssp.hand_made import archive, changed, component, connect, fmu, structure, system
+from ssp.hand_made import (
+    archive,
+    bind,
+    changed,
+    component,
+    connect,
+    fmu,
+    parameter_set,
+    structure,
+    system,
+)
 from support.native_fmus import needs_gcc
 from support.stimuli import driven
 
@@ -298,6 +308,73 @@ def test_a_whole_number_that_ssp_does_not_hold_is_refused(tmp_path: Path) -> Non
     assert round_trip(narrow, tmp_path) == narrow
     notes = write_ssp(narrow, tmp_path / "narrow.ssp").notes
     assert notes[-1] == "c.b is of type Binary: it has no connector"
+
+
+def filters(folder: Path) -> Path:
+    """An FMU of FMI 3.0 with arrays of n = 2 elements or more, in m, and a matrix."""
+    path = folder / "filters.fmu"
+    description = b"""<fmiModelDescription fmiVersion="3.0" modelName="f" instantiationToken="{}">
+      <CoSimulation modelIdentifier="f"/><UnitDefinitions><Unit name="m"><BaseUnit m="1"/></Unit>
+      </UnitDefinitions><ModelVariables>
+      <UInt64 name="n" valueReference="1" causality="structuralParameter" variability="fixed"
+      start="2"/>
+      <Float64 name="Ins" valueReference="2" causality="input" unit="m" start="0.0">
+      <Dimension valueReference="1"/></Float64>
+      <Float64 name="Outs" valueReference="3" causality="output" unit="m">
+      <Dimension valueReference="1"/></Float64>
+      <Float64 name="A" valueReference="4" causality="parameter" variability="fixed" start="1.0">
+      <Dimension start="2"/><Dimension start="2"/></Float64>
+      </ModelVariables><ModelStructure><Output valueReference="3"/></ModelStructure>
+      </fmiModelDescription>"""
+    with zipfile.ZipFile(path, "w") as file:
+        file.writestr("modelDescription.xml", description)
+    return path
+
+
+def test_arrays_of_a_given_size_come_back(tmp_path: Path) -> None:
+    """Under other names, whole or by elements, with units, values and connections of elements."""
+    path = filters(tmp_path)
+    first = Component(
+        "a", path, {"n": 3, "in[3]": 5.0, "A[1,2]": 7.0}, {"in": "Ins", "out": "Outs"}
+    )
+    second = Component(
+        "b", path, {"n": 3}, {"y": "Outs[1]", "u": "Ins"}, units={"u": "mm", "y": "cm"}
+    )
+    ports = [(f"out[{i}]", f"u[{i}]") for i in (1, 2, 3)]
+    connections = tuple(
+        Connection(Port("a", start), Port("b", end), 1000.0, 0.0) for start, end in ports
+    )
+    values = {"in[1]": 0.0, "in[2]": 0.0, **first.values}
+    whole = System(
+        "f.toml",
+        (replace(first, values=values), second),
+        connections,
+        1_000_000,
+        1_000_000_000,
+        "sequential",
+    )
+    again = round_trip(whole, tmp_path)
+    assert again == whole
+    with zipfile.ZipFile(tmp_path / "again.ssp") as file:
+        text = file.read("SystemStructure.ssd").decode()
+    assert 'startConnector="Outs[3]" endElement="b" endConnector="Ins[3]"' in text
+
+
+def test_an_archive_of_others_says_how_many_elements_there_are(tmp_path: Path) -> None:
+    inner = filters(tmp_path)
+    with zipfile.ZipFile(inner) as file:
+        description = file.read("modelDescription.xml")
+    given = bind(parameter_set("n Integer 4; Ins[4] Real 2.5", units=""))
+    parts = component("a", "output Outs[4] Real m") + component(
+        "b", "input Ins[3]; input Ins[4]", given
+    )
+    four = bind(parameter_set("a.n Integer 4"))
+    top = system(
+        "top", parts.replace("/a.fmu", "/b.fmu"), connect("a/Outs[4]", "b/Ins[3]"), "", four
+    )
+    loaded = System.load(archive(tmp_path, structure(top), {"b": description}), step=0.1)
+    assert loaded.components[1].values["Ins[4]"] == 2.5
+    assert loaded.connections[0].target == Port("b", "Ins[3]")
 
 
 def test_only_an_ssp_file_is_written(grasp: System, tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""SSP 1.0, System Structure and Parameterization, both ways: system to archive and back.
+"""SSP, System Structure and Parameterization: systems to archives of 1.0, archives to systems.
 
 Imports recording, system, interface and the ground floor. lxml reads and writes the XML, with the
 official schemas that FMPy brings along. The two libraries for SSP do not serve: fmpy.ssp (0.3.32)

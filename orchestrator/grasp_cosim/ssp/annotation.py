@@ -38,10 +38,6 @@ class Beside:
     units: Mapping[str, str] = field(default_factory=dict)
     solver: Solver | None = None
 
-    def new(self, own: str) -> str:
-        """Return the system's name of a variable of the FMU."""
-        return next((name for name, renamed in self.rename.items() if renamed == own), own)
-
 
 @dataclass(frozen=True, slots=True)
 class Extras:

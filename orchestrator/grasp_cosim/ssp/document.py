@@ -83,6 +83,7 @@ def checked(place: str, root: Any, form: str, notes: Notes) -> Any:
         raise InputError(f"{at(place, root)}: {short(root.tag)}: must be {ROOTS[form]}")
     version = root.get("version", "").strip()
     if version == "2.0":
+        notes.add(place, "of SSP 2.0, read as far as it is shared with 1.0")
         as_version_1(place, root, notes)
     elif not _VERSION_1.fullmatch(version):
         raise InputError(f"{at(place, root)}: SSP version {version!r}; must be '1.0' or '2.0'")
@@ -90,19 +91,21 @@ def checked(place: str, root: Any, form: str, notes: Notes) -> Any:
     schema = _schema(form)
     if not schema.validate(root):
         error = schema.error_log[0]
+        as_version_1(place, root, notes)
         _tidy(root)
         if not schema.validate(root):
             raise InputError(f"{place}:{error.line}: against the schema: {short(error.message)}")
-        notes.add(place, "elements are not in the order of the schema, or are empty lists")
+        notes.add(place, f"taken although not as the schema has it: {short(error.message)}")
     return root
 
 
 def _tidy(root: Any) -> None:
-    """Put the elements into the order of the schema, without empty lists."""
+    """Put the elements into the order of the schema, without what is empty and must not be."""
     for element in list(root.iter()):
-        name = etree.QName(element).localname
-        if name in _LISTS and len(element) == 0 and element.getparent() is not None:
-            element.getparent().remove(element)
+        name, parent = etree.QName(element).localname, element.getparent()
+        nameless = name == "Enumeration" and not element.attrib
+        if parent is not None and len(element) == 0 and (name in _LISTS or nameless):
+            parent.remove(element)
         else:
             element[:] = sorted(element, key=_place)
 

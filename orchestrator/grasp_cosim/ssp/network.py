@@ -45,15 +45,13 @@ class Carried:
 
 @dataclass(frozen=True)
 class Network:
-    """All systems and components by path, and the hops between their connectors.
-
-    InputError at a connector that its FMU lacks.
-    """
+    """All systems and components by path, and the hops between their connectors."""
 
     systems: Mapping[Path, Element]
     parts: Mapping[Path, Part]
 
-    def __post_init__(self) -> None:
+    def check(self) -> None:
+        """InputError at a connector that its FMU lacks."""
         for part in self.parts.values():
             _check_connectors(part)
 

@@ -1,5 +1,8 @@
 """The notes of an archive: what was decided or passed over in reading it, and where."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 
 class Notes:
     """Texts with their places; the same text of several places is one line."""
@@ -12,6 +15,15 @@ class Notes:
         places = self._places.setdefault(text, [])
         if place not in places:
             places.append(place)
+
+    @contextmanager
+    def off(self) -> Iterator[None]:
+        """Note nothing meanwhile."""
+        kept = {text: list(places) for text, places in self._places.items()}
+        try:
+            yield
+        finally:
+            self._places = kept
 
     def lines(self) -> list[str]:
         """The notes in the order of their first places."""

@@ -39,6 +39,13 @@ class Origin:
         """The entry of a source, relative to the document."""
         return self.archive.resolve(place, uri, dirname(self.entry))
 
+    def inside(self, fragment: str = "") -> "Origin":
+        """The same, in what is nested in it; InputError where that is nested in itself."""
+        place = f"{self.place}{fragment}"
+        if place in self.around:
+            raise InputError(f"{place}: contains itself; must not")
+        return replace(self, around=(*self.around, place))
+
     def unit(self, place: str, name: str | None, own: str | None) -> Unit | None:
         """The unit of that name, None for none; own is how the FMU names it, if it does.
 
@@ -89,9 +96,6 @@ def open_structure(
     archive: Archive, notes: Notes, entry: str = STRUCTURE, around: tuple[str, ...] = ()
 ) -> tuple[Origin, Any]:
     """The structure of an archive: where its elements stand, and its root."""
-    origin = Origin(archive, entry, notes)
-    if origin.place in around:
-        raise InputError(f"{origin.place}: contains itself; must not")
+    origin = Origin(archive, entry, notes, around=around).inside()
     root = parse(origin.place, archive.read(entry), "ssd", notes)
-    units = read_units(origin.place, root, "ssd")
-    return replace(origin, units=units, around=(*around, origin.place)), root
+    return replace(origin, units=read_units(origin.place, root, "ssd")), root

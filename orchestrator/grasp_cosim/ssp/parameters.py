@@ -73,6 +73,29 @@ def read_settings(network: Network) -> dict[Path, dict[str, Value]]:
 
     By the path of the component and the FMU's name of the variable.
     """
+    values: dict[Path, dict[str, Value]] = {}
+    for end, parameter in _settled(network):
+        value, source = _value(network, end, parameter), network.output(end)
+        if source:
+            text = f"{end} is connected to {source}; not used"
+            parameter.origin.notes.add(parameter.place, text)
+        else:
+            values.setdefault(end.path, {})[end.name] = value
+    return values
+
+
+def read_sizes(network: Network) -> dict[Path, dict[str, Value]]:
+    """The same of structural parameters alone, on which depends how many elements arrays have."""
+    sizes: dict[Path, dict[str, Value]] = {}
+    for end, parameter in _settled(network):
+        variable = network.parts[end.path].interface.by_name.get(end.name)
+        if variable and variable.causality == "structuralParameter":
+            sizes.setdefault(end.path, {})[end.name] = _value(network, end, parameter)
+    return sizes
+
+
+def _settled(network: Network) -> Iterator[tuple[Node, Parameter]]:
+    """Yield the variables that are given a value, and the one that holds."""
     given: dict[Node, Parameter] = {}
     for element, origin, binding in _bindings(network):
         place = f"{at(origin.place, binding)}: {element.name!r}"
@@ -83,18 +106,10 @@ def read_settings(network: Network) -> dict[Path, dict[str, Value]]:
             if not nodes:
                 text = f"no {entry.name!r} to give it to; not used"
                 origin.notes.add(entry.parameter.place, text)
-    values: dict[Path, dict[str, Value]] = {}
     for node in given:
         network.trace(node)  # refuses circles, in which there are no ends
         for end in _ends(network, node):
-            parameter = _arriving(network, end, given)
-            value, source = _value(network, end, parameter), network.output(end)
-            if source:
-                text = f"{end} is connected to {source}; not used"
-                parameter.origin.notes.add(parameter.place, text)
-            else:
-                values.setdefault(end.path, {})[end.name] = value
-    return values
+            yield end, _arriving(network, end, given)
 
 
 def _bindings(network: Network) -> Iterator[tuple[Element, Origin, Any]]:

@@ -12,6 +12,7 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from ..errors import InputError, choices
+from ..interface.expansion import expanded
 from ..interface.interface import Value
 from ..interface.units import known_unit
 from ..system.description import System, in_nanoseconds
@@ -25,8 +26,8 @@ from .network import Carried, Network, Part
 from .notes import Notes
 from .order import flow_order
 from .origin import open_structure
-from .parameters import read_settings
-from .tree import Hop, Path, read_system
+from .parameters import read_settings, read_sizes
+from .tree import Element, Hop, Path, read_system
 from .units import same
 
 
@@ -45,28 +46,25 @@ def read_ssp(
     parts = {e.path: Part(e, e.interface) for e in top.within() if e.interface is not None}
     if not parts:
         raise InputError(f"{top.place}: system {top.name!r} has no components; must have some")
+    systems = {e.path: e for e in top.within() if e.interface is None}
     names = _names(file, parts)
     annotated = _annotated(file, root, names.values())
     given_ns = None if step is None else in_nanoseconds("step", step)
     steps = Steps() if annotated else read_steps(file, root, given_ns)
     extras = annotated or no_extras(names.values(), steps)
-    named = {at: _units(part, extras.components[names[at]]) for at, part in parts.items()}
-    parts = {
-        at: replace(part, interface=part.interface.in_units(named[at], f"{file}: {names[at]}"))
+    parts = _sized(systems, parts, notes)
+    called = {
+        at: _Called(f"{file}: {names[at]}", part, extras.components[names[at]])
         for at, part in parts.items()
     }
-    network = Network({e.path: e for e in top.within() if e.interface is None}, parts)
-    connections = tuple(_connections(network, names, extras))
+    parts = {at: called[at].in_units() for at in parts}
+    network = Network(systems, parts)
+    network.check()
+    connections = tuple(_connections(network, names, called))
     values = read_settings(network)
-    given = []
-    for at_path, part in parts.items():
-        beside = extras.components[names[at_path]]
-        own = {beside.new(name): value for name, value in values.get(at_path, {}).items()}
-        in_units = {beside.new(name): unit for name, unit in named[at_path].items()}
-        more = {f.name: getattr(beside, f.name) for f in fields(beside)} | {"units": in_units}
-        if part.element.exchange and "CoSimulation" in part.interface.kinds:
-            more["solver"] = beside.solver or Solver()
-        given.append(Component(names[at_path], part.interface.path, own, **more))
+    given = [
+        called[at].component(names[at], part, values.get(at, {})) for at, part in parts.items()
+    ]
     stimuli = stimuli or extras.input
     driven = stimuli.columns if stimuli else ()
     decided: list[str] = []
@@ -76,6 +74,7 @@ def read_ssp(
         decided.append(f"order of execution: {', '.join(c.name for c in components)}")
     stop_ns = _stop(file, root, parts.values(), stop, decided)
     step_ns = _step(file, parts.values(), stop_ns, given_ns, annotated, steps, decided)
+    used = {TYPE, *FOREIGN} if annotated or steps.base_ns else {TYPE}
     return System(
         archive.place,
         components,
@@ -86,7 +85,7 @@ def read_ssp(
         extras.events,
         extras.faults,
         extras.initialisation,
-        (*_unused(archive, root), *_renamed(names), *notes.lines(), *decided),
+        (*_unused(archive, root, used), *_renamed(names), *notes.lines(), *decided),
         extras.roles,
         extras.presets,
         extras.diverging,
@@ -94,10 +93,57 @@ def read_ssp(
     )
 
 
-def _units(part: Part, beside: Beside) -> dict[str, str]:
-    """The units that are named for variables: by our annotation, or by connectors where the FMU
-    declares none, by the FMU's names.
-    """
+def _sized(
+    systems: Mapping[Path, Element], parts: Mapping[Path, Part], notes: Notes
+) -> dict[Path, Part]:
+    """The parts with their arrays taken apart, of as many elements as the archive's values say."""
+    if not any(v.shape for part in parts.values() for v in part.interface.variables):
+        return dict(parts)
+    with notes.off():  # of the values of elements that are not there yet
+        sizes = read_sizes(Network(systems, parts))
+    return {
+        at: replace(part, interface=expanded(part.interface, sizes.get(at, {})))
+        for at, part in parts.items()
+    }
+
+
+class _Called:
+    """The names of a component's variables, its FMU's and the system's, and units by the latter."""
+
+    def __init__(self, place: str, part: Part, beside: Beside) -> None:
+        self._place, self._part, self._beside = place, part, beside
+        renamed = part.interface.renamed(beside.rename, f"{place}: rename").variables
+        pairs = zip(part.interface.variables, renamed, strict=True)
+        self._new = {own: new for new, own in beside.rename.items()}  # of whole arrays, too
+        self._new |= {own.name: new.name for own, new in pairs}
+        own = {new: own for own, new in self._new.items()}
+        self._units = {
+            **_units(part),
+            **{own.get(name, name): unit for name, unit in beside.units.items()},
+        }
+
+    def new(self, own: str) -> str:
+        """The system's name of a variable of the FMU."""
+        return self._new.get(own, own)
+
+    def in_units(self) -> Part:
+        """The part with the units that the archive names."""
+        return replace(
+            self._part, interface=self._part.interface.in_units(self._units, self._place)
+        )
+
+    def component(self, name: str, part: Part, values: Mapping[str, Value]) -> Component:
+        """The component with these values, by the FMU's names."""
+        own = {self.new(variable): value for variable, value in values.items()}
+        units = {self.new(variable): unit for variable, unit in self._units.items()}
+        more = {f.name: getattr(self._beside, f.name) for f in fields(Beside)} | {"units": units}
+        if part.element.exchange and "CoSimulation" in part.interface.kinds:
+            more["solver"] = self._beside.solver or Solver()
+        return Component(name, part.interface.path, own, **more)
+
+
+def _units(part: Part) -> dict[str, str]:
+    """The units that connectors name for variables that have none in the FMU."""
     variables = part.interface.by_name
     connectors = {
         c.name: c.unit
@@ -105,10 +151,7 @@ def _units(part: Part, beside: Beside) -> dict[str, str]:
         if c.unit and (v := variables.get(c.name)) and v.kind == "Real" and v.unit is None
     }
     meant = {n: (unit, known_unit(unit.name)) for n, unit in connectors.items()}
-    return {
-        **{n: unit.name for n, (unit, known) in meant.items() if known and same(unit, known)},
-        **{beside.rename.get(name, name): unit for name, unit in beside.units.items()},
-    }
+    return {n: unit.name for n, (unit, known) in meant.items() if known and same(unit, known)}
 
 
 def _annotated(file: str, root: Any, names: Collection[str]) -> Extras | None:
@@ -140,7 +183,7 @@ def _names(file: str, parts: Iterable[Path]) -> dict[Path, str]:
 
 
 def _connections(
-    network: Network, names: Mapping[Path, str], extras: Extras
+    network: Network, names: Mapping[Path, str], called: Mapping[Path, _Called]
 ) -> Iterator[Connection]:
     """The connections, in the order of the connections that reach the inputs."""
     for target in network.into:
@@ -149,7 +192,7 @@ def _connections(
         hops = network.trace(target)
         carried = _carried(network, hops)
         source, sink = (
-            Port(names[node.path], extras.components[names[node.path]].new(node.name))
+            Port(names[node.path], called[node.path].new(node.name))
             for node in (hops[0].source, target)
         )
         if network.decided_by_units(hops, carried):
@@ -262,13 +305,16 @@ def _step(
     )
 
 
-def _unused(archive: Archive, root: Any) -> Iterator[str]:
-    """Yield a note for each part of the archive that has no bearing on the run."""
+def _unused(archive: Archive, root: Any, used: Collection[str]) -> Iterator[str]:
+    """Yield a note for each part of the archive that has no bearing on the run.
+
+    used are the types of the annotations that were read.
+    """
     for name in archive.names:
         if name.endswith(".ssd") and "/" not in name and name != STRUCTURE:
             yield f"variant {name} is not used; {STRUCTURE} is"
     types = Counter(annotation.get("type") for annotation in root.iter(qualified("ssc:Annotation")))
-    for kind in sorted(set(types) - {TYPE, *FOREIGN}):
+    for kind in sorted(set(types) - set(used)):
         yield f"annotations of type {kind!r} are not used ({types[kind]})"
 
 

@@ -197,20 +197,12 @@ def _interface(origin: Origin, place: str, source: str) -> Interface:
 
 
 def _nested(origin: Origin, entry: Any, path: Path, place: str) -> Element:
-    """The top system of another archive or SSD, as if it stood in the place of the component.
+    """The system that a component refers to, as if it stood in the place of the component.
 
     The component's parameter bindings come after its own and so go before them.
     """
-    source, _, variant = entry.get("source").partition("#")
-    found = origin.resolve(place, source)
-    if entry.get("type") == _DEFINITION:
-        archive, structure = origin.archive, found
-    else:
-        inside = f"{origin.archive.place}: {found}"
-        archive = Archive(origin.archive.extract(found), origin.notes, inside)
-        structure = archive.resolve(place, variant or STRUCTURE)
-    inner, root = open_structure(archive, origin.notes, structure, origin.around)
-    system = read_system(inner, child(root, "ssd:System"), path)
+    source = entry.get("source")
+    system = read_system(*_referred(origin, entry, place, source), path)
     connectors = dict(system.connectors)
     for name, outer in _connectors(origin, entry).items():
         known(f"{outer.place}: {system.name} has no connector", name, connectors)
@@ -223,6 +215,29 @@ def _nested(origin: Origin, entry: Any, path: Path, place: str) -> Element:
         connectors[name] = replace(connectors[name], unit=unit)
     bindings = (*system.bindings, *_bindings(origin, entry))
     return replace(system, name=entry.get("name"), connectors=connectors, bindings=bindings)
+
+
+def _referred(origin: Origin, entry: Any, place: str, source: str) -> tuple[Origin, Any]:
+    """The element of a system that a source names, and where it stands.
+
+    It is the top one of an archive, of its SystemStructure.ssd or a variant, or of an SSD; or, by
+    its id, one of the same document.
+    """
+    file, _, fragment = source.partition("#")
+    if not file:
+        systems = entry.getroottree().iter(qualified("ssd:System"))
+        by_id = {system.get("id"): system for system in systems if system.get("id")}
+        known(f"{place}: source {source!r}: no system of the id", fragment, by_id)
+        return origin.inside(source), by_id[fragment]
+    found = origin.resolve(place, file)
+    if entry.get("type") == _DEFINITION:
+        archive, structure = origin.archive, found
+    else:
+        within = f"{origin.archive.place}: {found}"
+        archive = Archive(origin.archive.extract(found), origin.notes, within)
+        structure = archive.resolve(place, fragment or STRUCTURE)
+    inner, root = open_structure(archive, origin.notes, structure, origin.around)
+    return inner, child(root, "ssd:System")
 
 
 def _dictionary(origin: Origin, entry: Any, path: Path) -> Element:

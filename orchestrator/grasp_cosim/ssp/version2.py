@@ -31,7 +31,6 @@ def as_version_1(place: str, root: Any, notes: Notes) -> None:
         for element in root.iter("{*}Connection")
         for end in ("startConnector", "endConnector")
     }
-    notes.add(place, "of SSP 2.0, read as far as it is shared with 1.0")
     for element in list(root.iter()):
         tag = etree.QName(element)
         where = f"{place}:{element.sourceline}"

@@ -106,15 +106,14 @@ def _fmu_entry(fmu: Path, entries: dict[str, bytes]) -> str:
 
 def _values_entry(component: Component, entries: dict[str, bytes]) -> str:
     """The entry of the values of a component, under the names of its FMU."""
-    interface = component.interface
+    interface, own = component.interface, _own_names(component)
     units = _units([component])
     root = new("ssv:ParameterSet", version=VERSION, name=SET, generationTool=_TOOL)
     parameters = add(root, "ssv:Parameters")
     used: dict[str, Unit] = {}
     for name, value in component.values.items():
         variable = interface.by_name[name]
-        own = component.rename.get(name, name)
-        element = add(parameters, "ssv:Parameter", name=own)
+        element = add(parameters, "ssv:Parameter", name=own[name])
         labels = [label for label, number in variable.items.items() if number == value]
         if labels:
             add(element, "ssv:Enumeration", value=labels[0])
@@ -139,7 +138,7 @@ def _added(entries: dict[str, bytes], stem: str, suffix: str, data: bytes) -> st
 
 
 def _structure(system: System, sources: Mapping[str, str], bindings: Mapping[str, str]) -> Any:
-    name = Path(system.name).stem
+    name = re.sub(r"\W|^(?=\d)", "_", Path(system.name).stem, flags=re.ASCII)  # as OMSimulator asks
     attributes = {"version": VERSION, "name": name, "generationTool": _TOOL}
     root = new("ssd:SystemStructureDescription", PREFIXES, **attributes)
     top = add(root, "ssd:System", name=name)
@@ -151,8 +150,9 @@ def _structure(system: System, sources: Mapping[str, str], bindings: Mapping[str
         )
     if system.connections:
         connections = add(top, "ssd:Connections")
+        names = {c.name: _own_names(c) for c in system.components}
         for connection in system.connections:
-            _write_connection(connections, system, connection)
+            _write_connection(connections, system, connection, names)
     for_oms = add(top, "ssd:Annotations")
     write_units(root, "ssd", units.values())
     stop = repr(system.stop_ns / NANOSECONDS)
@@ -197,22 +197,25 @@ def _connected(component: Component) -> list[Variable]:
 
     A parameter needs none to be set; libcosim refuses one whose type, an enumeration, it ignores.
     """
-    own = {component.rename.get(name, name): unit for name, unit in component.units.items()}
-    variables = read_interface(component.fmu).in_units(own).of(*_CAUSALITIES)
+    own = {**component.rename, **_own_names(component)}
+    units = {own[name]: unit for name, unit in component.units.items()}
+    declared = component.sized(read_interface(component.fmu)).in_units(units)
+    variables = declared.of(*_CAUSALITIES)
     return [v for v in variables if v.supported and not (v.items and v.causality == "parameter")]
 
 
-def _write_connection(connections: Any, system: System, connection: Connection) -> None:
-    (start, start_unit), (end, end_unit) = (
-        _own(system, port) for port in (connection.source, connection.target)
-    )
+def _write_connection(
+    connections: Any, system: System, connection: Connection, names: Mapping[str, Mapping[str, str]]
+) -> None:
+    start, end = connection.source, connection.target
+    start_unit, end_unit = (_unit_of(system, port) for port in (start, end))
     element = add(
         connections,
         "ssd:Connection",
         startElement=start.component,
-        startConnector=start.variable,
+        startConnector=names[start.component][start.variable],
         endElement=end.component,
-        endConnector=end.variable,
+        endConnector=names[end.component][end.variable],
     )
     given = connection.factor is not None or connection.offset is not None
     factor = 1.0 if connection.factor is None else connection.factor
@@ -224,13 +227,16 @@ def _write_connection(connections: Any, system: System, connection: Connection) 
         add(element, "ssc:LinearTransformation", factor=repr(factor), offset=repr(offset))
 
 
-def _own(system: System, port: Port) -> tuple[Port, Unit | None]:
-    """The port under the FMU's own name, and its unit."""
-    component = system.component(port.component, str(port))
-    own = component.rename.get(port.variable, port.variable)
-    return Port(port.component, own), component.interface.unit(
-        component.interface.by_name[port.variable]
-    )
+def _own_names(component: Component) -> dict[str, str]:
+    """The FMU's names of the variables by those of the system, of elements of arrays, too."""
+    declared = component.sized(read_interface(component.fmu)).variables
+    pairs = zip(component.interface.variables, declared, strict=True)
+    return {new.name: own.name for new, own in pairs}
+
+
+def _unit_of(system: System, port: Port) -> Unit | None:
+    interface = system.component(port.component, str(port)).interface
+    return interface.unit(interface.by_name[port.variable])
 
 
 def _units(components: Iterable[Component]) -> dict[str, Unit]:
