@@ -19,7 +19,7 @@ from .structure import Structure
 class Replacement:
     """An FMU for a component, with names and units of its variables as a Component has them.
 
-    They go before those that the component has already. isolation None is the component's own.
+    They go before those that the component has already.
     """
 
     fmu: Path
