@@ -367,13 +367,17 @@ def test_an_fmu_from_elsewhere(
 
 
 def fill_in(system: Path, block: str) -> None:
-    """Put each line of a block in the place of that with its key."""
-    text = system.read_text("utf-8")
-    for line in block.splitlines():
-        entry = re.compile(rf"^{re.escape(line.partition(' = ')[0])} = .*$", re.MULTILINE)
-        text, count = entry.subn(lambda _, new=line: new, text)
-        assert count == 1, line
-    system.write_text(text, encoding="utf-8")
+    """Put each line of a table in the place of that with its key."""
+    chunks = system.read_text("utf-8").split("\n\n")
+    for table in block.strip().split("\n\n"):
+        heading, *new = table.splitlines()
+        (place,) = (i for i, chunk in enumerate(chunks) if chunk.startswith(heading))
+        lines = {line.partition(" = ")[0]: line for line in chunks[place].splitlines()}
+        for line in new:
+            assert line.partition(" = ")[0] in lines
+            lines[line.partition(" = ")[0]] = line
+        chunks[place] = "\n".join(lines.values())
+    system.write_text("\n\n".join(chunks), encoding="utf-8")
 
 
 def try_commands(block: str, capsys: pytest.CaptureFixture[str]) -> None:
