@@ -42,8 +42,8 @@ def test_wheel_runs_in_an_empty_folder(tmp_path: Path) -> None:
     init = ("init", "mine/my_system.toml")
     python("-m", "grasp_cosim", *init, cwd=empty, path=site)
     (empty / "mine").rename(empty / "moved")
-    run = ("run", "moved/my_system.toml", "--stop", "0.2", "--out", "own", "--json")
-    python("-m", "grasp_cosim", *run, cwd=empty, path=site)
+    mine = ("run", "moved/my_system.toml", "--stop", "0.2", "--out", "own", "--json")
+    python("-m", "grasp_cosim", *mine, cwd=empty, path=site)
     own, built_in = (empty / folder / "signals.csv" for folder in ("own", "results"))
     assert own.read_bytes() == built_in.read_bytes()
     if shutil.which("gcc"):

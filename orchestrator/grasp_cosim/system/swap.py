@@ -32,8 +32,8 @@ def with_fmu(
 ) -> tuple[Component, list[str]]:
     """The component with another FMU, its values converted to the units of that; and notes.
 
-    `anew` are variables that get another value. A value of a variable that the new FMU lacks is left
-    out, which a note says. InputError where a value, or another number that the system states,
+    `anew` are variables that get another value. A value of a variable that the new FMU lacks is
+    left out, which a note says. InputError where a value, or another number that the system states,
     has no meaning in the new unit.
     """
     now = replaced(was, new, f"{place}: ")
