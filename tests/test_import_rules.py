@@ -118,7 +118,7 @@ def test_the_orchestrator_builds_fmus_at_four_places_only() -> None:
         for f, module in modules(ROOT / "orchestrator/grasp_cosim")
         if module.startswith("grasp_fmus") and not module.startswith(LINK)
     }
-    assert builders == {"build.py", "system.py", "proxy.py", "native.py"}
+    assert builders == {"build.py", "system.py", "proxy.py", "native.py", "init.py"}
 
 
 def test_the_protocol_of_the_link_is_known_to_both_its_ends_alone_and_knows_nobody() -> None:

@@ -39,6 +39,13 @@ def test_wheel_runs_in_an_empty_folder(tmp_path: Path) -> None:
     assert json.loads(out)["steps"] == 2000
     python("-m", "grasp_cosim", "report", "results", cwd=empty, path=site)
     assert (empty / "results/report.html").read_text("utf-8").endswith("</html>\n")
+    init = ("init", "mine/my_system.toml")
+    python("-m", "grasp_cosim", *init, cwd=empty, path=site)
+    (empty / "mine").rename(empty / "moved")
+    mine = ("run", "moved/my_system.toml", "--stop", "0.2", "--out", "own", "--json")
+    python("-m", "grasp_cosim", *mine, cwd=empty, path=site)
+    own, built_in = (empty / folder / "signals.csv" for folder in ("own", "results"))
+    assert own.read_bytes() == built_in.read_bytes()
     if shutil.which("gcc"):
         native = ("build", "--native", "GripperPlant", "--out", "native")
         python("-m", "grasp_cosim", *native, cwd=empty, path=site)

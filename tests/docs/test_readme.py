@@ -56,7 +56,7 @@ def user(checkout: Path, grasp: System, recorded: Path) -> Path:
 
 
 def test_there_is_something_to_try() -> None:
-    assert len(COMMANDS) == 24
+    assert len(COMMANDS) == 25
     assert len(EXAMPLES) == 1
 
 
@@ -69,6 +69,8 @@ def test_command(user: Path, command: str) -> None:
         pytest.skip("there is no C compiler")
     if arguments[1] in ("run", "qualify"):
         arguments += ["--stop", "0.01"]
+    if arguments[1] == "init":
+        (user / "my_system.toml").unlink()
     if arguments[1] in ("serve", "relay"):
         arguments += ["--port", "0", "--duration", "0.01"]
     touches = "--step-study" not in arguments  # in so short a time: nothing to judge

@@ -6,7 +6,6 @@ import re
 import runpy
 import shlex
 import subprocess
-import zipfile
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -16,8 +15,11 @@ import pytest
 from grasp_controller import series
 from grasp_controller.impact_reduction import Params as Layer2
 from grasp_controller.simultaneous_contact import Params as Layer3
-from grasp_cosim import System, cli
+from grasp_cosim import System, cli, simulate
+from grasp_cosim.recording.load import load_run
 from gripper_plant.friction import Params as Friction
+from support.native_fmus import needs_gcc
+from support.vendor import vendor_plant
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -321,21 +323,18 @@ def assert_loop(loop: Any) -> None:
 
 @pytest.mark.slow
 def test_your_plant(checkout: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    vendor(checkout / "fmus/build/GripperPlant.fmu", checkout / "vendor.fmu")
     source = (DOCS / "spring_plant.py").read_text("utf-8")
     excerpts = 0
-    for kind, block in BLOCKS.findall(page("your_plant")):
+    for kind, block in BLOCKS.findall(page("your_plant").partition("## b.")[0]):
         if kind == "python":
             assert block in source
             excerpts += 1
         elif kind == "console":
             try_commands(block, capsys)
-        elif block.startswith("[signals]"):
-            (checkout / "bands.toml").write_text(block, encoding="utf-8")
         else:
-            change_component(checkout / "my_system.toml", block)
+            assert block.startswith("[signals]")
+            (checkout / "bands.toml").write_text(block, encoding="utf-8")
     assert excerpts == 2
-    assert (checkout / "vendor/report.html").is_file()
     (lines,) = said("your_plant", r"about (\d+) lines")
     assert len(source.splitlines()) == pytest.approx(lines, abs=10)
     (cases,), _ = checked("your_plant", checkout)
@@ -346,6 +345,39 @@ def test_your_plant(checkout: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert case_1.metrics["impact_velocity"][1] == pytest.approx(rate[0], rel=0.05)
     place = case_1.signals["plant.object_position"]
     assert place[k] < place[k - 1]  # finger 2 is the left one
+
+
+@pytest.mark.slow
+@needs_gcc
+def test_an_fmu_from_elsewhere(
+    checkout: Path, grasp: System, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """From the file of a vendor to QUALIFIED, by the page alone."""
+    vendor_plant(checkout / "vendor.fmu")
+    page_b = page("your_plant").partition("## b.")[2].partition("## c.")[0]
+    for kind, block in BLOCKS.findall(page_b):
+        if kind == "console":
+            try_commands(block, capsys)
+        else:
+            fill_in(checkout / "my_system.toml", block)
+    assert (checkout / "vendor/report.html").is_file()
+    ours, theirs = simulate(grasp, step=1e-3).metrics, load_run(checkout / "vendor").metrics
+    for name in ("time_to_contact", "impact_velocity", "steady_contact_force", "object_shift"):
+        assert theirs[name] == pytest.approx(ours[name], rel=1e-9, abs=1e-12)
+
+
+def fill_in(system: Path, block: str) -> None:
+    """Put each line of a table in the place of that with its key."""
+    chunks = system.read_text("utf-8").split("\n\n")
+    for table in block.strip().split("\n\n"):
+        heading, *new = table.splitlines()
+        (place,) = (i for i, chunk in enumerate(chunks) if chunk.startswith(heading))
+        lines = {line.partition(" = ")[0]: line for line in chunks[place].splitlines()}
+        for line in new:
+            assert line.partition(" = ")[0] in lines
+            lines[line.partition(" = ")[0]] = line
+        chunks[place] = "\n".join(lines.values())
+    system.write_text("\n\n".join(chunks), encoding="utf-8")
 
 
 def try_commands(block: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -361,27 +393,6 @@ def try_commands(block: str, capsys: pytest.CaptureFixture[str]) -> None:
         code = cli.main(shlex.split(command)[1:])
         assert capsys.readouterr().out.startswith(shown), command
         assert code == (1 if shown.startswith("NOT") else 0), command
-
-
-def vendor(original: Path, path: Path) -> None:
-    """An FMU with other names for the gaps."""
-    names = {b'"gap[1]"': b'"GapRight"', b'"gap[2]"': b'"GapLeft"'}
-    with zipfile.ZipFile(original) as source, zipfile.ZipFile(path, "w") as target:
-        for name in source.namelist():
-            data = source.read(name)
-            if name == "modelDescription.xml":
-                for ours, theirs in names.items():
-                    assert data.count(ours) == 1
-                    data = data.replace(ours, theirs)
-            target.writestr(name, data)
-
-
-def change_component(system: Path, block: str) -> None:
-    """Put the table of a component in the place of that of its name."""
-    tables = system.read_text("utf-8").split("\n\n")
-    (place,) = (i for i, t in enumerate(tables) if t.startswith(block.partition("]")[0]))
-    tables[place] = block
-    system.write_text("\n\n".join(tables), encoding="utf-8")
 
 
 def test_the_spring_plant_obeys_its_equations() -> None:

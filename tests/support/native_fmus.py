@@ -85,12 +85,17 @@ def _library(version: str, complete: bool) -> bytes:
         source = SOURCES / f"fmi{version[0]}.c"
         _compile(library, source)
         if complete:
-            has = ctypes.CDLL(str(library))
-            missing = [n for n in dir(FMU3Slave) if n[:4] == "fmi3" and not hasattr(has, n)]
-            rest.write_text("".join(f"int {n}(void) {{ return 3; }}\n" for n in missing), "utf-8")
+            rest.write_text(missing_functions(library), "utf-8")
             library = library.with_name("complete.so")
             _compile(library, source, rest)
         return library.read_bytes()
+
+
+def missing_functions(library: Path) -> str:
+    """In C, the functions of FMI 3.0 that a library lacks; each fails."""
+    has = ctypes.CDLL(str(library))
+    missing = [n for n in dir(FMU3Slave) if n[:4] == "fmi3" and not hasattr(has, n)]
+    return "".join(f"int {n}(void) {{ return 3; }}\n" for n in missing)
 
 
 def _compile(library: Path, *sources: Path) -> None:

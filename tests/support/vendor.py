@@ -7,6 +7,7 @@ from pathlib import Path
 
 import fmpy
 from grasp_cosim import cli
+from support.native_fmus import missing_functions
 
 SOURCE = Path(__file__).with_name("vendor.c")
 FLOATS = {
@@ -35,11 +36,14 @@ def vendor_plant(path: Path) -> Path:
     with tempfile.TemporaryDirectory() as folder:
         code = Path(folder, "c")
         assert cli.main(["build", "--native", "--c-only", str(code), "GripperPlant"]) == 0
-        library = Path(folder, "vendor.so")
+        library, rest = Path(folder, "vendor.so"), Path(folder, "rest.c")
         headers = Path(fmpy.__file__).with_name("c-code")
         command = ["gcc", "-shared", "-fPIC", "-O2", "-ffp-contract=off", f"-I{headers}"]
-        sources = [str(SOURCE), str(code / "GripperPlant.c")]
-        subprocess.run([*command, f"-I{code}", *sources, "-lm", "-o", str(library)], check=True)
+        command += [f"-I{code}", str(SOURCE), str(code / "GripperPlant.c"), "-lm", "-o"]
+        subprocess.run([*command, str(library)], check=True)
+        rest.write_text(missing_functions(library), "utf-8")
+        library = library.with_name("complete.so")
+        subprocess.run([*command, str(library), str(rest)], check=True)
         with zipfile.ZipFile(path, "w") as archive:
             archive.writestr("modelDescription.xml", description())
             where = f"binaries/{fmpy.platform_tuple}/vendor{fmpy.sharedLibraryExtension}"
@@ -53,15 +57,19 @@ def description() -> str:
         f'<Unit name="{name}"><BaseUnit {base} factor="0.001"/></Unit>'
         for name, base in UNITS.items()
     )
-    variables = "".join(
-        f'<Float64 name="{name}" valueReference="{reference}" causality="{causality}" '
-        f'variability="{"fixed" if causality == "parameter" else "continuous"}" {more}>'
-        f"{DIMENSION if name == 'Gaps' else ''}</Float64>"
-        for name, (reference, causality, more) in FLOATS.items()
-    ) + "".join(
-        f'<Boolean name="{name}" valueReference="{reference}" causality="output" '
-        'variability="discrete"/>'
-        for name, reference in TOUCH.items()
+    variables = (
+        '<Float64 name="time" valueReference="0" causality="independent"/>'
+        + "".join(
+            f'<Float64 name="{name}" valueReference="{reference}" causality="{causality}" '
+            f'variability="{"fixed" if causality == "parameter" else "continuous"}" {more}>'
+            f"{DIMENSION if name == 'Gaps' else ''}</Float64>"
+            for name, (reference, causality, more) in FLOATS.items()
+        )
+        + "".join(
+            f'<Boolean name="{name}" valueReference="{reference}" causality="output" '
+            'variability="discrete"/>'
+            for name, reference in TOUCH.items()
+        )
     )
     outputs = [r for r, causality, _ in FLOATS.values() if causality == "output"]
     known = "".join(

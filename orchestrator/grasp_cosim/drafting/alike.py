@@ -169,7 +169,8 @@ def _likeness(
 ) -> tuple[float, str]:
     """How much a group of another FMU is like one of ours, from 0 to about 1, and by what.
 
-    pairs are all that there are; of what is left, it counts to be the only one.
+    pairs are all that there are; of what is left, it counts to be the only one, unless its name
+    means another quantity.
     """
     if group.words == other.words or _plural(group.words) == _plural(other.words):
         return 1.1, ""
@@ -178,10 +179,12 @@ def _likeness(
     unit = group.interface.unit(group.first), other.interface.unit(other.first)
     if other.joined == _symbol(group.first) and None not in unit:
         return 0.95, ""
+    common = group.meaning & other.meaning
     alone = what_is_left and (None not in unit or group.first.kind != "Real")
+    alone = alone and bool(common or not other.meaning & _SAME.keys())
     alone = alone and sum(g is group for g, _ in pairs) == 1 == sum(o is other for _, o in pairs)
     said = _meaning(_words(other.first.description or ""))
-    by_name = 0.7 * len(group.meaning & other.meaning) / len(group.meaning | other.meaning)
+    by_name = 0.7 * len(common) / len(group.meaning | other.meaning)
     by_text = 0.3 + 0.1 * len(group.meaning) if group.meaning <= said else 0.0
     if other.joined == _symbol(group.first):
         by_name = 0.8

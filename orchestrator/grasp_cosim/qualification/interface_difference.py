@@ -15,7 +15,7 @@ from typing import Any, Literal
 from ..checks import is_number
 from ..errors import choices
 from ..interface.capabilities import KINDS
-from ..interface.interface import PARAMETERS, SETTABLE, Interface, Value, Variable, as_float
+from ..interface.interface import SETTABLE, Interface, Value, Variable, as_float
 from ..interface.units import IDENTITY, Conversion
 from ..system.description import System
 from ..system.parts import NANOSECONDS, Port, literal
@@ -125,7 +125,7 @@ def interface_differences(
 
 def _missing(old: Variable, use: Use, candidate: Interface) -> Difference:
     name, causality = old.name, old.causality
-    if name in use.values and causality in PARAMETERS and name not in use.stated:
+    if name in use.values and name not in use.stated:
         text = f"{causality} is set to {literal(use.values[name])} in the system, but missing"
         return Difference("warns", "missing", name, f"{text}: left out")
     if use.uses(name):

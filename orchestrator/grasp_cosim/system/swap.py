@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ..errors import InputError
-from ..interface.interface import PARAMETERS, Interface, Value
+from ..interface.interface import Interface, Value
 from ..interface.read import describe
 from ..interface.units import IDENTITY
 from .parts import Component, Port, literal
@@ -19,7 +19,7 @@ from .structure import Structure
 class Replacement:
     """An FMU for a component, with names and units of its variables as a Component has them.
 
-    They go before those that the component has already. isolation None is the component's own.
+    They go before those that the component has already.
     """
 
     fmu: Path
@@ -32,20 +32,21 @@ def with_fmu(
 ) -> tuple[Component, list[str]]:
     """The component with another FMU, its values converted to the units of that; and notes.
 
-    `anew` are variables that get another value. A value of a parameter that the new FMU lacks is
+    `anew` are variables that get another value. A value of a variable that the new FMU lacks is
     left out, which a note says. InputError where a value, or another number that the system states,
     has no meaning in the new unit.
     """
     now = replaced(was, new, f"{place}: ")
     before, after = was.interface, now.interface
-    given = {n: v for n, v in was.values.items() if n in after.by_name or not _free(before, n)}
+    given = {name: value for name, value in was.values.items() if name in after.by_name}
     kept = {name: value for name, value in given.items() if name not in anew}
     for name in [*kept, *sorted(stated(system, was.name))]:
         reason = _lost(before, after, name, name in kept)
         if reason:
             raise InputError(f"{place}: {name} {reason}")
     notes = [
-        f"{place}: {new.fmu.name} has no parameter {name}: its value {literal(value)} is left out"
+        f"{place}: {new.fmu.name} has no {before.by_name[name].causality} {name}: its value "
+        f"{literal(value)} is left out"
         for name, value in was.values.items()
         if name not in given
     ]
@@ -76,11 +77,6 @@ def replaced(was: Component, new: Replacement, place: str) -> Component:
     units |= new.units
     solver = was.solver if theirs.exchange else None
     return replace(was, fmu=new.fmu, native=None, rename=rename, units=units, solver=solver)
-
-
-def _free(interface: Interface, name: str) -> bool:
-    """True for a variable that nothing in a system depends on, but what has a value for it."""
-    return name in interface.by_name and interface.by_name[name].causality in PARAMETERS
 
 
 def stated(system: Structure, name: str) -> frozenset[str]:

@@ -95,7 +95,7 @@ def check_filled_in(path: Path) -> None:
 def to_do(text: str) -> dict[int, str]:
     """The lines of a system file, by their numbers, with values that are a TODO."""
     lines = enumerate(text.split("\n"), 1)
-    return {number: line.strip() for number, line in lines if TODO.match(line)}
+    return {number: line.strip(" \t\r,") for number, line in lines if TODO.match(line)}
 
 
 def _initialisation(place: str, table: dict[str, Any]) -> Initialisation:

@@ -80,7 +80,7 @@ def init(
     write_text(file, text)
     open_lines = to_do(text)
     if not open_lines:
-        System.load(file)
+        _read_back(file)
     report = {
         "file": str(file),
         "components": {name: _found(draft) for name, draft in drafts.items()},
@@ -104,6 +104,13 @@ def shown(fmu: Path, folder: Path) -> str:
         there.is_relative_to(here.parent) and here.parent != Path(here.anchor)
     )
     return Path(os.path.relpath(there, here) if near else there).as_posix()
+
+
+def _read_back(file: Path) -> None:
+    try:
+        System.load(file)
+    except InputError as error:
+        raise InputError(f"{file}: written, but not yet a system: {error}") from error
 
 
 def _check_file(file: Path, force: bool) -> None:

@@ -1,0 +1,212 @@
+"""init: a system file that runs as it is, or that says what is left to do."""
+
+import json
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+from conftest import Run
+from grasp_cosim import System
+from grasp_cosim.cli.commands.init import shown
+from grasp_cosim.grasp.presets import SYSTEM
+from qualification.made import write_fmu
+from support.models import build_model
+from support.native_fmus import needs_gcc
+
+FOREIGN = {
+    "ForceRight": 'causality="input" | Real start="0" unit="N"',
+    "ForceLeft": 'causality="input" | Real start="0" unit="N"',
+    "valve": 'causality="input" | Real start="0.5" unit="1"',
+    "GapRight": 'causality="output" | Real unit="mm"',
+    "GapLeft": 'causality="output" | Real unit="mm"',
+    "x_1": 'causality="output" | Real unit="mm"',
+    "x_2": 'causality="output" | Real unit="mm"',
+    "v_1": 'causality="output" | Real',
+    "v_2": 'causality="output" | Real',
+    "place": 'causality="parameter" variability="fixed" | Real start="1" unit="mm"',
+}
+
+
+@pytest.fixture
+def fmus_here(command: Run, fmus: Path, tmp_path: Path) -> Run:
+    """The command in a folder in which the FMUs are built."""
+    shutil.copytree(fmus, tmp_path / "fmus/build")
+    return command
+
+
+def test_the_grasp(fmus_here: Run, tmp_path: Path) -> None:
+    code, out, err = fmus_here("init", "my_system.toml")
+    assert (code, err) == (0, "")
+    assert out == "my_system.toml: written\n    then: grasp-cosim run my_system.toml\n"
+    text = (tmp_path / "my_system.toml").read_text("utf-8")
+    assert text.replace('"fmus/build/', '"') == SYSTEM.read_text("utf-8")
+
+
+@pytest.mark.slow
+def test_the_grasp_runs_as_without_a_file(fmus_here: Run) -> None:
+    assert fmus_here("init", "my_system.toml")[0] == 0
+    for arguments in (("my_system.toml",), ()):
+        short = ("--stop", "0.02", "--step", "1e-3", "--out", f"run{len(arguments)}")
+        assert fmus_here("run", *arguments, *short)[0] == 0
+    assert Path("run0/signals.csv").read_bytes() == Path("run1/signals.csv").read_bytes()
+
+
+def test_the_folder_may_be_moved(fmus_here: Run, tmp_path: Path) -> None:
+    shutil.copytree(tmp_path / "fmus", tmp_path / "here/fmus")
+    assert fmus_here("init", "here/my_system.toml", "--controller", "adaptive")[0] == 0
+    shutil.move(tmp_path / "here", tmp_path / "there")
+    system = System.load(tmp_path / "there/my_system.toml")
+    assert system.component("controller", "test").fmu.name == "GraspControllerAdaptive.fmu"
+    assert all(c.fmu.is_relative_to(tmp_path / "there") for c in system.components)
+
+
+@pytest.mark.slow
+@needs_gcc
+def test_native_fmus(fmus_here: Run) -> None:
+    assert fmus_here("init", "native.toml", "--native")[0] == 0
+    system = System.load("native.toml")
+    assert not any(c.interface.python for c in system.components)
+
+
+WRONG = [
+    (("there.toml",), "there.toml: is there already; must be another name, or with --force"),
+    (("here.ssp",), "here.ssp: must end in .toml, a system file"),
+    (("folder.toml",), "folder.toml: is a folder; must be a file"),
+    (("a.toml", "--as", "hand=vendor.fmu"), "--as hand: no component 'hand'; valid: plant, sens"),
+    (("a.toml", "--as", "plant"), "--as 'plant': must be COMPONENT=FMU"),
+    (("a.toml", "--as", "plant=none.fmu"), "none.fmu: no such FMU file"),
+    (("a.toml", "--fmu", "a.b=vendor.fmu"), "--fmu 'a.b=vendor.fmu': must be a name of its own"),
+    (("a.toml", "--fmu", "a=vendor.fmu", "--fmu", "a=vendor.fmu"), "must be a name of its own"),
+    (("a.toml", "--fmu", "a=vendor.fmu", "--native"), "must be without --as, --controller and"),
+    (
+        ("a.toml", "--as", "controller=vendor.fmu", "--controller", "adaptive"),
+        "--controller adaptive: must not come with --as controller",
+    ),
+]
+
+
+@pytest.mark.parametrize(("arguments", "message"), WRONG)
+def test_wrong_input_is_one_line(
+    fmus_here: Run, tmp_path: Path, arguments: tuple[str, ...], message: str
+) -> None:
+    write_fmu(tmp_path / "vendor.fmu")
+    (tmp_path / "there.toml").write_text("mine")
+    (tmp_path / "folder.toml").mkdir()
+    before = sorted(tmp_path.iterdir())
+    code, out, err = fmus_here("init", *arguments)
+    assert (code, out) == (2, "")
+    assert err.startswith("grasp-cosim: ")
+    assert message in err
+    assert err.count("\n") == 1
+    assert sorted(tmp_path.iterdir()) == before
+    assert (tmp_path / "there.toml").read_text() == "mine"
+
+
+def filled_in(path: Path) -> None:
+    """Put something in the place of each TODO of a plant like FOREIGN."""
+    lines = path.read_text("utf-8").splitlines()
+    for i, line in enumerate(lines):
+        if ' = "TODO' in line:
+            value = "0.5" if line.startswith("valve") else '"mm/s"'
+            lines[i] = f"{line.partition(' = ')[0]} = {value}"
+    path.write_text("\n".join(lines), "utf-8")
+
+
+def test_a_foreign_plant(fmus_here: Run, tmp_path: Path) -> None:
+    write_fmu(tmp_path / "vendor.fmu", FOREIGN, {})
+    code, out, err = fmus_here("init", "a.toml", "--as", "plant=vendor.fmu", "--json")
+    assert (code, err) == (0, "")
+    report = json.loads(out)
+    plant = report["components"]["plant"]
+    assert plant["found"]["gap[2]"] == "GapLeft"
+    assert plant["units"]["velocity[1]"] is None
+    assert list(plant["to_check"]) == []
+    todo = [entry["text"].partition(" = ")[0] for entry in report["todo"]]
+    assert todo == ['"velocity[1]"', '"velocity[2]"', "valve"]
+    lines = (tmp_path / "a.toml").read_text("utf-8").split("\n")
+    assert all(lines[entry["line"] - 1] == entry["text"] for entry in report["todo"])
+    notes = [line for line in lines if line.startswith("# TODO")]
+    assert [note.partition(" in the system")[0] for note in notes] == [
+        "# TODO object_width = 0.07 m", "# TODO initial_object_position = 0.03 m",
+    ]  # fmt: skip
+    assert all(note.endswith("; it has place") for note in notes)
+    for command in (("run", "a.toml"), ("qualify", "a.toml", "--as", "plant")):
+        code, out, err = fmus_here(*command)
+        first = report["todo"][0]
+        assert (code, out) == (2, "")
+        assert err.startswith(f"grasp-cosim: a.toml: line {first['line']}: {first['text']}: must")
+        assert err.endswith(f"as is line {', '.join(str(e['line']) for e in report['todo'][1:])}\n")
+    filled_in(tmp_path / "a.toml")
+    component = System.load(tmp_path / "a.toml").component("plant", "test")
+    assert component.fmu == tmp_path / "vendor.fmu"
+    assert (component.isolation, component.values) == ("process", {"valve": 0.5})
+    assert component.interface.by_name["velocity[2]"].unit == "mm/s"
+
+
+def test_values_and_presets_are_in_the_units_of_the_fmu(fmus_here: Run, tmp_path: Path) -> None:
+    more = {
+        "obj_width": 'causality="parameter" variability="fixed" | Real start="1" unit="mm"',
+        "friction_coulomb_1": 'causality="parameter" variability="fixed" | Real start="0" unit="N"',
+        "friction_coulomb_2": 'causality="parameter" variability="fixed" | Real start="0" unit="N"',
+        "friction_viscous_1": 'causality="parameter" variability="fixed" | Real start="0"',
+        "friction_viscous_2": 'causality="parameter" variability="fixed" | Real start="0"',
+    }
+    write_fmu(tmp_path / "vendor.fmu", {**FOREIGN, **more}, {})
+    assert fmus_here("init", "a.toml", "--as", "plant=vendor.fmu")[0] == 0
+    lines = (tmp_path / "a.toml").read_text("utf-8").splitlines()
+    assert re.findall(r"^object_width = (.*?) +# (.*)$", "\n".join(lines), re.MULTILINE) == [
+        ('"obj_width"', "parameter, mm"), ("70.0", "parameter, mm"),
+    ]  # fmt: skip
+    bench = [line for line in lines if "plant.friction" in line]
+    assert bench[1].startswith('"plant.friction.coulomb[2]" = 1.33849')
+    assert bench[2].startswith('# "plant.friction.viscous[1]" = 35.7696')
+    assert bench[2].endswith("# TODO: in the unit that it has")
+
+
+def test_a_name_that_means_something_else_in_the_fmu(fmus_here: Run, tmp_path: Path) -> None:
+    own = {"gap[1]": 'causality="parameter" variability="fixed" | Boolean start="false"'}
+    write_fmu(tmp_path / "vendor.fmu", {**FOREIGN, **own}, {})
+    assert fmus_here("init", "a.toml", "--as", "plant=vendor.fmu")[0] == 0
+    filled_in(tmp_path / "a.toml")
+    found = System.load(tmp_path / "a.toml").component("plant", "test").interface.by_name
+    assert (found["gap[1]"].causality, found["gap[1]_of_the_FMU"].kind) == ("output", "Boolean")
+
+
+@pytest.mark.slow
+@needs_gcc
+def test_fmus_alone(fmus_here: Run, tmp_path: Path) -> None:
+    build_model("bouncing_ball", tmp_path, "3.0", file="ball")
+    build_model("feedthrough", tmp_path, "2.0", file="through")
+    fmus = ("--fmu", "ball=ball.fmu", "--fmu", "through=through.fmu")
+    assert fmus_here("init", "alone.toml", *fmus)[0] == 0
+    system = System.load("alone.toml")
+    assert [c.isolation for c in system.components] == ["process", "process"]
+    assert (system.step_ns, system.stop_ns) == (10_000_000, 3_000_000_000)
+    interface = system.component("through", "test").interface
+    inputs = {v.name: v.start_value for v in interface.of("input") if v.supported}
+    assert system.component("through", "test").values == inputs
+    text = (tmp_path / "alone.toml").read_text("utf-8")
+    assert "# g = -9.81  # parameter" in text
+    code, out, _ = fmus_here("run", "alone.toml", "--json")
+    assert (code, json.loads(out)["steps"]) == (0, 300)
+
+
+def test_an_fmu_that_recommends_no_experiment(fmus_here: Run, tmp_path: Path) -> None:
+    write_fmu(tmp_path / "vendor.fmu", FOREIGN, {}, step="0.3")
+    code, _, err = fmus_here("init", "alone.toml", "--fmu", "a=vendor.fmu")
+    assert (code, err) == (
+        0,
+        "no FMU recommends a stop time: chosen, step = 0.3 s, stop = 1 s\n"
+        "stop = 1 s: 0.9 s is a whole number of steps\n",
+    )
+    assert System.load("alone.toml").total_steps == 3
+
+
+def test_paths(tmp_path: Path) -> None:
+    """Relative below the folder of the file and beside it, else absolute."""
+    here = tmp_path / "project/systems"
+    assert shown(here / "a.fmu", here) == "a.fmu"
+    assert shown(here / "fmus/a.fmu", here) == "fmus/a.fmu"
+    assert shown(tmp_path / "project/fmus/a.fmu", here) == "../fmus/a.fmu"
+    assert shown(tmp_path / "a.fmu", here) == str(tmp_path / "a.fmu")
