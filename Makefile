@@ -3,6 +3,7 @@
 # make explore  the properties, on new random examples and more of them; a failure prints its recipe
 # make check  lint, format, types, import rules
 # make bench  measurements     make cards    the variable tables of the equation cards
+# make playground  docs/playground.html; needs zig where the C of the FMUs has changed
 
 PYTHON ?= $(firstword $(foreach p,python3 python3.13 python3.12 python3.11,$(shell \
 	$(p) -c 'import sys; print("$(p)" if sys.version_info >= (3, 11) else "")' 2>/dev/null)))
@@ -12,7 +13,7 @@ PIP := PIP_CONSTRAINT=constraints.txt PIP_DISABLE_PIP_VERSION_CHECK=1 $(BIN)/pyt
 # Tests start hundreds of Pythons: none should compile all modules anew, whatever the environment.
 PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 2 --maxschedchunk 1
 
-.PHONY: run test test-slow explore check bench cards clean
+.PHONY: run test test-slow explore check bench cards playground clean
 
 run: .venv/run
 	$(BIN)/grasp-cosim build
@@ -40,6 +41,10 @@ bench: .venv/dev
 
 cards: .venv/run
 	$(BIN)/python -m grasp_fmus.cards
+
+playground: .venv/run
+	$(BIN)/python -m grasp_cosim.grasp.play.wasm
+	$(BIN)/grasp-cosim play -o docs/playground.html
 
 .venv/run: pyproject.toml constraints.txt
 	$(if $(PYTHON),,$(error grasp-cosim needs Python 3.11 or newer; name one with PYTHON=...))

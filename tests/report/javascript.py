@@ -72,10 +72,11 @@ def in_browser(
     address: str = "",
     size: tuple[int, int] = (1200, 1600),
     dark: bool = False,
+    still: bool = False,
 ) -> Any:
     """What the function body act returns in the page, once it is ready; fails on any error in it.
 
-    address is what follows the # in the address.
+    address is what follows the # in the address; still says that its user wants no motion.
     """
     chromium = shutil.which("chromium") or shutil.which("chromium-browser")
     if chromium is None:
@@ -89,6 +90,7 @@ def in_browser(
             "--disable-background-networking", f"--user-data-dir={folder / 'profile'}",
             f"--window-size={size[0]},{size[1]}", f"--virtual-time-budget={1000 * WAIT}",
             *(["--blink-settings=preferredColorScheme=0"] if dark else []),
+            *(["--force-prefers-reduced-motion"] if still else []),
             "--dump-dom", f"{file.as_uri()}#{address}",
         ],
         capture_output=True, text=True, timeout=120,

@@ -36,7 +36,8 @@ class Grasp {
   // speed: simulated seconds per second at a contact, by which a glow lasts a while for the eye.
   draw(t, speed) {
     const { pen, width, height } = fitted(this.canvas), plan = this.plan;
-    const room = THICK + 70, scale = (width - 2 * room) / Math.max(this.high - this.low, 1e-6);
+    this.reach = Math.min(62, width / 8); // px of the longest arrow
+    const room = THICK + this.reach + 8, scale = (width - 2 * room) / Math.max(this.high - this.low, 1e-6);
     const x = (metres) => room + (metres - this.low) * scale;
     this.axis(pen, x, width, scale);
     const face = {}, surface = {};
@@ -84,7 +85,7 @@ class Grasp {
     pen.moveTo(0, FLOOR + 0.5);
     pen.lineTo(width, FLOOR + 0.5);
     for (const mark of ticks(1e3 * (this.low - 70 / scale), 1e3 * (this.high + 70 / scale),
-      width / 90)) {
+      width / Math.min(90, 40 + width / 12))) {
       const at = Math.round(x(1e-3 * mark.at)) + 0.5;
       pen.moveTo(at, FLOOR);
       pen.lineTo(at, FLOOR + 5);
@@ -136,7 +137,7 @@ class Grasp {
 
   // The actuator's force points to the finger's back or from it, the object's from the surface on.
   arrow(pen, at, y, force, j, where) {
-    const length = 62 * Math.sqrt(Math.abs(force) / this.strongest) * Math.sign(force);
+    const length = this.reach * Math.sqrt(Math.abs(force) / this.strongest) * Math.sign(force);
     if (Math.abs(length) < 2) return;
     const pushes = where === "outer" && Math.sign(force) === -SIDE[j];
     const from = pushes ? at - length : at, to = from + length, tip = Math.sign(force);

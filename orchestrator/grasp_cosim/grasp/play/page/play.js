@@ -111,6 +111,7 @@ function remember() {
 function recall() {
   const { found, wrong } = read(location.hash.slice(1));
   settings = found;
+  view = null;
   simulate();
   if (wrong.length) find("message").textContent = wrong.join("; ");
   const asks = new URLSearchParams(location.hash.slice(1));
@@ -153,6 +154,7 @@ function simulate() {
   document.body.classList.toggle("stale", rows < 2);
   if (rows >= 2) take(run);
   else find("summary").textContent = "";
+  view ??= whole();
   controls();
   find("took").textContent = rows < 2 ? "" : `· ${plural(rows - 1)} steps of `
     + `${digits(1e3 * settings.step)} ms, simulated in ${simulated.toFixed(0)} ms`;
@@ -235,7 +237,7 @@ function lines(run) { // the panels of these traces, made when they are first ne
 function shown(value, factor) {
   if (value === null) return "none";
   if (typeof value === "boolean") return value ? "yes" : "no";
-  return (value * factor).toFixed(3).replace(/^-(?=[\d.]*[1-9])/, "−").replace(/^-/, "");
+  return (Number((value * factor).toFixed(3)) || 0).toFixed(3).replace("-", "−");
 }
 
 function tell(metrics) {
@@ -258,7 +260,7 @@ function tell(metrics) {
         if (values.length === 1) cell.colSpan = 2;
         cell.textContent = shown(value, factor);
       }
-      row.insertCell().textContent = PRINTED[unit] ?? unit.replace(".", "·");
+      row.insertCell().textContent = PRINTED[unit] ?? unit.replaceAll(".", "·");
       return row;
     }));
 }
@@ -413,7 +415,15 @@ function choose(index) {
   latest = system.presets[index].name;
   view = null;
   simulate();
-  if (!playing) seek(recording.last);
+  present();
+}
+
+const still = matchMedia("(prefers-reduced-motion: reduce)");
+
+function present() { // from the beginning, moving if that is wanted
+  if (still.matches) return seek(recording.last);
+  seek(0);
+  play(true);
 }
 
 function turn(by) {
@@ -505,9 +515,7 @@ async function begin() {
   settings = start();
   recall();
   draw();
-  const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
-  if (still && !location.hash.includes("at=")) seek(recording.last);
-  else if (!location.hash.includes("at=")) play(true);
+  if (!/[#&]at=/.test(location.hash)) present();
   state.ready = "yes";
 }
 

@@ -1,0 +1,83 @@
+"""The page of the playground as a file: what the command writes, and what is in it."""
+
+import json
+import re
+import zlib
+from pathlib import Path
+
+import pytest
+from grasp_cosim import cli
+from grasp_cosim.grasp.play.page import playground_html
+from grasp_cosim.grasp.play.system import PLANTS, page_system, shipped
+from grasp_cosim.grasp.play.wasm import hash_at_hand, made, made_from
+from support.compilers import needs_zig
+
+DOCS = Path(__file__).parents[3] / "docs"
+
+
+def test_the_page_in_docs_is_the_one_that_the_command_writes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Else: make playground."""
+    page = tmp_path / "new" / "play.html"
+    assert cli.main(["play", "-o", str(page), "--json"]) == 0
+    written = {"page": str(page), "bytes": page.stat().st_size}
+    assert json.loads(capsys.readouterr().out) == written
+    assert page.read_bytes() == (DOCS / "playground.html").read_bytes()
+
+
+def test_it_is_one_small_file_that_asks_for_no_other() -> None:
+    html = playground_html()
+    assert len(html) < 250_000
+    assert not re.search(r"""https?:|\b(src|href)=["'](?!data:)|\bfetch\(|@import|url\((?!#)""", html)
+
+
+def test_a_place_that_cannot_be_written_to(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("")
+    assert cli.main(["play", "-o", str(tmp_path / "file" / "play.html")]) == 2
+    assert "file" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_the_wasm_is_made_from_the_sources_at_hand() -> None:
+    """It says which it is of, so that this needs no zig. Else: make playground."""
+    assert made_from(zlib.decompress(shipped())) == hash_at_hand()
+
+
+@pytest.mark.slow
+@needs_zig
+def test_zig_makes_the_same_wasm_again() -> None:
+    """Bit for bit, of the sources at hand."""
+    assert made() == zlib.decompress(shipped())
+
+
+def test_each_control_is_of_a_variable_and_begins_within_its_ends() -> None:
+    system = page_system()
+    starts = {
+        f"{component}.{name}": start
+        for component, model in [
+            *(("plant", PLANTS[plant]) for plant in ("movable", "soft", "fixed")),
+            *system["components"].items(),
+        ]
+        for name, _, causality, _, start, _ in system["models"][model]
+        if causality == "parameter"
+    } | system["values"]
+    controls = [control for group in system["groups"] for control in group["controls"]]
+    assert len({c["name"] for c in controls}) == len(controls)
+    for control in controls:
+        first, *others = (starts[name] for name in control["variables"])
+        assert control["low"] <= first * control["per"] <= control["high"], control["name"]
+        assert all(v == (-first if control.get("mirrored") else first) for v in others)
+
+
+def test_each_grasp_is_of_a_page_that_there_is() -> None:
+    presets = page_system()["presets"]
+    assert {"README.md", "docs/layers.md", "docs/limits.md", "docs/colour.md", "docs/guide.md"} == {
+        preset["page"] for preset in presets
+    }
+    for preset in presets:
+        assert (DOCS.parent / preset["page"]).is_file()
+    for what in ("name", "at"):
+        assert len({preset[what] for preset in presets}) == len(presets)

@@ -1,0 +1,313 @@
+"""The playground under a hand: sliders, choices, grasps of the documentation, keys, address, size."""
+
+import json
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import pytest
+from grasp_cosim.grasp.play.page import playground_html
+from grasp_cosim.grasp.play.system import PLANTS, page_system
+from report.javascript import in_browser
+
+pytestmark = pytest.mark.slow
+
+HANDS = """
+const settle = frame;
+const move = async (id, value, type = "input") => {
+  find(id).value = value;
+  find(id).dispatchEvent(new Event(type, { bubbles: true }));
+  await settle();
+};
+const click = async (element) => { element.click(); await settle(); };
+const press = async (key, more = {}) => {
+  (more.on || document.body).dispatchEvent(
+    new KeyboardEvent("keydown", { key, bubbles: true, cancelable: true, ...more }));
+  await settle();
+};
+"""
+
+
+@pytest.fixture(scope="module")
+def html() -> str:
+    return playground_html()
+
+
+def act(html: str, body: str, folder: Path, *rest: Any, **more: Any) -> Any:
+    return in_browser(html, HANDS + body, folder, *rest, **more)
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+def test_each_slider_and_its_number_run_the_grasp_anew(
+    html: str, tmp_path: Path, plant: str
+) -> None:
+    """Dragged, or by arrow keys, which give a range its value as well; or typed."""
+    body = """
+      const seen = {};
+      for (const { row, range, number, name, low, high, step } of CONTROLS) {
+        location.hash = start;
+        await frame();
+        if (row.hidden) continue;
+        const before = state.metrics, value = digits(Number(range.value) - 2 * step);
+        range.value = value >= low ? value : digits(value + 4 * step);
+        range.dispatchEvent(new Event("input", { bubbles: true }));
+        await frame();
+        const dragged = [range.value, number.value, command(), address(), state.metrics !== before];
+        await move(`${name}-number`, digits(low + 0.4 * (high - low)), "change");
+        seen[name] = [dragged, [range.value, number.value, command()]];
+      }
+      return seen;
+    """
+    start = f"plant={plant}&case=1&step=0.002&stop=4&at=0"
+    seen = act(html, f"const start = {start!r};{body}", tmp_path)
+    controls = {
+        c["name"]: c
+        for group in page_system()["groups"]
+        for c in group["controls"]
+        if _is_of(plant, c)
+    }
+    assert set(seen) == set(controls)
+    # Case 1 is without layer 3; a limit and a height matter where they are exceeded, or it tips.
+    idle = {"Ks", "Ka2", "Da2", "Ma2", "limit", "height"}
+    for name, ((place, number, command, address, differs), typed) in seen.items():
+        control = controls[name]
+        value = float(number) / control["per"]
+        setting = f"{control['variables'][0]}={value:.12g}"
+        assert place == number
+        assert setting in command.replace('"', "")
+        assert setting in unquote(address)
+        assert differs or name in idle, name
+        middle = control["low"] + 0.4 * (control["high"] - control["low"])
+        assert float(typed[1]) == pytest.approx(middle)
+        assert float(typed[0]) == pytest.approx(middle, abs=control["step"])
+        assert f"{control['variables'][0]}=" in typed[2]
+
+
+def _is_of(plant: str, control: dict[str, Any]) -> bool:
+    """True if the slider is there with a plant."""
+    system = page_system()
+    models = {**system["components"], "plant": PLANTS[plant]}
+    component, _, variable = control["variables"][0].partition(".")
+    names = (name for name, *_ in system["models"][models[component]])
+    return variable in names and plant in control.get("plants", [plant])
+
+
+def test_choices_and_switches(html: str, tmp_path: Path) -> None:
+    body = """
+      const seen = [];
+      for (const [id, value] of [["case", 0], ["case", 1], ["case", 2], ["controller", "adaptive"],
+        ["plant", "soft"], ["plant", "movable"], ["plant", "fixed"], ["controller", "published"]]) {
+        await click(document.querySelector(`#${id} input[value="${value}"]`));
+        seen.push(command());
+      }
+      await click(find("jacobi"));
+      await click(find("bench"));
+      await move("step", "0.005", "change");
+      await move("stop", "2");
+      seen.push(command(), address());
+      await move("name", "sensor_1.gain");
+      await move("value", "0.002");
+      await click(find("set"));
+      seen.push(find("chips").textContent, find("unit").textContent, find("meaning").textContent);
+      await click(find("chips").querySelector("button"));
+      seen.push(find("chips").textContent);
+      await move("value", "much");
+      await click(find("set"));
+      seen.push(find("message").textContent);
+      return seen;
+    """
+    seen = act(html, body, tmp_path, "at=0")
+    swap = "grasp-cosim run --swap plant=fmus/build/"
+    assert seen[:8] == [
+        "grasp-cosim run --case 0",
+        "grasp-cosim run --case 1",
+        "grasp-cosim run",
+        "grasp-cosim run --controller adaptive",
+        f"{swap}GripperPlantCompliant.fmu --controller adaptive",
+        f"{swap}GripperPlantMovable.fmu --controller adaptive",
+        "grasp-cosim run --controller adaptive",
+        "grasp-cosim run",
+    ]
+    assert seen[8] == "grasp-cosim run --bench --step 0.005 --stop 2 --scheme jacobi"
+    assert seen[9] == "bench=1&step=0.005&stop=2&scheme=jacobi"
+    assert seen[10].startswith("sensor_1.gain = 0.002 V·mⁿ")
+    assert seen[11:14] == ["V.m^n", seen[12], ""]
+    assert seen[12].startswith("K = ")
+    assert seen[14] == "sensor_1.gain: much: no value for it"
+
+
+def test_each_grasp_of_the_documentation_can_be_chosen(html: str, tmp_path: Path) -> None:
+    """From the list, and one after the other; it is there again from its address."""
+    body = """
+      const seen = [];
+      for (let i = 0; i < system.presets.length; i++) {
+        await move("preset", i, "change");
+        const [about, now, metrics] = [find("about").textContent, address(), state.metrics];
+        location.hash = "case=0&at=0";
+        await settle();
+        location.hash = `${now}&at=0`;
+        await settle();
+        seen.push([about, find("message").textContent, find("preset").value,
+          state.metrics === metrics]);
+      }
+      await click(find("next"));
+      seen.push(find("preset").value);
+      await click(find("previous"));
+      seen.push(find("preset").value);
+      return seen;
+    """
+    *seen, after_last, back = act(html, body, tmp_path, "at=0")
+    presets = page_system()["presets"]
+    assert seen == [
+        [f"{preset['text']} ({preset['page']})", "", str(i), True]
+        for i, preset in enumerate(presets)
+    ]
+    assert (after_last, back) == ("0", str(len(presets) - 1))
+
+
+def test_keys(html: str, tmp_path: Path) -> None:
+    body = """
+      const seen = [], note = () => seen.push([cursor, view.from, view.to, playing,
+        find("preset").value]);
+      note();
+      await press("ArrowRight"); note();
+      await press("ArrowLeft", { shiftKey: true }); note();
+      await press("+"); note();
+      await press("-"); note();
+      await press("+"); await press("0"); note();
+      await press("]"); play(false); note();
+      await press("["); await press("["); play(false); note();
+      await press(" "); note();
+      await press(" ", { on: find("position") }); note();
+      await press("]", { on: find("position-number") }); note();
+      return seen;
+    """
+    seen = act(html, body, tmp_path, "step=0.01&at=1.5")
+    times = [row[0] for row in seen[:6]]
+    assert times == pytest.approx([1.5, 1.53, 1.52, 1.52, 1.52, 1.52])
+    assert [row[1:3] for row in seen[2:6]] == [
+        [0, 3], [pytest.approx(0.77), pytest.approx(2.27)], [0, 3], [0, 3],
+    ]  # fmt: skip
+    last = len(page_system()["presets"]) - 1
+    assert [row[4] for row in seen[5:8]] == ["", "1", str(last)]
+    assert [row[3] for row in seen[7:]] == [False, True, False, False]
+    assert seen[10][4] == str(last)  # in a field the key is the field's
+
+
+def test_the_address_keeps_all_and_mistakes_in_it_are_said(html: str, tmp_path: Path) -> None:
+    body = """
+      const seen = [location.hash, cursor, view.from, view.to, find("left").value, command()];
+      await new Promise((done) => setTimeout(done, 500));
+      seen.push(location.hash);
+      location.hash = "plant=glass&case=7&step=x&sensor_1.gain=&sensor_3.gain=1&sensor_2.gain=0.002";
+      await settle();
+      seen.push(find("message").textContent, command());
+      return seen;
+    """
+    address = "case=1&step=0.001&sensor_2.reflectance=0.5&plant.friction.coulomb%5B1%5D=0.2"
+    seen = act(html, body, tmp_path, f"{address}&t=1,2&at=1.25")
+    assert seen[1:5] == [1.25, 1, 2, "0.5"]
+    assert seen[5] == (
+        "grasp-cosim run --case 1 --step 0.001 --set sensor_2.reflectance=0.5 "
+        '--set "plant.friction.coulomb[1]=0.2"'
+    )
+    assert seen[6] == f"#{address}&t=1,2&at=1.25"
+    assert seen[7].split("; ") == [
+        "plant=glass: must be one of fixed, soft, movable",
+        "case=7: must be one of 0, 1, 2",
+        "step=x: must be from 0.000001 to 1 s",
+        "sensor_1.gain=: no such parameter, or no value for it",
+        "sensor_3.gain=1: no such parameter, or no value for it",
+    ]
+    assert seen[8] == "grasp-cosim run --set sensor_2.gain=0.002"
+
+
+def test_what_an_fmu_refuses_is_said_and_mended(html: str, tmp_path: Path) -> None:
+    body = """
+      await move("width", 140);
+      await move("position", 70);
+      const seen = [find("message").textContent, document.body.className,
+        find("summary").textContent];
+      await move("position", 0);
+      return [...seen, find("message").textContent, document.body.className];
+    """
+    said, dimmed, *rest = act(html, body, tmp_path, "step=0.002&at=1")
+    assert said.startswith("plant, t = 0 s: object_width = 0.14 m at initial_object_position")
+    assert dimmed == "stale"
+    assert rest == ["", "", ""]
+
+
+def test_the_hand_moves_and_the_fingers_differ_without_colour(html: str, tmp_path: Path) -> None:
+    body = """
+      const seen = [], hand = find("fingers").dataset;
+      for (const t of [0, 0.5, 3]) {
+        seek(t);
+        await settle();
+        seen.push([hand.finger1, hand.finger2].map(Number));
+      }
+      const lines = [...document.querySelectorAll("#plots .panel")].map((panel) => [
+        panel.querySelector("h3").textContent,
+        ...[...panel.querySelectorAll("li")].map((line) => line.dataset.dash)]);
+      seek(0);
+      play(true);
+      const times = [];
+      while (playing) { await new Promise(requestAnimationFrame); times.push(cursor); }
+      return { seen, lines, times };
+    """
+    found = act(html, body, tmp_path, "at=0&step=0.002&controller=adaptive")
+    (start, *_, end) = found["seen"]
+    assert start == [0.11, -0.11]
+    assert end == pytest.approx([0.065, -0.005], abs=1e-4)
+    assert found["lines"] == [
+        ["gap in mm", "0", "1"],
+        ["contact force in N", "0", "1"],
+        ["target in mm", "0", "2"],
+        ["closing speed in mm/s", "0", "1"],
+        ["ratio of the reflectances, learnt", "0"],
+    ]
+    assert found["times"] == sorted(found["times"])
+    assert found["times"][-1] == 3.0
+    assert len(found["times"]) > 100
+
+
+@pytest.mark.parametrize("still", [False, True])
+def test_it_begins_to_move_unless_the_user_wants_no_motion(
+    html: str, tmp_path: Path, still: bool
+) -> None:
+    playing, cursor = act(html, "return [playing, cursor];", tmp_path, "step=0.002", still=still)
+    assert playing is not still
+    assert (cursor == 3.0) is still
+
+
+FRAMED = """
+<html data-ready="yes"><head></head><body style="margin: 0"><script>const recording = {};</script>
+<iframe style="border: 0"></iframe></body></html>
+"""
+"""For a page in a frame of any width; a window of Chromium has 500 px at least."""
+
+
+@pytest.mark.parametrize("width", [360, 768, 1280, 1900])
+def test_nothing_is_wider_than_the_window_or_without_a_name(
+    html: str, tmp_path: Path, width: int
+) -> None:
+    text = json.dumps(html).replace("</", "<\\/")
+    body = f"""
+      const inner = document.querySelector("iframe");
+      inner.width = {width};
+      inner.height = 900;
+      inner.srcdoc = {text};
+      let page = null;
+      while (!page?.documentElement.dataset.ready) {{
+        await sleep(1);
+        work();
+        page = inner.contentDocument;
+      }}
+      for (const details of page.querySelectorAll("details")) details.open = true;
+      const unnamed = [...page.querySelectorAll("button, input, select, canvas")].filter(
+        (e) => !(e.labels?.length || e.ariaLabel || e.title || e.textContent.trim()));
+      const small = [...page.querySelectorAll(".control input[type=range], .pick span")]
+        .filter((e) => e.offsetParent && e.getBoundingClientRect().height < 22);
+      return [inner.contentWindow.innerWidth, page.documentElement.scrollWidth,
+        unnamed.map((e) => e.outerHTML), small.map((e) => e.outerHTML)];
+    """
+    assert in_browser(FRAMED, body, tmp_path) == [width, width, [], []]

@@ -1,0 +1,93 @@
+"""The numbers of the page are those of `run --json`, for the same settings, to 1e-9."""
+
+import json
+import random
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+from grasp_cosim import cli
+from grasp_cosim.grasp.play.page import playground_html
+from grasp_cosim.grasp.play.system import LAWS, PLANTS, page_system
+from report.javascript import in_browser
+
+pytestmark = pytest.mark.slow
+
+VISIT = """
+const seen = [];
+for (const at of %s) {
+  location.hash = at || "case=2";
+  await frame();
+  seen.push({ command: command(), metrics: JSON.parse(state.metrics),
+    said: find("message").textContent, preset: find("preset").selectedOptions[0].textContent });
+}
+return seen;
+"""
+
+
+def visited(addresses: Sequence[str], folder: Path) -> list[dict[str, Any]]:
+    """What the page shows at these addresses."""
+    found: list[dict[str, Any]] = in_browser(
+        playground_html(), VISIT % json.dumps(addresses), folder
+    )
+    assert len(found) == len(addresses)
+    return found
+
+
+def assert_equal_to_a_run(page: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
+    """Run the command that the page shows; each of its metrics is the page's."""
+    assert page["said"] == ""
+    name, *words = shlex.split(page["command"])
+    assert name == "grasp-cosim"
+    assert cli.main([*words, "--json"]) == 0, page["command"]
+    run = json.loads(capsys.readouterr().out)
+    metrics = {k: v for k, v in page["metrics"].items() if v != [None, None] or k in run}
+    assert set(metrics) == set(run) & set(page["metrics"]), page["command"]
+    for metric, value in metrics.items():
+        pairs = zip(*(v if isinstance(v, list) else [v] for v in (value, run[metric])), strict=True)
+        for shown, expected in pairs:
+            near = shown is not None and expected is not None and abs(shown - expected) <= 1e-9
+            assert near or shown is expected, (page["command"], metric, shown, expected)
+
+
+def test_of_each_grasp_of_the_documentation(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    presets = page_system()["presets"]
+    pages = visited([preset["at"] for preset in presets], tmp_path)
+    assert [page["preset"] for page in pages] == [preset["name"] for preset in presets]
+    for page in pages:
+        assert_equal_to_a_run(page, capsys)
+
+
+def drawn(choose: random.Random) -> str:
+    """An address with settings of all kinds, in steps of 1 to 5 ms."""
+    system = page_system()
+    plant, law = choose.choice([*PLANTS]), choose.choice([*LAWS])
+    there = {
+        f"{component}.{name}"
+        for component, model in {
+            **system["components"], "plant": PLANTS[plant], "controller": LAWS[law],
+        }.items()
+        for name, *_ in system["models"][model]
+    }  # fmt: skip
+    parts = [
+        f"plant={plant}", f"controller={law}", f"case={choose.choice([0, 1, 2, 2])}",
+        f"step={choose.choice([0.001, 0.002, 0.005])}", f"stop={choose.choice([1, 2.5, 4])}",
+        f"plant.initial_object_position={choose.randint(-30, 30) / 1000}",
+    ]  # fmt: skip
+    controls = [c for group in system["groups"] for c in group["controls"] if c["name"] != "width"]
+    for control in choose.sample(controls, 4):
+        low, high = (control[end] / control["per"] for end in ("low", "high"))
+        value = round(choose.uniform(low, high), 4)
+        if control["variables"][0] in there and control["name"] != "position":
+            parts.append(f"{control['variables'][0]}={value}")
+    return "&".join(parts)
+
+
+def test_of_settings_drawn_at_random(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    choose = random.Random(19)
+    for page in visited([drawn(choose) for _ in range(30)], tmp_path):
+        assert_equal_to_a_run(page, capsys)
