@@ -377,14 +377,16 @@ def test_unifmu(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert (result["it.integer_c"][-1], result["it.string_c"][-1]) == (5, "xy")
 
 
+@pytest.mark.slow
 def test_fmus_from_elsewhere() -> None:
-    """All FMUs below the folder GRASP_COSIM_FMUS: in our master as in FMPy."""
+    """All FMUs below the folder GRASP_COSIM_FMUS that FMPy runs: the same values in our master."""
     folder = os.environ.get("GRASP_COSIM_FMUS")
     if not folder:
-        pytest.skip("GRASP_COSIM_FMUS names no folder with FMUs")
-    paths = sorted(Path(folder).rglob("*.fmu"))
-    assert paths
-    assert max(map(deviation_from_fmpy, paths)) <= float(row("test_fmus_from_elsewhere").deviation)
+        pytest.skip("GRASP_COSIM_FMUS names no folder of FMUs")
+    found = [deviation_from_fmpy(path) for path in sorted(Path(folder).rglob("*.fmu"))]
+    ran = [deviation for deviation in found if deviation is not None]
+    assert ran, found
+    assert max(ran) <= float(row("test_fmus_from_elsewhere").deviation.split()[0])
 
 
 # The page itself

@@ -1,7 +1,7 @@
 """Other tools that load or make FMUs and archives: where they are, and how they are run.
 
-Each runs in a process of its own, in the first Python that has it: that of the tests, or one of those
-that the environment variable GRASP_COSIM_TOOLS lists, for tools that pin what ours needs newer.
+Each runs in a process of its own, in the first Python that has it: that of the tests, or one of
+those that the environment variable GRASP_COSIM_TOOLS lists, for tools that pin what is newer here.
 """
 
 import json
@@ -21,7 +21,8 @@ with EcosSimulation(ssp_path=given["ssp"], step_size=given["step"]) as simulatio
     simulation.init(parameter_set="initialValues")
     for _ in range(given["steps"]):
         simulation.step(1)
-        found.append([float(simulation.get_real(n.replace(".", "::", 1))) for n in given["signals"]])
+        names = [name.replace(".", "::", 1) for name in given["signals"]]
+        found.append([float(simulation.get_real(name)) for name in names])
 """
 
 COSIM = """

@@ -39,7 +39,11 @@ def playground_html() -> str:
         "scene": _scene(),
         "marks": [],
     }  # fmt: skip
-    scripts = [traces_script(), scene_script(), *(map(_text, ("model.js", "metrics.js", "play.js")))]
+    scripts = [
+        traces_script(),
+        scene_script(),
+        *(map(_text, ("model.js", "metrics.js", "play.js"))),
+    ]
     return Template(_text("play.html")).substitute(
         style=page_style() + scene_style() + _text("play.css"),
         version=escape(version("grasp-cosim")),
