@@ -124,7 +124,7 @@ def test_what_we_write_is_where_the_two_look_for_it(grasp: System, tmp_path: Pat
 def test_a_step_that_varies_is_not_taken_and_said(tmp_path: Path) -> None:
     varies = annotation("org.openmodelica", '<oms:VariableStepMaster description="oms-mav"/>')
     loaded = load(tmp_path, top=varies)
-    assert (loaded.step_ns, loaded.scheme) == (10_000_000, "sequential")
+    assert (loaded.step_ns, loaded.scheme) == (1_000_000, "sequential")
     assert "annotations of type 'org.openmodelica' are not used (1)" in loaded.notes
 
 
