@@ -102,7 +102,7 @@ def test_a_connection_to_a_variable_without_a_connector(tmp_path: Path) -> None:
     loaded = load(tmp_path, structure(system("top", parts, connect("a/y", "b/u"))))
     assert loaded.connections == Y_TO_U
     assert any(
-        "connection 'a.y - b.u': b has no connector 'u'; its FMU has a variable" in note
+        "connection 'a.y - b.u': an end has no connector, but its FMU a variable" in note
         for note in loaded.notes
     )
 

@@ -185,7 +185,7 @@ def test_names_in_nested_systems(tmp_path: Path) -> None:
 
 def test_what_fits_nothing_is_said(tmp_path: Path) -> None:
     loaded = load(tmp_path, given("lenght Real 2"))
-    assert any("parameter 'lenght': no 'lenght' to give it to; not used" in n for n in loaded.notes)
+    assert any("parameter 'lenght': nothing of that name to give it to" in n for n in loaded.notes)
 
 
 def test_a_start_value_of_a_connected_input_is_not_used_and_said(tmp_path: Path) -> None:

@@ -332,9 +332,8 @@ def _end(place: str, system: Element, element: str | None, name: str) -> tuple[N
         owner = system.elements[element]
     variable = owner.interface.by_name.get(name) if owner.interface else None
     if name not in owner.connectors and variable and variable.causality in _CAUSALITIES:
-        system.origin.notes.add(
-            place, f"{owner.name} has no connector {name!r}; its FMU has a variable of that name"
-        )
+        text = "an end has no connector, but its FMU a variable of that name"
+        system.origin.notes.add(place, text)
         kind: str = variable.causality
     else:
         known(f"{place}: {owner.name} has no connector", name, owner.connectors)
