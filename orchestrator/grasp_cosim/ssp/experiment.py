@@ -51,7 +51,7 @@ def step_time(
     if annotated:
         return annotated.step_ns
     if steps.base_ns:
-        notes.append(f"step = {steps.base_ns / NANOSECONDS:g} s, scheme jacobi, by {steps.said}")
+        notes.append(f"step = {steps.base_ns / NANOSECONDS:g} s, by {steps.said}")
         return steps.base_ns
     declared_steps = sorted({part.interface.step for part in parts if part.interface.step})
     for step in declared_steps:

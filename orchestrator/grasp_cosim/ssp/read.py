@@ -71,6 +71,8 @@ def read_ssp(
     if annotated is None:
         components = flow_order(components, connections)
         decided.append(f"order of execution: {', '.join(c.name for c in components)}")
+    if steps.base_ns:
+        decided.append(f"scheme = {extras.scheme}, as meant by {steps.said}")
     stop_ns = stop_time(file, root, parts.values(), stop, decided)
     step_ns = step_time(file, parts.values(), stop_ns, given_ns, annotated, steps, decided)
     used = {TYPE, *FOREIGN} if annotated or steps.base_ns else {TYPE}
