@@ -1,5 +1,6 @@
 """Parameter sets and mappings: which value holds, in which unit, and what is refused."""
 
+import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -98,6 +99,30 @@ def test_a_set_and_a_mapping_in_files(tmp_path: Path) -> None:
     }
     # converted to 0.25 m, then 2 * 0.25 + 1
     assert load(tmp_path, binding, files=files).components[0].values["length"] == 1.5
+
+
+def test_a_set_in_the_fmu_of_the_component(tmp_path: Path) -> None:
+    binding = (
+        '<ssd:ParameterBinding source="resources/own.ssv" sourceBase="component">'
+        '<ssd:ParameterMapping source="resources/map.ssm"/></ssd:ParameterBinding>'
+    )
+    inner = tmp_path / "inner.zip"
+    with zipfile.ZipFile(inner, "w") as file:
+        file.writestr("modelDescription.xml", FMU)
+        file.writestr("resources/own.ssv", parameter_set("L Real 250.0 mm"))
+    top = system("top", component("a", "input u", binding))
+    files = {
+        "resources/a.fmu": inner.read_bytes(),
+        "resources/map.ssm": mapping(("L", "length", "")),
+    }
+    loaded = System.load(archive(tmp_path, structure(top), {}, files))
+    assert loaded.components[0].values["length"] == 0.25
+
+
+def test_a_system_has_no_files_of_its_own(tmp_path: Path) -> None:
+    binding = '<ssd:ParameterBinding source="resources/own.ssv" sourceBase="component"/>'
+    with pytest.raises(InputError, match="'top': sourceBase 'component': must be at a component"):
+        load(tmp_path, outer=binding)
 
 
 def test_a_later_binding_goes_before_an_earlier_one(tmp_path: Path) -> None:
@@ -294,8 +319,8 @@ REFUSED = [
         "Integer has ssc:BooleanMappingTransformation; must be Boolean",
     ),
     (
-        given("x Real 1", sourceBase="component"),
-        "sourceBase 'component' is not supported; put the file into resources/",
+        '<ssd:ParameterBinding source="resources/x.ssv" sourceBase="component"/>',
+        "source 'resources/x.ssv': not in the archive; valid: none",
     ),
     (
         given("x Real 1", type="text/csv"),
