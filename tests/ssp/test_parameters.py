@@ -111,7 +111,7 @@ def test_a_set_in_the_fmu_of_the_component(tmp_path: Path) -> None:
         file.writestr("modelDescription.xml", FMU)
         file.writestr("resources/own.ssv", parameter_set("L Real 250.0 mm"))
     top = system("top", component("a", "input u", binding))
-    files = {
+    files: dict[str, str | bytes] = {
         "resources/a.fmu": inner.read_bytes(),
         "resources/map.ssm": mapping(("L", "length", "")),
     }
