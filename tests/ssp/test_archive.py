@@ -72,7 +72,7 @@ REFUSED = [
     ),
     (
         structure(system("top", component("a", implementation="ModelExchange"))),
-        "component 'a': implementation 'ModelExchange' is not supported; must be CoSimulation",
+        "component 'a': implementation 'ModelExchange': resources/a.fmu has none; must be CoSim",
     ),
     (structure(system("top", ELEMENT + ELEMENT)), "system 'top': two elements 'a'; must differ"),
     (
@@ -168,11 +168,10 @@ def test_an_fmu_that_is_none(tmp_path: Path) -> None:
     assert "component 'a': resources/a.fmu: not a readable FMU: " in text
 
 
-def test_a_model_exchange_fmu(tmp_path: Path) -> None:
+def test_a_model_exchange_fmu_is_integrated(tmp_path: Path) -> None:
     exchange = A.replace(b"CoSimulation", b"ModelExchange")
-    assert "resources/a.fmu: is for model exchange only; ask" in refused(
-        tmp_path, structure(TOP), a=exchange
-    )
+    (part,) = System.load(archive(tmp_path, structure(TOP), {"a": exchange})).components
+    assert part.integrated
 
 
 def truncated(path: Path) -> None:
@@ -222,7 +221,7 @@ def folder(path: Path) -> None:
         (damaged, "SystemStructure.ssd: not readable: Bad CRC-32"),
         (encrypted, "SystemStructure.ssd: not readable: File 'SystemStructure.ssd' is encrypted"),
         (missing, "no such system file"),
-        (folder, "is a folder; must be an .ssp file"),
+        (folder, "is a folder; must be a system, a .toml or .ssp file"),
     ],
 )
 def test_wrong_files(tmp_path: Path, spoil: Callable[[Path], None], message: str) -> None:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim import InputError, System
+from grasp_cosim.system import checks
 from grasp_cosim.system.checks import transforms
 from grasp_cosim.system.parts import Connection, Port
 from ssp.hand_made import archive, component, connect, fmu, linear, structure, system
@@ -250,3 +251,13 @@ def test_a_connector_in_a_unit_of_the_archive_alone_is_a_factor(tmp_path: Path) 
     loaded = System.load(archive(tmp_path, drawn, files))
     assert loaded.component("a", "").units == {}
     assert loaded.connections == (Connection(*A_TO_B, 0.002, 0.0),)
+
+
+def test_the_place_of_a_connection_is_worked_out_for_errors_only(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It takes a look at all of them, and there may be thousands."""
+    drawn = system("top", BOTH, connect("a/y", "b/u"))
+    path = archive(tmp_path, structure(drawn), {"a": GIVES, "b": TAKES})
+    monkeypatch.setattr(checks, "as_written", lambda _: pytest.fail("looked for a place"))
+    assert len(System.load(path).connections) == 1

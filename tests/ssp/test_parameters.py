@@ -1,5 +1,6 @@
 """Parameter sets and mappings: which value holds, in which unit, and what is refused."""
 
+import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -100,6 +101,30 @@ def test_a_set_and_a_mapping_in_files(tmp_path: Path) -> None:
     assert load(tmp_path, binding, files=files).components[0].values["length"] == 1.5
 
 
+def test_a_set_in_the_fmu_of_the_component(tmp_path: Path) -> None:
+    binding = (
+        '<ssd:ParameterBinding source="resources/own.ssv" sourceBase="component">'
+        '<ssd:ParameterMapping source="resources/map.ssm"/></ssd:ParameterBinding>'
+    )
+    inner = tmp_path / "inner.zip"
+    with zipfile.ZipFile(inner, "w") as file:
+        file.writestr("modelDescription.xml", FMU)
+        file.writestr("resources/own.ssv", parameter_set("L Real 250.0 mm"))
+    top = system("top", component("a", "input u", binding))
+    files: dict[str, str | bytes] = {
+        "resources/a.fmu": inner.read_bytes(),
+        "resources/map.ssm": mapping(("L", "length", "")),
+    }
+    loaded = System.load(archive(tmp_path, structure(top), {}, files))
+    assert loaded.components[0].values["length"] == 0.25
+
+
+def test_a_system_has_no_files_of_its_own(tmp_path: Path) -> None:
+    binding = '<ssd:ParameterBinding source="resources/own.ssv" sourceBase="component"/>'
+    with pytest.raises(InputError, match="'top': sourceBase 'component': must be at a component"):
+        load(tmp_path, outer=binding)
+
+
 def test_a_later_binding_goes_before_an_earlier_one(tmp_path: Path) -> None:
     assert values(tmp_path, given("length Real 2") + given("length Real 3"))["length"] == 3.0
 
@@ -185,7 +210,7 @@ def test_names_in_nested_systems(tmp_path: Path) -> None:
 
 def test_what_fits_nothing_is_said(tmp_path: Path) -> None:
     loaded = load(tmp_path, given("lenght Real 2"))
-    assert any("parameter 'lenght': no 'lenght' to give it to; not used" in n for n in loaded.notes)
+    assert any("parameter 'lenght': nothing of that name to give it to" in n for n in loaded.notes)
 
 
 def test_a_start_value_of_a_connected_input_is_not_used_and_said(tmp_path: Path) -> None:
@@ -294,8 +319,8 @@ REFUSED = [
         "Integer has ssc:BooleanMappingTransformation; must be Boolean",
     ),
     (
-        given("x Real 1", sourceBase="component"),
-        "sourceBase 'component' is not supported; put the file into resources/",
+        '<ssd:ParameterBinding source="resources/x.ssv" sourceBase="component"/>',
+        "source 'resources/x.ssv': not in the archive; valid: none",
     ),
     (
         given("x Real 1", type="text/csv"),

@@ -355,6 +355,9 @@ def test_arrays_of_a_given_size_come_back(tmp_path: Path) -> None:
     )
     again = round_trip(whole, tmp_path)
     assert again == whole
+    notes = write_ssp(whole, tmp_path / "f.ssp").notes
+    said = "SSP 1.0 has no arrays: in, out, A by elements, which other tools do not know"
+    assert f"a: {said}" in notes
     with zipfile.ZipFile(tmp_path / "again.ssp") as file:
         text = file.read("SystemStructure.ssd").decode()
     assert 'startConnector="Outs[3]" endElement="b" endConnector="Ins[3]"' in text

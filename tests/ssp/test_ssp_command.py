@@ -73,4 +73,4 @@ def test_an_archive_without_a_step_says_how_to_give_one(
     assert main(["run", str(path), "--step", "1e-3"]) == 2  # now it is the FMU that has no code
     said = capsys.readouterr().err
     assert "order of execution: a" in said
-    assert "does not load" in said
+    assert "a.fmu has no binary at all" in said

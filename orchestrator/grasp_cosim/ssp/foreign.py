@@ -7,7 +7,7 @@ command line needs, first of the annotations there. Both let all components take
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -25,14 +25,10 @@ _OSP_TYPE, _OMS_TYPE = "com.opensimulationplatform", "org.openmodelica"
 FOREIGN = (_OSP_TYPE, "org.open-simulation-platform", _OMS_TYPE)
 """The types of the annotations that are read here; the second is an earlier one of OSP."""
 
-_BASE = {
-    f"{{{_OSP}}}FixedStepAlgorithm": "baseStepSize",
-    f"{{{_OSP}}}FixedStepMaster": "stepSize",
-    f"{{{_OMS}}}FixedStepMaster": "stepSize",
-}
-"""The elements that name a step, and in which attribute."""
+_BASE = {"FixedStepAlgorithm": "baseStepSize", "FixedStepMaster": "stepSize"}
+"""The elements that name a step, in any namespace, and in which attribute."""
 
-_TOP = ("ssd:DefaultExperiment", "ssd:System", "")
+_TOP: tuple[tuple[str, ...], ...] = (("ssd:DefaultExperiment",), ("ssd:System",), ())
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,13 +49,8 @@ def read_steps(file: str, root: Any, given_ns: int | None) -> Steps:
     InputError where they contradict each other.
     """
     found: dict[int, str] = {}
-    for parent in _TOP:
-        path = filter(None, (parent, "ssd:Annotations", "ssc:Annotation"))
-        for annotation in children(root, *path):
-            kind = annotation.get("type")
-            for element in annotation.iter(*_BASE) if kind in FOREIGN else ():
-                place = f"{at(file, element)}: annotation {kind!r}"
-                found.setdefault(_time(f"{place}: step", element.get(_BASE[element.tag])), place)
+    for step, place in _named(file, root):
+        found.setdefault(step, place)
     if not found:
         return Steps()
     if len(found) > 1 and given_ns is None:
@@ -67,6 +58,18 @@ def read_steps(file: str, root: Any, given_ns: int | None) -> Steps:
         raise InputError(f"{file}: its annotations name several steps, {listed}; give one: --step")
     base, said = next(iter(found.items()))
     return Steps(base, said, _hints(file, root, given_ns or base))
+
+
+def _named(file: str, root: Any) -> Iterator[tuple[int, str]]:
+    """Yield the steps that are named for the whole system, and where."""
+    for parent in _TOP:
+        for annotation in children(root, *parent, "ssd:Annotations", "ssc:Annotation"):
+            if annotation.get("type") not in FOREIGN:
+                continue
+            for name, attribute in _BASE.items():
+                for element in annotation.iter(f"{{*}}{name}"):
+                    place = f"{at(file, element)}: annotation {annotation.get('type')!r}"
+                    yield _time(f"{place}: step", element.get(attribute)), place
 
 
 def write_steps(experiment: Any, system: Any, step_ns: int) -> None:
@@ -102,7 +105,7 @@ def _hints(file: str, root: Any, base: int) -> dict[str, int]:
     own: dict[str, int] = {}
     path = ("ssd:System", "ssd:Elements", "ssd:Component")
     for component in children(root, *path):
-        for hint in component.iter(f"{{{_OSP}}}StepSizeHint"):
+        for hint in component.iter("{*}StepSizeHint"):
             hinted = _time(f"{at(file, hint)}: StepSizeHint", hint.get("value"))
             multiple = max(1, math.floor(hinted / base + 0.5)) * base
             if multiple != base:

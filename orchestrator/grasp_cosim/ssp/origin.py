@@ -22,13 +22,17 @@ _KINDS = {
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """A document, an entry of an archive, with its units and the documents that it is nested in."""
+    """A document, an entry of an archive, with its units and the documents that it is nested in.
+
+    fmu is the entry of the component that an element stands in, empty where it stands in none.
+    """
 
     archive: Archive
     entry: str
     notes: Notes
     units: Mapping[str, Unit] = field(default_factory=dict)
     around: tuple[str, ...] = ()
+    fmu: str = ""
 
     @property
     def place(self) -> str:
@@ -75,10 +79,6 @@ class Origin:
             raise InputError(
                 f"{place}: type {named_type!r} is not supported; must be application/x-ssp-{kind}"
             )
-        if entry.get("sourceBase", "SSD") != "SSD":
-            raise InputError(
-                f"{place}: sourceBase 'component' is not supported; put the file into resources/"
-            )
         source, inline = entry.get("source"), None if holder is None else child(holder, ROOTS[form])
         if (source is None) == (inline is None):
             raise InputError(
@@ -87,9 +87,19 @@ class Origin:
         if source is None:
             root = checked(self.place, inline, form, self.notes)
             return replace(self, units={**self.units, **read_units(self.place, root, form)}), root
-        found = replace(self, entry=self.resolve(place, source), units={})
-        root = parse(found.place, self.archive.read(found.entry), form, self.notes)
+        found = self._within_fmu(place) if entry.get("sourceBase") == "component" else self
+        found = replace(found, entry=found.resolve(place, source), units={})
+        root = parse(found.place, found.archive.read(found.entry), form, self.notes)
         return replace(found, units=read_units(found.place, root, form)), root
+
+    def _within_fmu(self, place: str) -> "Origin":
+        """The place of the files in the component's FMU."""
+        if not self.fmu:
+            raise InputError(f"{place}: sourceBase 'component': must be at a component with an FMU")
+        within = f"{self.archive.place}: {self.fmu}"
+        path = self.archive.extract(self.fmu)
+        archive = Archive(path, self.notes, within, "modelDescription.xml")
+        return replace(self, archive=archive, entry="")
 
 
 def open_structure(

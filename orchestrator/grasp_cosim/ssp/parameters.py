@@ -57,11 +57,12 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """A parameter for what is called name at the binding's system or component.
+    """A parameter for what is called name at the binding's system or component; place says so.
 
     With suppress its unit is not converted. transformation is its element, or None.
     """
 
+    place: str
     name: str
     parameter: Parameter
     suppress: bool = False
@@ -104,8 +105,7 @@ def _settled(network: Network) -> Iterator[tuple[Node, Parameter]]:
             for node in nodes:
                 given[node] = _adapted(network, node, entry)
             if not nodes:
-                text = f"no {entry.name!r} to give it to; not used"
-                origin.notes.add(entry.parameter.place, text)
+                origin.notes.add(entry.place, "nothing of that name to give it to; not used")
     for node in given:
         network.trace(node)  # refuses circles, in which there are no ends
         for end in _ends(network, node):
@@ -128,7 +128,7 @@ def _given(origin: Origin, place: str, binding: Any) -> Iterator[Given]:
     mapping = child(binding, "ssd:ParameterMapping")
     if mapping is None:
         for name, parameter in parameters.items():
-            yield Given(name, parameter)
+            yield Given(parameter.place, name, parameter)
         return
     inner, root = origin.inner(place, mapping, "ssm", mapping)
     unmapped = dict(parameters)
@@ -144,7 +144,7 @@ def _given(origin: Origin, place: str, binding: Any) -> Iterator[Given]:
             raise InputError(f"{where}: {target!r} has two sources; must have one")
         targets.add(target)
         suppress = is_true(element, "suppressUnitConversion")
-        yield Given(target, parameters[source], suppress, transformation(element))
+        yield Given(where, target, parameters[source], suppress, transformation(element))
     for parameter in unmapped.values():
         origin.notes.add(parameter.place, "not in the mapping; not used")
 

@@ -172,7 +172,8 @@ def _element(origin: Origin, entry: Any, parent: Path, reachable: Dictionaries) 
     known(f"{place}: type", kind, (FMU, _PACKAGE, _DEFINITION), " is not supported")
     if kind != FMU:
         return _nested(origin, entry, path, place)
-    interface = _interface(origin, place, entry.get("source"))
+    fmu = origin.resolve(place, entry.get("source"))
+    interface = _interface(origin, place, fmu)
     asked = entry.get("implementation", "any")
     if asked != "any" and asked not in interface.kinds:
         raise InputError(
@@ -182,18 +183,18 @@ def _element(origin: Origin, entry: Any, parent: Path, reachable: Dictionaries) 
     connectors = _connectors(origin, entry, interface)
     element = Element(at(origin.place, entry), path, name, origin, connectors)
     exchange = asked == "ModelExchange"
-    bindings = _bindings(origin, entry)
+    bindings = _bindings(replace(origin, fmu=fmu), entry)
     return replace(element, bindings=bindings, interface=interface, exchange=exchange)
 
 
-def _interface(origin: Origin, place: str, source: str) -> Interface:
+def _interface(origin: Origin, place: str, fmu: str) -> Interface:
     """The interface of the FMU of a component."""
-    path = origin.archive.extract(origin.resolve(place, source))
+    path = origin.archive.extract(fmu)
     try:
         return read_interface(path)
     except InputError as error:
         reason = str(error).removeprefix(f"{path}: ")
-        raise InputError(f"{place}: {source}: {reason}") from error
+        raise InputError(f"{place}: {fmu}: {reason}") from error
 
 
 def _nested(origin: Origin, entry: Any, path: Path, place: str) -> Element:
@@ -332,9 +333,8 @@ def _end(place: str, system: Element, element: str | None, name: str) -> tuple[N
         owner = system.elements[element]
     variable = owner.interface.by_name.get(name) if owner.interface else None
     if name not in owner.connectors and variable and variable.causality in _CAUSALITIES:
-        system.origin.notes.add(
-            place, f"{owner.name} has no connector {name!r}; its FMU has a variable of that name"
-        )
+        text = "an end has no connector, but its FMU a variable of that name"
+        system.origin.notes.add(place, text)
         kind: str = variable.causality
     else:
         known(f"{place}: {owner.name} has no connector", name, owner.connectors)

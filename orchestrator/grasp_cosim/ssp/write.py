@@ -17,7 +17,6 @@ from ..interface.read import read_interface
 from ..interface.units import Unit
 from ..system.description import System
 from ..system.parts import NANOSECONDS, Component, Connection, Port
-from ..system.swap import stated
 from .annotation import extras_of, write_extras
 from .archive import RESOURCES, STRUCTURE, write_archive
 from .document import VERSION, add, new, to_bytes
@@ -44,7 +43,6 @@ def write_ssp(system: System, path: Path) -> Written:
     """Write the archive; InputError where path is not that of an .ssp file."""
     if path.suffix.lower() != ".ssp" or path.is_dir():
         raise InputError(f"-o {path}: must be a file named like system.ssp")
-    _check_arrays(system)
     entries: dict[str, bytes] = {}
     sources = {c.name: _fmu_entry(c.fmu, entries) for c in system.components}
     bindings = {c.name: _values_entry(c, entries) for c in system.components if c.values}
@@ -52,20 +50,6 @@ def write_ssp(system: System, path: Path) -> Written:
     entries = {STRUCTURE: structure, **dict(sorted(entries.items()))}
     write_archive(path, entries)
     return Written(tuple(entries), tuple(_notes(system)))
-
-
-def _check_arrays(system: System) -> None:
-    """InputError where something is done with an array, for which SSP 1.0 has no form."""
-    ends = [port for c in system.connections for port in (c.source, c.target)]
-    values = [Port(c.name, name) for c in system.components for name in c.values]
-    others = [Port(c.name, name) for c in system.components for name in stated(system, c.name)]
-    for port in (*values, *ends, *others):
-        variable = system.component(port.component, "").interface.by_name.get(port.variable)
-        if variable is not None and variable.element:
-            raise InputError(
-                f"{system.name}: {port} is of an array, for which SSP 1.0 has no form; must be "
-                "without connections and values of arrays"
-            )
 
 
 def _notes(system: System) -> Iterable[str]:
@@ -84,7 +68,12 @@ def _notes(system: System) -> Iterable[str]:
     for component in system.components:
         if obstacle := of_binary(component.interface):
             yield f"{component.name}: {component.interface.called} {obstacle.what}"
-        for variable in read_interface(component.fmu).of(*_CAUSALITIES):
+        if arrays := component.interface.arrays:
+            yield (
+                f"{component.name}: SSP 1.0 has no arrays: {', '.join(arrays)} by elements, which "
+                "other tools do not know"
+            )
+        for variable in component.interface.of(*_CAUSALITIES):
             if not variable.supported:
                 port = Port(component.name, variable.name)
                 yield f"{port} is of type {variable.nature}: it has no connector"

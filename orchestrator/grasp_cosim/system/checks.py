@@ -136,23 +136,26 @@ def connection_transform(system: Structure, connection: Connection) -> tuple[flo
     given, taken = source.variable.unit, target.variable.unit
     if given is None or taken is None or given == taken:
         return 1.0, 0.0
-    ends = f"{place}: {source.port} is in {given} and {target.port} in {taken}"
+
+    def ends() -> str:
+        return f"{place}: {source.port} is in {given} and {target.port} in {taken}"
+
     advice = (
         f'{{ from = "{source.port}", to = "{target.port}", factor = ... }} '
         f"gives the factor from {given} to {taken}, and a component's units correct a wrong one"
     )
     units = source.interface.unit(source.variable), target.interface.unit(target.variable)
     if units[0] is None or units[1] is None:
-        raise InputError(f"{ends}, which their FMUs do not define in SI units; {advice}")
+        raise InputError(f"{ends()}, which their FMUs do not define in SI units; {advice}")
     found = conversion(units[0], units[1])
     if found is None:
         raise InputError(
-            f"{ends}, which cannot be converted; must be the same quantity, or {advice}"
+            f"{ends()}, which cannot be converted; must be the same quantity, or {advice}"
         )
     factor, offset = found
     if offset and source.variable.relative != target.variable.relative:
         raise InputError(
-            f"{ends}, and only one of them is a difference (relativeQuantity); must be both, or "
+            f"{ends()}, and only one of them is a difference (relativeQuantity); must be both, or "
             f"{advice}"
         )
     return factor, 0.0 if target.variable.relative else offset
@@ -249,20 +252,23 @@ def _check_types(place: _Place, source: _End, target: _End) -> None:
                 f"must be {choices(SUPPORTED)}"
             )
     given, taken = source.variable, target.variable
-    types = f"{place}: {source.port} is {given.type} and {target.port} is {taken.type}"
+
+    def types() -> str:
+        return f"{place}: {source.port} is {given.type} and {target.port} is {taken.type}"
+
     low, high = target.limits
     least, most = source.limits
     if (given.kind, taken.kind) == ("Integer", "Real"):
         if taken.type == "Float32" and not -(2**24) <= least <= most <= 2**24:
-            raise InputError(f"{types}, which does not hold all its values; must be Float64")
+            raise InputError(f"{types()}, which does not hold all its values; must be Float64")
     elif given.kind != taken.kind:
         raise InputError(
-            f"{types}; must be both Real, both Integer, both Boolean or both String, "
+            f"{types()}; must be both Real, both Integer, both Boolean or both String, "
             "or from Integer to Real"
         )
     elif given.kind == "Integer" and not low <= least <= most <= high:
         raise InputError(
-            f"{types}, which does not hold all its values; must be a type that holds "
+            f"{types()}, which does not hold all its values; must be a type that holds "
             f"{least} to {most}"
         )
 

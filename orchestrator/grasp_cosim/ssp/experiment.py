@@ -1,0 +1,68 @@
+"""The stop time and the step of an archive: given, named by it, or those of its FMUs."""
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+from ..errors import InputError, choices
+from ..system.description import in_nanoseconds
+from ..system.parts import NANOSECONDS
+from .annotation import Extras
+from .document import at, child
+from .foreign import Steps
+from .network import Part
+
+
+def stop_time(
+    file: str, root: Any, parts: Iterable[Part], given: float | None, notes: list[str]
+) -> int:
+    """The stop time in ns: given, or of the archive, or the longest that its FMUs name."""
+    experiment = child(root, "ssd:DefaultExperiment")
+    attributes = {} if experiment is None else experiment.attrib
+    start = float(attributes.get("startTime", "0"))
+    if start != 0.0:
+        raise InputError(
+            f"{at(file, experiment)}: startTime = {start:g} s is not supported; must be 0"
+        )
+    if given is not None:
+        return in_nanoseconds("stop", given)
+    if "stopTime" in attributes:
+        return in_nanoseconds(f"{at(file, experiment)}: stopTime", float(attributes["stopTime"]))
+    declared = [part.interface.experiment.get("stop_time") for part in parts]
+    stop = max((float(time) for time in declared if time is not None), default=0.0)
+    if not 0.0 < stop < math.inf:
+        raise InputError(f"{file}: no stopTime in a DefaultExperiment; give one: --stop")
+    notes.append(f"stop = {stop:g} s, the longest that its FMUs name; the archive names none")
+    return in_nanoseconds(f"{file}: stop time of its FMUs", stop)
+
+
+def step_time(
+    file: str,
+    parts: Iterable[Part],
+    stop_ns: int,
+    given_ns: int | None,
+    annotated: Extras | None,
+    steps: Steps,
+    notes: list[str],
+) -> int:
+    """The step in ns: given, ours, another tool's, or the FMUs' smallest that divides the stop."""
+    if given_ns is not None:
+        return given_ns
+    if annotated:
+        return annotated.step_ns
+    if steps.base_ns:
+        notes.append(f"step = {steps.base_ns / NANOSECONDS:g} s, by {steps.said}")
+        return steps.base_ns
+    declared_steps = sorted({part.interface.step for part in parts if part.interface.step})
+    for step in declared_steps:
+        if not 0.0 < step * NANOSECONDS <= stop_ns:
+            continue
+        step_ns = round(step * NANOSECONDS)
+        if step_ns and stop_ns % step_ns == 0 and math.isclose(step_ns / NANOSECONDS, step):
+            notes.append(f"step = {step:g} s, the smallest that its FMUs name; SSP has none")
+            return step_ns
+    listed = choices(f"{step:g} s" for step in declared_steps)
+    raise InputError(
+        f"{file}: names no step, as SSP has none, and of those of its FMUs ({listed}) none "
+        f"divides the stop of {stop_ns / NANOSECONDS:g} s; give one: --step"
+    )
