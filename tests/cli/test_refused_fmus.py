@@ -64,6 +64,8 @@ def test_a_kind_that_no_machine_runs(name: str, command: Run, tmp_path: Path) ->
         ("run", "--swap", "plant=x.fmu"),
         ("qualify", "x.fmu", "--as", "plant"),
         ("ssp", "s.toml", "-o", "s.ssp"),
+        ("init", "my.toml", "--as", "plant=x.fmu"),
+        ("init", "my.toml", "--fmu", "x=x.fmu"),
         ("proxy", "x.fmu", "-o", "p.fmu"),
         ("serve", "x.fmu", "--port", "0", "--duration", "0.1"),
     ):
