@@ -175,7 +175,7 @@ def test_one_without_its_licence(isolation: str, command: Run, tmp_path: Path) -
     assert "ask the vendor for an export that needs none" in (trial.fix or "")
     (tmp_path / "s.toml").write_text(SYSTEM)
     run = command("run", "s.toml", "--isolation", isolation)
-    one_line(run, "No license for feature X; it needs a licence on this machine", "needs none")
+    one_line(run, "No license for feature X in resources/key; it needs a licence on", "needs none")
 
 
 def test_one_that_is_encrypted(command: Run, tmp_path: Path) -> None:
