@@ -311,6 +311,8 @@ def test_a_description_that_fmpy_refuses(opened: Opened) -> None:
     assert verdict == "problem"
     assert 'illegal combination of causality="parameter" and variability="continuous"' in text
     assert len(text.splitlines()) == 1
+    loaded = doctor.description(dataclasses.replace(fmu, loads=True))
+    assert loaded[0] == "warning"  # this master reads it, and others may not
 
 
 def test_no_binary_for_this_system(stock: Path, tmp_path: Path) -> None:
