@@ -69,8 +69,9 @@ def _nature(path: Path, wanted: str) -> tuple[str, str]:
     found = _archive_nature(path)
     if found == "an FMU" and wanted == "system":
         return found, (
-            f"`grasp-cosim init my_system.toml --as NAME={name}` makes a system of it, "
-            f"`grasp-cosim run --swap COMPONENT={name}` puts it into one"
+            f"`grasp-cosim init my_system.toml --fmu NAME={name}` makes a system of it alone, "
+            f"`--as COMPONENT={name}` the grasp with it, `grasp-cosim run --swap COMPONENT={name}` "
+            "runs that"
         )
     if found == "an FMU":
         return found, f"`grasp-cosim inspect {name}` shows it"
@@ -97,6 +98,8 @@ def _folder_nature(path: Path, wanted: str) -> tuple[str, str]:
     suffixes = _SUFFIXES.get(wanted, ())
     inside = sorted(str(p) for p in path.iterdir() if p.suffix.lower() in suffixes)
     inside += sorted(str(p.parent) for p in path.glob("*/run.json")) if wanted == "run" else []
+    if wanted == "run" and not inside:
+        return "", ""  # what is missing in it is to be said
     return "a folder", f"there is: {choices(inside, 6)}" if inside else ""
 
 

@@ -64,6 +64,8 @@ def test_a_kind_that_no_machine_runs(name: str, command: Run, tmp_path: Path) ->
         ("run", "--swap", "plant=x.fmu"),
         ("qualify", "x.fmu", "--as", "plant"),
         ("ssp", "s.toml", "-o", "s.ssp"),
+        ("init", "my.toml", "--as", "plant=x.fmu"),
+        ("init", "my.toml", "--fmu", "x=x.fmu"),
         ("proxy", "x.fmu", "-o", "p.fmu"),
         ("serve", "x.fmu", "--port", "0", "--duration", "0.1"),
     ):
@@ -173,7 +175,7 @@ def test_one_without_its_licence(isolation: str, command: Run, tmp_path: Path) -
     assert "ask the vendor for an export that needs none" in (trial.fix or "")
     (tmp_path / "s.toml").write_text(SYSTEM)
     run = command("run", "s.toml", "--isolation", isolation)
-    one_line(run, "No license for feature X; it needs a licence on this machine", "needs none")
+    one_line(run, "No license for feature X in resources/key; it needs a licence on", "needs none")
 
 
 def test_one_that_is_encrypted(command: Run, tmp_path: Path) -> None:

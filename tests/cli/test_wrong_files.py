@@ -8,10 +8,20 @@ from conftest import Run
 from grasp_cosim import InputError, System, load_run, simulate
 from grasp_cosim.ssp.write import write_ssp
 
-FMU = ("inspect", "{}"), ("doctor", "{}"), ("proxy", "{}", "-o", "p.fmu"), ("serve", "{}")
-FMU = (*FMU, ("run", "--swap", "plant={}"), ("qualify", "{}", "--as", "plant"))
-SYSTEM = ("run", "{}"), ("ssp", "{}", "-o", "out.ssp"), ("qualify", "p.fmu", "--as", "a")
-SYSTEM = (*SYSTEM[:2], (*SYSTEM[2], "--system", "{}"))
+FMU = [
+    ("inspect", "{}"),
+    ("doctor", "{}"),
+    ("proxy", "{}", "-o", "p.fmu"),
+    ("serve", "{}"),
+    ("run", "--swap", "plant={}"),
+    ("init", "my.toml", "--as", "plant={}"),
+    ("qualify", "{}", "--as", "plant"),
+]
+SYSTEM = [
+    ("run", "{}"),
+    ("ssp", "{}", "-o", "out.ssp"),
+    ("qualify", "p.fmu", "--as", "a", "--system", "{}"),
+]
 
 
 @pytest.fixture
@@ -47,9 +57,9 @@ def refused(run: tuple[int, str, str], given: str, what: str, advice: str) -> No
 def test_in_the_place_of_a_system(arguments: tuple[str, ...], command: Run, things: Path) -> None:
     report = "`grasp-cosim report run` shows the run"
     for given, what, advice in (
-        ("plant.fmu", "an FMU", "`grasp-cosim init my_system.toml --as NAME=plant.fmu` makes a"),
-        ("plant.fmu", "an FMU", "`grasp-cosim run --swap COMPONENT=plant.fmu` puts it into one"),
-        ("my.zip", "an FMU", "--as NAME=my.zip`"),
+        ("plant.fmu", "an FMU", "`grasp-cosim init my_system.toml --fmu NAME=plant.fmu` makes a"),
+        ("plant.fmu", "an FMU", "`grasp-cosim run --swap COMPONENT=plant.fmu` runs that"),
+        ("my.zip", "an FMU", "--as COMPONENT=my.zip`"),
         ("b.zip", "an SSP archive", "its name must end in .ssp"),
         ("unpacked", "a folder, unpacked from an FMU", "zip -r - .) > unpacked.fmu` packs it"),
         ("structure", "a folder, unpacked from an SSP archive", "> structure.ssp` packs it"),

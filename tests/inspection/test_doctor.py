@@ -20,6 +20,7 @@ from grasp_cosim.errors import InputError
 from grasp_cosim.inspection import doctor
 from grasp_cosim.inspection.doctor import Finding, Unpacked, Verdict, examine, unpack
 from support import native_fmus
+from support.models import build_model
 
 Changes = dict[str, bytes | None]
 Opened = Callable[..., Unpacked]
@@ -260,8 +261,8 @@ def test_a_folder_is_no_fmu(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("version", "kinds"),
     [
-        ("3.0", '<ModelExchange modelIdentifier="N"/>'),
-        ("2.0", '<ModelExchange modelIdentifier="N"/>'),
+        ("3.0", '<ScheduledExecution modelIdentifier="N"/>'),
+        ("2.0", ""),
         ("1.0", ""),
     ],
 )
@@ -279,6 +280,17 @@ def test_an_fmu_of_another_kind_is_not_loaded(version: str, kinds: str, tmp_path
     assert found["binary"].status == ("ok" if version == "3.0" else "problem")
     assert found["trial"].status == "warning"
     assert "not loaded" in found["trial"].text
+
+
+@gcc
+@pytest.mark.slow
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_one_for_model_exchange_runs_here_by_a_solver(version: str, tmp_path: Path) -> None:
+    fmu = build_model("bouncing_ball", tmp_path, version, ("ModelExchange",))
+    found = {f.check: f for f in examine(fmu)}
+    checks = ("fmu", "binary", "libraries", "trial")
+    assert {found[check].status for check in checks} == {"ok"}
+    assert "run here by a solver, elsewhere ask the vendor" in found["fmu"].text
 
 
 def test_both_kinds_are_a_cosimulation(tmp_path: Path) -> None:
@@ -299,6 +311,8 @@ def test_a_description_that_fmpy_refuses(opened: Opened) -> None:
     assert verdict == "problem"
     assert 'illegal combination of causality="parameter" and variability="continuous"' in text
     assert len(text.splitlines()) == 1
+    loaded = doctor.description(dataclasses.replace(fmu, loads=True))
+    assert loaded[0] == "warning"  # this master reads it, and others may not
 
 
 def test_no_binary_for_this_system(stock: Path, tmp_path: Path) -> None:

@@ -81,6 +81,38 @@ def test_what_drives_inputs_comes_back_with_its_values(tmp_path: Path) -> None:
     assert ours["a.y_Real"].tolist()[-1] == 100.0
 
 
+@needs_gcc
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ('"times": [0, 300000000, 300000000]', '"times": [0, 300000000]'),
+        ('"times": [0, 300000000, 300000000]', '"times": [0, 3, 2]'),
+        ('"times": [0, 300000000, 300000000]', '"times": [0, 3, 99999999999999999999]'),
+        ('"samples": [0.0, 0.001, 0.1]', '"samples": [0.0, NaN, 0.1]'),
+        ('"samples": [0.0, 1.0, 1.0]', '"samples": [0.0, 1.0, 2.0]'),
+        ('"samples": [0.0, 1.0, 1.0]', '"samples": []'),
+        ('"lines": [2, 3, 5]', '"lines": [2, 3]'),
+    ],
+)
+def test_values_that_no_file_could_have_are_refused(
+    before: str, after: str, tmp_path: Path
+) -> None:
+    text = "time,a.u_Real [kN],a.u_Enumeration\n0,0,one\n0.3,1e-3,two\n\n0.3,0.1,two\n"
+    system = System.load(driven(tmp_path, text, more='[input]\nfile = "drive.csv"\n'))
+    write_ssp(system, tmp_path / "a.ssp")
+    with zipfile.ZipFile(tmp_path / "a.ssp") as whole:
+        files = {name: whole.read(name) for name in whole.namelist()}
+    structure = " ".join(files["SystemStructure.ssd"].decode().split())
+    plain = before.replace("[", "[ ").replace("]", " ]")
+    assert plain in structure
+    files["SystemStructure.ssd"] = structure.replace(plain, after).encode()
+    with zipfile.ZipFile(tmp_path / "b.ssp", "w") as changed_:
+        for name, data in files.items():
+            changed_.writestr(name, data)
+    with pytest.raises(InputError, match=r"annotation 'grasp-cosim': not as it was written"):
+        System.load(tmp_path / "b.ssp")
+
+
 def test_units_that_the_system_names_come_back(grasp: System, tmp_path: Path) -> None:
     """One that the FMU declares otherwise too, and under the system's name of a variable."""
     plant, *others = grasp.components

@@ -122,12 +122,12 @@ def licensed(folder: Path) -> Path:
     names = [part.split()[-1].lstrip("*") for part in found[1].split(",")]
     refusal = f"""
     char said[4096];
-    strcpy(said, "No license for feature X");
+    snprintf(said, 4096, "No license for feature X in %s/key", {names[3]});
     {names[4]}->logger(0, {names[0]}, fmi2Error, "error", said);
     return 0;
     """
     code, binary = folder / "licensed.c", folder / "licensed.so"
-    code.write_text("#include <string.h>\n" + text.replace(found[0], found[0] + refusal), "utf-8")
+    code.write_text("#include <stdio.h>\n" + text.replace(found[0], found[0] + refusal), "utf-8")
     headers = Path(fmpy.__file__).parent / "c-code"
     command = ["gcc", "-shared", "-fPIC", "-w", f"-I{headers}", str(code), "-o", str(binary)]
     subprocess.run(command, check=True)

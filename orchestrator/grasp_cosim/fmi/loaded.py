@@ -374,7 +374,6 @@ class LoadedInstance(ABC):
         """Return the logged messages that have not been read yet."""
         own = re.compile(rf"\A{re.escape(self.name)}, t = \S+ s: ")  # so our FMUs begin
         said = [own.sub("", text, count=1) for text in (*self._unread, *self._read_log())]
-        said = [without_scratch(text) for text in said]
         self._unread.clear()
         return [text for text in said if not _PYTHONFMU_PREFIX.match(text)] or said
 
@@ -394,7 +393,7 @@ def know_signatures(slave: type) -> type:
 def keep_message(kept: deque[str], status: int, message: bytes | None) -> None:
     """Keep a message that an FMU logged, unless its status is OK, and log it here."""
     if status > OK:
-        text = (message or b"").decode(errors="replace")
+        text = without_scratch((message or b"").decode(errors="replace"))
         LOGGER.info(" ".join(text.split()))
         kept.append(text)
 

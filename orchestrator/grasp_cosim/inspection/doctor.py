@@ -255,7 +255,8 @@ def description(fmu: Unpacked) -> Verdict:
         fmpy.read_model_description(fmu.folder)
     except Exception as error:  # FMPy raises whatever it likes
         text = f"FMPy refuses modelDescription.xml: {' '.join(str(error).split())}"
-        return "problem", text, "correct the description where the FMU is made"
+        fix = "correct the description where the FMU is made"
+        return "warning" if fmu.loads else "problem", f"{kind}; {text}", fix
     if "CoSimulation" not in fmu.declared.kinds:
         text += "; run here by a solver, elsewhere ask the vendor for an export for co-simulation"
     if tied := of_loading(fmu.declared, ""):

@@ -88,7 +88,7 @@ def read_extras(place: str, annotation: Any) -> Extras:
     element = annotation.find(_TAG)
     try:
         extras: Extras = _typed(Extras, json.loads("" if element is None else element.text or ""))
-    except (ValueError, TypeError, RecursionError) as error:
+    except (ValueError, TypeError, OverflowError, RecursionError) as error:
         raise InputError(f"{place}: annotation {TYPE!r}: not as it was written: {error}") from error
     return extras
 

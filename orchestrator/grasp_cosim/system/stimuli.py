@@ -84,6 +84,20 @@ class Stimuli:
     lines: Sequence[int] = field(default_factory=lambda: array("q"))
     partial: bool = field(default=False, compare=False)
 
+    def __post_init__(self) -> None:
+        """ValueError where the columns could not be read from a file."""
+        columns, count = self.columns.values(), len(self.times)
+        good = (
+            count
+            and all(len(c.samples) == count for c in columns)
+            and len(self.lines) in (0, count)
+            and all(map(le, self.times, islice(self.times, 1, None)))
+            and all(all(map(math.isfinite, c.samples)) for c in columns)
+            and all(set(c.samples) <= {*range(len(c.texts))} for c in columns if c.texts)
+        )
+        if not good:
+            raise ValueError(f"{self.file}: times and samples do not go together")
+
     def place(self, port: Port, row: int | None = None) -> str:
         """A column, and in it a row, for messages."""
         line = 1 if row is None else self.lines[row] if self.lines else row + 2

@@ -1,0 +1,115 @@
+"""run --input: columns for inputs of a system file, of an archive and of a swapped FMU."""
+
+import json
+import zipfile
+from pathlib import Path
+
+import pytest
+from conftest import Run
+from grasp_cosim import System, load_run, simulate
+from grasp_cosim.qualification.qualify import qualify
+from grasp_cosim.ssp.write import write_ssp
+from grasp_cosim.sweep.read import Made, read_studies
+from grasp_cosim.sweep.sweep import sweep
+from support.native_fmus import build, needs_gcc
+from support.stimuli import driven
+
+pytestmark = needs_gcc
+TEXT = "time,a.u_Real\n0,0\n1,10\n"
+INPUT = '[input]\nfile = "drive.csv"\n'
+
+
+def last(folder: str) -> float:
+    return float(load_run(folder)["a.y_Real"][-1])
+
+
+def test_inputs_of_a_system_file(command: Run, tmp_path: Path) -> None:
+    driven(tmp_path, TEXT)
+    code, _, err = command("run", "driven.toml", "--input", "drive.csv", "--out", "out")
+    assert code == 0, err
+    assert "drive.csv drives a.u_Real (linear)" in err
+    assert last("out") == pytest.approx(9.0)
+    assert json.loads(Path("out/run.json").read_text())["input"]["file"] == "drive.csv"
+    held = ("--input", "drive.csv", "--interpolation", "held")
+    assert command("run", "driven.toml", *held, "--out", "out")[0] == 0
+    assert last("out") == 0.0
+
+
+def test_what_is_wrong_is_one_line(command: Run, tmp_path: Path) -> None:
+    driven(tmp_path, TEXT)
+    for more, said in (
+        ([], "input a.u_Real has no source"),
+        (["--interpolation", "held"], "--interpolation: must come with --input"),
+        (["--input", "none.csv"], "none.csv: no such input file"),
+        (
+            ["--input", "drive.csv", "--set", "a.u_Real=1"],
+            "a.u_Real has two sources, drive.csv and",
+        ),
+        (["--input", "wrong.csv"], "wrong.csv: line 1, column 3, b.w: no component 'b'; valid: a"),
+    ):
+        Path("wrong.csv").write_text("time,a.u_Real,b.w\n0,1,1\n", "utf-8")
+        code, out, err = command("run", "driven.toml", *more)
+        assert (code, out) == (2, "")
+        assert said in err.splitlines()[-1]
+
+
+def test_an_fmu_that_is_swapped_in(command: Run, tmp_path: Path) -> None:
+    """The file has no a.u_Real before, and the new FMU no other source for it."""
+    system = driven(tmp_path, "time,a.u_Integer\n0,3\n")
+    system.write_text(
+        system.read_text()
+        .replace("native.fmu", "bare.fmu")
+        .replace("[components.a]", "[components.b]\nfmu = 'native.fmu'\nvalues = { u_Real = 1, "
+                 "u_Integer = 1, u_Boolean = false, u_Enumeration = 1, u_String = '' }\n"
+                 "[components.a]")
+        .replace("values = { u_Real = 0, ", "values = { ")
+    )  # fmt: skip
+    build(tmp_path, "native", "2.0")
+    with zipfile.ZipFile("native.fmu") as whole, zipfile.ZipFile("bare.fmu", "w") as bare:
+        for name in whole.namelist():
+            data = whole.read(name)
+            if name == "modelDescription.xml":
+                data = data.replace(b'"u_Real" valueReference="100" causality="input"',
+                                    b'"u_Real" valueReference="100" causality="local"')  # fmt: skip
+                data = data.replace(b'<Real start="0"/>', b"<Real/>", 1)
+            bare.writestr(name, data)
+    Path("drive.csv").write_text("time,a.u_Integer,a.u_Real\n0,3,7\n", "utf-8")
+    code, _, err = command("run", "driven.toml", "--input", "drive.csv")
+    assert code == 2
+    assert "column 3, a.u_Real: no input 'a.u_Real'" in err
+    swap = ("--swap", "a=native.fmu")
+    code, _, err = command("run", "driven.toml", "--input", "drive.csv", *swap, "--out", "out")
+    assert code == 0, err
+    assert last("out") == 7.0
+
+
+def test_an_archive_whose_input_would_keep_its_start_value(command: Run, tmp_path: Path) -> None:
+    system = System.load(driven(tmp_path, TEXT, more=INPUT))
+    write_ssp(system, tmp_path / "a.ssp")
+    assert command("run", "a.ssp", "--out", "out")[0] == 0
+    assert last("out") == pytest.approx(9.0)
+    Path("drive.csv").write_text("time,a.u_Real\n0,5\n", "utf-8")
+    assert command("run", "a.ssp", "--input", "drive.csv", "--out", "out")[0] == 0
+    assert last("out") == 5.0
+
+
+@pytest.mark.slow
+def test_a_study_and_a_qualification_are_driven_too(tmp_path: Path) -> None:
+    path = driven(tmp_path, TEXT, more=INPUT)
+    (tmp_path / "study.toml").write_text(
+        'system = "driven.toml"\noutputs = ["a.x", "a.y_Real"]\n[design]\nkind = "grid"\n'
+        '[[parameters]]\nvariables = ["a.gain"]\nvalues = [1.0, 2.0]\n',
+        "utf-8",
+    )
+    made = Made(lambda given: System.load(given or Path()))
+    (study,) = read_studies(tmp_path / "study.toml", made, (), None)
+    done = sweep(study, tmp_path / "done", 1)
+    assert done.numbers("a.y_Real").tolist() == [pytest.approx(9.0)] * 2
+    identity = study.identity
+    (tmp_path / "drive.csv").write_text(TEXT.replace("10", "11"), "utf-8")
+    (study,) = read_studies(tmp_path / "study.toml", made, (), None)
+    assert study.identity["study"] != identity["study"]
+    build(tmp_path, "other", "2.0", {"u_Real": "N"})
+    assert qualify(System.load(path), "a", tmp_path / "other.fmu").qualified
+    result = simulate(System.load(path))
+    assert result["a.y_Real"][-1] == pytest.approx(9.9)
