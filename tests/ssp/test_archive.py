@@ -72,7 +72,8 @@ REFUSED = [
     ),
     (
         structure(system("top", component("a", implementation="ModelExchange"))),
-        "component 'a': implementation 'ModelExchange' is not supported; must be CoSimulation",
+        "component 'a': implementation 'ModelExchange': resources/a.fmu has none; must be "
+        "CoSimulation, or any",
     ),
     (structure(system("top", ELEMENT + ELEMENT)), "system 'top': two elements 'a'; must differ"),
     (
@@ -168,10 +169,10 @@ def test_an_fmu_that_is_none(tmp_path: Path) -> None:
     assert "component 'a': resources/a.fmu: not a readable FMU: " in text
 
 
-def test_a_model_exchange_fmu(tmp_path: Path) -> None:
-    exchange = A.replace(b"CoSimulation", b"ModelExchange")
-    assert "resources/a.fmu: is for model exchange only; ask" in refused(
-        tmp_path, structure(TOP), a=exchange
+def test_an_fmu_for_scheduled_execution(tmp_path: Path) -> None:
+    scheduled = A.replace(b"CoSimulation", b"ScheduledExecution")
+    assert "resources/a.fmu: is for scheduled execution only; ask" in refused(
+        tmp_path, structure(TOP), a=scheduled
     )
 
 
