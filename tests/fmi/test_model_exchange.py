@@ -145,7 +145,8 @@ def test_values_of_all_types_arrive_in_event_mode(tmp_path: Path, version: str) 
     starts: dict[str, Value] = {}
     for v in from_one.interface.of("input"):
         if v.supported:
-            starts[v.name] = {"Boolean": True, "String": "text", "Real": 0.5}.get(v.kind, 2)
+            samples: dict[str, Value] = {"Boolean": True, "String": "text", "Real": 0.5}
+            starts[v.name] = samples.get(v.kind, 2)
     ends = [v.name[2:] for v in from_one.interface.of("output") if v.supported]
     connections = tuple(Connection(Port("a", f"y_{n}"), Port("b", f"u_{n}")) for n in ends)
     parts = (Component("a", fmu, starts), Component("b", fmu, {}))
