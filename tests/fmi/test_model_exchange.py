@@ -15,6 +15,7 @@ from support.analytic import bouncing_ball, held_input
 from support.both_engines import ENGINES
 from support.models import build_model
 from support.native_fmus import needs_gcc
+from support.state_space import state_space
 
 pytestmark = needs_gcc
 EXCHANGE = ("ModelExchange",)
@@ -156,6 +157,29 @@ def test_values_of_all_types_arrive_in_event_mode(tmp_path: Path, version: str) 
     for name in ends:
         assert result[f"b.y_{name}"][1] == starts[f"u_{name}"]
     assert result["b.y_String"].tolist() == ["text", "text", "other", "other"]
+
+
+@pytest.mark.parametrize("sizes", [{}, {"m": 1, "n": 5, "r": 2}])
+def test_arrays_are_states_inputs_and_outputs(tmp_path: Path, sizes: dict[str, int]) -> None:
+    """Sized by structural parameters; as its own co-simulation, which is exact, has it."""
+    found = []
+    for kind in ("CoSimulation", "ModelExchange"):
+        fmu = state_space(tmp_path, kind, kind=kind)
+        n, m, r = (sizes.get(name, 3) for name in ("n", "m", "r"))
+        given: dict[str, Value] = {**sizes, "x0[2]": 2.0}
+        given |= {f"A[{i},{j}]": -1.0 / (i + j) for i in range(1, n + 1) for j in range(1, n + 1)}
+        parts = (
+            Component("a", fmu, {**given, **{f"u[{i}]": 0.1 * i for i in range(1, m + 1)}}),
+            Component("b", fmu, {**given, **{f"u[{i}]": 0.5 for i in range(2, m + 1)}}),
+        )
+        connection = (Connection(Port("a", f"y[{r}]"), Port("b", "u[1]")),)
+        event = (Event({Port("a", "A[1,1]"): -2.0, Port("a", "u[1]"): 3.0}, 500_000_000),)
+        times = 100_000_000, 1_000_000_000
+        system = System("s", parts, connection, *times, "sequential", event)
+        found.append(simulate(system).signals)
+    assert len(found[0]) == 2 * r
+    for name, exact in found[0].items():
+        assert found[1][name] == pytest.approx(exact, rel=WITHIN)
 
 
 ODDITIES = {"STEPS": 2, "ITERATES": 4}
