@@ -170,16 +170,16 @@ def test_a_step_ends_early_only_where_its_length_may_vary(tmp_path: Path) -> Non
 
 
 @both
-def test_a_wish_to_end_the_simulation_is_an_error(
+def test_a_wish_to_end_the_simulation_is_told(
     tmp_path: Path, version: str, isolation: Isolation
 ) -> None:
     with running(tmp_path, version, isolation, {"terminate_at": 0.1}) as part:
         status = Bound(part, 0.2).step()
         assert status == (DISCARD if version == "2.0" else EARLY)
-        message = "part: native.fmu asked for the end of the simulation at t = 0 s"
-        with pytest.raises(SimulationError, match=message):
-            part.last_successful_time()
-        assert str(part.failure(status, 0.0)) == message
+        assert part.the_end() == 0.1
+    with running(tmp_path, version, isolation, {"early_at": 0.1}, MIGHT_RETURN_EARLY) as part:
+        Bound(part, 0.2).step()
+        assert part.the_end() is None
 
 
 def test_structural_parameters_are_set_in_configuration_mode(tmp_path: Path) -> None:

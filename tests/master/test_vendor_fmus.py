@@ -289,7 +289,7 @@ def test_what_is_left_alone_is_named(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("before", "after", "message"),
     [
-        ("<CoSimulation ", "<ModelExchange ", "is for model exchange only; ask the vendor for an"),
+        ("<CoSimulation ", "<ScheduledExecution ", "is for scheduled execution only; ask the"),
         ('fmiVersion="3.0"', 'fmiVersion="4.0"', "not a readable FMU: Unsupported FMI version"),
         ('factor="0.001"', 'factor="0"', "not a readable FMU: unit 'mm': factor = 0"),
         ('m="1"', 'm="one"', "not a readable FMU: unit 'm': m = 'one': must be a whole number"),

@@ -313,11 +313,10 @@ def test_capabilities(
         assert difference.variable.startswith(flag)
 
 
-def test_a_candidate_for_model_exchange_only(system: System, tmp_path: Path) -> None:
+def test_a_candidate_for_model_exchange_is_noted(system: System, tmp_path: Path) -> None:
     path = write_fmu(tmp_path / "c.fmu", kind="ModelExchange", capabilities="")
-    result = swap(system, path)
-    assert found(result) == [("blocks", "capability", "kind")]
-    assert result.differences[0].text == "is for model exchange; must be for co-simulation"
+    (difference, *_) = [d for d in swap(system, path).differences if d.severity == "notes"]
+    assert difference.text == "is for model exchange, and is integrated by CVode here"
 
 
 def able(version: str, **flags: Any) -> Interface:
@@ -328,6 +327,14 @@ def test_fmi_3_names_of_capabilities_are_those_of_fmi_2() -> None:
     two = able("2.0", canGetAndSetFMUstate=True, providesDirectionalDerivative=True)
     three = able("3.0", canGetAndSetFMUState=True, providesDirectionalDerivatives=True)
     assert [d.variable for d in capability_differences(two, three, 1e-3)] == ["fmiVersion"]
+
+
+def test_a_candidate_for_scheduled_execution_only() -> None:
+    candidate = replace(able("3.0"), kinds=("ScheduledExecution",))
+    (difference,) = capability_differences(able("3.0"), candidate, 1e-3)
+    assert (difference.severity, difference.variable) == ("blocks", "kind")
+    must = "must be for co-simulation or model exchange"
+    assert difference.text == f"is for scheduled execution; {must}"
 
 
 @pytest.mark.parametrize(("internal", "fits"), [(1e-4, True), (1e-3, True), (3e-4, False)])

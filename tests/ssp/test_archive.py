@@ -174,6 +174,13 @@ def test_a_model_exchange_fmu_is_integrated(tmp_path: Path) -> None:
     assert part.integrated
 
 
+def test_an_fmu_for_scheduled_execution(tmp_path: Path) -> None:
+    scheduled = A.replace(b"CoSimulation", b"ScheduledExecution")
+    assert "resources/a.fmu: is for scheduled execution only; ask" in refused(
+        tmp_path, structure(TOP), a=scheduled
+    )
+
+
 def truncated(path: Path) -> None:
     data = path.read_bytes()
     path.write_bytes(data[: len(data) // 2])

@@ -18,15 +18,22 @@ TYPES = (
 _UNIT = "1 0 0 0 1 0 0 0 1"
 
 
-def state_space(folder: Path, name: str = "ss", types: bool = False, more: str = "") -> Path:
+def state_space(
+    folder: Path,
+    name: str = "ss",
+    types: bool = False,
+    more: str = "",
+    kind: str = "CoSimulation",
+) -> Path:
     """The FMU name.fmu in folder: m inputs u, n states x, r outputs y, 3 of each at the start.
 
-    With types it has u_T and y_T for all types; more are further variables of its description.
+    With types it has u_T and y_T for all types; more are further variables of its description. kind
+    is CoSimulation or ModelExchange.
     """
     path = folder / f"{name}.fmu"
     library = f"binaries/{fmpy.platform_tuple}/state_space{fmpy.sharedLibraryExtension}"
     with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("modelDescription.xml", _description(types, more))
+        archive.writestr("modelDescription.xml", _description(types, more, kind))
         archive.writestr(library, _library())
     return path
 
@@ -56,7 +63,7 @@ def _variable(
     )
 
 
-def _description(types: bool, more: str) -> str:
+def _description(types: bool, more: str, kind: str) -> str:
     tunable = ' variability="tunable"'
     variables = [
         '<Float64 name="time" valueReference="0" causality="independent"/>',
@@ -73,18 +80,19 @@ def _description(types: bool, more: str) -> str:
         _variable("Float64", "y", 11, "output", "3"),
         _variable("Float64", "x", 12, "local", "2"),
     ]
+    able = ' canHandleVariableCommunicationStepSize="true"' if kind == "CoSimulation" else ""
     outputs = '<Output valueReference="11" dependencies="7 8 10 12"/>'
-    for number, kind in enumerate(TYPES) if types else ():
-        start = "false" if kind == "Boolean" else "1" if kind == "Enumeration" else "0"
-        own = ' variability="discrete"' if "Float" not in kind else ""
-        own += ' declaredType="Choice"' if kind == "Enumeration" else ""
-        variables.append(_variable(kind, f"u_{kind}", 100 + number, "input", "=2 4", start, own))
-        variables.append(_variable(kind, f"y_{kind}", 200 + number, "output", "=2 4", "", own))
+    for number, of in enumerate(TYPES) if types else ():
+        start = "false" if of == "Boolean" else "1" if of == "Enumeration" else "0"
+        own = ' variability="discrete"' if "Float" not in of else ""
+        own += ' declaredType="Choice"' if of == "Enumeration" else ""
+        variables.append(_variable(of, f"u_{of}", 100 + number, "input", "=2 4", start, own))
+        variables.append(_variable(of, f"y_{of}", 200 + number, "output", "=2 4", "", own))
         outputs += f'<Output valueReference="{200 + number}" dependencies="{100 + number}"/>'
     return (
         '<?xml version="1.0"?><fmiModelDescription fmiVersion="3.0" modelName="StateSpace" '
-        'instantiationToken="{state space}"><CoSimulation modelIdentifier="state_space" '
-        'canHandleVariableCommunicationStepSize="true"/><TypeDefinitions>'
+        f'instantiationToken="{{state space}}"><{kind} modelIdentifier="state_space"{able}/>'
+        "<TypeDefinitions>"
         '<EnumerationType name="Choice"><Item name="slow" value="1"/><Item name="fast" value="2"/>'
         f"</EnumerationType></TypeDefinitions><ModelVariables>{''.join(variables)}{more}"
         f"</ModelVariables><ModelStructure>{outputs}"

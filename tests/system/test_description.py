@@ -66,7 +66,7 @@ WRONG = [
     (
         'fmu = "GripperPlant.fmu"',
         'fnu = "x"',
-        "unknown entry 'fnu'; valid: fmu, isolation, rename, step, units, values",
+        "unknown entry 'fnu'; valid: fmu, isolation, rename, solver, step, units, values",
     ),
     ("object_width = 0.07", "width = 0.07", "no input or parameter 'width'; valid: force"),
     ("object_width = 0.07", "object_width = -1.0", "must be a finite number from 0 to 10 m"),

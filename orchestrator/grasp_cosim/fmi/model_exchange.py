@@ -13,7 +13,7 @@ from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -48,8 +48,11 @@ MOST_STATES = 20_000
 class ModelInstance(LoadedInstance):
     """One instance of an FMU for model exchange, the parts that FMI 2.0 and 3.0 have in common."""
 
-    SLOPES: str
+    SLOPES: ClassVar[str]
     """The function that evaluates the derivatives."""
+
+    NEEDS: ClassVar[Sequence[str]] = ()
+    """Functions that FMPy loads only if they are there."""
 
     def __init__(self, name: str, interface: Interface, chosen: Solver) -> None:
         """Extract and instantiate; InputError where the FMU does not load."""
@@ -264,13 +267,17 @@ class ModelInstance(LoadedInstance):
     def _bind(self) -> None:
         """Bind the functions that are called in the steps of the solver, and make that."""
         number, place, size = ctypes.c_double, ctypes.c_void_p, ctypes.c_size_t
-        self._set_time = self._bound("SetTime", number)
-        self._set_states = self._bound("SetContinuousStates", place, size)
-        self._get_states = self._bound("GetContinuousStates", place, size)
-        self._get_nominals = self._bound("GetNominalsOfContinuousStates", place, size)
-        self._get_slopes = self._bound(self.SLOPES, place, size)
-        self._get_indicators = self._bound("GetEventIndicators", place, size)
+        for name in self.NEEDS:
+            self._bound(name)
         self._states, self._indicators = self._sizes()
+        self._set_time = self._bound("SetTime", number)
+        if self._states:
+            self._set_states = self._bound("SetContinuousStates", place, size)
+            self._get_states = self._bound("GetContinuousStates", place, size)
+            self._get_nominals = self._bound("GetNominalsOfContinuousStates", place, size)
+            self._get_slopes = self._bound(self.SLOPES, place, size)
+        if self._indicators:
+            self._get_indicators = self._bound("GetEventIndicators", place, size)
         if self._states > MOST_STATES:
             raise InputError(
                 f"{self.name}: {self.interface.path.name} has {self._states} continuous states; "
@@ -282,9 +289,13 @@ class ModelInstance(LoadedInstance):
             self._x = self._solver.x.ctypes.data
 
     def _bound(self, name: str, *kinds: Any) -> Any:
-        """A function of the FMU, for its instance."""
+        """A function of the FMU, for its instance; InputError where it has none such."""
         prototype = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, *kinds)
-        return partial(prototype((self.PREFIX + name, self._slave.dll)), self._slave.component)
+        try:
+            function = prototype((self.PREFIX + name, self._slave.dll))
+        except AttributeError as error:
+            raise InputError(f"{self.name}: {self.interface.path} is damaged: {error}") from None
+        return partial(function, self._slave.component)
 
     def _slopes_at(self, time: float, states: int, slopes: int) -> int:
         """The derivatives, for the solver."""
@@ -373,6 +384,13 @@ class Fmi3Model(ModelInstance, Fmi3Instance):
     """One instance of an FMI 3.0 FMU for model exchange."""
 
     SLOPES = "GetContinuousStateDerivatives"
+    NEEDS = (
+        "EnterEventMode",
+        "UpdateDiscreteStates",
+        "EnterContinuousTimeMode",
+        "GetNumberOfContinuousStates",
+        "GetNumberOfEventIndicators",
+    )
 
     def _instantiate(self, folder: Path) -> FMU3Model:
         model = know_signatures(_Model)(

@@ -266,11 +266,14 @@ def capability_differences(
     if versions[0] != versions[1]:
         text = f"FMI {versions[1]} instead of {versions[0]}"
         yield Difference("notes", "capability", "fmiVersion", text, *versions)
+    was, now = ([KINDS[kind] for kind in fmu.kinds] for fmu in (original, candidate))
     if not {"CoSimulation", "ModelExchange"} & set(candidate.kinds):
-        was, now = ([KINDS[kind] for kind in fmu.kinds] for fmu in (original, candidate))
         text = f"is for {choices(now)}; must be for co-simulation or model exchange"
         yield Difference("blocks", "capability", "kind", text, was, now)
         return
+    if "CoSimulation" in original.kinds and "CoSimulation" not in candidate.kinds:
+        text = "is for model exchange, and is integrated by CVode here"
+        yield Difference("notes", "capability", "kind", text, was, now)
     for flag, (severity, lost, text) in RESTRICTIONS.items():
         had, has = bool(original.capability(flag)), bool(candidate.capability(flag))
         if had != has and had == lost:

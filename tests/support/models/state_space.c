@@ -1,4 +1,5 @@
-/* An FMI 3.0 co-simulation FMU of arrays: dx/dt = A x + B u, y = C x + D u, and arrays of each type.
+/* An FMI 3.0 FMU of arrays: dx/dt = A x + B u, y = C x + D u, and arrays of each type. For
+ * co-simulation and, at the end, model exchange.
  *
  * m inputs, n states and r outputs are structural parameters, set in configuration mode alone. A step
  * is exact for an input that is held over it. For each type T of FMI there is y_T = u_T, 2 x k.
@@ -27,7 +28,7 @@ typedef struct {
     fmi3Int32 u_Int32[2 * MOST]; fmi3UInt32 u_UInt32[2 * MOST];
     fmi3Int64 u_Int64[2 * MOST], u_Enumeration[2 * MOST]; fmi3UInt64 u_UInt64[2 * MOST];
     fmi3Boolean u_Boolean[2 * MOST];
-    int mode;
+    int mode, continuous;
     fmi3InstanceEnvironment environment;
     fmi3LogMessageCallback log;
 } Model;
@@ -145,6 +146,7 @@ fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference r[], s
     size_t at = 0, size;
     for (size_t i = 0; i < n; i++, at += size) {
         double *to = place(s, r[i], &size);
+        if (s->continuous) return fail(s, "not in event mode");
         if (!to || r[i] == X || r[i] == OUT || r[i] == TIME) return fail(s, "not settable");
         if (r[i] == X0 && s->mode == STEPPING) return fail(s, "x0 is fixed");
         if (at + size > nv) return fail(s, "too few values");
@@ -264,5 +266,76 @@ fmi3Status fmi3DoStep(
     if (s->mode != STEPPING) return fail(s, "not in step mode");
     advance(s, step);
     s->time = *last = time + step;
+    return fmi3OK;
+}
+
+/* Model exchange */
+
+fmi3Instance fmi3InstantiateModelExchange(
+    fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
+    fmi3Boolean logging, fmi3InstanceEnvironment environment, fmi3LogMessageCallback log) {
+    return fmi3InstantiateCoSimulation(name, token, resources, visible, logging, fmi3False,
+                                       fmi3False, NULL, 0, environment, log, NULL);
+}
+
+fmi3Status fmi3EnterEventMode(fmi3Instance instance) {
+    ((Model *)instance)->continuous = 0;
+    return fmi3OK;
+}
+
+fmi3Status fmi3UpdateDiscreteStates(
+    fmi3Instance instance, fmi3Boolean *again, fmi3Boolean *terminate, fmi3Boolean *nominals,
+    fmi3Boolean *states, fmi3Boolean *defined, fmi3Float64 *next) {
+    (void)instance; (void)next;
+    *again = *terminate = *nominals = *states = *defined = fmi3False;
+    return fmi3OK;
+}
+
+fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance instance) {
+    ((Model *)instance)->continuous = 1;
+    return fmi3OK;
+}
+
+fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time) {
+    ((Model *)instance)->time = time;
+    return fmi3OK;
+}
+
+fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance instance, size_t *n) {
+    *n = ((Model *)instance)->n;
+    return fmi3OK;
+}
+
+fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance instance, size_t *n) {
+    (void)instance;
+    *n = 0;
+    return fmi3OK;
+}
+
+fmi3Status fmi3SetContinuousStates(fmi3Instance instance, const fmi3Float64 x[], size_t n) {
+    Model *s = instance;
+    if (n != s->n) return fail(s, "another number of states");
+    memcpy(s->x, x, n * sizeof *x);
+    return fmi3OK;
+}
+
+fmi3Status fmi3GetContinuousStates(fmi3Instance instance, fmi3Float64 x[], size_t n) {
+    Model *s = instance;
+    if (n != s->n) return fail(s, "another number of states");
+    memcpy(x, s->x, n * sizeof *x);
+    return fmi3OK;
+}
+
+fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance instance, fmi3Float64 x[], size_t n) {
+    (void)instance;
+    for (size_t i = 0; i < n; i++) x[i] = 1.0;
+    return fmi3OK;
+}
+
+fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance instance, fmi3Float64 dx[], size_t n) {
+    Model *s = instance;
+    memset(dx, 0, n * sizeof *dx);
+    add(dx, s->a, s->x, s->n, s->n);
+    add(dx, s->b, s->u, s->n, s->m);
     return fmi3OK;
 }

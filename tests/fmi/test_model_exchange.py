@@ -1,0 +1,271 @@
+"""FMUs for model exchange are integrated to their exact solutions, event by event."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from grasp_cosim import SimulationError, System, simulate
+from grasp_cosim.interface.interface import Value
+from grasp_cosim.recording.result import Result
+from grasp_cosim.system.parts import Component, Connection, Event, Isolation, Port, Solver
+from scipy.integrate import solve_ivp
+from support.analytic import bouncing_ball, held_input
+from support.both_engines import ENGINES
+from support.models import build_model
+from support.native_fmus import needs_gcc
+from support.state_space import state_space
+
+pytestmark = needs_gcc
+EXCHANGE = ("ModelExchange",)
+WITHIN = 1e-6
+"""Relative, of the exact solution, with the tolerance that a solver has where none is given."""
+GIVEN: Mapping[str, Mapping[str, Value]] = {"dahlquist": {"u": 0.0}, "odd": {"u": False}}
+
+versions = pytest.mark.parametrize("version", ["2.0", pytest.param("3.0", marks=pytest.mark.slow)])
+
+
+def part(name: str, folder: Path, version: str = "2.0", **more: Value) -> Component:
+    fmu = build_model(name, folder, version, EXCHANGE)
+    return Component(name, fmu, {**GIVEN.get(name, {}), **more})
+
+
+def run(component: Component, step: float, stop: float, **more: str) -> Result:
+    times = round(step * 1e9), round(stop * 1e9)
+    return simulate(System("alone", (component,), (), *times, "sequential"), **more)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("step", [0.01, 0.1, 3.0])
+def test_a_ball_bounces_as_it_should(tmp_path: Path, step: float) -> None:
+    """By 16 state events, to rest; however many of them are in a communication step."""
+    result = run(part("bouncing_ball", tmp_path), step, 3.0)
+    height, speed = bouncing_ball(result.time)
+    assert result["bouncing_ball.h"] == pytest.approx(height, rel=WITHIN, abs=WITHIN)
+    assert result["bouncing_ball.v"] == pytest.approx(speed, rel=WITHIN, abs=WITHIN)
+    assert result.log == (
+        "bouncing_ball: bouncing_ball.fmu runs by model exchange, integrated by CVode with a "
+        "relative tolerance of 1e-10",
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_a_ball_bounces_300_times(tmp_path: Path, version: str) -> None:
+    result = run(part("bouncing_ball", tmp_path, version, e=0.99, v_min=0.01), 0.01, 60.0)
+    height, speed = bouncing_ball(result.time, e=0.99, v_min=0.01)
+    assert result["bouncing_ball.h"] == pytest.approx(height, abs=WITHIN)
+    landing = np.abs(height) < 1e-5  # the speed jumps there
+    assert result["bouncing_ball.v"][~landing] == pytest.approx(speed[~landing], abs=4.0 * WITHIN)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_van_der_pol(tmp_path: Path, version: str) -> None:
+    result = run(part("van_der_pol", tmp_path, version, mu=5.0), 0.1, 20.0)
+
+    def slopes(_: float, x: list[float]) -> list[float]:
+        return [x[1], 5.0 * (1.0 - x[0] ** 2) * x[1] - x[0]]
+
+    times, tight = result.time, {"rtol": 1e-12, "atol": 1e-13}
+    exact = solve_ivp(slopes, (0.0, 20.0), [2.0, 0.0], "DOP853", times, **tight).y
+    for name, states in zip(("x0", "x1"), exact, strict=True):
+        assert result[f"van_der_pol.{name}"] == pytest.approx(states, abs=WITHIN * np.ptp(states))
+
+
+@versions
+def test_an_exponential_to_its_tail(tmp_path: Path, version: str) -> None:
+    result = run(part("dahlquist", tmp_path, version), 0.1, 10.0)
+    assert result["dahlquist.x"] == pytest.approx(np.exp(-result.time), rel=WITHIN, abs=0.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+@pytest.mark.parametrize("name", ["bouncing_ball", "van_der_pol", "dahlquist"])
+def test_fmpy_gets_the_same(tmp_path: Path, name: str, version: str) -> None:
+    component = part(name, tmp_path, version)
+    result = run(component, 0.1, 3.0)
+    theirs = fmpy.simulate_fmu(
+        str(component.fmu), stop_time=3.0, output_interval=0.1, relative_tolerance=1e-10,
+        record_events=False,
+    )  # fmt: skip
+    for output in theirs.dtype.names[1:]:
+        found = np.interp(result.time, theirs["time"], theirs[output])
+        assert result[f"{name}.{output}"] == pytest.approx(found, abs=1e-5)
+
+
+@pytest.mark.parametrize(("width", "step"), [(1.0, 0.2), (0.1, 0.01), (0.3, 0.1)])
+@versions
+def test_a_stair_has_its_steps_at_the_very_points(
+    tmp_path: Path, version: str, width: float, step: float
+) -> None:
+    """0.1 and 0.3 s are added up in the FMU, which is not exact; the points are."""
+    result = run(part("stair", tmp_path, version, width=width, last=100), step, 30.0 * width)
+    count = 1 + np.floor(result.time / width + 1e-9)
+    assert result["stair.counter"].tolist() == count.tolist()
+
+
+def test_events_without_states(tmp_path: Path) -> None:
+    """Half waves of 1 Hz; the one that begins at 0 counts, too."""
+    result = run(part("sine", tmp_path), 0.1, 3.0)
+    count = 1 + np.floor(2.0 * result.time[1:] - 1e-9)
+    assert result["sine.count"][1:].tolist() == count.tolist()
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@versions
+def test_inputs_jump_at_communication_points(tmp_path: Path, version: str, engine: str) -> None:
+    """The first one's state is the second one's input, and held over its steps."""
+    fmu = build_model("dahlquist", tmp_path, version, EXCHANGE)
+    parts = (Component("a", fmu, {"u": 0.0}), Component("b", fmu, {"k": 3.0}))
+    connection = (Connection(Port("a", "x"), Port("b", "u")),)
+    system = System("pair", parts, connection, 100_000_000, 1_000_000_000, "jacobi")
+    result = simulate(system, engine=engine)  # type: ignore[arg-type]
+    a, b = result["a.x"], result["b.x"]
+    assert a == pytest.approx(np.exp(-result.time), rel=WITHIN)
+    assert b == pytest.approx(held_input(3.0, 0.1, a, 1.0), rel=WITHIN)
+
+
+def test_events_of_the_system_tune_parameters_and_set_inputs(tmp_path: Path) -> None:
+    """At 0.5 s x' = -x becomes x' = -4 x + 2."""
+    component = part("dahlquist", tmp_path)
+    event = Event({Port("dahlquist", "k"): 4.0, Port("dahlquist", "u"): 2.0}, 500_000_000)
+    times = 100_000_000, 1_000_000_000
+    result = simulate(System("s", (component,), (), *times, "sequential", (event,)))
+    x, before = result["dahlquist.x"], result.time <= 0.5
+    assert x[before] == pytest.approx(np.exp(-result.time[before]), rel=WITHIN)
+    later = 0.5 + (np.exp(-0.5) - 0.5) * np.exp(-4.0 * (result.time[~before] - 0.5))
+    assert x[~before] == pytest.approx(later, rel=WITHIN)
+
+
+@versions
+def test_values_of_all_types_arrive_in_event_mode(tmp_path: Path, version: str) -> None:
+    """The FMU takes others than continuous ones there alone; they arrive one step later."""
+    fmu = build_model("feedthrough", tmp_path, version, EXCHANGE)
+    from_one = Component("a", fmu, {})
+    starts: dict[str, Value] = {}
+    for v in from_one.interface.of("input"):
+        if v.supported:
+            samples: dict[str, Value] = {"Boolean": True, "String": "text", "Real": 0.5}
+            starts[v.name] = samples.get(v.kind, 2)
+    ends = [v.name[2:] for v in from_one.interface.of("output") if v.supported]
+    connections = tuple(Connection(Port("a", f"y_{n}"), Port("b", f"u_{n}")) for n in ends)
+    parts = (Component("a", fmu, starts), Component("b", fmu, {}))
+    event = Event({Port("a", f"u_{n}"): "other" for n in ends if n == "String"}, 100_000_000)
+    system = System("pair", parts, connections, *(10**8, 3 * 10**8), "sequential", (event,))
+    result = simulate(system)
+    for name in ends:
+        assert result[f"b.y_{name}"][1] == starts[f"u_{name}"]
+    assert result["b.y_String"].tolist() == ["text", "text", "other", "other"]
+
+
+@pytest.mark.parametrize("sizes", [{}, {"m": 1, "n": 5, "r": 2}])
+def test_arrays_are_states_inputs_and_outputs(tmp_path: Path, sizes: dict[str, int]) -> None:
+    """Sized by structural parameters; as its own co-simulation, which is exact, has it."""
+    found = []
+    for kind in ("CoSimulation", "ModelExchange"):
+        fmu = state_space(tmp_path, kind, kind=kind)
+        n, m, r = (sizes.get(name, 3) for name in ("n", "m", "r"))
+        given: dict[str, Value] = {**sizes, "x0[2]": 2.0}
+        given |= {f"A[{i},{j}]": -1.0 / (i + j) for i in range(1, n + 1) for j in range(1, n + 1)}
+        parts = (
+            Component("a", fmu, {**given, **{f"u[{i}]": 0.1 * i for i in range(1, m + 1)}}),
+            Component("b", fmu, {**given, **{f"u[{i}]": 0.5 for i in range(2, m + 1)}}),
+        )
+        connection = (Connection(Port("a", f"y[{r}]"), Port("b", "u[1]")),)
+        event = (Event({Port("a", "A[1,1]"): -2.0, Port("a", "u[1]"): 3.0}, 500_000_000),)
+        times = 100_000_000, 1_000_000_000
+        system = System("s", parts, connection, *times, "sequential", event)
+        found.append(simulate(system).signals)
+    assert len(found[0]) == 2 * r
+    for name, exact in found[0].items():
+        assert found[1][name] == pytest.approx(exact, rel=WITHIN)
+
+
+ODDITIES = {"STEPS": 2, "ITERATES": 4}
+"""See tests/support/models/odd.c."""
+
+
+@pytest.mark.parametrize(("kind", "gain", "events"), [("STEPS", 1.0, 2), ("ITERATES", 3.0, 4)])
+@versions
+def test_events_after_a_step_and_iterations_of_one(
+    tmp_path: Path, version: str, kind: str, gain: float, events: int
+) -> None:
+    result = run(part("odd", tmp_path, version, kind=ODDITIES[kind]), 0.1, 1.0)
+    assert result["odd.x"][-1] == pytest.approx(1.0 + gain, rel=1e-9)
+    assert result["odd.events"][-1] == events
+
+
+STUCK = {
+    1: r"chatters, or comes to no rest \(1000 events in a row, each within 1% of the step after "
+    r"the one before\) at t = .*; must have a hysteresis, or a shorter step than 0.1 s",
+    3: "does not settle an event in 1000 iterations at t = 0.5 s",
+    5: r"chatters, or comes to no rest \(1000 events",
+    6: "returned error at t = 0.5 s",
+    7: r"cannot be integrated by CVode \(At t = 0.5 repeated recoverable right-hand side",
+    8: r"cannot be integrated by CVode \(At t = 0.5 and h = .*\) at t = 0.5 s",
+}
+
+
+@pytest.mark.parametrize("kind", STUCK)
+def test_what_does_not_go_on_ends_in_one_line(tmp_path: Path, kind: int) -> None:
+    with pytest.raises(SimulationError, match=f"^odd: odd.fmu {STUCK[kind]}") as caught:
+        run(part("odd", tmp_path, kind=kind), 0.1, 1.0)
+    assert "\n" not in str(caught.value)
+    assert caught.value.result is not None
+
+
+def test_a_ball_that_never_rests_ends_in_one_line(tmp_path: Path) -> None:
+    """Where its bounces come together, at (1 + e) / (1 - e) times that of the first."""
+    component = part("bouncing_ball", tmp_path, v_min=0.0)
+    with pytest.raises(SimulationError, match="chatters, or comes to no rest") as caught:
+        run(component, 0.01, 9.0)
+    assert "at t = 2.5586285" in str(caught.value)
+
+
+@pytest.mark.parametrize("isolation", ["none", pytest.param("process", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("engine", ENGINES)
+def test_the_bits_are_the_same_everywhere(
+    tmp_path: Path, isolation: Isolation, engine: str
+) -> None:
+    """In both engines, in a process, in FMI 3.0, beside another instance."""
+    here = run(part("bouncing_ball", tmp_path), 0.1, 1.0)
+    fmu = build_model("bouncing_ball", tmp_path, "3.0", EXCHANGE, "other")
+    parts = tuple(Component(n, fmu, {}, isolation=isolation) for n in ("a", "b"))
+    system = System("two", parts, (), 100_000_000, 1_000_000_000, "sequential")
+    result = simulate(system, engine=engine)  # type: ignore[arg-type]
+    for name in ("a.h", "b.h"):
+        assert result[name].tolist() == here["bouncing_ball.h"].tolist()
+
+
+def test_a_session_and_its_settings(tmp_path: Path) -> None:
+    component = part("dahlquist", tmp_path)
+    system = System("s", (component,), (), 100_000_000, 1_000_000_000, "sequential")
+    with simulate.session(system) as session:
+        session.step(5)
+        session.set("dahlquist.u", 1.0)
+        session.set("dahlquist.u", 0.0)  # as it was: nothing happens
+        while session.step(2):
+            pass
+        assert session["dahlquist.x"] == pytest.approx(np.exp(-1.0), rel=WITHIN)
+        settings = session.result().settings["components"]["dahlquist"]
+    assert settings["solver"]["relative_tolerance"] == 1e-10
+
+
+def test_a_solver_table_is_kept_to(tmp_path: Path) -> None:
+    """An FMU of both kinds runs co-simulation without one."""
+    fmu = build_model("dahlquist", tmp_path)
+    errors = []
+    for solver in (None, Solver(1e-3), Solver(1e-6), Solver(1e-3, maximum_step=1e-4)):
+        result = run(Component("x", fmu, {"u": 0.0}, solver=solver), 0.5, 1.0)
+        assert ("solver" in result.settings["components"]["x"]) == (solver is not None)
+        errors.append(abs(result["x.x"][-1] - np.exp(-1.0)))
+    assert errors[1] > 10.0 * errors[2]
+    assert errors[1] > 3.0 * errors[3]
+    assert errors[0] < 1e-9
+
+
+@pytest.mark.skipif(not Path("/proc/self/maps").exists(), reason="there is no /proc")
+def test_the_libraries_are_unloaded(tmp_path: Path) -> None:
+    run(part("bouncing_ball", tmp_path), 0.1, 0.2)
+    assert "bouncing_ball.so" not in Path("/proc/self/maps").read_text("utf-8")
