@@ -94,7 +94,10 @@ def test_a_mistake_is_one_line(load: Load, connections: str, a: str, message: st
         ('at = 0.5\nset = { "a.u" = 2.0 }', r"set.a.u: is an array; .* valid: a.u\[1\], a.u\[2\]"),
         ('at = 0.5\nset = { "a.n" = 2 }', "set.a.n: is a tunable structuralParameter; must be"),
         ('when = "a.y_Enumeration[1,1] == \'quick\'"\nset = { "a.u[1]" = 2.0 }', "has no item"),
-        ('when = "a.y_Int8[1,1] == \'fast\'"\nset = { "a.u[1]" = 2.0 }', "no item 'fast'; valid: none"),
+        (
+            'when = "a.y_Int8[1,1] == \'fast\'"\nset = { "a.u[1]" = 2.0 }',
+            "no item 'fast'; valid: none",
+        ),
         ('when = "a.y_Int64[1,1] == 9007199254740993"\nset = { "a.u[1]" = 2.0 }', r"2\*\*53"),
         ('at = 0.5\nset = { "a.u_Enumeration[1,1]" = "quick" }', "must be one of slow, fast"),
     ],
