@@ -13,6 +13,7 @@ from grasp_cosim.cli.entry import main
 from grasp_cosim.master.engine import Engine
 from grasp_cosim.recording.load import load_run
 from grasp_cosim.recording.result import Result
+from grasp_cosim.system.parts import Isolation
 from scipy.linalg import expm
 from support.both_engines import engines
 from support.native_fmus import needs_gcc
@@ -83,6 +84,32 @@ def test_a_state_space_model_is_exact(
     result = simulate(alone(tmp_path).with_values(values), engine=engine)
     np.testing.assert_allclose(signals(result, "ss.y", sizes[2]), exact(given), 1e-10, 1e-12)
     assert list(result.signals) == [f"ss.y[{i}]" for i in range(1, sizes[2] + 1)]
+
+
+@pytest.mark.parametrize("sizes", [(3, 3, 3), (7, 2, 5)])
+@pytest.mark.parametrize("isolation", ["none", "process"])
+def test_it_is_as_exact_by_a_solver(
+    tmp_path: Path, isolation: Isolation, sizes: tuple[int, int, int]
+) -> None:
+    table = '[components.ss]\nfmu = "ss.fmu"\nsolver = { relative_tolerance = 1e-10 }\n'
+    given = values_of(*sizes)
+    values: dict[str, Any] = dict(zip(("ss.n", "ss.m", "ss.r"), sizes, strict=True))
+    values |= {f"ss.{name}": value for name, value in given.items()}
+    system = load(tmp_path, table, types=False).with_values(values).with_isolation(isolation)
+    result = simulate(system)
+    np.testing.assert_allclose(signals(result, "ss.y", sizes[2]), exact(given), 1e-7, 1e-8)
+
+
+@engines
+@pytest.mark.parametrize("isolation", ["none", "process"])
+def test_stimuli_drive_elements(tmp_path: Path, engine: Engine, isolation: Isolation) -> None:
+    (tmp_path / "drive.csv").write_text("time,ss.u[2]\n0,1\n1,3\n", "utf-8")
+    table = '[components.ss]\nfmu = "ss.fmu"\nvalues = { C = 0 }\n[input]\nfile = "drive.csv"\n'
+    system = load(tmp_path, table, types=False).with_isolation(isolation)
+    found = signals(simulate(system, engine=engine), "ss.y", 3)
+    times = np.arange(17) * STEP - STEP
+    assert found[1:, 1].tolist() == np.interp(times[1:], [0.0, 1.0], [1.0, 3.0]).tolist()
+    assert found[:, [0, 2]].tolist() == [[1.0, 3.0]] * 17
 
 
 @engines

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Set
 from dataclasses import replace
 
 from ..errors import InputError, choices
@@ -57,10 +57,12 @@ def check_arrays(system: Structure) -> None:
 
     The rest of what is given keeps its start value, which must be declared for the size it has.
     """
-    sourced = {*(connection.target for connection in system.connections), *driven(system)}
+    connected = {connection.target for connection in system.connections}
+    stimuli = driven(system)
     for component in system.components:
-        for name, unknown in _incomplete(component):
-            missing = [n for n in unknown if Port(component.name, n) not in sourced]
+        given = {*component.values, *(p.variable for p in stimuli if p.component == component.name)}
+        for name, unknown in _incomplete(component, given):
+            missing = [n for n in unknown if Port(component.name, n) not in connected]
             if missing:
                 raise InputError(
                     f"{system.name}: {component.name}.{name}: no value for {choices(missing, 6)}, "
@@ -68,17 +70,13 @@ def check_arrays(system: Structure) -> None:
                 )
 
 
-def _incomplete(component: Component) -> Iterator[tuple[str, list[str]]]:
+def _incomplete(component: Component, given: Set[str]) -> Iterator[tuple[str, list[str]]]:
     """Arrays that are given in part, each with its elements that have no value at all."""
     interface = component.interface
     for name, array in interface.arrays.items():
-        if not component.values.keys().isdisjoint(array.names):
-            unknown = [
-                n
-                for n in array.names
-                if n not in component.values and interface.by_name[n].start is None
-            ]
-            yield name, unknown
+        if not given.isdisjoint(array.names):
+            starts = {n for n in array.names if interface.by_name[n].start is not None}
+            yield name, [n for n in array.names if n not in given and n not in starts]
 
 
 def unsourced(system: Structure, component: Component) -> Iterator[str]:
