@@ -61,6 +61,8 @@ def test_names_and_units_of_whole_arrays(load: Load) -> None:
 MISTAKES = [
     ('"a.y -> b.u"', "values = { r = 2 }", r"connections\[0\] 'a.y -> b.u': a.y is \[2\] and b.u "),
     ('"a.y -> b.u[1]"', "", r"a.y is \[3\] and b.u\[1\] is no array; must have equal shapes"),
+    ('"a.y -> b.v"', "", r"connections\[0\] 'a.y -> b.v': b has no input 'v'; valid: u\[1\], u"),
+    ('"a.y -> c.u"', "", r"connections\[0\] 'a.y -> c.u': no component 'c'; valid: a, b"),
     ('"a.y_Int8 -> b.u"', "", r"a.y_Int8 is \[2, 3\] and b.u is \[3\]"),
     ('"a.y[1] -> b.u[1]", "a.y[4] -> b.u[2]"', "", r"connections\[1\] 'a.y\[4\] -> .* no output"),
     ('"a.y -> b.u", "a.y[1] -> b.u[2]"', "", r"connections\[1\] .*: b.u\[2\] has two sources"),
@@ -135,6 +137,15 @@ def test_inputs_without_a_source_are_said_in_one_line(load: Load) -> None:
     (of_a, of_b) = remarks(load('"a.y[2] -> b.u[1]"'))
     assert of_a.startswith("a: no source for u, u_Float64, u_Float32, ")
     assert of_b.startswith("b: no source for u[2], u[3], u_Float64, ")
+
+
+def test_a_remark_on_a_connection_of_arrays_is_one_line(load: Load) -> None:
+    lines = remarks(load('"a.y_Float64 -> b.u_Float32"', 'units = { y_Float64 = "mm" }'))
+    assert lines[:2] == (
+        "a.y_Float64 -> b.u_Float32: from Float64 to Float32, rounded to 7 digits",
+        "a.y_Float64 -> b.u_Float32: b.u_Float32 has no unit, taken to be in mm",
+    )
+    assert len(lines) == 4
 
 
 @pytest.mark.parametrize(

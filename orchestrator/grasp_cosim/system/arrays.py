@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Set
 from dataclasses import replace
 
+from ..checks import known
 from ..errors import InputError, choices
 from ..interface.arrays import shape_text
 from .parts import Component, Connection, Port
@@ -28,17 +29,22 @@ def by_element(system: Structure) -> tuple[Connection, ...]:
     made: list[Connection] = []
     for i, connection in enumerate(system.connections):
         ends = (connection.source, connection.target)
-        found = [arrays.get(port.component, {}).get(port.variable) for port in ends]
-        source, target = found
+        source, target = found = [arrays.get(p.component, {}).get(p.variable) for p in ends]
         if source is None and target is None:
             made.append(connection)
             continue
+        place = f"{system.name}: connections[{i}] '{connection}'"
+        for port, array, causality in zip(ends, found, ("output", "input"), strict=True):
+            interface = system.component(port.component, place).interface
+            if array is None:
+                valid = [v.name for v in interface.of(causality)]
+                known(f"{place}: {port.component} has no {causality}", port.variable, valid)
         if source is None or target is None or source.shape != target.shape:
             shapes = [shape_text(a.shape) if a else "no array" for a in found]
             has = [f"{port} is {shape}" for port, shape in zip(ends, shapes, strict=True)]
             raise InputError(
-                f"{system.name}: connections[{i}] '{connection}': {' and '.join(has)}; must have "
-                "equal shapes, or be of elements, like u[1]"
+                f"{place}: {' and '.join(has)}; must have equal shapes, or be of elements, like "
+                "u[1]"
             )
         made += (
             replace(
