@@ -62,6 +62,7 @@ MISTAKES = [
     ('"a.y -> b.u"', "values = { r = 2 }", r"connections\[0\] 'a.y -> b.u': a.y is \[2\] and b.u "),
     ('"a.y -> b.u[1]"', "", r"a.y is \[3\] and b.u\[1\] is no array; must have equal shapes"),
     ('"a.y -> b.v"', "", r"connections\[0\] 'a.y -> b.v': b has no input 'v'; valid: u\[1\], u"),
+    ('"a.y -> b.u"', "values = { r = 1099511627776 }", "a.y is array of Float64 with more than 1"),
     ('"a.y -> c.u"', "", r"connections\[0\] 'a.y -> c.u': no component 'c'; valid: a, b"),
     ('"a.y_Int8 -> b.u"', "", r"a.y_Int8 is \[2, 3\] and b.u is \[3\]"),
     ('"a.y[1] -> b.u[1]", "a.y[4] -> b.u[2]"', "", r"connections\[1\] 'a.y\[4\] -> .* no output"),

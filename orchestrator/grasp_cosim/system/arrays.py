@@ -34,14 +34,17 @@ def by_element(system: Structure) -> tuple[Connection, ...]:
             made.append(connection)
             continue
         place = f"{system.name}: connections[{i}] '{connection}'"
+        has = []
         for port, array, causality in zip(ends, found, ("output", "input"), strict=True):
             interface = system.component(port.component, place).interface
             if array is None:
                 valid = [v.name for v in interface.of(causality)]
                 known(f"{place}: {port.component} has no {causality}", port.variable, valid)
+                v = interface.by_name[port.variable]
+                has.append(f"{port} is {v.nature if v.shape else 'no array'}")
+            else:
+                has.append(f"{port} is {shape_text(array.shape)}")
         if source is None or target is None or source.shape != target.shape:
-            shapes = [shape_text(a.shape) if a else "no array" for a in found]
-            has = [f"{port} is {shape}" for port, shape in zip(ends, shapes, strict=True)]
             raise InputError(
                 f"{place}: {' and '.join(has)}; must have equal shapes, or be of elements, like "
                 "u[1]"
