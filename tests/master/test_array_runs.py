@@ -25,10 +25,15 @@ Floats = npt.NDArray[np.float64]
 
 
 def load(
-    folder: Path, tables: str, connections: str = "", scheme: str = "sequential", types: bool = True
+    folder: Path,
+    tables: str,
+    connections: str = "",
+    scheme: str = "sequential",
+    types: bool = True,
+    kind: str = "CoSimulation",
 ) -> System:
     """A system of ss.fmu."""
-    state_space(folder, types=types)
+    state_space(folder, types=types, kind=kind)
     path = folder / "system.toml"
     path.write_text(
         f"connections = [{connections}]\n[experiment]\nstep = {STEP}\nstop = {STOP}\n"
@@ -95,8 +100,8 @@ def test_it_is_as_exact_by_a_solver(
     given = values_of(*sizes)
     values: dict[str, Any] = dict(zip(("ss.n", "ss.m", "ss.r"), sizes, strict=True))
     values |= {f"ss.{name}": value for name, value in given.items()}
-    system = load(tmp_path, table, types=False).with_values(values).with_isolation(isolation)
-    result = simulate(system)
+    system = load(tmp_path, table, types=False, kind="ModelExchange").with_values(values)
+    result = simulate(system.with_isolation(isolation))
     np.testing.assert_allclose(signals(result, "ss.y", sizes[2]), exact(given), 1e-7, 1e-8)
 
 
@@ -119,7 +124,7 @@ def test_fmpy_finds_the_same_bits(tmp_path: Path, engine: Engine) -> None:
         alone(tmp_path).with_values({f"ss.{k}": v for k, v in given.items()}), engine=engine
     )
     theirs = fmpy.simulate_fmu(
-        tmp_path / "ss.fmu",
+        state_space(tmp_path, "complete", complete=True),
         stop_time=STOP,
         step_size=STEP,
         output_interval=STEP,

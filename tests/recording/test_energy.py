@@ -313,8 +313,10 @@ def test_an_array_makes_no_bond(name: str, grasp: System, monkeypatch: pytest.Mo
 
     def declared(path: Path) -> Interface:
         found = read_interface(path)
-        large = {"shape": (MOST_ELEMENTS + 1,), "sizes": (None,)}
-        variables = tuple(replace(v, **large) if v.name == name else v for v in found.variables)
+        large = (MOST_ELEMENTS + 1,)
+        variables = tuple(
+            replace(v, shape=large, sizes=(None,)) if v.name == name else v for v in found.variables
+        )
         return replace(found, variables=variables)
 
     monkeypatch.setattr(parts, "read_interface", declared)

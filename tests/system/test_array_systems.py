@@ -7,7 +7,6 @@ from typing import Any
 import pytest
 from grasp_cosim import InputError, System
 from grasp_cosim.cli import main
-from grasp_cosim.ssp.write import write_ssp
 from grasp_cosim.system.checks import remarks
 from grasp_cosim.system.parts import Condition, Port
 from grasp_cosim.system.scenario import event_entry, read_events
@@ -147,26 +146,6 @@ def test_a_remark_on_a_connection_of_arrays_is_one_line(load: Load) -> None:
         "a.y_Float64 -> b.u_Float32: b.u_Float32 has no unit, taken to be in mm",
     )
     assert len(lines) == 4
-
-
-@pytest.mark.parametrize(
-    ("connections", "a", "port"),
-    [('"a.y -> b.u"', "", r"a\.y\[1\]"), ("", "values = { 'A[1,2]' = 2 }", r"a\.A\[1,2\]")],
-)
-def test_ssp_has_no_form_for_arrays(
-    load: Load, tmp_path: Path, connections: str, a: str, port: str
-) -> None:
-    system, out = load(connections, a), tmp_path / "system.ssp"
-    with pytest.raises(InputError, match=f"^system.toml: {port} is of an array, for which SSP 1.0"):
-        write_ssp(system, out)
-    assert not out.exists()
-
-
-def test_arrays_that_nothing_is_done_with_do_not_hinder_ssp(load: Load, tmp_path: Path) -> None:
-    found = write_ssp(load(), tmp_path / "system.ssp")
-    assert "a.y is of type array of Float64: it has no connector" in found.notes
-    back = System.load(tmp_path / "system.ssp")
-    assert back.recorded.keys() == load().recorded.keys()
 
 
 def test_inspect_shows_shapes_and_what_they_come_from(
