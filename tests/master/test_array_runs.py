@@ -92,7 +92,7 @@ def test_a_state_space_model_is_exact(
 
 
 @pytest.mark.parametrize("sizes", [(3, 3, 3), (7, 2, 5)])
-@pytest.mark.parametrize("isolation", ["none", "process"])
+@pytest.mark.parametrize("isolation", ["none", pytest.param("process", marks=pytest.mark.slow)])
 def test_it_is_as_exact_by_a_solver(
     tmp_path: Path, isolation: Isolation, sizes: tuple[int, int, int]
 ) -> None:
@@ -106,7 +106,7 @@ def test_it_is_as_exact_by_a_solver(
 
 
 @engines
-@pytest.mark.parametrize("isolation", ["none", "process"])
+@pytest.mark.parametrize("isolation", ["none", pytest.param("process", marks=pytest.mark.slow)])
 def test_stimuli_drive_elements(tmp_path: Path, engine: Engine, isolation: Isolation) -> None:
     (tmp_path / "drive.csv").write_text("time,ss.u[2]\n0,1\n1,3\n", "utf-8")
     table = '[components.ss]\nfmu = "ss.fmu"\nvalues = { C = 0 }\n[input]\nfile = "drive.csv"\n'
