@@ -7,6 +7,7 @@ from functools import lru_cache
 from pathlib import Path
 
 import fmpy
+from fmpy.fmi3 import FMU3Slave
 
 SOURCE = Path(__file__).parent / "models" / "state_space.c"
 TYPES = (
@@ -24,26 +25,33 @@ def state_space(
     types: bool = False,
     more: str = "",
     kind: str = "CoSimulation",
+    binary: bool = True,
+    complete: bool = False,
 ) -> Path:
     """The FMU name.fmu in folder: m inputs u, n states x, r outputs y, 3 of each at the start.
 
     With types it has u_T and y_T for all types; more are further variables of its description. kind
-    is CoSimulation or ModelExchange.
+    is CoSimulation or ModelExchange. One without a binary needs no compiler. With complete, it has
+    the functions of other kinds of FMUs, too, without which FMPy does not load it.
     """
     path = folder / f"{name}.fmu"
     library = f"binaries/{fmpy.platform_tuple}/state_space{fmpy.sharedLibraryExtension}"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("modelDescription.xml", _description(types, more, kind))
-        archive.writestr(library, _library())
+        if binary:
+            archive.writestr(library, _library(complete))
     return path
 
 
 @lru_cache
-def _library() -> bytes:
+def _library(complete: bool) -> bytes:
     headers = Path(fmpy.__file__).parent / "c-code"
     with tempfile.TemporaryDirectory() as folder:
-        out = Path(folder, "state_space.so")
-        command = ["gcc", "-shared", "-fPIC", "-O2", f"-I{headers}", str(SOURCE), "-lm"]
+        out, rest = Path(folder, "state_space.so"), Path(folder, "rest.c")
+        names = (n for n in dir(FMU3Slave) if n.startswith("fmi3") and complete)
+        weak = "__attribute__((weak)) int {}(void) {{ return 3; }}\n"
+        rest.write_text("".join(map(weak.format, names)), "utf-8")
+        command = ["gcc", "-shared", "-fPIC", "-O2", f"-I{headers}", str(SOURCE), str(rest), "-lm"]
         subprocess.run([*command, "-o", str(out)], check=True)
         return out.read_bytes()
 

@@ -6,7 +6,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal, Protocol, get_args
 
 from ..checks import known
 from ..errors import InputError, choices
@@ -15,8 +15,17 @@ from .arrays import MOST_ELEMENTS, Array, Element, element_names, size_of
 from .units import IDENTITY, Conversion, Unit, conversion, known_unit
 
 Value = float | int | bool | str
-Given = Value | Sequence["Given"]
-"""What is given for a variable: a value, or those of an array as lists of lists."""
+
+
+class Nested(Protocol):
+    """An array like those of NumPy."""
+
+    def tolist(self) -> Any:
+        """The same as lists of lists."""
+
+
+Given = Value | Sequence["Given"] | Nested
+"""What is given for a variable: a value, or those of an array as lists of lists or so."""
 
 Kind = Literal["Real", "Integer", "Boolean", "String", "Binary", "Clock"]
 KINDS: tuple[str, ...] = get_args(Kind)

@@ -116,9 +116,10 @@ class Master:
                 self._settled(instance, propagation.values)
         kept = self._kept(propagation.values)
         for port, slot in self.slots.items():
-            value = propagation.values[port] if port in propagation.values else kept[port]
             if drive := self._drives.get(port):
-                value = drive.at(0)
+                value: Value = drive.at(0)
+            else:
+                value = propagation.values[port] if port in propagation.values else kept[port]
             if port in self.texts:
                 value = self.texts[port].number(str(value))
             if isinstance(value, int) and abs(value) >= loop.EXACT:
@@ -128,10 +129,11 @@ class Master:
         self._handed_on_at = time.monotonic()
 
     def _kept(self, values: Mapping[Port, Value]) -> dict[Port, Value]:
-        """The elements of connected arrays that have no connection themselves."""
+        """The elements of connected arrays that have no source themselves."""
         found: dict[Port, Value] = {}
+        rest = [port for port in self.slots if port not in values and port not in self._drives]
         for instance in self.instances:
-            ports = [p for p in self.slots if p.component == instance.name and p not in values]
+            ports = [port for port in rest if port.component == instance.name]
             variables = [instance.interface.by_name[port.variable] for port in ports]
             found |= zip(ports, instance.get(variables) if ports else (), strict=True)
         return found

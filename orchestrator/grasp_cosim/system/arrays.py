@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Set
 from dataclasses import replace
 
+from ..checks import known
 from ..errors import InputError, choices
 from ..interface.arrays import shape_text
 from .parts import Component, Connection, Port
@@ -28,17 +29,25 @@ def by_element(system: Structure) -> tuple[Connection, ...]:
     made: list[Connection] = []
     for i, connection in enumerate(system.connections):
         ends = (connection.source, connection.target)
-        found = [arrays.get(port.component, {}).get(port.variable) for port in ends]
-        source, target = found
+        source, target = found = [arrays.get(p.component, {}).get(p.variable) for p in ends]
         if source is None and target is None:
             made.append(connection)
             continue
+        place = f"{system.name}: connections[{i}] '{connection}'"
+        has = []
+        for port, array, causality in zip(ends, found, ("output", "input"), strict=True):
+            interface = system.component(port.component, place).interface
+            if array is None:
+                valid = [v.name for v in interface.of(causality)]
+                known(f"{place}: {port.component} has no {causality}", port.variable, valid)
+                v = interface.by_name[port.variable]
+                has.append(f"{port} is {v.nature if v.shape else 'no array'}")
+            else:
+                has.append(f"{port} is {shape_text(array.shape)}")
         if source is None or target is None or source.shape != target.shape:
-            shapes = [shape_text(a.shape) if a else "no array" for a in found]
-            has = [f"{port} is {shape}" for port, shape in zip(ends, shapes, strict=True)]
             raise InputError(
-                f"{system.name}: connections[{i}] '{connection}': {' and '.join(has)}; must have "
-                "equal shapes, or be of elements, like u[1]"
+                f"{place}: {' and '.join(has)}; must have equal shapes, or be of elements, like "
+                "u[1]"
             )
         made += (
             replace(
@@ -57,10 +66,12 @@ def check_arrays(system: Structure) -> None:
 
     The rest of what is given keeps its start value, which must be declared for the size it has.
     """
-    sourced = {*(connection.target for connection in system.connections), *driven(system)}
+    connected = {connection.target for connection in system.connections}
+    stimuli = driven(system)
     for component in system.components:
-        for name, unknown in _incomplete(component):
-            missing = [n for n in unknown if Port(component.name, n) not in sourced]
+        given = {*component.values, *(p.variable for p in stimuli if p.component == component.name)}
+        for name, unknown in _incomplete(component, given):
+            missing = [n for n in unknown if Port(component.name, n) not in connected]
             if missing:
                 raise InputError(
                     f"{system.name}: {component.name}.{name}: no value for {choices(missing, 6)}, "
@@ -68,17 +79,13 @@ def check_arrays(system: Structure) -> None:
                 )
 
 
-def _incomplete(component: Component) -> Iterator[tuple[str, list[str]]]:
+def _incomplete(component: Component, given: Set[str]) -> Iterator[tuple[str, list[str]]]:
     """Arrays that are given in part, each with its elements that have no value at all."""
     interface = component.interface
     for name, array in interface.arrays.items():
-        if not component.values.keys().isdisjoint(array.names):
-            unknown = [
-                n
-                for n in array.names
-                if n not in component.values and interface.by_name[n].start is None
-            ]
-            yield name, unknown
+        if not given.isdisjoint(array.names):
+            starts = {n for n in array.names if interface.by_name[n].start is not None}
+            yield name, [n for n in array.names if n not in given and n not in starts]
 
 
 def unsourced(system: Structure, component: Component) -> Iterator[str]:

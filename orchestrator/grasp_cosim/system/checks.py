@@ -189,16 +189,16 @@ def remarks(system: Structure) -> tuple[str, ...]:
             for name, unit in component.units.items()
             if (v := declared.sample(name)) and v.unit not in (None, unit)
         ]
-    for connection in system.connections:
-        ends = _ends(system, connection)
-        source, target = (end.variable for end in ends)
+    for named, connection in {c.whole or c: c for c in system.connections}.items():
+        source, target = (end.variable for end in _ends(system, connection))
         if target.type == "Float32" and source.type in ("Real", "Float64"):
-            lines.append(f"{connection}: from {source.type} to Float32, rounded to 7 digits")
+            lines.append(f"{named}: from {source.type} to Float32, rounded to 7 digits")
         if target.kind == "Real" and connection.factor is None and connection.offset is None:
-            missing = [end.port for end in ends if end.variable.unit is None]
+            ends = ((named.source, source), (named.target, target))
+            missing = [port for port, variable in ends if variable.unit is None]
             if len(missing) == 1:
                 unit = source.unit or target.unit
-                lines.append(f"{connection}: {missing[0]} has no unit, taken to be in {unit}")
+                lines.append(f"{named}: {missing[0]} has no unit, taken to be in {unit}")
     for component in system.components:
         for variable in component.interface.of("input", "output"):
             if not variable.supported:

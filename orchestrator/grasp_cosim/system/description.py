@@ -80,9 +80,10 @@ class System(Structure):
         name, _, variable = key.partition(".")
         component = self.component(name, key)
         declared = component.interface.by_name.get(variable)
-        if declared is None or declared.start is None:
+        value = component.values.get(variable, None if declared is None else declared.start)
+        if value is None:
             raise InputError(f"{key}: {component.fmu.name} declares no such start value")
-        return float(component.values.get(variable, declared.start))
+        return float(value)
 
     def with_values(self, values: Mapping[str, Given]) -> "System":
         """A copy with start values changed; the keys are like 'plant.object_width'.

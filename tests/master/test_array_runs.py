@@ -1,0 +1,292 @@
+"""Arrays in a run: a state-space model against its exact solution and FMPy, and all types."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import numpy as np
+import numpy.typing as npt
+import pytest
+from grasp_cosim import InputError, SimulationError, System, simulate
+from grasp_cosim.cli.entry import main
+from grasp_cosim.master.engine import Engine
+from grasp_cosim.recording.load import load_run
+from grasp_cosim.recording.result import Result
+from grasp_cosim.system.parts import Isolation
+from scipy.linalg import expm
+from support.both_engines import engines
+from support.native_fmus import needs_gcc
+from support.state_space import TYPES, state_space
+
+pytestmark = needs_gcc
+STEP, STOP = 0.125, 2.0
+Floats = npt.NDArray[np.float64]
+
+
+def load(
+    folder: Path,
+    tables: str,
+    connections: str = "",
+    scheme: str = "sequential",
+    types: bool = True,
+    kind: str = "CoSimulation",
+) -> System:
+    """A system of ss.fmu."""
+    state_space(folder, types=types, kind=kind)
+    path = folder / "system.toml"
+    path.write_text(
+        f"connections = [{connections}]\n[experiment]\nstep = {STEP}\nstop = {STOP}\n"
+        f'scheme = "{scheme}"\n{tables}',
+        "utf-8",
+    )
+    return System.load(path)
+
+
+def alone(folder: Path) -> System:
+    return load(folder, '[components.ss]\nfmu = "ss.fmu"\n', types=False)
+
+
+def two(folder: Path, connections: str, more: str = "", scheme: str = "sequential") -> System:
+    tables = '[components.a]\nfmu = "ss.fmu"\n[components.b]\nfmu = "ss.fmu"\n'
+    return load(folder, tables + more, connections, scheme)
+
+
+def values_of(n: int, m: int, r: int, seed: int = 1) -> dict[str, Any]:
+    """A stable system of that many states, inputs and outputs."""
+    draw = np.random.default_rng(seed).normal
+    a = draw(size=(n, n)) - 2.0 * np.eye(n)
+    b, c, d = draw(size=(n, m)), draw(size=(r, n)), draw(size=(r, m))
+    return {"A": a, "B": b, "C": c, "D": d, "x0": draw(size=n), "u": draw(size=m)}
+
+
+def exact(given: dict[str, Any]) -> Floats:
+    """y at each step, for an input that is held."""
+    a, b, c, d, x, u = (given[k] for k in ("A", "B", "C", "D", "x0", "u"))
+    n, m = b.shape
+    whole = np.zeros((n + m, n + m))
+    whole[:n] = np.hstack([a, b])
+    power = expm(STEP * whole)[:n]
+    rows = []
+    for _ in range(round(STOP / STEP) + 1):
+        rows.append(c @ x + d @ u)
+        x = power @ np.concatenate([x, u])
+    return np.array(rows)
+
+
+def signals(result: Result, name: str, count: int) -> Floats:
+    return np.array([result[f"{name}[{i}]"] for i in range(1, count + 1)]).T
+
+
+@engines
+@pytest.mark.parametrize("sizes", [(3, 3, 3), (1, 1, 1), (7, 2, 5), (2, 6, 1), (24, 4, 3)])
+def test_a_state_space_model_is_exact(
+    tmp_path: Path, engine: Engine, sizes: tuple[int, int, int]
+) -> None:
+    given = values_of(*sizes)
+    values = dict(zip(("ss.n", "ss.m", "ss.r"), sizes, strict=True))
+    values |= {f"ss.{name}": value for name, value in given.items()}
+    result = simulate(alone(tmp_path).with_values(values), engine=engine)
+    np.testing.assert_allclose(signals(result, "ss.y", sizes[2]), exact(given), 1e-10, 1e-12)
+    assert list(result.signals) == [f"ss.y[{i}]" for i in range(1, sizes[2] + 1)]
+
+
+@pytest.mark.parametrize("sizes", [(3, 3, 3), (7, 2, 5)])
+@pytest.mark.parametrize("isolation", ["none", pytest.param("process", marks=pytest.mark.slow)])
+def test_it_is_as_exact_by_a_solver(
+    tmp_path: Path, isolation: Isolation, sizes: tuple[int, int, int]
+) -> None:
+    table = '[components.ss]\nfmu = "ss.fmu"\nsolver = { relative_tolerance = 1e-10 }\n'
+    given = values_of(*sizes)
+    values: dict[str, Any] = dict(zip(("ss.n", "ss.m", "ss.r"), sizes, strict=True))
+    values |= {f"ss.{name}": value for name, value in given.items()}
+    system = load(tmp_path, table, types=False, kind="ModelExchange").with_values(values)
+    result = simulate(system.with_isolation(isolation))
+    np.testing.assert_allclose(signals(result, "ss.y", sizes[2]), exact(given), 1e-7, 1e-8)
+
+
+@engines
+@pytest.mark.parametrize("isolation", ["none", pytest.param("process", marks=pytest.mark.slow)])
+def test_stimuli_drive_elements(tmp_path: Path, engine: Engine, isolation: Isolation) -> None:
+    (tmp_path / "drive.csv").write_text("time,ss.u[2]\n0,1\n1,3\n", "utf-8")
+    table = '[components.ss]\nfmu = "ss.fmu"\nvalues = { C = 0 }\n[input]\nfile = "drive.csv"\n'
+    system = load(tmp_path, table, types=False).with_isolation(isolation)
+    found = signals(simulate(system, engine=engine), "ss.y", 3)
+    times = np.arange(17) * STEP - STEP
+    assert found[1:, 1].tolist() == np.interp(times[1:], [0.0, 1.0], [1.0, 3.0]).tolist()
+    assert found[:, [0, 2]].tolist() == [[1.0, 3.0]] * 17
+
+
+@engines
+def test_fmpy_finds_the_same_bits(tmp_path: Path, engine: Engine) -> None:
+    given = values_of(3, 3, 3)
+    result = simulate(
+        alone(tmp_path).with_values({f"ss.{k}": v for k, v in given.items()}), engine=engine
+    )
+    theirs = fmpy.simulate_fmu(
+        state_space(tmp_path, "complete", complete=True),
+        stop_time=STOP,
+        step_size=STEP,
+        output_interval=STEP,
+        start_values={k: v.ravel().tolist() for k, v in given.items()},
+        output=["y"],
+    )
+    np.testing.assert_array_equal(signals(result, "ss.y", 3), theirs["y"])
+
+
+@engines
+def test_a_process_of_its_own_changes_no_bit(tmp_path: Path, engine: Engine) -> None:
+    more = '[[events]]\nat = 0.5\nset = { "b.u[3]" = 4.0, "b.A[1,2]" = 0.5 }\n'
+    system = two(tmp_path, '"a.y[2] -> b.u[1]", "a.y_Int8 -> b.u_Int8"', more)
+    system = system.with_values({"a.r": 2, "a.u_Int8": 5, "b.u_Float32": [[1, 2, 3], [4, 5, 6]]})
+    here = simulate(system, engine=engine)
+    there = simulate(system.with_isolation("process"), engine=engine)
+    assert list(here.signals) == list(there.signals)
+    for name in here.signals:
+        np.testing.assert_array_equal(here[name], there[name], name)
+
+
+@engines
+@pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
+def test_whole_arrays_and_their_elements_are_connected(
+    tmp_path: Path, engine: Engine, scheme: str
+) -> None:
+    parts = [f"a.y[{i}] -> b.u[{i}]" for i in (3, 1, 2)]
+    ends = '{ from = "a.y_Float32", to = "b.u_Float32", factor = 2.0 }'
+    whole = simulate(two(tmp_path, f'"a.y -> b.u", {ends}', "", scheme), engine=engine)
+    listed = ", ".join(f'"{part}"' for part in parts)
+    by_part = simulate(two(tmp_path, f"{listed}, {ends}", "", scheme), engine=engine)
+    for name in whole.signals:
+        np.testing.assert_array_equal(whole[name], by_part[name], name)
+    assert whole["b.y[3]"][-1] > whole["a.y[3]"][-1] > 3.0
+
+
+@engines
+def test_the_rest_of_an_array_keeps_its_value_or_start(tmp_path: Path, engine: Engine) -> None:
+    """B = D = 0 but for one row, so that y[1] is u[2] and so on."""
+    system = two(tmp_path, '"a.y[1] -> b.u[2]"').with_values(
+        {"a.C": 0, "a.D": 0, "a.D[1,3]": 1.0, "a.u[3]": 9.0}
+        | {"b.C": 0, "b.D": np.eye(3), "b.u[3]": -1.5}
+    )
+    result = simulate(system, engine=engine)
+    assert signals(result, "b.y", 3)[[0, -1]].tolist() == [[1.0, 9.0, -1.5]] * 2
+    assert "b: no source for u[1], u_Float64, " in " ".join(result.log)
+
+
+@engines
+def test_without_a_start_the_rest_is_what_the_fmu_has(tmp_path: Path, engine: Engine) -> None:
+    system = two(tmp_path, '"a.y[1] -> b.u[2]"').with_values(
+        {"b.m": 4, "b.C": 0, "b.D": np.eye(3, 4), "b.B": 0}
+    )
+    result = simulate(system, engine=engine)
+    assert signals(result, "b.y", 3)[0].tolist() == [1.0, 1.0, 3.0]
+
+
+@engines
+def test_all_types_pass_whole(tmp_path: Path, engine: Engine) -> None:
+    links = ", ".join(f'"a.y_{t} -> b.u_{t}"' for t in TYPES)
+    given: dict[str, Any] = {
+        f"a.u_{t}": np.arange(6).reshape(2, 3) + 1 if "Int" in t else [[1.5] * 3, [-0.25] * 3]
+        for t in TYPES[:-2]
+    }
+    given["a.u_Boolean"] = [[True, False, True], [False, False, True]]
+    given["a.u_Enumeration"] = [["slow", "fast", "slow"], ["fast", "fast", "slow"]]
+    result = simulate(two(tmp_path, links).with_values(given), engine=engine)
+    expected = {t: np.ravel(given[f"a.u_{t}"]).tolist() for t in TYPES[:-1]}
+    expected["Enumeration"] = [1, 2, 1, 2, 2, 1]
+    for t in TYPES:
+        places = [f"[{i},{j}]" for i in (1, 2) for j in (1, 2, 3)]
+        for component in "ab":
+            found = [result[f"{component}.y_{t}{place}"][-1] for place in places]
+            assert found == expected[t], t
+
+
+@engines
+def test_events_set_elements_of_arrays(tmp_path: Path, engine: Engine) -> None:
+    more = (
+        '[[events]]\nat = 0.5\nset = { "b.u[3]" = 4.0, "a.u[2]" = 7.0, "a.D[1,1]" = 0.0 }\n'
+        "[[events]]\nwhen = \"a.y_Enumeration[2,1] == 'fast'\"\n"
+        'set = { "b.u_Int16[1,2]" = 77 }\n'
+        '[[events]]\nat = 1.0\nset = { "a.u_Enumeration[2,1]" = "fast" }\n'
+    )
+    system = two(tmp_path, '"a.y[1] -> b.u[1]", "a.y[2] -> b.u[2]"', more).with_values(
+        {"a.C": 0, "a.D": np.eye(3), "b.C": 0, "b.D": np.eye(3)}
+    )
+    result = simulate(system, engine=engine)
+    before, after = 4, 5
+    assert signals(result, "b.y", 3)[before].tolist() == [1.0, 2.0, 3.0]
+    assert signals(result, "a.y", 3)[after].tolist() == [0.0, 7.0, 3.0]
+    assert signals(result, "b.y", 3)[after].tolist() == [0.0, 7.0, 4.0]
+    assert result["b.y_Int16[1,2]"][[9, 10]].tolist() == [0, 77]
+    assert "t = 1.125 s: b.u_Int16[1,2] = 77 (a.y_Enumeration[2,1] == 'fast')" in result.log
+
+
+@engines
+def test_faults_act_on_elements(tmp_path: Path, engine: Engine) -> None:
+    more = (
+        '[[faults]]\nconnection = "a.y[2] -> b.u[2]"\nkind = "bias"\nvalue = 10.0\n'
+        '[[faults]]\nconnection = "b.u_Enumeration[1,1]"\nkind = "stuck"\nvalue = "fast"\n'
+    )
+    system = two(tmp_path, '"a.y -> b.u", "a.y_Enumeration -> b.u_Enumeration"', more)
+    result = simulate(system.with_values({"b.C": 0, "a.C": 0}), engine=engine)
+    assert signals(result, "b.y", 3)[-1].tolist() == [1.0, 12.0, 3.0]
+    assert result["b.y_Enumeration[1,1]"][-1] == 2
+    assert result["b.y_Enumeration[1,2]"][-1] == 1
+
+
+@engines
+def test_sizes_of_0(tmp_path: Path, engine: Engine) -> None:
+    values: dict[str, Any] = {"a.m": 0, "a.k": 0, "a.n": 0, "b.m": 2, "b.r": 1, "a.r": 2}
+    result = simulate(two(tmp_path, '"a.y -> b.u"').with_values({"b.m": 3}), engine=engine)
+    assert result["b.y[1]"][0] == 1.0
+    result = simulate(
+        load(tmp_path, '[components.a]\nfmu = "ss.fmu"\n').with_values(
+            {k: v for k, v in values.items() if k[0] == "a"}
+        ),
+        engine=engine,
+    )
+    assert list(result.signals) == ["a.y[1]", "a.y[2]"]
+    assert signals(result, "a.y", 2).tolist() == [[0.0, 0.0]] * 17
+
+
+@engines
+def test_a_loop_of_arrays_is_solved(tmp_path: Path, engine: Engine) -> None:
+    """u = D y + ... both ways: the fixed point of y = u / 2, at t = 0."""
+    system = two(tmp_path, '"a.y -> b.u", "b.y -> a.u"').with_values(
+        {f"{c}.D": 0.5 * np.eye(3) for c in "ab"} | {f"{c}.x0": [1, 2, 3] for c in "ab"}
+    )
+    result = simulate(system, engine=engine)
+    assert "algebraic loops at t = 0 through" in " ".join(result.log)
+    np.testing.assert_allclose(signals(result, "b.y", 3)[0], [2.0, 4.0, 6.0], 1e-9)
+
+
+def test_a_recorded_run_reads_back(tmp_path: Path) -> None:
+    two(tmp_path, '"a.y -> b.u"')
+    out, file = tmp_path / "out", str(tmp_path / "system.toml")
+    assert main(["run", file, "--set", "a.u=4,5,6", "--set", "b.A[1,2]=2", "--out", str(out)]) == 0
+    result = simulate(System.load(file).with_values({"a.u": [4, 5, 6], "b.A[1,2]": 2}))
+    assert '"a.y_Float64[1,2]"' in (out / "signals.csv").read_text("utf-8").partition("\n")[0]
+    written = json.loads((out / "run.json").read_text("utf-8"))["components"]
+    assert written["a"]["values"] == {"u[1]": 4.0, "u[2]": 5.0, "u[3]": 6.0}
+    assert written["b"]["values"] == {"A[1,2]": 2.0}
+    read = load_run(out)
+    assert list(read.signals) == list(result.signals)
+    for name in result.signals:
+        np.testing.assert_array_equal(read[name], result[name])
+
+
+def test_a_long_integer_in_an_array_ends_the_run_by_name(tmp_path: Path) -> None:
+    system = load(tmp_path, '[components.a]\nfmu = "ss.fmu"\n')
+    long = system.with_values({"a.u_Int64[2,1]": 2**53 + 1})
+    with pytest.raises(InputError, match=r"^a\.y_Int64\[2,1\] = 9007199254740993 at step 0"):
+        simulate(long)
+    with simulate.session(system, engine="python") as session:
+        session.step(3)
+        session.set("a.u_UInt64[1,1]", 2**60)
+        with pytest.raises(SimulationError, match=r"^a\.y_UInt64\[1,1\] = 1152921504606846976 at"):
+            session.step(1)
+
+
+def test_what_the_fmu_refuses_is_said(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"^ss: ss\.fmu refused its initialisation: at most 24$"):
+        simulate(alone(tmp_path).with_values({"ss.r": 25}))

@@ -1,0 +1,159 @@
+"""Arrays in a system: connections, values, sizes and units, and each mistake in one line."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from grasp_cosim import InputError, System
+from grasp_cosim.cli import main
+from grasp_cosim.system.checks import remarks
+from grasp_cosim.system.parts import Condition, Port
+from grasp_cosim.system.scenario import event_entry, read_events
+from support.state_space import state_space
+
+Load = Callable[..., System]
+TABLES = '[components.a]\nfmu = "ss.fmu"\n{}\n[components.b]\nfmu = "ss.fmu"\n{}\n'
+
+
+@pytest.fixture
+def load(tmp_path: Path) -> Load:
+    """Two FMUs with arrays, which need no binary here."""
+    state_space(tmp_path, types=True, binary=False)
+
+    def made(connections: str = "", a: str = "", b: str = "", more: str = "") -> System:
+        path = tmp_path / "system.toml"
+        head = f"connections = [{connections}]\n[experiment]\nstep = 0.1\nstop = 1.0\n"
+        path.write_text(head + TABLES.format(a, b) + more, "utf-8")
+        return System.load(path)
+
+    return made
+
+
+def test_a_connection_of_arrays_is_one_for_each_element(load: Load) -> None:
+    system = load('"a.y -> b.u"')
+    assert list(map(str, system.connections)) == [f"a.y[{i}] -> b.u[{i}]" for i in (1, 2, 3)]
+    smaller = system.with_values({"a.r": 2, "b.m": 2})
+    assert list(map(str, smaller.connections)) == ["a.y[1] -> b.u[1]", "a.y[2] -> b.u[2]"]
+    assert smaller.with_values({"a.r": 3, "b.m": 3}).connections == system.connections
+
+
+def test_values_decide_sizes_before_arrays_are_set(load: Load) -> None:
+    system = load(a="values = { A = [[1, 2], [3, 4]], n = 2, u = 5.0 }")
+    values = system.component("a", "").values
+    expected = {"n": 2, "A[1,1]": 1.0, "A[1,2]": 2.0, "A[2,1]": 3.0, "A[2,2]": 4.0}
+    assert values == {**expected, "u[1]": 5.0, "u[2]": 5.0, "u[3]": 5.0}
+    assert system.start("a.A[2,1]") == 3.0
+    one = system.with_values({"a.n": 1, "a.A": -1}).component("a", "").values
+    assert {n: v for n, v in one.items() if n[0] == "A"} == {"A[1,1]": -1.0}
+
+
+def test_names_and_units_of_whole_arrays(load: Load) -> None:
+    system = load(
+        '"a.way -> b.u"', 'rename = { way = "y" }\nunits = { way = "mm" }', 'units = { u = "m" }'
+    )
+    assert [c.source.variable for c in system.connections] == ["way[1]", "way[2]", "way[3]"]
+    assert next(iter(system.recorded)) == Port("a", "way[1]")
+    assert system.recorded[Port("a", "way[2]")].unit == "mm"
+
+
+MISTAKES = [
+    ('"a.y -> b.u"', "values = { r = 2 }", r"connections\[0\] 'a.y -> b.u': a.y is \[2\] and b.u "),
+    ('"a.y -> b.u[1]"', "", r"a.y is \[3\] and b.u\[1\] is no array; must have equal shapes"),
+    ('"a.y -> b.v"', "", r"connections\[0\] 'a.y -> b.v': b has no input 'v'; valid: u\[1\], u"),
+    ('"a.y -> b.u"', "values = { r = 1099511627776 }", "a.y is array of Float64 with more than 1"),
+    ('"a.y -> c.u"', "", r"connections\[0\] 'a.y -> c.u': no component 'c'; valid: a, b"),
+    ('"a.y_Int8 -> b.u"', "", r"a.y_Int8 is \[2, 3\] and b.u is \[3\]"),
+    ('"a.y[1] -> b.u[1]", "a.y[4] -> b.u[2]"', "", r"connections\[1\] 'a.y\[4\] -> .* no output"),
+    ('"a.y -> b.u", "a.y[1] -> b.u[2]"', "", r"connections\[1\] .*: b.u\[2\] has two sources"),
+    ('"a.y_Boolean -> b.u_Int8"', "", r"a.y_Boolean\[1,1\] is Boolean and b.u_Int8\[1,1\] is Int8"),
+    ("", "values = { u = [1, 2] }", r"values: u = \[1, 2\]: is \[2\]; must be \[3\], or a list"),
+    ("", "values = { m = 2, 'u[3]' = 1 }", r"no input or parameter 'u\[3\]'"),
+    (
+        "",
+        "values = { n = 2, 'A[1,1]' = 1 }",
+        r"a.A: no value for A\[1,2\], A\[2,1\], A\[2,2\], and",
+    ),
+    ("", "values = { n = -1 }", "values: n = -1: must be a whole number of type UInt64"),
+    (
+        "",
+        "values = { n = 1099511627776, A = 1 }",
+        "array of Float64 with more than 100000 elements",
+    ),
+]
+
+
+@pytest.mark.parametrize(("connections", "a", "message"), MISTAKES)
+def test_a_mistake_is_one_line(load: Load, connections: str, a: str, message: str) -> None:
+    with pytest.raises(InputError, match=message) as caught:
+        load(connections, a)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ('at = 0.5\nset = { "a.u" = 2.0 }', r"set.a.u: is an array; .* valid: a.u\[1\], a.u\[2\]"),
+        ('at = 0.5\nset = { "a.n" = 2 }', "set.a.n: is a tunable structuralParameter; must be"),
+        ('when = "a.y_Enumeration[1,1] == \'quick\'"\nset = { "a.u[1]" = 2.0 }', "has no item"),
+        (
+            'when = "a.y_Int8[1,1] == \'fast\'"\nset = { "a.u[1]" = 2.0 }',
+            "no item 'fast'; valid: none",
+        ),
+        ('when = "a.y_Int64[1,1] == 9007199254740993"\nset = { "a.u[1]" = 2.0 }', r"2\*\*53"),
+        ('at = 0.5\nset = { "a.u_Enumeration[1,1]" = "quick" }', "must be one of slow, fast"),
+    ],
+)
+def test_a_mistake_in_an_event_is_one_line(load: Load, more: str, message: str) -> None:
+    with pytest.raises(InputError, match=message) as caught:
+        load(more=f"[[events]]\n{more}\n")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_value_that_a_smaller_array_has_no_place_for_is_named(load: Load) -> None:
+    system = load(a="values = { A = 1 }")
+    with pytest.raises(
+        InputError, match=r"^with_values a\.n = 2: there is then no A\[1,3\], which"
+    ):
+        system.with_values({"a.n": 2})
+
+
+def test_a_long_number_for_a_fault_is_refused(load: Load) -> None:
+    fault = '[[faults]]\nconnection = "b.u_Int64[1,2]"\nkind = "stuck"\nvalue = 9007199254740993\n'
+    with pytest.raises(InputError, match=r"faults\[0\]: value = 9007199254740993: must be smaller"):
+        load('"a.y_Int64 -> b.u_Int64"', more=fault)
+
+
+@pytest.mark.parametrize("name", ["fast", "it's", "two words", "1", "a == b"])
+def test_the_name_of_an_item_in_a_condition_reads_back(name: str) -> None:
+    quote = '"' if "'" in name else "'"
+    entry: Any = {"when": f"a.mode == {quote}{name}{quote}", "set": {"a.u": 1.0}}
+    (event,) = read_events("here", [entry])
+    assert event.when == Condition(Port("a", "mode"), "==", name)
+    assert event_entry(event) == entry
+
+
+def test_inputs_without_a_source_are_said_in_one_line(load: Load) -> None:
+    (of_a, of_b) = remarks(load('"a.y[2] -> b.u[1]"'))
+    assert of_a.startswith("a: no source for u, u_Float64, u_Float32, ")
+    assert of_b.startswith("b: no source for u[2], u[3], u_Float64, ")
+
+
+def test_a_remark_on_a_connection_of_arrays_is_one_line(load: Load) -> None:
+    lines = remarks(load('"a.y_Float64 -> b.u_Float32"', 'units = { y_Float64 = "mm" }'))
+    assert lines[:2] == (
+        "a.y_Float64 -> b.u_Float32: from Float64 to Float32, rounded to 7 digits",
+        "a.y_Float64 -> b.u_Float32: b.u_Float32 has no unit, taken to be in mm",
+    )
+    assert len(lines) == 4
+
+
+def test_inspect_shows_shapes_and_what_they_come_from(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fmu = state_space(tmp_path, types=True, binary=False)
+    assert main(["inspect", str(fmu)]) == 0
+    rows = {line.split()[0]: line for line in capsys.readouterr().out.splitlines() if line}
+    assert "Float64[n=3, m=3]" in rows["B"]
+    assert "Int8[2, k=3]" in rows["u_Int8"]
+    assert " slow " in rows["u_Enumeration"]
