@@ -109,11 +109,18 @@ def _names(
             renamed.append(name)
             check = f"CHECK, found {match.doubt}; " if match.doubt else ""
             yield Row(name, quoted(match.variable.name), check + told(match.variable))
-        elif not match and name in needed:
-            renamed.append(name)
+        elif not match and (name in needed or variable.causality == "output"):
             there = [v.name for v in candidates(ours, name, theirs, own)]
             what = f"the FMU's name of {a(variable)}"
-            yield Row(name, todo(what if there else f"{what}; it has none left", there))
+            if name in needed:
+                renamed.append(name)
+                none = f"{what}; it has none left: without it, no line here and no connection"
+                yield Row(name, todo(what if there else none, there))
+            else:
+                such = f": {choices(there, FEW)}" if there else "; it has none left"
+                yield Row(
+                    "", "", f"TODO {key(name)} = {what}{such}; metrics and figures may want it"
+                )
     for name in renamed:
         if name in theirs.by_name and name not in own:
             yield Row(f"{name}{OTHER}", quoted(name), "something else than the system's")
