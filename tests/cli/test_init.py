@@ -212,3 +212,23 @@ def test_paths(tmp_path: Path) -> None:
     assert shown(here / "fmus/a.fmu", here) == "fmus/a.fmu"
     assert shown(tmp_path / "project/fmus/a.fmu", here) == "../fmus/a.fmu"
     assert shown(tmp_path / "a.fmu", here) == str(tmp_path / "a.fmu")
+
+
+def test_names_that_a_system_file_has_to_quote(fmus_here: Run, tmp_path: Path) -> None:
+    brake = 'plant.the "brake"'
+    awkward = {
+        {
+            "GapRight": "plant.l_1",
+            "GapLeft": "plant.l_2",
+            "valve": brake.replace('"', "&quot;"),
+        }.get(name, name): text
+        for name, text in FOREIGN.items()
+    }
+    write_fmu(tmp_path / "é #1.fmu", awkward, {})
+    assert fmus_here("init", "a.toml", "--as", "plant=é #1.fmu")[0] == 0
+    text = (tmp_path / "a.toml").read_text("utf-8")
+    text = re.sub(r'^("velocity.*) = "TODO.*', r'\1 = "mm/s"', text, flags=re.MULTILINE)
+    (tmp_path / "a.toml").write_text(re.sub(r'"TODO: 0.5 .*"', "0.25", text), "utf-8")
+    plant = System.load(tmp_path / "a.toml").component("plant", "test")
+    assert plant.values == {brake: 0.25}
+    assert plant.rename["gap[2]"] == "plant.l_2"

@@ -41,9 +41,11 @@ class Draft:
         A table of the file begins with its heading and ends with an empty line.
         """
         own = f"[components.{self.name}]"
-        chunks = (self.text if c.startswith(own) else c for c in text.split("\n\n"))
         line = re.compile(rf'^("{re.escape(self.name)}\.(.+?)") = (\S+)(.*)$', re.MULTILINE)
-        return line.sub(self._preset, "\n\n".join(chunks))
+        chunks = text.split("\n\n")
+        return "\n\n".join(
+            self.text if c.startswith(own) else line.sub(self._preset, c) for c in chunks
+        )
 
     def _preset(self, match: re.Match[str]) -> str:
         """A line of a preset in the unit of the FMU; a comment where it has no such variable."""
