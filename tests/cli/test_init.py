@@ -126,11 +126,13 @@ def test_a_foreign_plant(fmus_here: Run, tmp_path: Path) -> None:
     assert todo == ['"velocity[1]"', '"velocity[2]"', "valve"]
     lines = (tmp_path / "a.toml").read_text("utf-8").split("\n")
     assert all(lines[entry["line"] - 1] == entry["text"] for entry in report["todo"])
-    notes = [line for line in lines if line.startswith("# TODO")]
-    assert [note.partition(" in the system")[0] for note in notes] == [
-        "# TODO object_width = 0.07 m", "# TODO initial_object_position = 0.03 m",
+    notes = [re.split(" =| in the", line)[0] for line in lines if line.startswith("# TODO")]
+    assert notes == [
+        '# TODO "contact_force[1]"', '# TODO "contact_force[2]"', '# TODO "contact[1]"',
+        '# TODO "contact[2]"', "# TODO object_position", "# TODO object_width",
+        "# TODO initial_object_position",
     ]  # fmt: skip
-    assert all(note.endswith("; it has place") for note in notes)
+    assert any(line.endswith("not found in the FMU, left out; it has place") for line in lines)
     for command in (("run", "a.toml"), ("qualify", "a.toml", "--as", "plant")):
         code, out, err = fmus_here(*command)
         first = report["todo"][0]
@@ -210,3 +212,23 @@ def test_paths(tmp_path: Path) -> None:
     assert shown(here / "fmus/a.fmu", here) == "fmus/a.fmu"
     assert shown(tmp_path / "project/fmus/a.fmu", here) == "../fmus/a.fmu"
     assert shown(tmp_path / "a.fmu", here) == str(tmp_path / "a.fmu")
+
+
+def test_names_that_a_system_file_has_to_quote(fmus_here: Run, tmp_path: Path) -> None:
+    brake = 'plant.the "brake"'
+    awkward = {
+        {
+            "GapRight": "plant.l_1",
+            "GapLeft": "plant.l_2",
+            "valve": brake.replace('"', "&quot;"),
+        }.get(name, name): text
+        for name, text in FOREIGN.items()
+    }
+    write_fmu(tmp_path / "é #1.fmu", awkward, {})
+    assert fmus_here("init", "a.toml", "--as", "plant=é #1.fmu")[0] == 0
+    text = (tmp_path / "a.toml").read_text("utf-8")
+    text = re.sub(r'^("velocity.*) = "TODO.*', r'\1 = "mm/s"', text, flags=re.MULTILINE)
+    (tmp_path / "a.toml").write_text(re.sub(r'"TODO: 0.5 .*"', "0.25", text), "utf-8")
+    plant = System.load(tmp_path / "a.toml").component("plant", "test")
+    assert plant.values == {brake: 0.25}
+    assert plant.rename["gap[2]"] == "plant.l_2"

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from conftest import Altered
 from grasp_cosim import System, cli
+from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.qualification.bands import read_bands
 
 Run = Callable[..., tuple[int, str, str]]
@@ -48,6 +49,28 @@ def test_a_copy_is_qualified(qualify: Run, fmus: Path) -> None:
     )
     assert re.fullmatch(r"0 of \d+ signals and 0 of 19 metrics out of band", lines[1])
     assert "interface: no difference" in lines
+
+
+@pytest.mark.slow
+def test_a_system_file_has_the_candidate_with_its_names_and_values(
+    qualify: Run, fmus: Path, tmp_path: Path
+) -> None:
+    """A heavier finger, and gaps under other names: what the file says of it, and nothing else."""
+    text = SYSTEM.read_text("utf-8").replace('fmu = "', f'fmu = "{fmus}/')
+    path = tmp_path / "mine.toml"
+    path.write_text(text.replace("object_width = 0.07,", '"finger_mass[2]" = 0.6,'), "utf-8")
+    code, out, _ = qualify(path, "--as", "plant", *SHORT, "--json")
+    report = json.loads(out)
+    assert (code, report["qualified"]) == (1, False)
+    outside = {s["name"] for s in report["signals"] if not s["inside"]}
+    assert "plant.position[2]" in outside
+    assert "plant.position[1]" not in outside
+    path.write_text(text, "utf-8")
+    assert qualify(path, "--as", "plant", *SHORT)[0] == 0
+    path.write_text(text.replace("components.plant", "components.gripper"), "utf-8")
+    code, _, err = qualify(path, "--as", "plant", *SHORT)
+    assert code == 2
+    assert err.count("\n") == 1
 
 
 @pytest.mark.slow

@@ -80,6 +80,8 @@ def test_names_of_the_gaps_that_need_no_check(
         (("gapA", "gapB"), "which is 1, which 2"),
         (("distanceToWall1", "distanceToWall2"), "by its name"),
         (("gapOne", "gapTwo"), "which is 1, which 2"),
+        (("gapr", "gapl"), "which is 1, which 2"),
+        (("surfaceDistance1", "surfaceDistance2"), "by its description"),
     ],
 )
 def test_names_that_are_to_be_checked(plant: Interface, pair: tuple[str, str], doubt: str) -> None:

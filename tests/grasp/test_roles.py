@@ -31,7 +31,7 @@ NAMES = {"plant": "gripper", "sensor_1": "right", "sensor_2": "left", "controlle
 
 def written(fmus: Path, folder: Path, names: Mapping[str, str], roles: bool, presets: bool) -> Path:
     """The built-in system file with other names of its components, in folder."""
-    text, _, rest = SYSTEM.read_text("utf-8").partition("# Cases of the paper")
+    text, _, rest = SYSTEM.read_text("utf-8").partition("# Values under a name")
     text += rest.partition("\n")[2] if presets else ""
     for old, new in names.items():
         for place in ('"{}.', "-> {}.", "components.{}]"):

@@ -185,7 +185,7 @@ def test_a_blocked_candidate_is_not_run(short: System, fmus: Path) -> None:
     report = as_json(found)
     assert report["reason"].startswith("not run, the interface does not fit: force[1], ")
     blocked = {d["variable"] for d in report["differences"] if d["severity"] == "blocks"}
-    assert {"force[1]", "gap[2]", "velocity[1]", "object_width"} <= blocked
+    assert {"force[1]", "gap[2]", "velocity[1]"} <= blocked
     assert "blocks  missing" in as_text(found)
 
 

@@ -7,11 +7,14 @@ and l_2, or the elements of an array. x points right, and finger 1 is the right 
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 from ..interface.interface import Interface, Variable
+from ..interface.units import Unit
 
 CERTAIN = 0.9
 """From this likeness on, where no other is as great, it needs no check."""
@@ -31,6 +34,9 @@ _SIDES = (
     (("a", "b"), False),
 )
 """Words for 1 and 2; if that needs no check."""
+
+_GLUED = ("r", "l")
+"""Letters for 1 and 2 at the end of a word, as in gapr and gapl."""
 
 _SAME = {
     "gap": "distance dist clearance separation spacing proximity",
@@ -56,6 +62,8 @@ _SILENT = (
 _NOISE = frozenset(_SILENT.split())
 """Words that say nothing of a quantity."""
 
+_KNOWN = frozenset(_MEANING) | _NOISE
+
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[^\W\d_]+|\d+")
 _SYMBOL = re.compile(r"[^\W\d]\w{0,5}")
 
@@ -68,7 +76,7 @@ class Match:
     doubt: str
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False)
 class _Group:
     """Variables that differ by their number only; certain if it is one for sure."""
 
@@ -79,32 +87,47 @@ class _Group:
     by_text: bool = False
     """True if descriptions alone say that they belong together."""
 
-    @property
+    @cached_property
     def first(self) -> Variable:
         return next(iter(self.members.values()))
 
-    @property
+    @cached_property
     def names(self) -> set[str]:
         return {v.name for v in self.members.values()}
 
-    @property
+    @cached_property
     def meaning(self) -> frozenset[str]:
         return _meaning(self.words)
 
-    @property
+    @cached_property
     def joined(self) -> str:
         """The words written as one, as a symbol is."""
         return "".join(w for w in self.words if w not in _NOISE)
 
+    @cached_property
+    def told(self) -> frozenset[str]:
+        """What its description means."""
+        return _meaning(_words(self.first.description or ""))
+
+    @cached_property
+    def symbol(self) -> str:
+        """The symbol that begins a description, 'l_j, distance ...', without its index j."""
+        match = _SYMBOL.match((self.first.description or "").partition(",")[0])
+        found = match[0].replace("_", "").lower() if match else ""
+        return found.removesuffix("j")
+
+    @cached_property
+    def unit(self) -> Unit | None:
+        return self.interface.unit(self.first)
+
     def fits(self, other: _Group) -> bool:
         """True if the one could be the other: of one type, direction, size and quantity."""
         ours, theirs = self.first, other.first
-        units = self.interface.unit(ours), other.interface.unit(theirs)
         return (
             ours.kind == theirs.kind
             and ours.causality == theirs.causality
             and self.members.keys() == other.members.keys()
-            and (units[0] is None or units[1] is None or units[0].measures(units[1]))
+            and (self.unit is None or other.unit is None or self.unit.measures(other.unit))
         )
 
 
@@ -118,7 +141,10 @@ def matches(ours: Interface, wanted: Collection[str], theirs: Interface) -> dict
     others, result = _groups(theirs), dict[str, Match]()
     for what_is_left in (False, True):
         pairs = [(g, o) for o in others for g in left if g.fits(o)]
-        likely = [(*_likeness(g, o, pairs, what_is_left), g, o) for g, o in pairs]
+        count = Counter(group for pair in pairs for group in pair)
+        likely = [
+            (*_likeness(g, o, what_is_left and count[g] == count[o] == 1), g, o) for g, o in pairs
+        ]
         done, taken = _settle(sorted(likely, key=lambda f: -f[0]), result)
         left = [g for g in left if g not in done]
         others = [o for o in others if not o.names & taken]
@@ -164,30 +190,26 @@ def candidates(
     ]
 
 
-def _likeness(
-    group: _Group, other: _Group, pairs: Sequence[tuple[_Group, _Group]], what_is_left: bool
-) -> tuple[float, str]:
+def _likeness(group: _Group, other: _Group, alone: bool) -> tuple[float, str]:
     """How much a group of another FMU is like one of ours, from 0 to about 1, and by what.
 
-    pairs are all that there are; of what is left, it counts to be the only one, unless its name
+    alone says that nothing else that is left fits either; it counts unless the name of the other
     means another quantity.
     """
     if group.words == other.words or _plural(group.words) == _plural(other.words):
         return 1.1, ""
     if group.meaning == other.meaning:
         return 1.0, ""
-    unit = group.interface.unit(group.first), other.interface.unit(other.first)
-    if other.joined == _symbol(group.first) and None not in unit:
+    units = group.unit is not None and other.unit is not None
+    is_symbol = other.joined == group.symbol
+    if is_symbol and units:
         return 0.95, ""
     common = group.meaning & other.meaning
-    alone = what_is_left and (None not in unit or group.first.kind != "Real")
+    alone = alone and (units or group.first.kind != "Real")
     alone = alone and bool(common or not other.meaning & _SAME.keys())
-    alone = alone and sum(g is group for g, _ in pairs) == 1 == sum(o is other for _, o in pairs)
-    said = _meaning(_words(other.first.description or ""))
-    by_name = 0.7 * len(common) / len(group.meaning | other.meaning)
-    by_text = 0.3 + 0.1 * len(group.meaning) if group.meaning <= said else 0.0
-    if other.joined == _symbol(group.first):
-        by_name = 0.8
+    by_name = 0.8 if is_symbol else 0.7 * len(common) / len(group.meaning | other.meaning)
+    told = [m for m, s in ((group.meaning, other.told), (other.meaning, group.told)) if m <= s]
+    by_text = max((0.3 + 0.1 * len(meaning) for meaning in told), default=0.0)
     reasons = ["by its name", "by its description", "the only one of its unit and type"]
     values = [by_name, by_text, ALONE if alone else 0.0]
     return max(values[:2]) + values[2], reasons[values.index(max(values))]
@@ -247,6 +269,10 @@ def _numbered(variable: Variable) -> Iterator[tuple[_Pattern, int, bool]]:
                 if text in sides:
                     pattern = _Pattern(rest, match.start(), sides, not sure, nature)
                     yield pattern, 1 + sides.index(text), certain
+            if sure and len(text) > 1 and text[-1] in _GLUED:
+                glued = f"{name[: match.end() - 1]} {name[match.end() :]}"
+                pattern = _Pattern(glued, match.start(), _GLUED, False, nature)
+                yield pattern, 1 + _GLUED.index(text[-1]), False
 
 
 def _words(name: str) -> tuple[str, ...]:
@@ -256,11 +282,10 @@ def _words(name: str) -> tuple[str, ...]:
 
 def _parts(word: str) -> Iterable[str]:
     """A word that is written as one with another, taken apart where both are known."""
-    known = {**_MEANING, **dict.fromkeys(_NOISE, "")}
-    if word in known or word.rstrip("s") in known:
+    if word in _KNOWN or word.rstrip("s") in _KNOWN:
         return [word]
     splits = ((word[:i], word[i:]) for i in range(3, len(word) - 2))
-    return next((list(pair) for pair in splits if all(p in known for p in pair)), [word])
+    return next((pair for pair in splits if _KNOWN.issuperset(pair)), [word])
 
 
 def _plural(words: Iterable[str]) -> tuple[str, ...]:
@@ -272,10 +297,3 @@ def _meaning(words: Iterable[str]) -> frozenset[str]:
     plain = _plural(words)
     telling = [w for w in plain if w not in _NOISE] or plain
     return frozenset(_MEANING.get(w, w) for w in telling if not w.isdigit())
-
-
-def _symbol(variable: Variable) -> str:
-    """The symbol that begins a description, 'l_j, distance ...', without its index j."""
-    match = _SYMBOL.match((variable.description or "").partition(",")[0])
-    found = match[0].replace("_", "").lower() if match else ""
-    return found.removesuffix("j")

@@ -41,9 +41,11 @@ class Draft:
         A table of the file begins with its heading and ends with an empty line.
         """
         own = f"[components.{self.name}]"
-        chunks = (self.text if c.startswith(own) else c for c in text.split("\n\n"))
         line = re.compile(rf'^("{re.escape(self.name)}\.(.+?)") = (\S+)(.*)$', re.MULTILINE)
-        return line.sub(self._preset, "\n\n".join(chunks))
+        chunks = text.split("\n\n")
+        return "\n\n".join(
+            self.text if c.startswith(own) else line.sub(self._preset, c) for c in chunks
+        )
 
     def _preset(self, match: re.Match[str]) -> str:
         """A line of a preset in the unit of the FMU; a comment where it has no such variable."""
@@ -109,11 +111,18 @@ def _names(
             renamed.append(name)
             check = f"CHECK, found {match.doubt}; " if match.doubt else ""
             yield Row(name, quoted(match.variable.name), check + told(match.variable))
-        elif not match and name in needed:
-            renamed.append(name)
+        elif not match and (name in needed or variable.causality == "output"):
             there = [v.name for v in candidates(ours, name, theirs, own)]
             what = f"the FMU's name of {a(variable)}"
-            yield Row(name, todo(what if there else f"{what}; it has none left", there))
+            if name in needed:
+                renamed.append(name)
+                none = f"{what}; it has none left: without it, no line here and no connection"
+                yield Row(name, todo(what if there else none, there))
+            else:
+                such = f": {choices(there, FEW)}" if there else "; it has none left"
+                yield Row(
+                    "", "", f"TODO {key(name)} = {what}{such}; metrics and figures may want it"
+                )
     for name in renamed:
         if name in theirs.by_name and name not in own:
             yield Row(f"{name}{OTHER}", quoted(name), "something else than the system's")

@@ -102,8 +102,9 @@ class System(Structure):
     ) -> "System":
         """A copy with the FMU of one component replaced by another with the same variables.
 
-        Its values are converted where that has them in other units. rename and units are those of a
-        Component, and go before its own.
+        Its values are converted where that has them in other units, and left out, with a note,
+        where it has no such variable. rename and units are those of a Component, and go before its
+        own.
         """
         new = Replacement(Path(fmu), rename or {}, units or {})
         return self.revised({component: new}, {}, ("swap", "with_values"))
@@ -114,7 +115,10 @@ class System(Structure):
         values: Mapping[str, Given],
         places: tuple[str, str],
     ) -> "System":
-        """A copy with FMUs replaced, then values changed; places name the two, for messages."""
+        """A copy with FMUs replaced, then values changed; places name the two, for messages.
+
+        An FMU given by its path alone must have what the component has values for.
+        """
         components, notes = {c.name: c for c in self.components}, [*self.notes]
         given: dict[str, dict[str, Given]] = {}
         for key, value in values.items():
@@ -123,7 +127,7 @@ class System(Structure):
             given.setdefault(name, {})[variable] = value
         for name, fmu in fmus.items():
             place = f"{places[0]} {name}"
-            new = fmu if isinstance(fmu, Replacement) else Replacement(Path(fmu))
+            new = fmu if isinstance(fmu, Replacement) else Replacement(Path(fmu), exact=True)
             was, anew = self.component(name, place), given.get(name, {})
             arrays = was.interface.arrays
             parts = (arrays[key].names if key in arrays else (key,) for key in anew)

@@ -19,12 +19,14 @@ from .structure import Structure
 class Replacement:
     """An FMU for a component, with names and units of its variables as a Component has them.
 
-    They go before those that the component has already.
+    They go before those that the component has already. exact says that a value of a variable which
+    it lacks is not left out, but a mistake.
     """
 
     fmu: Path
     rename: Mapping[str, str] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
+    exact: bool = False
 
 
 def with_fmu(
@@ -38,7 +40,7 @@ def with_fmu(
     """
     now = replaced(was, new, f"{place}: ")
     before, after = was.interface, now.interface
-    given = {name: value for name, value in was.values.items() if name in after.by_name}
+    given = {n: value for n, value in was.values.items() if new.exact or n in after.by_name}
     kept = {name: value for name, value in given.items() if name not in anew}
     for name in [*kept, *sorted(stated(system, was.name))]:
         reason = _lost(before, after, name, name in kept)
