@@ -40,7 +40,7 @@ STEP = 1e-3  # s
 FORCE = "plant.contact_force[1]"
 PUSH = {"force[1]": -2.0, "force[2]": 2.0}  # N
 BINARY, PUSHED = 2.0**-9, 0.5
-"""s; a step that FMPy, which adds up, and we, who count nanoseconds, meet at the very same times."""
+"""s; a step that FMPy, which adds up, and we, who count nanoseconds, meet at the same times."""
 
 Column = npt.NDArray[np.float64]
 
