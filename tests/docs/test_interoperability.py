@@ -238,7 +238,8 @@ def test_pyssp_standard_reads(kinds: Mapping[str, Path], tmp_path: Path) -> None
 @all_slow
 def test_fmutool(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
     python = tool("test_fmutool")
-    for fmu in sorted(kinds[kind].glob("*.fmu")):
+    for name in ("GripperPlant", "ProximitySensor", "GraspController"):
+        fmu = kinds[kind] / f"{name}.fmu"
         said = call([script_of(python, "fmutool"), "-input", fmu, "-check"], tmp_path)
         fmi = 3 if kind == "native FMI 3" else 2
         assert f"This FMU seems to be compliant with FMI-{fmi}.0." in said
@@ -248,8 +249,7 @@ def test_fmutool(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
 # From them to us
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ALL)
+@pytest.mark.parametrize("kind", [slow("python"), slow("native FMI 3")])
 def test_pyssp_standard_writes(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
     python = tool("test_pyssp_standard_writes")
     path = archived(grasp_of(kinds[kind]), tmp_path)
