@@ -358,6 +358,88 @@ def test_slave_of(package: str, fmi: str, real: str, whole: str, tmp_path: Path)
     assert simulate(system)["it.n"][-1] == 100
 
 
+ARRAYS = """
+from pythonfmu3 import Dimension, Fmi3Causality as C, Fmi3Slave, Fmi3Variability as V, Float64
+import numpy as np
+class StateSpace(Fmi3Slave):
+    def __init__(self, **given):
+        super().__init__(**given)
+        self.A, self.u, self.y, self.time = np.eye(3), np.ones(3), np.zeros(3), 0.0
+        def put(name, shape):
+            return lambda v: setattr(self, name, np.array(v).reshape(shape))
+        sized = {"u": dict(dimensions=[Dimension(start="3")], setter=put("u", 3))}
+        sized["A"] = dict(dimensions=[Dimension(start="3")] * 2, setter=put("A", (3, 3)))
+        self.register_variable(Float64("time", causality=C.independent))
+        parameter = dict(causality=C.parameter, variability=V.tunable)
+        self.register_variable(Float64("A", **parameter, **sized["A"]))
+        self.register_variable(Float64("u", causality=C.input, **sized["u"]))
+        self.register_variable(Float64("y", causality=C.output, dimensions=[Dimension(start="3")]))
+    def do_step(self, now, step):
+        self.y = self.y + step * (self.A @ self.y + self.u)
+        return True
+"""
+
+
+@pytest.mark.slow
+def test_arrays_of_pythonfmu3(tmp_path: Path) -> None:
+    name = "test_arrays_of_pythonfmu3"
+    python = tool(name, "numpy")
+    (tmp_path / "pythonfmu3_arrays.py").write_text(ARRAYS, "utf-8")
+    call([script_of(python, "pythonfmu3"), "build", "-f", "pythonfmu3_arrays.py"], tmp_path)
+    u, a = [1.0, 0.5, 0.25], [-1.0, 0.5, 0.0, 0.0, -2.0, 0.0, 0.0, 0.0, -1.5]
+    system = alone("StateSpace.fmu", tmp_path, f"{{ u = {u}, A = {a} }}", "process")
+    x, expected = np.zeros(3), [0.0]
+    for _ in range(100):
+        x = x + 0.01 * (np.reshape(a, (3, 3)) @ x + np.array(u))
+        expected.append(float(x[0]))
+    kept(name, force(system, "it.y[1]"), np.array(expected))
+
+
+BALL = """
+from pythonfmu3 import Fmi3Causality as C, Fmi3Initial as I, Fmi3SlaveBase
+from pythonfmu3 import Fmi3UpdateDiscreteStatesResult, Fmi3Variability as V, Float64, ModelExchange
+class Ball(Fmi3SlaveBase, ModelExchange):
+    def __init__(self, **given):
+        super().__init__(**given)
+        self.time, self.h, self.v = 0.0, 1.0, 0.0
+        varies = dict(variability=V.continuous)
+        local = dict(causality=C.local, **varies)
+        state = dict(causality=C.output, initial=I.exact, **varies)
+        self.register_variable(Float64("time", causality=C.independent, **varies))
+        self.register_variable(Float64("h", **state))
+        self.register_variable(Float64("der_h", derivative=1, getter=lambda: self.v, **local))
+        self.register_variable(Float64("v", **state))
+        self.register_variable(Float64("der_v", derivative=3, getter=lambda: -9.81, **local))
+        height = Float64("z", getter=lambda: self.h, **local)
+        self.register_variable(height, has_event_indicator=True)
+    def get_continuous_state_derivatives(self):
+        return [self.v, -9.81]
+    def get_event_indicators(self):
+        return [self.h]
+    def update_discrete_states(self):
+        result = Fmi3UpdateDiscreteStatesResult()
+        if self.h <= 0.0 and self.v < 0.0:
+            self.h, self.v = 1e-300, -0.7 * self.v
+            result.valuesOfContinuousStatesChanged = True
+        return result
+"""
+
+
+@pytest.mark.slow
+def test_model_exchange_of_pythonfmu3(tmp_path: Path) -> None:
+    """A ball of 1 m, and its first bounce, against the solution in closed form."""
+    name = "test_model_exchange_of_pythonfmu3"
+    python = tool(name)
+    (tmp_path / "pythonfmu3_ball.py").write_text(BALL, "utf-8")
+    call([script_of(python, "pythonfmu3"), "build", "-f", "pythonfmu3_ball.py"], tmp_path)
+    system = alone("Ball.fmu", tmp_path, "{}", "process")
+    g, t = 9.81, np.arange(101) * 0.01
+    first = (2.0 / g) ** 0.5
+    later = t - first
+    after = 0.7 * g * first * later - g * later**2 / 2.0
+    kept(name, force(system, "it.h"), np.where(later < 0.0, 1.0 - g * t**2 / 2.0, after))
+
+
 @pytest.mark.slow
 def test_unifmu(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its example, an adder of all types in Python, which it runs in a process behind a socket."""
