@@ -27,6 +27,7 @@ from support.foreign_tools import (
     COSIM,
     ECOS,
     PYSSP_STANDARD,
+    PYSSP_STANDARD_MAKES,
     call,
     python_with,
     run_in,
@@ -134,6 +135,14 @@ def asked_of(system: System, **more: object) -> dict[str, object]:
     return {"step": STEP, "steps": steps, "signals": [FORCE], **more}
 
 
+def parts_of(system: System) -> dict[str, object]:
+    ends = [(c.source, c.target) for c in system.connections]
+    return {
+        "fmus": {c.name: str(c.fmu) for c in system.components},
+        "connections": [(*str(s).split(".", 1), *str(t).split(".", 1)) for s, t in ends],
+    }
+
+
 def found(python: str, program: str, folder: Path, given: dict[str, object]) -> Column:
     return np.array(run_in(python, program, folder, given))[:, 0]
 
@@ -168,12 +177,7 @@ def test_cofmupy(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
         c.name: {t.variable: float(start[str(s)][0]) for s, t in ends if t.component == c.name}
         for c in system.components
     }
-    given = asked_of(
-        system,
-        fmus={c.name: str(c.fmu) for c in system.components},
-        connections=[(*str(s).split(".", 1), *str(t).split(".", 1)) for s, t in ends],
-        inputs=inputs,
-    )
+    given = asked_of(system, inputs=inputs, **parts_of(system))
     kept("test_cofmupy", found(python, COFMUPY, tmp_path, given), force(system)[1:])
 
 
@@ -257,6 +261,16 @@ def test_pyssp_standard_writes(kinds: Mapping[str, Path], kind: str, tmp_path: P
     run_in(python, PYSSP_STANDARD, tmp_path, {"ssp": str(path)})
     assert path.read_bytes() != before
     kept("test_pyssp_standard_writes", force(System.load(path)), force(grasp_of(kinds[kind])))
+
+
+@pytest.mark.parametrize("kind", [slow("python"), slow("native FMI 3")])
+def test_pyssp_standard_makes(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
+    python = tool("test_pyssp_standard_makes")
+    system, path = grasp_of(kinds[kind]), tmp_path / "grasp.ssp"
+    given = {"ssp": str(path), "stop": 2.5, **parts_of(system)}
+    run_in(python, PYSSP_STANDARD_MAKES, tmp_path, given)
+    theirs = System.load(path).with_experiment(STEP, scheme="jacobi")  # SSP names neither
+    kept("test_pyssp_standard_makes", force(theirs), force(system))
 
 
 SIDE = ("position", "velocity", "contact_force", "gap")
