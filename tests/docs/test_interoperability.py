@@ -6,7 +6,6 @@ import os
 import re
 import shutil
 import sysconfig
-import zipfile
 from collections.abc import Mapping
 from ctypes.util import find_library
 from pathlib import Path
@@ -21,12 +20,13 @@ from fmpy.validation import validate_fmu
 from grasp_cosim import System, cli, simulate
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.ssp.write import write_ssp
-from support.foreign_fmus import deviation_from_fmpy
+from support.foreign_fmus import deviations_from_fmpy
 from support.foreign_tools import (
     COFMUPY,
     COSIM,
     ECOS,
     PYSSP_STANDARD,
+    PYSSP_STANDARD_MAKES,
     call,
     python_with,
     run_in,
@@ -40,7 +40,7 @@ STEP = 1e-3  # s
 FORCE = "plant.contact_force[1]"
 PUSH = {"force[1]": -2.0, "force[2]": 2.0}  # N
 BINARY, PUSHED = 2.0**-9, 0.5
-"""s; a step that FMPy, which adds up, and we, who count nanoseconds, meet at the very same times."""
+"""s; a step that FMPy, which adds up, and we, who count nanoseconds, meet at the same times."""
 
 Column = npt.NDArray[np.float64]
 
@@ -59,7 +59,7 @@ class Row(NamedTuple):
 ROWS = [
     Row(*(cell.strip() for cell in line.strip("|").split("|")))
     for line in PAGE.splitlines()
-    if line.count("|") == len(Row._fields) + 1 and ("test_" in line or "--" in line)
+    if line.count("|") == len(Row._fields) + 1 and "test_" in line
 ]
 
 
@@ -77,7 +77,7 @@ def tool(name: str, *needed: str) -> str:
 def kept(name: str, theirs: Column, ours: Column) -> None:
     """The last value is the page's, and no sample is farther from ours than it says."""
     assert theirs.shape == ours.shape
-    assert f"{theirs[-1]:.4f}" == row(name).value
+    assert f"{theirs[-1]:.4f}" in row(name).value.split()
     assert abs(theirs - ours).max() <= float(row(name).deviation.split()[0])
 
 
@@ -102,7 +102,6 @@ def kinds(folder_of: Folder, made_once: MadeOnce) -> Mapping[str, Path]:
 ALL = ("python", "bound", "native", "native FMI 3")
 all_slow = pytest.mark.parametrize("kind", [slow(kind) for kind in ALL])
 of_fmi_2 = pytest.mark.parametrize("kind", [slow(kind) for kind in ALL[:3]])
-natives = pytest.mark.parametrize("kind", [slow(kind) for kind in ALL[2:]])
 
 
 def grasp_of(folder: Path) -> System:
@@ -134,6 +133,14 @@ def asked_of(system: System, **more: object) -> dict[str, object]:
     return {"step": STEP, "steps": steps, "signals": [FORCE], **more}
 
 
+def parts_of(system: System) -> dict[str, object]:
+    ends = [(c.source, c.target) for c in system.connections]
+    return {
+        "fmus": {c.name: str(c.fmu) for c in system.components},
+        "connections": [(*str(s).split(".", 1), *str(t).split(".", 1)) for s, t in ends],
+    }
+
+
 def found(python: str, program: str, folder: Path, given: dict[str, object]) -> Column:
     return np.array(run_in(python, program, folder, given))[:, 0]
 
@@ -158,6 +165,16 @@ def test_libcosimpy(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> Non
     kept("test_libcosimpy", found(python, COSIM, tmp_path, given), force(system)[1:])
 
 
+@pytest.mark.slow
+def test_libcosimpy_knows_no_fmi_3(kinds: Mapping[str, Path], tmp_path: Path) -> None:
+    """Where it does, the page has one kind more to tell of."""
+    python = tool("test_libcosimpy")
+    system = grasp_of(kinds["native FMI 3"])
+    given = asked_of(system, ssp=str(archived(system, tmp_path)))
+    with pytest.raises(AssertionError, match=r"(?i)fmi"):
+        run_in(python, COSIM, tmp_path, given)
+
+
 @all_slow
 def test_cofmupy(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
     python = tool("test_cofmupy")
@@ -168,12 +185,7 @@ def test_cofmupy(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
         c.name: {t.variable: float(start[str(s)][0]) for s, t in ends if t.component == c.name}
         for c in system.components
     }
-    given = asked_of(
-        system,
-        fmus={c.name: str(c.fmu) for c in system.components},
-        connections=[(*str(s).split(".", 1), *str(t).split(".", 1)) for s, t in ends],
-        inputs=inputs,
-    )
+    given = asked_of(system, inputs=inputs, **parts_of(system))
     kept("test_cofmupy", found(python, COFMUPY, tmp_path, given), force(system)[1:])
 
 
@@ -206,24 +218,6 @@ def test_fmpy_finds_no_problem(kinds: Mapping[str, Path], kind: str) -> None:
     assert [validate_fmu(fmu) for fmu in shipped] == [[]] * len(shipped)
 
 
-@natives
-@pytest.mark.skipif(not shutil.which("cmake"), reason="NO cmake")
-def test_fmpy_compiles_our_sources(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
-    """Ours has no binary any more when FMPy compiles its sources."""
-    python = tool("test_fmpy_compiles_our_sources")
-    with (
-        zipfile.ZipFile(kinds[kind] / "GripperPlant.fmu") as ours,
-        zipfile.ZipFile(tmp_path / "GripperPlant.fmu", "w") as bare,
-    ):
-        for name in ours.namelist():
-            if not name.startswith("binaries/"):
-                bare.writestr(name, ours.read(name))
-    call([python, "-m", "fmpy", "compile", "GripperPlant.fmu"], tmp_path)
-    system = grasp_of(kinds[kind])
-    theirs = force(system.swap("plant", tmp_path / "GripperPlant.fmu"))
-    kept("test_fmpy_compiles_our_sources", theirs, force(system))
-
-
 @pytest.mark.slow
 def test_pyssp_standard_reads(kinds: Mapping[str, Path], tmp_path: Path) -> None:
     python = tool("test_pyssp_standard_reads")
@@ -238,7 +232,8 @@ def test_pyssp_standard_reads(kinds: Mapping[str, Path], tmp_path: Path) -> None
 @all_slow
 def test_fmutool(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
     python = tool("test_fmutool")
-    for fmu in sorted(kinds[kind].glob("*.fmu")):
+    for name in ("GripperPlant", "ProximitySensor", "GraspController"):
+        fmu = kinds[kind] / f"{name}.fmu"
         said = call([script_of(python, "fmutool"), "-input", fmu, "-check"], tmp_path)
         fmi = 3 if kind == "native FMI 3" else 2
         assert f"This FMU seems to be compliant with FMI-{fmi}.0." in said
@@ -248,8 +243,7 @@ def test_fmutool(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
 # From them to us
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ALL)
+@pytest.mark.parametrize("kind", [slow("python"), slow("native FMI 3")])
 def test_pyssp_standard_writes(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
     python = tool("test_pyssp_standard_writes")
     path = archived(grasp_of(kinds[kind]), tmp_path)
@@ -257,6 +251,16 @@ def test_pyssp_standard_writes(kinds: Mapping[str, Path], kind: str, tmp_path: P
     run_in(python, PYSSP_STANDARD, tmp_path, {"ssp": str(path)})
     assert path.read_bytes() != before
     kept("test_pyssp_standard_writes", force(System.load(path)), force(grasp_of(kinds[kind])))
+
+
+@pytest.mark.parametrize("kind", [slow("python"), slow("native FMI 3")])
+def test_pyssp_standard_makes(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
+    python = tool("test_pyssp_standard_makes")
+    system, path = grasp_of(kinds[kind]), tmp_path / "grasp.ssp"
+    given = {"ssp": str(path), "stop": 2.5, **parts_of(system)}
+    run_in(python, PYSSP_STANDARD_MAKES, tmp_path, given)
+    theirs = System.load(path).with_experiment(STEP, scheme="jacobi")  # SSP names neither
+    kept("test_pyssp_standard_makes", force(theirs), force(system))
 
 
 SIDE = ("position", "velocity", "contact_force", "gap")
@@ -358,6 +362,88 @@ def test_slave_of(package: str, fmi: str, real: str, whole: str, tmp_path: Path)
     assert simulate(system)["it.n"][-1] == 100
 
 
+ARRAYS = """
+from pythonfmu3 import Dimension, Fmi3Causality as C, Fmi3Slave, Fmi3Variability as V, Float64
+import numpy as np
+class StateSpace(Fmi3Slave):
+    def __init__(self, **given):
+        super().__init__(**given)
+        self.A, self.u, self.y, self.time = np.eye(3), np.ones(3), np.zeros(3), 0.0
+        def put(name, shape):
+            return lambda v: setattr(self, name, np.array(v).reshape(shape))
+        sized = {"u": dict(dimensions=[Dimension(start="3")], setter=put("u", 3))}
+        sized["A"] = dict(dimensions=[Dimension(start="3")] * 2, setter=put("A", (3, 3)))
+        self.register_variable(Float64("time", causality=C.independent))
+        parameter = dict(causality=C.parameter, variability=V.tunable)
+        self.register_variable(Float64("A", **parameter, **sized["A"]))
+        self.register_variable(Float64("u", causality=C.input, **sized["u"]))
+        self.register_variable(Float64("y", causality=C.output, dimensions=[Dimension(start="3")]))
+    def do_step(self, now, step):
+        self.y = self.y + step * (self.A @ self.y + self.u)
+        return True
+"""
+
+
+@pytest.mark.slow
+def test_arrays_of_pythonfmu3(tmp_path: Path) -> None:
+    name = "test_arrays_of_pythonfmu3"
+    python = tool(name, "numpy")
+    (tmp_path / "pythonfmu3_arrays.py").write_text(ARRAYS, "utf-8")
+    call([script_of(python, "pythonfmu3"), "build", "-f", "pythonfmu3_arrays.py"], tmp_path)
+    u, a = [1.0, 0.5, 0.25], [-1.0, 0.5, 0.0, 0.0, -2.0, 0.0, 0.0, 0.0, -1.5]
+    system = alone("StateSpace.fmu", tmp_path, f"{{ u = {u}, A = {a} }}", "process")
+    x, expected = np.zeros(3), [0.0]
+    for _ in range(100):
+        x = x + 0.01 * (np.reshape(a, (3, 3)) @ x + np.array(u))
+        expected.append(float(x[0]))
+    kept(name, force(system, "it.y[1]"), np.array(expected))
+
+
+BALL = """
+from pythonfmu3 import Fmi3Causality as C, Fmi3Initial as I, Fmi3SlaveBase
+from pythonfmu3 import Fmi3UpdateDiscreteStatesResult, Fmi3Variability as V, Float64, ModelExchange
+class Ball(Fmi3SlaveBase, ModelExchange):
+    def __init__(self, **given):
+        super().__init__(**given)
+        self.time, self.h, self.v = 0.0, 1.0, 0.0
+        varies = dict(variability=V.continuous)
+        local = dict(causality=C.local, **varies)
+        state = dict(causality=C.output, initial=I.exact, **varies)
+        self.register_variable(Float64("time", causality=C.independent, **varies))
+        self.register_variable(Float64("h", **state))
+        self.register_variable(Float64("der_h", derivative=1, getter=lambda: self.v, **local))
+        self.register_variable(Float64("v", **state))
+        self.register_variable(Float64("der_v", derivative=3, getter=lambda: -9.81, **local))
+        height = Float64("z", getter=lambda: self.h, **local)
+        self.register_variable(height, has_event_indicator=True)
+    def get_continuous_state_derivatives(self):
+        return [self.v, -9.81]
+    def get_event_indicators(self):
+        return [self.h]
+    def update_discrete_states(self):
+        result = Fmi3UpdateDiscreteStatesResult()
+        if self.h <= 0.0 and self.v < 0.0:
+            self.h, self.v = 1e-300, -0.7 * self.v
+            result.valuesOfContinuousStatesChanged = True
+        return result
+"""
+
+
+@pytest.mark.slow
+def test_model_exchange_of_pythonfmu3(tmp_path: Path) -> None:
+    """A ball of 1 m, and its first bounce, against the solution in closed form."""
+    name = "test_model_exchange_of_pythonfmu3"
+    python = tool(name)
+    (tmp_path / "pythonfmu3_ball.py").write_text(BALL, "utf-8")
+    call([script_of(python, "pythonfmu3"), "build", "-f", "pythonfmu3_ball.py"], tmp_path)
+    system = alone("Ball.fmu", tmp_path, "{}", "process")
+    g, t = 9.81, np.arange(101) * 0.01
+    first = (2.0 / g) ** 0.5
+    later = t - first
+    after = 0.7 * g * first * later - g * later**2 / 2.0
+    kept(name, force(system, "it.h"), np.where(later < 0.0, 1.0 - g * t**2 / 2.0, after))
+
+
 @pytest.mark.slow
 def test_unifmu(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its example, an adder of all types in Python, which it runs in a process behind a socket."""
@@ -377,16 +463,18 @@ def test_unifmu(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert (result["it.integer_c"][-1], result["it.string_c"][-1]) == (5, "xy")
 
 
-@pytest.mark.slow
-def test_fmus_from_elsewhere() -> None:
+@pytest.mark.parametrize("interface", [slow("CoSimulation"), slow("ModelExchange")])
+def test_fmus_from_elsewhere(interface: str) -> None:
     """All FMUs below the folder GRASP_COSIM_FMUS that FMPy runs: the same values in our master."""
     folder = os.environ.get("GRASP_COSIM_FMUS")
     if not folder:
         pytest.skip("GRASP_COSIM_FMUS names no folder of FMUs")
-    found = [deviation_from_fmpy(path) for path in sorted(Path(folder).rglob("*.fmu"))]
-    ran = [deviation for deviation in found if deviation is not None]
-    assert ran, found
-    assert max(ran) <= float(row("test_fmus_from_elsewhere").deviation.split()[0])
+    found = [deviations_from_fmpy(path) for path in sorted(Path(folder).rglob("*.fmu"))]
+    ran = [deviations[interface] for deviations in found if interface in deviations]
+    if not ran:
+        pytest.skip(f"below GRASP_COSIM_FMUS there is none for {interface}")
+    name = f"test_fmus_from_elsewhere[{interface}]"
+    assert max(ran) <= float(row(name).deviation.split()[0])
 
 
 # The page itself

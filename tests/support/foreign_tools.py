@@ -79,6 +79,30 @@ with SSP(given["ssp"]) as archive, archive.system_structure as system:
 """
 """It writes the file that it has opened."""
 
+PYSSP_STANDARD_MAKES = """
+from pathlib import Path
+from pyssp_standard import SSP
+from pyssp_standard.ssd import Component, Connection, Connector, DefaultExperiment, System
+with SSP(Path(given["ssp"]), mode="w") as archive:
+    for fmu in given["fmus"].values():
+        archive.add_resource(Path(fmu), overwrite=True)
+    with archive.system_structure as ssd:
+        ssd.name, ssd.version, ssd.system = "grasp", "1.0", System(name="grasp")
+        ssd.default_experiment = DefaultExperiment()
+        ssd.default_experiment.start_time, ssd.default_experiment.stop_time = 0.0, given["stop"]
+        for name, fmu in given["fmus"].items():
+            component = Component()
+            component.name, component.source = name, "resources/" + Path(fmu).name
+            component.component_type = "application/x-fmu-sharedlibrary"
+            ends = {(e[1], "output") for e in given["connections"] if e[0] == name}
+            ends |= {(e[3], "input") for e in given["connections"] if e[2] == name}
+            component.connectors = [Connector(name=n, kind=k) for n, k in sorted(ends)]
+            ssd.system.elements.append(component)
+        for a, b, c, d in given["connections"]:
+            ends = dict(start_element=a, start_connector=b, end_element=c, end_connector=d)
+            ssd.add_connection(Connection(**ends))
+"""
+
 _FRAME = """
 import json, sys
 given, found = json.load(open(sys.argv[1])), []
