@@ -1,4 +1,4 @@
-"""The playground under a hand: sliders, choices, grasps of the documentation, keys, address, size."""
+"""The playground under a hand: sliders, choices, grasps to choose, keys, address, size."""
 
 import json
 from pathlib import Path
@@ -199,7 +199,8 @@ def test_the_address_keeps_all_and_mistakes_in_it_are_said(html: str, tmp_path: 
       const seen = [location.hash, cursor, view.from, view.to, find("left").value, command()];
       await new Promise((done) => setTimeout(done, 500));
       seen.push(location.hash);
-      location.hash = "plant=glass&case=7&step=x&sensor_1.gain=&sensor_3.gain=1&sensor_2.gain=0.002";
+      location.hash = "plant=glass&case=7&step=x&sensor_1.gain=&sensor_3.gain=1"
+        + "&sensor_2.gain=0.002";
       await settle();
       seen.push(find("message").textContent, command());
       return seen;
