@@ -92,7 +92,7 @@ function read(address) { // settings from an address; a line for each part that 
 function parsed(text, type) { // the value of a parameter, undefined where the text is none
   if (type === BOOLEAN) return { true: true, false: false, 1: true, 0: false }[text.trim()];
   const value = Number(text);
-  return text.trim() && Number.isFinite(value) && (type === REAL || Number.isInteger(value))
+  return text.trim() && Number.isFinite(value) && (type === REAL || value === (value | 0))
     ? value : undefined;
 }
 
