@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim import cli
+from grasp_cosim.errors import InputError
+from grasp_cosim.grasp.play import wasm
 from grasp_cosim.grasp.play.page import playground_html
 from grasp_cosim.grasp.play.system import PLANTS, page_system, shipped
-from grasp_cosim.grasp.play.wasm import hash_at_hand, made, made_from
 from support.compilers import needs_zig
 
 DOCS = Path(__file__).parents[3] / "docs"
@@ -29,9 +30,8 @@ def test_the_page_in_docs_is_the_one_that_the_command_writes(
 def test_it_is_one_small_file_that_asks_for_no_other() -> None:
     html = playground_html()
     assert len(html) < 250_000
-    assert not re.search(
-        r"""https?:|\b(src|href)=["'](?!data:)|\bfetch\(|@import|url\((?!#)""", html
-    )
+    asking = r"""https?:|\b(src|href)=["'](?!data:)|\bfetch\(|@import|url\((?!#)"""
+    assert not re.search(asking, html)
 
 
 def test_a_place_that_cannot_be_written_to(
@@ -45,14 +45,22 @@ def test_a_place_that_cannot_be_written_to(
 @pytest.mark.slow
 def test_the_wasm_is_made_from_the_sources_at_hand() -> None:
     """It says which it is of, so that this needs no zig. Else: make playground."""
-    assert made_from(zlib.decompress(shipped())) == hash_at_hand()
+    assert wasm.made_from(zlib.decompress(shipped())) == wasm.hash_at_hand()
 
 
 @pytest.mark.slow
 @needs_zig
-def test_zig_makes_the_same_wasm_again() -> None:
+def test_zig_makes_the_same_wasm_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Bit for bit, of the sources at hand."""
-    assert made() == zlib.decompress(shipped())
+    monkeypatch.setattr(wasm, "WASM", tmp_path / "play.wasm.z")
+    wasm.main()
+    assert zlib.decompress((tmp_path / "play.wasm.z").read_bytes()) == zlib.decompress(shipped())
+
+
+def test_another_zig_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(wasm, "version", lambda _: "0.13.0")
+    with pytest.raises(InputError, match=r"^ziglang: 0\.13\.0; must be 0\.17\.1, .* pip install"):
+        wasm.made()
 
 
 def test_each_control_is_of_a_variable_and_begins_within_its_ends() -> None:

@@ -1,4 +1,4 @@
-"""The playground under a hand: sliders, choices, grasps of the documentation, keys, address, size."""
+"""The playground under a hand: sliders, choices, grasps to choose, keys, address, size."""
 
 import json
 from pathlib import Path
@@ -139,18 +139,21 @@ def test_choices_and_switches(html: str, tmp_path: Path) -> None:
 def test_each_grasp_of_the_documentation_can_be_chosen(html: str, tmp_path: Path) -> None:
     """From the list, and one after the other; it is there again from its address."""
     body = """
-      const seen = [];
+      const chosen = [], seen = [];
       for (let i = 0; i < system.presets.length; i++) {
-        await move("preset", i, "change");
-        const [about, now, metrics] = [find("about").textContent, address(), state.metrics];
-        location.hash = "case=0&at=0";
-        await settle();
-        location.hash = `${now}&at=0`;
+        find("preset").value = i;
+        find("preset").dispatchEvent(new Event("change"));
+        play(false);
+        chosen.push([find("about").textContent, address(), state.metrics]);
+      }
+      for (const [about, there, metrics] of chosen) {
+        location.hash = `${there}&at=0`;
         await settle();
         seen.push([about, find("message").textContent, find("preset").value,
           state.metrics === metrics]);
       }
       await click(find("next"));
+      play(false);
       seen.push(find("preset").value);
       await click(find("previous"));
       seen.push(find("preset").value);
@@ -199,7 +202,8 @@ def test_the_address_keeps_all_and_mistakes_in_it_are_said(html: str, tmp_path: 
       const seen = [location.hash, cursor, view.from, view.to, find("left").value, command()];
       await new Promise((done) => setTimeout(done, 500));
       seen.push(location.hash);
-      location.hash = "plant=glass&case=7&step=x&sensor_1.gain=&sensor_3.gain=1&sensor_2.gain=0.002";
+      location.hash = "plant=glass&case=7&step=x&sensor_1.gain=&sensor_3.gain=1"
+        + "&sensor_2.gain=0.002";
       await settle();
       seen.push(find("message").textContent, command());
       return seen;

@@ -30,7 +30,7 @@ return seen;
 def visited(addresses: Sequence[str], folder: Path) -> list[dict[str, Any]]:
     """What the page shows at these addresses."""
     found: list[dict[str, Any]] = in_browser(
-        playground_html(), VISIT % json.dumps(addresses), folder
+        playground_html(), VISIT % json.dumps(addresses), folder, "at=0"
     )
     assert len(found) == len(addresses)
     return found

@@ -39,18 +39,14 @@ def playground_html() -> str:
         "scene": _scene(),
         "marks": [],
     }  # fmt: skip
-    scripts = [
-        traces_script(),
-        scene_script(),
-        *(map(_text, ("model.js", "metrics.js", "play.js"))),
-    ]
+    own = (_text(f"{name}.js") for name in ("model", "metrics", "play"))
     return Template(_text("play.html")).substitute(
         style=page_style() + scene_style() + _text("play.css"),
         version=escape(version("grasp-cosim")),
         size=len(zlib.decompress(wasm)) // 1000,
         page=json.dumps(state, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c"),
         wasm=base64.b64encode(wasm).decode("ascii"),
-        script="\n".join(scripts),
+        script="\n".join([traces_script(), scene_script(), *own]),
     )
 
 

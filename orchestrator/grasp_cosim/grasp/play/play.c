@@ -158,10 +158,11 @@ int play_component(int kind)
 int play_set(int component, int type, fmi2ValueReference vr, double value)
 {
     const Component *c = &components[component];
-    fmi2Integer whole = (fmi2Integer)value;
+    fmi2Integer whole;
     if (type == REAL) {
         return c->kind->set_real(c->instance, &vr, 1, &value) <= fmi2Warning;
     }
+    whole = (fmi2Integer)value;
     return (type == BOOLEAN ? c->kind->set_boolean : c->kind->set_integer)(c->instance, &vr, 1,
                                                                            &whole) <= fmi2Warning;
 }

@@ -52,7 +52,7 @@ _UNSEEN = re.compile(rb"/\*.*?\*/|\s+", re.DOTALL)
 
 def sources() -> dict[str, bytes]:
     """Return all files of C by name, those of each FMU in a folder of its name."""
-    found = {"play.c": WASM.with_name("play.c").read_bytes()}
+    found = {"play.c": Path(__file__).with_name("play.c").read_bytes()}
     for name in MODELS:
         translation = translated(name, model(name).block)
         of_fmu = native_sources(name, translation, CONTENT, GUID, 2)
@@ -110,8 +110,12 @@ def made() -> bytes:
 
 def main() -> None:
     """Write play.wasm.z anew where it is not of the sources at hand."""
-    if not WASM.is_file() or made_from(zlib.decompress(shipped())) != hash_at_hand():
+    if WASM.is_file() and made_from(zlib.decompress(shipped())) == hash_at_hand():
+        return
+    try:
         write_file(WASM, zlib.compress(made(), 9))
+    except InputError as error:
+        sys.exit(str(error))
 
 
 if __name__ == "__main__":

@@ -29,8 +29,9 @@ function ticks(low, high, wanted) {
   return marks;
 }
 
-function text(value) {
+function text(value, decimals) { // as many as it needs where none are asked for
   if (!Number.isFinite(value)) return String(value);
+  if (decimals >= 0) return (Number(value.toFixed(decimals)) || 0).toFixed(decimals).replace("-", "−");
   const size = Math.abs(value), short = size !== 0 && (size < 1e-3 || size >= 1e6);
   const digits = short ? value.toExponential(3) : value.toFixed(size < 10 ? 4 : size < 1000 ? 3 : 1);
   return digits.replace(/^-/, "−");
@@ -51,7 +52,7 @@ function fitted(canvas) { // the context of a canvas, cleared, in CSS pixels
 class Panel {
   constructor(recording, title, series, parent) {
     this.recording = recording;
-    this.series = series; // each with values, levels, style: {color, dash}, and scale if it is fixed
+    this.series = series; // each with values, levels, style: {color, dash}, and, if it is fixed, scale
     this.root = document.createElement("section");
     this.root.className = "panel";
     this.root.innerHTML = "<header><h3></h3><ul></ul></header><canvas></canvas>";
@@ -125,7 +126,7 @@ class Panel {
     this.series.forEach((one, i) => {
       const value = valueAt(time, one, t);
       this.readings[i].textContent = one.texts ? one.texts[value]
-        : one.steps ? `${value}` : `${text(value * factor)} ${unit}`;
+        : one.steps ? `${value}` : `${text(value * factor, one.scale?.decimals)} ${unit}`;
     });
   }
 

@@ -5,7 +5,7 @@ const page = JSON.parse(document.getElementById("page").textContent);
 const state = document.documentElement.dataset;
 const find = (id) => document.getElementById(id);
 
-let view = null, cursor = 0, hover = null, panels = [], scene = null, due = false;
+let view = null, cursor = 0, hover = null, panels = [], scene = null, due = 0;
 
 const clamp = (v, low, high) => Math.min(Math.max(v, low), high);
 const whole = () => ({ from: recording.first, to: Math.max(recording.last, recording.first + 1e-9) });
@@ -23,13 +23,13 @@ function seek(t) {
   redraw();
 }
 
-function redraw() {
-  if (!due) requestAnimationFrame(draw);
-  due = true;
+function redraw() { // once, in the next frame
+  due ||= requestAnimationFrame(draw);
 }
 
 function draw() {
-  due = false;
+  cancelAnimationFrame(due);
+  due = 0;
   for (const panel of panels) panel.draw(view, page.marks, cursor, hover);
   overview();
   find("span").textContent = `${clock(view.from)} to ${clock(view.to)}`;

@@ -51,7 +51,7 @@ function firstContact(run, j, outputs) {
 
 function impulse(after, force) {
   if (!(after[1] <= IMPACT) || after[after.length - 1] < IMPACT) return null;
-  const inner = [...after].filter((t) => t > 0 && t < IMPACT), times = [0, ...inner, IMPACT];
+  const inner = after.filter((t) => t > 0 && t < IMPACT), times = [0, ...inner, IMPACT];
   const at = times.map((t) => interpolated(t, after, force));
   let sum = 0;
   for (let i = 1; i < times.length; i++) sum += (times[i] - times[i - 1]) * (at[i] + at[i - 1]) / 2;

@@ -7,6 +7,7 @@ class Simulation {
   constructor(system, exports) {
     this.system = system;
     this.wasm = exports;
+    this.known = new Map(); // parameters, by components
     exports._initialize();
   }
 
@@ -31,9 +32,12 @@ class Simulation {
     return { component, type, vr, causality, unit, start, text };
   }
 
-  // Every parameter that can be set, by name.
+  // Every parameter that can be set, by name; of the same components the same map.
   parameters(components) {
+    const key = Object.values(components).join();
+    if (this.known.has(key)) return this.known.get(key);
     const found = new Map();
+    this.known.set(key, found);
     for (const [component, model] of Object.entries(components)) {
       for (const [name, type, causality, unit, start, text] of this.system.models[model]) {
         if (causality === "parameter" && type !== null) {
@@ -84,7 +88,8 @@ class Simulation {
     const start = wasm.play_columns(), { buffer } = wasm.memory;
     const signal = (name) => new Float64Array(
       buffer, start + 8 * columns.get(name) * (steps + 1), rows);
-    const time = Float64Array.from({ length: rows }, (_, k) => k * stepNs / 1e9);
+    const time = new Float64Array(rows);
+    for (let k = 0; k < rows; k++) time[k] = k * stepNs / 1e9;
     return {
       time, signal, error: rows <= steps ? this.text : "", has: (name) => columns.has(name),
       of: (name, finger) => signal(`${name}[${finger}]`),

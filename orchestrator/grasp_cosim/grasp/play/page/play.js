@@ -9,7 +9,7 @@ const MOST = 200000; // steps of a run
 const VIEW = ["at", "t"]; // of the address, what is no setting
 
 const recording = { time: new Float64Array(1), first: 0, last: 0 };
-let simulation = null, settings = null, latest = "", asked = false;
+let simulation = null, settings = null, latest = "", named = null, asked = false;
 
 const digits = (value) => Number(value.toPrecision(12)); // so that 30 mm is 0.03 m to the bit
 const plural = (n) => n.toLocaleString("en");
@@ -92,7 +92,7 @@ function read(address) { // settings from an address; a line for each part that 
 function parsed(text, type) { // the value of a parameter, undefined where the text is none
   if (type === BOOLEAN) return { true: true, false: false, 1: true, 0: false }[text.trim()];
   const value = Number(text);
-  return text.trim() && Number.isFinite(value) && (type === REAL || Number.isInteger(value))
+  return text.trim() && Number.isFinite(value) && (type === REAL || value === (value | 0))
     ? value : undefined;
 }
 
@@ -158,6 +158,7 @@ function simulate() {
   controls();
   find("took").textContent = rows < 2 ? "" : `· ${plural(rows - 1)} steps of `
     + `${digits(1e3 * settings.step)} ms, simulated in ${simulated.toFixed(0)} ms`;
+  draw();
   state.took = performance.now() - began;
 }
 
@@ -201,19 +202,19 @@ function drawn(name, values) { // a signal of the hand: of its extremes the hand
 }
 
 // Traces --------------------------------------------------------------------------------------
-const MILLI = (unit) => ({ factor: 1e3, unit: `m${unit}` });
+const SCALE = (factor, unit) => ({ factor, unit, decimals: 3 });
 const TRACES = [
-  { title: "gap", scale: MILLI("m"), of: (run) => fingers((j) => run.of("plant.gap", j)) },
-  { title: "contact force", scale: { factor: 1, unit: "N" },
+  { title: "gap", scale: SCALE(1e3, "mm"), of: (run) => fingers((j) => run.of("plant.gap", j)) },
+  { title: "contact force", scale: SCALE(1, "N"),
     of: (run) => fingers((j) => run.of("plant.contact_force", j).map(Math.abs)) },
-  { title: "target", scale: MILLI("m"), of: (run) => [
+  { title: "target", scale: SCALE(1e3, "mm"), of: (run) => [
     { name: "target of the controller", values: run.signal("controller.target_position"),
       style: { color: "--ink", dash: 0 } },
     { name: "middle of the object", values: run.signal("plant.object_position"),
       style: { color: "--muted", dash: 2 } }] },
-  { title: "closing speed", scale: MILLI("m/s"), of: (run) => fingers(
+  { title: "closing speed", scale: SCALE(1e3, "mm/s"), of: (run) => fingers(
     (j) => run.of("plant.velocity", j).map((v) => CLOSING[j] * v)) },
-  { title: "ratio of the reflectances, learnt", scale: { factor: 1, unit: "" },
+  { title: "ratio of the reflectances, learnt", scale: SCALE(1, ""),
     needs: "controller.reflectance_ratio", of: (run) => [
       { name: "right to left", values: run.signal("controller.reflectance_ratio"),
         style: { color: "--ink", dash: 0 } }] },
@@ -237,16 +238,27 @@ function lines(run) { // the panels of these traces, made when they are first ne
 function shown(value, factor) {
   if (value === null) return "none";
   if (typeof value === "boolean") return value ? "yes" : "no";
-  return (Number((value * factor).toFixed(3)) || 0).toFixed(3).replace("-", "−");
+  return text(value * factor, 3);
+}
+
+function touches({ time_to_contact: [a, b], impact_velocity: speeds, steady_contact_force: forces }) {
+  if (a === null && b === null) return "Neither finger touches the object.";
+  if (a === null || b === null) {
+    return `Finger ${a === null ? 2 : 1} alone touches, at ${text(a ?? b, 3)} s.`;
+  }
+  const [v, w] = speeds.map((speed) => (speed === null ? "?" : text(1e3 * speed, 1)));
+  return `Both touch, ${text(Math.abs(b - a), 3)} s apart, at ${v} and ${w} mm/s; in the end they press `
+    + `with ${forces.map((force) => text(force, 2)).join(" and ")} N.`;
+}
+
+function happens({ object_shift: shift, toppled, damaged }) { // to the object
+  if (toppled) return "The object topples.";
+  if (damaged) return "The object is damaged.";
+  return shift >= 5e-4 ? `The object is shifted by ${text(1e3 * shift, 1)} mm.` : "";
 }
 
 function tell(metrics) {
-  const [a, b] = metrics.time_to_contact, [v, w] = metrics.impact_velocity;
-  const speeds = [v, w].map((speed) => (speed === null ? "?" : (1e3 * speed).toFixed(1)));
-  find("summary").textContent = a === null && b === null ? "Neither finger touches the object."
-    : a === null || b === null ? `Finger ${a === null ? 2 : 1} alone touches, at ${(a ?? b).toFixed(3)} s.`
-      : `Both touch, ${Math.abs(b - a).toFixed(3)} s apart, at ${speeds[0]} and ${speeds[1]} mm/s; `
-        + `in the end they press with ${metrics.steady_contact_force.map((f) => f.toFixed(2)).join(" and ")} N.`;
+  find("summary").textContent = [touches(metrics), happens(metrics)].filter(Boolean).join(" ");
   find("metrics").replaceChildren(...page.metrics
     .filter(({ name, reason }) => name in metrics
       && !(reason && metrics[name].every((value) => value === null)))
@@ -456,7 +468,10 @@ function controls() {
   find("stop").value = find("stop-number").value = stop();
   find("jacobi").checked = settings.scheme === "jacobi";
   find("bench").checked = settings.bench;
-  find("names").replaceChildren(...[...there.keys()].map((name) => made("option", { value: name })));
+  if (there !== named) {
+    find("names").replaceChildren(...[...there.keys()].map((value) => made("option", { value })));
+    named = there;
+  }
   find("command").textContent = command();
   preset();
 }
@@ -514,7 +529,6 @@ async function begin() {
   }
   settings = start();
   recall();
-  draw();
   if (!/[#&]at=/.test(location.hash)) present();
   state.ready = "yes";
 }
