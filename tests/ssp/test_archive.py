@@ -174,9 +174,9 @@ def test_a_model_exchange_fmu_is_integrated(tmp_path: Path) -> None:
     assert part.integrated
 
 
-def test_an_fmu_for_scheduled_execution(tmp_path: Path) -> None:
+def test_an_fmu_of_no_kind_of_its_version(tmp_path: Path) -> None:
     scheduled = A.replace(b"CoSimulation", b"ScheduledExecution")
-    assert "resources/a.fmu: is for scheduled execution only; ask" in refused(
+    assert "resources/a.fmu: declares no kind of FMU; ask" in refused(
         tmp_path, structure(TOP), a=scheduled
     )
 

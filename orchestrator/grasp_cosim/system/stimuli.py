@@ -183,7 +183,9 @@ def _header(file: str, names: Sequence[str]) -> tuple[list[Port], list[str | Non
     split = [(m[1], m[2]) if m else (name, None) for m, name in zip(found, names, strict=True)]
     (time, unit), *others = split
     if time != "time":
-        raise InputError(f"{_place(file, 1, 1)} = {names[0]!r}: must be time, then inputs")
+        raise InputError(
+            f"{_place(file, 1, 1)} = {names[0]!r}: must be time, then inputs, commas between"
+        )
     if not others:
         raise InputError(f"{file}: line 1: drives nothing; must have columns component.variable")
     ports: list[Port] = []
