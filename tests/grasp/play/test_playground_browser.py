@@ -274,6 +274,29 @@ def test_the_hand_moves_and_the_fingers_differ_without_colour(html: str, tmp_pat
     assert len(found["times"]) > 100
 
 
+def test_the_object_can_be_dragged(html: str, tmp_path: Path) -> None:
+    body = """
+      const canvas = find("fingers"), seen = [];
+      canvas.setPointerCapture = () => {};
+      const send = (type, x, more) => canvas.dispatchEvent(new PointerEvent(type,
+        { clientX: 300 + x * canvas.dataset.scale / 1000, button: 0, bubbles: true, ...more }));
+      send("pointerdown", 0, { button: 2 });
+      send("pointermove", 5);
+      send("pointerdown", 0);
+      for (const x of [-20.3, -49.8, 900]) {
+        send("pointermove", x);
+        await frame();
+        seen.push(find("position-number").value);
+      }
+      send("pointerup", 900);
+      send("pointermove", 0);
+      await frame();
+      return [...seen, find("position-number").value, command()];
+    """
+    command = "grasp-cosim run --step 0.002 --set plant.initial_object_position=0.07"
+    assert act(html, body, tmp_path, "at=0&step=0.002") == ["10", "-20", "70", "70", command]
+
+
 @pytest.mark.parametrize("still", [False, True])
 def test_it_begins_to_move_unless_the_user_wants_no_motion(
     html: str, tmp_path: Path, still: bool

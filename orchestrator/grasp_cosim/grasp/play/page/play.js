@@ -353,7 +353,28 @@ function build() {
   gestures();
 }
 
+// The object follows a pointer, in steps of its slider.
+function carry(event) {
+  const { variables: [name], per, low, high, step } = CONTROLS.find((one) => one.name === "position");
+  const canvas = find("fingers"), begin = valueOf(name) * per, from = event.clientX;
+  if (event.button !== 0) return;
+  const move = (now) => {
+    const by = (now.clientX - from) / canvas.dataset.scale * per;
+    const value = clamp(step * Math.round((begin + by) / step), low, high);
+    setValue(name, digits(value / per));
+    changed();
+  };
+  const up = () => {
+    canvas.removeEventListener("pointermove", move);
+    for (const end of ["pointerup", "pointercancel"]) canvas.removeEventListener(end, up);
+  };
+  canvas.setPointerCapture(event.pointerId);
+  canvas.addEventListener("pointermove", move);
+  for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, up);
+}
+
 function connectControls() {
+  find("fingers").addEventListener("pointerdown", carry);
   find("controls").addEventListener("submit", (event) => event.preventDefault());
   find("preset").addEventListener("change", () => choose(find("preset").value));
   find("previous").addEventListener("click", () => turn(-1));
