@@ -4,12 +4,12 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from conftest import Run
 from grasp_cosim import System, simulate
 from grasp_cosim.fmi.process import ProcessInstance
-from grasp_cosim.interface.interface import Interface
 from support.native_fmus import TYPES, build, needs_gcc
 
 ADVICE = "run has --isolation process"
@@ -106,9 +106,9 @@ def test_the_option_goes_before_the_file(
     names = []
     start = ProcessInstance.__init__
 
-    def noted(part: ProcessInstance, name: str, interface: Interface) -> None:
+    def noted(part: ProcessInstance, name: str, *rest: Any) -> None:
         names.append(name)
-        start(part, name, interface)
+        start(part, name, *rest)
 
     monkeypatch.setattr(ProcessInstance, "__init__", noted)
     given = ["--isolation", said] if said else []

@@ -58,9 +58,10 @@ def loaded(folder: Path, *arguments: str) -> set[int]:
 
 @needs_gcc
 def test_what_only_reads(folder: Path) -> None:
-    assert "| `inspect`, `ssp`, `proxy`, `report` |" in PAGE
+    assert "| `inspect`, `init`, `ssp`, `proxy`, `report` |" in PAGE
     assert loaded(folder, "run", "system.toml", "--out", "results") == {os.getpid()}
     assert not loaded(folder, "inspect", "a.fmu")
+    assert not loaded(folder, "init", "alone.toml", "--fmu", "a=a.fmu")
     assert not loaded(folder, "ssp", "system.toml", "-o", "system.ssp")
     assert not loaded(folder, "ssp", "system.ssp", "-o", "again.ssp")
     assert not loaded(folder, "proxy", "a.fmu", "-o", "proxy.fmu")

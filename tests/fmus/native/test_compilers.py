@@ -159,7 +159,7 @@ def test_a_missing_compiler_is_named_with_its_fix(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
-    monkeypatch.setattr(compilers, "_zig", lambda: None)
+    monkeypatch.setattr(compilers, "zig_compiler", lambda: None)
     fix = f"{sys.executable} -m pip install ziglang"
     one = "one of CC, cc, gcc, clang, zig"
     for target, asked, needed in (
