@@ -14,6 +14,7 @@ from . import extensions
 from .errors import InputError, SimulationError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
     from .grasp.system import grasp_system
@@ -109,6 +110,12 @@ def _grasp_scene(result: Result) -> Scene | None:
     return grasp_scene(result)
 
 
+def _grasp_traits(result: Result) -> Mapping[str, str]:
+    from .grasp.presets import case_of
+
+    return {"case": case_of(result.settings)}
+
+
 def _draw_signals(result: Result, path: Path) -> None:
     from .report.plot import plot_signals
 
@@ -118,5 +125,7 @@ def _draw_signals(result: Result, path: Path) -> None:
 extensions.readers |= {".toml": _read_toml, ".ssp": _read_ssp}
 if find_spec(f"{__name__}.grasp"):
     extensions.metrics.append(_grasp_metrics)
-    extensions.drawings.append(extensions.Drawing("grasp", _is_grasp, _draw_grasp, _grasp_scene))
+    extensions.drawings.append(
+        extensions.Drawing("grasp", _is_grasp, _draw_grasp, _grasp_scene, _grasp_traits)
+    )
 extensions.drawings.append(extensions.Drawing("signals", lambda _: True, _draw_signals))

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Mapping
     from pathlib import Path
 
 readers: dict[str, Callable[[Path, Path | None, float | None, float | None, Any], Any]] = {}
@@ -22,13 +22,15 @@ metrics: list[Callable[[], Iterable[Any]]] = []
 class Drawing(NamedTuple):
     """A picture of a result: its file's stem, if it fits a result, how to draw it at a path.
 
-    `scene` makes what the page of such a result has besides (`report.page.Scene`), or None.
+    `scene` makes what the page of such a result has besides (`report.page.Scene`), or None;
+    `traits` are what such a result is beside its settings, in words, like {"case": "2"}.
     """
 
     stem: str
     fits: Callable[[Any], bool]
     draw: Callable[[Any, Path], None]
     scene: Callable[[Any], Any] = lambda _: None
+    traits: Callable[[Any], Mapping[str, str]] = lambda _: {}
 
 
 drawings: list[Drawing] = []
