@@ -48,7 +48,7 @@ def _facts(run: Result) -> Iterator[tuple[str, str]]:
         twin = ", native" if "native_twin_of" in ran else ""
         guid = f" {ran['guid']}" if "guid" in ran else ""
         yield f"FMU of {name}", f"{component['fmu']}{guid}{twin}"
-        for key in ("step", "isolation", "rename", "units"):
+        for key in ("step", "isolation", "solver", "rename", "units"):
             yield from _nested(f"{key} of {name}", component.get(key))
     yield from _values(run)
     yield from _nested("role", settings.get("roles", {}))

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..errors import InputError
+from ..files import check_nature
 from ..interface.units import IDENTITY, Conversion, conversion, known_unit
 from ..metrics.metric import Metric, Signals
 from ..qualification.tube import ROUNDING, Curve, curve
@@ -98,9 +99,9 @@ def read_side(path: Path) -> Side:
 
     InputError where it is missing, damaged or none of these.
     """
-    folder = path.parent if path.name in (SIGNALS, SETTINGS) else path
-    if path.is_dir() or (folder != path and (folder / SETTINGS).is_file()):
-        return _run(path, load_run(folder))
+    one_of_its = path.name in (SIGNALS, SETTINGS) and path.with_name(SETTINGS).is_file()
+    if path.is_dir() or one_of_its:
+        return _run(path, load_run(path))
     if not path.is_file():
         raise InputError(
             f"{path}: no such run; must be a folder that `run --out` wrote, a .csv or an .mf4 file"
@@ -110,6 +111,7 @@ def read_side(path: Path) -> Side:
         return _log(path, time, columns, units)
     if path.suffix.lower() == ".csv":
         return _csv(path)
+    check_nature(path, "run")
     raise InputError(
         f"{path}: must be a folder that `run --out` wrote, a .csv or an .mf4 file of signals"
     )
