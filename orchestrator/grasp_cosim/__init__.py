@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
+    from matplotlib.figure import Figure
+
     from .grasp.system import grasp_system
     from .master.simulation import simulate
     from .metrics.metric import Metric, metric
@@ -98,10 +100,10 @@ def _is_grasp(result: Result) -> bool:
     return is_grasp(result.by_role)
 
 
-def _draw_grasp(result: Result, path: Path) -> None:
+def _draw_grasp(result: Result, path: Path | None) -> Figure:
     from .grasp.pictures import draw_grasp
 
-    draw_grasp(result, path)
+    return draw_grasp(result, path)
 
 
 def _grasp_scene(result: Result) -> Scene | None:
@@ -116,10 +118,16 @@ def _grasp_traits(result: Result) -> Mapping[str, str]:
     return {"case": case_of(result.settings)}
 
 
-def _draw_signals(result: Result, path: Path) -> None:
+def _draw_signals(result: Result, path: Path | None) -> Figure:
     from .report.plot import plot_signals
 
-    plot_signals(result, path)
+    return plot_signals(result, path)
+
+
+def _html(result: Result) -> str:
+    from .report.tables import result_html
+
+    return result_html(result)
 
 
 extensions.readers |= {".toml": _read_toml, ".ssp": _read_ssp}
@@ -128,4 +136,5 @@ if find_spec(f"{__name__}.grasp"):
     extensions.drawings.append(
         extensions.Drawing("grasp", _is_grasp, _draw_grasp, _grasp_scene, _grasp_traits)
     )
+extensions.html.append(_html)
 extensions.drawings.append(extensions.Drawing("signals", lambda _: True, _draw_signals))

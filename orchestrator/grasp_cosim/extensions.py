@@ -19,8 +19,13 @@ metrics: list[Callable[[], Iterable[Any]]] = []
 """Sources of metrics (`metrics.metric.Metric`) that every result is asked for."""
 
 
+html: list[Callable[[Any], str]] = []
+"""What a notebook shows of a result, as HTML."""
+
+
 class Drawing(NamedTuple):
-    """A picture of a result: its file's stem, if it fits a result, how to draw it at a path.
+    """A picture of a result: its file's stem, if it fits a result, how to draw the figure, which is
+    written to a path if there is one.
 
     `scene` makes what the page of such a result has besides (`report.page.Scene`), or None;
     `traits` are what such a result is beside its settings, in words, like {"case": "2"}.
@@ -28,7 +33,7 @@ class Drawing(NamedTuple):
 
     stem: str
     fits: Callable[[Any], bool]
-    draw: Callable[[Any, Path], None]
+    draw: Callable[[Any, Path | None], Any]
     scene: Callable[[Any], Any] = lambda _: None
     traits: Callable[[Any], Mapping[str, str]] = lambda _: {}
 

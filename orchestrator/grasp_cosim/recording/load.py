@@ -125,6 +125,7 @@ def _result(
         more_metrics=_as_recorded(written),
         origin={key: written[key] for key in ORIGIN_KEYS if key in written},
         to_si=_to_si(f"{path}: to_si", written),
+        folder=path.parent,
     )
 
 

@@ -41,6 +41,19 @@ def summary(run: Mapping[str, Any]) -> str:
     return text
 
 
+def result_html(result: Result) -> str:
+    """What a notebook shows of a result: what it is, its metrics, the names of its signals."""
+    of = f"{escape(str(result.settings['system']))}: {summary(result.metrics)}"
+    where = f", read from {escape(str(result.folder))}" if result.folder else ""
+    names = "".join(
+        f"<li>{escape(n)} <small>{escape(u or '')}</small></li>" for n, u in result.units.items()
+    )
+    return (
+        f"<p>{of}{where}</p>{metrics_table(result)}"
+        f"<details><summary>{len(result)} signals</summary><ul>{names}</ul></details>"
+    )
+
+
 def metrics_table(result: Result) -> str:
     """Return the metrics of a result, and why others are missing.
 
