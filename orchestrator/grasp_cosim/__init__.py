@@ -1,7 +1,17 @@
 """Fixed-step co-simulation of FMUs, and the grasp of the paper. Card: orchestrator/README.md.
 
+    from grasp_cosim import grasp_system, simulate
+
+    system = grasp_system().with_values({"plant.initial_object_position": 0.02})
+    result = simulate(system, stop=3.0)
+    result.metrics["time_to_contact"], result["plant.gap[1]"], result.units["plant.gap[1]"]
+    result.plot("grasp.png")
+
 Importing it imports nothing yet, builds nothing and writes nothing: each name below is imported
-when it is asked for.
+when it is asked for. Further in: `grasp_cosim.metrics.metric`, `grasp_cosim.recording.listener`,
+`grasp_cosim.recording.csv`, `grasp_cosim.recording.mdf`, `grasp_cosim.convergence.step_study`,
+`grasp_cosim.comparison.compare`, `grasp_cosim.qualification.qualify`,
+`grasp_cosim.qualification.bands`.
 """
 
 from __future__ import annotations
@@ -20,7 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from .grasp.system import grasp_system
-    from .master.simulation import simulate
+    from .master.simulation import Session, simulate
     from .metrics.metric import Metric, metric
     from .realtime.options import Realtime
     from .recording.load import load_run
@@ -34,6 +44,7 @@ __all__ = [
     "Metric",
     "Realtime",
     "Result",
+    "Session",
     "SimulationError",
     "System",
     "grasp_system",
@@ -46,6 +57,7 @@ _HOMES = {
     "Metric": "metrics.metric",
     "Realtime": "realtime.options",
     "Result": "recording.result",
+    "Session": "master.simulation",
     "System": "system.description",
     "grasp_system": "grasp.system",
     "load_run": "recording.load",

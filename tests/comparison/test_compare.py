@@ -49,6 +49,12 @@ def test_a_run_is_like_itself(folders: Any) -> None:
     assert "the settings of the runs are the same" in as_text(found)
 
 
+def test_results_are_compared_as_they_are() -> None:
+    found = compare(grasp_run(), cut(grasp_run(), slice(0, 1001)))
+    assert found.alike
+    assert (found.a.name, found.b.name, found.end) == ("A", "B", 1.0)
+
+
 def test_a_shift_in_time_within_the_band_is_allowed_and_a_longer_one_is_not(folders: Any) -> None:
     run = grasp_run()
     late = np.concatenate([run[GAP][:1].repeat(5), run[GAP][:-5]])

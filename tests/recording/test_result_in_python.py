@@ -1,4 +1,4 @@
-"""A result as a user of Python meets it: in a console, in a notebook, as tables of other packages."""
+"""A result as Python users meet it: in a console, in a notebook, as tables of other packages."""
 
 import json
 import pickle
@@ -106,7 +106,7 @@ def test_plot_returns_a_figure_that_a_notebook_shows_and_writes_it_where_asked(
     figure = ring_run(["a", "b"]).plot(tmp_path / "own.png")
     assert isinstance(figure, figure_module.Figure)
     assert (tmp_path / "own.png").read_bytes().startswith(b"\x89PNG")
-    shown = figure._repr_png_()  # type: ignore[attr-defined]
+    shown = figure._repr_png_()
     assert shown.startswith(b"\x89PNG")
     figure.axes[0].set_title("mine")
     figure.savefig(tmp_path / "mine.svg")

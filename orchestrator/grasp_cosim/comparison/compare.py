@@ -20,8 +20,9 @@ from ..qualification.compared import (
     single_values,
 )
 from ..qualification.tube import ROUNDING, Curve
+from ..recording.result import Result
 from .settings import Difference, differences
-from .side import Side, read_side
+from .side import Side, side_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,15 +54,18 @@ class Comparison:
 
 
 def compare(
-    a: str | Path, b: str | Path, *, bands: Bands | None = None, metrics: Sequence[Metric] = ()
+    a: Result | str | Path,
+    b: Result | str | Path,
+    *,
+    bands: Bands | None = None, metrics: Sequence[Metric] = ()
 ) -> Comparison:
-    """Compare two runs: each a folder that `run --out` wrote, or a CSV or MDF file of signals.
+    """Compare two runs: each a result, a folder that `run --out` wrote, or a CSV or MDF file.
 
     Bands that are not given are derived from a alone, as in a qualification. `metrics` are compared
     beside those that every result is asked for. InputError where one cannot be read, or the two
     have no time or no signal in common.
     """
-    bands, first, second = bands or Bands(), read_side(Path(a)), read_side(Path(b))
+    bands, first, second = bands or Bands(), side_of(a, "A"), side_of(b, "B")
     first, second = first.like(second), second.like(first)
     begin, end = _overlap(first, second)
     ours, theirs = first.part(begin, end), second.part(begin, end)

@@ -94,6 +94,11 @@ class Side:
         return self.result.more_metrics if self.result else ()
 
 
+def side_of(run: Result | str | Path, called: str) -> Side:
+    """The side of a result, which is `called` so, or of what read_side() takes."""
+    return _run(called, run) if isinstance(run, Result) else read_side(Path(run))
+
+
 def read_side(path: Path) -> Side:
     """The run in a folder, of its signals.csv or run.json; or the log in a .csv or .mf4 file.
 
@@ -101,7 +106,7 @@ def read_side(path: Path) -> Side:
     """
     one_of_its = path.name in (SIGNALS, SETTINGS) and path.with_name(SETTINGS).is_file()
     if path.is_dir() or one_of_its:
-        return _run(path, load_run(path))
+        return _run(str(path), load_run(path))
     if not path.is_file():
         raise InputError(
             f"{path}: no such run; must be a folder that `run --out` wrote, a .csv or an .mf4 file"
@@ -117,10 +122,10 @@ def read_side(path: Path) -> Side:
     )
 
 
-def _run(path: Path, result: Result) -> Side:
+def _run(name: str, result: Result) -> Side:
     texts = tuple(name for name in result if name not in result.numbers)
     return Side(
-        str(path), result.time, result.numbers, result.units, result.to_si, texts, result,
+        name, result.time, result.numbers, result.units, result.to_si, texts, result,
         result.roles,
     )  # fmt: skip
 

@@ -323,9 +323,9 @@ class Simulate:
         realtime paces the run by the clock: the result has a timing, and the same bits. metrics are
         worked out beside those that every result is asked for: from @metric, or functions of their
         own name; a name among them says that the result must have that metric. diverging, "stop" or
-        "continue", replaces that of the system. note gets the lines of the log but for system.notes: what is
-        known of the system and of t = 0 before the first step, the others at the end, also after a
-        failure.
+        "continue", replaces that of the system. note gets the lines of the log but for
+        system.notes: what is known of the system and of t = 0 before the first step, the others at
+        the end, also after a failure.
         Ctrl-C ends the run early: the result is what was recorded, with complete = False.
         InputError where an FMU does not load or refuses its parameters; SimulationError, with what
         was recorded as its result, where one fails on the way, or a signal runs away.

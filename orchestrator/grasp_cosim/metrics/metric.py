@@ -34,9 +34,6 @@ from ..errors import InputError, choices, nearest
 from ..interface.units import Conversion
 
 Value = float | bool | None
-Function = Callable[["Signals"], Value | Sequence[Value]]
-
-
 RESERVED = frozenset((
     "command", "complete", "components", "connections", "date", "descriptions", "diverging",
     "error", "events", "faults", "fmus", "index", "initialisation", "log", "metric_units",
@@ -94,6 +91,9 @@ class Signals(Mapping[str, npt.NDArray[Any]]):
 
     def __len__(self) -> int:
         return len(self.by_name)
+
+
+Function = Callable[[Signals], Value | Sequence[Value]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,0 +1,63 @@
+"""The pages of the Python interface: made from the docstrings without a warning, and whole."""
+
+import re
+import runpy
+from importlib.util import find_spec
+from os.path import normpath
+from pathlib import Path
+
+import grasp_cosim
+import pytest
+
+pytestmark = pytest.mark.slow
+
+API = runpy.run_path(str(Path(__file__).parents[2] / "docs/api.py")) if find_spec("pdoc") else {}
+MODULES: tuple[str, ...] = API.get("MODULES", ())
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    pytest.importorskip("pdoc")
+    folder = tmp_path_factory.mktemp("api")
+    written = API["write_pages"](folder)
+    return {str(path.relative_to(folder)): path.read_text("utf-8") for path in written}
+
+
+def section(page: str, name: str) -> str:
+    """The text of a name, without tags."""
+    found = re.search(rf'<section id="{re.escape(name)}">(.*?)</section>', page, re.DOTALL)
+    assert found, name
+    return re.sub(r"<[^>]+>", "", found[1])
+
+
+def test_every_public_name_is_there_with_its_docstring(pages: dict[str, str]) -> None:
+    page = pages["grasp_cosim.html"]
+    for name in grasp_cosim.__all__:
+        assert f'<section id="{name}">' in page
+    assert "Run a system to its stop time" in section(page, "simulate")
+    assert "step: float | None = None" in section(page, "simulate")
+    for member, text in (("plot", "Draw a grasp as one"), ("to_pandas", "as a DataFrame")):
+        method = section(page, "Result").partition(f"{member}(")[2]
+        assert text in method
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_what_a_page_says_is_the_same_each_time_and_leads_somewhere(
+    pages: dict[str, str], name: str
+) -> None:
+    file = f"{name.replace('.', '/')}.html"
+    page = pages[file]
+    assert not re.search(r" at 0x[0-9a-f]+", page)
+    for link, place in re.findall(r'href="([^":#]*)(?:#([^"]*))?"', page):
+        other = normpath(Path(file).parent / link) if link else file
+        assert not place or f'id="{place}"' in pages[other]
+    if name != "grasp_cosim":
+        assert f'href="{file}"' in pages["grasp_cosim.html"]
+
+
+def test_a_wrong_annotation_is_an_error(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    pytest.importorskip("pdoc", reason="pdoc is not installed")
+    monkeypatch.setitem(grasp_cosim.load_run.__annotations__, "folder", "NoSuchType")
+    with pytest.raises(UserWarning, match="NoSuchType"):
+        API["write_pages"](tmp_path)
+    assert not list(tmp_path.iterdir())
