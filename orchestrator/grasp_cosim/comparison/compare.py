@@ -57,7 +57,8 @@ def compare(
     a: Result | str | Path,
     b: Result | str | Path,
     *,
-    bands: Bands | None = None, metrics: Sequence[Metric] = ()
+    bands: Bands | None = None,
+    metrics: Sequence[Metric] = (),
 ) -> Comparison:
     """Compare two runs: each a result, a folder that `run --out` wrote, or a CSV or MDF file.
 
