@@ -36,8 +36,8 @@ def test_what_differs_is_at_the_top_and_metrics_are_side_by_side(found: Comparis
     assert "<td>scheme</td>" in top
     assert '<td class="w">sequential</td><td class="w">jacobi</td>' in top
     assert "DIFFERENT: 1 of 16 signals" in top
-    assert '<th class="n">A</th><th class="n">B</th><th class="n">B - A</th>' in rest
-    assert "time to contact, finger 1" in rest
+    assert '<th class="n">A</th><th class="n">B</th><th class="n">B − A</th>' in rest
+    assert "time to contact, finger 1 in s</td>" in rest
     assert f'data-show="{GAP}"' in rest
 
 

@@ -47,8 +47,8 @@ def comparison_html(c: Comparison, limit: int = LIMIT) -> str:
     sections = {
         "runs": ("A and B", _runs(c)),
         "traces": ("Traces", traces_html(_exactness(c, shown, len(time)), units, texts, ())),
-        "metrics": ("Metrics", _metrics(c)),
-        "signals-table": ("Signals, the worst first", _signals(c)),
+        "metrics": ("Metrics", f'<div class="pairs">{_metrics(c)}</div>'),
+        "signals-table": ("Signals, the worst first", f'<div class="pairs">{_signals(c)}</div>'),
     }
     return document(
         f"{c.a.name} and {c.b.name}",
@@ -162,8 +162,12 @@ def _metrics(c: Comparison) -> str:
     ]
     if not rows:
         return "<p>There are no metrics that both have.</p>"
-    heads = "".join(f'<th class="n">{head}</th>' for head in (*RUNS, "B - A", "band"))
-    return table(f"<th></th>{heads}<th></th><th></th>", rows)
+    return table(_heads(*RUNS, "B − A", "", "band"), rows)
+
+
+def _heads(*heads: str) -> str:
+    """The heads of columns of numbers, after one of names."""
+    return "<th></th>" + "".join(f'<th class="n">{head}</th>' for head in heads)
 
 
 def _metric(metric: Metric, m: Compared) -> str:
@@ -171,24 +175,28 @@ def _metric(metric: Metric, m: Compared) -> str:
     title = metric.column_title(m.name) if m.name in metric.columns else f"{metric.title}{entry}"
     there = m.original is not None and m.candidate is not None
     apart = (m.candidate or 0.0) - (m.original or 0.0) if there else None
-    values = (m.original, m.candidate, apart, m.band.width)
-    cells = "".join(f'<td class="n">{escape(scaled(v, metric.factor))}</td>' for v in values)
-    return f"<td>{escape(title)}</td>{cells}<td>{escape(metric.display_unit)}</td>{_verdict(m)}"
+    first, second, difference, band = (
+        f'<td class="n">{escape(scaled(v, metric.factor))}</td>'
+        for v in (m.original, m.candidate, apart, m.band.width)
+    )
+    return f"{_name(title, metric.display_unit)}{first}{second}{difference}{_verdict(m)}{band}"
+
+
+def _name(name: str, unit: str | None) -> str:
+    return f"<td>{escape(name)}{f' in {escape(unit)}' if unit else ''}</td>"
 
 
 def _signals(c: Comparison) -> str:
     """The signals, the worst first; a button goes to the worst moment."""
-    heads = "".join(f'<th class="n">{head}</th>' for head in ("deviation", "band", *RUNS))
     rows = [
-        f"<td>{escape(s.name)}</td>"
+        f'{_name(s.name, s.unit)}{_verdict(s)}<td class="n">{_moment(c, s)}</td>'
         + "".join(
             f'<td class="n">{escape(number(v, 4))}</td>'
             for v in (s.deviation, s.band.width, s.original, s.candidate)
         )
-        + f"<td>{escape(s.unit or '')}</td><td>{_moment(c, s)}</td>{_verdict(s)}"
         for s in c.signals
     ]
-    return table(f"<th></th>{heads}<th></th><th>at</th><th></th>", rows)
+    return table(_heads("", "at", "deviation", "band", *RUNS), rows)
 
 
 def _moment(c: Comparison, s: Compared) -> str:
@@ -203,5 +211,7 @@ def _verdict(compared: Compared) -> str:
     """How many widths of its band it is off, and if that is in the band."""
     if compared.inside:
         return '<td class="n">inside</td>'
-    times = f"{compared.ratio:.3g} × band" if isfinite(compared.ratio) else "no band"
+    if not isfinite(compared.deviation):
+        return '<td class="n warn">one has none</td>'
+    times = f"{compared.ratio:.3g} × band" if isfinite(compared.ratio) else "differ"
     return f'<td class="n warn">{times}</td>'
