@@ -2,25 +2,30 @@
 
 import re
 import runpy
-from importlib.util import find_spec
 from os.path import normpath
 from pathlib import Path
+from typing import Any
 
 import grasp_cosim
 import pytest
 
 pytestmark = pytest.mark.slow
 
-API = runpy.run_path(str(Path(__file__).parents[2] / "docs/api.py")) if find_spec("pdoc") else {}
-MODULES: tuple[str, ...] = API.get("MODULES", ())
+SCRIPT = Path(__file__).parents[2] / "docs/api.py"
 
 
 @pytest.fixture(scope="module")
-def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    pytest.importorskip("pdoc")
+def api() -> dict[str, Any]:
+    """The names of the script."""
+    pytest.importorskip("pdoc", reason="pdoc is not installed")
+    return runpy.run_path(str(SCRIPT))
+
+
+@pytest.fixture(scope="module")
+def pages(api: dict[str, Any], tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     folder = tmp_path_factory.mktemp("api")
-    written = API["write_pages"](folder)
-    return {str(path.relative_to(folder)): path.read_text("utf-8") for path in written}
+    written = api["write_pages"](folder)
+    return {path.relative_to(folder).as_posix(): path.read_text("utf-8") for path in written}
 
 
 def section(page: str, name: str) -> str:
@@ -41,23 +46,24 @@ def test_every_public_name_is_there_with_its_docstring(pages: dict[str, str]) ->
         assert text in method
 
 
-@pytest.mark.parametrize("name", MODULES)
 def test_what_a_page_says_is_the_same_each_time_and_leads_somewhere(
-    pages: dict[str, str], name: str
+    api: dict[str, Any], pages: dict[str, str]
 ) -> None:
-    file = f"{name.replace('.', '/')}.html"
-    page = pages[file]
-    assert not re.search(r" at 0x[0-9a-f]+", page)
-    for link, place in re.findall(r'href="([^":#]*)(?:#([^"]*))?"', page):
-        other = normpath(Path(file).parent / link) if link else file
-        assert not place or f'id="{place}"' in pages[other]
-    if name != "grasp_cosim":
+    files = [f"{name.replace('.', '/')}.html" for name in api["MODULES"]]
+    assert {*files, "index.html"} == pages.keys()
+    for file in files:
+        assert not re.search(r" at 0x[0-9a-f]+", pages[file])
+        for link, place in re.findall(r'href="([^":#]*)(?:#([^"]*))?"', pages[file]):
+            other = normpath(Path(file).parent / link) if link else file
+            assert not place or f'id="{place}"' in pages[other]
+    for file in files[1:]:
         assert f'href="{file}"' in pages["grasp_cosim.html"]
 
 
-def test_a_wrong_annotation_is_an_error(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    pytest.importorskip("pdoc", reason="pdoc is not installed")
+def test_a_wrong_annotation_is_an_error(
+    api: dict[str, Any], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     monkeypatch.setitem(grasp_cosim.load_run.__annotations__, "folder", "NoSuchType")
     with pytest.raises(UserWarning, match="NoSuchType"):
-        API["write_pages"](tmp_path)
+        api["write_pages"](tmp_path)
     assert not list(tmp_path.iterdir())
