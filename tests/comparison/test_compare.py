@@ -55,23 +55,18 @@ def test_results_are_compared_as_they_are() -> None:
     assert (found.a.name, found.b.name, found.end) == ("A", "B", 1.0)
 
 
-def test_a_shift_in_time_within_the_band_is_allowed_and_a_longer_one_is_not(folders: Any) -> None:
+def test_a_shift_in_time_within_the_band_is_allowed_and_a_longer_one_is_not() -> None:
     run = grasp_run()
     late = np.concatenate([run[GAP][:1].repeat(5), run[GAP][:-5]])
     moved = replace(run, signals={**run.signals, GAP: late})
     given = {GAP: Given(absolute=1e-9, time=5e-3)}
     others = {"*": Given(absolute=1e9)}
     wide = Bands(signals={**given, **others}, metrics=others)
-    assert folders(run, moved, bands=wide).alike
+    assert compare(run, moved, bands=wide).alike
     tight = replace(wide, signals={GAP: Given(absolute=1e-9, time=4e-3), **others})
-    found = compare_again(folders, tight)
+    found = compare(run, moved, bands=tight)
     assert not found.alike
     assert [s.name for s in found.signals if not s.inside] == [GAP]
-
-
-def compare_again(folders: Any, bands: Bands) -> Comparison:
-    base = Path(folders.__closure__[0].cell_contents)
-    return compare(base / "a", base / "b", bands=bands)
 
 
 def test_runs_of_unlike_length_and_step_are_compared_where_both_are(folders: Any) -> None:
@@ -169,6 +164,7 @@ def test_a_band_for_nothing_is_refused(folders: Any) -> None:
         folders(grasp_run(), grasp_run(), bands=bands)
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(by=st.floats(-1e-2, 1e-2), width=st.floats(1e-6, 1e-2))
 def test_an_offset_is_inside_just_where_it_is_no_wider_than_its_band(

@@ -58,6 +58,7 @@ def test_an_odd_result_has_a_repr_too(changes: dict[str, object]) -> None:
     assert "\x1b" not in text
 
 
+@pytest.mark.slow
 @given(names=st.lists(st.text(min_size=1), min_size=1, max_size=30, unique=True))
 def test_names_of_any_length_stay_in_their_line(names: list[str]) -> None:
     lines = repr(ring_run(names, rows=3)).split("\n")
@@ -99,6 +100,7 @@ def test_a_name_like_none_lists_all_and_looking_for_one_is_no_error() -> None:
     assert "a.y" in run
 
 
+@pytest.mark.slow
 def test_plot_returns_a_figure_that_a_notebook_shows_and_writes_it_where_asked(
     tmp_path: Path,
 ) -> None:
