@@ -2,6 +2,7 @@
 # make test   the quick tests, in three minutes; make test-slow: the others; each runs in one of them
 # make explore  the properties, on new random examples and more of them; a failure prints its recipe
 # make check  lint, format, types, import rules
+# make docs   the pages of the Python interface in results/api, and what the notebook in docs/ shows
 # make bench  measurements     make cards    the variable tables of the equation cards
 # make playground  docs/playground.html; needs zig where the C of the FMUs has changed
 
@@ -13,7 +14,7 @@ PIP := PIP_CONSTRAINT=constraints.txt PIP_DISABLE_PIP_VERSION_CHECK=1 $(BIN)/pyt
 # Tests start hundreds of Pythons: none should compile all modules anew, whatever the environment.
 PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 2 --maxschedchunk 1
 
-.PHONY: run test test-slow explore check bench cards playground clean
+.PHONY: run test test-slow explore check docs bench cards playground clean
 
 run: .venv/run
 	$(BIN)/grasp-cosim build
@@ -33,6 +34,10 @@ check: .venv/dev
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -q tests/test_import_rules.py
+
+docs: .venv/dev
+	$(BIN)/python docs/api.py
+	$(BIN)/python docs/notebook.py
 
 bench: .venv/dev
 	$(BIN)/python -m benchmarks.macro_step

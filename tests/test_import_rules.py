@@ -184,7 +184,7 @@ FLOORS = (
     ("recording",),
     ("ssp", "inspection", "drafting"),
     ("master",),
-    ("convergence", "sweep", "qualification", "hil"),
+    ("convergence", "sweep", "qualification", "comparison", "hil"),
     ("report",),
     ("grasp",),
     ("cli",),

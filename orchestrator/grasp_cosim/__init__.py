@@ -1,7 +1,17 @@
 """Fixed-step co-simulation of FMUs, and the grasp of the paper. Card: orchestrator/README.md.
 
+    from grasp_cosim import grasp_system, simulate
+
+    system = grasp_system().with_values({"plant.initial_object_position": 0.02})
+    result = simulate(system, stop=3.0)
+    result.metrics["time_to_contact"], result["plant.gap[1]"], result.units["plant.gap[1]"]
+    result.plot("grasp.png")
+
 Importing it imports nothing yet, builds nothing and writes nothing: each name below is imported
-when it is asked for.
+when it is asked for. Further in: `grasp_cosim.metrics.metric`, `grasp_cosim.recording.listener`,
+`grasp_cosim.recording.csv`, `grasp_cosim.recording.mdf`, `grasp_cosim.convergence.step_study`,
+`grasp_cosim.comparison.compare`, `grasp_cosim.qualification.qualify`,
+`grasp_cosim.qualification.bands`.
 """
 
 from __future__ import annotations
@@ -14,10 +24,13 @@ from . import extensions
 from .errors import InputError, SimulationError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
+    from matplotlib.figure import Figure
+
     from .grasp.system import grasp_system
-    from .master.simulation import simulate
+    from .master.simulation import Session, simulate
     from .metrics.metric import Metric, metric
     from .realtime.options import Realtime
     from .recording.load import load_run
@@ -31,6 +44,7 @@ __all__ = [
     "Metric",
     "Realtime",
     "Result",
+    "Session",
     "SimulationError",
     "System",
     "grasp_system",
@@ -43,6 +57,7 @@ _HOMES = {
     "Metric": "metrics.metric",
     "Realtime": "realtime.options",
     "Result": "recording.result",
+    "Session": "master.simulation",
     "System": "system.description",
     "grasp_system": "grasp.system",
     "load_run": "recording.load",
@@ -97,10 +112,10 @@ def _is_grasp(result: Result) -> bool:
     return is_grasp(result.by_role)
 
 
-def _draw_grasp(result: Result, path: Path) -> None:
+def _draw_grasp(result: Result, path: Path | None) -> Figure:
     from .grasp.pictures import draw_grasp
 
-    draw_grasp(result, path)
+    return draw_grasp(result, path)
 
 
 def _grasp_scene(result: Result) -> Scene | None:
@@ -109,14 +124,29 @@ def _grasp_scene(result: Result) -> Scene | None:
     return grasp_scene(result)
 
 
-def _draw_signals(result: Result, path: Path) -> None:
+def _grasp_traits(result: Result) -> Mapping[str, str]:
+    from .grasp.presets import case_of
+
+    return {"case": case_of(result.settings)}
+
+
+def _draw_signals(result: Result, path: Path | None) -> Figure:
     from .report.plot import plot_signals
 
-    plot_signals(result, path)
+    return plot_signals(result, path)
+
+
+def _html(result: Result) -> str:
+    from .report.tables import result_html
+
+    return result_html(result)
 
 
 extensions.readers |= {".toml": _read_toml, ".ssp": _read_ssp}
 if find_spec(f"{__name__}.grasp"):
     extensions.metrics.append(_grasp_metrics)
-    extensions.drawings.append(extensions.Drawing("grasp", _is_grasp, _draw_grasp, _grasp_scene))
+    extensions.drawings.append(
+        extensions.Drawing("grasp", _is_grasp, _draw_grasp, _grasp_scene, _grasp_traits)
+    )
+extensions.html.append(_html)
 extensions.drawings.append(extensions.Drawing("signals", lambda _: True, _draw_signals))

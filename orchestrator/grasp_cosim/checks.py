@@ -9,6 +9,7 @@ import tomllib
 from collections.abc import Collection, Iterable, Mapping
 from importlib import import_module
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 from .errors import InputError, choices
@@ -125,7 +126,7 @@ def extra_module(name: str, purpose: str, extra: str) -> Any:
     except ModuleNotFoundError as error:
         raise InputError(
             f"{name.partition('.')[0]} is not installed, {purpose}; "
-            f"install it with: pip install 'grasp-cosim[{extra}]'"
+            f"install it with: {quote(sys.executable)} -m pip install 'grasp-cosim[{extra}]'"
         ) from error
 
 

@@ -15,6 +15,25 @@ class SimulationError(Exception):
     """What was recorded until then, a recording.result.Result; None where there is nothing."""
 
 
+class UnknownNameError(KeyError):
+    """A mapping has no such name; the message names what is nearest to it."""
+
+    def __str__(self) -> str:
+        """Worked out when it is read: most are caught."""
+        name, names = self.args
+        return f"{name!r}: no such signal; {nearest(str(name), names)}"
+
+
+def nearest(name: str, names: Iterable[str]) -> str:
+    """The names that look like one: "did you mean a, b?"; all where none does: "valid: ..."."""
+    from difflib import get_close_matches
+
+    listed = [*names]
+    lower = {known.lower(): known for known in listed}
+    found = [lower[close] for close in get_close_matches(name.lower(), lower, 3)]
+    return f"did you mean {', '.join(found)}?" if found else f"valid: {choices(listed)}"
+
+
 def choices(names: Iterable[object], limit: int = 24) -> str:
     """The valid choices as a readable list, cut where it gets long."""
     listed = [str(name) for name in names]

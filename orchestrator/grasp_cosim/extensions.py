@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Mapping
     from pathlib import Path
 
 readers: dict[str, Callable[[Path, Path | None, float | None, float | None, Any], Any]] = {}
@@ -19,16 +19,23 @@ metrics: list[Callable[[], Iterable[Any]]] = []
 """Sources of metrics (`metrics.metric.Metric`) that every result is asked for."""
 
 
-class Drawing(NamedTuple):
-    """A picture of a result: its file's stem, if it fits a result, how to draw it at a path.
+html: list[Callable[[Any], str]] = []
+"""What a notebook shows of a result, as HTML."""
 
-    `scene` makes what the page of such a result has besides (`report.page.Scene`), or None.
+
+class Drawing(NamedTuple):
+    """A picture of a result: its file's stem, if it fits a result, how to draw the figure, which is
+    written to a path if there is one.
+
+    `scene` makes what the page of such a result has besides (`report.page.Scene`), or None;
+    `traits` are what such a result is beside its settings, in words, like {"case": "2"}.
     """
 
     stem: str
     fits: Callable[[Any], bool]
-    draw: Callable[[Any, Path], None]
+    draw: Callable[[Any, Path | None], Any]
     scene: Callable[[Any], Any] = lambda _: None
+    traits: Callable[[Any], Mapping[str, str]] = lambda _: {}
 
 
 drawings: list[Drawing] = []

@@ -205,7 +205,7 @@ def test_no_pyarrow_is_one_line(command: Run, monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     code, _, err = command(STUDY)
     assert code == 2
-    assert err.endswith("install it with: pip install 'grasp-cosim[sweep]'\n")
+    assert err.endswith("-m pip install 'grasp-cosim[sweep]'\n")
 
 
 def test_a_study_of_the_bench_is_that_of_run_bench(tmp_path: Path, grasp: System) -> None:

@@ -50,13 +50,14 @@ def user(checkout: Path, grasp: System, recorded: Path) -> Path:
     (checkout / "my_system.toml").write_text(text, encoding="utf-8")
     write_ssp(grasp, checkout / "my_system.ssp")
     (checkout / "my_metrics.py").write_text(METRICS, encoding="utf-8")
-    for written in ("signals.csv", "run.json"):
-        shutil.copy(recorded / written, _folder(checkout / "results"))
+    for name in ("results", "other"):
+        for written in ("signals.csv", "run.json"):
+            shutil.copy(recorded / written, _folder(checkout / name))
     return checkout
 
 
 def test_there_is_something_to_try() -> None:
-    assert len(COMMANDS) == 26
+    assert len(COMMANDS) == 27
     assert len(EXAMPLES) == 1
 
 

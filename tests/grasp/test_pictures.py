@@ -8,23 +8,8 @@ import numpy as np
 import pytest
 from grasp_cosim.grasp import pictures
 from grasp_cosim.recording.result import Result
-from matplotlib.figure import Figure
 from report.runs import TOUCH, grasp_run
 from support.slow import slow
-
-
-@pytest.fixture
-def saved(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
-    """Collects the figures that are saved."""
-    figures: list[Figure] = []
-    from grasp_cosim.report.plot import save
-
-    def keep(figure: Figure, path: Path) -> None:
-        figures.append(figure)
-        save(figure, path)
-
-    monkeypatch.setattr(pictures, "save", keep)
-    return figures
 
 
 def width(path: Path) -> int:
@@ -54,10 +39,9 @@ def test_close_ups_of_the_contacts(
     moments: dict[int, float],
     close_ups: list[list[int]],
     tmp_path: Path,
-    saved: list[Figure],
 ) -> None:
-    pictures.draw_grasp(touching_from(grasp_run(), moments), tmp_path / "grasp.png")
-    axes = saved[0].axes
+    run = touching_from(grasp_run(), moments)
+    axes = pictures.draw_grasp(run, tmp_path / "grasp.png").axes
     assert len(axes) == 3 * (1 + len(close_ups))
     by_column = [axes[1 + k :: 1 + len(close_ups)] for k in range(len(close_ups))]
     for fingers, column in zip(close_ups, by_column, strict=True):
@@ -70,20 +54,16 @@ def test_close_ups_of_the_contacts(
     assert width(tmp_path / "grasp.png") == int(130 * (7.2 + 2.9 * len(close_ups)))
 
 
-def test_the_picture_says_which_controller_it_was(tmp_path: Path, saved: list[Figure]) -> None:
+def test_the_picture_says_which_controller_it_was() -> None:
     run = touching_from(grasp_run(), {})
     own = {"components": {"controller": {"fmu": "My$Law$.fmu"}}}
     for settings, title in ((own, "My$Law$"), ({}, "")):
-        pictures.draw_grasp(replace(run, settings=settings), tmp_path / "grasp.png")
-        assert saved[-1].get_suptitle() == title
+        assert pictures.draw_grasp(replace(run, settings=settings)).get_suptitle() == title
 
 
-def test_a_close_up_shows_the_samples_around_the_contact(
-    tmp_path: Path, saved: list[Figure]
-) -> None:
+def test_a_close_up_shows_the_samples_around_the_contact() -> None:
     run = grasp_run()
-    pictures.draw_grasp(run, tmp_path / "grasp.png")
-    gap, force, speed = saved[0].axes[1::3]
+    gap, force, speed = pictures.draw_grasp(run).axes[1::3]
     time, shown = gap.lines[0].get_data()
     rows = (run.time >= TOUCH[1] - 0.015) & (run.time < TOUCH[1] + 0.03)
     np.testing.assert_array_equal(time, run.time[rows])

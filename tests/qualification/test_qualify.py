@@ -9,7 +9,8 @@ import pytest
 from conftest import Altered
 from grasp_cosim import InputError, SimulationError, System
 from grasp_cosim.qualification.bands import Bands, Given
-from grasp_cosim.qualification.qualify import Compared, qualify
+from grasp_cosim.qualification.compared import Compared
+from grasp_cosim.qualification.qualify import qualify
 from grasp_cosim.qualification.verdict import as_bands, as_json, as_text
 from support.cases import CASES
 

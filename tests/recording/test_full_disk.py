@@ -1,5 +1,6 @@
 """A full disk: whatever writes a result names the file that was asked for, and leaves no other."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -39,8 +40,8 @@ def test_what_is_beside_it(tmp_path: Path, result: Result, kind: str) -> None:
         result.plot(tmp_path / "before.png")  # matplotlib may write a cache of its own
         (tmp_path / "before.png").unlink()
     path = tmp_path / kind
-    write = {"json": result.to_json, "plot": result.plot}[kind]
+    writers: dict[str, Callable[[Path], object]] = {"json": result.to_json, "plot": result.plot}
     with full_disk(100), pytest.raises(OSError, match="too large") as caught:
-        write(path)
+        writers[kind](path)
     assert caught.value.filename == str(path)
     assert list(tmp_path.iterdir()) == []

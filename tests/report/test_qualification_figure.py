@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from grasp_cosim import System
 from grasp_cosim.qualification.bands import Band
-from grasp_cosim.qualification.qualify import Compared, Qualification
+from grasp_cosim.qualification.compared import Compared
+from grasp_cosim.qualification.qualify import Qualification
 from grasp_cosim.qualification.swap import Swap
 from grasp_cosim.qualification.tube import Curve
 from grasp_cosim.report.qualification import ROWS, draw_qualification

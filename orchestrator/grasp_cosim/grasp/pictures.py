@@ -11,11 +11,12 @@ import numpy as np
 from ..metrics.metric import resolved
 from ..numerals import fixed
 from ..recording.result import Result
-from ..report.plot import BLUE, GREY, RED, finish, new_figure, save
+from ..report.plot import BLUE, GREY, RED, finish, kept, new_figure
 from .metrics import CLOSING, FINGERS, first_contact
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 COLOR = {1: BLUE, 2: RED}
 """Finger 1, the right one, is blue and finger 2 red, as in the paper's figures."""
@@ -27,8 +28,11 @@ BEFORE, AFTER, NEAR = 0.015, 0.03, 0.05
 """s before and after a contact in a close-up; contacts that are nearer than NEAR share one."""
 
 
-def draw_grasp(run: Result, path: Path) -> None:
-    """Gaps, contact forces, target and closing speed as a PNG; on the right around the contacts."""
+def draw_grasp(run: Result, path: Path | None = None) -> Figure:
+    """Gaps, contact forces, target and closing speed; on the right around the contacts.
+
+    With a `path` the figure is written there as a PNG.
+    """
     spans = _around_contacts(run)
     figure = new_figure(7.2 + 2.9 * len(spans), 8.0)
     rows = figure.subplots(
@@ -49,7 +53,7 @@ def draw_grasp(run: Result, path: Path) -> None:
     controller = resolved("controller.", run.roles)[:-1]
     fmu = run.settings.get("components", {}).get(controller, {}).get("fmu", "")
     figure.suptitle(fmu.removesuffix(".fmu"), fontsize=10, parse_math=False)
-    save(figure, path)
+    return kept(figure, path)
 
 
 def _around_contacts(run: Result) -> list[tuple[Sequence[int], float, float]]:

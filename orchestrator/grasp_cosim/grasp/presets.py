@@ -44,6 +44,21 @@ def with_preset(system: System, name: str) -> System:
     return with_si_values(system, built_in_presets()[name], f"[presets.{name}] of {SYSTEM.name}:")
 
 
+def case_of(settings: Mapping[str, Any]) -> str:
+    """The case of a run by its settings, "0" to "2"; "other" where it is in none of these.
+
+    What is not set is taken to be as in case 2, as the controller starts.
+    """
+    roles, presets = settings.get("roles", {}), built_in_presets()
+    given = {
+        f"{name}.{variable}": value
+        for name, component in settings["components"].items()
+        for variable, value in component["values"].items()
+    }
+    values = {k: given.get(resolved(k, roles), v) for k, v in presets["case_2"].items()}
+    return next((str(case) for case in CASES if presets[f"case_{case}"] == values), "other")
+
+
 def with_si_values(system: System, values: Mapping[str, Value], place: str) -> System:
     """The system with start values by role, like plant.object_width, numbers in SI units.
 

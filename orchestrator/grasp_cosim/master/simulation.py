@@ -15,7 +15,7 @@ from ..errors import InputError, SimulationError, choices
 from ..fmi.load import load
 from ..interface.interface import Value
 from ..interruption import interruptible, interrupts, noticing
-from ..metrics.metric import Metric, registered
+from ..metrics.metric import Function, Metric, chosen, registered
 from ..metrics.units import in_si
 from ..realtime.options import Realtime
 from ..realtime.pacer import Pacer
@@ -59,15 +59,16 @@ class Session:
         listeners: Sequence[Listener] = (),
         engine: Engine = "auto",
         realtime: Realtime | None = None,
-        metrics: Sequence[Metric] = (),
+        metrics: Sequence[Metric | Function | str] = (),
         diverging: str | None = None,
         note: Callable[[str], None] | None = None,
     ) -> None:
         """Load and initialise; see simulate() for the arguments and errors."""
         system = system.with_experiment(step, stop, scheme, diverging)
         _check_count("every", every)
-        self._in_si = in_si(system, registered(metrics))  # refuses before the run, not after
-        self._metrics = tuple(metrics)
+        recorded = {str(port) for port in system.recorded}
+        self._metrics = chosen(metrics, recorded, system.roles)
+        self._in_si = in_si(system, registered(self._metrics))  # refuses before, not after
         self.system = system
         self._memory = MemoryListener(every)
         self._wall_time = 0.0
@@ -309,7 +310,7 @@ class Simulate:
         listeners: Sequence[Listener] = (),
         engine: Engine = "auto",
         realtime: Realtime | None = None,
-        metrics: Sequence[Metric] = (),
+        metrics: Sequence[Metric | Function | str] = (),
         diverging: str | None = None,
         note: Callable[[str], None] | None = None,
     ) -> Result:
@@ -320,10 +321,11 @@ class Simulate:
         the last. listeners get what is kept while it is recorded. engine is "python", "compiled"
         (needs a C compiler) or "auto", compiled where that pays; the results have the same bits.
         realtime paces the run by the clock: the result has a timing, and the same bits. metrics are
-        worked out beside those that every result is asked for. diverging, "stop" or "continue",
-        replaces that of the system. note gets the lines of the log but for system.notes: what is
-        known of the system and of t = 0 before the first step, the others at the end, also after a
-        failure.
+        worked out beside those that every result is asked for: from @metric, or functions of their
+        own name; a name among them says that the result must have that metric. diverging, "stop" or
+        "continue", replaces that of the system. note gets the lines of the log but for
+        system.notes: what is known of the system and of t = 0 before the first step, the others at
+        the end, also after a failure.
         Ctrl-C ends the run early: the result is what was recorded, with complete = False.
         InputError where an FMU does not load or refuses its parameters; SimulationError, with what
         was recorded as its result, where one fails on the way, or a signal runs away.

@@ -30,13 +30,10 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import extensions
-from ..errors import InputError, choices
+from ..errors import InputError, choices, nearest
 from ..interface.units import Conversion
 
 Value = float | bool | None
-Function = Callable[["Signals"], Value | Sequence[Value]]
-
-
 RESERVED = frozenset((
     "command", "complete", "components", "connections", "date", "descriptions", "diverging",
     "error", "events", "faults", "fmus", "index", "initialisation", "log", "metric_units",
@@ -94,6 +91,9 @@ class Signals(Mapping[str, npt.NDArray[Any]]):
 
     def __len__(self) -> int:
         return len(self.by_name)
+
+
+Function = Callable[[Signals], Value | Sequence[Value]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -240,6 +240,32 @@ def registered(more: Iterable[Metric] = ()) -> tuple[Metric, ...]:
     if twice is not None:
         raise InputError(f"metric {twice!r}: is there twice; must have another name")
     return tuple(found)
+
+
+def chosen(
+    asked: Iterable[Metric | Function | str], names: Collection[str], roles: Mapping[str, str]
+) -> tuple[Metric, ...]:
+    """Those of `asked` that not every result has anyway: metrics, functions, names of metrics.
+
+    A function is a metric of its own name, without a unit; a name is one of those that every result
+    is asked for. InputError where there is none of that name, or the signals of these `names` do
+    not permit it.
+    """
+    usual = {m.name: m for m in registered()}
+    for name in (item for item in asked if isinstance(item, str)):
+        if name not in usual:
+            raise InputError(f"metrics: {name!r}: no such metric; {nearest(name, usual)}")
+        reason = lacking(usual[name].needs, names, roles)
+        if reason:
+            raise InputError(f"metrics: {name}: cannot be had: {reason}")
+    own = (item for item in asked if not isinstance(item, str))
+    return tuple(m if isinstance(m, Metric) else metric(_name(m))(m) for m in own)
+
+
+def _name(function: Function) -> str:
+    if not callable(function):
+        raise InputError(f"metrics: {function!r}: must be a metric, a function or a name")
+    return str(getattr(function, "__name__", type(function).__name__))
 
 
 def check_portable(metrics: Iterable[Metric]) -> None:

@@ -8,68 +8,28 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import inf
 from pathlib import Path
-
-import numpy as np
 
 from ..errors import InputError, SimulationError
 from ..interface.interface import Value
 from ..interface.units import IDENTITY, Conversion
 from ..master.simulation import simulate
-from ..metrics.metric import Metric, Signals, measure, registered
+from ..metrics.metric import Metric, registered
 from ..metrics.units import in_si
 from ..recording.result import Result
 from ..system.description import System
 from ..system.parts import NANOSECONDS, Component, Isolation
 from ..system.structure import SCHEMES
-from .bands import SHARE, Band, Bands, Given, check_patterns, entry_for, metric_band, signal_band
+from .bands import SHARE, Bands, entry_for
+from .compared import FEWEST_STEPS, Compared, Curves, Reference, curves_of, every_second
 from .interface_difference import Difference
 from .swap import Swap, prepare_swap
-from .tube import Curve, curve, deviation
-
-FEWEST_STEPS = 2
-"""The least shift in time a derived band allows, in steps: one for the step, one for the scheme."""
+from .tube import Curve
 
 END = Metric(
     "end_of_run", lambda run: float(run.time[-1]), "s", "where an FMU asked for the end, else stop"
 )
 """Compared where one of the runs ends before the stop time."""
-
-Curves = Mapping[str, Curve]
-Entries = Mapping[str, Given | None]
-
-
-@dataclass(frozen=True, slots=True)
-class Compared:
-    """A signal or metric of both runs, in the unit of the original.
-
-    deviation is the largest (inf where only one run has a value of a metric), time in s when that
-    is, original and candidate are the values then, of one the nearest within the shift that its
-    band allows. span is the range of the original's signal.
-    Metrics have no time and span.
-    """
-
-    name: str
-    unit: str | None
-    band: Band
-    deviation: float
-    original: float | None
-    candidate: float | None
-    time: float | None = None
-    span: float | None = None
-
-    @property
-    def ratio(self) -> float:
-        """The deviation in widths of its band."""
-        if self.deviation == 0.0 or self.band.width == inf:
-            return 0.0
-        return self.deviation / self.band.width if self.band.width else inf
-
-    @property
-    def inside(self) -> bool:
-        """True if the deviation is in its band."""
-        return self.ratio <= 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,8 +107,16 @@ def qualify(
     reference = _run(swap.system, progress)
     to_si = {n: c for n, c in more.items() if n not in reference} | dict(reference.to_si)
     asked += (END,) if _ended_early(reference) else ()
-    original = _Original(swap, _curves(reference), reference.units, asked, to_si)
-    signals, singles = original.entries(bands)
+    original = Reference(
+        curves_of(reference),
+        reference.units,
+        _shift(swap.system),
+        asked,
+        swap.system.roles,
+        to_si,
+        swap.nominals,
+    )
+    signals, singles = original.entries(bands, metrics=(END.name,))
     result, failure = None, None
     try:
         result = _run(swap.swapped, progress)
@@ -160,14 +128,14 @@ def qualify(
     numerics: list[str] = []
     if not all(entry and entry.wide for entry in (*signals.values(), *singles.values())):
         again, numerics = _other_numerics(swap.system, original.curves, progress)
-    theirs = _converted(_curves(result), swap) if result else {}
+    theirs = _converted(curves_of(result), swap) if result else {}
     if result and _ended_early(result) and END not in asked:
         original = replace(original, asked=(*asked, END))
         singles = {**singles, END.name: entry_for(bands.metrics, END.name)}
     return Qualification(
         swap,
         original.signals(theirs, again, signals),
-        () if failure else original.metrics(theirs, again, singles),
+        () if failure else original.metrics(original.values(theirs), again, singles),
         failure,
         tuple(numerics),
         (original.curves, theirs),
@@ -204,11 +172,11 @@ def _other_numerics(
 
     And what they are, in words.
     """
-    runs: list[Curves] = [{n: c.thinned(first) for n, c in original.items()} for first in (0, 1)]
+    runs = every_second(original)
     said = ["every second sample"]
     for name, other in _variants(system):
         try:
-            runs.append(_curves(_run(other, progress)))
+            runs.append(curves_of(_run(other, progress)))
             said.append(name)
         except (InputError, SimulationError) as error:
             said.append(f"not {name}: {error}")
@@ -233,8 +201,9 @@ def _remarks(reference: Result, result: Result) -> tuple[str, ...]:
     return (*said, *(f"{name} is a String: not compared" for name in texts))
 
 
-def _curves(result: Result) -> dict[str, Curve]:
-    return {name: curve(result.time, values) for name, values in result.numbers.items()}
+def _shift(system: System) -> float:
+    """The shift in time in s that a derived band allows."""
+    return max(SHARE * system.stop_ns, FEWEST_STEPS * system.step_ns) / NANOSECONDS
 
 
 def _converted(curves: Curves, swap: Swap) -> dict[str, Curve]:
@@ -244,89 +213,3 @@ def _converted(curves: Curves, swap: Swap) -> dict[str, Curve]:
         for name, c in curves.items()
         if (change := swap.back.get(name, IDENTITY)) is not None
     }
-
-
-@dataclass(frozen=True, slots=True)
-class _Original:
-    """The original's run, with which the candidate's is compared, and the metrics of both."""
-
-    swap: Swap
-    curves: Curves
-    units: Mapping[str, str | None]
-    asked: tuple[Metric, ...]
-    to_si: Mapping[str, Conversion | None]
-
-    def entries(self, bands: Bands) -> tuple[Entries, Entries]:
-        """Each signal and each metric with its entry; InputError where an entry is for nothing."""
-        names = self._values(self.curves)
-        check_patterns(f"{bands.place}: [signals]", bands.signals, tuple(self.curves))
-        metrics = [n for name in names for n in dict.fromkeys((_plain(name), name))] + [END.name]
-        check_patterns(f"{bands.place}: [metrics]", bands.metrics, metrics)
-        return (
-            {name: entry_for(bands.signals, name) for name in self.curves},
-            {name: entry_for(bands.metrics, name, _plain(name)) for name in names},
-        )
-
-    def signals(
-        self, candidate: Curves, again: Sequence[Curves], given: Entries
-    ) -> tuple[Compared, ...]:
-        """All signals that both have, up to the end of the run that ends first.
-
-        again are the original's runs with other numerics.
-        """
-        found = []
-        for name, reference in self.curves.items():
-            if name not in candidate:
-                continue
-            theirs = candidate[name].until(float(reference.time[-1]))
-            nominal, others = self.swap.nominals.get(name), [run[name] for run in again]
-            band = signal_band(reference, others, nominal, self._shift, given[name])
-            apart = deviation(reference.until(float(theirs.time[-1])), theirs, band.time)
-            worst = apart.values.argmax()
-            time, distance, ours, other = (float(column[worst]) for column in apart)
-            span = float(np.ptp(reference.values))
-            unit = self.units[name]
-            found.append(Compared(name, unit, band, distance, ours, other, time, span))
-        return tuple(sorted(found, key=lambda c: -c.ratio))
-
-    def metrics(
-        self, candidate: Curves, again: Sequence[Curves], given: Entries
-    ) -> tuple[Compared, ...]:
-        """All metrics of the original; one that the candidate's run lacks is None there.
-
-        But for optional ones that the candidate's signals do not permit.
-        """
-        theirs, others = self._values(candidate), [self._values(run) for run in again]
-        asked, found = {m.name: m for m in self.asked}, []
-        for name, value in self._values(self.curves).items():
-            metric, other = asked[_plain(name)], theirs.get(name)
-            if metric.optional and name not in theirs:
-                continue
-            least = self._shift if metric.unit == "s" else SHARE if metric.unit == "1" else 0.0
-            band = metric_band(value, [run.get(name) for run in others], least, given[name])
-            if value is None or other is None:
-                apart = 0.0 if value is other else inf
-            else:
-                apart = abs(other - value)
-            found.append(Compared(name, metric.unit, band, apart, value, other))
-        return tuple(sorted(found, key=lambda c: -c.ratio))
-
-    @property
-    def _shift(self) -> float:
-        """The shift in time in s that a derived band allows."""
-        system = self.swap.system
-        return max(SHARE * system.stop_ns, FEWEST_STEPS * system.step_ns) / NANOSECONDS
-
-    def _values(self, curves: Curves) -> dict[str, float | None]:
-        """The single values by name, like time_to_contact[1]; true is 1 and false 0."""
-        if not curves:
-            return {}
-        time = next(iter(curves.values())).time
-        roles = self.swap.system.roles
-        signals = Signals(time, {n: c.values for n, c in curves.items()}, roles, self.to_si)
-        found = measure(signals, self.asked).flat()
-        return {name: None if v is None else float(v) for name, v in found.items()}
-
-
-def _plain(value: str) -> str:
-    return value.partition("[")[0]

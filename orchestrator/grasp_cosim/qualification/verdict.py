@@ -5,22 +5,13 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import asdict
-from math import inf, isfinite
 from typing import Any
 
 from ..errors import choices
 from ..system.parts import NANOSECONDS
 from .interface_difference import SEVERITIES, Difference
-from .qualify import Compared, Qualification
-
-ROWS = 8
-"""The most signals, metrics or differences of one severity that the text lists."""
-
-FEW = 3
-"""How many it lists where all of them are inside, or just notes."""
-
-WIDE = 0.1
-"""A band wider than this share of the range of its signal proves little."""
+from .qualify import Qualification
+from .tables import FEW, ROWS, bands_lines, compared_json, compared_table, counts
 
 
 def as_text(q: Qualification) -> str:
@@ -34,7 +25,7 @@ def as_text(q: Qualification) -> str:
     parts = [[head, reason(q)]]
     for name, compared in (("signal", q.signals), ("metric", q.metrics)):
         if compared:
-            parts.append(_table(name, compared))
+            parts.append(compared_table(name, compared))
     parts.append(_differences(q.swap.differences))
     if q.signals:
         parts.append(_basis(q))
@@ -58,8 +49,8 @@ def as_json(q: Qualification) -> dict[str, Any]:
         "scheme": system.scheme,
         "failure": q.failure,
         "differences": [asdict(d) for d in q.swap.differences],
-        "signals": [_compared_json(c) for c in q.signals],
-        "metrics": [_compared_json(c) for c in q.metrics],
+        "signals": [compared_json(c) for c in q.signals],
+        "metrics": [compared_json(c) for c in q.metrics],
         "uncompared": list(q.uncompared),
         "numerics": list(q.numerics),
         "log": list(q.log),
@@ -86,51 +77,7 @@ def reason(q: Qualification) -> str:
         return f"the candidate failed: {q.failure}"
     if not (q.signals or q.metrics):
         return "nothing was compared: no output that both record is a number"
-    counts = [
-        f"{sum(not c.inside for c in compared)} of {len(compared)} {name}"
-        for name, compared in (("signals", q.signals), ("metrics", q.metrics))
-        if compared
-    ]
-    return f"{' and '.join(counts)} out of band"
-
-
-def _table(name: str, compared: Sequence[Compared]) -> list[str]:
-    outside = [c for c in compared if not c.inside]
-    shown = outside[:ROWS] or compared[:FEW]
-    rows = [("x band", name, "deviation", "band", "unit", "at t in s", "original", "candidate")]
-    rows += [
-        (
-            _number(c.ratio, 3),
-            c.name,
-            _number(c.deviation, 3),
-            _number(c.band.width, 3),
-            c.unit or "",
-            "" if c.time is None else f"{c.time:.9g}",
-            _number(c.original, 6),
-            _number(c.candidate, 6),
-        )
-        for c in shown
-    ]
-    if name == "metric":
-        rows = [(*row[:5], *row[6:]) for row in rows]  # type: ignore[misc]
-    left = len(compared) - len(shown)
-    more = f"{len(outside) - len(shown)} more out of band, " if len(outside) > len(shown) else ""
-    inside = len(compared) - len(outside) if outside else left
-    rest = [f"{'':8}{more}{inside} more inside"] if left else []
-    return [*_aligned(rows), *rest]
-
-
-def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Columns side by side: texts to the left, numbers to the right."""
-    texts = {i for i, title in enumerate(rows[0]) if title in ("signal", "metric", "unit")}
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return [
-        "  ".join(
-            cell.ljust(width) if i in texts else cell.rjust(width)
-            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in rows
-    ]
+    return counts(q.signals, q.metrics)
 
 
 def _differences(differences: Sequence[Difference]) -> list[str]:
@@ -148,14 +95,8 @@ def _differences(differences: Sequence[Difference]) -> list[str]:
 
 
 def _basis(q: Qualification) -> list[str]:
-    given = sum(c.band.source == "given" for c in (*q.signals, *q.metrics))
-    derived = len(q.signals) + len(q.metrics) - given
     runs = "; ".join(q.numerics) or "its own range alone"
-    lines = [f"bands: {given} given, {derived} derived from the original ({runs})"]
-    if not derived:
-        lines = [f"bands: all {given} given"]
-    if wide := [c.name for c in q.signals if c.span and WIDE * c.span < c.band.width < inf]:
-        lines.append(f"bands that are wide for the range of their signals: {', '.join(wide)}")
+    lines = bands_lines(q.signals, q.metrics, f"the original ({runs})")
     if q.uncompared:
         names = ", ".join(q.uncompared)
         lines.append(f"not compared, as the candidate has no such output: {names}")
@@ -163,23 +104,3 @@ def _basis(q: Qualification) -> list[str]:
     if len(q.log) > ROWS:
         lines.append(f"the candidate's run: {len(q.log) - ROWS} lines more; --json has all")
     return lines
-
-
-def _number(value: float | None, digits: int) -> str:
-    return "none" if value is None else f"{value:.{digits}g}"
-
-
-def _compared_json(c: Compared) -> dict[str, Any]:
-    numbers = {"ratio": c.ratio, "deviation": c.deviation, "band": c.band.width}
-    return {
-        "name": c.name,
-        "unit": c.unit,
-        "inside": c.inside,
-        **{key: value if isfinite(value) else None for key, value in numbers.items()},
-        "band_time": c.band.time,
-        "band_source": c.band.source,
-        "time": c.time,
-        "original": c.original,
-        "candidate": c.candidate,
-        "span": c.span,
-    }

@@ -125,6 +125,7 @@ def _result(
         more_metrics=_as_recorded(written),
         origin={key: written[key] for key in ORIGIN_KEYS if key in written},
         to_si=_to_si(f"{path}: to_si", written),
+        folder=path.parent,
     )
 
 
@@ -179,7 +180,8 @@ def load_log(path: Path, note: Callable[[str], None] | None = None) -> Signals:
     if not path.is_file():
         raise InputError(f"{path}: no such log; must be a .csv or .mf4 file")
     if path.suffix.lower() == ".mf4":
-        log = _mdf(path)
+        time, columns, units = read_mdf(path)
+        log = Signals(time, columns, to_si=_known(units))
     elif path.suffix.lower() == ".csv":
         time, columns = _table(path)
         log = Signals(time, {n: c for n, c in columns.items() if c.dtype != object})
@@ -193,8 +195,13 @@ def load_log(path: Path, note: Callable[[str], None] | None = None) -> Signals:
     return replace(log, to_si=_to_si(f"{beside}: to_si", _settings(beside)))
 
 
-def _mdf(path: Path) -> Signals:
-    """Every channel of the first group that has samples, on its master."""
+def read_mdf(
+    path: Path,
+) -> tuple[npt.NDArray[np.float64], dict[str, npt.NDArray[np.float64]], dict[str, str]]:
+    """Every channel of the first group that has samples, on its master in s, and their units.
+
+    InputError without asammdf, or where it is damaged or has none.
+    """
     check_mdf()
     from asammdf import MDF
 
@@ -208,12 +215,14 @@ def _mdf(path: Path) -> Signals:
     if not channels:
         raise InputError(f"{path}: no channel has samples; must be a recorded log")
     time = channels[0].timestamps
-    signals = {
-        c.name: c.samples.astype(np.float64)
-        for c in channels
-        if c.samples.shape == time.shape and c.samples.dtype.kind in "fiub"
-    }
-    return Signals(time, signals, to_si=_known({c.name: c.unit for c in channels}))
+    numbers = [
+        c for c in channels if c.samples.shape == time.shape and c.samples.dtype.kind in "fiub"
+    ]
+    return (
+        time,
+        {c.name: c.samples.astype(np.float64) for c in numbers},
+        {c.name: str(c.unit) for c in numbers},
+    )
 
 
 def _settings(path: Path) -> dict[str, Any]:

@@ -1,27 +1,41 @@
 """The result of a run: every output at every communication point, as plain data."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from .. import extensions
+from ..checks import is_number
+from ..errors import UnknownNameError, choices
 from ..files import in_one_piece, write_json
 from ..interface.units import Conversion
 from ..metrics.metric import Measured, Metric, Signals, measure, registered
+from ..plain import on_one_line
 from ..realtime.timing import Timing
 from ..system.parts import NANOSECONDS
 from .csv import CsvListener
+from .frames import as_pandas, as_xarray
 from .listener import Experiment, Listener, Signal
 from .mdf import MdfListener
 from .proxies import proxy_figures
 
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+    from matplotlib.figure import Figure
+
 KINDS = {"f": "Real", "i": "Integer", "b": "Boolean", "O": "String"}
 """The kind of a signal by the kind of its column's element type."""
+
+FEW, WIDTH = 3, 100
+"""So many names, and characters, are in a line of a result's repr()."""
 
 PIECE = 8192
 """Rows written at once."""
@@ -71,9 +85,26 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     """The date, versions and command of a run with a folder: see recording.folder."""
     to_si: Mapping[str, Conversion | None] = field(default_factory=dict)
     """The conversions to SI base units of signals in others; None where the unit is in doubt."""
+    folder: Path | None = None
+    """Where it was read from; None of a run that was just done."""
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
+        """The signal; KeyError, with the names nearest to it, where there is none."""
+        if name not in self.signals:
+            raise UnknownNameError(name, tuple(self.signals))
         return self.signals[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.signals
+
+    def __repr__(self) -> str:
+        """What it is, in five lines."""
+        lines = map(on_one_line, self._in_words())
+        return "\n".join(x if len(x) <= WIDTH else f"{x[: WIDTH - 3]}..." for x in lines)
+
+    def _repr_html_(self) -> str:
+        """The run and its metrics, as notebooks show them."""
+        return extensions.html[0](self)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.signals)
@@ -174,12 +205,47 @@ class Result(Mapping[str, npt.NDArray[Any]]):
         }
         write_json(Path(path), report)
 
-    def plot(self, path: str | Path) -> None:
-        """Draw the result as a PNG: a grasp as one, of any other system all signals.
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """Draw a grasp as one, of any other system all signals: the figure of matplotlib.
 
-        InputError without matplotlib.
+        With a `path` it is written there too, as a PNG. InputError without matplotlib.
         """
-        self.drawing.draw(self, Path(path))
+        figure: Figure = self.drawing.draw(self, None if path is None else Path(path))
+        return figure
+
+    def to_pandas(self) -> pd.DataFrame:
+        """The signals as a DataFrame, by time in s; its `attrs` have the units, by column.
+
+        InputError without pandas.
+        """
+        return as_pandas(self.time, self.signals, self.units, self._about)
+
+    def to_xarray(self) -> xr.Dataset:
+        """The signals as a Dataset over time in s, each with its `units`, and its description as
+        `long_name`. InputError without xarray.
+        """
+        return as_xarray(self.time, self.signals, self.units, self.descriptions, self._about)
+
+    @property
+    def _about(self) -> dict[str, Any]:
+        """The run in a few words, for the attributes of a table."""
+        return {key: self.settings[key] for key in ("system", "scheme", "step", "stop")}
+
+    def _in_words(self) -> Iterator[str]:
+        """The lines of its repr()."""
+        settings, rows = self.settings, len(self.time)
+        where = f", read from {self.folder}" if self.folder else ""
+        yield f"Result of {settings['system']}{where}"
+        end = f"{self.time[-1]:.6g} s of " if rows and not self.complete else ""
+        took = f", took {self.wall_time:.3g} s" if self.wall_time else ""
+        broken = "" if self.complete else ", not complete"
+        step, stop = 1e3 * settings["step"], settings["stop"]
+        how = f"in steps of {step:.6g} ms, {settings['scheme']}"
+        yield f"  run      {end}{stop:.6g} s {how}{took}{broken}"
+        yield f"  signals  {len(self)}, of {rows} rows: {choices(self, FEW)}"
+        found = (_in_words(m, self.measured.values[m.name]) for m in self.measured.metrics)
+        yield f"  metrics  {'; '.join([*found][:FEW]) or 'none'}"
+        yield f"  log      {choices(self.log, 1) if self.log else 'nothing to report'}"
 
     @property
     def drawing(self) -> extensions.Drawing:
@@ -214,6 +280,16 @@ class Result(Mapping[str, npt.NDArray[Any]]):
                 listener.block(steps, rows)
         finally:
             listener.end(self.complete)
+
+
+def _in_words(metric: Metric, value: Any) -> str:
+    """A metric and its value, as tables show it: time_to_contact 1.887, 1.897 s."""
+    values = value if isinstance(value, list) else [value]
+    texts = [
+        f"{metric.factor * v:.4g}" if is_number(v) else "none" if v is None else str(v)
+        for v in values
+    ]
+    return f"{metric.name} {', '.join(texts)} {metric.display_unit}".rstrip()
 
 
 def conversions_entry(to_si: Mapping[str, Conversion | None]) -> dict[str, Any]:

@@ -91,27 +91,56 @@ def page_html(result: Result, title: str, *, scene: Scene | None = None, limit: 
         "connections": ("Connections", _connections(result)),
         "settings": ("Settings", settings_html(result)),
     }
-    there = {name: section for name, section in sections.items() if section}
-    scene_script = scene.scripts if scene else ""
+    return document(
+        title,
+        summary(result.metrics),
+        {name: section for name, section in sections.items() if section},
+        _state(result, shown, scene),
+        data_html(shown.time, {f"signal{k}": v for k, v in enumerate(shown.signals.values())}),
+        [scripts("main", "panels"), scene.scripts if scene else ""],
+        scene.style if scene else "",
+    )
+
+
+def document(
+    title: str,
+    summary: str,
+    sections: Mapping[str, tuple[str, str]],
+    state: Mapping[str, Any],
+    data: str,
+    script: Sequence[str],
+    style: str = "",
+) -> str:
+    """Return a page with traces as text.
+
+    `summary` and `data` are HTML, `sections` are by their ids, each its head and its HTML; `state`
+    is what the scripts take as `page`, `script` what comes between those of the traces and the
+    start, and `style` what comes after that of the page.
+    """
     return Template(_text("page.html")).substitute(
         title=escape(title),
-        style=page_style() + (scene.style if scene else ""),
-        summary=summary(result.metrics),
-        contents="".join(f'<a href="#{name}">{head}</a>' for name, (head, _) in there.items()),
+        style=page_style() + style,
+        summary=summary,
+        contents="".join(f'<a href="#{name}">{head}</a>' for name, (head, _) in sections.items()),
         sections="\n".join(
             f'<section id="{name}">\n<h2>{head}</h2>\n{html}\n</section>'
-            for name, (head, html) in there.items()
+            for name, (head, html) in sections.items()
         ),
         version=escape(version("grasp-cosim")),
-        page=_json(_state(result, shown, scene)),
-        data=_data(shown),
-        script="\n".join([traces_script(), _text("main.js"), scene_script, _text("start.js")]),
+        page=_json(state),
+        data=data,
+        script="\n".join([traces_script(), *script, scripts("start")]),
     )
 
 
 def traces_script() -> str:
     """Return the scripts that draw traces and take what a hand does to them."""
-    return "\n".join(_text(f"{name}.js") for name in ("data", "traces", "view", "hands"))
+    return scripts("data", "traces", "view", "hands")
+
+
+def scripts(*names: str) -> str:
+    """Return the scripts of these names."""
+    return "\n".join(_text(f"{name}.js") for name in names)
 
 
 def page_style() -> str:
@@ -121,7 +150,7 @@ def page_style() -> str:
 
 def _state(result: Result, shown: Shown, scene: Scene | None) -> dict[str, Any]:
     """Return the data for the scripts, without the values of the signals."""
-    marks = [*(scene.marks if scene else ()), *((t, "--fault") for t in _moments(result.log))]
+    marks = [*(scene.marks if scene else ()), *((t, "--fault") for t in moments(result.log))]
     return {
         "rows": len(shown.time),
         "signals": [
@@ -156,19 +185,16 @@ def _json(value: Any) -> str:
     return json.dumps(value).replace("<", "\\u003c")
 
 
-def _data(shown: Shown) -> str:
-    columns = {
-        "time": shown.time,
-        **{f"signal{k}": v for k, v in enumerate(shown.signals.values())},
-    }
+def data_html(time: npt.NDArray[np.float64], columns: Mapping[str, npt.NDArray[Any]]) -> str:
+    """Return the columns of the traces by their ids, as elements that the scripts unpack."""
     return "\n".join(
         f'<script type="text/plain" id="{name}">{packed(values)}</script>'
-        for name, values in columns.items()
+        for name, values in {"time": time, **columns}.items()
     )
 
 
-def _exactness(shown: Shown, rows: int) -> str:
-    columns = len(shown.signals)
+def exactness(shown: Shown, rows: int, columns: int) -> str:
+    """Return how much of so many rows and signals is in the page, as HTML."""
     if shown.rows_per_pair is None:
         return f"All {count(rows)} points of {columns} signals are in this page, to the last bit."
     return (
@@ -178,21 +204,35 @@ def _exactness(shown: Shown, rows: int) -> str:
 
 
 def _traces(result: Result, shown: Shown, scene: Scene | None) -> str:
-    """Return the traces: buttons, boxes to choose signals, the place where they are drawn."""
-    zooms = "\n".join(
+    return traces_html(
+        exactness(shown, len(result.time), len(shown.signals)),
+        {name: result.units[name] for name in result.signals},
+        result.descriptions,
+        scene.zooms if scene else (),
+    )
+
+
+def traces_html(
+    how_exact: str, units: Mapping[str, str | None], texts: Mapping[str, str], zooms: Sequence[Zoom]
+) -> str:
+    """Return the traces: buttons, boxes to choose signals, the place where they are drawn.
+
+    `units` are those of the signals by name, `texts` their descriptions.
+    """
+    buttons = "\n".join(
         f'<button type="button" class="{zoom.kind}" data-from="{zoom.begin!r}" '
         f'data-to="{zoom.end!r}">{escape(zoom.text)}</button>'
-        for zoom in (scene.zooms if scene else ())
+        for zoom in zooms
     )
     return Template(_text("traces.html")).substitute(
-        zooms=zooms, signals=_choice(result), exactness=_exactness(shown, len(result.time))
+        zooms=buttons, signals=_choice(units, texts), exactness=how_exact
     )
 
 
-def _choice(result: Result) -> str:
+def _choice(units: Mapping[str, str | None], texts: Mapping[str, str]) -> str:
     """A box to tick per signal, in groups by component."""
     groups: dict[str, list[str]] = {}
-    for name in result.signals:
+    for name in units:
         groups.setdefault(name.partition(".")[0], []).append(name)
     html = []
     for component, names in groups.items():
@@ -202,8 +242,8 @@ def _choice(result: Result) -> str:
             "</legend>"
         )
         for name in names:
-            unit = f" <small>{escape(result.units[name] or '')}</small>"
-            about = escape(result.descriptions.get(name, ""))
+            unit = f" <small>{escape(units[name] or '')}</small>"
+            about = escape(texts.get(name, ""))
             html.append(
                 f'<label title="{about}"><input type="checkbox" '
                 f'data-signal="{escape(name)}" data-of="{of}">'
@@ -213,7 +253,7 @@ def _choice(result: Result) -> str:
     return "".join(html)
 
 
-def _moments(log: Sequence[str]) -> list[float]:
+def moments(log: Sequence[str]) -> list[float]:
     """The times in s with which lines of the log begin: events, faults."""
     found = (re.match(r"t = (\S+) s: ", line) for line in log)
     return [float(match[1]) for match in found if match]

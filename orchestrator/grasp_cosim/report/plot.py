@@ -30,14 +30,18 @@ MOST_NAMED = 12
 """So many lines at most get a legend."""
 
 
-def plot_signals(run: Result, path: Path) -> None:
-    """Draw all signals of any run but Strings over time, as a PNG, those of the same unit together.
+def plot_signals(run: Result, path: Path | None = None) -> Figure:
+    """Draw all signals of any run but Strings over time, those of the same unit together.
 
-    InputError without matplotlib, or where there are no signals.
+    With a `path` the figure is written there as a PNG. InputError without matplotlib, or where
+    there are no signals.
     """
     units = list(dict.fromkeys(run.units[name] or "" for name in run.numbers))
     if not units:
-        raise InputError(f"{path}: nothing to draw; must be a result with signals that are numbers")
+        place = run.settings["system"] if path is None else path
+        raise InputError(
+            f"{place}: nothing to draw; must be a result with signals that are numbers"
+        )
     figure = new_figure(9.0, 1.2 + 2.2 * len(units))
     rows = figure.subplots(len(units), 1, sharex=True, squeeze=False)[:, 0]
     for axes, unit in zip(rows, units, strict=True):
@@ -46,13 +50,21 @@ def plot_signals(run: Result, path: Path) -> None:
             axes.plot(run.time, run.signals[name], linewidth=1.0, label=name)
         finish(axes, f"in {unit}" if unit else "no unit", len(names) <= MOST_NAMED)
     figure.axes[-1].set_xlabel("time in s")
-    save(figure, path)
+    return kept(figure, path)
 
 
 def new_figure(width: float, height: float) -> Figure:
     """Return an empty figure, sizes in inches; InputError without matplotlib."""
-    module = extra_module("matplotlib.figure", "it draws the figures", "plot")
-    figure: Figure = module.Figure(figsize=(width, height), dpi=DPI, layout="constrained")
+    extra_module("matplotlib.figure", "it draws the figures", "plot")
+    from .picture import Picture
+
+    return Picture(figsize=(width, height), dpi=DPI, layout="constrained")
+
+
+def kept(figure: Figure, path: Path | None) -> Figure:
+    """Return the figure, saved if there is a path."""
+    if path is not None:
+        save(figure, path)
     return figure
 
 

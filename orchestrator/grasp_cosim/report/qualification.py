@@ -13,7 +13,8 @@ from .plot import BLUE, GREY, RED, new_figure, save
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..qualification.qualify import Compared, Qualification
+    from ..qualification.compared import Compared
+    from ..qualification.qualify import Qualification
 
 ROWS = 4
 """The most signals that are drawn."""

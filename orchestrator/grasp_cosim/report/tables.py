@@ -41,6 +41,19 @@ def summary(run: Mapping[str, Any]) -> str:
     return text
 
 
+def result_html(result: Result) -> str:
+    """What a notebook shows of a result: what it is, its metrics, the names of its signals."""
+    of = f"{escape(str(result.settings['system']))}: {summary(result.metrics)}"
+    where = f", read from {escape(str(result.folder))}" if result.folder else ""
+    names = "".join(
+        f"<li>{escape(n)} <small>{escape(u or '')}</small></li>" for n, u in result.units.items()
+    )
+    return (
+        f"<p>{of}{where}</p>{metrics_table(result)}"
+        f"<details><summary>{len(result)} signals</summary><ul>{names}</ul></details>"
+    )
+
+
 def metrics_table(result: Result) -> str:
     """Return the metrics of a result, and why others are missing.
 
@@ -71,14 +84,15 @@ def _metric(title: str, values: Sequence[Any], metric: Metric, columns: int) -> 
     """A row: a cell per value, or one across all columns."""
     one = f' class="both" colspan="{max(columns, 1)}"'
     how = one if len(values) == 1 else ' class="n"'
-    cells = "".join(f"<td{how}>{escape(_scaled(v, metric.factor))}</td>" for v in values)
+    cells = "".join(f"<td{how}>{escape(scaled(v, metric.factor))}</td>" for v in values)
     note = f' title="{escape(metric.description)}"' if metric.description else ""
     return f"<td{note}>{escape(title)}</td>{cells}<td>{escape(metric.display_unit)}</td>"
 
 
-def _scaled(value: Any, factor: float) -> str:
+def scaled(value: Any, factor: float) -> str:
+    """A value of a metric in its shown unit, for the eye."""
     if isinstance(value, list):
-        return ", ".join(_scaled(v, factor) for v in value)
+        return ", ".join(scaled(v, factor) for v in value)
     if isinstance(value, float):
         return fixed(factor * value, 4, most=1e4, digits=6)
     return number(value)
@@ -101,7 +115,9 @@ def settings_html(result: Result) -> str:
         f"<td>{escape(number(run[key]))} {_UNITS.get(key, '')}</td>"
         for key in EXPERIMENT
     ]
-    experiment += [f"<td>{key}</td><td>{escape(text)}</td>" for key, text in _origin(result.origin)]
+    experiment += [
+        f"<td>{key}</td><td>{escape(text)}</td>" for key, text in origin_rows(result.origin)
+    ]
     lists = [
         bullets("Events", map(entries, run["events"]), "No events."),
         bullets("Faults on connections", map(entries, run["faults"]), "No faults."),
@@ -119,7 +135,7 @@ def settings_html(result: Result) -> str:
     )
 
 
-def _origin(origin: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+def origin_rows(origin: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     """When and with what the run was made, as far as that is known."""
     if "date" in origin:
         yield "date", str(origin["date"])

@@ -17,10 +17,7 @@ function styles(series) { // the colours that signals have, else colours in turn
   });
 }
 
-async function show() {
-  const order = ++asked;
-  const series = await Promise.all(chosen.map((name) => recording.series(name)));
-  if (order !== asked) return; // the choice has changed meanwhile
+function grouped(series) { // those of one panel, by its title
   const groups = new Map();
   for (const one of series) {
     const unit = one.unit ? ` in ${one.unit}` : "";
@@ -28,11 +25,7 @@ async function show() {
     const title = find("by").value === "unit" ? one.unit || "no unit" : name + unit;
     groups.set(title, [...(groups.get(title) || []), one]);
   }
-  find("plots").replaceChildren();
-  panels = [...groups].map(([title, group]) => new Panel(
-    recording, title.replace(/ in \S*$/, ""), styles(group), find("plots")));
-  find("none").hidden = panels.length > 0;
-  redraw();
+  return [...groups].map(([title, group]) => [title.replace(/ in \S*$/, ""), group]);
 }
 
 function choose(names) {

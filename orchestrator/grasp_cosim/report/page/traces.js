@@ -49,6 +49,8 @@ function fitted(canvas) { // the context of a canvas, cleared, in CSS pixels
   return { pen, width, height };
 }
 
+const rows = (begin, end) => Int32Array.from({ length: end - begin + 1 }, (_, i) => begin + i);
+
 class Panel {
   constructor(recording, title, series, parent) {
     this.recording = recording;
@@ -65,6 +67,10 @@ class Panel {
       const item = document.createElement("li"), value = document.createElement("output");
       item.style.setProperty("--line", `var(${one.style.color})`);
       item.dataset.dash = one.style.dash;
+      if (one.style.width) {
+        item.classList.add("wide");
+        item.style.setProperty("--width", `${one.style.width}px`);
+      }
       item.title = one.text;
       item.append(one.name, value);
       this.root.querySelector("ul").append(item);
@@ -111,14 +117,19 @@ class Panel {
     pen.rect(plot.left, plot.top - 2, plot.right - plot.left, plot.bottom - plot.top + 4);
     pen.clip();
     for (const mark of marks) this.upright(pen, plot, x(mark.t), color(mark.color), 0.45, [2, 3]);
+    for (const one of this.series) {
+      if (one.tube) this.tube(pen, x, y, one, begin, end, dense && edges);
+    }
     this.series.forEach((one, i) => {
       pen.strokeStyle = pen.fillStyle = color(one.style.color);
+      pen.globalAlpha = one.style.width ? 0.45 : 1;
       pen.setLineDash(DASHES[one.style.dash]);
-      pen.lineWidth = 1.5;
+      pen.lineWidth = one.style.width || 1.5;
       pen.lineJoin = "round";
       if (dense) this.bars(pen, plot.left, y, drawn[i]);
       else this.points(pen, x, y, one, begin, end, columns);
     });
+    pen.globalAlpha = 1;
     this.upright(pen, plot, x(cursor), color("--ink"), 0.7, []);
     if (hover !== null) this.upright(pen, plot, x(hover), color("--ink"), 0.35, []);
     pen.restore();
@@ -169,6 +180,23 @@ class Panel {
     pen.lineTo(Math.round(at) + 0.5, plot.bottom);
     pen.stroke();
     pen.restore();
+  }
+
+  tube(pen, x, y, { tube, style }, begin, end, edges) { // filled from its lowest to its highest
+    const { lows } = envelope(tube.low, edges || rows(begin, end));
+    const { highs } = envelope(tube.high, edges || rows(begin, end));
+    const at = (i) => x(this.recording.time[edges ? edges[i] : begin + i]);
+    pen.beginPath();
+    for (let i = 0; i < highs.length; i++) {
+      if (!Number.isNaN(highs[i])) pen.lineTo(at(i), y(highs[i]));
+    }
+    for (let i = lows.length - 1; i >= 0; i--) {
+      if (!Number.isNaN(lows[i])) pen.lineTo(at(i), y(lows[i]));
+    }
+    pen.fillStyle = color(style.color);
+    pen.globalAlpha = 0.16;
+    pen.fill();
+    pen.globalAlpha = 1;
   }
 
   bars(pen, left, y, { lows, highs }) { // more rows than pixels: from lowest to highest, joined

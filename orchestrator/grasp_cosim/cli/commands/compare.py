@@ -1,0 +1,52 @@
+"""The command compare."""
+
+from pathlib import Path
+
+import click
+
+from ...comparison import words
+from ...comparison.compare import compare as compare_runs
+from ...files import check_folder
+from ...qualification.bands import read_bands
+from ...report.comparison import write_comparison
+from ..frame import NEGATIVE, PATH, chosen_metrics, json_option, metrics_option, say, show
+
+
+@click.command()
+@click.argument("a", type=PATH)
+@click.argument("b", type=PATH)
+@click.option("-o", "--out", type=PATH, help="A page of both, one over the other: compare.html")
+@click.option("--bands", type=PATH, help="TOML, as of qualify; default: derived from A.")
+@metrics_option
+@json_option
+def compare(
+    a: Path,
+    b: Path,
+    out: Path | None,
+    bands: Path | None,
+    metric_files: tuple[Path, ...],
+    as_json: bool,
+) -> int:
+    """Compare two recorded runs, A and B: signals, metrics and settings.
+
+    Each is a folder that `run --out` wrote, or a file of signals from elsewhere: CSV with the
+    column time and names like plant.gap[1], with a unit in brackets where it is another one,
+    "plant.gap[1] [mm]"; or ASAM MDF (.mf4). Runs of unlike length are compared where both are.
+    Exit code 0: all that both have is inside its band; 1: not.
+
+    \b
+    Example: grasp-cosim compare results_a results_b -o compare.html
+    """
+    if out:
+        check_folder(out.parent)
+    found = compare_runs(
+        a,
+        b,
+        bands=read_bands(bands) if bands else None,
+        metrics=chosen_metrics(metric_files),
+    )
+    if out:
+        write_comparison(found, out)
+        say(f"wrote {out}: {out.stat().st_size / 1e6:.1f} MB")
+    show(as_json, words.as_json(found), words.as_text(found))
+    return 0 if found.alike else NEGATIVE

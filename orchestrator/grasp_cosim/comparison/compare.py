@@ -1,0 +1,181 @@
+"""Compares two runs over the time that both have: signals and metrics, each in its band."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import InputError, choices
+from ..interface.units import Conversion
+from ..metrics.metric import Metric, registered
+from ..qualification.bands import SHARE, Bands
+from ..qualification.compared import (
+    FEWEST_STEPS,
+    Compared,
+    Curves,
+    Reference,
+    Values,
+    every_second,
+    single_values,
+)
+from ..qualification.tube import ROUNDING, Curve
+from ..recording.result import Result
+from .settings import Difference, differences
+from .side import Side, side_of
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """Two runs from `begin` to `end` in s; signals and metrics that both have, the worst first.
+
+    Both are in the units of a. `curves` are the signals of a and of b that were compared, `asked`
+    the metrics that were, `only` the signals that only a has, then those that only b has, and
+    `only_metrics` the metrics. `differences` are those of their settings, where both are runs.
+    """
+
+    a: Side
+    b: Side
+    begin: float
+    end: float
+    signals: tuple[Compared, ...]
+    metrics: tuple[Compared, ...]
+    curves: tuple[Curves, Curves]
+    asked: tuple[Metric, ...]
+    only: tuple[tuple[str, ...], tuple[str, ...]]
+    only_metrics: tuple[tuple[str, ...], tuple[str, ...]]
+    differences: tuple[Difference, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def alike(self) -> bool:
+        """True if all that was compared is inside its band."""
+        return all(c.inside for c in (*self.signals, *self.metrics))
+
+
+def compare(
+    a: Result | str | Path,
+    b: Result | str | Path,
+    *,
+    bands: Bands | None = None,
+    metrics: Sequence[Metric] = (),
+) -> Comparison:
+    """Compare two runs: each a result, a folder that `run --out` wrote, or a CSV or MDF file.
+
+    Bands that are not given are derived from a alone, as in a qualification. `metrics` are compared
+    beside those that every result is asked for. InputError where one cannot be read, or the two
+    have no time or no signal in common.
+    """
+    bands, first, second = bands or Bands(), side_of(a, "A"), side_of(b, "B")
+    first, second = first.like(second), second.like(first)
+    begin, end = _overlap(first, second)
+    ours, theirs = first.part(begin, end), second.part(begin, end)
+    changes = _changes(ours, theirs)
+    asked, other = (_asked(side, part, metrics) for side, part in ((first, ours), (second, theirs)))
+    interval = max(ours.interval, theirs.interval)
+    reference = Reference(
+        ours.curves(),
+        ours.units,
+        max(SHARE * (end - begin), FEWEST_STEPS * interval),
+        asked,
+        ours.roles,
+        ours.to_si,
+    )
+    entries, singles = reference.entries(bands, _lacking(theirs.signals, ours.signals))
+    curves = _converted(theirs, changes, reference.curves)
+    values, again = single_values(theirs.by_role(), other), every_second(reference.curves)
+    own = reference.values(reference.curves)
+    runs = first.result, second.result
+    return Comparison(
+        first,
+        second,
+        begin,
+        end,
+        reference.signals(curves, again, entries),
+        tuple(c for c in reference.metrics(values, again, singles) if c.name in values),
+        ({name: reference.curves[name] for name in curves}, curves),
+        asked,
+        (_lacking(ours.signals, theirs.signals), _lacking(theirs.signals, ours.signals)),
+        (_lacking(own, values), _lacking(values, own)),
+        differences(runs[0], runs[1]) if runs[0] and runs[1] else (),
+        tuple(_notes(first, second, begin, end, changes)),
+    )
+
+
+def _overlap(a: Side, b: Side) -> tuple[float, float]:
+    """The first and the last time in s that both have; InputError where there is none."""
+    begin, end = max(a.time[0], b.time[0]), min(a.time[-1], b.time[-1])
+    spans = [f"{s.name}: {s.time[0]:.6g} to {s.time[-1]:.6g} s" for s in (a, b)]
+    if begin > end + ROUNDING:
+        raise InputError(f"{'; '.join(spans)}: must have some time in common")
+    for side in (a, b):
+        if not len(side.part(begin, end).time):
+            raise InputError(
+                f"{side.name}: has no row from {begin:.6g} to {end:.6g} s; must have one"
+            )
+    return float(begin), float(end)
+
+
+def _changes(a: Side, b: Side) -> dict[str, Conversion | None]:
+    """The conversion of each signal that both have to the unit of a; None where there is none."""
+    for side, other in ((a, b), (b, a)):
+        texts = [name for name in side.texts if name in other.signals]
+        if texts:
+            raise InputError(
+                f"{side.name}: {texts[0]}: has texts; must be numbers, as in {other.name}"
+            )
+    found = {name: a.change(name, b) for name in a.signals if name in b.signals}
+    if not any(found.values()):
+        names = [f"{side.name} has {choices(side.signals, 3)}" for side in (a, b)]
+        raise InputError(f"{'; '.join(names)}: must have a signal of one name and quantity")
+    return found
+
+
+def _asked(side: Side, part: Side, more: Sequence[Metric]) -> tuple[Metric, ...]:
+    """The metrics of a side, those of its own file as they were recorded if all of it counts."""
+    taken, whole = {m.name for m in more}, len(side.time) == len(part.time)
+    own = [m for m in side.recorded_metrics if whole and m.name not in taken]
+    return tuple(m for m in registered([*more, *own]) if not m.reason)
+
+
+def _converted(
+    side: Side, changes: Mapping[str, Conversion | None], like: Curves
+) -> dict[str, Curve]:
+    """The signals in the units of the other, held where one of both is."""
+    curves = side.curves()
+    return {
+        name: Curve(curves[name].time, change(curves[name].values), curves[name].held)
+        if like[name].held == curves[name].held
+        else Curve(curves[name].time, change(curves[name].values), True)
+        for name, change in changes.items()
+        if change is not None
+    }
+
+
+def _lacking(names: Iterable[str], other: Collection[str] | Values) -> tuple[str, ...]:
+    return tuple(name for name in names if name not in other)
+
+
+def _notes(
+    a: Side, b: Side, begin: float, end: float, changes: Mapping[str, Conversion | None]
+) -> Iterator[str]:
+    """What a reader should know of the comparison."""
+    spans = [f"{letter} is {s.time[0]:.6g} to {s.time[-1]:.6g} s" for letter, s in _sides(a, b)]
+    if (a.time[0], a.time[-1]) != (b.time[0], b.time[-1]):
+        yield f"compared from {begin:.6g} to {end:.6g} s, where both are: {', '.join(spans)}"
+    for letter, side in _sides(a, b):
+        if side.result and not side.result.complete:
+            yield f"{letter} did not come to its end: it has rows to {side.time[-1]:.6g} s"
+        if not side.result:
+            yield f"{letter} is a log from elsewhere: its settings are not known"
+            if side.silent:
+                yield f"{letter} tells no units of {choices(side.silent, 6)}: taken as in the other"
+        if side.texts:
+            yield f"{letter} has texts, which are not compared: {choices(side.texts, 6)}"
+    unlike = [f"{n} ({a.units[n]}, {b.units[n]})" for n, change in changes.items() if not change]
+    if unlike:
+        yield f"not compared, as the units do not convert: {choices(unlike, 6)}"
+
+
+def _sides(a: Side, b: Side) -> tuple[tuple[str, Side], tuple[str, Side]]:
+    return ("A", a), ("B", b)

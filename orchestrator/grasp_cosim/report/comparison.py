@@ -1,0 +1,217 @@
+"""The page of a comparison: two runs over each other, and what differs between them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from html import escape
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..comparison.compare import Comparison
+from ..comparison.side import Side
+from ..comparison.words import RUNS, basis, only_lines, verdict
+from ..files import write_text
+from ..metrics.metric import Metric
+from ..qualification.compared import Compared
+from ..qualification.tube import deviation, tube
+from .embed import LIMIT, Shown, fit
+from .page import Scene, data_html, document, moments, scripts, traces_html
+from .tables import bullets, count, number, origin_rows, scaled, summary, table
+
+AT_FIRST = 4
+"""So many of the worst signals are shown first."""
+
+AROUND = 0.02
+"""The share of the time in view before and after a worst moment that a button zooms to."""
+
+Columns = Mapping[str, npt.NDArray[Any]]
+
+
+def write_comparison(c: Comparison, path: Path, limit: int = LIMIT) -> None:
+    """Write the page of a comparison; of more than `limit` values the signals are thinned."""
+    write_text(path, comparison_html(c, limit))
+
+
+def comparison_html(c: Comparison, limit: int = LIMIT) -> str:
+    """Return the page as text, see write_comparison."""
+    time = np.union1d(*(run.part(c.begin, c.end).time for run in (c.a, c.b)))
+    shown = fit(time, {f"{s.name} {k}": v for s in c.signals for k, v in _drawn(c, s, time)}, limit)
+    ids = {key: f"column{k}" for k, key in enumerate(shown.signals)}
+    scene = c.a.result.drawing.scene(c.a.result) if c.a.result else None
+    units = {s.name: s.unit for s in sorted(c.signals, key=lambda s: [*c.curves[0]].index(s.name))}
+    texts = c.a.result.descriptions if c.a.result else {}
+    sections = {
+        "runs": ("A and B", _runs(c)),
+        "traces": ("Traces", traces_html(_exactness(c, shown, len(time)), units, texts, ())),
+        "metrics": ("Metrics", f'<div class="pairs">{_metrics(c)}</div>'),
+        "signals-table": ("Signals, the worst first", f'<div class="pairs">{_signals(c)}</div>'),
+    }
+    return document(
+        f"{c.a.name} and {c.b.name}",
+        f'<span class="{"" if c.alike else "warn"}">{escape(verdict(c))}</span>',
+        sections,
+        _state(c, shown, ids, scene, texts),
+        data_html(shown.time, {ids[key]: values for key, values in shown.signals.items()}),
+        [scripts("main", "pairs")],
+        scene.style if scene else "",
+    )
+
+
+def _drawn(
+    c: Comparison, s: Compared, time: npt.NDArray[np.float64]
+) -> Iterator[tuple[str, npt.NDArray[Any]]]:
+    """What is drawn of a signal at these times: both runs, their deviation and the band."""
+    first, second = (run[s.name] for run in c.curves)
+    apart = deviation(first.until(float(second.time[-1])), second, s.band.time)
+    yield "a", first.at(time)
+    yield "b", second.at(time)
+    yield "apart", np.interp(time, apart.time, apart.values)
+    if isfinite(s.band.width):
+        around = tube(first, time, s.band.time)
+        yield "low", around.low - s.band.width
+        yield "high", around.high + s.band.width
+
+
+def _state(
+    c: Comparison, shown: Shown, ids: Mapping[str, str], scene: Scene | None,
+    texts: Mapping[str, str],
+) -> dict[str, Any]:  # fmt: skip
+    """Return the data for the scripts, without the values of the signals."""
+    logs = [run.result.log for run in (c.a, c.b) if run.result]
+    first = [name for name in (scene.shown if scene else ()) if name in c.curves[0]]
+    worst = [s.name for s in c.signals[:AT_FIRST]]
+    return {
+        "rows": len(shown.time),
+        "signals": [
+            {
+                "name": s.name,
+                "unit": s.unit,
+                "steps": c.curves[0][s.name].held,
+                "text": texts.get(s.name, ""),
+                "id": ids[f"{s.name} a"],
+                "texts": None,
+                "pair": {k: ids.get(f"{s.name} {k}") for k in ("b", "low", "high", "apart")},
+                "width": s.band.width if isfinite(s.band.width) else None,
+            }
+            for s in c.signals
+        ],
+        "shown": list(dict.fromkeys([*first, *worst])),
+        "colors": dict(scene.colors) if scene else {},
+        "marks": [{"t": t, "color": "--fault"} for log in logs for t in moments(log)],
+        "scene": None,
+    }
+
+
+def _exactness(c: Comparison, shown: Shown, rows: int) -> str:
+    thinned = shown.rows_per_pair
+    kept = (
+        f" Of each {thinned} rows this page keeps the lowest and the highest value."
+        if thinned
+        else ""
+    )
+    return (
+        f"A solid and pale, B dashed over it; the tube is the band around A. {count(rows)} rows of "
+        f"{len(c.signals)} signals.{kept}"
+    )
+
+
+def _runs(c: Comparison) -> str:
+    """What the two are, in what they differ, and what is not compared."""
+    sides, heads = (c.a, c.b), "".join(f"<th>{name}</th>" for name in ("", *RUNS))
+    about = [dict(origin_rows(side.result.origin)) if side.result else {} for side in sides]
+    rows = [
+        _row("from", [escape(side.name) for side in sides]),
+        _row("run", [_summary(side) for side in sides]),
+        *(
+            _row(key, [escape(of.get(key, "")) for of in about])
+            for key in ("date", "command")
+            if any(key in of for of in about)
+        ),
+    ]
+    differ = [_row(d.what, [escape(d.a), escape(d.b)]) for d in c.differences]
+    settings = f"<h3>The settings differ in</h3>{table(heads, differ)}" if differ else ""
+    if c.a.result and c.b.result and not differ:
+        settings = "<p>The settings of the two runs are the same.</p>"
+    notes = bullets("Notes", [*c.notes, *only_lines(c), *basis(c)], "None.")
+    return f"{table(heads, rows)}{settings}{notes}"
+
+
+def _summary(side: Side) -> str:
+    if side.result:
+        return summary(side.result.metrics)
+    span = " to ".join(number(float(side.time[row])) for row in (0, -1))
+    return f"{count(len(side.time))} rows, {span} s"
+
+
+def _row(what: str, cells: Iterable[str]) -> str:
+    """A row of cells that are HTML already."""
+    return f"<td>{escape(what)}</td>" + "".join(f'<td class="w">{cell}</td>' for cell in cells)
+
+
+def _metrics(c: Comparison) -> str:
+    """The metrics of both side by side, in the order in which they are worked out."""
+    rows = [
+        _metric(metric, m)
+        for metric in c.asked
+        for m in sorted(c.metrics, key=lambda m: m.name)
+        if m.name.partition("[")[0] == metric.name
+    ]
+    if not rows:
+        return "<p>There are no metrics that both have.</p>"
+    return table(_heads(*RUNS, "B − A", "", "band"), rows)
+
+
+def _heads(*heads: str) -> str:
+    """The heads of columns of numbers, after one of names."""
+    return "<th></th>" + "".join(f'<th class="n">{head}</th>' for head in heads)
+
+
+def _metric(metric: Metric, m: Compared) -> str:
+    entry = m.name.removeprefix(metric.name)
+    title = metric.column_title(m.name) if m.name in metric.columns else f"{metric.title}{entry}"
+    there = m.original is not None and m.candidate is not None
+    apart = (m.candidate or 0.0) - (m.original or 0.0) if there else None
+    first, second, difference, band = (
+        f'<td class="n">{escape(scaled(v, metric.factor))}</td>'
+        for v in (m.original, m.candidate, apart, m.band.width)
+    )
+    return f"{_name(title, metric.display_unit)}{first}{second}{difference}{_verdict(m)}{band}"
+
+
+def _name(name: str, unit: str | None) -> str:
+    return f"<td>{escape(name)}{f' in {escape(unit)}' if unit else ''}</td>"
+
+
+def _signals(c: Comparison) -> str:
+    """The signals, the worst first; a button goes to the worst moment."""
+    rows = [
+        f'{_name(s.name, s.unit)}{_verdict(s)}<td class="n">{_moment(c, s)}</td>'
+        + "".join(
+            f'<td class="n">{escape(number(v, 4))}</td>'
+            for v in (s.deviation, s.band.width, s.original, s.candidate)
+        )
+        for s in c.signals
+    ]
+    return table(_heads("", "at", "deviation", "band", *RUNS), rows)
+
+
+def _moment(c: Comparison, s: Compared) -> str:
+    time, around = s.time or 0.0, AROUND * (c.end - c.begin) or 1e-3
+    return (
+        f'<button type="button" data-show="{escape(s.name)}" data-from="{time - around!r}" '
+        f'data-to="{time + around!r}">{number(time)} s</button>'
+    )
+
+
+def _verdict(compared: Compared) -> str:
+    """How many widths of its band it is off, and if that is in the band."""
+    if compared.inside:
+        return '<td class="n">inside</td>'
+    if not isfinite(compared.deviation):
+        return '<td class="n warn">one has none</td>'
+    times = f"{compared.ratio:.3g} × band" if isfinite(compared.ratio) else "differ"
+    return f'<td class="n warn">{times}</td>'

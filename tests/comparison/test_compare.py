@@ -1,0 +1,182 @@
+"""Two runs compared: what is in both, over the time that both have, each in its band."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from grasp_cosim import InputError, metric
+from grasp_cosim.comparison.compare import Comparison, compare
+from grasp_cosim.comparison.words import as_json, as_text
+from grasp_cosim.qualification.bands import Bands, Given
+from grasp_cosim.recording.result import Result
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from report.runs import grasp_run, write_run
+
+GAP = "plant.gap[1]"
+
+
+def changed(run: Result, **signals: Any) -> Result:
+    """The run with other signals, by the last parts of their names."""
+    return replace(run, signals={**run.signals, **{f"plant.{k}": v for k, v in signals.items()}})
+
+
+def cut(run: Result, rows: slice) -> Result:
+    """Some rows of the run."""
+    columns = {name: column[rows] for name, column in run.items()}
+    return replace(run, time=run.time[rows], signals=columns)
+
+
+@pytest.fixture
+def folders(tmp_path: Path) -> Any:
+    def compared(a: Result, b: Result, **more: Any) -> Comparison:
+        for name, run in (("a", a), ("b", b)):
+            write_run(tmp_path / name, run)
+        return compare(tmp_path / "a", tmp_path / "b", **more)
+
+    return compared
+
+
+def test_a_run_is_like_itself(folders: Any) -> None:
+    found = folders(grasp_run(), grasp_run())
+    assert found.alike
+    assert {s.name for s in found.signals} == set(grasp_run())
+    assert {s.deviation for s in found.signals} == {0.0}
+    assert len(found.metrics) > 8
+    assert as_text(found).startswith("ALIKE: 0 of 16 signals and 0 of ")
+    assert "the settings of the runs are the same" in as_text(found)
+
+
+def test_results_are_compared_as_they_are() -> None:
+    found = compare(grasp_run(), cut(grasp_run(), slice(0, 1001)))
+    assert found.alike
+    assert (found.a.name, found.b.name, found.end) == ("A", "B", 1.0)
+
+
+def test_a_shift_in_time_within_the_band_is_allowed_and_a_longer_one_is_not() -> None:
+    run = grasp_run()
+    late = np.concatenate([run[GAP][:1].repeat(5), run[GAP][:-5]])
+    moved = replace(run, signals={**run.signals, GAP: late})
+    given = {GAP: Given(absolute=1e-9, time=5e-3)}
+    others = {"*": Given(absolute=1e9)}
+    wide = Bands(signals={**given, **others}, metrics=others)
+    assert compare(run, moved, bands=wide).alike
+    tight = replace(wide, signals={GAP: Given(absolute=1e-9, time=4e-3), **others})
+    found = compare(run, moved, bands=tight)
+    assert not found.alike
+    assert [s.name for s in found.signals if not s.inside] == [GAP]
+
+
+def test_runs_of_unlike_length_and_step_are_compared_where_both_are(folders: Any) -> None:
+    run = grasp_run()
+    found = folders(run, cut(run, slice(200, 1801, 4)))
+    assert (found.begin, found.end) == (0.2, 1.8)
+    by_name = {s.name: s for s in found.signals}
+    assert by_name[GAP].inside
+    assert by_name["controller.target_position"].deviation < 1e-6
+    same = {m.name: (m.original, m.candidate) for m in found.metrics}
+    assert same["object_shift"][0] == same["object_shift"][1]
+    assert same["target_position"][0] == pytest.approx(run["controller.target_position"][1800])
+    note = "compared from 0.2 to 1.8 s, where both are: A is 0 to 2 s, B is 0.2 to 1.8 s"
+    assert note in found.notes
+
+
+def test_runs_at_other_times_are_refused_in_one_line(folders: Any) -> None:
+    run = grasp_run()
+    later = replace(run, time=run.time + 5.0)
+    with pytest.raises(InputError, match=r"a: 0 to 2 s; .*b: 5 to 7 s: must have some time in"):
+        folders(run, later)
+
+
+def test_signals_and_metrics_of_one_run_only_are_named_and_not_judged(folders: Any) -> None:
+    run = grasp_run()
+    less = {name: c for name, c in run.items() if name != "controller.target_position"}
+    found = folders(run, replace(run, signals=less, units={n: run.units[n] for n in less}))
+    assert found.alike
+    assert found.only == (("controller.target_position",), ())
+    assert "time_to_contact[1]" in found.only_metrics[0]
+    assert not found.metrics
+    assert "signals only in A: controller.target_position" in as_text(found)
+
+
+def test_signals_in_another_unit_are_converted_and_of_another_quantity_left_out(
+    folders: Any,
+) -> None:
+    run = grasp_run()
+    names = (GAP, "plant.gap[2]")
+    other = replace(
+        run,
+        signals={**run.signals, GAP: 1e3 * run[GAP]},
+        units={**run.units, GAP: "mm", "plant.gap[2]": "N"},
+    )
+    found = folders(run, other)
+    signals = {s.name: s for s in found.signals}
+    assert signals[GAP].inside
+    assert signals[GAP].unit == "m"
+    assert names[1] not in signals
+    assert "not compared, as the units do not convert: plant.gap[2] (m, N)" in found.notes
+
+
+def test_a_metric_that_is_off_makes_the_runs_differ(folders: Any) -> None:
+    @metric("farthest", unit="m")
+    def farthest(run: Any) -> float:
+        return float(run[GAP].max())
+
+    run = grasp_run()
+    spike = run[GAP].copy()
+    spike[0] += 0.01
+    found = folders(
+        run,
+        changed(run, **{"gap[1]": spike}),
+        bands=Bands(signals={"*": Given(absolute=np.inf)}, metrics={"farthest": Given(relative=0)}),
+        metrics=[farthest],
+    )
+    off = {m.name: m for m in found.metrics}["farthest"]
+    assert off.deviation == pytest.approx(0.01)
+    assert not found.alike
+    report = as_json(found)
+    entry = next(m for m in report["metrics"] if m["name"] == "farthest")
+    assert (entry["a"], entry["b"], entry["inside"]) == (run[GAP][0], spike[0], False)
+
+
+def test_recorded_metrics_of_a_users_file_are_compared_as_they_were(
+    folders: Any, tmp_path: Path
+) -> None:
+    def own(value: float) -> Result:
+        @metric("grip", unit="N")
+        def grip(_: Any) -> float:
+            return value
+
+        return replace(grasp_run(), more_metrics=(grip,))
+
+    found = folders(own(3.0), own(4.0))
+    assert [(m.original, m.candidate) for m in found.metrics if m.name == "grip"] == [(3.0, 4.0)]
+    short = tmp_path / "short"
+    write_run(short, cut(own(4.0), slice(0, 1500)))
+    assert "grip" not in {m.name for m in compare(tmp_path / "a", short).metrics}
+
+
+def test_a_band_for_nothing_is_refused(folders: Any) -> None:
+    bands = Bands("own.toml", signals={"plant.gp*": Given(absolute=1.0)})
+    with pytest.raises(InputError, match=r"own.toml: \[signals\]: nothing is called 'plant.gp\*'"):
+        folders(grasp_run(), grasp_run(), bands=bands)
+
+
+@pytest.mark.slow
+@settings(max_examples=25)
+@given(by=st.floats(-1e-2, 1e-2), width=st.floats(1e-6, 1e-2))
+def test_an_offset_is_inside_just_where_it_is_no_wider_than_its_band(
+    tmp_path_factory: pytest.TempPathFactory, by: float, width: float
+) -> None:
+    folder = tmp_path_factory.mktemp("offset")
+    rows = [(t, 0.1) for t in np.linspace(0.0, 1.0, 11).tolist()]
+    for name, offset in (("a", 0.0), ("b", by)):
+        lines = [f"{t!r},{v + offset!r}" for t, v in rows]
+        (folder / f"{name}.csv").write_text("\n".join(["time,x.y", *lines]))
+    bands = Bands(signals={"x.y": Given(absolute=width)})
+    found = compare(folder / "a.csv", folder / "b.csv", bands=bands)
+    assert found.alike == (abs((0.1 + by) - 0.1) <= width)
+    back = compare(folder / "b.csv", folder / "a.csv", bands=bands)
+    assert back.signals[0].deviation == found.signals[0].deviation
