@@ -83,6 +83,19 @@ def test_an_fmu_that_is_swapped_in(command: Run, tmp_path: Path) -> None:
     assert last("out") == 7.0
 
 
+def test_a_misspelt_column_of_an_input_without_a_source(command: Run, tmp_path: Path) -> None:
+    text = driven(tmp_path, TEXT).read_text("utf-8")
+    (tmp_path / "driven.toml").write_text(text.replace("values = { u_Real = 0, ", "values = { "))
+    for column, said in (
+        ("a.u_Raal", "drive.csv: line 1, column 2, a.u_Raal: no input 'a.u_Raal'; valid: a.u_Real"),
+        ("b.u_Real", "drive.csv: line 1, column 2, b.u_Real: no component 'b'; valid: a"),
+    ):
+        Path("drive.csv").write_text(f"time,{column}\n0,7\n", "utf-8")
+        code, _, err = command("run", "driven.toml", "--input", "drive.csv")
+        assert code == 2
+        assert said in err
+
+
 def test_an_archive_whose_input_would_keep_its_start_value(command: Run, tmp_path: Path) -> None:
     system = System.load(driven(tmp_path, TEXT, more=INPUT))
     write_ssp(system, tmp_path / "a.ssp")

@@ -49,6 +49,12 @@ WRONG = [
     ((*TWO[:2], "--rename", "gap"), "must be [COMPONENT.]VARIABLE=FMUS_VARIABLE"),
     ((*TWO[:2], "--rename", "gap[1]=Gap"), "GripperPlant.fmu has no variable 'Gap'; valid: force"),
     ((*TWO[:2], "--units", "gap[1]=quux"), "units: 'gap[1]' = 'quux': no unit that GripperPlant"),
+    (
+        ("--swap", "plant=fmus/ProximitySensor.fmu"),
+        "--swap plant: ProximitySensor.fmu has no output 'gap[1]', and 7 more that are connected; "
+        "valid: intensity; if they have other names: --rename 'gap[1]=NAME', or `grasp-cosim init "
+        "my_system.toml --as plant=",
+    ),
     (("--isolation", "hand=none"), "--isolation hand=none: no component 'hand'; valid: plant, s"),
 ]
 

@@ -54,6 +54,16 @@ def test_a_connection_converts_by_the_named_unit(tmp_path: Path, unit: str, fact
     assert settings(system)["components"]["plant"]["units"] == {"gap": unit}
 
 
+@pytest.mark.parametrize("plant", [PLANT, BARE])
+def test_a_minus_before_a_unit_turns_the_sign(tmp_path: Path, plant: dict[str, str]) -> None:
+    system = load(tmp_path, plant, 'units = { gap = "-mm", width = "-m" }')
+    assert gap_to_position(system) == pytest.approx((-1e-3, 0.0), rel=1e-15)
+    interface = system.component("plant", "").interface
+    assert interface.in_units({"gap": "-m"}).units["-m"].factor == -1.0
+    with pytest.raises(InputError, match="units: 'gap' = '--kg': no unit that"):
+        interface.in_units({"gap": "--kg"})
+
+
 def test_without_a_name_values_are_passed_as_they_are(tmp_path: Path) -> None:
     assert gap_to_position(load(tmp_path, BARE)) == (1.0, 0.0)
 

@@ -349,8 +349,9 @@ class Interface:
     def in_units(self, units: Mapping[str, str], place: str = "units") -> "Interface":
         """The same with other units: `units` maps a variable to the name of its unit.
 
-        That is one of the FMU's own definitions, or else a known one. place says where the table
-        comes from. InputError where there is no such variable, or no such unit.
+        That is one of the FMU's own definitions, or else a known one, with a minus before it where
+        the FMU counts the other way. place says where the table comes from. InputError where there
+        is no such variable, or no such unit.
         """
         key = ("units", *units.items())
         if units and key not in self.made:
@@ -372,13 +373,15 @@ class Interface:
                     f"{entry}: is of type {self.by_name[name].nature}; must be a Real, as only "
                     "these have units"
                 )
-            found = defined.get(unit) or known_unit(unit)
+            plain = unit[1:] if unit.startswith("-") else unit
+            found = defined.get(unit) or known_unit(unit) or defined.get(plain) or known_unit(plain)
             if found is None:
                 raise InputError(
                     f"{entry}: no unit that {self.path.name} defines, or that is known; must be "
-                    "like 'mm', 'm/s', 'N.s/m', 'deg', 'degC', '1'"
+                    "like 'mm', 'm/s', 'N.s/m', 'deg', 'degC', '1', or '-mm' for what counts the "
+                    "other way"
                 )
-            defined[unit] = found
+            defined[unit] = found if found.name == unit else found.reversed(unit)
         variables = (
             replace(v, unit=units[v.name], display_unit=None) if v.name in units else v
             for v in self.variables

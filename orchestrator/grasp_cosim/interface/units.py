@@ -33,6 +33,10 @@ class Unit:
         """The unit of differences."""
         return replace(self, offset=0.0) if self.offset else self
 
+    def reversed(self, name: str) -> "Unit":
+        """The unit, by another name, of values with the other sign."""
+        return replace(self, name=name, factor=-self.factor)
+
     def measures(self, other: "Unit") -> bool:
         """True if both are of one quantity; an angle is a number, as many tools define it."""
         return self.exponents[:-1] == other.exponents[:-1]

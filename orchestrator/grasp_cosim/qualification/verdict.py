@@ -100,6 +100,11 @@ def _basis(q: Qualification) -> list[str]:
     if q.uncompared:
         names = ", ".join(q.uncompared)
         lines.append(f"not compared, as the candidate has no such output: {names}")
+        if any(c.original is not None and c.candidate is None for c in q.metrics):
+            lines.append(
+                "metrics that want such an output have no value there; to judge it without them: "
+                "--bands with '*' = { absolute = inf } under [metrics]"
+            )
     lines += [f"the candidate's run: {line}" for line in q.log[:ROWS]]
     if len(q.log) > ROWS:
         lines.append(f"the candidate's run: {len(q.log) - ROWS} lines more; --json has all")

@@ -14,7 +14,7 @@ from ..interface.interface import SUPPORTED, Interface, Variable, limits
 from ..interface.units import conversion
 from .arrays import as_written, unsourced
 from .parts import LOOPS, Component, Connection, Port, seconds
-from .stimuli_checks import driven, stimuli_remarks
+from .stimuli_checks import check_stimuli, driven, stimuli_remarks
 from .structure import Structure
 
 FINEST, COARSEST = 1e-13, 0.1
@@ -110,6 +110,7 @@ def check_connections(system: Structure) -> None:
         if (port := Port(component.name, v.name)) not in sources and port not in others
     ]
     if missing:
+        check_stimuli(system, whole=True)
         outputs = [
             Port(c.name, v.name) for c in system.components for v in c.interface.of("output")
         ]

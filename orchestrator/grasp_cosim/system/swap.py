@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from shlex import quote
 
-from ..errors import InputError
+from ..errors import InputError, choices
 from ..interface.interface import Interface, Value
 from ..interface.read import describe
 from ..interface.units import IDENTITY
@@ -40,6 +41,7 @@ def with_fmu(
     """
     now = replaced(was, new, f"{place}: ")
     before, after = was.interface, now.interface
+    _check_ends(system, was, after, place)
     given = {n: value for n, value in was.values.items() if new.exact or n in after.by_name}
     kept = {name: value for name, value in given.items() if name not in anew}
     for name in [*kept, *sorted(stated(system, was.name))]:
@@ -53,6 +55,23 @@ def with_fmu(
         if name not in given
     ]
     return replace(now, values={**given, **converted(kept, before, after)}), notes
+
+
+def _check_ends(system: Structure, was: Component, after: Interface, place: str) -> None:
+    """InputError where another FMU lacks what the system connects: it may call that otherwise."""
+    ends = [port for c in system.connections for port in (c.source, c.target)]
+    names = dict.fromkeys(p.variable for p in ends if p.component == was.name)
+    lacking = [n for n in names if n in was.interface.by_name and n not in after.by_name]
+    if lacking:
+        causality = was.interface.by_name[lacking[0]].causality
+        more = f", and {len(lacking) - 1} more that are connected" if lacking[1:] else ""
+        its = choices([v.name for v in after.of(causality)])
+        fmu = quote(str(after.path))
+        raise InputError(
+            f"{place}: {after.path.name} has no {causality} {lacking[0]!r}{more}; valid: {its}; if "
+            f"they have other names: --rename '{lacking[0]}=NAME', or `grasp-cosim init "
+            f"my_system.toml --as {was.name}={fmu}` finds them"
+        )
 
 
 def replaced(was: Component, new: Replacement, place: str) -> Component:
