@@ -1,6 +1,7 @@
 """Values at t = 0: the order they are passed on in, algebraic loops, wrong declarations."""
 
 from collections.abc import Callable, Sequence
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -148,6 +149,14 @@ def test_a_loop_that_no_declaration_shows_is_refused(mock: Make) -> None:
     mocks = [mock("a", lambda u, t: u + 1.0, direct=False), mock("b", through)]
     with pytest.raises(InputError, match="do not settle, a loop through"):
         run(mocks, ["ab", "ba"]).master.initialise()
+
+
+def test_an_output_that_changes_each_time_it_is_read_is_said(mock: Make) -> None:
+    """As the time of day does: nothing is connected to it, so it is no loop."""
+    clock = count()
+    started = run([mock("a", through), mock("b", lambda u, t: float(next(clock)))], ["ab"])
+    started.master.initialise()
+    assert started.master.log == ["b.y changes each time it is read"]
 
 
 def test_a_failure_in_initialisation_is_a_wrong_input(mock: Make) -> None:

@@ -203,8 +203,13 @@ class Propagation:
         return number if kind == "Real" else int(number) if kind == "Integer" else number != 0.0
 
     def _check_dependencies(self) -> list[str]:
-        """Pass on again while outputs change: a line for each that hides a dependency."""
+        """Pass on again while outputs change: a line for each that hides a dependency.
+
+        Outputs that nothing is connected to may change each time they are read, like the time of
+        day.
+        """
         given = {port: self.values[port] for port in self.order.cuts}
+        sources = {connection.source for connection in self._connections.values()}
         found: list[Port] = []
         for _ in range(len(self.order.ports) + 1):
             before = dict(self.values)
@@ -221,6 +226,8 @@ class Propagation:
                     for port in dict.fromkeys(found)
                 ]
             found.append(moved[0])  # the others may follow from it
+        if sources.isdisjoint(moved):
+            return [f"{port} changes each time it is read" for port in moved]
         raise InputError(
             f"{self.system.name}: the values at t = 0 do not settle, a loop through "
             f"{choices(dict.fromkeys(found))} that the FMUs' dependencies do not show; {ADVICE}"
