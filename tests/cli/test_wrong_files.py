@@ -26,7 +26,7 @@ SYSTEM = [
 
 @pytest.fixture
 def things(grasp: System, fmus: Path, tmp_path: Path) -> Path:
-    """One of each: plant.fmu and my.zip, the same; the folder unpacked; a.ssp; a.toml; b.py; run/."""
+    """One of each: plant.fmu, my.zip, the same; the folder unpacked; a.ssp; a.toml; b.py; run/."""
     plant = tmp_path / "plant.fmu"
     plant.write_bytes((fmus / "GripperPlant.fmu").read_bytes())
     (tmp_path / "my.zip").write_bytes(plant.read_bytes())
