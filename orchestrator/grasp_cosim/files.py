@@ -81,6 +81,8 @@ def _nature(path: Path, wanted: str) -> tuple[str, str]:
         return found, f"`grasp-cosim run {name}` runs it; its FMUs are in it, below resources/"
     if path.suffix.lower() == ".toml" and path.is_file() and wanted in ("fmu", "run"):
         return "a TOML file", f"`grasp-cosim run {name}` runs it, if it is a system"
+    if path.suffix.lower() == ".py" and path.is_file():
+        return "a Python file", f"`grasp-cosim build {name}` makes an FMU of it, if it is a block"
     return "", ""
 
 

@@ -26,7 +26,7 @@ SYSTEM = [
 
 @pytest.fixture
 def things(grasp: System, fmus: Path, tmp_path: Path) -> Path:
-    """One of each: plant.fmu and my.zip, the same; the folder unpacked; a.ssp; a.toml; run/."""
+    """One of each: plant.fmu, my.zip, the same; the folder unpacked; a.ssp; a.toml; b.py; run/."""
     plant = tmp_path / "plant.fmu"
     plant.write_bytes((fmus / "GripperPlant.fmu").read_bytes())
     (tmp_path / "my.zip").write_bytes(plant.read_bytes())
@@ -38,6 +38,7 @@ def things(grasp: System, fmus: Path, tmp_path: Path) -> Path:
     with zipfile.ZipFile(tmp_path / "a.ssp") as archive:
         archive.extractall(tmp_path / "structure")
     (tmp_path / "a.toml").write_text("connections = []\n")
+    (tmp_path / "b.py").write_text("import json\n")
     result = simulate(grasp, step=1e-3, stop=0.002)
     (tmp_path / "run").mkdir()
     result.to_json(tmp_path / "run" / "run.json")
@@ -67,6 +68,7 @@ def test_in_the_place_of_a_system(arguments: tuple[str, ...], command: Run, thin
         ("run/run.json", "a file of a run", report),
         ("run/signals.csv", "a file of a run", report),
         (".", "a folder", "there is: a.ssp, a.toml"),
+        ("b.py", "a Python file", "`grasp-cosim build b.py` makes an FMU of it, if it is a block"),
     ):
         run = command(*(part.format(given) for part in arguments))
         refused(run, given, what, advice)
@@ -79,6 +81,7 @@ def test_in_the_place_of_an_fmu(arguments: tuple[str, ...], command: Run, things
         ("run", "a folder that `grasp-cosim run --out` wrote", "`grasp-cosim report run`"),
         ("run/signals.csv", "a file of a run", "`grasp-cosim report run` shows the run"),
         (".", "a folder", "there is: p.fmu, plant.fmu"),
+        ("b.py", "a Python file", "`grasp-cosim build b.py` makes an FMU of it, if it is a block"),
         *(
             (("a.ssp", "an SSP archive", "`grasp-cosim run a.ssp` runs it; its FMUs are in it"),
              ("a.toml", "a TOML file", "`grasp-cosim run a.toml` runs it, if it is a system"))

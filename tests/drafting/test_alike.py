@@ -132,6 +132,13 @@ def test_of_two_that_are_as_much_alike_none_is_taken(plant: Interface) -> None:
     assert names(plant, *two, *exact)["gap[1]"] == "gap1"
 
 
+def test_an_integer_may_be_a_flag_that_is_recorded(plant: Interface) -> None:
+    flags = output("Kontakt", kind="Integer"), output("Zustand", kind="Boolean")
+    theirs = foreign(*flags, output("l"))
+    assert candidates(plant, "contact[1]", theirs, []) == [*flags]
+    assert [v.name for v in candidates(plant, "gap[1]", theirs, [])] == ["l"]
+
+
 def test_parameters(plant: Interface) -> None:
     width, start = settable("partWidth", "parameter", "mm"), settable("W", "parameter", "m")
     assert names(plant, width, certain=True) == {"object_width": "partWidth"}

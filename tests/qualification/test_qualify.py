@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from conftest import Altered
 from grasp_cosim import InputError, SimulationError, System
-from grasp_cosim.qualification.bands import Bands, Given
+from grasp_cosim.qualification.bands import Bands, Given, read_bands
 from grasp_cosim.qualification.compared import Compared
 from grasp_cosim.qualification.qualify import qualify
 from grasp_cosim.qualification.verdict import as_bands, as_json, as_text
@@ -199,6 +199,17 @@ def test_metrics_of_the_object_that_only_one_of_two_plants_has(short: System, fm
         assert len(found.metrics) == 19
         assert not any(c.name in OF_OBJECT for c in found.metrics)
     assert set(found.uncompared) == {"plant.squeeze", "plant.damaged"}
+
+
+@pytest.mark.slow
+def test_a_plant_that_lacks_what_metrics_want(short: System, tmp_path: Path) -> None:
+    plant = replace(short.component("plant", ""), rename={"elsewhere": "object_position"})
+    found = qualify(short, "plant", plant, isolation="none")
+    assert not found.qualified
+    assert "to judge it without them: --bands with '*' = { absolute = inf }" in as_text(found)
+    (tmp_path / "bands.toml").write_text('[metrics]\n"*" = { absolute = inf }\n', "utf-8")
+    bands = read_bands(tmp_path / "bands.toml")
+    assert qualify(short, "plant", plant, isolation="none", bands=bands).qualified
 
 
 def test_damage_is_a_difference(grasp: System, fmus: Path, altered: Altered) -> None:

@@ -109,7 +109,7 @@ REFUSED = [
     ),
     (
         structure(TOP, '<ssd:DefaultExperiment startTime="1" stopTime="2"/>'),
-        "startTime = 1 s is not supported; must be 0",
+        "startTime = 1 s is not supported, as a run begins at 0 s; must be 0, with a stopTime that",
     ),
     (
         structure(TOP, '<ssd:DefaultExperiment stopTime="-2"/>'),

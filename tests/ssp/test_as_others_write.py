@@ -77,6 +77,22 @@ def test_forms_of_xml(tmp_path: Path, form: str) -> None:
     assert loaded.notes == load(tmp_path, structure(TOP)).notes
 
 
+def test_a_prefix_in_an_annotation_that_is_for_no_namespace_is_said(tmp_path: Path) -> None:
+    """As early archives for libcosim have it."""
+    foreign = '<osp:Master stepSize="1e-4"/>'
+    noted = f'<ssc:Annotation type="org.open-simulation-platform">{foreign}</ssc:Annotation>'
+    annotations = f"<ssd:Annotations>{noted}</ssd:Annotations>"
+    text = structure(TOP.replace('name="top">', f'name="top">{annotations}'))
+    loaded = load(tmp_path, text)
+    assert loaded.connections == Y_TO_U
+    assert any("XML has it: Namespace prefix osp on Master is not" in n for n in loaded.notes)
+    for broken in (text.replace("</ssd:System>", ""), text.replace("<osp:", "<osp:b:")):
+        with pytest.raises(InputError, match="ssd: not readable as XML: "):
+            load(tmp_path, broken)
+    with pytest.raises(InputError, match=r"against the schema: .*ssx"):
+        load(tmp_path, text.replace("ssd:Elements", "ssx:Elements"))
+
+
 def test_elements_in_another_order_and_empty_lists_are_said(tmp_path: Path) -> None:
     """As OMSimulator's own test archives have them."""
     annotations = '<ssd:Annotations><ssc:Annotation type="x"/></ssd:Annotations><ssd:Connectors/>'

@@ -179,13 +179,18 @@ def _settle(
 def candidates(
     ours: Interface, name: str, theirs: Interface, taken: Collection[str]
 ) -> list[Variable]:
-    """The variables of another FMU, other than those taken, that could be one of ours."""
+    """The variables of another FMU, other than those taken, that could be one of ours.
+
+    An Integer output, 0 or 1, could be a Boolean one that is only recorded.
+    """
     variable = ours.by_name[name]
     unit = ours.unit(variable)
+    flag = (variable.kind, variable.causality) == ("Boolean", "output")
     return [
         v
         for v in theirs.of(variable.causality)
-        if v.supported and v.kind == variable.kind and v.name not in taken
+        if v.supported and v.name not in taken
+        if v.kind == variable.kind or (flag and v.kind == "Integer")
         if unit is None or (other := theirs.unit(v)) is None or unit.measures(other)
     ]
 

@@ -77,7 +77,8 @@ def replacing(system: Structure, name: str, fmu: Path, path: str, presets: Itera
     names = {m.variable.name: n for n, m in found.items()}
     names |= {json.loads(r.value): r.key for r in rename if r.key.endswith(OTHER)}
     theirs = theirs.renamed({new: own for own, new in names.items() if own != new})
-    units = [*_units(ours, theirs, [n for n in found if n in asked])]
+    wanted = [*(n for n in found if n in asked), *(row.key for row in rename if row.open)]
+    units = [*_units(ours, theirs, wanted, found)]
     theirs = theirs.in_units({row.key: json.loads(row.value) for row in units if not row.open})
     unknown = {row.key for row in units if row.open}
     draft = Draft(name, "", found, ours, theirs, unknown)
@@ -128,14 +129,22 @@ def _names(
             yield Row(f"{name}{OTHER}", quoted(name), "something else than the system's")
 
 
-def _units(ours: Interface, theirs: Interface, names: Iterable[str]) -> Iterator[Row]:
-    """The entries of units of variables that declare none: as their description says, or to do."""
+def _units(
+    ours: Interface, theirs: Interface, names: Iterable[str], found: Collection[str]
+) -> Iterator[Row]:
+    """The entries of units of variables that declare none: as their description says, or to do.
+
+    One that is not found is one that none of those that it could be declares a unit of.
+    """
     for name in names:
-        here, there = ours.by_name[name], theirs.by_name[name]
-        unit = ours.unit(here)
-        if unit is None or here.unit == "1" or here.kind != "Real" or theirs.unit(there):
+        here, unit = ours.by_name[name], ours.unit(ours.by_name[name])
+        able = [theirs.by_name[name]] if name in found else candidates(ours, name, theirs, found)
+        if unit is None or here.unit == "1" or here.kind != "Real":
             continue
-        texts = _UNIT_IN_TEXT.findall(there.description or "")
+        if not able or any(map(theirs.unit, able)):
+            continue
+        there = able[0]
+        texts = _UNIT_IN_TEXT.findall(there.description or "") if name in found else []
         said = next((t for t in texts if (u := known_unit(t)) and u.measures(unit)), None)
         if said:
             yield Row(name, quoted(said), "CHECK, found by its description")
@@ -162,5 +171,5 @@ def _values(draft: Draft, was: Component) -> Iterator[Row]:
             yield Row("", "", f"{meant}; it has {choices(there, FEW)}" if there else meant)
     for v in draft.theirs.of("input"):
         if v.supported and v.name not in found:
-            what = f"{number(start(v))} or another value, or a connection and no line here"
+            what = f"{number(start(v))} or another value; no line here if connected or named above"
             yield Row(v.name, todo(f"{what}; {told(v)}"))

@@ -29,6 +29,9 @@ ROOTS = {
 }
 """The root element of each format."""
 
+_UNDECLARED = etree.ErrorTypes.NS_ERR_UNDEFINED_NAMESPACE
+"""The one error of XML that is taken: annotations in circulation have a prefix for no namespace."""
+
 VERSION = "1.0"
 _VERSION_1 = re.compile(r"1\.\d+(\.\d+)?(-.*)?")
 _LAST = (
@@ -61,17 +64,32 @@ def parse(place: str, data: bytes, form: str, notes: Notes) -> Any:
 
     InputError where it is not; place names the file.
     """
-    parser = etree.XMLParser(
-        resolve_entities=False, no_network=True, remove_comments=True, remove_pis=True
-    )
     try:
-        root = etree.fromstring(data, parser)
+        root = etree.fromstring(data, _parser())
     except etree.XMLSyntaxError as error:
+        lenient = _parser(recover=True)
+        root = etree.fromstring(data, lenient)
         reason = " ".join(str(error.msg).split())
-        raise InputError(f"{place}: not readable as XML: {reason}") from error
+        if {entry.type for entry in lenient.error_log} != {_UNDECLARED}:
+            raise InputError(f"{place}: not readable as XML: {reason}") from error
+        notes.add(place, f"taken although not as XML has it: {reason}")
+        for element in root.iter():
+            prefix, colon, name = element.tag.partition(":")
+            if colon and not prefix.startswith("{"):
+                element.tag = f"{{{prefix}}}{name}"
     if root.getroottree().docinfo.doctype:
         raise InputError(f"{place}: has a document type; SSP has none")
     return checked(place, root, form, notes)
+
+
+def _parser(recover: bool = False) -> Any:
+    return etree.XMLParser(
+        resolve_entities=False,
+        no_network=True,
+        remove_comments=True,
+        remove_pis=True,
+        recover=recover,
+    )
 
 
 def checked(place: str, root: Any, form: str, notes: Notes) -> Any:

@@ -22,7 +22,9 @@ def stop_time(
     start = float(attributes.get("startTime", "0"))
     if start != 0.0:
         raise InputError(
-            f"{at(file, experiment)}: startTime = {start:g} s is not supported; must be 0"
+            f"{at(file, experiment)}: startTime = {start:g} s is not supported, as a run begins at "
+            f"0 s; must be 0, with a stopTime that is {start:g} s less, the same for FMUs that do "
+            "not go by the clock"
         )
     if given is not None:
         return in_nanoseconds("stop", given)
