@@ -179,7 +179,7 @@ def _natives(folder: Path) -> Path:
 
 
 def _found(draft: Draft) -> dict[str, Any]:
-    """What is known of a component that was filled in, for JSON."""
+    """The matches, doubts and units of a component that was filled in, for JSON."""
     return {
         "found": {name: match.variable.name for name, match in draft.found.items()},
         "to_check": {name: match.doubt for name, match in draft.found.items() if match.doubt},
