@@ -42,7 +42,7 @@ WANTED = {
     "study": "a study, a .toml file, or the name of one that is built in",
     "run": "a folder that `grasp-cosim run --out` wrote",
 }
-"""What a command may want, in words."""
+"""The natures of files that a command may want, in words."""
 
 _SUFFIXES = {"fmu": (".fmu",), "system": (".toml", ".ssp"), "study": (".toml",)}
 _IN_A_RUN = {"run.json", "signals.csv"}
@@ -60,7 +60,7 @@ def check_nature(path: Path, wanted: str) -> None:
 
 
 def _nature(path: Path, wanted: str) -> tuple[str, str]:
-    """What is at a path, and what to do with it; empty where that is not plain."""
+    """The nature of a file, and what to do with it; empty where that is not plain."""
     name, parent = quote(str(path)), quote(str(path.parent))
     if path.is_dir():
         return _folder_nature(path, wanted)
@@ -106,7 +106,7 @@ def _folder_nature(path: Path, wanted: str) -> tuple[str, str]:
 
 
 def _archive_nature(path: Path) -> str:
-    """What an archive is by its content; empty for any other file, or one that is damaged."""
+    """The nature of an archive by its content; empty for another file, or a damaged one."""
     with suppress(OSError, ValueError, RuntimeError, NotImplementedError, zipfile.BadZipFile):
         if path.is_file() and zipfile.is_zipfile(path):
             with zipfile.ZipFile(path) as archive:

@@ -50,6 +50,18 @@ def test_a_copy_has_no_difference(system: System, tmp_path: Path) -> None:
     assert same.system == system
 
 
+@pytest.mark.parametrize(("declared", "kept"), [("", {"mass": "g"}), (' unit="m"', {})])
+def test_a_unit_that_the_system_names_is_for_want_of_a_declared_one(
+    declared: str, kept: dict[str, str], system: System, tmp_path: Path
+) -> None:
+    plant, spring = system.components
+    named = replace(system, components=(replace(plant, units={"mass": "g"}), spring))
+    variables = changed("mass", 'start="0.5"', f'start="0.5"{declared}')
+    swapped = of_variables(named, tmp_path, variables).swapped
+    assert swapped is not None
+    assert swapped.component("plant", "test").units == kept
+
+
 ONE: list[tuple[dict[str, str], tuple[str, str, str], str]] = [
     (
         without("gap"),

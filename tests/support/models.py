@@ -4,18 +4,15 @@ The equations are in MODEL.c, the functions of FMI in fmi2.c and fmi3.c, which r
 wrong mode. The value reference of a variable is its place in the list here and in the C.
 """
 
-import subprocess
-import tempfile
-import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
-import fmpy
 from fmpy.fmi2 import FMU2Model, FMU2Slave
 from fmpy.fmi3 import FMU3Model
+
+from .compiled import pack, shared_library
 
 SOURCES = Path(__file__).with_name("models")
 KINDS = ("ModelExchange", "CoSimulation")
@@ -152,30 +149,18 @@ def build_model(
     """The FMU of a model, for the kinds given, as folder/FILE.fmu (by default NAME.fmu)."""
     model = MODELS[name] if name != "feedthrough" else Model(_PASSED[version])
     describe = _description_2 if version == "2.0" else _description_3
-    platform = fmpy.platform if version == "2.0" else fmpy.platform_tuple
-    path = folder / f"{file or name}.fmu"
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("modelDescription.xml", describe(name, model, kinds))
-        library = f"binaries/{platform}/{name}{fmpy.sharedLibraryExtension}"
-        archive.writestr(library, _library(name, version, "CoSimulation" in kinds))
-    return path
+    library = _library(name, version, "CoSimulation" in kinds)
+    return pack(
+        folder / f"{file or name}.fmu", version, name, describe(name, model, kinds), library
+    )
 
 
-@lru_cache
 def _library(name: str, version: str, steps: bool) -> bytes:
     """The binary, with all functions that FMPy asks for; only with steps it can do any."""
     fmi = f"fmi{version[0]}"
-    asked = dir(FMU3Model) if version == "3.0" else dir(FMU2Slave if steps else FMU2Model)
-    unused = (f"int __attribute__((weak)) {n}(void) {{ return 3; }}" for n in asked if fmi in n)
-    headers = Path(fmpy.__file__).parent / "c-code"
-    options = [f"-I{headers}", f"-D{fmi.upper()}", f'-DFMI="{fmi}.c"', *["-DNO_STEPS"][steps:]]
-    with tempfile.TemporaryDirectory() as folder:
-        out, rest = Path(folder, "model.so"), Path(folder, "rest.c")
-        rest.write_text("\n".join(unused), "utf-8")
-        sources = [str(SOURCES / f"{name}.c"), str(rest)]
-        command = ["gcc", "-shared", "-fPIC", "-O1", *options, *sources, "-o", str(out), "-lm"]
-        subprocess.run(command, check=True)
-        return out.read_bytes()
+    asked = FMU3Model if version == "3.0" else FMU2Slave if steps else FMU2Model
+    options = (f"-D{fmi.upper()}", f'-DFMI="{fmi}.c"', *["-DNO_STEPS"][steps:], "-lm")
+    return shared_library(SOURCES / f"{name}.c", options=options, asked=asked)
 
 
 def _attributes(**values: object) -> str:

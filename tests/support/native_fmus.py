@@ -6,18 +6,14 @@ in a step that then goes wrong: crash_at, exit_at, hang_at, error_at, discard_at
 step is done), early_at and terminate_at (the step ends there).
 """
 
-import ctypes
 import shutil
-import subprocess
-import tempfile
-import zipfile
 from collections.abc import Mapping
-from functools import lru_cache
 from pathlib import Path
 
-import fmpy
 import pytest
 from fmpy.fmi3 import FMU3Slave
+
+from .compiled import pack, shared_library
 
 SOURCES = Path(__file__).parents[1] / "fmi" / "native"
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
@@ -66,42 +62,10 @@ def build(
     """
     capabilities = CAPABLE if capabilities is None else capabilities
     describe = _description_2 if version == "2.0" else _description_3
-    platform = fmpy.platform if version == "2.0" else fmpy.platform_tuple
-    path = folder / f"{name}.fmu"
     xml = describe(dict(units or {}), dict(capabilities), strings).replace("{native}", token)
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("modelDescription.xml", xml)
-        archive.writestr(
-            f"binaries/{platform}/native{fmpy.sharedLibraryExtension}", _library(version, complete)
-        )
-        archive.writestr("resources/", "")
-    return path
-
-
-@lru_cache
-def _library(version: str, complete: bool) -> bytes:
-    with tempfile.TemporaryDirectory() as folder:
-        library, rest = Path(folder, "native.so"), Path(folder, "rest.c")
-        source = SOURCES / f"fmi{version[0]}.c"
-        _compile(library, source)
-        if complete:
-            rest.write_text(missing_functions(library), "utf-8")
-            library = library.with_name("complete.so")
-            _compile(library, source, rest)
-        return library.read_bytes()
-
-
-def missing_functions(library: Path) -> str:
-    """In C, the functions of FMI 3.0 that a library lacks; each fails."""
-    has = ctypes.CDLL(str(library))
-    missing = [n for n in dir(FMU3Slave) if n[:4] == "fmi3" and not hasattr(has, n)]
-    return "".join(f"int {n}(void) {{ return 3; }}\n" for n in missing)
-
-
-def _compile(library: Path, *sources: Path) -> None:
-    headers = Path(fmpy.__file__).parent / "c-code"
-    command = ["gcc", "-shared", "-fPIC", "-O2", f"-I{headers}", *map(str, sources)]
-    subprocess.run([*command, "-o", str(library)], check=True)
+    source, asked = SOURCES / f"fmi{version[0]}.c", FMU3Slave if complete else None
+    library = shared_library(source, asked=asked)
+    return pack(folder / f"{name}.fmu", version, "native", xml, library)
 
 
 def _attributes(values: Mapping[str, str]) -> str:

@@ -1,25 +1,22 @@
 """FMUs that do not run here, each made of one that does by a change of its files."""
 
 import re
-import shutil
-import subprocess
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
 import fmpy
 
-from .native_fmus import build
+from .compiled import binary, shared_library
+from .native_fmus import SOURCES, build
 
 Files = dict[str, bytes]
 
 CODE = """
 double ceil(double), atan2(double, double), tanh(double), no_such_function(double);
 double of_libm(double x) { return ceil(x) + atan2(x, 2.0) + tanh(x); }
-#ifdef MISSING
-double missing(double x) { return no_such_function(x); }
-#endif
 """
+MISSING = "double missing(double x) { return no_such_function(x); }\n"
 
 
 def _described(before: str, after: str) -> Callable[[Files], Files]:
@@ -99,24 +96,14 @@ def changed(fmu: Path, out: Path, change: Callable[[Files], Files]) -> Path:
 
 def linked(folder: Path, missing: bool = False) -> Path:
     """An FMU whose binary leaves libm undefined, as Dymola's do; or also what is nowhere."""
-    code, binary = folder / "more.c", folder / "linked.so"
-    code.write_text(CODE, "utf-8")
-    sources = Path(__file__).parents[1] / "fmi" / "native" / "fmi2.c"
-    headers = Path(fmpy.__file__).parent / "c-code"
-    gcc = shutil.which("gcc")
-    assert gcc
-    command = [gcc, "-shared", "-fPIC", "-w", "-fno-builtin", f"-I{headers}"]
-    command += ["-DMISSING"] * missing + ["-nostdlib", "-Wl,--unresolved-symbols=ignore-all"]
-    subprocess.run([*command, str(sources), str(code), "-o", str(binary), "-lc"], check=True)
-    place = f"binaries/{HERE}/native{fmpy.sharedLibraryExtension}"
-    whole = build(folder, "whole", "2.0")
-    return changed(whole, folder / "x.fmu", lambda files: files | {place: binary.read_bytes()})
+    options = ("-fno-builtin", "-nostdlib", "-Wl,--unresolved-symbols=ignore-all", "-lc")
+    code = CODE + MISSING if missing else CODE
+    return _with_library(folder, code, SOURCES / "fmi2.c", options=options)
 
 
 def licensed(folder: Path) -> Path:
     """An FMU that logs that it finds no licence, with the path of its resources, and gives up."""
-    sources = Path(__file__).parents[1] / "fmi" / "native" / "fmi2.c"
-    text = sources.read_text("utf-8")
+    text = (SOURCES / "fmi2.c").read_text("utf-8")
     found = re.search(r"fmi2Component fmi2Instantiate\((.*?)\)\s*\{", text, re.DOTALL)
     assert found
     names = [part.split()[-1].lstrip("*") for part in found[1].split(",")]
@@ -126,11 +113,13 @@ def licensed(folder: Path) -> Path:
     {names[4]}->logger(0, {names[0]}, fmi2Error, "error", said);
     return 0;
     """
-    code, binary = folder / "licensed.c", folder / "licensed.so"
-    code.write_text("#include <stdio.h>\n" + text.replace(found[0], found[0] + refusal), "utf-8")
-    headers = Path(fmpy.__file__).parent / "c-code"
-    command = ["gcc", "-shared", "-fPIC", "-w", f"-I{headers}", str(code), "-o", str(binary)]
-    subprocess.run(command, check=True)
-    place = f"binaries/{HERE}/native{fmpy.sharedLibraryExtension}"
+    return _with_library(
+        folder, "#include <stdio.h>\n" + text.replace(found[0], found[0] + refusal)
+    )
+
+
+def _with_library(folder: Path, code: str, *sources: Path, options: tuple[str, ...] = ()) -> Path:
+    library = shared_library(*sources, code=code, options=options)
     whole = build(folder, "whole", "2.0")
-    return changed(whole, folder / "x.fmu", lambda files: files | {place: binary.read_bytes()})
+    place = binary("2.0", "native")
+    return changed(whole, folder / "x.fmu", lambda files: files | {place: library})

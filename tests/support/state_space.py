@@ -1,13 +1,10 @@
 """Builds the FMU of tests/support/models/state_space.c: arrays, sized by parameters."""
 
-import subprocess
-import tempfile
-import zipfile
-from functools import lru_cache
 from pathlib import Path
 
-import fmpy
 from fmpy.fmi3 import FMU3Slave
+
+from .compiled import pack, shared_library
 
 SOURCE = Path(__file__).parent / "models" / "state_space.c"
 TYPES = (
@@ -34,26 +31,10 @@ def state_space(
     is CoSimulation or ModelExchange. One without a binary needs no compiler. With complete, it has
     the functions of other kinds of FMUs, too, without which FMPy does not load it.
     """
-    path = folder / f"{name}.fmu"
-    library = f"binaries/{fmpy.platform_tuple}/state_space{fmpy.sharedLibraryExtension}"
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("modelDescription.xml", _description(types, more, kind))
-        if binary:
-            archive.writestr(library, _library(complete))
-    return path
-
-
-@lru_cache
-def _library(complete: bool) -> bytes:
-    headers = Path(fmpy.__file__).parent / "c-code"
-    with tempfile.TemporaryDirectory() as folder:
-        out, rest = Path(folder, "state_space.so"), Path(folder, "rest.c")
-        names = (n for n in dir(FMU3Slave) if n.startswith("fmi3") and complete)
-        weak = "__attribute__((weak)) int {}(void) {{ return 3; }}\n"
-        rest.write_text("".join(map(weak.format, names)), "utf-8")
-        command = ["gcc", "-shared", "-fPIC", "-O2", f"-I{headers}", str(SOURCE), str(rest), "-lm"]
-        subprocess.run([*command, "-o", str(out)], check=True)
-        return out.read_bytes()
+    asked = FMU3Slave if complete else None
+    library = shared_library(SOURCE, asked=asked) if binary else b""
+    description = _description(types, more, kind)
+    return pack(folder / f"{name}.fmu", "3.0", "state_space", description, library)
 
 
 def _variable(

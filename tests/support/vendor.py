@@ -1,13 +1,12 @@
 """Builds the gripper plant of another vendor: native, in mm and mN, with names of its own."""
 
-import subprocess
 import tempfile
-import zipfile
 from pathlib import Path
 
-import fmpy
+from fmpy.fmi3 import FMU3Slave
 from grasp_cosim import cli
-from support.native_fmus import missing_functions
+
+from .compiled import pack, shared_library
 
 SOURCE = Path(__file__).with_name("vendor.c")
 FLOATS = {
@@ -34,21 +33,10 @@ UNITS = {"mm": 'm="1"', "mN": 'kg="1" m="1" s="-2"'}
 def vendor_plant(path: Path) -> Path:
     """Build it as an FMU at path, with gcc."""
     with tempfile.TemporaryDirectory() as folder:
-        code = Path(folder, "c")
-        assert cli.main(["build", "--native", "--c-only", str(code), "GripperPlant"]) == 0
-        library, rest = Path(folder, "vendor.so"), Path(folder, "rest.c")
-        headers = Path(fmpy.__file__).with_name("c-code")
-        command = ["gcc", "-shared", "-fPIC", "-O2", "-ffp-contract=off", f"-I{headers}"]
-        command += [f"-I{code}", str(SOURCE), str(code / "GripperPlant.c"), "-lm", "-o"]
-        subprocess.run([*command, str(library)], check=True)
-        rest.write_text(missing_functions(library), "utf-8")
-        library = library.with_name("complete.so")
-        subprocess.run([*command, str(library), str(rest)], check=True)
-        with zipfile.ZipFile(path, "w") as archive:
-            archive.writestr("modelDescription.xml", description())
-            where = f"binaries/{fmpy.platform_tuple}/vendor{fmpy.sharedLibraryExtension}"
-            archive.write(library, where)
-    return path
+        assert cli.main(["build", "--native", "--c-only", folder, "GripperPlant"]) == 0
+        ours = Path(folder, "GripperPlant.c")
+        library = shared_library(SOURCE, ours, options=(f"-I{folder}", "-lm"), asked=FMU3Slave)
+    return pack(path, "3.0", "vendor", description(), library)
 
 
 def description() -> str:

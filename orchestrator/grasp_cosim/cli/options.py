@@ -58,7 +58,7 @@ names_options = together(
         help="Of the new FMU, where it declares none or a wrong one.",
     ),
 )
-"""What an FMU in the place of another calls things, in its `renames` and `named`."""
+"""Names and units of an FMU in the place of another, in its `renames` and `named`."""
 
 _FORMS = {
     "--rename": "[COMPONENT.]VARIABLE=FMUS_VARIABLE",
@@ -129,7 +129,7 @@ input_options = together(
 
 
 def chosen_stimuli(given: Mapping[str, Any]) -> Stimuli | None:
-    """What --input drives, of FMUs that may yet be swapped."""
+    """The stimuli of --input, for FMUs that may yet be swapped."""
     if not given["input"]:
         if given["interpolation"]:
             raise InputError("--interpolation: must come with --input, the file that it is for")

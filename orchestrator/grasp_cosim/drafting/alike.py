@@ -23,7 +23,7 @@ LEAST = 0.3
 """Below this likeness nothing is proposed."""
 
 ALONE = 0.3
-"""What it counts to be the only group of its unit, type and size in both."""
+"""The score for the only group of its unit, type and size in both."""
 
 _SIDES = (
     (("right", "left"), True),
@@ -106,7 +106,7 @@ class _Group:
 
     @cached_property
     def told(self) -> frozenset[str]:
-        """What its description means."""
+        """The words of its description, by their meaning."""
         return _meaning(_words(self.first.description or ""))
 
     @cached_property
@@ -298,7 +298,7 @@ def _plural(words: Iterable[str]) -> tuple[str, ...]:
 
 
 def _meaning(words: Iterable[str]) -> frozenset[str]:
-    """What words mean; of those that say nothing all, where there are no others."""
+    """The meanings of words; of those that say nothing all, where there are no others."""
     plain = _plural(words)
     telling = [w for w in plain if w not in _NOISE] or plain
     return frozenset(_MEANING.get(w, w) for w in telling if not w.isdigit())

@@ -93,7 +93,7 @@ def replacing(system: Structure, name: str, fmu: Path, path: str, presets: Itera
 
 
 OTHER = "_of_the_FMU"
-"""What is added to a name that means something else in the FMU."""
+"""The ending of a name that means something else in the FMU."""
 
 
 def _names(

@@ -79,12 +79,12 @@ def number(value: Value) -> str:
 
 
 def neat(value: Value) -> Value:
-    """What a conversion made of a number, to the 15 digits that it has."""
+    """A converted number, to the 15 digits that it has."""
     return float(f"{value:.15g}") if isinstance(value, float) else value
 
 
 def start(variable: Variable) -> Value:
-    """What a variable starts with, in its type; zero, false or nothing where it does not say."""
+    """The start value of a variable, in its type; zero, false or nothing where it has none."""
     zeros: dict[str, Value] = {"Boolean": False, "Integer": 0, "String": ""}
     zero = zeros.get(variable.kind, 0.0)
     value = variable.start_value
@@ -92,7 +92,7 @@ def start(variable: Variable) -> Value:
 
 
 def told(variable: Variable) -> str:
-    """What a comment says of a variable: its causality, unit, items and description."""
+    """A comment on a variable: its causality, unit, items and description."""
     unit = "" if variable.unit in (None, "1") else str(variable.unit)
     items = [f"{number} {name}" for name, number in variable.items.items()]
     parts = [variable.causality, unit, choices(items, FEW) if items else ""]

@@ -318,7 +318,7 @@ class ModelInstance(LoadedInstance):
         return self._answer(status)
 
     def _answer(self, status: int) -> int:
-        """What a status means to the solver: go on, try a shorter step, or give up."""
+        """The meaning of a status to the solver: go on, try a shorter step, or give up."""
         if status <= WARNING:
             return 0
         if status == DISCARD:

@@ -25,7 +25,7 @@ class Nested(Protocol):
 
 
 Given = Value | Sequence["Given"] | Nested
-"""What is given for a variable: a value, or those of an array as lists of lists or so."""
+"""A value for a variable, or those of an array as lists of lists or so."""
 
 Kind = Literal["Real", "Integer", "Boolean", "String", "Binary", "Clock"]
 KINDS: tuple[str, ...] = get_args(Kind)
@@ -191,7 +191,7 @@ class Variable:
 
 @dataclass(frozen=True)
 class Exchange:
-    """What model exchange needs: the name of the binary, in FMI 2.0 the numbers of states and event
+    """Needs of model exchange: the name of the binary, in FMI 2.0 the numbers of states and event
     indicators. Of FMI 3.0 the instance says these.
     """
 
@@ -240,7 +240,7 @@ class Interface:
 
     @cached_property
     def made(self) -> dict[tuple[Any, ...], "Interface"]:
-        """What was made of this one by elements, names or units, which is asked for again."""
+        """Interfaces made of this one by elements, names or units, which are asked for again."""
         return {}
 
     @cached_property

@@ -1,4 +1,4 @@
-"""What keeps an FMU from running here, by what it declares, and what to ask its vendor for.
+"""Obstacles to running an FMU here, by what it declares, and what to ask its vendor for.
 
 The one place that says so: reading a system, loading an instance and `doctor` ask it.
 """
@@ -19,7 +19,7 @@ _LICENCE = re.compile(r"licen[cs]|dongle|flexlm|activation|not activated", re.IG
 
 
 class Obstacle(NamedTuple):
-    """What an FMU is that does not run here, and what would."""
+    """The reason why an FMU does not run here, and what would."""
 
     what: str
     remedy: str
@@ -64,7 +64,7 @@ def of_binary(fmu: Interface) -> Obstacle | None:
 
 
 def of_loading(fmu: Interface, said: str) -> Obstacle | None:
-    """What may be the reason where the FMU does not instantiate and says something or nothing."""
+    """The likely obstacle where the FMU does not instantiate and says something or nothing."""
     tool = fmu.tool or "the tool that made it"
     if _LICENCE.search(said):
         return Obstacle(

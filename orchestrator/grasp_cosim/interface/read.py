@@ -358,7 +358,7 @@ class _Reader:
         return None if reference is None else _name(self.places[_whole("Dimension", reference)])
 
     def exchange(self, kinds: Mapping[str, Element]) -> Exchange | None:
-        """What model exchange needs; None where the FMU is not for that."""
+        """The needs of model exchange; None where the FMU is not for that."""
         if "ModelExchange" not in kinds:
             return None
         identifier, indicators = kinds["ModelExchange"].get("modelIdentifier", ""), 0

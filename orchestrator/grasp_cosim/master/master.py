@@ -66,7 +66,7 @@ class Master:
         self.rejections: dict[str, Rejection] = {}
         self.log: list[str] = []
         self.ends: list[str] = []
-        """What asked for the end of the simulation, before the stop time, a line each."""
+        """The requests to end the simulation before the stop time, a line each."""
         self.slots = slots_of(system, instances)
         strings = (port for port, v in system.recorded.items() if v.kind == "String")
         self.texts = {port: Texts() for port in strings}

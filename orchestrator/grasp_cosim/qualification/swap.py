@@ -9,7 +9,7 @@ from pathlib import Path
 from ..checks import known
 from ..errors import InputError
 from ..interface.expansion import values_of
-from ..interface.interface import Value
+from ..interface.interface import Interface, Value
 from ..interface.read import describe
 from ..interface.units import Conversion, conversion
 from ..system.description import System
@@ -63,10 +63,7 @@ def prepare_swap(
     now = replaced(was, Replacement(fmu, rename, units or {}), "--")
     theirs = now.sized(describe(fmu)).renamed(now.rename, "--rename")
     theirs = theirs.in_units(now.units, "--units")
-    for new, name in rename.items():
-        for called in theirs.arrays[new].names if new in theirs.arrays else (new,):
-            entry = f"--rename: {new!r} = {name!r}"
-            known(f"{entry}: the original has no variable", called, ours.by_name)
+    _check_renamed(rename, ours, theirs)
     names = (*theirs.by_name, *(n for n in theirs.arrays if n not in ours.arrays))
     extra = {f"{component}.{name}": name for name in names if name not in ours.by_name}
     own = {n: v for n, v in now.values.items() if n not in ours.by_name}
@@ -91,24 +88,32 @@ def prepare_swap(
             swapped = replace(system, components=components)
         except InputError as error:
             differences.append(Difference("blocks", "system", component, str(error)))
-    return Swap(
-        system,
-        component,
-        fmu,
-        tuple(sorted(differences, key=lambda d: SEVERITIES.index(d.severity))),
-        swapped,
-        {
-            f"{component}.{v.name}": theirs.conversion(v.name, ours)
-            for v in ours.of("output")
-            if v.name in theirs.by_name
-        }
-        | (_between(swapped, system, component) if swapped else {}),
-        {
-            f"{name}.{v.name}": v.magnitude if isinstance(v.magnitude, float) else None
-            for name, interface in interfaces.items()
-            for v in interface.of("output")
-        },
-    )
+    differences.sort(key=lambda d: SEVERITIES.index(d.severity))
+    back = {
+        f"{component}.{v.name}": theirs.conversion(v.name, ours)
+        for v in ours.of("output")
+        if v.name in theirs.by_name
+    }
+    back |= _between(swapped, system, component) if swapped else {}
+    nominals = _nominals(interfaces)
+    return Swap(system, component, fmu, tuple(differences), swapped, back, nominals)
+
+
+def _check_renamed(rename: Mapping[str, str], ours: Interface, theirs: Interface) -> None:
+    """InputError where the candidate's variables get names that the original does not have."""
+    for new, name in rename.items():
+        for called in theirs.arrays[new].names if new in theirs.arrays else (new,):
+            entry = f"--rename: {new!r} = {name!r}"
+            known(f"{entry}: the original has no variable", called, ours.by_name)
+
+
+def _nominals(interfaces: Mapping[str, Interface]) -> dict[str, float | None]:
+    """The nominal values of all outputs, by signal name."""
+    return {
+        f"{name}.{v.name}": v.magnitude if isinstance(v.magnitude, float) else None
+        for name, interface in interfaces.items()
+        for v in interface.of("output")
+    }
 
 
 def _between(source: System, target: System, name: str) -> dict[str, Conversion | None]:

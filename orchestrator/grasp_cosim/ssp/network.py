@@ -101,7 +101,7 @@ class Network:
         return part.interface.unit(self.variable(node)) or (connector.unit if connector else None)
 
     def unit_name(self, node: Node) -> str | None:
-        """What the unit of a node is called."""
+        """The name of the unit of a node."""
         if node.path in self.parts and self.variable(node).unit:
             return self.variable(node).unit
         unit = self.unit(node)

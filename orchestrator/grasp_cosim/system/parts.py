@@ -41,7 +41,7 @@ def literal(value: Value) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Solver:
-    """What CVode keeps to where it integrates an FMU of model exchange.
+    """The tolerances that CVode keeps to where it integrates an FMU of model exchange.
 
     The local error of a state in a step of the solver is below relative_tolerance times the state
     plus absolute_tolerance times its nominal value, by default a hundredth of the former.
@@ -79,7 +79,7 @@ class Component:
 
     @property
     def integrated(self) -> Solver | None:
-        """What its equations are integrated with; None where it runs by co-simulation."""
+        """The solver of its equations; None where it runs by co-simulation."""
         if self.solver is None and "CoSimulation" in self.loaded.kinds:
             return None
         return self.solver or Solver()

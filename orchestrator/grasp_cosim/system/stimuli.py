@@ -69,7 +69,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Stimuli:
-    """What drives inputs: their columns, and the times of the rows in ns, which do not fall.
+    """Samples that drive inputs: columns, and the times of the rows in ns, which do not fall.
 
     "linear" interpolates continuous Reals and holds all others from row to row; "held" holds all.
     Before the first row and after the last one their values are held. lines are those of the rows
@@ -224,7 +224,7 @@ def _times(column: _Cells, factor: float, lines: Sequence[int]) -> array[int]:
 
 
 def input_entry(stimuli: Stimuli) -> dict[str, str]:
-    """What drives inputs, for run.json: the file, how, and a hash of the samples."""
+    """The stimuli for run.json: the file, the interpolation, and a hash of the samples."""
     made_of = hashlib.sha256(array("q", stimuli.times))
     for port, column in stimuli.columns.items():
         made_of.update(f"\0{port}\0{column.unit}\0{column.texts}\0".encode())

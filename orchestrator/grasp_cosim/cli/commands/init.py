@@ -12,7 +12,8 @@ import click
 
 from ...drafting.text import with_paths
 from ...errors import InputError, SimulationError
-from ...files import NATIVE_FOLDER, check_fmu_file, check_folder, write_text
+from ...files import NATIVE_FOLDER, check_folder, write_text
+from ...interface.read import read_interface
 from ...system.description import System
 from ...system.toml import to_do
 from ..frame import PATH, json_option, pair, say, show
@@ -131,7 +132,7 @@ def _paired(option: str, texts: tuple[str, ...]) -> dict[str, Path]:
         if not NAME.fullmatch(name) or name in fmus:
             raise InputError(f"{option} {text!r}: must be a name of its own, letters, digits, _, -")
         fmus[name] = Path(path)
-        check_fmu_file(fmus[name])
+        read_interface(fmus[name])  # before any of ours is built
     return fmus
 
 
@@ -178,7 +179,7 @@ def _natives(folder: Path) -> Path:
 
 
 def _found(draft: Draft) -> dict[str, Any]:
-    """What is known of a component that was filled in, for JSON."""
+    """The matches, doubts and units of a component that was filled in, for JSON."""
     return {
         "found": {name: match.variable.name for name, match in draft.found.items()},
         "to_check": {name: match.doubt for name, match in draft.found.items() if match.doubt},

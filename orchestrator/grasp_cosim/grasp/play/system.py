@@ -1,4 +1,4 @@
-"""What the page simulates: the built-in grasp, its components' variables, the settings shown."""
+"""The system of the page: the built-in grasp, its components' variables, the settings shown."""
 
 import tomllib
 from functools import cache

@@ -47,7 +47,7 @@ OPTIONS = (
 """Of the compiler. The last folder has the headers of FMI, which are the same in all."""
 
 _UNSEEN = re.compile(rb"/\*.*?\*/|\s+", re.DOTALL)
-"""What no C compiler minds."""
+"""Comments and white space, which no C compiler minds."""
 
 
 def sources() -> dict[str, bytes]:
