@@ -11,9 +11,10 @@ from grasp_cosim.comparison.compare import Comparison, compare
 from grasp_cosim.comparison.words import as_json, as_text
 from grasp_cosim.qualification.bands import Bands, Given
 from grasp_cosim.recording.result import Result
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from report.runs import grasp_run, write_run
+from support.examples import examples
 
 GAP = "plant.gap[1]"
 
@@ -165,7 +166,7 @@ def test_a_band_for_nothing_is_refused(folders: Any) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=25)
+@examples(25)
 @given(by=st.floats(-1e-2, 1e-2), width=st.floats(1e-6, 1e-2))
 def test_an_offset_is_inside_just_where_it_is_no_wider_than_its_band(
     tmp_path_factory: pytest.TempPathFactory, by: float, width: float

@@ -188,7 +188,7 @@ def test_an_fmu_that_does_not_load_is_not_offered(
     captured = capsys.readouterr()
     assert captured.out == ""
     assert captured.err.count("\n") == 1
-    assert f"GripperPlant: {empty} does not load: " in captured.err
+    assert f"GripperPlant: {empty} has no binary at all; " in captured.err
 
 
 def test_a_bounded_service_ends_by_itself(fmus: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -8,9 +8,10 @@ from fmpy import simulate_fmu
 from grasp_cosim import InputError, Realtime, Result, System, simulate
 from grasp_cosim.master.engine import Engine
 from grasp_cosim.system.stimuli import read_stimuli
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from support.both_engines import engines
+from support.examples import examples
 from support.native_fmus import build, needs_gcc
 from support.stimuli import REALS, driven
 
@@ -77,7 +78,7 @@ def test_an_own_step_takes_the_value_at_its_beginning(
     times=st.lists(st.integers(-3, 13), min_size=1, max_size=6).map(sorted),
     values=st.lists(st.floats(-1e6, 1e6), min_size=6, max_size=6),
 )
-@settings(max_examples=25, deadline=None)
+@examples(25)
 def test_both_engines_give_the_same_bits(
     times: list[int], values: list[float], tmp_path_factory: pytest.TempPathFactory
 ) -> None:

@@ -10,7 +10,7 @@ import pytest
 from grasp_cosim import InputError, System, simulate
 from grasp_cosim.ssp.write import write_ssp
 from grasp_cosim.system.parts import Connection, Port
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from lxml import etree  # type: ignore[import-untyped]
 from ssp.hand_made import (
@@ -24,6 +24,7 @@ from ssp.hand_made import (
     structure,
     system,
 )
+from support.examples import examples
 
 FMU = fmu("input Real u 0.5 m", "output Real y - m", "parameter Real k 1.0 m", "output Boolean b -")
 PARTS = component("a", "output y Real") + component("b", "input u Real")
@@ -132,7 +133,7 @@ FULL = structure(
 )
 
 
-@settings(max_examples=20, deadline=None)
+@examples(20)
 @given(st.randoms(use_true_random=False))
 def test_any_order_of_elements_means_the_same(chance: Random) -> None:
     """But for the order in a list, which counts."""

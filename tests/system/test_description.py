@@ -112,10 +112,10 @@ def test_a_file_that_is_no_fmu(grasp: System, tmp_path: Path, content: bytes) ->
 
 def test_swap_wants_the_same_variables(grasp: System, fmus: Path) -> None:
     with pytest.raises(
-        InputError, match=r"gap\[1\] -> sensor_1.gap': plant has no output 'gap\[1\]'; valid: int"
+        InputError, match=r"ProximitySensor.fmu has no output 'gap\[1\]', and 7 more"
     ):
         grasp.swap("plant", fmus / "ProximitySensor.fmu")
-    with pytest.raises(InputError, match=r"sensor_1 has no input 'gap'; valid: position\[1\]"):
+    with pytest.raises(InputError, match=r"GraspController.fmu has no input 'gap'"):
         grasp.swap("sensor_1", fmus / "GraspController.fmu")
 
 
