@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from conftest import Run
 from grasp_cosim import InputError, Result, System, load_run, simulate
-from grasp_cosim.grasp.metrics import METRICS, NEEDS
+from grasp_cosim.grasp.metrics import METRICS, OBJECT_NEEDS
 from grasp_cosim.grasp.presets import (
     CASES,
     SYSTEM,
@@ -132,7 +132,7 @@ def test_metrics_do_not_depend_on_the_names_of_components(
 ) -> None:
     """Not even where the controller is called plant, and the plant controller."""
     names = dict(zip(("plant", "controller"), chosen, strict=True))
-    signals = {name: original[name] for name in NEEDS}
+    signals = {name: original[name] for name in OBJECT_NEEDS}
     expected = measure(Signals(original.time, signals), METRICS)
     found = measure(Signals(original.time, renamed(signals, names), names), METRICS)
     assert found.values == expected.values

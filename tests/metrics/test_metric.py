@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from grasp_cosim import InputError, Metric, System, extensions, metric, simulate
-from grasp_cosim.grasp.metrics import METRICS, NEEDS, time_difference
+from grasp_cosim.grasp.metrics import METRICS, OBJECT_NEEDS, time_difference
 from grasp_cosim.metrics.metric import (
     RESERVED,
     MissingSignalError,
@@ -181,7 +181,8 @@ def test_a_metric_in_a_sweep_that_raises_fails_its_run_alone(grasp: System) -> N
 
 def grasp_signals(without: str = "") -> Signals:
     """Signals of a grasp that does not move, but for some of them."""
-    names = [n for n in (*NEEDS, "controller.force[1]") if not (without and n.startswith(without))]
+    every = (*OBJECT_NEEDS, "controller.force[1]")
+    names = [n for n in every if not (without and n.startswith(without))]
     return Signals(TIME, {name: np.zeros(3) for name in names})
 
 
@@ -207,6 +208,13 @@ def test_a_signal_that_a_grasp_lacks_is_said_once(without: str, reason: str) -> 
         "no metrics of the grasp: no component is the controller; name it under [roles]: "
         'controller = "..."',
     )
+
+
+def test_a_plant_that_does_not_tell_where_the_object_is_has_the_other_metrics() -> None:
+    found = measure(grasp_signals("plant.object_position"), METRICS)
+    lost = ["object_shift", "object_drift"]
+    assert [*found.values, *lost] == [m.name for m in METRICS if not m.optional]
+    assert found.missing == tuple(f"no {name}: plant lacks object_position" for name in lost)
 
 
 def test_a_grasp_whose_components_have_other_names_is_told_of_the_roles() -> None:

@@ -26,23 +26,23 @@ CLOSING = {1: -1.0, 2: 1.0}
 """Direction in which a finger closes."""
 
 PLANT_OUTPUTS: Mapping[str, str | None] = {
-    "plant.object_position": "m",
-    **{
-        f"plant.{name}[{j}]": unit
-        for name, unit in {
-            "position": "m",
-            "velocity": "m/s",
-            "gap": "m",
-            "contact_force": "N",
-            "contact": None,
-        }.items()
-        for j in FINGERS
-    },
+    f"plant.{name}[{j}]": unit
+    for name, unit in {
+        "position": "m",
+        "velocity": "m/s",
+        "gap": "m",
+        "contact_force": "N",
+        "contact": None,
+    }.items()
+    for j in FINGERS
 }
-"""The outputs of every gripper plant, and their units."""
+"""The outputs of every gripper plant on its fingers, and their units."""
 
 NEEDS: Mapping[str, str | None] = {"controller.target_position": "m", **PLANT_OUTPUTS}
 """The signals of a grasp, and their units."""
+
+OBJECT_NEEDS: Mapping[str, str | None] = {**NEEDS, "plant.object_position": "m"}
+"""The same with where the object is."""
 
 IMPACT_WINDOW = 0.02
 """s from first contact; an impact is over by then, the grasp presses within a second."""
@@ -205,14 +205,14 @@ def target_position(signals: Signals) -> float:
     return float(signals["controller.target_position"][-1])
 
 
-@of_grasp("object_shift", "m")
+@of_grasp("object_shift", "m", needs=OBJECT_NEEDS)
 def object_shift(signals: Signals) -> float:
     """Largest displacement of the object, either way."""
     position = signals["plant.object_position"]
     return float(np.abs(position - position[0]).max())
 
 
-@of_grasp("object_drift", "m/s")
+@of_grasp("object_drift", "m/s", needs=OBJECT_NEEDS)
 def object_drift(signals: Signals) -> float | None:
     """Mean speed of the object over the last STEADY_WINDOW, either way; None in a shorter run."""
     time, position = signals.time, signals["plant.object_position"]
@@ -243,8 +243,8 @@ METRICS = tuple(_found)
 
 
 def is_grasp(signals: Signals) -> bool:
-    """True if there are the signals of a gripper plant and its controller."""
-    return all(name in signals for name in NEEDS)
+    """True if there are the signals of a gripper plant, its object and its controller."""
+    return all(name in signals for name in OBJECT_NEEDS)
 
 
 def _force(signals: Signals, finger: int) -> Floats:

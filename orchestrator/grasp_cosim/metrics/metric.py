@@ -313,16 +313,15 @@ def available(
     metrics: Iterable[Metric], names: Collection[str], roles: Mapping[str, str]
 ) -> tuple[list[Metric], list[str]]:
     """The metrics that signals of these `names` permit, and a line for each reason against one."""
-    there: list[Metric] = []
-    missing: dict[str, None] = {}
-    for m in metrics:
-        reason = lacking(m.needs, names, roles)
-        if not reason:
-            there.append(m)
-        elif not m.optional and not (m.group and _unknown(m.needs, names, roles)):
-            what = f"metrics of the {m.group}" if m.group else m.name
-            missing[f"no {what}: {reason}"] = None
-    return there, list(missing)
+    reasons = [(m, lacking(m.needs, names, roles)) for m in metrics]
+    there = [m for m, reason in reasons if not reason]
+    in_part = {m.group for m in there}
+    missing: dict[str, str] = {}
+    for m, reason in reasons:
+        if reason and not m.optional and not (m.group and _unknown(m.needs, names, roles)):
+            whole = m.group and m.group not in in_part
+            missing.setdefault(f"metrics of the {m.group}" if whole else m.name, reason)
+    return there, [f"no {what}: {reason}" for what, reason in missing.items()]
 
 
 def lacking(needs: Iterable[str], names: Collection[str], roles: Mapping[str, str]) -> str | None:
