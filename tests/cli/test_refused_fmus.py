@@ -105,6 +105,7 @@ def test_a_candidate_with_a_binary_for_others(command: Run, fmus: Path, tmp_path
         one_line(run, "x.fmu: has a binary for win64 only", "ask the vendor for an FMU with a bin")
 
 
+@pytest.mark.slow
 @needs_gcc
 def test_what_an_fmu_lacks_is_a_warning_where_this_host_has_it(
     command: Run, tmp_path: Path

@@ -61,7 +61,7 @@ def test_a_solver_for_co_simulation_alone(tmp_path: Path) -> None:
 def test_another_fmu_takes_the_solver_that_it_can(tmp_path: Path) -> None:
     system = load(tmp_path, "solver = { relative_tolerance = 1e-6 }")
     for kind, solver in (("CoSimulation", None), ("ModelExchange", Solver(1e-6))):
-        other = build_model("dahlquist", tmp_path, "3.0", [kind], "other")
+        other = build_model("dahlquist", tmp_path, kinds=[kind], file="other")
         assert system.swap("x", other).components[0].solver == solver
 
 

@@ -30,7 +30,7 @@ from ..errors import InputError, SimulationError
 from ..files import FULL
 from ..interface.arrays import Element
 from ..interface.interface import Interface, Value, Variable
-from ..interface.obstacles import of_binary, of_loading
+from ..interface.obstacles import of_binary, of_loading, this_machine
 from ..scratch import ScratchFolder, without_scratch
 from .inputs import Inputs
 from .instance import EARLY, ERROR, FATAL, OK, STATUS, TRANSFER_3, Call, Native
@@ -55,7 +55,7 @@ def _decoded(text: bytes | None) -> str:
     return (text or b"").decode(errors="replace")
 
 
-_OF_THIS_MACHINE = tuple(f"binaries/{name}/" for name in (fmpy.platform, fmpy.platform_tuple))
+_OF_THIS_MACHINE = tuple(f"binaries/{name}/" for name in map(this_machine, ("2.0", "3.0")))
 _UNUSED = ("documentation/", "sources/", "binaries/")
 
 LOGGER = logging.getLogger(__name__)

@@ -21,7 +21,7 @@ import fmpy
 from ..errors import choices
 from ..interface.document import unreadable
 from ..interface.interface import Interface
-from ..interface.obstacles import of_binary, of_kind, of_loading
+from ..interface.obstacles import of_binary, of_kind, of_loading, this_machine
 from ..interface.read import describe
 from ..scratch import ScratchFolder
 from .packed_imports import imports
@@ -230,8 +230,8 @@ def unpack(fmu: Path, folder: Path) -> Unpacked:
         fmpy.extract(fmu, folder)
     except Exception as error:  # FMPy and zipfile raise whatever they like
         raise unreadable(fmu, str(error).replace(f"{folder}/", "")) from error
-    system = fmpy.platform_tuple if found.version.startswith("3") else fmpy.platform
-    binary = folder / "binaries" / system / f"{found.identifier}{fmpy.sharedLibraryExtension}"
+    file = f"{found.identifier}{fmpy.sharedLibraryExtension}"
+    binary = folder / "binaries" / this_machine(found.version) / file
     made = [folder / "resources" / name for name in ("slavemodule.txt", "pythonfmu")]
     return Unpacked(
         fmu,

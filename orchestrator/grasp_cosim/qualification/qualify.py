@@ -105,25 +105,10 @@ def qualify(
     asked = tuple(m for m in registered(metrics) if not m.reason)
     more = _conversions_of_candidate(swap.swapped, asked)
     reference = _run(swap.system, progress)
-    to_si = {n: c for n, c in more.items() if n not in reference} | dict(reference.to_si)
     asked += (END,) if _ended_early(reference) else ()
-    original = Reference(
-        curves_of(reference),
-        reference.units,
-        _shift(swap.system),
-        asked,
-        swap.system.roles,
-        to_si,
-        swap.nominals,
-    )
+    original = _reference(swap, reference, asked, more)
     signals, singles = original.entries(bands, metrics=(END.name,))
-    result, failure = None, None
-    try:
-        result = _run(swap.swapped, progress)
-    except SimulationError as error:
-        result, failure = error.result, str(error)
-    except InputError as error:  # does not load, or refuses its initialisation
-        failure = str(error)
+    result, failure = _tried(swap.swapped, progress)
     again: list[Curves] = []
     numerics: list[str] = []
     if not all(entry and entry.wide for entry in (*signals.values(), *singles.values())):
@@ -141,6 +126,25 @@ def qualify(
         (original.curves, theirs),
         _remarks(reference, result) if result else (),
     )
+
+
+def _reference(
+    swap: Swap, run: Result, asked: tuple[Metric, ...], more: Mapping[str, Conversion | None]
+) -> Reference:
+    """The run of the original to compare with; more are conversions of signals that it lacks."""
+    to_si = {n: c for n, c in more.items() if n not in run} | dict(run.to_si)
+    shift, roles = _shift(swap.system), swap.system.roles
+    return Reference(curves_of(run), run.units, shift, asked, roles, to_si, swap.nominals)
+
+
+def _tried(swapped: System, progress: bool) -> tuple[Result | None, str | None]:
+    """The candidate's run as far as it got, and why it did not get to the end."""
+    try:
+        return _run(swapped, progress), None
+    except SimulationError as error:
+        return error.result, str(error)
+    except InputError as error:  # does not load, or refuses its initialisation
+        return None, str(error)
 
 
 def _conversions_of_candidate(
@@ -195,7 +199,7 @@ def _variants(system: System) -> Iterator[tuple[str, System]]:
 
 
 def _remarks(reference: Result, result: Result) -> tuple[str, ...]:
-    """What the candidate's run said that the original's did not, and what is not compared."""
+    """Lines that only the candidate's run said, and on what is not compared."""
     texts = [name for name in reference if name not in reference.numbers]
     said = [line for line in result.log if line not in reference.log]
     return (*said, *(f"{name} is a String: not compared" for name in texts))

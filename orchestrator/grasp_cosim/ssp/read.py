@@ -5,7 +5,7 @@ here, as orchestrator/README.md describes, and said in the notes of the system.
 """
 
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any
@@ -60,14 +60,10 @@ def read_ssp(
     network = Network(systems, parts)
     network.check()
     connections = tuple(_connections(network, names, called))
-    values = read_settings(network)
-    given = [
-        called[at].component(names[at], part, values.get(at, {})) for at, part in parts.items()
-    ]
     stimuli = stimuli or extras.input
-    driven = stimuli.columns if stimuli else ()
+    sourced = {*(c.target for c in connections), *(stimuli.columns if stimuli else ())}
     decided: list[str] = []
-    components = tuple(_keep_starts(file, given, connections, driven, decided))
+    components = tuple(_components(file, network, names, called, sourced, decided))
     if annotated is None:
         components = flow_order(components, connections)
         decided.append(f"order of execution: {', '.join(c.name for c in components)}")
@@ -171,20 +167,22 @@ def _carried(network: Network, hops: list[Hop]) -> Carried:
     return carried
 
 
-def _keep_starts(
+def _components(
     file: str,
-    components: Iterable[Component],
-    connections: Iterable[Connection],
-    driven: Iterable[Port],
+    network: Network,
+    names: Mapping[Path, str],
+    called: Mapping[Path, Called],
+    sourced: Collection[Port],
     notes: list[str],
 ) -> Iterator[Component]:
-    """The components, with the start values of inputs that have no source as values."""
-    connected = {*(connection.target for connection in connections), *driven}
-    for component in components:
+    """The components with the archive's values, and start values of inputs not among sourced."""
+    settings = read_settings(network)
+    for path, part in network.parts.items():
+        component = called[path].component(names[path], part, settings.get(path, {}))
         starts: dict[str, Value] = {}
         for variable in component.interface.of("input"):
             port, start = Port(component.name, variable.name), variable.start
-            given = port in connected or variable.name in component.values
+            given = port in sourced or variable.name in component.values
             if variable.supported and not variable.element and not given and start is not None:
                 place = f"{file}: start value of {port}"
                 starts[variable.name] = component.interface.parse(
