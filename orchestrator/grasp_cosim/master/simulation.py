@@ -278,7 +278,8 @@ class Session:
     def _log(self) -> tuple[str, ...]:
         master = self._master
         rejected = (
-            f"{name}: rejected steps, taken in parts: {r.count}, the first at t = {r.first:.9g} s"
+            f"{name}: steps discarded or ended early, taken in parts: {r.count}, "
+            f"the first at t = {r.first:.9g} s"
             for name, r in master.rejections.items()
         )
         pending = master.scenario.pending() if self.complete else ()
