@@ -51,12 +51,11 @@ def read_ssp(
     given_ns = None if step is None else in_nanoseconds("step", step)
     steps = Steps() if annotated else read_steps(file, root, given_ns)
     extras = annotated or no_extras(names.values(), steps)
-    parts = _sized(systems, parts, notes)
     called = {
         at: Called(f"{file}: {names[at]}", part, extras.components[names[at]])
-        for at, part in parts.items()
+        for at, part in _sized(systems, parts, notes).items()
     }
-    parts = {at: called[at].in_units() for at in parts}
+    parts = {at: part.in_units() for at, part in called.items()}
     network = Network(systems, parts)
     network.check()
     connections = tuple(_connections(network, names, called))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -82,16 +82,26 @@ def init(
     open_lines = to_do(text)
     if not open_lines:
         _read_back(file)
-    report = {
+    show(
+        as_json,
+        _report(file, drafts, open_lines, notes),
+        "\n    ".join(_lines(file, drafts, open_lines)),
+    )
+    for note in notes if not as_json else ():
+        say(note)
+    return 0
+
+
+def _report(
+    file: Path, drafts: Mapping[str, Draft], open_lines: Mapping[int, str], notes: Sequence[str]
+) -> dict[str, Any]:
+    """What was written, for --json."""
+    return {
         "file": str(file),
         "components": {name: _found(draft) for name, draft in drafts.items()},
         "todo": [{"line": number, "text": line} for number, line in open_lines.items()],
         "notes": notes,
     }
-    show(as_json, report, "\n    ".join(_lines(file, drafts, open_lines)))
-    for note in notes if not as_json else ():
-        say(note)
-    return 0
 
 
 def shown(fmu: Path, folder: Path) -> str:
