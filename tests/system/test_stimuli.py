@@ -37,6 +37,13 @@ def test_a_time_may_be_in_another_unit(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.parametrize("name", ["Time", "TIME [s]", "time[s]", " time  [s] "])
+def test_the_time_as_other_tools_call_it_and_rows_of_empty_cells(tmp_path: Path, name: str) -> None:
+    found = read(tmp_path, f"{name},a.u\r\n0,1\r\n , \r\n1,\u00a02\r\n,\r\n")
+    assert found.times == array("q", [0, 10**9])
+    assert list(found.columns[Port("a", "u")].samples) == [1.0, 2.0]
+
+
 @given(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=1, max_size=8))
 def test_numbers_are_read_as_they_are_written(values: list[float]) -> None:
     from tempfile import TemporaryDirectory

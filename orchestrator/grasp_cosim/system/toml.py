@@ -21,8 +21,8 @@ KEYS = (
 )  # fmt: skip
 """The entries of a system file."""
 
-TODO = re.compile(r"""[^#]*["']TODO\b""")
-"""A line with a value that is left to do."""
+TODO = re.compile(r"""(?:[^#"']|"(?!TODO\b)(?:[^"\\]|\\.)*"|'(?!TODO\b)[^']*')*["']TODO\b""")
+"""A line with a value that is left to do; a # in quotes begins no comment."""
 
 
 def read_toml(path: Path, fmus: Path | None = None, stimuli: Stimuli | None = None) -> System:

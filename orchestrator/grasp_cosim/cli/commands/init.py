@@ -6,6 +6,7 @@ import os
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -14,6 +15,7 @@ from ...drafting.text import with_paths
 from ...errors import InputError, SimulationError
 from ...files import NATIVE_FOLDER, check_folder, write_text
 from ...interface.read import read_interface
+from ...numerals import counted
 from ...system.description import System
 from ...system.toml import to_do
 from ..frame import PATH, json_option, pair, say, show
@@ -22,6 +24,9 @@ if TYPE_CHECKING:
     from ...drafting.component import Draft
 
 NAME = re.compile(r"[A-Za-z0-9_-]+")
+
+MOST = 24
+"""So many lines with a TODO at most are listed; --json and the file have all."""
 
 
 @click.command()
@@ -205,6 +210,7 @@ def _lines(file: Path, drafts: Mapping[str, Draft], left: Mapping[int, str]) -> 
             f"{name}: {len(draft.found)} of the FMU's variables found"
             + (f", {doubtful} of them to check: CHECK" if doubtful else "")
         )
-    lines += [f"line {number}: {line}" for number, line in left.items()]
+    listed = [f"line {number}: {line}" for number, line in left.items()]
+    more = [f"and {counted(len(listed) - MOST, 'line')} more"] if len(listed) > MOST else []
     then = "when no TODO is left" if left else "then"
-    return [*lines, f"{then}: grasp-cosim run {file}"]
+    return [*lines, *listed[:MOST], *more, f"{then}: grasp-cosim run {quote(str(file))}"]
