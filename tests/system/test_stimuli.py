@@ -66,8 +66,9 @@ def test_a_mistake_far_down_is_found(tmp_path: Path) -> None:
     [
         ("", "drive.csv: is empty; must begin with names"),
         ("time,a.u\n", "drive.csv: has no row after the names"),
-        ("time\n0\n", "line 1: drives nothing"),
+        ("time\n0\n", "line 1: has the time alone; must have columns"),
         ("t,a.u\n0,0\n", "line 1, column 1 = 't': must be time"),
+        ("time;a.u\n0;1,5\n", "= 'time;a.u': must be time, then component.variable, with commas"),
         ("time [m],a.u\n0,0\n", "line 1, column 1 = 'time [m]': must be in a unit of time"),
         ("time,u\n0,0\n", "line 1, column 2 = 'u': must be component.variable"),
         ("time,a.u,a.u\n0,0,0\n", "line 1, column 3 = 'a.u': is there twice"),

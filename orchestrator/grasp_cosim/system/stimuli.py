@@ -188,10 +188,13 @@ def _header(file: str, names: Sequence[str]) -> tuple[list[Port], list[str | Non
     others = [(m[1], m[2]) if m else (name, None) for m, name in zip(found, names[1:], strict=True)]
     if not time:
         raise InputError(
-            f"{_place(file, 1, 1)} = {names[0]!r}: must be time, then inputs, commas between"
+            f"{_place(file, 1, 1)} = {names[0]!r}: must be time, then component.variable, with "
+            "commas between them and points in numbers"
         )
     if not others:
-        raise InputError(f"{file}: line 1: drives nothing; must have columns component.variable")
+        raise InputError(
+            f"{file}: line 1: has the time alone; must have columns component.variable"
+        )
     ports: list[Port] = []
     for i, (name, _) in enumerate(others, 2):
         component, dot, variable = name.partition(".")
