@@ -150,7 +150,9 @@ def test_a_number_that_float64_does_not_have_is_quoted_as_it_is_written(tmp_path
 def test_an_input_has_one_source(tmp_path: Path) -> None:
     text = "time,a.u_Real\n0,1\n"
     system = System.load(driven(tmp_path, text, more=INPUT))
-    with pytest.raises(InputError, match=r"a.u_Real has two sources, drive.csv and a value"):
+    with pytest.raises(
+        InputError, match=r"a.u_Real has two sources, drive.csv and a value; .*: take"
+    ):
         system.with_values({"a.u_Real": 2.0})
     event = '[[events]]\nat = 0.5\nset = { "a.u_Real" = 1.0 }\n'
     with pytest.raises(InputError, match=r"a.u_Real has two sources, drive.csv and an event"):
