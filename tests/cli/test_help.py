@@ -29,4 +29,5 @@ def test_the_group_lists_every_command() -> None:
 def test_a_command_that_is_none_is_named() -> None:
     result = CliRunner().invoke(cli, ["rnu"])
     assert result.exit_code == 2
-    assert "No such command 'rnu'" in result.output
+    assert "'rnu': no such command; did you mean run?" in result.output
+    assert "`grasp-cosim --help` shows all" in CliRunner().invoke(cli, ["xyz"]).output

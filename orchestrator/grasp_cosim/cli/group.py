@@ -9,6 +9,7 @@ import click
 
 from .. import interruption
 from ..early import begin
+from ..errors import nearest
 from ..scratch import sweep
 
 OF_THE_GRASP = {"evaluate", "identify", "play"}
@@ -23,6 +24,15 @@ class Commands(click.Group):
         found = [file.name for file in files(f"{__package__}.commands").iterdir()]
         names = {n.removesuffix(".py") for n in found if n.endswith(".py") and n[0] != "_"}
         return sorted(names if find_spec("..grasp", __package__) else names - OF_THE_GRASP)
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """The command that the arguments name; UsageError with those nearest to it, where none."""
+        if args[0] not in self.list_commands(ctx) and not args[0].startswith("-"):
+            near = nearest(args[0], self.list_commands(ctx), "`grasp-cosim --help`")
+            ctx.fail(f"{args[0]!r}: no such command; {near}")
+        return super().resolve_command(ctx, args)
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
         """The command of that name; None where there is none."""

@@ -11,7 +11,7 @@ from typing import Any
 
 from tqdm import tqdm
 
-from ..errors import InputError, SimulationError, choices
+from ..errors import InputError, SimulationError, nearest
 from ..fmi.load import load
 from ..interface.interface import Value
 from ..interruption import interruptible, interrupts, noticing
@@ -215,7 +215,7 @@ class Session:
         slots, texts = self._master.slots, self._master.texts
         port = Port(*name.split(".", 1)) if "." in name else None
         if port not in slots:
-            raise InputError(f"{name!r}: no such signal; valid: {choices(slots)}")
+            raise InputError(f"{name!r}: no such signal; {nearest(name, slots)}")
         value = float(self._master.values[slots[port]])
         return texts[port].listed[int(value)] if port in texts else value
 
