@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 import traceback
 from collections.abc import Callable, Collection, Sequence
@@ -39,6 +40,14 @@ def together(*options: Command) -> Command:
 
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+
+workers_option = click.option(
+    "--workers",
+    type=click.IntRange(1),
+    default=os.cpu_count(),
+    show_default="all cores",
+    help="Processes that run at the same time.",
+)
 
 metrics_option = click.option(
     "--metrics",

@@ -12,6 +12,14 @@ from ..early import begin
 from ..errors import nearest
 from ..scratch import sweep
 
+SECTIONS = {
+    "Simulate": ("run", "play", "sweep", "tune", "evaluate", "identify"),
+    "Look at recorded runs": ("report", "compare"),
+    "Make and check FMUs and systems": ("init", "build", "inspect", "doctor", "qualify", "ssp"),
+    "Hardware in the loop": ("proxy", "serve", "relay"),
+}
+"""Where the help lists a command; one that is in none of these is among the others."""
+
 OF_THE_GRASP = {"evaluate", "identify", "play"}
 """The commands that there are with the room grasp/ only."""
 
@@ -24,6 +32,18 @@ class Commands(click.Group):
         found = [file.name for file in files(f"{__package__}.commands").iterdir()]
         names = {n.removesuffix(".py") for n in found if n.endswith(".py") and n[0] != "_"}
         return sorted(names if find_spec("..grasp", __package__) else names - OF_THE_GRASP)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the sections of the help, in which each command is once."""
+        left = self.list_commands(ctx)
+        width = formatter.width - 6 - max(map(len, left))
+        others = {"Other commands": tuple(sorted(set(left).difference(*SECTIONS.values())))}
+        for title, names in (SECTIONS | others).items():
+            found = [(n, self.get_command(ctx, n)) for n in names if n in left]
+            rows = [(n, command.get_short_help_str(width)) for n, command in found if command]
+            if rows:
+                with formatter.section(title):
+                    formatter.write_dl(rows)
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

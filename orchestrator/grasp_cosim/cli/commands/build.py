@@ -47,9 +47,10 @@ def build(
     c_only: Path | None,
     as_json: bool,
 ) -> int:
-    """Build the FMUs: the plants, GripperPlant*, ProximitySensor, and the GraspController*.
+    """Build the FMUs, of Python or as C.
 
-    With BLOCK, a Python file: the FMU of that block alone, spring_plant.py becomes SpringPlant.fmu.
+    These are the plants, GripperPlant*, ProximitySensor, and the GraspController*. With BLOCK, a
+    Python file: the FMU of that block alone, spring_plant.py becomes SpringPlant.fmu.
     docs/your_plant.md shows one. With --native, BLOCK may be the name of one of ours as well.
 
     Says what is not as it was built last. --bind-python adds the libpython of PYTHON, by default

@@ -31,7 +31,13 @@ KINDS: Mapping[str, type[Value]] = {"Real": float, "Integer": int, "Boolean": bo
 @click.argument("fmu", type=PATH)
 @click.option("-o", "--out", type=PATH, help="The proxy to write, an .fmu.")
 @click.option("--host", default=DEFAULTS.host, show_default=True, help="Where its peer is.")
-@click.option("--port", type=click.IntRange(1, 65535), default=DEFAULTS.port, show_default=True)
+@click.option(
+    "--port",
+    type=click.IntRange(1, 65535),
+    default=DEFAULTS.port,
+    show_default=True,
+    help="UDP port of the peer.",
+)
 @click.option(
     "--timeout",
     type=float,
@@ -62,12 +68,13 @@ def proxy(
     c_header: Path | None,
     as_json: bool,
 ) -> int:
-    """Make a proxy of FMU: an FMU with the same variables that gets its outputs from a peer.
+    """Make a proxy of FMU, whose outputs come from a peer.
 
-    It sends inputs and parameters in one UDP datagram per step and waits --timeout for the outputs.
-    What happens without an answer is up to its parameters proxy.*, where --host, --port and
-    --timeout are start values. The peer: grasp-cosim serve, or a bench with the header of
-    --c-header. With --native it is C, for hosts and machines without Python.
+    It is an FMU with the same variables. It sends inputs and parameters in one UDP datagram per
+    step and waits --timeout for the outputs. What happens without an answer is up to its parameters
+    proxy.*, where --host, --port and --timeout are start values. The peer: grasp-cosim serve, or a
+    bench with the header of --c-header. With --native it is C, for hosts and machines without
+    Python.
 
     \b
     Example: grasp-cosim proxy fmus/build/GripperPlant.fmu -o GripperPlantProxy.fmu --timeout 0.001

@@ -14,6 +14,7 @@ from ...qualification.qualify import Qualification
 from ...qualification.qualify import qualify as run_qualification
 from ...report.qualification import draw_qualification
 from ...system.parts import ISOLATIONS, Isolation
+from ..completion import components
 from ..frame import (
     NEGATIVE,
     PATH,
@@ -31,7 +32,14 @@ from ..options import chosen_system, names_options, replacements, set_values, sy
 
 @click.command()
 @click.argument("candidate", type=PATH)
-@click.option("--as", "component", required=True, metavar="COMPONENT", help="Whose place it takes.")
+@click.option(
+    "--as",
+    "component",
+    required=True,
+    metavar="COMPONENT",
+    shell_complete=components(),
+    help="Whose place it takes.",
+)
 @click.option("--system", type=PATH, help="Default: the built-in grasp.")
 @system_options
 @click.option("--bands", type=PATH, help="TOML; default: derived.")
@@ -62,9 +70,9 @@ def qualify(
     as_json: bool,
     **given: Any,
 ) -> int:
-    """Find out whether CANDIDATE, an FMU or a system file with it, may take the place of COMPONENT.
+    """Find out whether CANDIDATE may take the place of COMPONENT.
 
-    Of a system file it is the FMU of the component of that name, as it is there.
+    It is an FMU, or a system file: then the FMU of the component of that name, as it is there.
 
     Compares the interfaces, then the closed loops with the original and with the candidate, signal
     by signal and metric by metric. Exit code 0: qualified; 1: not.

@@ -18,6 +18,7 @@ from ...sweep.store import Store
 from ...sweep.study import STATISTICS, Pictures, Study
 from ...sweep.sweep import RUNS, Sweep
 from ...sweep.sweep import sweep as run_study
+from ..completion import studies
 from ..frame import (
     INTERRUPTED,
     NEGATIVE,
@@ -38,7 +39,7 @@ from ..options import controller_option
 
 
 @click.command()
-@click.argument("study")
+@click.argument("study", shell_complete=studies)
 @controller_option
 @click.option("--seed", type=click.IntRange(0), help="Draw other runs than the study's own seed.")
 @click.option("--out", type=PATH, help="Folder of the runs; by default the study's name, here.")
@@ -62,7 +63,7 @@ def sweep(
     native: bool | None,
     as_json: bool,
 ) -> int:
-    """Do all runs of STUDY: a .toml file, or the name of one that is built in.
+    """Do all runs of STUDY, a .toml file or a built-in one.
 
     Built in: reflectance_map, grasp_sensitivity, bench_monte_carlo, and those of the adaptive
     controller, which docs/colour.md tells of.
