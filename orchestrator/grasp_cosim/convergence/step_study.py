@@ -313,7 +313,7 @@ def step_study(
         )
     # the finest, which is the longest, first
     jobs = [(replace(system, step_ns=ns), question) for ns in chosen]
-    runs = run_all(run_step, jobs, min(workers, len(jobs)), progress, "steps")
+    runs = run_all(run_step, jobs, min(workers, len(jobs)), progress, "step study")
     found = dict.fromkeys(name for run in runs for name in run.values)
     return StepStudy(
         system.name,

@@ -9,14 +9,13 @@ from contextlib import ExitStack, contextmanager
 from numbers import Integral
 from typing import Any
 
-from tqdm import tqdm
-
 from ..errors import InputError, SimulationError, nearest
 from ..fmi.load import load
 from ..interface.interface import Value
 from ..interruption import interruptible, interrupts, noticing
 from ..metrics.metric import Function, Metric, chosen, registered
 from ..metrics.units import in_si
+from ..progress import Progress
 from ..realtime.options import Realtime
 from ..realtime.pacer import Pacer
 from ..realtime.privileges import Privileges, privileges
@@ -306,7 +305,7 @@ class Simulate:
         step: float | None = None,
         stop: float | None = None,
         scheme: str | None = None,
-        progress: bool = False,
+        progress: bool | str = False,
         every: int = 1,
         listeners: Sequence[Listener] = (),
         engine: Engine = "auto",
@@ -317,10 +316,11 @@ class Simulate:
     ) -> Result:
         """Run a system to its stop time and return every output at every communication point.
 
-        step and stop in s and the scheme replace those of the system. progress shows a bar on
-        standard error if that is a terminal. every keeps only each n-th communication point, and
-        the last. listeners get what is kept while it is recorded. engine is "python", "compiled"
-        (needs a C compiler) or "auto", compiled where that pays; the results have the same bits.
+        step and stop in s and the scheme replace those of the system. progress shows on standard
+        error how far it is, by the name of the system or the one given. every keeps only each n-th
+        communication point, and the last. listeners get what is kept while it is recorded. engine
+        is "python", "compiled" (needs a C compiler) or "auto", compiled where that pays; the
+        results have the same bits.
         realtime paces the run by the clock: the result has a timing, and the same bits. metrics are
         worked out beside those that every result is asked for: from @metric, or functions of their
         own name; a name among them says that the result must have that metric. diverging, "stop" or
@@ -369,16 +369,17 @@ def _folder_kept() -> Iterator[None]:
             os.chdir(here)
 
 
-def _drive(session: Session, progress: bool) -> None:
+def _drive(session: Session, progress: bool | str) -> None:
     total = session.system.stop_ns / NANOSECONDS
     with (
         interrupts(session.halt),
-        tqdm(
-            total=total,
+        Progress(
+            progress if isinstance(progress, str) else session.system.name,
+            total,
             unit="s",
-            desc="simulated",
-            disable=None if progress else True,
-            bar_format="{l_bar}{bar}| {n:.2f}/{total:.2f} s [{elapsed}<{remaining}]{postfix}",
+            shown=bool(progress),
+            at_once=session.pacer is not None,
+            ticking=False,  # a thread more would be felt in real time
         ) as bar,
     ):
 

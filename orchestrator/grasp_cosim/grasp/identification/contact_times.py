@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...errors import InputError, SimulationError, choices
-from ...parallel import Crew, progress_bar
+from ...parallel import Crew
+from ...progress import Progress
 from ...system.description import System
 from ..closing import close
 from ..metrics import FINGERS
@@ -103,10 +104,10 @@ def identify_from_times(
 ) -> Fit:
     """Fit the parameters to contact times, grasps in parallel; the residuals are in s.
 
-    progress counts the grasps on standard error if that is a terminal.
+    progress counts the grasps on standard error.
     """
     system = system.with_experiment(STEP, STOP)
-    with progress_bar("grasps", None, progress) as bar, Crew(workers) as crew:
+    with Progress("identify", unit="grasp", shown=progress) as bar, Crew(workers) as crew:
 
         def simulate(grasps: Sequence[Grasp]) -> Iterable[Times]:
             return crew.map(contact_times, [(system, grasp) for grasp in grasps], bar)
