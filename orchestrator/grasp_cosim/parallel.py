@@ -21,7 +21,7 @@ from typing import Any, NamedTuple, Self, TypeVar
 
 from . import interruption
 from .errors import SimulationError
-from .progress import Progress
+from .progress import Progress, phase
 from .scratch import sweep
 
 Job = TypeVar("Job")
@@ -52,7 +52,8 @@ def run_all(
     keep: Keep[Run] = lambda *_: None,
 ) -> list[Run]:
     """Return the results of Crew.map; `progress` shows how far they are, named `what`."""
-    with Progress(what, len(jobs), shown=progress) as bar, Crew(workers) as crew:
+    bar = Progress(what, len(jobs), shown=progress)
+    with phase(f"{what}, {len(jobs)} runs on {workers} processes"), bar, Crew(workers) as crew:
         return crew.map(run, jobs, bar, keep)
 
 

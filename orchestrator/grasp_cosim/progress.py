@@ -3,15 +3,20 @@
 What is over sooner than can be read shows nothing.
 """
 
+import logging
 import signal
 import sys
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from tqdm import tqdm
 
 from .interruption import SIGNALS
+
+LOGGER = logging.getLogger(__name__)
 
 DELAY = 0.5
 """s after which there is a bar on a terminal."""
@@ -27,8 +32,8 @@ class Progress(tqdm):  # type: ignore[type-arg]  # subscripted, it is no class
     """A context manager; update() says how much more is done, of `total` or of nobody knows what.
 
     Named `what`: "candidate: 1.25 of 3.00 s" for the unit "s", else "map: run 12 of 36", the run
-    that is at work. Two samples are needed to tell how long the rest takes: the first says how long
-    it took to begin, too.
+    that is at work; without a unit nothing is counted. Two samples are needed to tell how long the
+    rest takes: the first says how long it took to begin, too.
     """
 
     def __init__(
@@ -92,7 +97,9 @@ class Progress(tqdm):  # type: ignore[type-arg]  # subscripted, it is no class
             took.append(f"about {span(left)} left")
         if self.postfix:
             took.append(str(self.postfix))
-        return {**found, "what": f"{self.desc}: {self._count()}", "took": ", ".join(took)}
+        count = self._count()
+        what = f"{self.desc}: {count}" if count else self.desc
+        return {**found, "what": what, "took": ", ".join(took)}
 
     def display(self, msg: str | None = None, pos: int | None = None) -> bool:  # type: ignore[override]
         """Draw the bar, or write a line."""
@@ -114,7 +121,7 @@ class Progress(tqdm):  # type: ignore[type-arg]  # subscripted, it is no class
         if self.unit == "s":
             return f"{self.n:.2f} of {self.total:.2f} s"
         if self.total is None:
-            return f"{self.n} {self.unit}s"
+            return self.unit and f"{self.n} {self.unit}s"
         return f"{self.unit} {min(self.n + 1, self.total)} of {self.total}"
 
     def _tick(self) -> None:
@@ -125,6 +132,14 @@ class Progress(tqdm):  # type: ignore[type-arg]  # subscripted, it is no class
             if now - self.start_t >= self._delay and now - self.last_print_t >= wait:
                 self.last_print_t = now
                 self.refresh()
+
+
+@contextmanager
+def phase(what: str) -> Iterator[None]:
+    """Log at its end how long a part of the work took, at the level INFO."""
+    began = time.perf_counter()
+    yield
+    LOGGER.info("%s: %.2f s", what, time.perf_counter() - began)
 
 
 def span(seconds: float) -> str:

@@ -11,6 +11,7 @@ from .. import interruption
 from ..early import begin
 from ..errors import nearest
 from ..scratch import sweep
+from .frame import VERBOSITY
 
 SECTIONS = {
     "Simulate": ("run", "play", "sweep", "tune", "evaluate", "identify"),
@@ -59,6 +60,7 @@ class Commands(click.Group):
         if name not in self.list_commands(ctx):
             return None
         command: click.Command = getattr(import_module(f"{__package__}.commands.{name}"), name)
+        command.params += [option for option in VERBOSITY if option not in command.params]
         return command
 
 

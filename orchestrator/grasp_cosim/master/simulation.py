@@ -15,7 +15,7 @@ from ..interface.interface import Value
 from ..interruption import interruptible, interrupts, noticing
 from ..metrics.metric import Function, Metric, chosen, registered
 from ..metrics.units import in_si
-from ..progress import Progress
+from ..progress import Progress, phase
 from ..realtime.options import Realtime
 from ..realtime.pacer import Pacer
 from ..realtime.privileges import Privileges, privileges
@@ -26,13 +26,13 @@ from ..recording.proxies import proxy_lines
 from ..recording.result import Result
 from ..system.checks import remarks
 from ..system.description import System
-from ..system.parts import NANOSECONDS, Port
+from ..system.parts import NANOSECONDS, Component, Port
 from ..system.settings import settings
 from .engine import Engine
 from .master import Master
 
 LOGGER = logging.getLogger(__name__)
-"""Gets what the operating system does not permit."""
+"""Gets what the operating system does not permit, and at the level INFO what a run does."""
 
 MOST = 2**62
 """The highest number of steps, far beyond the longest run."""
@@ -85,9 +85,11 @@ class Session:
             self._stack.enter_context(noticing())
             with interruptible(), _folder_kept():
                 instances = []
-                for component in system.components:
-                    instances.append(load(component))
-                    self._stack.callback(instances[-1].close)
+                with phase(f"loading {len(system.components)} FMUs"):
+                    for component in system.components:
+                        LOGGER.info("%s", _loaded(component))
+                        instances.append(load(component))
+                        self._stack.callback(instances[-1].close)
                 self._master = Master(
                     system, instances, lambda *rows: self._dispatch(*rows), engine, self.pacer
                 )
@@ -101,7 +103,7 @@ class Session:
                 if self.pacer:
                     self.pacer.spare = self._dispatch.spare
                 self._stack.callback(self._end)
-                with self._failures():  # where the row of t = 0 is not finite
+                with phase("initialising"), self._failures():  # the row of t = 0 may not be finite
                     self._master.initialise()
             self._tell(self._early())
             if realtime and self.pacer:
@@ -344,13 +346,22 @@ class Simulate:
             diverging=diverging,
             note=note,
         ) as session:
-            _drive(session, progress)
+            with phase(f"{system.name} to {session.system.stop_ns / NANOSECONDS:g} s"):
+                _drive(session, progress)
             return session.result()
 
     session = Session
 
 
 simulate = Simulate()
+
+
+def _loaded(component: Component) -> str:
+    """Which FMU runs as a component, and how, in words."""
+    fmu = component.loaded
+    kind = "Python" if fmu.python else "a binary"
+    place = ", in a process of its own" if component.isolation == "process" else ""
+    return f"{component.name}: {fmu.path}, FMI {fmu.version}, {kind}{place}"
 
 
 def _check_count(name: str, count: object) -> None:

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from ..errors import InputError
 from ..files import remove_parts, write_text
 from ..parallel import Crew, Lost
-from ..progress import Progress
+from ..progress import Progress, phase
 from .cluster import run_on_cluster
 from .run import Job, Outcome, Task, run_job
 from .sensitivity import Sensitivity, sensitivity
@@ -115,7 +115,7 @@ def sweep(
             results = run_here(task, jobs, min(workers or os.cpu_count() or 1, len(left)))
         what = f"{study.name}, {study.variant}" if study.variant else study.name
         bar = Progress(what, study.runs, shown=progress, initial=resumed)
-        with bar, closing(results):
+        with phase(f"{what}, {len(left)} runs"), bar, closing(results):
             for outcome in results:
                 store.keep(outcome)
                 done[outcome.index] = outcome

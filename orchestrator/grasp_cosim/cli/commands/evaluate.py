@@ -18,6 +18,7 @@ from ..frame import (
     NEGATIVE,
     PATH,
     fail,
+    is_quiet,
     json_option,
     load_system,
     show,
@@ -63,7 +64,7 @@ def evaluate(
     system = with_preset(system, "bench") if bench else system
     try:
         with natively(system, native) as chosen:
-            report = run_evaluation(chosen, out, workers, True, source)
+            report = run_evaluation(chosen, out, workers, not is_quiet(), source)
     except KeyboardInterrupt:
         kept = Parts(out / FOLDER).kept()
         goes_on = f"; {kept} grasps are kept in {out / FOLDER}, the same command goes on"

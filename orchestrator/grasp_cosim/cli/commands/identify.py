@@ -18,7 +18,7 @@ from ...grasp.identification.log import identify_from_log
 from ...grasp.identification.parameters import DEFAULT, GROUPS, chosen
 from ...recording.load import load_log
 from ...system.description import System
-from ..frame import PATH, json_option, load_system, say, show, workers_option
+from ..frame import PATH, is_quiet, json_option, load_system, say, show, workers_option
 from ..native import many_runs_option, natively
 from ..options import set_option, set_values
 
@@ -93,7 +93,7 @@ def _from_times(
     contacts = read_contacts(path) if path else published_contacts()
     parameters = chosen(groups, tuple(GROUPS), "identify")
     with natively(system, native) as run:
-        fit = identify_from_times(run, contacts, parameters, workers, progress=True)
+        fit = identify_from_times(run, contacts, parameters, workers, progress=not is_quiet())
     rows = [
         {"condition": c.label, "case": c.case, "finger": c.finger, "measured": c.time}
         for c in contacts

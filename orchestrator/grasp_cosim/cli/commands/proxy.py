@@ -17,7 +17,7 @@ from ...hil.protocol import link_signature
 from ...interface.interface import Interface, Value, Variable
 from ...interface.read import read_interface
 from ...interface.units import BASE
-from ..frame import PATH, announce, bind_python_option, json_option, say, show
+from ..frame import PATH, bind_python_option, json_option, say, show, waiting
 from .build import FIRST
 
 if TYPE_CHECKING:
@@ -150,9 +150,9 @@ def _built_native(
     from grasp_fmus.native.targets import targets
 
     plan = planned(targets(target.split(",")) if target is not None else (), 3 if fmi == "3" else 2)
-    first = FIRST if target else ""
-    announce(f"building for {', '.join(t.tuple for t in plan.places)}{first}")
-    built = build_native_proxy(out, original, plan, settings)
+    places = ", ".join(t.tuple for t in plan.places)
+    with waiting(f"building for {places}{FIRST if target else ''}"):
+        built = build_native_proxy(out, original, plan, settings)
     return built, [plan.note] if plan.note else []
 
 

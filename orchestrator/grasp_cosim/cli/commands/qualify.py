@@ -20,6 +20,7 @@ from ..frame import (
     PATH,
     check_outputs,
     chosen_metrics,
+    is_quiet,
     json_option,
     load_system,
     metrics_option,
@@ -95,7 +96,7 @@ def qualify(
             values=set_values(given["settings"]),
             bands=read_bands(bands) if bands else None,
             isolation=isolation,
-            progress=True,
+            progress=not is_quiet(),
             metrics=chosen_metrics(metric_files),
         )
     if out:

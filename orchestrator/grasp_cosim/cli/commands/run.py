@@ -24,6 +24,7 @@ from ..frame import (
     check_outputs,
     chosen_metrics,
     fail,
+    is_quiet,
     json_option,
     metrics_option,
     pair,
@@ -122,7 +123,7 @@ def run(
         try:
             result = simulate(
                 chosen,
-                progress=True,
+                progress=not is_quiet(),
                 every=every,
                 listeners=[folder] if folder else (),
                 engine=engine,

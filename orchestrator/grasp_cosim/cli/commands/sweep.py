@@ -26,6 +26,7 @@ from ..frame import (
     check_outputs,
     chosen_metrics,
     fail,
+    is_quiet,
     json_option,
     load_system,
     metrics_option,
@@ -89,7 +90,9 @@ def sweep(
     try:
         with all_natively([v.system for v in variants], native) as systems:
             done = [
-                run_study(replace(v, system=s), folder / v.variant, workers, scheduler, True)
+                run_study(
+                    replace(v, system=s), folder / v.variant, workers, scheduler, not is_quiet()
+                )
                 for v, s in zip(variants, systems, strict=True)
             ]
     except KeyboardInterrupt:
