@@ -16,6 +16,7 @@ from ...grasp.identification.contact_times import (
 from ...grasp.identification.log import GROUPS as IN_A_LOG
 from ...grasp.identification.log import identify_from_log
 from ...grasp.identification.parameters import DEFAULT, GROUPS, chosen
+from ...numerals import counted
 from ...recording.load import load_log
 from ...system.description import System
 from ..frame import PATH, is_quiet, json_option, load_system, say, show, workers_option
@@ -80,7 +81,7 @@ def _from_log(system: System, path: Path, groups: tuple[str, ...]) -> report.Ide
     parameters = chosen(groups, IN_A_LOG, f"--log {path}")
     windows, fit = identify_from_log(system, load_log(path, say), parameters, str(path))
     rows = [{"finger": w.finger, "time": float(t)} for w in windows for t in w.time]
-    return report.Identification(f"{path}, {len(rows)} windows", "N", fit, rows)
+    return report.Identification(f"{path}, {counted(len(rows), 'window')}", "N", fit, rows)
 
 
 def _from_times(
