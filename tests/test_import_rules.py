@@ -173,6 +173,7 @@ FLOORS = (
         "files",
         "scratch",
         "interruption",
+        "progress",
         "parallel",
         "extensions",
     ),

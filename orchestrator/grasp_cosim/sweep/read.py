@@ -19,7 +19,7 @@ from ..checks import (
     toml_table,
     whole,
 )
-from ..errors import InputError, choices
+from ..errors import InputError, choices, nearest
 from ..interface.interface import Value
 from ..metrics.metric import Metric, load_metrics
 from ..system.description import System
@@ -84,7 +84,7 @@ def study_file(name: str, folder: Path) -> Path:
     if path.suffix != ".toml" and name in known:
         return folder / f"{name}.toml"
     if not path.is_file():
-        raise InputError(f"{path}: no such study; must be a .toml file or {choices(known)}")
+        raise InputError(f"{path}: no such study, nor .toml file; {nearest(name, known)}")
     return path
 
 

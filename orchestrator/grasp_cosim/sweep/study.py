@@ -11,7 +11,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from ..checks import known
-from ..errors import InputError, choices
+from ..errors import InputError, choices, nearest
 from ..interface.interface import Value, Variable
 from ..interface.units import IDENTITY, Conversion
 from ..metrics.metric import Metric, available, check_portable, registered
@@ -155,7 +155,7 @@ class Study:
         component, _, variable = name.partition(".")
         interface = self.system.component(component, f"{self.name}: {name}").interface
         said = f"{self.name}: {name}: {interface.path.name} has no variable"
-        known(said, variable, interface.by_name)
+        known(said, variable, interface.by_name, see=interface.listing)
         return interface.by_name[variable]
 
     @cached_property
@@ -296,8 +296,8 @@ class Study:
         for name in (*(m.of for m in self.pictures.maps), *self.pictures.distributions):
             if not (name in columns or name.startswith(PROXIES) or self.metric_of(name)):
                 raise InputError(
-                    f"{self.name}: figures: no column {name!r} in the results; valid: "
-                    f"{choices(columns)}"
+                    f"{self.name}: figures: no column {name!r} in the results; "
+                    f"{nearest(name, columns)}"
                 )
 
     @cached_property

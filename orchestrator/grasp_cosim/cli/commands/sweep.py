@@ -18,6 +18,7 @@ from ...sweep.store import Store
 from ...sweep.study import STATISTICS, Pictures, Study
 from ...sweep.sweep import RUNS, Sweep
 from ...sweep.sweep import sweep as run_study
+from ..completion import studies
 from ..frame import (
     INTERRUPTED,
     NEGATIVE,
@@ -25,6 +26,7 @@ from ..frame import (
     check_outputs,
     chosen_metrics,
     fail,
+    is_quiet,
     json_option,
     load_system,
     metrics_option,
@@ -38,7 +40,7 @@ from ..options import controller_option
 
 
 @click.command()
-@click.argument("study")
+@click.argument("study", shell_complete=studies)
 @controller_option
 @click.option("--seed", type=click.IntRange(0), help="Draw other runs than the study's own seed.")
 @click.option("--out", type=PATH, help="Folder of the runs; by default the study's name, here.")
@@ -62,7 +64,7 @@ def sweep(
     native: bool | None,
     as_json: bool,
 ) -> int:
-    """Do all runs of STUDY: a .toml file, or the name of one that is built in.
+    """Do all runs of STUDY, a .toml file or a built-in one.
 
     Built in: reflectance_map, grasp_sensitivity, bench_monte_carlo, and those of the adaptive
     controller, which docs/colour.md tells of.
@@ -88,7 +90,9 @@ def sweep(
     try:
         with all_natively([v.system for v in variants], native) as systems:
             done = [
-                run_study(replace(v, system=s), folder / v.variant, workers, scheduler, True)
+                run_study(
+                    replace(v, system=s), folder / v.variant, workers, scheduler, not is_quiet()
+                )
                 for v, s in zip(variants, systems, strict=True)
             ]
     except KeyboardInterrupt:
