@@ -14,6 +14,11 @@ def in_milli(unit: str | None) -> tuple[float, str]:
     return MILLI.get(unit or "", (1.0, "" if unit in (None, "1") else str(unit)))
 
 
+def counted(count: int, noun: str) -> str:
+    """Return a count with its noun, which takes an s unless it is 1: `1 fault`, `2 faults`."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
 def fixed(
     value: float,
     decimals: int,
