@@ -26,6 +26,9 @@ Floats = npt.NDArray[np.float64]
 COLOURS = "viridis"
 """The colours of a map, by the name that matplotlib knows them by."""
 
+LIMIT = "black"
+"""The colour of the line of a limit."""
+
 MISSING, HATCH = "#dddddd", "////"
 """The colour and the hatches of cells without a value."""
 
@@ -184,9 +187,9 @@ def _draw_limit(axes: Axes, points: _Points, limit: float, label: str) -> None:
     halo: list[AbstractPathEffect] = [
         withStroke(linewidth=3.5, foreground="white")
     ]  # so that it shows in grey, too
-    line = axes.contour(points.x, points.y, z, levels=[limit], colors=RED, linewidths=1.5)
+    line = axes.contour(points.x, points.y, z, levels=[limit], colors=LIMIT, linewidths=1.5)
     line.set_path_effects(halo)
-    axes.plot([], [], color=RED, label=label, path_effects=halo)
+    axes.plot([], [], color=LIMIT, label=label, path_effects=halo)
 
 
 def _name_missing(axes: Axes, in_cells: bool, label: str) -> None:
@@ -242,7 +245,7 @@ def _draw_curves(sweeps: Sequence[Sweep], curves: Sequence[Curve], path: Path) -
         factor, unit = study.shown(lines[0][1])
         if wanted.limit is not None:
             label = f"limit, {factor * wanted.limit:g} {unit}".rstrip()
-            axes.axhline(factor * wanted.limit, color="black", linestyle=":", label=label)
+            axes.axhline(factor * wanted.limit, color=LIMIT, linestyle=":", label=label)
         cell = _what_of_a_cell(
             sweeps[0], len(_curve(sweeps[0], wanted, lines[0][1])[0]), wanted.cell
         )
@@ -292,7 +295,8 @@ def _heading(sweeps: Sequence[Sweep]) -> str:
     study, count = sweeps[0].study, len(sweeps[0].outcomes)
     each = f"{len(sweeps)} times " if len(sweeps) > 1 else ""
     names = [_plain(p.name) for p in study.parameters]
-    over = " and ".join(names) if len(names) <= 3 else f"{len(names)} parameters"
+    over = " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
+    over = over if len(names) <= 3 else f"{len(names)} parameters"
     failed = sum(sweep.failed for sweep in sweeps)
     failures = f", {failed} failed" if failed else ""
     return f"{_plain(study.title)}: {each}{_runs(count)}{failures}\nover {over}"

@@ -1,4 +1,4 @@
-"""A study from a TOML file, in the format that orchestrator/README.md describes."""
+"""A study from a TOML file, in the format that docs/studies.md describes."""
 
 import math
 import re

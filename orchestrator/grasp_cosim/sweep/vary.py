@@ -56,10 +56,8 @@ def varied(
     parameters = tuple(map(parameter, texts))
     signals = [str(port) for port in system.recorded]
     there = available(registered(metrics), signals, system.roles)[0]
-    columns: dict[str, tuple[str, ...]] = {
-        c: (c,) for c in (*(c for m in there for c in m.columns), *signals)
-    }
-    columns |= {m.name: m.columns for m in there}
+    columns = {m.name: m.columns for m in there}
+    columns |= {c: (c,) for c in (*(c for m in there for c in m.columns), *signals)}
     for name in of:
         known("--of: no metric or signal", name, columns)
     asked = tuple(of) or tuple(m.name for m in there if m.primary)

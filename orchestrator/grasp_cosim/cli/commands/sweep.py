@@ -147,7 +147,8 @@ def _chosen(
     if study is None:
         raise InputError(f"no STUDY; must be a .toml file, the name of a built-in one, or {VARY}")
     for option, key in OF_VARY.items():
-        if given[key] not in (None, (), False):
+        value = given[key]
+        if not (value is None or value is False or value == ()):
             raise InputError(f"{option}: must come with {VARY}; a study says it itself")
     path, built_in = _file(study)
     fmus = FMU_FOLDER if built_in else None
