@@ -185,6 +185,7 @@ FLOORS = (
     ("ssp", "inspection", "drafting"),
     ("master",),
     ("convergence", "sweep", "qualification", "comparison", "hil"),
+    ("tuning",),
     ("report",),
     ("grasp",),
     ("cli",),

@@ -11,7 +11,7 @@ from .. import interruption
 from ..early import begin
 from ..scratch import sweep
 
-OF_THE_GRASP = {"evaluate", "identify", "play"}
+OF_THE_GRASP = {"evaluate", "identify", "play", "tune"}
 """The commands that there are with the room grasp/ only."""
 
 
