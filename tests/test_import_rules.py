@@ -186,6 +186,7 @@ FLOORS = (
     ("ssp", "inspection", "drafting"),
     ("master",),
     ("convergence", "sweep", "qualification", "comparison", "hil"),
+    ("tuning",),
     ("report",),
     ("grasp",),
     ("cli",),

@@ -21,7 +21,7 @@ SECTIONS = {
 }
 """Where the help lists a command; one that is in none of these is among the others."""
 
-OF_THE_GRASP = {"evaluate", "identify", "play"}
+OF_THE_GRASP = {"evaluate", "identify", "play", "tune"}
 """The commands that there are with the room grasp/ only."""
 
 
