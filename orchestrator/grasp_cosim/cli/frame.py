@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import InputError
-from ..files import check_folder
+from ..files import PICTURES, check_folder
 from ..plain import on_one_line
 
 if TYPE_CHECKING:
@@ -39,6 +39,19 @@ def together(*options: Command) -> Command:
 
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+
+format_option = click.option(
+    "--format",
+    "suffix",
+    type=click.Choice(PICTURES),
+    default=PICTURES[0],
+    show_default=True,
+    help="Of the pictures.",
+)
+
+title_option = click.option(
+    "--title", default="", help="Of pictures and pages. Default: system, case and controller."
+)
 
 metrics_option = click.option(
     "--metrics",

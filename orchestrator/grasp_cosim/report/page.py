@@ -26,6 +26,7 @@ import numpy.typing as npt
 from ..files import write_text
 from ..recording.listener import Texts
 from ..recording.result import Result
+from .caption import Caption, caption
 from .diagram import Link, diagram_svg
 from .embed import LIMIT, Shown, fit, packed
 from .tables import count, metrics_table, number, settings_html, summary
@@ -70,16 +71,16 @@ class Scene:
 
 
 def write_page(
-    result: Result, title: str, path: Path, *, scene: Scene | None = None, limit: int = LIMIT
+    result: Result, path: Path, *, scene: Scene | None = None, limit: int = LIMIT
 ) -> None:
-    """Write the page of a result.
+    """Write the page of a result, under its title: see caption.caption().
 
     Of more than `limit` values the signals are thinned, and it says so.
     """
-    write_text(path, page_html(result, title, scene=scene, limit=limit))
+    write_text(path, page_html(result, scene=scene, limit=limit))
 
 
-def page_html(result: Result, title: str, *, scene: Scene | None = None, limit: int = LIMIT) -> str:
+def page_html(result: Result, *, scene: Scene | None = None, limit: int = LIMIT) -> str:
     """Return the page as text, see write_page."""
     shown = fit(result.time, {name: _drawn(column) for name, column in result.items()}, limit)
     timing = result.timing
@@ -92,7 +93,7 @@ def page_html(result: Result, title: str, *, scene: Scene | None = None, limit: 
         "settings": ("Settings", settings_html(result)),
     }
     return document(
-        title,
+        caption(result),
         summary(result.metrics),
         {name: section for name, section in sections.items() if section},
         _state(result, shown, scene),
@@ -103,7 +104,7 @@ def page_html(result: Result, title: str, *, scene: Scene | None = None, limit: 
 
 
 def document(
-    title: str,
+    said: Caption,
     summary: str,
     sections: Mapping[str, tuple[str, str]],
     state: Mapping[str, Any],
@@ -118,7 +119,8 @@ def document(
     start, and `style` what comes after that of the page.
     """
     return Template(_text("page.html")).substitute(
-        title=escape(title),
+        title=escape(said.title),
+        about=escape(said.about),
         style=page_style() + style,
         summary=summary,
         contents="".join(f'<a href="#{name}">{head}</a>' for name, (head, _) in sections.items()),
