@@ -4,6 +4,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from grasp_cosim.comparison.compare import compare
+from grasp_cosim.report.comparison import comparison_html
 from grasp_cosim.report.page import page_html
 from report.javascript import in_browser
 from report.runs import grasp_run, ring_run
@@ -74,12 +76,21 @@ def test_wheel_drag_and_double_click_change_the_time_in_view(html: str, tmp_path
 
 
 @pytest.mark.parametrize("size", [(360, 800), (1900, 1000)])
+@pytest.mark.parametrize("kind", ["run", "comparison"])
 def test_nothing_sticks_out_of_a_narrow_or_wide_window(
-    size: tuple[int, int], html: str, tmp_path: Path
+    size: tuple[int, int], kind: str, tmp_path: Path
 ) -> None:
-    act = "return [document.documentElement.scrollWidth, innerWidth];"
-    width, inner = in_browser(html, act, tmp_path, size=size)
+    run = replace(grasp_run(), timing=paced(steps=50))
+    scene = run.drawing.scene(run)
+    html = page_html(run, scene=scene) if kind == "run" else comparison_html(compare(run, run))
+    act = """
+      const scrolls = [...document.querySelectorAll(".cards, .cards td")].map((e) => e.scrollWidth);
+      return [document.documentElement.scrollWidth, innerWidth, Math.max(0, ...scrolls)];
+    """
+    width, inner, table = in_browser(html, act, tmp_path, size=size)
+    assert inner == size[0]
     assert width <= inner
+    assert table <= inner - 28  # with the margins of the page
 
 
 @pytest.mark.parametrize("width", [420, 1101, 1900])

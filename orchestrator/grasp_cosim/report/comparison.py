@@ -21,7 +21,7 @@ from ..qualification.tube import deviation, tube
 from ..recording.result import Result
 from .caption import Caption, about, caption, changes
 from .embed import LIMIT, Shown, fit
-from .page import Scene, data_html, document, moments, scripts, traces_html
+from .page import Scene, data_html, document, looks, moments, scripts, traces_html
 from .tables import bullets, count, number, origin_rows, scaled, summary, table
 
 AT_FIRST = 4
@@ -58,7 +58,7 @@ def comparison_html(c: Comparison, limit: int = LIMIT) -> str:
         sections,
         _state(c, shown, ids, scene, texts),
         data_html(shown.time, {ids[key]: values for key, values in shown.signals.items()}),
-        [scripts("main", "pairs")],
+        [scripts("main", "save", "pairs")],
         scene.style if scene else "",
     )
 
@@ -107,7 +107,8 @@ def _state(
             for s in c.signals
         ],
         "shown": list(dict.fromkeys([*first, *worst])),
-        "colors": dict(scene.colors) if scene else {},
+        **looks(scene),
+        "about": about(None),
         "marks": [{"t": t, "color": "--fault"} for log in logs for t in moments(log)],
         "scene": None,
     }
