@@ -1,9 +1,10 @@
-# make run    the published grasp from FMUs: .venv, build, evaluate, pictures in results/
+# make run    the published grasp from FMUs: .venv, build, evaluate, pictures and playground in results/
 # make test   the quick tests, in three minutes; make test-slow: the others; each runs in one of them
 # make explore  the properties, on new random examples and more of them; a failure prints its recipe
 # make check  lint, format, types, import rules
 # make docs   the pages of the Python interface in results/api, and what the notebook in docs/ shows
 # make bench  measurements     make cards    the variable tables of the equation cards
+# make pictures   those in docs/, in minutes; needs Chromium
 # make playground  docs/playground.html; needs zig where the C of the FMUs has changed
 
 PYTHON ?= $(firstword $(foreach p,python3 python3.13 python3.12 python3.11,$(shell \
@@ -14,11 +15,12 @@ PIP := PIP_CONSTRAINT=constraints.txt PIP_DISABLE_PIP_VERSION_CHECK=1 $(BIN)/pyt
 # Tests start hundreds of Pythons: none should compile all modules anew, whatever the environment.
 PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 2 --maxschedchunk 1
 
-.PHONY: run test test-slow explore check docs bench cards playground clean
+.PHONY: run test test-slow explore check docs bench cards pictures playground clean
 
 run: .venv/run
 	$(BIN)/grasp-cosim build
 	$(BIN)/grasp-cosim evaluate --out results
+	$(BIN)/grasp-cosim play -o results/play.html
 
 test: .venv/dev
 	$(PYTEST) -m "not slow"
@@ -46,6 +48,9 @@ bench: .venv/dev
 
 cards: .venv/run
 	$(BIN)/python -m grasp_fmus.cards
+
+pictures: .venv/dev
+	$(BIN)/python docs/pictures.py
 
 playground: .venv/run
 	$(BIN)/python -m grasp_cosim.grasp.play.wasm

@@ -392,8 +392,8 @@ BLOCKS = ("spring_plant.py", "quotient_controller.py", "moving_object.py")
 """What the pages build before they run it."""
 
 
-def main() -> None:
-    """Update the pages and their pictures."""
+def main(pictures: Path = HERE) -> None:
+    """Update the pages, and their pictures in a folder."""
     for block in BLOCKS:
         if code := cli.main(["build", str(HERE / block)]):
             sys.exit(code)
@@ -403,7 +403,7 @@ def main() -> None:
             page = HERE / f"{name}.md"
             text, tables = worked_out(page.read_text("utf-8"), do)
             write_text(page, text)
-            draw(tables, HERE)
+            draw(tables, pictures)
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from grasp_cosim.numerals import MOST, fixed
+from grasp_cosim.numerals import MOST, counted, fixed
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -37,3 +37,8 @@ def test_no_number_is_long_or_looks_like_0(value: float) -> None:
 def test_what_is_too_small_may_be_rounded_to_0() -> None:
     assert fixed(6.3e-15, 3, sign="+", rounded=True) == "+0.000"
     assert fixed(4.6e40, 3, sign="+", rounded=True) == "+4.6e+40"
+
+
+@pytest.mark.parametrize(("count", "text"), [(0, "0 faults"), (1, "1 fault"), (2, "2 faults")])
+def test_a_noun_agrees_with_its_number(count: int, text: str) -> None:
+    assert counted(count, "fault") == text

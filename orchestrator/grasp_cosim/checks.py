@@ -14,6 +14,9 @@ from typing import Any
 
 from .errors import InputError, choices
 
+EXACT = 2**53
+"""Whole numbers of a smaller magnitude are exact as a float64."""
+
 
 def is_number(value: Any) -> bool:
     """Return True if `value` is an int or a float; a bool is no number."""
@@ -61,6 +64,36 @@ def whole(
     if not is_whole(value) or not low <= value <= high:
         raise InputError(f"{place} = {value!r}: must be {must}")
     return int(value)
+
+
+def exact(place: str, value: Any, text: str = "", failure: type[Exception] = InputError) -> None:
+    """Refuse a whole number that a float64, in which values travel, may not tell from the next.
+
+    All other values are fine. `text` is how the message quotes it, by default as Python does;
+    `failure` is what is raised, with the line.
+    """
+    if isinstance(value, int) and abs(value) >= EXACT:
+        raise failure(
+            f"{place} = {text or value}: must be smaller than 2**53 in magnitude, to be exact as a "
+            "float64"
+        )
+
+
+def real(text: str) -> float:
+    """Return the number that a text of a file stands for, as all tools write it.
+
+    ValueError where it is none; Python itself takes 1_0 for 10, and the digits of any script.
+    """
+    if "_" in text or not text.isascii():
+        raise ValueError(f"{text!r}: must be a number")
+    return float(text)
+
+
+def integer(text: str) -> int:
+    """Return the whole number that a text of a file stands for; ValueError as of real()."""
+    if "_" in text or not text.isascii():
+        raise ValueError(f"{text!r}: must be a whole number")
+    return int(text)
 
 
 def choice(place: str, value: Any, valid: Iterable[Any]) -> Any:

@@ -4,6 +4,11 @@ MOST = 1e9
 """The size from which a number in a table is written with a power of ten."""
 
 
+def counted(count: int, noun: str) -> str:
+    """Return a count with its noun, which takes an s unless it is 1: `1 fault`, `2 faults`."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
 def fixed(
     value: float,
     decimals: int,

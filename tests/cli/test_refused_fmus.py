@@ -126,10 +126,13 @@ def test_what_an_fmu_lacks_is_a_warning_where_this_host_has_it(
 def test_what_an_fmu_lacks_is_a_problem_where_nobody_has_it(command: Run, tmp_path: Path) -> None:
     findings = found(linked(tmp_path, missing=True))
     assert findings["libraries"].status == findings["trial"].status == "problem"
-    assert "no_such_function" in findings["trial"].text
+    assert "licence_check" in findings["trial"].text
+    assert findings["trial"].fix is None  # a name alone is no want of a licence
     (tmp_path / "s.toml").write_text(SYSTEM)
     for more in ((), ("--isolation", "process")):
-        one_line(command("run", "s.toml", *more), "undefined symbol: no_such_function", "linux64/")
+        run = command("run", "s.toml", *more)
+        one_line(run, "undefined symbol: licence_check", "linux64/")
+        assert "it needs a licence" not in run[2]
 
 
 @pytest.mark.slow

@@ -273,7 +273,9 @@ def test_a_tolerance_must_be_positive(grasp: System, tolerance: float) -> None:
 
 
 def test_too_few_steps_are_refused(grasp: System) -> None:
-    with pytest.raises(InputError, match=r"only 2 steps fit the stop time, 0.0001, 0.001 s; must"):
+    with pytest.raises(
+        InputError, match=r"steps that fit the stop time: only 0.0001, 0.001 s; must"
+    ):
         step_study(grasp, steps=[1e-3])
 
 

@@ -19,6 +19,7 @@ from grasp_cosim import System, cli, simulate
 from grasp_cosim.recording.load import load_run
 from gripper_plant.friction import Params as Friction
 from support.native_fmus import needs_gcc
+from support.pictures import assert_same_picture
 from support.vendor import vendor_plant
 
 ROOT = Path(__file__).parents[2]
@@ -59,11 +60,9 @@ def said(name: str, pattern: str) -> list[float]:
 def checked(name: str, checkout: Path) -> tuple[list[Any], Any]:
     """The runs of the tables of a page, whose cells and pictures must be those of the runs.
 
-    The cells must be the same to the printed digit: the runs are deterministic. Of the pictures a
-    few pixels may be others, as another processor rounds. Maps of studies, which take minutes, have
-    the name of the study whose command on the page draws them.
+    The cells must be the same to the printed digit: the runs are deterministic. Maps of studies
+    have the name of the study whose command on the page draws them; tests/docs/test_pictures.py.
     """
-    image = pytest.importorskip("matplotlib.image")
     tutorials = load_tutorials()
     do = tutorials.recorder(checkout / "recorded")
     text, tables = tutorials.worked_out(page(name), do)
@@ -76,9 +75,7 @@ def checked(name: str, checkout: Path) -> tuple[list[Any], Any]:
     shown = re.findall(r"!\[.*?\]\((.*?)\)", page(name))
     assert sorted(set(shown) - maps) == sorted(pictures)
     for picture in pictures:
-        new, kept = (image.imread(folder / picture) for folder in (drawn, DOCS))
-        assert new.shape == kept.shape
-        assert (abs(new - kept).max(axis=-1) > 0.1).mean() < 1e-3, f"{picture}: docs/tutorials.py"
+        assert_same_picture(drawn / picture, DOCS / picture, "docs/tutorials.py")
     return tables, do
 
 

@@ -1,6 +1,7 @@
 """A plant of another vendor in mm, mm/s and mN has the metrics of the one in SI."""
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -278,6 +279,11 @@ def test_factors_without_a_unit_are_refused_before_the_run(
     code, out, err = command(*arguments)
     assert (code, out) == (2, "")
     assert err.startswith("grasp-cosim: mm.toml: plant.position[1] has no unit, and its connection")
-    assert '[components.plant] units = { "object_position" = "...", "position[1]" = ' in err
+    entry = re.search(r"\[components\.plant\] units = \{(.*?)\}", err)
+    assert entry, err
+    pairs = {
+        f"{name}[{j}]" for name in ("position", "velocity", "gap", "contact_force") for j in (1, 2)
+    }
+    assert set(re.findall(r'"(\S+)" = "\.\.\."', entry[1])) == {"object_position", *pairs}
     assert err.count("\n") == 1
     assert not list((tmp_path / "out").glob("*"))

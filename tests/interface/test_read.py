@@ -157,6 +157,7 @@ def test_aliases_and_dimensions_of_fmi_3(write: Write) -> None:
 
 FLAWS = [
     ('min="1"', 'min="x"', "variable 'y': min = 'x': must be a number"),
+    ('max="2"', 'max="1_0"', "variable 'y': max = '1_0': must be a number"),
     ('max="2"', 'max="1,5"', "variable 'y': max = '1,5': must be a number"),
     ('nominal="3"', 'nominal="-"', "variable 'y': nominal = '-': must be a number"),
     ('m="1"', 'm="0.5"', "unit 'mm': m = '0.5': must be a whole number"),

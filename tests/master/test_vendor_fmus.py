@@ -91,7 +91,8 @@ def test_limits_are_those_of_numpy(version: str) -> None:
         ("u_Int8", 127, True), ("u_Int8", 128, False), ("u_UInt8", -1, False),
         ("u_UInt64", 2**64 - 1, True), ("u_UInt64", 2**64, False), ("u_UInt64", "7.0", True),
         ("u_Int64", 2**53 + 1, True), ("u_Int64", -(2**63) - 1, False), ("u_Int32", 1.5, False),
-        ("u_Int16", "x", False), ("u_Float32", 3.4e38, True), ("u_Float32", 3.5e38, False),
+        ("u_Int16", "x", False), ("u_Int16", "1_0", False), ("u_Float64", "1_0", False),
+        ("u_Float32", 3.4e38, True), ("u_Float32", 3.5e38, False),
         ("u_Boolean", 1, False), ("u_String", 1, False), ("u_Enumeration", True, False),
     ],
 )  # fmt: skip

@@ -12,12 +12,13 @@ from grasp_cosim.errors import InputError
 from grasp_cosim.interface.interface import Interface, Variable, kind_of
 from grasp_cosim.interface.units import Unit
 from grasp_cosim.qualification.interface_difference import capability_differences
-from grasp_cosim.qualification.swap import Swap, prepare_swap
+from grasp_cosim.qualification.swap import Swap, component_of, prepare_swap
 from grasp_cosim.system.description import System
 from grasp_cosim.system.parts import Condition, Connection, Event, Fault, Initialisation, Port
 from qualification.made import DEPENDENCIES, PLANT, changed, without, write_fmu, write_system
 
 GAP = Port("plant", "gap")
+POSITION = Port("spring", "position")
 FORCE_CONNECTION = Connection(Port("spring", "force"), Port("plant", "force"))
 
 
@@ -438,3 +439,45 @@ def test_wrong_components_and_candidates(system: System, tmp_path: Path) -> None
     (tmp_path / "text.fmu").write_text("no archive")
     with pytest.raises(InputError, match=r"text.fmu: not a readable FMU"):
         swap(system, tmp_path / "text.fmu")
+
+
+@pytest.mark.parametrize(
+    ("theirs", "ours", "refused"),
+    [
+        ((None, None), (None, None), False),
+        ((1e-3, None), (None, None), True),
+        ((None, 0.01), (None, None), True),
+        ((1.0, None), (None, None), False),
+        ((1e-3, None), (1e-3, 0.0), False),
+        ((None, None), (1e-3, None), True),
+    ],
+)
+def test_a_system_file_whose_connections_pass_on_other_values_is_refused(
+    theirs: tuple[float | None, float | None],
+    ours: tuple[float | None, float | None],
+    refused: bool,
+    system: System,
+) -> None:
+    def scaled(by: tuple[float | None, float | None]) -> System:
+        return replace(system, connections=(FORCE_CONNECTION, Connection(GAP, POSITION, *by)))
+
+    if refused:
+        line = r"^loop.toml: plant.gap -> spring.position: has factor = .*; must be units of its"
+        with pytest.raises(InputError, match=line):
+            component_of(scaled(theirs), "plant", scaled(ours))
+    else:
+        assert component_of(scaled(theirs), "plant", scaled(ours)) == system.components[0]
+
+
+def test_a_factor_that_is_that_of_the_units_is_as_good(system: System, tmp_path: Path) -> None:
+    write_fmu(tmp_path / "mm.fmu", changed("gap", 'unit="m"', 'unit="mm"'))
+    plant = replace(system.components[0], fmu=tmp_path / "mm.fmu")
+    theirs = Connection(GAP, POSITION, 0.001)
+    other = replace(
+        system,
+        components=(plant, system.components[1]),
+        connections=(FORCE_CONNECTION, theirs),
+    )
+    assert component_of(other, "plant", system) == plant
+    with pytest.raises(InputError, match="no component 'box'; valid: plant, spring"):
+        component_of(other, "box", system)

@@ -103,7 +103,7 @@ def test_a_part_that_cannot_be_written_is_one_line(study: Study, tmp_path: Path)
     store.keep(OUTCOMES[0])
     (tmp_path / "parts/0000007.json").mkdir()
     with pytest.raises(
-        SimulationError, match=r"0000007.json: .*; 2 runs are kept, the same command goes on$"
+        SimulationError, match=r"0000007.json: .*; 2 runs kept, the same command goes on$"
     ):
         store.keep(OUTCOMES[1])
     assert not list(tmp_path.rglob("*.part"))

@@ -72,6 +72,7 @@ def test_a_mistake_far_down_is_found(tmp_path: Path) -> None:
         ("time,a.u\nnow,0\n", "line 2, column 1, time = 'now': must be a number"),
         ("time,a.u\n0,0\nnan,0\n", "line 3, column 1, time = nan: must be a finite number"),
         ("time,a.u\n0,0\n2,0\n1,0\n", "line 4, column 1, time = 1.0: is before 2.0 of line 3"),
+        ("time,a.u\n1_0,0\n", "line 2, column 1, time = '1_0': must be a number"),
         ("time,a.u\n1e10,0\n", "time to 1e+10 s; must be at most 1e+09 s"),
         ('time,a.u\n0,"1\n', "line 2: no CSV"),
     ],
@@ -107,6 +108,12 @@ def test_what_is_no_such_file_is_said(tmp_path: Path) -> None:
         ("time,a.u_Real [m]\n0,1\n", "a.u_Real [m]: cannot be converted into N"),
         ("time,a.u_Integer\n0,1\n1,1.5\n", "line 3, column 2, a.u_Integer: u_Integer = '1.5'"),
         ("time,a.u_Integer\n0,1\n1,3e9\n", "line 3, column 2, a.u_Integer: u_Integer = '300000"),
+        ("time,a.u_Real\n0,1\n1,1_0\n", "line 3, column 2, a.u_Real: u_Real = '1_0': must be"),
+        ("time,a.u_Real\n0,\u0661\n", "line 2, column 2, a.u_Real: u_Real = '\u0661': must be"),
+        (
+            "time,a.u_Integer\n0,1\n1,-9007199254740993\n",
+            "line 3, column 2, a.u_Integer: u_Integer = '-9007199254740993': must be",
+        ),
         ("time,a.u_Integer [N]\n0,1\n", "is of type Integer; must have no unit"),
         ("time,a.u_Boolean\n0,1\n1,2\n", "line 3, column 2, a.u_Boolean: u_Boolean = '2': must"),
         ("time,a.u_Enumeration\n0,3\n", "u_Enumeration = '3': must be one of one, two"),
@@ -120,6 +127,15 @@ def test_a_column_that_does_not_fit_is_one_line_with_its_place(
     with pytest.raises(InputError, match=re.escape(said)) as refused:
         System.load(driven(tmp_path, text, more=INPUT))
     assert "\n" not in str(refused.value)
+
+
+@needs_gcc
+def test_a_number_that_float64_does_not_have_is_quoted_as_it_is_written(tmp_path: Path) -> None:
+    long = "9007199254740993"
+    with pytest.raises(InputError, match=rf"line 3, column 2, a\.u_Int64 = {long}: must be small"):
+        System.load(driven(tmp_path, f"time,a.u_Int64\n0,1\n1,{long}\n", "3.0", INPUT))
+    mixed = read(tmp_path, "time,a.u\n0," + long + "\n" + "0,1\n" * PIECE + "0,red\n")
+    assert mixed.columns[Port("a", "u")].texts == (long, "1", "red")
 
 
 @needs_gcc

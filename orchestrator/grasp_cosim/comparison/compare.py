@@ -159,7 +159,7 @@ def _lacking(names: Iterable[str], other: Collection[str] | Values) -> tuple[str
 def _notes(
     a: Side, b: Side, begin: float, end: float, changes: Mapping[str, Conversion | None]
 ) -> Iterator[str]:
-    """What a reader should know of the comparison."""
+    """Lines on the time compared, on runs that ended early, and on units that were assumed."""
     spans = [f"{letter} is {s.time[0]:.6g} to {s.time[-1]:.6g} s" for letter, s in _sides(a, b)]
     if (a.time[0], a.time[-1]) != (b.time[0], b.time[-1]):
         yield f"compared from {begin:.6g} to {end:.6g} s, where both are: {', '.join(spans)}"

@@ -1,4 +1,4 @@
-"""What two runs were made of, and where that differs."""
+"""The settings, FMUs and versions of two runs, and where they differ."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ NONE = "none"
 
 
 class Difference(NamedTuple):
-    """What differs between two runs, and what it is in each of them, in words."""
+    """A setting that differs between two runs, and its value in each of them, in words."""
 
     what: str
     a: str
@@ -36,7 +36,7 @@ def differences(a: Result, b: Result) -> tuple[Difference, ...]:
 
 
 def _facts(run: Result) -> Iterator[tuple[str, str]]:
-    """What a run was made of by name, each in words; the same where the run is."""
+    """The settings, FMUs and versions of a run by name, each in words; equal for equal runs."""
     settings, fmus = run.settings, run.origin.get("fmus", {})
     yield from run.drawing.traits(run).items()
     for key in ("system", "scheme", "step", "stop"):

@@ -49,7 +49,7 @@ class Side:
         return float(np.median(np.diff(self.time))) if len(self.time) > 1 else 0.0
 
     def part(self, begin: float, end: float) -> Side:
-        """What there is from begin to end in s."""
+        """The rows from begin to end in s."""
         first = int(np.searchsorted(self.time, begin - ROUNDING, side="left"))
         rows = slice(first, int(np.searchsorted(self.time, end + ROUNDING, side="right")))
         signals = {name: column[rows] for name, column in self.signals.items()}

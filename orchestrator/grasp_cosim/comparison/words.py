@@ -9,7 +9,7 @@ from ..qualification.tables import bands_lines, compared_json, compared_table, c
 from .compare import Comparison
 
 RUNS = ("A", "B")
-"""What the two are called."""
+"""The names of the two runs."""
 
 MOST = 12
 """So many differences of the settings at most are in the text."""

@@ -312,7 +312,7 @@ def step_study(
     if len(chosen) < FEWEST:
         listed = ", ".join(f"{ns / NANOSECONDS:g}" for ns in chosen)
         raise InputError(
-            f"{system.name}: only {len(chosen)} steps fit the stop time, {listed} s; must be at "
+            f"{system.name}: steps that fit the stop time: only {listed} s; must be at "
             f"least {FEWEST}: a stop time that more of them divide, or other steps"
         )
     # the finest, which is the longest, first

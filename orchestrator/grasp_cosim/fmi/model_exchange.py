@@ -255,7 +255,14 @@ class ModelInstance(LoadedInstance):
     def _count(self, near: float) -> None:
         """Count events that come close upon each other; SimulationError where they do not end."""
         self._dense = self._dense + 1 if self._now - self._last_event <= near else 0
-        self._last_event = self._now
+        behind, self._last_event = self._next <= self._last_event, self._now
+        if self._dense >= MOST_DENSE and behind:
+            raise self._error(
+                f"names t = {self._next:.9g} s as the time of its next event, {MOST_DENSE} times "
+                "in a row",
+                self._now,
+                "; must name a later time than that of the event",
+            )
         if self._dense >= MOST_DENSE:
             raise self._error(
                 f"chatters, or comes to no rest ({MOST_DENSE} events in a row, each within "

@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal, Protocol, get_args
 
-from ..checks import known
+from ..checks import EXACT, integer, known, real
 from ..errors import InputError, choices
 from ..scratch import without_scratch
 from .arrays import MOST_ELEMENTS, Array, Element, element_names, size_of
@@ -68,7 +68,7 @@ def typed(fmi_type: str, text: str | None) -> Value | None:
     if kind == "Boolean":
         return {"true": True, "1": True, "false": False, "0": False}.get(text.strip(), text)
     try:
-        number = float(text) if kind == "Real" else int(text)
+        number = real(text) if kind == "Real" else integer(text)
         return number if math.isfinite(number) else str(number)
     except (ValueError, OverflowError):
         return text
@@ -460,12 +460,12 @@ def _number(value: Value, whole: bool) -> float | int | None:
         return None
     if whole and not isinstance(value, float):
         with suppress(ValueError):
-            return int(value)
+            return integer(value) if isinstance(value, str) else int(value)
     with suppress(ValueError, OverflowError):
-        number = float(value)
+        number = real(value) if isinstance(value, str) else float(value)
         if math.isfinite(number) and not whole:
             return number
-        if number.is_integer() and abs(number) < 2.0**53:
+        if number.is_integer() and abs(number) < EXACT:
             return int(number)
     return None
 

@@ -17,6 +17,9 @@ RUN = ("CoSimulation", "ModelExchange")
 
 _LICENCE = re.compile(r"licen[cs]|dongle|flexlm|activation|not activated", re.IGNORECASE)
 
+_SYMBOL = re.compile(r"undefined symbol:? \S+", re.IGNORECASE)
+"""A function that the binary lacks: whatever it is called, it says nothing of a licence."""
+
 
 class Obstacle(NamedTuple):
     """The reason why an FMU does not run here, and what would."""
@@ -66,7 +69,7 @@ def of_binary(fmu: Interface) -> Obstacle | None:
 def of_loading(fmu: Interface, said: str) -> Obstacle | None:
     """The likely obstacle where the FMU does not instantiate and says something or nothing."""
     tool = fmu.tool or "the tool that made it"
-    if _LICENCE.search(said):
+    if _LICENCE.search(_SYMBOL.sub("", said)):
         return Obstacle(
             "needs a licence on this machine",
             f"have that of {tool} found here, or ask the vendor for an export that needs none",

@@ -13,6 +13,7 @@ from functools import lru_cache
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
+from ..checks import real
 from ..errors import InputError
 from ..files import check_fmu_file
 from .capabilities import capabilities_of, kinds_of
@@ -411,7 +412,7 @@ def _printable(what: str, name: str) -> str:
 
 def _real(place: str, text: str) -> float:
     try:
-        return float(text)
+        return real(text)
     except ValueError:
         raise ValueError(f"{place} = {text!r}: must be a number") from None
 

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from ..errors import InputError, choices
 from ..fmi.instance import Instance
 from ..interface.interface import Value, Variable
+from ..numerals import counted
 from ..system.checks import transforms
 from ..system.description import System
 from ..system.faults import INITIAL
@@ -122,7 +123,7 @@ class Propagation:
                 )
         count, residual = self._solve(choice)
         # Other values may solve a loop that its start values solve: that they were kept is said.
-        solution = f"solved in {count} iteration{'' if count == 1 else 's'}"
+        solution = f"solved in {counted(count, 'iteration')}"
         if not count:
             solution = "its start values solve it and are kept"
         loops = "algebraic loop" if len(order.loops) == 1 else f"{len(order.loops)} algebraic loops"

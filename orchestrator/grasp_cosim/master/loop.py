@@ -10,6 +10,8 @@ from collections.abc import Sequence
 from ctypes import c_float
 from typing import Any, NamedTuple
 
+from .. import checks
+
 COPY, SCALE, STORE, LOAD, LOAD_LONG, DRIVE, CALL, STEP = range(8)  # calls last
 """Operations: over connections COPY and SCALE; over casts STORE into a buffer of another type, LOAD
 from one, LOAD_LONG with a check; over drives DRIVE; over calls CALL and STEP, which sets the clock
@@ -25,7 +27,7 @@ RAISED = 101
 FULL, HALTED, OVERRUN = 102, 103, 104
 """Of the compiled loop alone: the rows have no room left; it was halted; a late step ends it."""
 
-EXACT = 2.0**53
+EXACT = float(checks.EXACT)
 """Integers of a smaller magnitude are exact as a float64."""
 
 WORST = 1

@@ -11,6 +11,7 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
+from ..checks import exact
 from ..errors import InputError, SimulationError
 from ..fmi.instance import DISCARD, EARLY, Instance
 from ..interface.interface import Value
@@ -122,8 +123,7 @@ class Master:
                 value = propagation.values[port] if port in propagation.values else kept[port]
             if port in self.texts:
                 value = self.texts[port].number(str(value))
-            if isinstance(value, int) and abs(value) >= loop.EXACT:
-                raise InputError(_too_long(port, value, 0))
+            exact(str(port), value, f"{value} at step 0")
             self.values[slot] = float(value)
         self._receive(np.zeros(1, np.int64), self.values[np.newaxis])
         self._handed_on_at = time.monotonic()
@@ -293,7 +293,7 @@ class Master:
         """Make good for a step that was rejected; any other bad status ends the run."""
         kind, call, _, period, _ = self.plan.operations[operation]
         if status == loop.TOO_LONG:
-            raise SimulationError(_too_long(*self._longest(step, operation)))
+            self._too_long(step, operation)
         if status == loop.RAISED:
             raise self.plan.raised.pop()
         instance = self.plan.owners[call]
@@ -309,19 +309,11 @@ class Master:
         known = self.rejections.get(instance.name, Rejection(0, begin))
         self.rejections[instance.name] = Rejection(known.count + 1, known.first)
 
-    def _longest(self, step: int, operation: int) -> tuple[Port, int, int]:
-        """The port whose value the operation refused, the value, and the number of its row."""
+    def _too_long(self, step: int, operation: int) -> None:
+        """SimulationError for the value that the operation refused."""
         _, first, last, _, _ = self.plan.operations[operation]
-        buffers = self.plan.buffers
         for buffer, index, slot in self.plan.casts[first:last]:
-            if abs(value := int(buffers[buffer][index])) >= loop.EXACT:
-                port = next(p for p, s in self.slots.items() if s == slot)
-                return port, value, step + 1
+            port = next(p for p, s in self.slots.items() if s == slot)
+            value = int(self.plan.buffers[buffer][index])
+            exact(str(port), value, f"{value} at step {step + 1}", SimulationError)
         raise AssertionError("no value is too long")  # pragma: no cover
-
-
-def _too_long(port: Port, value: int, step: int) -> str:
-    return (
-        f"{port} = {value} at step {step}: must be smaller than 2**53 in magnitude, "
-        "to be exact as a float64"
-    )

@@ -8,11 +8,12 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from ..checks import exact
 from ..fmi.instance import Instance
 from ..interface.interface import Value, Variable
 from ..system.description import System
 from ..system.parts import Condition, Event, Fault, Port, first_step, literal, seconds
-from ..system.scenario_checks import check_exact, check_setting
+from ..system.scenario_checks import check_setting
 from .faults import Window, fault_functions
 
 _COMPARE: Mapping[str, Callable[[float, float], bool]] = {
@@ -158,7 +159,7 @@ class _PendingEvent:
             instance = by_name[port.component]
             if port in slots:
                 number = instance.interface.parse(name, port.variable, value)
-                check_exact(f"{name}: {port}", number)
+                exact(f"{name}: {port}", number)
                 self._placed[slots[port]] = float(number)
                 continue
             _, variables, given = self._calls.setdefault(port.component, (instance, [], []))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from math import isclose
 from pathlib import Path
 
 from ..checks import known
@@ -12,9 +13,10 @@ from ..interface.expansion import values_of
 from ..interface.interface import Interface, Value
 from ..interface.read import describe
 from ..interface.units import Conversion, conversion
+from ..system.checks import transforms
 from ..system.description import System
 from ..system.parts import Component, Isolation
-from ..system.readings import readings
+from ..system.readings import between, readings
 from ..system.swap import Replacement, converted, replaced
 from .feedthrough import feedthrough_differences
 from .interface_difference import SEVERITIES, Difference, interface_differences, use_of
@@ -97,6 +99,34 @@ def prepare_swap(
     back |= _between(swapped, system, component) if swapped else {}
     nominals = _nominals(interfaces)
     return Swap(system, component, fmu, tuple(differences), swapped, back, nominals)
+
+
+def component_of(found: System, name: str, system: System) -> Component:
+    """The component of that name in another system, as a candidate for the one in `system`.
+
+    It runs on the connections of `system`. InputError where one of its own passes on other values
+    than the same one does there, as by a factor: what the component puts out would be misread.
+    """
+    component = found.component(name, found.name)
+    connected = {port for c in system.connections for port in (c.source, c.target)}
+    there = {(c.source, c.target): c for c in system.connections}
+    passed = transforms(found)
+    for c in found.connections:
+        if not any(port.component == name and port in connected for port in (c.source, c.target)):
+            continue
+        place, same = f"{found.name}: {c}", there.get((c.source, c.target))
+        if same and (same.factor, same.offset) != (None, None):
+            factor, offset = same.factor or 1.0, same.offset or 0.0
+        else:
+            factor, offset = between(found, place, c.source, c.target)
+        own = passed[c.target]
+        if not (isclose(own[0], factor) and isclose(own[1], offset)):
+            raise InputError(
+                f"{place}: has factor = {own[0]:g}, offset = {own[1]:g}, which the connections of "
+                f"{system.name}, on which the candidate runs, do not have; must be units of its "
+                f"component instead, in [components.{name}] or --units"
+            )
+    return component
 
 
 def _check_renamed(rename: Mapping[str, str], ours: Interface, theirs: Interface) -> None:

@@ -8,6 +8,7 @@ from dataclasses import asdict
 from typing import Any
 
 from ..errors import choices
+from ..numerals import counted
 from ..system.parts import NANOSECONDS
 from .interface_difference import SEVERITIES, Difference
 from .qualify import Qualification
@@ -107,5 +108,7 @@ def _basis(q: Qualification) -> list[str]:
             )
     lines += [f"the candidate's run: {line}" for line in q.log[:ROWS]]
     if len(q.log) > ROWS:
-        lines.append(f"the candidate's run: {len(q.log) - ROWS} lines more; --json has all")
+        lines.append(
+            f"the candidate's run: {counted(len(q.log) - ROWS, 'line')} more; --json has all"
+        )
     return lines

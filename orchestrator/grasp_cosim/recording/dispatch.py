@@ -21,7 +21,7 @@ from .listener import Experiment, Leisurely, Listener, Signal, Texts
 class Dispatcher:
     """Takes rows of all values and hands every n-th one on, and the last.
 
-    What listeners get are the outputs in the order of the system, then the derived signals, which
+    Listeners get the outputs in the order of the system, then the derived signals, which
     are computed from every row.
     """
 
@@ -47,7 +47,7 @@ class Dispatcher:
         self._divergence = Divergence(system, outputs)
         self._goes_on = system.diverging == "continue"
         self.log: list[str] = []
-        """What ran away in a run that went on."""
+        """A line for each signal that ran away in a run that went on."""
         self._energy = ExchangeEnergy(bonds(system), slots, transforms(system))
         self.signals = (*outputs.values(), *self._energy.signals)
         self._block = np.empty((len(self.signals), 0))

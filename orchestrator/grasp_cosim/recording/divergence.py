@@ -139,7 +139,7 @@ class Divergence:
         return f"{text}; {self._hint(decade)}"
 
     def _hint(self, decade: float) -> str:
-        """What to look at, where it takes so many steps for a decade."""
+        """The advice for a signal that takes so many steps for a decade."""
         turned = [c for c in self._system.connections if c.factor is not None and c.factor < 0.0]
         look = f"look at factor = {turned[0].factor:g} of {turned[0]}" if turned else ""
         if decade < FEW:

@@ -28,7 +28,7 @@ from .memory import TYPES
 from .result import Result, conversions_entry
 
 DRAWN = ("report.html", "signals.mf4", *of_any_format("timing"))
-"""What else may be made of a run in its folder, beside its picture."""
+"""The files that may be made of a run in its folder, beside its picture."""
 
 FIRST_GUESS = 20e3
 """ns that it takes to write a row."""

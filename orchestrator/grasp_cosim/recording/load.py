@@ -14,11 +14,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..checks import choice, is_number
+from ..checks import choice, is_number, real
 from ..errors import InputError, choices
 from ..files import check_nature
 from ..interface.units import Conversion, known_unit
 from ..metrics.metric import Metric, Signals, registered
+from ..numerals import counted
 from ..plain import from_cell
 from ..realtime.timing import Timing
 from .mdf import check_mdf
@@ -289,9 +290,7 @@ def _table(
     except (ValueError, csv.Error) as error:  # also where it is no UTF-8
         raise InputError(f"{path}: is damaged: {str(error).splitlines()[0]}") from error
     if table.shape[1] != len(places):
-        raise InputError(
-            f"{path}: is damaged: {table.shape[1]} values in a row, {len(names) + 1} names"
-        )
+        raise InputError(f"{path}: is damaged: {_uneven(table.shape[1], names)}")
     if not (np.diff(table[:, 0], prepend=-np.inf) > 0.0).all():
         raise InputError(f"{path}: is damaged: the time must grow from row to row")
     columns |= {names[i - 1]: table[:, k] for k, i in enumerate(places[1:], 1)}
@@ -306,10 +305,15 @@ def _texts(
     cells: dict[str, list[str]] = {name: [] for name in places.values()}
     for row in islice(_rows(path), count):
         if len(row) != len(names) + 1:
-            raise ValueError(f"{len(row)} values in a row, {len(names) + 1} names")
+            raise ValueError(_uneven(len(row), names))
         for i, name in places.items():
             cells[name].append(from_cell(row[i]))
     return {name: np.array(column, object) for name, column in cells.items()}
+
+
+def _uneven(values: int, names: Sequence[str]) -> str:
+    """What is wrong with a row of so many values, the time among them."""
+    return f"{counted(values, 'value')} in a row, {counted(len(names) + 1, 'name')}"
 
 
 def _not_numbers(path: Path, names: Sequence[str]) -> set[str]:
@@ -328,7 +332,7 @@ def _rows(path: Path) -> Iterator[list[str]]:
 
 def _is_number(cell: str) -> bool:
     try:
-        float(cell)
+        real(cell)
     except ValueError:
         return False
     return True

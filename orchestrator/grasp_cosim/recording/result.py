@@ -98,7 +98,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
         return name in self.signals
 
     def __repr__(self) -> str:
-        """What it is, in five lines."""
+        """The system, its settings, metrics and signals in five lines."""
         lines = map(on_one_line, self._in_words())
         return "\n".join(x if len(x) <= WIDTH else f"{x[: WIDTH - 3]}..." for x in lines)
 

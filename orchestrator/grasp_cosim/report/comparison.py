@@ -71,7 +71,7 @@ def _called(side: Side) -> str:
 def _drawn(
     c: Comparison, s: Compared, time: npt.NDArray[np.float64]
 ) -> Iterator[tuple[str, npt.NDArray[Any]]]:
-    """What is drawn of a signal at these times: both runs, their deviation and the band."""
+    """The curves of a signal at these times by name: both runs, their deviation, the band."""
     first, second = (run[s.name] for run in c.curves)
     apart = deviation(first.until(float(second.time[-1])), second, s.band.time)
     yield "a", first.at(time)
@@ -128,7 +128,7 @@ def _exactness(c: Comparison, shown: Shown, rows: int) -> str:
 
 
 def _runs(c: Comparison) -> str:
-    """What the two are, in what they differ, and what is not compared."""
+    """A table of the two runs and of the settings that differ; and what is not compared."""
     sides, heads = (c.a, c.b), "".join(f"<th>{name}</th>" for name in ("", *RUNS))
     about = [dict(origin_rows(side.result.origin)) if side.result else {} for side in sides]
     rows = [

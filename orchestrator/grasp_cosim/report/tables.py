@@ -42,7 +42,7 @@ def summary(run: Mapping[str, Any]) -> str:
 
 
 def result_html(result: Result) -> str:
-    """What a notebook shows of a result: what it is, its metrics, the names of its signals."""
+    """The HTML of a result for a notebook: its summary, metrics and names of signals."""
     of = f"{escape(str(result.settings['system']))}: {summary(result.metrics)}"
     where = f", read from {escape(str(result.folder))}" if result.folder else ""
     names = "".join(

@@ -13,6 +13,7 @@ from typing import Any
 
 from lxml import etree  # type: ignore[import-untyped]
 
+from ..checks import real
 from ..errors import InputError, choices
 from ..system.description import in_nanoseconds
 from ..system.parts import NANOSECONDS
@@ -95,7 +96,7 @@ def _add(parent: Any, namespace: str, name: str, **attributes: str) -> Any:
 
 def _time(place: str, text: str | None) -> int:
     try:
-        return in_nanoseconds(place, float(text or ""))
+        return in_nanoseconds(place, real(text or ""))
     except ValueError:
         raise InputError(f"{place} = {text!r}: must be a number of s") from None
 

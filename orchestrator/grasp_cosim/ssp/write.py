@@ -15,6 +15,7 @@ from ..interface.interface import Value, Variable
 from ..interface.obstacles import of_binary
 from ..interface.read import read_interface
 from ..interface.units import Unit
+from ..numerals import counted
 from ..system.description import System
 from ..system.parts import NANOSECONDS, Component, Connection, Port
 from .annotation import extras_of, write_extras
@@ -77,9 +78,9 @@ def _notes(system: System) -> Iterable[str]:
             if not variable.supported:
                 port = Port(component.name, variable.name)
                 yield f"{port} is of type {variable.nature}: it has no connector"
-    for parts, what in ((system.events, "events"), (system.faults, "faults")):
+    for parts, what in ((system.events, "event"), (system.faults, "fault")):
         if parts:
-            yield f"only in the annotation: {len(parts)} {what}"
+            yield f"only in the annotation: {counted(len(parts), what)}"
     if system.input:
         yield f"only in the annotation: what {system.input.file} drives"
 

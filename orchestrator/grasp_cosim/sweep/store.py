@@ -13,6 +13,7 @@ from typing import Any
 from ..checks import is_whole
 from ..errors import InputError, SimulationError
 from ..files import write_text
+from ..numerals import counted
 from .run import Outcome
 from .study import Study
 
@@ -68,7 +69,8 @@ class Parts:
             write_text(path, json.dumps(content) + "\n")
         except OSError as error:
             raise SimulationError(
-                f"{path}: {error.strerror}; {self.kept()} runs are kept, the same command goes on"
+                f"{path}: {error.strerror}; {counted(self.kept(), 'run')} kept, the same command "
+                "goes on"
             ) from error
 
     def clear(self) -> None:

@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from ..checks import as_table, check_keys
+from ..checks import as_table, check_keys, real
 from ..errors import InputError, choices
 from .description import in_nanoseconds
 from .faults import RANDOM
@@ -124,7 +124,7 @@ def _constant(text: str) -> float | str | None:
     if text in ("true", "false"):
         return text == "true"
     try:
-        return float(text)
+        return real(text)
     except ValueError:
         return None
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ..checks import choice, known, whole
+from ..checks import choice, exact, known, whole
 from ..errors import InputError, choices
 from ..interface.interface import Interface, Value
 from .faults import FAULTS
@@ -71,14 +71,6 @@ def check_setting(system: Structure, port: Port, value: Value, place: str) -> No
     interface.parse(place, port.variable, value)
 
 
-def check_exact(place: str, value: Value) -> None:
-    """InputError where an integer is none that a float64 holds exactly."""
-    if isinstance(value, int) and abs(value) >= 2**53:
-        raise InputError(
-            f"{place} = {value}: must be smaller than 2**53 in magnitude, to be exact as a float64"
-        )
-
-
 def _check_condition(system: Structure, condition: Condition, place: str) -> None:
     interface = system.component(condition.port.component, place).interface
     valid = [v.name for v in interface.of("output") if v.is_number]
@@ -94,8 +86,8 @@ def _check_condition(system: Structure, condition: Condition, place: str) -> Non
         said = f"{place}: {condition.port} is {kind} and has no item"
         known(said, condition.value, items)
         return
-    if kind == "Integer" and abs(condition.value) >= 2**53:
-        raise InputError(f"{place}: must be smaller than 2**53 in magnitude, as what is recorded")
+    if kind == "Integer" and float(condition.value).is_integer():
+        exact(place, int(condition.value))
     boolean = isinstance(condition.value, bool)
     if boolean != (kind == "Boolean") or not math.isfinite(condition.value):
         expected = "true or false" if kind == "Boolean" else "a finite number"
@@ -146,4 +138,4 @@ def _check_parameters(fault: Fault, interface: Interface, place: str) -> None:
             valid.check(f"{place}: {name}", fault.parameters.get(name))
         elif valid is None and name in fault.parameters:
             at, given = f"{place}: {name}", fault.parameters[name]
-            check_exact(at, interface.parse(at, fault.target.variable, given))
+            exact(at, interface.parse(at, fault.target.variable, given))

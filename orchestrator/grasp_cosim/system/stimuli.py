@@ -20,9 +20,10 @@ from operator import le
 from pathlib import Path
 from typing import Literal, get_args
 
-from ..checks import choice
+from ..checks import EXACT, choice, integer, real
 from ..errors import InputError
 from ..interface.units import conversion, known_unit
+from ..numerals import counted
 from ..plain import from_cell
 from .parts import LONGEST, NANOSECONDS, Port
 
@@ -41,17 +42,20 @@ class Column:
     """The samples of one input, in its unit or in the one named.
 
     With texts, such as the names of an enumeration, they are their places among these. Sequences
-    are arrays, which take 8 bytes a number.
+    are arrays, which take 8 bytes a number. rounded are the whole numbers, by row, that float64
+    does not have, as they are written.
     """
 
     samples: Sequence[float]
     unit: str | None = None
     texts: tuple[str, ...] = ()
+    rounded: Mapping[int, str] = field(default_factory=dict, compare=False)
 
     def text(self, row: int) -> str:
         """The sample of a row as a text."""
-        sample = self.samples[row]
-        return self.texts[int(sample)] if self.texts else repr(sample).removesuffix(".0")
+        if self.texts:
+            return self.texts[int(self.samples[row])]
+        return self.rounded.get(row) or _text(self.samples[row])
 
     @cached_property
     def extremes(self) -> tuple[int, ...]:
@@ -147,7 +151,7 @@ def _read(path: Path, reader: _Reader, interpolation: Interpolation) -> Stimuli:
         file,
         _times(columns[0], factor, lines),
         {
-            port: Column(column.samples, unit, tuple(column.texts))
+            port: Column(column.samples, unit, tuple(column.texts), column.rounded)
             for port, unit, column in zip(ports, units, columns[1:], strict=True)
         },
         interpolation,
@@ -169,7 +173,7 @@ def _rows(file: str, reader: _Reader) -> Iterator[tuple[int, list[str]]]:
             if len(row) > width:
                 raise InputError(
                     f"{_place(file, line, width + 1)} = {row[width]!r}: has no name; must have "
-                    f"{width} cells"
+                    f"{counted(width, 'cell')}"
                 )
             yield line, row
     except csv.Error as error:
@@ -243,21 +247,25 @@ class _Cells:
         self.file, self.number, self.name = file, number, name
         self.samples: array[float] = array("d")
         self.texts: dict[str, int] = {}
+        self.rounded: dict[int, str] = {}
 
     def extend(self, lines: Sequence[int], cells: Sequence[str]) -> None:
         """Take more cells, of these lines; InputError at one without a value."""
         before = len(self.samples)
         if not self.texts:
             try:
-                self.samples.extend(map(float, cells))
+                self.samples.extend(map(real, cells))
             except ValueError:
                 del self.samples[before:]
-                numbers = [repr(x).removesuffix(".0") for x in self.samples]
+                numbers = [self.rounded.get(i) or _text(x) for i, x in enumerate(self.samples)]
                 self.samples = array("d", map(self._text, numbers))
             else:
                 new = self.samples[before:]
                 if not math.isfinite(sum(new)):
                     self._check(lines, map(math.isfinite, new), cells)
+                if max(new) >= EXACT or min(new) <= -EXACT:
+                    written = enumerate(map(str.strip, cells), before)
+                    self.rounded |= {row: cell for row, cell in written if _is_rounded(cell)}
                 return
         self._check(lines, map(str.strip, cells), cells)
         self.samples.extend(self._text(cell.strip()) for cell in cells)
@@ -274,6 +282,19 @@ class _Cells:
                     f" = {cell.strip()}: must be a finite number" if cell.strip() else ": missing"
                 )
                 raise InputError(f"{place}{what}{'' if cell.strip() else '; must be a value'}")
+
+
+def _text(sample: float) -> str:
+    """A number as it may have been written."""
+    return repr(sample).removesuffix(".0")
+
+
+def _is_rounded(cell: str) -> bool:
+    """True for a whole number, written as one, that float64 does not have."""
+    try:
+        return integer(cell) != float(cell)
+    except ValueError:
+        return False
 
 
 def _place(file: str, line: int, column: int, name: str = "") -> str:

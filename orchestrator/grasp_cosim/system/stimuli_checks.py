@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from array import array
 
-from ..checks import known
+from ..checks import exact, known
 from ..errors import InputError, choices
 from ..interface.interface import Interface, Value, Variable
 from ..interface.units import IDENTITY, Conversion, conversion, known_unit
@@ -12,9 +12,6 @@ from .parts import Port
 from .readings import unit_of
 from .stimuli import Column, Stimuli
 from .structure import Structure
-
-EXACT = 2**53
-"""Integers of a smaller magnitude are exact as a float64."""
 
 
 def driven(system: Structure) -> tuple[Port, ...]:
@@ -99,11 +96,7 @@ def _check_samples(stimuli: Stimuli, port: Port, interface: Interface) -> None:
     numbers = variable.kind == "Real" and not column.texts
     for row in column.extremes if numbers else column.distinct:
         value = _value(stimuli, port, interface, row)
-        if variable.kind == "Integer" and abs(int(value)) >= EXACT:
-            raise InputError(
-                f"{stimuli.place(port, row)} = {column.text(row)}: must be smaller than 2**53 in "
-                "magnitude, to be exact as a float64"
-            )
+        exact(stimuli.place(port, row), value, column.text(row))
 
 
 def _value(stimuli: Stimuli, port: Port, interface: Interface, row: int) -> Value:

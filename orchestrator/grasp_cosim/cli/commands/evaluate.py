@@ -13,7 +13,7 @@ from ...grasp.published.evaluate import PICTURES
 from ...grasp.published.evaluate import evaluate as run_evaluation
 from ...grasp.published.store import FOLDER
 from ...grasp.published.tables import Source
-from ...numerals import fixed
+from ...numerals import counted, fixed
 from ...sweep.store import Parts
 from ..frame import (
     INTERRUPTED,
@@ -63,7 +63,7 @@ def evaluate(
             report = run_evaluation(chosen, out, workers, True, source, suffix)
     except KeyboardInterrupt:
         kept = Parts(out / FOLDER).kept()
-        goes_on = f"; {kept} grasps are kept in {out / FOLDER}, the same command goes on"
+        goes_on = f"; {counted(kept, 'grasp')} kept in {out / FOLDER}, the same command goes on"
         return fail(f"interrupted{goes_on if kept else ''}", INTERRUPTED)
     holds = all(claim["holds"] for claim in report["claims"])
     show(as_json, report, _verdict(report, out, suffix))

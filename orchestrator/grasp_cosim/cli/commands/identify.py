@@ -17,6 +17,7 @@ from ...grasp.identification.contact_times import (
 from ...grasp.identification.log import GROUPS as IN_A_LOG
 from ...grasp.identification.log import identify_from_log
 from ...grasp.identification.parameters import DEFAULT, GROUPS, chosen
+from ...numerals import counted
 from ...recording.load import load_log
 from ...system.description import System
 from ..frame import PATH, json_option, load_system, say, show
@@ -79,7 +80,7 @@ def _from_log(system: System, path: Path, groups: tuple[str, ...]) -> report.Ide
     parameters = chosen(groups, IN_A_LOG, f"--log {path}")
     windows, fit = identify_from_log(system, load_log(path, say), parameters, str(path))
     rows = [{"finger": w.finger, "time": float(t)} for w in windows for t in w.time]
-    return report.Identification(f"{path}, {len(rows)} windows", "N", fit, rows)
+    return report.Identification(f"{path}, {counted(len(rows), 'window')}", "N", fit, rows)
 
 
 def _from_times(

@@ -26,5 +26,9 @@ def play(out: Path, as_json: bool) -> int:
     check_folder(out.parent)
     write_playground(out)
     size = out.stat().st_size
-    show(as_json, {"page": str(out), "bytes": size}, f"{out}: {size / 1e6:.2f} MB")
+    show(
+        as_json,
+        {"page": str(out), "bytes": size},
+        f"{out}: {size / 1e6:.2f} MB; to be opened in a browser",
+    )
     return 0

@@ -12,6 +12,7 @@ from ...qualification import verdict
 from ...qualification.bands import read_bands
 from ...qualification.qualify import Qualification
 from ...qualification.qualify import qualify as run_qualification
+from ...qualification.swap import component_of
 from ...report.qualification import draw_qualification
 from ...system.parts import ISOLATIONS, Isolation
 from ..frame import (
@@ -84,7 +85,7 @@ def qualify(
         found = run_qualification(
             system,
             component,
-            load_system(candidate).component(component, str(candidate)) if is_file else candidate,
+            component_of(load_system(candidate), component, system) if is_file else candidate,
             rename=new.rename,
             units=new.units,
             values=set_values(given["settings"]),

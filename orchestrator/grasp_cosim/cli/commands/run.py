@@ -11,7 +11,7 @@ import click
 from ...errors import InputError, SimulationError
 from ...master.engine import ENGINES, Engine
 from ...master.simulation import MOST, simulate
-from ...numerals import fixed
+from ...numerals import counted, fixed
 from ...recording.folder import RunFolder
 from ...recording.mdf import check_mdf
 from ...recording.result import Result
@@ -183,7 +183,7 @@ def _as_json(result: Result) -> dict[str, Any]:
 def _summary(result: Result) -> str:
     m = result.metrics
     lines = [
-        f"{m['steps']} steps of {1e3 * m['step']:g} ms, {m['scheme']}, "
+        f"{counted(m['steps'], 'step')} of {1e3 * m['step']:g} ms, {m['scheme']}, "
         f"{fixed(m['real_time_factor'], 2)} times as fast as real time"
     ]
     lines += [

@@ -13,7 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...checks import real
 from ...errors import InputError, SimulationError, choices
+from ...numerals import counted
 from ...parallel import Crew, progress_bar
 from ...system.description import System
 from ..closing import close
@@ -172,11 +174,13 @@ def contact_times(job: tuple[System, Grasp]) -> Times:
 
 def _read(place: str, names: Sequence[str], line: Sequence[str]) -> Contact:
     if len(line) != len(names):
-        raise InputError(f"{place}: {len(line)} entries; must be {len(names)}, as many as columns")
+        raise InputError(
+            f"{place}: {counted(len(line), 'cell')}; must be {len(names)}, as many as columns"
+        )
     numbers: dict[str, float] = {}
     for name, text in zip(names, line, strict=True):
         try:
-            numbers[name] = float(text)
+            numbers[name] = real(text)
         except ValueError:
             raise InputError(f"{place}: {name} = {text!r}: must be a number") from None
         if not np.isfinite(numbers[name]):

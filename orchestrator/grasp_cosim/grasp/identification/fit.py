@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from ...checks import extra_module
 from ...errors import InputError, SimulationError
+from ...numerals import counted
 
 Vector = npt.NDArray[np.float64]
 
@@ -106,7 +107,8 @@ def fit(residuals: Residuals, parameters: Sequence[Parameter], place: str) -> Fi
         (found,) = finite([x])
         if len(found) <= len(parameters):
             raise InputError(
-                f"{place}: {len(found)} figures for {len(parameters)} parameters; must be more"
+                f"{place}: {counted(len(found), 'figure')} for "
+                f"{counted(len(parameters), 'parameter')}; must be more"
             )
         return found
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from ...errors import InputError, choices
 from ...metrics.metric import Signals
+from ...numerals import counted
 from ...system.description import System
 from ..metrics import FINGERS
 from ..presets import start_in_si
@@ -127,7 +128,7 @@ def _signal(log: Signals, name: str, place: str) -> Vector:
 
 def _step(time: Vector, place: str) -> float:
     if len(time) < 2:
-        raise InputError(f"{place}: {len(time)} samples; must be at least two")
+        raise InputError(f"{place}: {counted(len(time), 'sample')}; must be at least two")
     if not (np.diff(time) > 0.0).all() or not np.isfinite(time).all():
         raise InputError(f"{place}: the time must be finite and grow from sample to sample")
     step = float(np.median(np.diff(time)))

@@ -1,0 +1,153 @@
+"""Makes the pictures in docs, each by the command or the runs that it shows.
+
+    .venv/bin/python docs/pictures.py [NAME...]     # in the folder of the checkout; make pictures
+
+Without a NAME, like report or hand, all of them, in three minutes. report.png takes Chromium.
+"""
+
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import redirect_stdout
+from importlib.resources import files
+from io import StringIO
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import tutorials
+from grasp_cosim import cli
+from grasp_cosim.files import write_text
+from grasp_cosim.recording.load import load_run
+from grasp_cosim.recording.result import Result
+from grasp_cosim.report.diagram import Link, diagram_svg
+from hand import hand_svg
+
+HERE = Path(__file__).parent
+
+GRASP = ("run", "--every", "10")
+"""The grasp of hand.svg and loop.svg."""
+
+ENDS = ("from", "to")
+"""Of a connection, in run.json."""
+
+
+def do(*words: str) -> None:
+    """Do a command and keep what it prints to itself; SystemExit where it fails."""
+    with redirect_stdout(StringIO()):
+        code = cli.main(list(words))
+    if code:
+        raise SystemExit(f"grasp-cosim {' '.join(words)}: exit code {code}")
+
+
+def recorded(folder: Path, *words: str) -> Result:
+    """What a command records in a folder."""
+    do(*words, "--out", str(folder))
+    return load_run(folder)
+
+
+def draw_hand(folder: Path) -> None:
+    """hand.svg, the beginning of the README: the hand closes without and with layer 3."""
+    with TemporaryDirectory() as kept:
+        rows = [
+            (f"Case {case}: {title}", recorded(Path(kept, case), *GRASP, "--case", case))
+            for case, title in (("1", "without layer 3"), ("2", "with layer 3"))
+        ]
+        write_text(folder / "hand.svg", hand_svg(rows))
+
+
+def draw_loop(folder: Path) -> None:
+    """loop.svg: the FMUs of the built-in system and their connections, as `report` draws them."""
+    with TemporaryDirectory() as kept:
+        run = recorded(Path(kept), *GRASP, "--stop", "0.01")
+    ends = [
+        [(component, variable) for component, _, variable in (c[e].partition(".") for e in ENDS)]
+        for c in run.settings["connections"]
+    ]
+    links = [Link(source, target) for source, target in ends]
+    boxes = {name: c["fmu"] for name, c in run.settings["components"].items()}
+    svg = diagram_svg(boxes, links, run.units)
+    head, tag, rest = svg.partition("<defs>")
+    backing = '<rect width="100%" height="100%" rx="8" fill="var(--paper)"/>'
+    head = head.replace("<svg ", '<svg class="diagram" ', 1)
+    write_text(
+        folder / "loop.svg", f"{head}<style>\n{_diagram_style()}</style>{backing}{tag}{rest}\n"
+    )
+
+
+def _diagram_style() -> str:
+    """The part of the page's style that is of its colours and of a diagram."""
+    css = (files("grasp_cosim.report") / "page/page.css").read_text("utf-8")
+    colors, _, _ = css.partition("* {")
+    rules = re.findall(r"^(?:\.diagram [.t]|#tip)[^{]*\{[^}]*\}\n", css, re.MULTILINE)
+    return colors + "".join(rules)
+
+
+def draw_report(folder: Path) -> None:
+    """report.png, the page of a run at the second contact, as Chromium shows it."""
+    browser = shutil.which("chromium") or shutil.which("chromium-browser")
+    if browser is None:
+        raise SystemExit("chromium is not installed; it takes the picture of the page, report.png")
+    with TemporaryDirectory(ignore_cleanup_errors=True) as kept:
+        run = recorded(Path(kept, "grasp"), "run", "--native")
+        page = Path(kept, "grasp/report.html")
+        do("report", str(page.parent))
+        touches = run.time.searchsorted(max(run.metrics["time_to_contact"]))
+        subprocess.run(  # noqa: S603 - the browser of this machine, our own page
+            [
+                browser, "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars",
+                f"--user-data-dir={kept}/profile", "--virtual-time-budget=5000",
+                "--window-size=1280,1560", f"--screenshot={folder.resolve() / 'report.png'}",
+                f"{page.as_uri()}#at={run.time[touches]}",
+            ],
+            check=True, capture_output=True, timeout=120,
+        )  # fmt: skip
+
+
+def draw_timing(folder: Path) -> None:
+    """timing.png: how a run of this machine kept to the clock, never twice the same."""
+    with TemporaryDirectory() as kept:
+        do("run", "--realtime", "--step", "1e-3", "--plot", "--out", kept)
+        shutil.copy(Path(kept, "timing.png"), folder)
+
+
+def draw_evaluation(folder: Path) -> None:
+    """contact_times.png and contact_forces.png, as `make run` has them in results."""
+    with TemporaryDirectory() as kept:
+        do("evaluate", "--out", kept)
+        for name in ("contact_times.png", "contact_forces.png"):
+            shutil.copy(Path(kept, name), folder)
+
+
+def draw_colour_map(folder: Path) -> None:
+    """colour_map.png, of the study of that name."""
+    with TemporaryDirectory() as kept:
+        do("sweep", "colour_map", "--plot", "--out", kept)
+        shutil.copy(Path(kept, "map.png"), folder / "colour_map.png")
+
+
+PICTURES: Mapping[Callable[[Path], None], Sequence[str]] = {
+    draw_hand: ("hand.svg",),
+    draw_loop: ("loop.svg",),
+    draw_evaluation: ("contact_times.png", "contact_forces.png"),
+    draw_report: ("report.png",),
+    draw_timing: ("timing.png",),
+    draw_colour_map: ("colour_map.png",),
+    tutorials.main: ("colour.png", "layers.png", "objects.png", "limits.png", "your_plant.png"),
+}
+"""What each draws into a folder."""
+
+
+def main(*names: str) -> None:
+    """Make the pictures of these names, or all."""
+    known = {Path(picture).stem for pictures in PICTURES.values() for picture in pictures}
+    if wrong := [name for name in names if name not in known]:
+        raise SystemExit(f"{', '.join(wrong)}: must be of {', '.join(sorted(known))}")
+    for draw, pictures in PICTURES.items():
+        if not names or {Path(picture).stem for picture in pictures} & {*names}:
+            draw(HERE)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,25 @@
+"""The likely reason why an FMU does not load, by what is said of it."""
+
+from pathlib import Path
+
+import pytest
+from grasp_cosim.interface.obstacles import of_loading
+from grasp_cosim.interface.read import describe
+from support.models import build_model
+from support.native_fmus import needs_gcc
+
+
+@needs_gcc
+@pytest.mark.parametrize(
+    ("said", "licence"),
+    [
+        ("No license for feature X", True),
+        ("libflexlm.so: cannot open shared object file", True),
+        ("x.so: undefined symbol: licence_check", False),
+        ("undefined symbol: licence_check (no licence)", True),
+        ("cannot allocate memory", False),
+    ],
+)
+def test_a_licence_is_wanted_where_that_is_said(said: str, licence: bool, tmp_path: Path) -> None:
+    obstacle = of_loading(describe(build_model("stair", tmp_path)), said)
+    assert (obstacle is not None and "licence" in obstacle.what) == licence
