@@ -27,11 +27,11 @@ def test_a_run_without_a_date_says_none(monkeypatch: pytest.MonkeyPatch) -> None
     assert caption(run).about == fresh
     assert not caption(replace(run, folder=Path("results"))).about
     changed = replace(run, settings={**run.settings, "changed": {}})
-    assert caption(changed).about == f"as the system file has it · {fresh}"
+    assert caption(changed).about == f"as in the system file · {fresh}"
 
 
 def test_many_changes_are_counted() -> None:
-    assert changes({}) == "as the system file has it"
+    assert changes({}) == "as in the system file"
     assert changes({"a": True, "b": 0.1, "c": "x.fmu"}) == "a = true, b = 0.1, c = x.fmu"
     assert changes({f"v{k}": k for k in range(8)}).endswith("v5 = 5, 2 more")
 

@@ -16,7 +16,7 @@ MOST_CHANGED = 6
 """So many values that differ from the defaults are named, of more their number."""
 
 
-DEFAULTS = "as the system file has it"
+DEFAULTS = "as in the system file"
 """In place of changes, where there are none."""
 
 
