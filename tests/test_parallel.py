@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from grasp_cosim.errors import InputError, SimulationError
 from grasp_cosim.parallel import Crew, progress_bar, run_all
+from support.processes import ends
 
 
 def _process(job: int) -> tuple[int, int]:
@@ -133,17 +134,4 @@ def test_a_kill_ends_its_processes_whatever_they_are_at(tmp_path: Path) -> None:
         time.sleep(0.01)
     killed.kill()
     killed.wait()
-    assert ended(int(file.read_text()))
-
-
-def ended(process: int) -> bool:
-    """True if a process ends within 20 s; else it is ended."""
-    for _ in range(2000):
-        try:
-            if "State:\tZ" in Path(f"/proc/{process}/status").read_text("utf-8"):
-                return True
-        except OSError:
-            return True
-        time.sleep(0.01)
-    os.kill(process, signal.SIGKILL)
-    return False
+    assert ends(int(file.read_text()))

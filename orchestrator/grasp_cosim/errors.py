@@ -16,12 +16,12 @@ class SimulationError(Exception):
 
 
 class UnknownNameError(KeyError):
-    """A mapping has no such name; the message names what is nearest to it."""
+    """A mapping has no such name among its names of a kind; the message has the nearest ones."""
 
     def __str__(self) -> str:
         """Worked out when it is read: most are caught."""
-        name, names = self.args
-        return f"{name!r}: no such signal; {nearest(str(name), names)}"
+        name, names, kind = self.args
+        return f"{name!r}: no such {kind}; {nearest(str(name), names)}"
 
 
 def nearest(name: str, names: Iterable[str]) -> str:

@@ -85,36 +85,39 @@ class Session:
         try:
             self._stack.enter_context(noticing())
             with interruptible(), _folder_kept():
-                instances = []
-                for component in system.components:
-                    instances.append(load(component))
-                    self._stack.callback(instances[-1].close)
-                self._master = Master(
-                    system, instances, lambda *rows: self._dispatch(*rows), engine, self.pacer
-                )
-                self._dispatch = Dispatcher(
-                    system,
-                    self._master.slots,
-                    (self._memory, *listeners),
-                    every,
-                    self._master.texts,
-                )
-                if self.pacer:
-                    self.pacer.spare = self._dispatch.spare
-                self._stack.callback(self._end)
-                with self._failures():  # where the row of t = 0 is not finite
-                    self._master.initialise()
+                self._begin(listeners, every, engine)
             self._tell(self._early())
             if realtime and self.pacer:
-                sleeps = self.pacer.sleeps or self._master.runs_alone
-                granted = privileges(realtime, sleeps)
-                self._privileges = self._stack.enter_context(granted)
-                self.pacer.breathes = realtime.priority is not None
-            for line in self._privileges.refused:
-                LOGGER.warning("%s", line)
+                self._ask_for_privileges(realtime, self.pacer)
         except BaseException:
             self._stack.close()
             raise
+
+    def _begin(self, listeners: Sequence[Listener], every: int, engine: Engine) -> None:
+        """Load the FMUs, initialise them and hand on the row of t = 0; the stack undoes it all."""
+        instances = []
+        for component in self.system.components:
+            instances.append(load(component))
+            self._stack.callback(instances[-1].close)
+        self._master = Master(
+            self.system, instances, lambda *rows: self._dispatch(*rows), engine, self.pacer
+        )
+        slots, texts = self._master.slots, self._master.texts
+        receivers = (self._memory, *listeners)
+        self._dispatch = Dispatcher(self.system, slots, receivers, every, texts)
+        if self.pacer:
+            self.pacer.spare = self._dispatch.spare
+        self._stack.callback(self._end)
+        with self._failures():  # where the row of t = 0 is not finite
+            self._master.initialise()
+
+    def _ask_for_privileges(self, realtime: Realtime, pacer: Pacer) -> None:
+        """What a run in real time asks of the system; what that refuses is a warning."""
+        granted = privileges(realtime, pacer.sleeps or self._master.runs_alone)
+        self._privileges = self._stack.enter_context(granted)
+        pacer.breathes = realtime.priority is not None
+        for line in self._privileges.refused:
+            LOGGER.warning("%s", line)
 
     @contextmanager
     def _failures(self) -> Iterator[None]:

@@ -55,6 +55,13 @@ class Rejection:
     first: float
 
 
+class Figures(dict[str, Any]):
+    """Metrics and other figures by name; KeyError, with the nearest names, where there is none."""
+
+    def __missing__(self, name: str) -> Any:
+        raise UnknownNameError(name, tuple(self), "metric")
+
+
 @dataclass(frozen=True, eq=False)
 class Result(Mapping[str, npt.NDArray[Any]]):
     """Recorded signals by name, like result["plant.gap[1]"], on result.time in s.
@@ -91,7 +98,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
         """The signal; KeyError, with the names nearest to it, where there is none."""
         if name not in self.signals:
-            raise UnknownNameError(name, tuple(self.signals))
+            raise UnknownNameError(name, tuple(self.signals), "signal")
         return self.signals[name]
 
     def __contains__(self, name: object) -> bool:
@@ -141,7 +148,8 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     def metrics(self) -> Mapping[str, Any]:
         """The metrics by name, then the figures of UNITS, then those of any proxies.
 
-        InputError where the function of a metric fails.
+        InputError where the function of a metric fails; KeyError, with the nearest names, where
+        there is none of that name.
         """
         self.measured.check()
         return self._figures
@@ -152,7 +160,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
         simulated, wall_time = float(self.time[-1]), self.wall_time
         factor = simulated / wall_time if wall_time else wall_time
         proxies = proxy_figures(self.time, self.signals)
-        return {
+        figures = {
             **self.measured.values,
             "wall_time": wall_time,
             "real_time_factor": factor,
@@ -163,6 +171,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
             "complete": self.complete,
             **({"proxies": proxies} if proxies else {}),
         }
+        return Figures(figures)
 
     @property
     def metric_units(self) -> dict[str, str | None]:

@@ -47,9 +47,10 @@ def check_stimuli(system: Structure, whole: bool = False) -> None:
                 "Enumeration to be driven"
             )
         if port in sources:
+            without = ": take the value out" if sources[port] == "a value" else ""
             raise InputError(
                 f"{place}: {port} has two sources, {stimuli.file} and {sources[port]}; must have "
-                "one"
+                f"one{without}"
             )
         _check_samples(stimuli, port, interface)
 

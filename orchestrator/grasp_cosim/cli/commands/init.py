@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -14,6 +15,7 @@ from ...drafting.text import with_paths
 from ...errors import InputError, SimulationError
 from ...files import NATIVE_FOLDER, check_folder, write_text
 from ...interface.read import read_interface
+from ...numerals import counted
 from ...system.description import System
 from ...system.toml import to_do
 from ..frame import PATH, json_option, pair, say, show
@@ -22,6 +24,9 @@ if TYPE_CHECKING:
     from ...drafting.component import Draft
 
 NAME = re.compile(r"[A-Za-z0-9_-]+")
+
+MOST = 24
+"""So many lines with a TODO at most are listed; --json and the file have all."""
 
 
 @click.command()
@@ -82,16 +87,26 @@ def init(
     open_lines = to_do(text)
     if not open_lines:
         _read_back(file)
-    report = {
+    show(
+        as_json,
+        _report(file, drafts, open_lines, notes),
+        "\n    ".join(_lines(file, drafts, open_lines)),
+    )
+    for note in notes if not as_json else ():
+        say(note)
+    return 0
+
+
+def _report(
+    file: Path, drafts: Mapping[str, Draft], open_lines: Mapping[int, str], notes: Sequence[str]
+) -> dict[str, Any]:
+    """What was written, for --json."""
+    return {
         "file": str(file),
         "components": {name: _found(draft) for name, draft in drafts.items()},
         "todo": [{"line": number, "text": line} for number, line in open_lines.items()],
         "notes": notes,
     }
-    show(as_json, report, "\n    ".join(_lines(file, drafts, open_lines)))
-    for note in notes if not as_json else ():
-        say(note)
-    return 0
 
 
 def shown(fmu: Path, folder: Path) -> str:
@@ -195,6 +210,7 @@ def _lines(file: Path, drafts: Mapping[str, Draft], left: Mapping[int, str]) -> 
             f"{name}: {len(draft.found)} of the FMU's variables found"
             + (f", {doubtful} of them to check: CHECK" if doubtful else "")
         )
-    lines += [f"line {number}: {line}" for number, line in left.items()]
+    listed = [f"line {number}: {line}" for number, line in left.items()]
+    more = [f"and {counted(len(listed) - MOST, 'line')} more"] if len(listed) > MOST else []
     then = "when no TODO is left" if left else "then"
-    return [*lines, f"{then}: grasp-cosim run {file}"]
+    return [*lines, *listed[:MOST], *more, f"{then}: grasp-cosim run {quote(str(file))}"]
