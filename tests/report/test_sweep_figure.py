@@ -116,7 +116,9 @@ def test_variants_and_maps_are_beside_each_other(grasp: System, figures: list[Fi
 def test_it_says_what_differs_in_all_variants_and_takes_a_title(
     grasp: System, figures: list[Figure]
 ) -> None:
-    width, mass = {"plant.object_width": 0.06}, {"plant.finger_mass[1]": 0.4}
+    """But not what varies anyway, here the reflectance."""
+    width = {"plant.object_width": 0.06, "sensor_1.reflectance": 0.5}
+    mass = {"plant.finger_mass[1]": 0.4}
     both = [
         made(grasp.with_values(values), GRID, Pictures((MAP,)))
         for values in (width | mass, width | {"plant.finger_mass[1]": 0.6})

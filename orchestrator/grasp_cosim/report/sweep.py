@@ -146,7 +146,7 @@ def _draw_map(axes: Axes, sweep: Sweep, wanted: Map, points: _Points, norm: Any)
         there = np.isfinite(points.z)
         axes.scatter(points.x[~there], points.y[~there], s=14, color=GREY, marker="x")
         x, y, z = (values[there] for values in (points.x, points.y, points.z))
-        axes.scatter(x, y, c=z, s=14, norm=norm, cmap=COLOURS)
+        axes.scatter(x, y, c=z, s=16, norm=norm, cmap=COLOURS, edgecolors="black", linewidths=0.3)
     if points.missing:
         of = "cells" if points.in_cells else "runs"
         label = f"no {_title(study, wanted.of)}: {points.missing} of {points.z.size} {of}"
@@ -270,7 +270,7 @@ def _draw_curve(axes: Axes, sweep: Sweep, wanted: Curve, column: str, place: int
     missing = ~np.isfinite(values)
     if missing.any():
         axes.plot(
-            x[missing], np.full(missing.sum(), 0.03 + 0.04 * place), "x", color=colour,
+            x[missing], np.full(missing.sum(), 0.03 + 0.04 * (place % 5)), "x", color=colour,
             transform=axes.get_xaxis_transform(), label=f"no {name}: {missing.sum()} of {len(x)}",
         )  # fmt: skip
 
@@ -305,9 +305,12 @@ def _made_title(sweeps: Sequence[Sweep]) -> str:
 
 
 def _changed(sweeps: Sequence[Sweep]) -> dict[str, Any]:
-    """What of the system differs from its file, and is the same in all variants."""
+    """What of the system differs from its file, and is the same in all variants and runs."""
+    study = sweeps[0].study
+    varied = {*study.seeds, *(v for p in study.parameters for v in p.variables)}
     first, *others = (changed(sweep.study.system) for sweep in sweeps)
-    return {k: v for k, v in first.items() if all(o.get(k) == v for o in others)}
+    same = {k: v for k, v in first.items() if all(o.get(k) == v for o in others)}
+    return {k: v for k, v in same.items() if k not in varied}
 
 
 def _cells(cell: Cell, x: Floats, y: Floats, z: Floats) -> tuple[Floats, Floats, Floats]:
