@@ -110,7 +110,7 @@ def test_variants_and_maps_are_beside_each_other(grasp: System, figures: list[Fi
     for figure in figures:
         title, about = (text.get_text() for text in figure.texts)
         assert title == "grasp: 2 times 20 runs, 20 failed, over ratio and position"
-        assert about.startswith("as the system file has it · ")
+        assert about.startswith("as in the system file · ")
 
 
 def test_it_says_what_differs_in_all_variants_and_takes_a_title(
