@@ -49,7 +49,8 @@ def hand_svg(rows: Sequence[tuple[str, Result]]) -> str:
     drawn = "\n".join(svg for svg, _ in parts)
     told = "; ".join(f"{title}: {_outcome(run)}" for title, run in rows)
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" role="img" '
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" height="{height}" '
+        f'viewBox="0 0 {WIDTH} {height}" role="img" '
         f'aria-label="{told}">\n<style>{STYLE}@media (prefers-reduced-motion: no-preference) {{\n'
         f"{''.join(css for _, css in parts)}}}\n</style>\n"
         f'<rect width="{WIDTH}" height="{height}" rx="8" fill="var(--paper)"/>\n'

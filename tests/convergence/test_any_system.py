@@ -60,7 +60,7 @@ def test_signals_tend_to_the_solution_in_continuous_time(
     apart = [max(abs(run.values[n] - x) for n, x in EXACT.items()) for run in study.runs]  # type: ignore[operator]
     assert study.kept == tuple(error <= 5e-3 for error in apart)
     assert study.holds
-    assert f"a.x and b.x within 0.005 m is {1e3 * study.largest:g} ms" in study.as_text()  # type: ignore[operator]
+    assert f"a.x and b.x within 5 mm is {1e3 * study.largest:g} ms" in study.as_text()  # type: ignore[operator]
     found = study.as_json()
     assert {found["units"][name] for name in ("tolerance", "limit", "value", "error")} == {"m"}
     assert found["runs"][0]["value"] == dict(study.runs[0].values)
@@ -121,7 +121,7 @@ def test_nothing_is_asked_of_it_by_default(oscillator: System) -> None:
         (("phase", "phase"), None, "tolerance: must be given for phase, phase, in rad"),
         (("a.y_Real",), None, "tolerance: must be given for a.y_Real, in its unit"),
         (("a.x",), 0.0, "tolerance = 0.0 m: must be a number greater than 0"),
-        (("a.u_Real",), 1.0, "no metric or signal 'a.u_Real'; valid: phase, a.y_Real, "),
+        (("a.u_Real",), 1.0, "no metric or signal 'a.u_Real'; did you mean a.y_Real"),
         (("time_to_contact",), None, "no metric or signal 'time_to_contact'; valid: phase, a.y_R"),
         (("a.y_String",), None, "no metric or signal 'a.y_String'; valid: phase, a.y_Real, "),
     ],

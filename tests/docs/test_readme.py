@@ -3,6 +3,7 @@
 import re
 import shlex
 import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -132,12 +133,17 @@ def test_the_keys_of_a_component_are_read(user: Path) -> None:
     assert (plant.step_ns, plant.isolation, len(plant.rename)) == (1_000_000, "process", 2)
 
 
-def test_pictures_and_links_exist() -> None:
-    for page in ("README.md", "docs/guide.md"):
-        text = (ROOT / page).read_text("utf-8")
-        linked = re.findall(r"\]\(([^)#]+?)(?:#[^)]*)?\)", text)
-        assert "](docs/contact_times.png)" in README
-        assert [link for link in linked if not (ROOT / page).parent.joinpath(link).exists()] == []
+def test_the_first_screen_is_the_hand_and_two_commands_of_which_one_ends_with_it_moving() -> None:
+    """Within 25 lines of the README; the last thing that `make run` does is to write the page."""
+    first = "\n".join(README.splitlines()[:25])
+    for shown in ("](docs/hand.svg)", "    make run ", "    make test ", "](docs/loop.svg)"):
+        assert shown in first
+    make = shutil.which("make")
+    if make is None:
+        pytest.skip("make is not installed")
+    done = subprocess.run([make, "-n", "run"], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1].endswith("grasp-cosim play -o results/play.html")
+    assert "then open results/play.html" in first
 
 
 @pytest.mark.parametrize("card", sorted(ROOT.glob("*/README.md")), ids=lambda p: p.parent.name)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -55,6 +55,13 @@ class Rejection:
     first: float
 
 
+class Figures(dict[str, Any]):
+    """Metrics and other figures by name; KeyError, with the nearest names, where there is none."""
+
+    def __missing__(self, name: str) -> Any:
+        raise UnknownNameError(name, tuple(self), "metric")
+
+
 @dataclass(frozen=True, eq=False)
 class Result(Mapping[str, npt.NDArray[Any]]):
     """Recorded signals by name, like result["plant.gap[1]"], on result.time in s.
@@ -82,7 +89,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     more_metrics: tuple[Metric, ...] = ()
     """Metrics that were asked for beside those that every result is asked for."""
     origin: Mapping[str, Any] = field(default_factory=dict)
-    """The date, versions and command of a run with a folder: see recording.folder."""
+    """The date, versions, command and title of a run with a folder: see recording.folder."""
     to_si: Mapping[str, Conversion | None] = field(default_factory=dict)
     """The conversions to SI base units of signals in others; None where the unit is in doubt."""
     folder: Path | None = None
@@ -91,7 +98,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
         """The signal; KeyError, with the names nearest to it, where there is none."""
         if name not in self.signals:
-            raise UnknownNameError(name, tuple(self.signals))
+            raise UnknownNameError(name, tuple(self.signals), "signal")
         return self.signals[name]
 
     def __contains__(self, name: object) -> bool:
@@ -141,7 +148,8 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     def metrics(self) -> Mapping[str, Any]:
         """The metrics by name, then the figures of UNITS, then those of any proxies.
 
-        InputError where the function of a metric fails.
+        InputError where the function of a metric fails; KeyError, with the nearest names, where
+        there is none of that name.
         """
         self.measured.check()
         return self._figures
@@ -152,7 +160,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
         simulated, wall_time = float(self.time[-1]), self.wall_time
         factor = simulated / wall_time if wall_time else wall_time
         proxies = proxy_figures(self.time, self.signals)
-        return {
+        figures = {
             **self.measured.values,
             "wall_time": wall_time,
             "real_time_factor": factor,
@@ -163,6 +171,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
             "complete": self.complete,
             **({"proxies": proxies} if proxies else {}),
         }
+        return Figures(figures)
 
     @property
     def metric_units(self) -> dict[str, str | None]:
@@ -205,13 +214,19 @@ class Result(Mapping[str, npt.NDArray[Any]]):
         }
         write_json(Path(path), report)
 
-    def plot(self, path: str | Path | None = None) -> Figure:
+    def plot(self, path: str | Path | None = None, title: str = "") -> Figure:
         """Draw a grasp as one, of any other system all signals: the figure of matplotlib.
 
-        With a `path` it is written there too, as a PNG. InputError without matplotlib.
+        With a `path` it is written there too, as its suffix says: .png, .svg or .pdf. InputError
+        where that is another one, or without matplotlib.
         """
-        figure: Figure = self.drawing.draw(self, None if path is None else Path(path))
+        run = self.titled(title)
+        figure: Figure = self.drawing.draw(run, None if path is None else Path(path))
         return figure
+
+    def titled(self, title: str) -> Result:
+        """Return the result under another title, which its pictures and pages have; not if ''."""
+        return replace(self, origin={**self.origin, "title": title}) if title else self
 
     def to_pandas(self) -> pd.DataFrame:
         """The signals as a DataFrame, by time in s; its `attrs` have the units, by column.

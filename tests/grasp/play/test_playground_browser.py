@@ -1,6 +1,7 @@
 """The playground under a hand: sliders, choices, grasps to choose, keys, address, size."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -295,6 +296,88 @@ def test_the_object_can_be_dragged(html: str, tmp_path: Path) -> None:
     """
     command = "grasp-cosim run --step 0.002 --set plant.initial_object_position=0.07"
     assert act(html, body, tmp_path, "at=0&step=0.002") == ["10", "-20", "70", "70", command]
+
+
+def test_buttons_and_time(html: str, tmp_path: Path) -> None:
+    """Reset, the links to copy, the time and the speed of the hand."""
+    body = """
+      const seen = [], copied = [];
+      Object.defineProperty(navigator, "clipboard", { configurable: true,
+        value: { writeText: async (text) => { copied.push(text); } } });
+      await move("position", 12);
+      await click(find("copy"));
+      await click(find("link"));
+      seen.push(find("copy").textContent, find("link").textContent, copied.map(
+        (text) => text.split("#").at(-1)));
+      navigator.clipboard.writeText = async () => { throw new Error("no"); };
+      await click(find("copy"));
+      seen.push(find("copy").textContent);
+      await click(find("reset"));
+      play(false);
+      seen.push(command(), find("position").value);
+      await move("scrub", 1.25);
+      seen.push(cursor, find("clock").textContent, find("pace").textContent);
+      await move("speed", 0, "change");
+      seen.push(find("pace").textContent);
+      await click(find("play"));
+      seen.push(playing, find("play").textContent);
+      await click(find("play"));
+      seen.push(playing, cursor > 1.25);
+      return seen;
+    """
+    run = "grasp-cosim run --step 0.002 --set plant.initial_object_position=0.012"
+    link = "step=0.002&plant.initial_object_position=0.012&at=1"
+    copied, linked, texts, refused, *rest = act(html, body, tmp_path, "at=1&step=0.002")
+    assert (copied, linked, texts) == ("Copied", "Copied", [run, link])
+    assert refused == "The browser does not allow it"
+    assert rest[:2] == ["grasp-cosim run", "30"]
+    assert rest[2:6] == [1.25, "1.250 s", "", "1 × real time"]
+    assert rest[6:] == [True, "Pause", False, True]
+
+
+def luminance(color: str) -> float:
+    """The relative luminance of a color like rgb(1, 2, 3), as WCAG 2.2 has it."""
+    shares = [int(part) / 255.0 for part in re.findall(r"\d+", color)[:3]]
+    r, g, b = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in shares)
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b
+
+
+def contrast(one: str, other: str) -> float:
+    darker, lighter = sorted((luminance(one), luminance(other)))
+    return (lighter + 0.05) / (darker + 0.05)
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_all_that_is_written_and_the_fingers_are_told_from_the_ground(
+    html: str, tmp_path: Path, dark: bool
+) -> None:
+    """4.5 to 1 for text, 3 to 1 for what is drawn: WCAG 2.2, AA."""
+    body = """
+      for (const details of document.querySelectorAll("details")) details.open = true;
+      const clear = "rgba(0, 0, 0, 0)", seen = {};
+      const ground = (e) => {
+        const own = e ? getComputedStyle(e).backgroundColor : "rgb(255, 255, 255)";
+        return own === clear ? ground(e.parentElement) : own;
+      };
+      for (const e of document.querySelectorAll("body *")) {
+        const written = [...e.childNodes].some((n) => n.nodeType === 3 && n.textContent.trim());
+        if (!e.offsetParent || !(written || e.matches("input[type=number], #name"))) continue;
+        seen[`${getComputedStyle(e).color} on ${ground(e)}`] = e.outerHTML.slice(0, 80);
+      }
+      const probe = document.createElement("i");
+      document.body.append(probe);
+      const drawn = ["--finger1", "--finger2", "--ink", "--muted"].map((name) => {
+        probe.style.color = `var(${name})`;
+        return getComputedStyle(probe).color;
+      });
+      return [seen, drawn, getComputedStyle(document.body).backgroundColor];
+    """
+    texts, drawn, paper = act(html, body, tmp_path, "at=1&step=0.002", dark=dark)
+    assert (luminance(paper) < 0.1) is dark
+    faint = {pair: of for pair, of in texts.items() if contrast(*pair.split(" on ")) < 4.5}
+    assert len(texts) > 4
+    assert faint == {}
+    assert min(contrast(color, paper) for color in drawn) >= 3.0
 
 
 @pytest.mark.parametrize("still", [False, True])

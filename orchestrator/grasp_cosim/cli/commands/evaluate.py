@@ -1,6 +1,5 @@
 """The command evaluate."""
 
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -9,6 +8,7 @@ import click
 
 from ...files import check_folder
 from ...grasp.presets import with_preset
+from ...grasp.published.evaluate import PICTURES
 from ...grasp.published.evaluate import evaluate as run_evaluation
 from ...grasp.published.store import FOLDER
 from ...grasp.published.tables import Source
@@ -19,10 +19,13 @@ from ..frame import (
     NEGATIVE,
     PATH,
     fail,
+    format_option,
+    is_quiet,
     json_option,
     load_system,
     show,
     with_controller,
+    workers_option,
 )
 from ..native import many_runs_option, natively
 from ..options import controller_option
@@ -31,9 +34,16 @@ from ..options import controller_option
 @click.command()
 @click.option("--bench", is_flag=True, help="The experiments, with friction and electronics.")
 @controller_option
-@click.option("--out", type=PATH, default=Path("results"), show_default=True)
-@click.option("--workers", type=click.IntRange(1), default=os.cpu_count(), show_default="all cores")
+@click.option(
+    "--out",
+    type=PATH,
+    default=Path("results"),
+    show_default=True,
+    help="Folder for report.md, pictures and numbers.",
+)
+@workers_option
 @many_runs_option
+@format_option
 @json_option
 def evaluate(
     bench: bool,
@@ -41,11 +51,13 @@ def evaluate(
     out: Path,
     workers: int,
     native: bool | None,
+    suffix: str,
     as_json: bool,
 ) -> int:
-    """Run the published simulation table and figures and compare; --bench: the experiments.
+    """Run the published table and figures, and compare.
 
-    Finished grasps are kept until all are done: the same command goes on where it was ended.
+    With --bench these are the experiments, else the simulations. Finished grasps are kept until all
+    are done: the same command goes on where it was ended.
 
     \b
     Example: grasp-cosim evaluate --out results
@@ -56,17 +68,17 @@ def evaluate(
     system = with_preset(system, "bench") if bench else system
     try:
         with natively(system, native) as chosen:
-            report = run_evaluation(chosen, out, workers, True, source)
+            report = run_evaluation(chosen, out, workers, not is_quiet(), source, suffix)
     except KeyboardInterrupt:
         kept = Parts(out / FOLDER).kept()
         goes_on = f"; {counted(kept, 'grasp')} kept in {out / FOLDER}, the same command goes on"
         return fail(f"interrupted{goes_on if kept else ''}", INTERRUPTED)
     holds = all(claim["holds"] for claim in report["claims"])
-    show(as_json, report, _verdict(report, out))
+    show(as_json, report, _verdict(report, out, suffix))
     return 0 if holds else NEGATIVE
 
 
-def _verdict(report: Mapping[str, Any], out: Path) -> str:
+def _verdict(report: Mapping[str, Any], out: Path, suffix: str) -> str:
     rms = ", ".join(
         f"{name.replace('_', ' ')} {fixed(value, 3, rounded=True)}"
         for name, value in report["rms"].items()
@@ -75,7 +87,7 @@ def _verdict(report: Mapping[str, Any], out: Path) -> str:
         [
             *(f"{'holds' if c['holds'] else 'FAILS'}  {c['text']}" for c in report["claims"]),
             f"root mean square of the differences in s: {rms}",
-            f"report: {out / 'report.md'}   pictures: {out / 'contact_forces.png'}, "
-            f"{out / 'target_position.png'}, {out / 'contact_times.png'}",
+            f"report: {out / 'report.md'}   pictures: "
+            + ", ".join(str(out / f"{name}.{suffix}") for name in PICTURES),
         ]
     )

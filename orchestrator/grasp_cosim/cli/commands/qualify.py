@@ -6,7 +6,7 @@ from typing import Any
 import click
 
 from ...extensions import readers
-from ...files import remove, write_json, write_text
+from ...files import of_any_format, remove, write_json, write_text
 from ...interface.read import check_runs
 from ...qualification import verdict
 from ...qualification.bands import read_bands
@@ -15,11 +15,14 @@ from ...qualification.qualify import qualify as run_qualification
 from ...qualification.swap import component_of
 from ...report.qualification import draw_qualification
 from ...system.parts import ISOLATIONS, Isolation
+from ..completion import components
 from ..frame import (
     NEGATIVE,
     PATH,
     check_outputs,
     chosen_metrics,
+    format_option,
+    is_quiet,
     json_option,
     load_system,
     metrics_option,
@@ -32,7 +35,14 @@ from ..options import chosen_system, names_options, replacements, set_values, sy
 
 @click.command()
 @click.argument("candidate", type=PATH)
-@click.option("--as", "component", required=True, metavar="COMPONENT", help="Whose place it takes.")
+@click.option(
+    "--as",
+    "component",
+    required=True,
+    metavar="COMPONENT",
+    shell_complete=components(),
+    help="Whose place it takes.",
+)
 @click.option("--system", type=PATH, help="Default: the built-in grasp.")
 @system_options
 @click.option("--bands", type=PATH, help="TOML; default: derived.")
@@ -51,6 +61,7 @@ from ..options import chosen_system, names_options, replacements, set_values, sy
     type=PATH,
     help="Folder for qualification.json, qualification.png and bands_used.toml.",
 )
+@format_option
 @json_option
 def qualify(
     candidate: Path,
@@ -60,12 +71,13 @@ def qualify(
     native: bool | None,
     metric_files: tuple[Path, ...],
     out: Path | None,
+    suffix: str,
     as_json: bool,
     **given: Any,
 ) -> int:
-    """Find out whether CANDIDATE, an FMU or a system file with it, may take the place of COMPONENT.
+    """Find out whether CANDIDATE may take the place of COMPONENT.
 
-    Of a system file it is the FMU of the component of that name, as it is there.
+    It is an FMU, or a system file: then the FMU of the component of that name, as it is there.
 
     Compares the interfaces, then the closed loops with the original and with the candidate, signal
     by signal and metric by metric. Exit code 0: qualified; 1: not.
@@ -88,19 +100,19 @@ def qualify(
             values=set_values(given["settings"]),
             bands=read_bands(bands) if bands else None,
             isolation=isolation,
-            progress=True,
+            progress=not is_quiet(),
             metrics=chosen_metrics(metric_files),
         )
     if out:
-        _write(found, out)
+        _write(found, out, suffix)
     show(as_json, verdict.as_json(found), verdict.as_text(found))
     return 0 if found.qualified else NEGATIVE
 
 
-def _write(found: Qualification, out: Path) -> None:
+def _write(found: Qualification, out: Path, suffix: str) -> None:
     """What there is: without a run there is no band and no figure, not even an earlier one."""
-    figure, bands = out / "qualification.png", out / "bands_used.toml"
-    remove(out, "qualification.json", figure.name, bands.name)
+    figure, bands = out / f"qualification.{suffix}", out / "bands_used.toml"
+    remove(out, "qualification.json", bands.name, *of_any_format(figure.stem))
     write_json(out / "qualification.json", verdict.as_json(found))
     if found.signals:
         write_text(bands, verdict.as_bands(found))

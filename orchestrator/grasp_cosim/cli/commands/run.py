@@ -1,5 +1,6 @@
 """The command run."""
 
+from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +17,7 @@ from ...recording.mdf import check_mdf
 from ...recording.result import Result
 from ...report.timing import draw_result
 from ...system.description import System
+from ..completion import components
 from ..frame import (
     INTERRUPTED,
     NEGATIVE,
@@ -23,11 +25,14 @@ from ..frame import (
     check_outputs,
     chosen_metrics,
     fail,
+    format_option,
+    is_quiet,
     json_option,
     metrics_option,
     pair,
     say,
     show,
+    title_option,
 )
 from ..native import native_option, natively
 from ..options import (
@@ -47,7 +52,14 @@ from ..step_study import check_step_study, step_study_options, study_step
 @click.command()
 @click.argument("system", required=False, type=PATH)
 @system_options
-@click.option("--swap", "swaps", multiple=True, metavar="COMPONENT=FMU")
+@click.option(
+    "--swap",
+    "swaps",
+    multiple=True,
+    metavar="COMPONENT=FMU",
+    shell_complete=components("="),
+    help="Another FMU in the place of a component.",
+)
 @names_options
 @input_options
 @click.option("--out", type=PATH, help="Folder for signals.csv and run.json.")
@@ -56,6 +68,8 @@ from ..step_study import check_step_study, step_study_options, study_step
     is_flag=True,
     help="Draw grasp.png, and timing.png with --realtime, in --out or the current folder.",
 )
+@format_option
+@title_option
 @click.option("--mdf", is_flag=True, help="Write signals.mf4 (ASAM MDF 4) too; needs --out.")
 @click.option(
     "--every", type=click.IntRange(1, MOST), default=1, help="Record each N-th step only."
@@ -65,10 +79,17 @@ from ..step_study import check_step_study, step_study_options, study_step
     "isolation",
     multiple=True,
     metavar="[COMPONENT=]none|process",
+    shell_complete=components("="),
     help="Where all FMUs run, or one: in a process of its own, or none. Default: as SYSTEM says.",
 )
 @native_option("as SYSTEM names them; with --step-study, native where there is a C compiler.")
-@click.option("--engine", type=click.Choice(ENGINES), default="auto", show_default=True)
+@click.option(
+    "--engine",
+    type=click.Choice(ENGINES),
+    default="auto",
+    show_default=True,
+    help="The loop over the steps in Python, or in C; auto: in C where that pays.",
+)
 @metrics_option
 @step_study_options
 @realtime_options
@@ -79,6 +100,7 @@ def run(
     every: int,
     engine: Engine,
     metric_files: tuple[Path, ...],
+    title: str,
     as_json: bool,
     **given: Any,
 ) -> int:
@@ -99,15 +121,14 @@ def run(
     if mdf:
         check_mdf()
     check_outputs(out, given["plot"])
-    command = ("grasp-cosim", *click.get_current_context().find_root().obj)
     with (
         natively(system, bool(given["native"])) as chosen,
-        RunFolder(out, chosen, command, paced is not None) if out else nullcontext() as folder,
+        _folder(out, chosen, paced is not None, title) as folder,
     ):
         try:
             result = simulate(
                 chosen,
-                progress=True,
+                progress=not is_quiet(),
                 every=every,
                 listeners=[folder] if folder else (),
                 engine=engine,
@@ -117,16 +138,24 @@ def run(
             )
         except SimulationError as error:
             if error.result:
-                _write(error.result, folder, out, given["plot"], mdf)
+                _write(error.result.titled(title), folder, given, mdf)
                 if out:
                     say(f"kept what was recorded, in {out}")
             raise
-        _write(result, folder, out, given["plot"], mdf)
+        _write(result.titled(title), folder, given, mdf)
     show(as_json, _as_json(result), _summary(result))
     if not result.complete:
         message = f"interrupted at t = {result.time[-1]:.6g} s; kept what was recorded"
         return fail(message, INTERRUPTED)
     return 0 if result.signals else NEGATIVE  # as the log says
+
+
+def _folder(
+    out: Path | None, system: System, paced: bool, title: str
+) -> RunFolder | nullcontext[None]:
+    """The folder of the run, if it is to have one."""
+    command = ("grasp-cosim", *click.get_current_context().find_root().obj)
+    return RunFolder(out, system, command, paced, title) if out else nullcontext()
 
 
 def _chosen(given: dict[str, Any], swaps: tuple[str, ...]) -> System:
@@ -143,16 +172,16 @@ def _chosen(given: dict[str, Any], swaps: tuple[str, ...]) -> System:
     return isolations(swapped, given["isolation"])
 
 
-def _write(
-    result: Result, folder: RunFolder | None, out: Path | None, plot: bool, mdf: bool
-) -> None:
+def _write(result: Result, folder: RunFolder | None, given: Mapping[str, Any], mdf: bool) -> None:
+    out, suffix = given["out"], given["suffix"]
     if folder:
         folder.finish(result)
     if not result.signals:
         return
     if out and mdf:
         result.to_mdf(out / "signals.mf4")
-    for picture in draw_result(result, out or Path()) if plot and result.numbers else ():
+    plot = given["plot"] and result.numbers
+    for picture in draw_result(result, out or Path(), suffix) if plot else ():
         say(f"drew {picture}")
 
 
