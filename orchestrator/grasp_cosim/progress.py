@@ -102,7 +102,9 @@ class Progress(tqdm):  # type: ignore[type-arg]  # subscripted, it is no class
         return {**found, "what": what, "took": ", ".join(took)}
 
     def display(self, msg: str | None = None, pos: int | None = None) -> bool:  # type: ignore[override]
-        """Draw the bar, or write a line."""
+        """Draw the bar, or write a line, once the delay is over."""
+        if hasattr(self, "start_t") and time.time() - self.start_t < self._delay:
+            return False
         if not self._lines:
             return bool(super().display(msg, pos))
         if msg is None:
@@ -132,6 +134,14 @@ class Progress(tqdm):  # type: ignore[type-arg]  # subscripted, it is no class
             if now - self.start_t >= self._delay and now - self.last_print_t >= wait:
                 self.last_print_t = now
                 self.refresh()
+
+
+def write(line: str) -> None:
+    """Write a line on standard error, above a bar that is there."""
+    if sys.stderr.isatty():
+        tqdm.write(line, file=sys.stderr)
+    else:
+        sys.stderr.write(line + "\n")
 
 
 @contextmanager

@@ -13,7 +13,7 @@ from ..files import remove, write_json
 from ..metrics.metric import Metric
 from ..report.step_study import draw_step_study
 from ..system.description import System
-from .frame import NEGATIVE, check_outputs, is_quiet, say, show, together
+from .frame import NEGATIVE, check_outputs, is_quiet, say, show, together, waiting
 from .native import natively
 
 step_study_options = together(
@@ -61,7 +61,8 @@ def study_step(
         remove(folder, "step_study.json", "step_study.png")
         write_json(folder / "step_study.json", study.as_json())
     if given["plot"]:
-        draw_step_study(study, folder / "step_study.png")
+        with waiting("drawing"):
+            draw_step_study(study, folder / "step_study.png")
         say(f"drew {folder / 'step_study.png'}")
     show(as_json, study.as_json(), study.as_text())
     return 0 if study.holds else NEGATIVE

@@ -9,7 +9,7 @@ from ...files import check_folder, remove_parts
 from ...recording.load import load_run, run_folder
 from ...report.page import write_page
 from ...report.timing import TIMING, draw_result
-from ..frame import PATH, json_option, say, show
+from ..frame import PATH, json_option, say, show, waiting
 
 
 @click.command()
@@ -27,10 +27,20 @@ def report(run: Path, out: Path | None, as_json: bool) -> int:
     Example: grasp-cosim report results
     """
     run = run_folder(run)
+    page = out or run / "report.html"
+    with waiting(f"drawing {page}"):
+        drawn = _draw(run, page)
+    size = page.stat().st_size
+    written = {"page": str(page), "bytes": size, "pictures": drawn}
+    show(as_json, written, "\n".join([f"{page}: {size / 1e6:.1f} MB", *drawn]))
+    return 0
+
+
+def _draw(run: Path, page: Path) -> list[str]:
+    """Write the page of a run; the pictures that were drawn beside it."""
     recorded = load_run(run)
     if recorded.wall_time is None:
         say(f"{run}: unfinished, to t = {recorded.time[-1]:.6g} s")
-    page = out or run / "report.html"
     check_folder(page.parent)
     remove_parts(page.parent, page.name, f"{recorded.drawing.stem}.png", TIMING)
     scene = recorded.drawing.scene(recorded)
@@ -40,7 +50,4 @@ def report(run: Path, out: Path | None, as_json: bool) -> int:
         drawn += map(str, draw_result(recorded, page.parent))
     except InputError as error:
         say(f"no picture: {error}")
-    size = page.stat().st_size
-    written = {"page": str(page), "bytes": size, "pictures": drawn}
-    show(as_json, written, "\n".join([f"{page}: {size / 1e6:.1f} MB", *drawn]))
-    return 0
+    return drawn

@@ -30,6 +30,7 @@ from ..frame import (
     pair,
     say,
     show,
+    waiting,
 )
 from ..native import native_option, natively
 from ..options import (
@@ -168,8 +169,10 @@ def _write(
         return
     if out and mdf:
         result.to_mdf(out / "signals.mf4")
-    for picture in draw_result(result, out or Path()) if plot and result.numbers else ():
-        say(f"drew {picture}")
+    if plot and result.numbers:
+        with waiting("drawing"):
+            for picture in draw_result(result, out or Path()):
+                say(f"drew {picture}")
 
 
 def _as_json(result: Result) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from typing import Any
 from ...files import remove, write_json, write_text
 from ...metrics.metric import registered
 from ...parallel import run_all
+from ...progress import Progress
 from ...recording.result import UNITS
 from ...report.plot import new_figure, save
 from ...sweep.store import Parts
@@ -94,8 +95,9 @@ def evaluate(
             "units": _units(rows, next(iter(runs.values()))),
         }
         remove(out, *WRITTEN)
-        _draw_signals(runs, how.shown, out)
-        _draw_times(rows, out / "contact_times.png")
+        with Progress("drawing", unit="", shown=progress):
+            _draw_signals(runs, how.shown, out)
+            _draw_times(rows, out / "contact_times.png")
         named = [{**r, "finger": r["finger"] or "difference"} for r in rows]
         write_text(out / "evaluation.csv", table_csv(named))
         write_json(out / "evaluation.json", report)
