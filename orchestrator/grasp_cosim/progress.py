@@ -62,7 +62,7 @@ class Progress(tqdm):  # type: ignore[type-arg]  # subscripted, it is no class
             unit=unit,
             initial=initial,
             disable=not shown,
-            leave=not self._lines,
+            leave=bool(unit) and not self._lines,
             delay=self._delay,
             mininterval=EVERY if self._lines else 0.1,
             miniters=0,
@@ -94,7 +94,7 @@ class Progress(tqdm):  # type: ignore[type-arg]  # subscripted, it is no class
         found = super().format_dict
         took = [span(found["elapsed"])]
         if (left := self.left) is not None:
-            took.append(f"about {span(left)} left")
+            took.append(f"about {span(max(left, 1.0))} left")
         if self.postfix:
             took.append(str(self.postfix))
         count = self._count()
@@ -113,7 +113,7 @@ class Progress(tqdm):  # type: ignore[type-arg]  # subscripted, it is no class
         return False
 
     def close(self) -> None:
-        """End it; a bar that was there stays."""
+        """End it; a bar that counts something stays."""
         self._over.set()
         if self._ticker:
             self._ticker.join()
