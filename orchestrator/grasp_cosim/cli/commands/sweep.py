@@ -35,6 +35,7 @@ from ..frame import (
     pair,
     say,
     show,
+    waiting,
     with_controller,
     with_preset,
 )
@@ -128,8 +129,10 @@ def sweep(
         kept = sum(Store(folder / v.variant).kept() for v in variants)
         of = f"{kept} of {sum(v.runs for v in variants)} runs are kept in {folder}"
         return fail(f"interrupted; {of}, the same command goes on", INTERRUPTED)
-    for picture in draw_sweep(done, folder) if plot else []:
-        say(f"drew {picture}")
+    if plot:
+        with waiting("drawing"):
+            for picture in draw_sweep(done, folder):
+                say(f"drew {picture}")
     limits = reached(done)
     show(as_json, _as_json(name, folder, done, limits), _as_text(done, limits))
     failed = all(d.failed == d.study.runs for d in done)
