@@ -122,11 +122,11 @@ def draw_evaluation(folder: Path) -> None:
             shutil.copy(Path(kept, name), folder)
 
 
-def draw_colour_map(folder: Path) -> None:
-    """colour_map.png, of the study of that name."""
+def draw_map(folder: Path, study: str) -> None:
+    """The map of a built-in study, by its name."""
     with TemporaryDirectory() as kept:
-        do("sweep", "colour_map", "--plot", "--out", kept)
-        shutil.copy(Path(kept, "map.png"), folder / "colour_map.png")
+        do("sweep", study, "--plot", "--out", kept)
+        shutil.copy(Path(kept, "map.png"), folder / f"{study}.png")
 
 
 def draw_page(folder: Path, name: str) -> None:
@@ -141,7 +141,8 @@ PICTURES: Mapping[str, tuple[Callable[[Path], None], Sequence[str]]] = {
     "evaluation": (draw_evaluation, ["contact_times.png", "contact_forces.png"]),
     "report": (draw_report, ["report.png"]),
     "timing": (draw_timing, ["timing.png"]),
-    "colour_map": (draw_colour_map, ["colour_map.png"]),
+    "colour_map": (partial(draw_map, study="colour_map"), ["colour_map.png"]),
+    "reflectance_map": (partial(draw_map, study="reflectance_map"), ["reflectance_map.png"]),
     "colour": (partial(draw_page, name="colour"), ["colour.png"]),
     "layers": (partial(draw_page, name="layers"), ["layers.png", "objects.png"]),
     "limits": (partial(draw_page, name="limits"), ["limits.png"]),

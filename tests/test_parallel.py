@@ -11,7 +11,9 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim.errors import InputError, SimulationError
-from grasp_cosim.parallel import Crew, progress_bar, run_all
+from grasp_cosim.parallel import Crew, run_all
+from grasp_cosim.progress import Progress
+from support.processes import ends
 
 
 def _process(job: int) -> tuple[int, int]:
@@ -49,7 +51,7 @@ def test_a_process_that_dies_is_an_error() -> None:
 
 
 def test_batches_share_their_processes() -> None:
-    with Crew(1) as crew, progress_bar("runs", None, progress=False) as bar:
+    with Crew(1) as crew, Progress("runs", shown=False) as bar:
         first, second = (crew.map(_process, range(2), bar) for _ in range(2))
     assert first == second
 
@@ -133,17 +135,4 @@ def test_a_kill_ends_its_processes_whatever_they_are_at(tmp_path: Path) -> None:
         time.sleep(0.01)
     killed.kill()
     killed.wait()
-    assert ended(int(file.read_text()))
-
-
-def ended(process: int) -> bool:
-    """True if a process ends within 20 s; else it is ended."""
-    for _ in range(2000):
-        try:
-            if "State:\tZ" in Path(f"/proc/{process}/status").read_text("utf-8"):
-                return True
-        except OSError:
-            return True
-        time.sleep(0.01)
-    os.kill(process, signal.SIGKILL)
-    return False
+    assert ends(int(file.read_text()))

@@ -66,6 +66,9 @@ def _nature(path: Path, wanted: str) -> tuple[str, str]:
         return _folder_nature(path, wanted)
     if path.name in _IN_A_RUN and (path.parent / "run.json").is_file():
         return "a file of a run", f"`grasp-cosim report {parent}` shows the run"
+    if path.is_file() and path.name in _IN_AN_ARCHIVE:
+        what = _IN_AN_ARCHIVE[path.name]
+        return f"a file unpacked from {what}", _packs(path.parent, what)
     found = _archive_nature(path)
     if found == "an FMU" and wanted == "system":
         return found, (
@@ -83,6 +86,10 @@ def _nature(path: Path, wanted: str) -> tuple[str, str]:
         return "a TOML file", f"`grasp-cosim run {name}` runs it, if it is a system"
     if path.suffix.lower() == ".py" and path.is_file():
         return "a Python file", f"`grasp-cosim build {name}` makes an FMU of it, if it is a block"
+    if path.suffix.lower() == ".csv" and path.is_file() and wanted == "system":
+        return "a CSV file", f"`grasp-cosim run --input {name}` drives inputs of the grasp with it"
+    if path.name == "OspSystemStructure.xml" and path.is_file():
+        return "a system structure of OSP, which is no SSP", ""
     return "", ""
 
 
@@ -92,17 +99,19 @@ def _folder_nature(path: Path, wanted: str) -> tuple[str, str]:
         return WANTED["run"], f"`grasp-cosim report {name}` shows the run"
     for file, what in _IN_AN_ARCHIVE.items():
         if (path / file).is_file():
-            archive = quote(f"{path.resolve().name}.{'fmu' if what == 'an FMU' else 'ssp'}")
-            return (
-                f"a folder, unpacked from {what}",
-                f"`(cd {name} && zip -r - .) > {archive}` packs it again",
-            )
+            return f"a folder, unpacked from {what}", _packs(path, what)
     suffixes = _SUFFIXES.get(wanted, ())
     inside = sorted(str(p) for p in path.iterdir() if p.suffix.lower() in suffixes)
     inside += sorted(str(p.parent) for p in path.glob("*/run.json")) if wanted == "run" else []
     if wanted == "run" and not inside:
         return "", ""  # what is missing in it is to be said
     return "a folder", f"there is: {choices(inside, 6)}" if inside else ""
+
+
+def _packs(folder: Path, what: str) -> str:
+    """How a folder becomes the archive again that was unpacked there."""
+    archive = quote(f"{folder.resolve().name}.{'fmu' if what == 'an FMU' else 'ssp'}")
+    return f"`(cd {quote(str(folder))} && zip -r - .) > {archive}` packs it again"
 
 
 def _archive_nature(path: Path) -> str:

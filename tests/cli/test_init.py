@@ -10,6 +10,7 @@ from conftest import Run
 from grasp_cosim import System
 from grasp_cosim.cli.commands.init import shown
 from grasp_cosim.grasp.presets import SYSTEM
+from grasp_cosim.system.toml import to_do
 from qualification.made import write_fmu
 from support.models import build_model
 from support.native_fmus import needs_gcc
@@ -249,3 +250,16 @@ def test_names_that_a_system_file_has_to_quote(fmus_here: Run, tmp_path: Path) -
     plant = System.load(tmp_path / "a.toml").component("plant", "test")
     assert plant.values == {brake: 0.25}
     assert plant.rename["gap[2]"] == "plant.l_2"
+
+
+def test_many_lines_to_do_are_counted(fmus_here: Run, tmp_path: Path) -> None:
+    inputs = {f"u{i}": 'causality="input" | Real start="0" unit="m"' for i in range(40)}
+    write_fmu(tmp_path / "vendor.fmu", FOREIGN | inputs, {})
+    code, out, _ = fmus_here("init", "my file.toml", "--as", "plant=vendor.fmu")
+    lines = out.splitlines()
+    assert (code, sum("TODO:" in line for line in lines)) == (0, 24)
+    more = len(to_do((tmp_path / "my file.toml").read_text("utf-8"))) - 24
+    assert lines[-2:] == [
+        f"    and {more} lines more",
+        "    when no TODO is left: grasp-cosim run 'my file.toml'",
+    ]

@@ -38,6 +38,8 @@ def things(grasp: System, fmus: Path, tmp_path: Path) -> Path:
     with zipfile.ZipFile(tmp_path / "a.ssp") as archive:
         archive.extractall(tmp_path / "structure")
     (tmp_path / "a.toml").write_text("connections = []\n")
+    (tmp_path / "drive.csv").write_text("time,plant.u\n")
+    (tmp_path / "OspSystemStructure.xml").write_text("<OspSystemStructure/>\n")
     (tmp_path / "b.py").write_text("import json\n")
     result = simulate(grasp, step=1e-3, stop=0.002)
     (tmp_path / "run").mkdir()
@@ -67,6 +69,18 @@ def test_in_the_place_of_a_system(arguments: tuple[str, ...], command: Run, thin
         ("run", "a folder that `grasp-cosim run --out` wrote", report),
         ("run/run.json", "a file of a run", report),
         ("run/signals.csv", "a file of a run", report),
+        (
+            "structure/SystemStructure.ssd",
+            "a file unpacked from an SSP archive",
+            "> structure.ssp`",
+        ),
+        (
+            "unpacked/modelDescription.xml",
+            "a file unpacked from an FMU",
+            "> unpacked.fmu` packs it",
+        ),
+        ("OspSystemStructure.xml", "a system structure of OSP, which is no SSP", ""),
+        ("drive.csv", "a CSV file", "`grasp-cosim run --input drive.csv` drives"),
         (".", "a folder", "there is: a.ssp, a.toml"),
         ("b.py", "a Python file", "`grasp-cosim build b.py` makes an FMU of it, if it is a block"),
     ):

@@ -204,6 +204,7 @@ STUCK = {
     6: "returned error at t = 0.5 s",
     7: r"cannot be integrated by CVode \(At t = 0.5 repeated recoverable right-hand side",
     8: r"cannot be integrated by CVode \(At t = 0.5 and h = .*\) at t = 0.5 s",
+    10: r"names nan as the time of its next event at t = 0.5 s",
     9: r"names t = 0.25 s as the time of its next event, 1000 times in a row at t = 0.5 s; must",
 }
 

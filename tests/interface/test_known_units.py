@@ -59,6 +59,14 @@ def test_the_units_of_our_own_fmus_are_known_as_they_define_them(name: str) -> N
         ("-", 1.0, 0.0, {}),
         ("kOhm", 1e3, 0.0, {"kg": 1, "m": 2, "s": -3, "A": -2}),
         ("in", 0.0254, 0.0, {"m": 1}),
+        ("m/s²", 1.0, 0.0, {"m": 1, "s": -2}),
+        ("s⁻¹", 1.0, 0.0, {"s": -1}),
+        ("mm³", 1e-9, 0.0, {"m": 3}),
+        ("°C", 1.0, 273.15, {"K": 1}),
+        ("°/s", math.pi / 180.0, 0.0, {"rad": 1, "s": -1}),
+        ("\u03bcm", 1e-6, 0.0, {"m": 1}),
+        ("k\u03a9", 1e3, 0.0, {"kg": 1, "m": 2, "s": -3, "A": -2}),
+        ("\u2126", 1.0, 0.0, {"kg": 1, "m": 2, "s": -3, "A": -2}),
     ],
 )
 def test_known_names(name: str, factor: float, offset: float, powers: dict[str, int]) -> None:
@@ -69,7 +77,7 @@ def test_known_names(name: str, factor: float, offset: float, powers: dict[str, 
     assert found.offset == pytest.approx(offset, rel=1e-15)
 
 
-OTHERS = "Nm kgm N/m.s m/s/s m. .m /s () 10m 12 1e3 PS at zork mkg kdeg m- -- d99 m² µ k"
+OTHERS = "Nm kgm N/m.s m/s/s m. .m /s () 10m 12 1e3 PS at zork mkg kdeg m- -- d99 m¹² µ k ² °m"
 
 
 @pytest.mark.parametrize("name", [*OTHERS.split(), "", " m", "m s"])
@@ -94,7 +102,7 @@ def test_prefixes_are_powers_of_ten_to_the_bit(
     assert found.factor == float(f"1e{TEN[above] - power * TEN[below]}")
 
 
-@given(st.text(alphabet="mskNKPagh1-2%./()*^°µ ", max_size=8))
+@given(st.text(alphabet="mskNKPagh1-2%./()*^°µ²⁻ ", max_size=8))
 def test_no_text_is_more_than_no_unit(name: str) -> None:
     found = known_unit(name)
     assert found is None or (math.isfinite(found.factor) and found.factor > 0.0)

@@ -241,3 +241,11 @@ def test_a_file_is_read_once_until_it_changes(write: Write) -> None:
     assert read_interface(path) is first
     write(FMI_2.replace('"u"', '"w"'))
     assert "w" in read_interface(path).by_name
+
+
+@pytest.mark.parametrize("name", ["top/modelDescription.xml", "ModelDescription.xml"])
+def test_a_description_in_another_place_is_named(tmp_path: Path, name: str) -> None:
+    with zipfile.ZipFile(tmp_path / "x.fmu", "w") as archive:
+        archive.writestr(name, FMI_2)
+    with pytest.raises(InputError, match=rf"must be there, and called so: there is {name}$"):
+        describe(tmp_path / "x.fmu")

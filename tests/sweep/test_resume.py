@@ -13,6 +13,7 @@ import pytest
 from grasp_cosim.sweep.sweep import sweep
 from support.made_studies import GAIN, HEAD, native_study, write_native
 from support.native_fmus import needs_gcc
+from support.processes import alive
 
 pytestmark = [needs_gcc, pytest.mark.slow]
 
@@ -58,14 +59,6 @@ def children(process: subprocess.Popen[str]) -> list[int]:
     return [int(pid) for pid in listed.split()]
 
 
-def running(pid: int) -> bool:
-    """Whether a process is there and no zombie."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except FileNotFoundError:
-        return False
-
-
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="this system has no /proc")
 def test_killed_at_any_moment_it_goes_on(tmp_path: Path) -> None:
     study = native_study(write_native(tmp_path), study_of(RUNS))
@@ -73,12 +66,12 @@ def test_killed_at_any_moment_it_goes_on(tmp_path: Path) -> None:
     for workers in (2, 1):
         process = start(tmp_path, workers)
         wait_for(process, tmp_path, len(kept) + generator.randint(1, 40))
-        alive = children(process)
+        started = children(process)
         process.kill()
         process.communicate()
         assert process.returncode == -signal.SIGKILL
-        assert alive
-        while any(map(running, alive)):
+        assert started
+        while any(map(alive, started)):
             time.sleep(0.01)
         now = parts(tmp_path)
         assert kept.items() <= now.items()

@@ -37,6 +37,13 @@ def test_a_time_may_be_in_another_unit(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.parametrize("name", ["Time", "TIME [s]", "time[s]", " time  [s] "])
+def test_the_time_as_other_tools_call_it_and_rows_of_empty_cells(tmp_path: Path, name: str) -> None:
+    found = read(tmp_path, f"{name},a.u\r\n0,1\r\n , \r\n1,\u00a02\r\n,\r\n")
+    assert found.times == array("q", [0, 10**9])
+    assert list(found.columns[Port("a", "u")].samples) == [1.0, 2.0]
+
+
 @given(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=1, max_size=8))
 def test_numbers_are_read_as_they_are_written(values: list[float]) -> None:
     from tempfile import TemporaryDirectory
@@ -59,8 +66,9 @@ def test_a_mistake_far_down_is_found(tmp_path: Path) -> None:
     [
         ("", "drive.csv: is empty; must begin with names"),
         ("time,a.u\n", "drive.csv: has no row after the names"),
-        ("time\n0\n", "line 1: drives nothing"),
+        ("time\n0\n", "line 1: has the time alone; must have columns"),
         ("t,a.u\n0,0\n", "line 1, column 1 = 't': must be time"),
+        ("time;a.u\n0;1,5\n", "= 'time;a.u': must be time, then component.variable, with commas"),
         ("time [m],a.u\n0,0\n", "line 1, column 1 = 'time [m]': must be in a unit of time"),
         ("time,u\n0,0\n", "line 1, column 2 = 'u': must be component.variable"),
         ("time,a.u,a.u\n0,0,0\n", "line 1, column 3 = 'a.u': is there twice"),
@@ -142,7 +150,9 @@ def test_a_number_that_float64_does_not_have_is_quoted_as_it_is_written(tmp_path
 def test_an_input_has_one_source(tmp_path: Path) -> None:
     text = "time,a.u_Real\n0,1\n"
     system = System.load(driven(tmp_path, text, more=INPUT))
-    with pytest.raises(InputError, match=r"a.u_Real has two sources, drive.csv and a value"):
+    with pytest.raises(
+        InputError, match=r"a.u_Real has two sources, drive.csv and a value; .*: take"
+    ):
         system.with_values({"a.u_Real": 2.0})
     event = '[[events]]\nat = 0.5\nset = { "a.u_Real" = 1.0 }\n'
     with pytest.raises(InputError, match=r"a.u_Real has two sources, drive.csv and an event"):

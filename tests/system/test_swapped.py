@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim import InputError, System
+from grasp_cosim.system.toml import to_do
 from qualification.made import PLANT, changed, write_fmu, write_system
 
 VENDOR = {{"gap": "luft", "force": "kraft"}.get(n, n): text for n, text in PLANT.items()}
@@ -111,3 +112,8 @@ def test_a_file_with_something_left_to_do_is_refused_by_its_line(tmp_path: Path)
         System.load(path)
     path.write_text(TODO.replace("TODO ->", "plant.gap ->").replace('"TODO: in m"', "0.1"))
     assert System.load(path).start("plant.width") == 0.1
+
+
+def test_a_hash_in_quotes_begins_no_comment() -> None:
+    line = """"a # 'b" = 1, 'c # "d' = "TODO: e\""""
+    assert to_do(f'{line}\n"f" = 1  # "TODO"\n') == {1: line}

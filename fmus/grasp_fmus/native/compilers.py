@@ -15,6 +15,7 @@ import sys
 import tempfile
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from hashlib import sha256
 from pathlib import Path
@@ -138,15 +139,20 @@ def _compiled(jobs: Iterable[Job]) -> list[bytes]:
     """Return the libraries of jobs, in their order; however this ends, no compiler runs on."""
     most = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     waiting, running, done = deque(jobs), deque[_Running](), []
-    with _scratch_folder() as scratch:
+
+    def start(job: Job) -> None:
+        running.append(_started(job, Path(tempfile.mkdtemp(dir=scratch))))
+
+    # Ctrl-C comes to the main thread alone: what another one starts is in the list, too.
+    with _scratch_folder() as scratch, ThreadPoolExecutor(1) as starter:
         try:
             while waiting or running:
                 while waiting and len(running) < most:
-                    folder = Path(tempfile.mkdtemp(dir=scratch))
-                    running.append(_started(waiting.popleft(), folder))
+                    starter.submit(start, waiting.popleft()).result()
                 done.append(_result(running[0]))
                 running.popleft()
         finally:
+            starter.shutdown()
             for started in running:
                 _end(started.process)
     return done
@@ -231,7 +237,7 @@ def compiler_for(target: Target, asked: bool) -> Compiler:
     zig = zig_compiler()
     if zig and target.zig:
         return zig._replace(command=(*zig.command, "-target", target.zig, "-s"))
-    install = f"{sys.executable} -m pip install ziglang"
+    install = shlex.join([sys.executable, "-m", "pip", "install", "ziglang"])
     needed = "one of CC, cc, gcc, clang, zig" if target == here() and not asked else "zig"
     raise ValueError(f"no C compiler for {target.tuple}: must be {needed}; {install}")
 

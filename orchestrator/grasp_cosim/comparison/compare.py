@@ -72,20 +72,12 @@ def compare(
     ours, theirs = first.part(begin, end), second.part(begin, end)
     changes = _changes(ours, theirs)
     asked, other = (_asked(side, part, metrics) for side, part in ((first, ours), (second, theirs)))
-    interval = max(ours.interval, theirs.interval)
-    reference = Reference(
-        ours.curves(),
-        ours.units,
-        max(SHARE * (end - begin), FEWEST_STEPS * interval),
-        asked,
-        ours.roles,
-        ours.to_si,
-    )
+    shift = max(SHARE * (end - begin), FEWEST_STEPS * max(ours.interval, theirs.interval))
+    reference = Reference(ours.curves(), ours.units, shift, asked, ours.roles, ours.to_si)
     entries, singles = reference.entries(bands, _lacking(theirs.signals, ours.signals))
     curves = _converted(theirs, changes, reference.curves)
     values, again = single_values(theirs.by_role(), other), every_second(reference.curves)
     own = reference.values(reference.curves)
-    runs = first.result, second.result
     return Comparison(
         first,
         second,
@@ -97,7 +89,7 @@ def compare(
         asked,
         (_lacking(ours.signals, theirs.signals), _lacking(theirs.signals, ours.signals)),
         (_lacking(own, values), _lacking(values, own)),
-        differences(runs[0], runs[1]) if runs[0] and runs[1] else (),
+        differences(first.result, second.result) if first.result and second.result else (),
         tuple(_notes(first, second, begin, end, changes)),
     )
 

@@ -234,6 +234,8 @@ class ModelInstance(LoadedInstance):
                 break
         else:
             raise self._error(f"does not settle an event in {ITERATIONS} iterations", self._now)
+        if defined and math.isnan(time):
+            raise self._error("names nan as the time of its next event", self._now)
         self._next = time if defined else math.inf
         self._slave.enterContinuousTimeMode()
         if self._solver:

@@ -38,7 +38,9 @@ def read_document(path: Path) -> tuple[ElementTree.Element, tuple[str, ...]]:
                 raise ValueError(f"{locked} is encrypted; ask the vendor for it without a password")
             entries = {i.filename.replace("\\", "/"): i for i in archive.infolist()}
             if NAME not in entries:
-                raise ValueError(f"no {NAME} at the top of the archive")
+                near = next((n for n in entries if n.lower().endswith(NAME.lower())), "")
+                found = near and f"; must be there, and called so: there is {near}"
+                raise ValueError(f"no {NAME} at the top of the archive{found}")
             description = entries[NAME].file_size
             if description > LARGEST:
                 raise ValueError(f"{NAME} has {description} bytes; must have at most {LARGEST}")

@@ -104,6 +104,12 @@ _OTHER = {
 }  # fmt: skip
 """Symbols without a prefix: factor, offset, powers of base units."""
 
+_SIGNS = {
+    "°C": "degC", "°F": "degF", "°": "deg", "Ω": "Ohm", "\u2126": "Ohm", "\u03bc": "µ", "⁻": "-",
+    "¹": "1", "²": "2", "³": "3",
+}  # fmt: skip
+"""Signs and how the names above have them; two are of the ohm, one is a Greek mu."""
+
 _FACTOR = re.compile(r"(1|-|[^\d\s.*·/^()+-]+)(?:(?<![1-])\^?([+-]?\d))?")
 _PRODUCT = re.compile("[.*·]")
 _UNIT = re.compile(r"([^/()]+)(?:/(?:([^/()]+)|\(([^/()]+)\)))?")
@@ -113,10 +119,13 @@ _UNIT = re.compile(r"([^/()]+)(?:/(?:([^/()]+)|\(([^/()]+)\)))?")
 def known_unit(name: str) -> Unit | None:
     """The unit of a name, without a definition: SI with prefixes, deg, degC, min, h, %, rpm, ...
 
-    Products, powers and a quotient are as FMI writes them: N.s/m, m/s2, J/(kg.K). None where it is
-    no such name.
+    Products, powers and a quotient are as FMI writes them: N.s/m, m/s2, J/(kg.K); or with signs
+    like °C and m/s². None where it is no such name.
     """
-    parts = _UNIT.fullmatch(name)
+    written = name
+    for mark, meant in _SIGNS.items():
+        written = written.replace(mark, meant)
+    parts = _UNIT.fullmatch(written)
     if parts is None:
         return None
     above, single, several = parts.groups()

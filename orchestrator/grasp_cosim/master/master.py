@@ -79,21 +79,13 @@ class Master:
         self._receive = receive
         self.meanwhile: Callable[[], None] = lambda: None
         """Called while the loop of a run in real time goes on without Python's lock."""
+        slots, values, texts = self.slots, self.values, self.texts
         self.plan = Planner(
-            system,
-            instances,
-            self.slots,
-            self.values,
-            self.scenario,
-            self.texts,
-            self._drives,
-            pacer,
+            system, instances, slots, values, self.scenario, texts, self._drives, pacer
         ).plan()
         self._pacer = pacer
-        self._loop = make_loop(self.plan, engine, None if pacer else self.total_steps)
-        self._alone = None
-        if pacer is not None and isinstance(self._loop, CompiledLoop) and self._loop.alone:
-            self._alone = self._loop
+        self._loop = made = make_loop(self.plan, engine, None if pacer else self.total_steps)
+        self._alone = made if pacer and isinstance(made, CompiledLoop) and made.alone else None
         self._rows = np.empty((ROOM if self._alone else CHUNK, len(self.values)))
         self._rows.fill(0.0)  # its memory is there from now on
         self._cpus = os.sched_getaffinity(0) if self._alone else ()

@@ -3,9 +3,10 @@
 from collections.abc import Callable
 
 import numpy as np
+import numpy.typing as npt
 
 from ..errors import SimulationError
-from ..fmi.instance import DISCARD, EARLY, WARNING, Instance
+from ..fmi.instance import DISCARD, EARLY, OK, WARNING, Instance
 
 SMALLEST = 1024
 """A step that is rejected is divided down to this part of it, then the run fails."""
@@ -40,21 +41,37 @@ def finish_step(
             length = end - float(clock[0])
         elif (length := length / 2) < smallest or clock[0] + length == clock[0]:
             raise instance.failure(status, float(clock[0]))
-        while clock[0] < end:
-            if over():
-                name, time = instance.interface.path.name, float(clock[0])
-                raise SimulationError(
-                    f"{name}: the end came at t = {time:.9g} s of a step to {end:.9g} s, in parts"
-                )
-            length = min(length, end - float(clock[0]))
-            status = instance.stepper(clock, length).python()
-            if status > WARNING:
-                break
-            clock[0] = end if clock[0] + length >= end - smallest / 2 else clock[0] + length
-        else:
+        status, length = _go_on(instance, clock, end, length, smallest, over)
+        if status <= WARNING:
             return None
         if status not in (DISCARD, EARLY):
             raise instance.failure(status, float(clock[0]))
         if (ended := instance.the_end()) is not None:
             return ended
     raise instance.failure(status, float(clock[0]))
+
+
+def _go_on(
+    instance: Instance,
+    clock: npt.NDArray[np.float64],
+    end: float,
+    length: float,
+    smallest: float,
+    over: Callable[[], bool],
+) -> tuple[int, float]:
+    """Steps of a length in s from the time in clock[0] to end, or to one that is rejected.
+
+    The last status, and the length of that step. A rest below half of the smallest is none.
+    """
+    status = OK
+    while clock[0] < end and status <= WARNING:
+        if over():
+            name, time = instance.interface.path.name, float(clock[0])
+            raise SimulationError(
+                f"{name}: the end came at t = {time:.9g} s of a step to {end:.9g} s, in parts"
+            )
+        length = min(length, end - float(clock[0]))
+        status = instance.stepper(clock, length).python()
+        if status <= WARNING:
+            clock[0] = end if clock[0] + length >= end - smallest / 2 else clock[0] + length
+    return status, length

@@ -85,20 +85,30 @@ def prepare_swap(
             text = f"--set {component}.{name}"
             given |= values_of(theirs, text, name, value, text=True)
         place = replace(now, name=component, values=given, isolation=isolation)
-        components = tuple(place if c.name == component else c for c in system.components)
         try:
-            swapped = replace(system, components=components)
+            swapped = _with(system, place)
         except InputError as error:
             differences.append(Difference("blocks", "system", component, str(error)))
     differences.sort(key=lambda d: SEVERITIES.index(d.severity))
-    back = {
+    back = _back(component, ours, theirs)
+    back |= _between(swapped, system, component) if swapped else {}
+    nominals = _nominals(interfaces)
+    return Swap(system, component, fmu, tuple(differences), swapped, back, nominals)
+
+
+def _with(system: System, place: Component) -> System:
+    """The system with a component in the place of that of its name; InputError as of a system."""
+    components = tuple(place if c.name == place.name else c for c in system.components)
+    return replace(system, components=components)
+
+
+def _back(component: str, ours: Interface, theirs: Interface) -> dict[str, Conversion | None]:
+    """The conversions of outputs that both declare to the units of the original."""
+    return {
         f"{component}.{v.name}": theirs.conversion(v.name, ours)
         for v in ours.of("output")
         if v.name in theirs.by_name
     }
-    back |= _between(swapped, system, component) if swapped else {}
-    nominals = _nominals(interfaces)
-    return Swap(system, component, fmu, tuple(differences), swapped, back, nominals)
 
 
 def component_of(found: System, name: str, system: System) -> Component:
@@ -134,7 +144,7 @@ def _check_renamed(rename: Mapping[str, str], ours: Interface, theirs: Interface
     for new, name in rename.items():
         for called in theirs.arrays[new].names if new in theirs.arrays else (new,):
             entry = f"--rename: {new!r} = {name!r}"
-            known(f"{entry}: the original has no variable", called, ours.by_name)
+            known(f"{entry}: the original has no variable", called, ours.by_name, see=ours.listing)
 
 
 def _nominals(interfaces: Mapping[str, Interface]) -> dict[str, float | None]:

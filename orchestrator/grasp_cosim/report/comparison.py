@@ -16,6 +16,7 @@ from ..comparison.side import Side
 from ..comparison.words import RUNS, basis, only_lines, verdict
 from ..files import write_text
 from ..metrics.metric import Metric
+from ..numerals import counted
 from ..qualification.compared import Compared
 from ..qualification.tube import deviation, tube
 from .embed import LIMIT, Shown, fit
@@ -115,7 +116,7 @@ def _exactness(c: Comparison, shown: Shown, rows: int) -> str:
     )
     return (
         f"A solid and pale, B dashed over it; the tube is the band around A. {count(rows)} rows of "
-        f"{len(c.signals)} signals.{kept}"
+        f"{counted(len(c.signals), 'signal')}.{kept}"
     )
 
 

@@ -9,7 +9,7 @@ from html import escape
 from typing import Any
 
 from ..metrics.metric import Metric
-from ..numerals import fixed
+from ..numerals import counted, fixed
 from ..recording.result import Result
 
 EXPERIMENT = (
@@ -50,7 +50,7 @@ def result_html(result: Result) -> str:
     )
     return (
         f"<p>{of}{where}</p>{metrics_table(result)}"
-        f"<details><summary>{len(result)} signals</summary><ul>{names}</ul></details>"
+        f"<details><summary>{counted(len(result), 'signal')}</summary><ul>{names}</ul></details>"
     )
 
 

@@ -25,7 +25,7 @@ from .names import Called, component_names, renamed
 from .network import Carried, Network, Part
 from .notes import Notes
 from .order import flow_order
-from .origin import open_structure
+from .origin import Origin, open_structure
 from .parameters import read_settings, read_sizes
 from .tree import Element, Hop, Path, read_system
 
@@ -41,22 +41,14 @@ def read_ssp(
     archive = Archive(path, notes)
     origin, root = open_structure(archive, notes)
     file = origin.place
-    top = read_system(origin, child(root, "ssd:System"))
-    parts = {e.path: Part(e, e.interface) for e in top.within() if e.interface is not None}
-    if not parts:
-        raise InputError(f"{top.place}: system {top.name!r} has no components; must have some")
-    systems = {e.path: e for e in top.within() if e.interface is None}
+    systems, parts = _elements(origin, root)
     names = component_names(file, parts)
     annotated = _annotated(file, root, names.values())
     given_ns = None if step is None else in_nanoseconds("step", step)
     steps = Steps() if annotated else read_steps(file, root, given_ns)
     extras = annotated or no_extras(names.values(), steps)
-    parts = _sized(systems, parts, notes)
-    called = {
-        at: Called(f"{file}: {names[at]}", part, extras.components[names[at]])
-        for at, part in parts.items()
-    }
-    parts = {at: called[at].in_units() for at in parts}
+    called = _called(file, _sized(systems, parts, notes), names, extras)
+    parts = {at: part.in_units() for at, part in called.items()}
     network = Network(systems, parts)
     network.check()
     connections = tuple(_connections(network, names, called))
@@ -88,6 +80,28 @@ def read_ssp(
         extras.diverging,
         stimuli,
     )
+
+
+def _elements(origin: Origin, root: Any) -> tuple[dict[Path, Element], dict[Path, Part]]:
+    """The systems and the components of a structure; InputError where it has no component."""
+    top = read_system(origin, child(root, "ssd:System"))
+    parts = {e.path: Part(e, e.interface) for e in top.within() if e.interface is not None}
+    if not parts:
+        raise InputError(f"{top.place}: system {top.name!r} has no components; must have some")
+    return {e.path: e for e in top.within() if e.interface is None}, parts
+
+
+def _called(
+    file: str,
+    parts: Mapping[Path, Part],
+    names: Mapping[Path, str],
+    extras: Extras,
+) -> dict[Path, Called]:
+    """The components under the names that they get, and under those of their variables."""
+    return {
+        at: Called(f"{file}: {names[at]}", part, extras.components[names[at]])
+        for at, part in parts.items()
+    }
 
 
 def _sized(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -190,16 +190,7 @@ def remarks(system: Structure) -> tuple[str, ...]:
             for name, unit in component.units.items()
             if (v := declared.sample(name)) and v.unit not in (None, unit)
         ]
-    for named, connection in {c.whole or c: c for c in system.connections}.items():
-        source, target = (end.variable for end in _ends(system, connection))
-        if target.type == "Float32" and source.type in ("Real", "Float64"):
-            lines.append(f"{named}: from {source.type} to Float32, rounded to 7 digits")
-        if target.kind == "Real" and connection.factor is None and connection.offset is None:
-            ends = ((named.source, source), (named.target, target))
-            missing = [port for port, variable in ends if variable.unit is None]
-            if len(missing) == 1:
-                unit = source.unit or target.unit
-                lines.append(f"{named}: {missing[0]} has no unit, taken to be in {unit}")
+    lines += _of_connections(system)
     for component in system.components:
         for variable in component.interface.of("input", "output"):
             if not variable.supported:
@@ -214,6 +205,20 @@ def remarks(system: Structure) -> tuple[str, ...]:
             "Boolean or String"
         )
     return tuple(lines)
+
+
+def _of_connections(system: Structure) -> Iterator[str]:
+    """Remarks on connections that round values, or that lack a unit at one end."""
+    for named, connection in {c.whole or c: c for c in system.connections}.items():
+        source, target = (end.variable for end in _ends(system, connection))
+        if target.type == "Float32" and source.type in ("Real", "Float64"):
+            yield f"{named}: from {source.type} to Float32, rounded to 7 digits"
+        if target.kind == "Real" and connection.factor is None and connection.offset is None:
+            ends = ((named.source, source), (named.target, target))
+            missing = [port for port, variable in ends if variable.unit is None]
+            if len(missing) == 1:
+                unit = source.unit or target.unit
+                yield f"{named}: {missing[0]} has no unit, taken to be in {unit}"
 
 
 class _Place:
@@ -236,8 +241,8 @@ def _ends(system: Structure, connection: Connection) -> tuple[_End, _End]:
         found = interface.by_name.get(port.variable)
         if found is None or found.causality != causality:
             valid = [v.name for v in interface.of(causality)]
-            place = _Place(system, connection)
-            known(f"{place}: {port.component} has no {causality}", port.variable, valid)
+            said = f"{_Place(system, connection)}: {port.component} has no {causality}"
+            known(said, port.variable, valid, see=interface.listing)
             raise AssertionError(port)  # pragma: no cover
         return _End(port, interface, found)
 

@@ -35,6 +35,7 @@ PIECE = 4096
 """Rows that are read at once."""
 
 _UNIT = re.compile(r"(.*\S)\s+\[([^\[\]]*)\]")
+_TIME = re.compile(r"time\s*(?:\[([^\[\]]*)\])?", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -165,7 +166,7 @@ def _rows(file: str, reader: _Reader) -> Iterator[tuple[int, list[str]]]:
     try:
         for row in reader:
             line: int = reader.line_num  # type: ignore[attr-defined]
-            if not row:
+            if not any(map(str.strip, row)):
                 continue
             width = width or len(row)
             if len(row) < width:
@@ -183,15 +184,17 @@ def _rows(file: str, reader: _Reader) -> Iterator[tuple[int, list[str]]]:
 
 def _header(file: str, names: Sequence[str]) -> tuple[list[Port], list[str | None], float]:
     """The ports of the columns after the time, their units, and the time's in s."""
-    found = [_UNIT.fullmatch(name) for name in names]
-    split = [(m[1], m[2]) if m else (name, None) for m, name in zip(found, names, strict=True)]
-    (time, unit), *others = split
-    if time != "time":
+    time, *found = _TIME.fullmatch(names[0]), *map(_UNIT.fullmatch, names[1:])
+    others = [(m[1], m[2]) if m else (name, None) for m, name in zip(found, names[1:], strict=True)]
+    if not time:
         raise InputError(
-            f"{_place(file, 1, 1)} = {names[0]!r}: must be time, then inputs, commas between"
+            f"{_place(file, 1, 1)} = {names[0]!r}: must be time, then component.variable, with "
+            "commas between them and points in numbers"
         )
     if not others:
-        raise InputError(f"{file}: line 1: drives nothing; must have columns component.variable")
+        raise InputError(
+            f"{file}: line 1: has the time alone; must have columns component.variable"
+        )
     ports: list[Port] = []
     for i, (name, _) in enumerate(others, 2):
         component, dot, variable = name.partition(".")
@@ -201,7 +204,7 @@ def _header(file: str, names: Sequence[str]) -> tuple[list[Port], list[str | Non
         if port in ports:
             raise InputError(f"{_place(file, 1, i)} = {name!r}: is there twice; must be once")
         ports.append(port)
-    second, given = known_unit("s"), known_unit(unit or "s")
+    second, given = known_unit("s"), known_unit(time[1] or "s")
     change = conversion(given, second) if given and second else None
     if change is None:
         raise InputError(f"{_place(file, 1, 1)} = {names[0]!r}: must be in a unit of time, like ms")

@@ -21,8 +21,8 @@ KEYS = (
 )  # fmt: skip
 """The entries of a system file."""
 
-TODO = re.compile(r"""[^#]*["']TODO\b""")
-"""A line with a value that is left to do."""
+TODO = re.compile(r"""(?:[^#"']|"(?!TODO\b)(?:[^"\\]|\\.)*"|'(?!TODO\b)[^']*')*["']TODO\b""")
+"""A line with a value that is left to do; a # in quotes begins no comment."""
 
 
 def read_toml(path: Path, fmus: Path | None = None, stimuli: Stimuli | None = None) -> System:
@@ -41,12 +41,7 @@ def read_toml(path: Path, fmus: Path | None = None, stimuli: Stimuli | None = No
     experiment = part("experiment")
     check_keys(f"{place}: [experiment]", experiment, {"step", "stop", "scheme", "diverging"})
     components = part("components")
-    entries = table.get("connections", [])
-    if not isinstance(entries, list):
-        raise InputError(f"{place}: connections = {entries!r}: must be a list of 'output -> input'")
-    connections = tuple(
-        _connection(f"{place}: connections[{i}]", entry) for i, entry in enumerate(entries)
-    )
+    connections = _connections(f"{place}: connections", table.get("connections", []))
     system = System(
         place,
         tuple(_component(place, name, entry, folder) for name, entry in components.items()),
@@ -146,6 +141,12 @@ def _names(place: str, table: Any, must: str) -> dict[str, str]:
     for key, name in names.items():
         text(f"{place}: {key!r}", name, must)
     return names
+
+
+def _connections(place: str, entries: Any) -> tuple[Connection, ...]:
+    if not isinstance(entries, list):
+        raise InputError(f"{place} = {entries!r}: must be a list of 'output -> input'")
+    return tuple(_connection(f"{place}[{i}]", entry) for i, entry in enumerate(entries))
 
 
 def _connection(place: str, entry: Any) -> Connection:

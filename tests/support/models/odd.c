@@ -3,11 +3,11 @@
  * RELAY: the rate is against x, so that it comes to 0 and chatters there. STEPS: an event after the
  * fifth step of the solver adds 1 to x. ENDLESS: an event at 0.5 s that never settles. ITERATES: one
  * there that adds 1 to x in each of three iterations, the first of which alone says so. STANDS: each
- * event names the next one for now. PAST: that at 0.5 s names one before it. FAILS, DISCARDS: no
- * slope from x = 0.5 on. NO_NUMBER: it is none from there.
+ * event names the next one for now. PAST, NOWHERE: that at 0.5 s names one before it, or
+ * at NaN. FAILS, DISCARDS: no slope from x = 0.5 on. NO_NUMBER: it is none from there.
  */
 enum { TIME, X, DER_X, RATE, KIND, EVENTS, U, VARIABLES };
-enum { RELAY = 1, STEPS, ENDLESS, ITERATES, STANDS, FAILS, DISCARDS, NO_NUMBER, PAST };
+enum { RELAY = 1, STEPS, ENDLESS, ITERATES, STANDS, FAILS, DISCARDS, NO_NUMBER, PAST, NOWHERE };
 #define STATES 1
 #define INDICATORS 1
 #define INPUT(r) ((r) == U)
@@ -40,6 +40,7 @@ static void event(Model *m) {
     if (kind(m) == RELAY) *real(m, RATE) = *real(m, X) > 0.0 ? -1.0 : 1.0;
     if (kind(m) == STANDS) m->next = m->time;
     if (kind(m) == PAST) m->next = half ? 0.25 : 0.5;
+    if (kind(m) == NOWHERE) m->next = half ? NAN : 0.5;
     if (kind(m) == STEPS && m->steps == 5) *real(m, X) += 1.0;
     if (kind(m) == ENDLESS || kind(m) == ITERATES) m->next = half ? INFINITY : 0.5;
     m->again = half && (kind(m) == ENDLESS || (kind(m) == ITERATES && m->v[EVENTS].Int32 < 4));

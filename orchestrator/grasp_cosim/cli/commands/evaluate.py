@@ -1,6 +1,5 @@
 """The command evaluate."""
 
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -19,10 +18,12 @@ from ..frame import (
     NEGATIVE,
     PATH,
     fail,
+    is_quiet,
     json_option,
     load_system,
     show,
     with_controller,
+    workers_option,
 )
 from ..native import many_runs_option, natively
 from ..options import controller_option
@@ -31,8 +32,14 @@ from ..options import controller_option
 @click.command()
 @click.option("--bench", is_flag=True, help="The experiments, with friction and electronics.")
 @controller_option
-@click.option("--out", type=PATH, default=Path("results"), show_default=True)
-@click.option("--workers", type=click.IntRange(1), default=os.cpu_count(), show_default="all cores")
+@click.option(
+    "--out",
+    type=PATH,
+    default=Path("results"),
+    show_default=True,
+    help="Folder for report.md, pictures and numbers.",
+)
+@workers_option
 @many_runs_option
 @json_option
 def evaluate(
@@ -43,9 +50,10 @@ def evaluate(
     native: bool | None,
     as_json: bool,
 ) -> int:
-    """Run the published simulation table and figures and compare; --bench: the experiments.
+    """Run the published table and figures, and compare.
 
-    Finished grasps are kept until all are done: the same command goes on where it was ended.
+    With --bench these are the experiments, else the simulations. Finished grasps are kept until all
+    are done: the same command goes on where it was ended.
 
     \b
     Example: grasp-cosim evaluate --out results
@@ -56,7 +64,7 @@ def evaluate(
     system = with_preset(system, "bench") if bench else system
     try:
         with natively(system, native) as chosen:
-            report = run_evaluation(chosen, out, workers, True, source)
+            report = run_evaluation(chosen, out, workers, not is_quiet(), source)
     except KeyboardInterrupt:
         kept = Parts(out / FOLDER).kept()
         goes_on = f"; {counted(kept, 'grasp')} kept in {out / FOLDER}, the same command goes on"

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -14,14 +15,19 @@ from ...drafting.text import with_paths
 from ...errors import InputError, SimulationError
 from ...files import NATIVE_FOLDER, check_folder, write_text
 from ...interface.read import read_interface
+from ...numerals import counted
 from ...system.description import System
 from ...system.toml import to_do
+from ..completion import components
 from ..frame import PATH, json_option, pair, say, show
 
 if TYPE_CHECKING:
     from ...drafting.component import Draft
 
 NAME = re.compile(r"[A-Za-z0-9_-]+")
+
+MOST = 24
+"""So many lines with a TODO at most are listed; --json and the file have all."""
 
 
 @click.command()
@@ -31,6 +37,7 @@ NAME = re.compile(r"[A-Za-z0-9_-]+")
     "candidates",
     multiple=True,
     metavar="COMPONENT=FMU",
+    shell_complete=components("="),
     help="A foreign FMU in the place of a component of the grasp: its names, units and values.",
 )
 @click.option(
@@ -41,6 +48,7 @@ NAME = re.compile(r"[A-Za-z0-9_-]+")
     type=click.Choice(("published", "adaptive")),
     default="published",
     show_default=True,
+    help="Which of our controllers it has.",
 )
 @click.option("--native", is_flag=True, help="Our FMUs as C, which need no Python.")
 @click.option("--force", is_flag=True, help="Write over a file that is there already.")
@@ -54,10 +62,10 @@ def init(
     force: bool,
     as_json: bool,
 ) -> int:
-    """Write FILE, a system file to start from: the grasp, its FMUs in fmus/build beside FILE.
+    """Write FILE, a system file to start from.
 
-    With --as, one of its components is filled in for an FMU of another vendor. What cannot be told
-    is a TODO there; a run names it.
+    It is the grasp, with its FMUs in fmus/build beside FILE. With --as, one of its components is
+    filled in for an FMU of another vendor. What cannot be told is a TODO there; a run names it.
 
     \b
     Example: grasp-cosim init my_system.toml --as plant=vendor.fmu
@@ -82,16 +90,26 @@ def init(
     open_lines = to_do(text)
     if not open_lines:
         _read_back(file)
-    report = {
+    show(
+        as_json,
+        _report(file, drafts, open_lines, notes),
+        "\n    ".join(_lines(file, drafts, open_lines)),
+    )
+    for note in notes if not as_json else ():
+        say(note)
+    return 0
+
+
+def _report(
+    file: Path, drafts: Mapping[str, Draft], open_lines: Mapping[int, str], notes: Sequence[str]
+) -> dict[str, Any]:
+    """What was written, for --json."""
+    return {
         "file": str(file),
         "components": {name: _found(draft) for name, draft in drafts.items()},
         "todo": [{"line": number, "text": line} for number, line in open_lines.items()],
         "notes": notes,
     }
-    show(as_json, report, "\n    ".join(_lines(file, drafts, open_lines)))
-    for note in notes if not as_json else ():
-        say(note)
-    return 0
 
 
 def shown(fmu: Path, folder: Path) -> str:
@@ -195,6 +213,7 @@ def _lines(file: Path, drafts: Mapping[str, Draft], left: Mapping[int, str]) -> 
             f"{name}: {len(draft.found)} of the FMU's variables found"
             + (f", {doubtful} of them to check: CHECK" if doubtful else "")
         )
-    lines += [f"line {number}: {line}" for number, line in left.items()]
+    listed = [f"line {number}: {line}" for number, line in left.items()]
+    more = [f"and {counted(len(listed) - MOST, 'line')} more"] if len(listed) > MOST else []
     then = "when no TODO is left" if left else "then"
-    return [*lines, f"{then}: grasp-cosim run {file}"]
+    return [*lines, *listed[:MOST], *more, f"{then}: grasp-cosim run {quote(str(file))}"]

@@ -17,11 +17,11 @@ from ..frame import PATH, json_option, say, show
 @click.option("--out", type=PATH, help="The page. Default: RUN/report.html")
 @json_option
 def report(run: Path, out: Path | None, as_json: bool) -> int:
-    """Make a page of RUN, a folder that `run --out` wrote: traces, metrics, connections, settings.
+    """Make a page of RUN, a folder that `run --out` wrote.
 
-    The page is one file that needs nothing else. A picture is drawn beside it with matplotlib, the
-    extra plot, and one more of the timing of a run in real time; without it there is the page
-    alone.
+    It has traces, metrics, connections and settings. The page is one file that needs nothing else.
+    A picture is drawn beside it with matplotlib, the extra plot, and one more of the timing of a
+    run in real time; without it there is the page alone.
 
     \b
     Example: grasp-cosim report results
