@@ -258,7 +258,7 @@ def draw_layers(tables: Sequence[Runs], folder: Path) -> None:
             gap = 1e3 * run.signals[f"plant.gap[{j}]"]
             gaps.plot(run.time, gap, "-" if j == 1 else "--", color=COLOR[j], label=f"finger {j}")
         finish(gaps, "gap in mm")
-        draw_contact_forces(forces, [(run, "-", "")])
+        draw_contact_forces(forces, run)
         draw_targets(target, [(run, "-", "")])
         gaps.set_title(f"Case {case}: {_LAYERS[case]}", fontsize=10)
         target.set_xlabel("time in s")

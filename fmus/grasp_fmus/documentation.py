@@ -2,10 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from html import escape
+from itertools import cycle
 from pathlib import Path
-from re import MULTILINE, sub
+from re import MULTILINE, search, sub
 from string import Template
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from .cards import BEGIN
 
@@ -108,6 +109,20 @@ def _packages(requires: Sequence[str]) -> str:
     )
 
 
+def _equation(tokens: Sequence[Any], index: int, *_: object) -> str:
+    """Return the HTML of a fence with an equation and its number, if it has a tag; else nothing."""
+    if tokens[index].info.strip() != "math":
+        return ""
+    from latex2mathml.converter import convert  # takes time to load
+
+    tag = r"\\tag\{(.*?)\}"
+    said = search(tag, tokens[index].content)
+    # An element of HTML: it needs no namespace.
+    math = sub(' xmlns="[^"]*"', "", convert(sub(tag, "", tokens[index].content), display="block"))
+    number = f"<span>({escape(said[1])})</span>" if said else ""
+    return f'<div class="equation"><div>{math}</div>{number}</div>\n'
+
+
 def licences(files: Mapping[str, str] | None = None) -> dict[str, bytes]:
     """Return the files of documentation/licenses, each from an installed distribution.
 
@@ -136,7 +151,11 @@ def icon(name: str) -> bytes | None:
 
 
 def _rendered(card: str) -> str:
-    """Return the card as HTML, a heading level down: the page has its own title."""
+    """Return the card as HTML, a heading level down: the page has its own title.
+
+    Equations in LaTeX, in ```math, come out as MathML. Each cell of a table knows its head, for
+    phones, where a row is shown as a list.
+    """
     from markdown_it import MarkdownIt  # takes time to load
 
     card = sub(r"^<!--.*-->$", "", card.replace(BEGIN, "## Variables\n\n"), flags=MULTILINE)
@@ -144,8 +163,21 @@ def _rendered(card: str) -> str:
     for rule in ("link_open", "link_close"):
         markdown.add_render_rule(rule, lambda *_: "")
     markdown.add_render_rule("image", lambda _, tokens, index, *__: escape(tokens[index].content))
+    renderer: Any = markdown.renderer
+    code = renderer.rules["fence"]
+    markdown.add_render_rule("fence", lambda _, *given: _equation(*given) or code(*given))
     tokens = markdown.parse(card)
-    for token in tokens:
+    heads: list[str] = []
+    cells = cycle([""])
+    for i, token in enumerate(tokens):
+        if token.type == "thead_open":
+            heads = []
+        if token.type == "th_open":
+            heads.append(tokens[i + 1].content)
+        if token.type == "tbody_open":
+            cells = cycle(heads)
+        if token.type == "td_open":
+            token.attrSet("data-head", next(cells))
         if token.type in ("heading_open", "heading_close"):
             token.tag = f"h{min(int(token.tag[1]) + 1, 6)}"
     html: str = markdown.renderer.render(tokens, markdown.options, {})

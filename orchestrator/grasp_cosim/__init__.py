@@ -24,7 +24,7 @@ from . import extensions
 from .errors import InputError, SimulationError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     from matplotlib.figure import Figure
@@ -130,6 +130,12 @@ def _grasp_traits(result: Result) -> Mapping[str, str]:
     return {"case": case_of(result.settings)}
 
 
+def _grasp_words(result: Result) -> Sequence[str]:
+    from .grasp.presets import words_of
+
+    return words_of(result.settings)
+
+
 def _draw_signals(result: Result, path: Path | None) -> Figure:
     from .report.plot import plot_signals
 
@@ -146,7 +152,9 @@ extensions.readers |= {".toml": _read_toml, ".ssp": _read_ssp}
 if find_spec(f"{__name__}.grasp"):
     extensions.metrics.append(_grasp_metrics)
     extensions.drawings.append(
-        extensions.Drawing("grasp", _is_grasp, _draw_grasp, _grasp_scene, _grasp_traits)
+        extensions.Drawing(
+            "grasp", _is_grasp, _draw_grasp, _grasp_scene, _grasp_traits, _grasp_words
+        )
     )
 extensions.html.append(_html)
 extensions.drawings.append(extensions.Drawing("signals", lambda _: True, _draw_signals))

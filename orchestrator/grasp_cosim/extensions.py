@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Callable, Iterable, Mapping, Sequence
     from pathlib import Path
 
 readers: dict[str, Callable[[Path, Path | None, float | None, float | None, Any], Any]] = {}
@@ -28,7 +28,8 @@ class Drawing(NamedTuple):
     written to a path if there is one.
 
     `scene` makes what the page of such a result has besides (`report.page.Scene`), or None;
-    `traits` are what such a result is beside its settings, in words, like {"case": "2"}.
+    `traits` are what such a result is beside its settings, in words, like {"case": "2"}; `words`
+    are those that a title has of it, like "case 2".
     """
 
     stem: str
@@ -36,6 +37,7 @@ class Drawing(NamedTuple):
     draw: Callable[[Any, Path | None], Any]
     scene: Callable[[Any], Any] = lambda _: None
     traits: Callable[[Any], Mapping[str, str]] = lambda _: {}
+    words: Callable[[Any], Sequence[str]] = lambda _: ()
 
 
 drawings: list[Drawing] = []

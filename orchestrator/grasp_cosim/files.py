@@ -23,6 +23,9 @@ FMU_FOLDER = Path("fmus/build")
 NATIVE_FOLDER = Path("fmus/native")
 """Where native ones are built, below the current folder."""
 
+PICTURES = ("png", "svg", "pdf")
+"""The formats of pictures, by their suffixes."""
+
 
 def check_folder(folder: Path) -> None:
     """InputError where files could not be written to the folder, which need not exist."""
@@ -166,6 +169,11 @@ def remove(folder: Path, *names: str) -> None:
     for name in names:
         (folder / name).unlink(missing_ok=True)
     remove_parts(folder, *names)
+
+
+def of_any_format(*stems: str) -> list[str]:
+    """The names that pictures of these stems have."""
+    return [f"{stem}.{suffix}" for stem in stems for suffix in PICTURES]
 
 
 def remove_parts(folder: Path, *names: str) -> None:

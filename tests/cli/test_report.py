@@ -27,7 +27,7 @@ def test_the_page_and_the_picture_are_beside_the_run(
     out, err = capsys.readouterr()
     html = (folder / "report.html").read_text("utf-8")
     for run in (load_run(folder), grasp_run()):
-        assert html == page_html(run, "results", scene=run.drawing.scene(run))
+        assert html == page_html(run, scene=run.drawing.scene(run))
     assert 'id="scene"' in html
     assert (folder / "grasp.png").read_bytes().startswith(b"\x89PNG")
     assert out.splitlines()[0].startswith(f"{folder / 'report.html'}: ")
@@ -68,7 +68,7 @@ def test_a_paced_run_has_a_picture_of_its_timing_too(
     assert json.loads(capsys.readouterr().out)["pictures"] == [str(p) for p in pictures]
     assert all(p.read_bytes().startswith(b"\x89PNG") for p in pictures)
     html = (tmp_path / "ring" / "report.html").read_text("utf-8")
-    assert html == page_html(run, "ring")
+    assert html == page_html(run)
     assert "2 of 50 steps (4 %) ended after their period" in html
 
 

@@ -1,5 +1,6 @@
 """The page, the licences and the icon that every FMU holds."""
 
+import re
 import runpy
 import struct
 import zipfile
@@ -15,6 +16,7 @@ from grasp_fmus.contract import Field, declared
 from grasp_fmus.documentation import PROXY, icon, licences, page
 from grasp_fmus.fmu import build_fmu
 from grasp_fmus.shipped import SCRIPTS, blocks
+from report.javascript import in_browser
 
 ROOT = Path(__file__).parents[2]
 
@@ -124,12 +126,54 @@ def variables_of(card: Path) -> set[str]:
     return {shown(f) for block in sharing for f in declared(block)}
 
 
-def test_the_equations_are_set_as_they_are_written(html: str, name: str) -> None:
+def test_the_equations_are_set(html: str, name: str) -> None:
     card = folder(BLOCKS[name]).joinpath("README.md").read_text("utf-8")
-    equations = [line.strip() for line in card.splitlines() if line.startswith("    ")]
-    set_as_code = "".join("".join(e.itertext()) for e in parsed(html).iter("pre"))
-    assert equations
-    assert all(equation in set_as_code for equation in equations)
+    equations = re.findall(r"^```math\n(.*)\n```$", card, re.MULTILINE)
+    divs = [e for e in parsed(html).iter("div") if e.get("class") == "equation"]
+    assert len(divs) == len(equations) > 0
+    for equation, div in zip(equations, divs, strict=True):
+        math = div.find("div/math")
+        assert math is not None
+        assert math.get("display") == "block"
+        assert "\\" not in text(math)
+        tag = re.search(r"\\tag\{(.*)\}", equation)
+        assert [text(e) for e in div.findall("span")] == ([f"({tag[1]})"] if tag else [])
+    assert "```" not in html
+
+
+def test_an_equation_comes_out_as_mathml() -> None:
+    html = rendered("```math\n\\xi = \\frac{K}{l^n} \\tag{9}\n```")
+    assert html == (
+        '<div class="equation"><div><math display="block"><mrow><mi>&#x003BE;</mi>'
+        "<mo>&#x0003D;</mo><mfrac><mrow><mi>K</mi></mrow><mrow><msup><mi>l</mi><mi>n</mi></msup>"
+        "</mrow></mfrac></mrow></math></div><span>(9)</span></div>"
+    )
+    assert rendered("```sh\nrun\n```").startswith("<pre><code")
+
+
+def test_a_cell_of_a_table_knows_its_head() -> None:
+    html = rendered("| a | b |\n|---|---|\n| 1 | 2 |\n| 3 | 4 |\n\n| c |\n|---|\n| 5 |\n")
+    cells = [(e.get("data-head"), text(e)) for e in parsed(f"<p>{html}</p>").iter("td")]
+    assert cells == [("a", "1"), ("b", "2"), ("a", "3"), ("b", "4"), ("c", "5")]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("size", [(360, 800), (1200, 800)])
+@pytest.mark.parametrize("block", ["GraspController", "GripperPlant", "ProximitySensor"])
+def test_nothing_sticks_out_of_the_page(block: str, size: tuple[int, int], tmp_path: Path) -> None:
+    """Of an equation that is too long for a phone the rest is reached within its own line."""
+    card = folder(BLOCKS[block]).joinpath("README.md").read_text("utf-8")
+    html = page(block, "A summary", card, "1.2.3")
+    ready = "<script>document.documentElement.dataset.ready = 1; const recording = {};</script>"
+    act = """
+      const box = (e) => e.getBoundingClientRect(), all = [...document.querySelectorAll("body *")];
+      const beyond = all.filter((e) => !e.closest(".equation, pre") && box(e).right > innerWidth);
+      return [document.documentElement.scrollWidth - innerWidth, beyond.map((e) => e.tagName)];
+    """
+    assert in_browser(html.replace("</head>", f"{ready}</head>"), act, tmp_path, size=size) == [
+        0,
+        [],
+    ]
 
 
 @pytest.mark.parametrize("title", SECTIONS)

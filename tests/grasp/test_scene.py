@@ -13,7 +13,7 @@ from report.test_page import Elements
 
 def page_of(result: Result) -> str:
     """The page as the command report makes it."""
-    return page_html(result, "results", scene=grasp_scene(result))
+    return page_html(result, scene=grasp_scene(result))
 
 
 def test_only_a_grasp_has_the_scene() -> None:

@@ -86,7 +86,7 @@ def test_nothing_that_takes_a_result_stumbles_over_a_text(tmp_path: Path) -> Non
     pytest.importorskip("matplotlib")
     system = changing(tmp_path, "2.0", "none")
     result = simulate(system)
-    assert '"texts": ["at rest", "=1+1"' in page_html(result, "texts")
+    assert '"texts": ["at rest", "=1+1"' in page_html(result)
     result.plot(tmp_path / "signals.png")
     assert "a.y_String" not in result.numbers
     assert "a.x" in result.numbers

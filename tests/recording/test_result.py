@@ -11,7 +11,7 @@ from grasp_cosim import InputError, Result, SimulationError, System, simulate
 from grasp_cosim.files import in_one_piece
 from grasp_cosim.recording.load import load_run
 from grasp_cosim.recording.result import Rejection
-from grasp_cosim.system.settings import settings
+from grasp_cosim.system.settings import run_settings
 from recording.rows import full_disk
 
 
@@ -81,7 +81,7 @@ def test_json_has_the_metrics_and_what_led_to_them(
     found = json.loads((tmp_path / "run.json").read_text())
     assert found == {
         **json.loads(json.dumps(dict(result.metrics))),
-        **settings(grasp.with_experiment(stop=0.1)),
+        **run_settings(grasp.with_experiment(stop=0.1)),
         "units": dict(result.units),
         "to_si": {},
         "types": {

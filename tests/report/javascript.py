@@ -5,7 +5,7 @@ import re
 import shutil
 import subprocess
 from collections.abc import Sequence
-from html import unescape
+from html import escape, unescape
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -42,6 +42,26 @@ _ACT = """
 })();
 </script>
 </body>"""
+
+
+_PHONE = """<!DOCTYPE html><html lang="en"><body style="margin: 0"><iframe
+style="width: %dpx; height: %dpx; border: 0" srcdoc="%s"></iframe><script>
+const inner = document.querySelector("iframe").contentWindow;
+const state = document.documentElement.dataset;
+const look = () => {
+  const { error, result } = inner.document.documentElement?.dataset ?? {};
+  if (error) state.error = error;
+  else if (result) state.result = result;
+  else setTimeout(look, 20);
+};
+look();
+</script></body></html>"""
+"""A window narrower than NARROWEST: the page in a frame, where it has no address to keep."""
+
+NARROWEST = 500
+"""px; Chromium makes no window that is narrower."""
+
+_NO_ADDRESS = "<head><script>history.replaceState = () => {};</script>"
 
 
 def run_node(scripts: Sequence[str], body: str, given: Any, folder: Path) -> Any:
@@ -83,7 +103,10 @@ def in_browser(
         pytest.skip("chromium is not installed")
     file = folder / "acted.html"
     assert html.count("<head>") == html.count("</body>") == 1
-    file.write_text(html.replace("<head>", _FRAMES).replace("</body>", _ACT % act), "utf-8")
+    acted = html.replace("<head>", _FRAMES).replace("</body>", _ACT % act)
+    if size[0] < NARROWEST:
+        acted = _PHONE % (*size, escape(acted.replace("<head>", _NO_ADDRESS, 1)))
+    file.write_text(acted, "utf-8")
     done = subprocess.run(
         [
             chromium, "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars",

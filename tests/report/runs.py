@@ -21,6 +21,8 @@ EXPERIMENT = {
     "initialisation": {"loops": "iterate", "tolerance": 1e-10, "iterations": 50},
 }
 
+ORIGIN = {"date": "2026-01-02T03:04:05+00:00", "versions": {"grasp-cosim": "1.2.3"}}
+
 
 def evenly(rows: int, span_ns: int) -> np.ndarray[Any, np.dtype[np.float64]]:
     """Times in s as they are recorded, so that they are the same when read back."""
@@ -90,7 +92,7 @@ def grasp_run(rows: int = 2001) -> Result:
         settings, time, signals, units, wall_time=1.5, complete=True,
         descriptions={"plant.gap[1]": "l_1, distance"},
         rejections={"sensor_2": Rejection(3, 0.25)},
-        log=("t = 0.5 s: sensor_1.reflectance = 0.6",),
+        log=("t = 0.5 s: sensor_1.reflectance = 0.6",), origin=ORIGIN,
     )  # fmt: skip
 
 
@@ -109,7 +111,8 @@ def ring_run(names: list[str], rows: int = 50) -> Result:
         "faults": [],
         "roles": {},
     }
-    return Result(settings, time, signals, dict.fromkeys(signals), wall_time=1.5, complete=True)
+    units: dict[str, str | None] = dict.fromkeys(signals)
+    return Result(settings, time, signals, units, wall_time=1.5, complete=True, origin=ORIGIN)
 
 
 def write_run(folder: Path, result: Result) -> None:

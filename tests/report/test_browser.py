@@ -4,6 +4,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from grasp_cosim.comparison.compare import compare
+from grasp_cosim.report.comparison import comparison_html
 from grasp_cosim.report.page import page_html
 from report.javascript import in_browser
 from report.runs import grasp_run, ring_run
@@ -28,7 +30,7 @@ const panels = () => [...document.querySelectorAll("#plots .panel")].map((panel)
 
 @pytest.fixture(scope="module")
 def html() -> str:
-    return page_html(grasp_run(), "results")
+    return page_html(grasp_run())
 
 
 def test_wheel_drag_and_double_click_change_the_time_in_view(html: str, tmp_path: Path) -> None:
@@ -74,18 +76,27 @@ def test_wheel_drag_and_double_click_change_the_time_in_view(html: str, tmp_path
 
 
 @pytest.mark.parametrize("size", [(360, 800), (1900, 1000)])
+@pytest.mark.parametrize("kind", ["run", "comparison"])
 def test_nothing_sticks_out_of_a_narrow_or_wide_window(
-    size: tuple[int, int], html: str, tmp_path: Path
+    size: tuple[int, int], kind: str, tmp_path: Path
 ) -> None:
-    act = "return [document.documentElement.scrollWidth, innerWidth];"
-    width, inner = in_browser(html, act, tmp_path, size=size)
+    run = replace(grasp_run(), timing=paced(steps=50))
+    scene = run.drawing.scene(run)
+    html = page_html(run, scene=scene) if kind == "run" else comparison_html(compare(run, run))
+    act = """
+      const scrolls = [...document.querySelectorAll(".cards, .cards td")].map((e) => e.scrollWidth);
+      return [document.documentElement.scrollWidth, innerWidth, Math.max(0, ...scrolls)];
+    """
+    width, inner, table = in_browser(html, act, tmp_path, size=size)
+    assert inner == size[0]
     assert width <= inner
+    assert table <= inner - 28  # with the margins of the page
 
 
 @pytest.mark.parametrize("width", [420, 1101, 1900])
 def test_the_chart_of_a_paced_run_fits(width: int, tmp_path: Path) -> None:
     """It takes the width of the page, on a narrow one it scrolls; the page's own rules are kept."""
-    html = page_html(replace(grasp_run(), timing=paced(steps=2000)), "results")
+    html = page_html(replace(grasp_run(), timing=paced(steps=2000)))
     act = """
       const box = (element) => element.getBoundingClientRect(), root = document.documentElement;
       const chart = document.querySelector(".chart"), svg = chart.querySelector("svg");
@@ -110,7 +121,7 @@ def test_the_chart_of_a_paced_run_fits(width: int, tmp_path: Path) -> None:
 
 
 def test_any_system_has_traces(tmp_path: Path) -> None:
-    html = page_html(ring_run(["<b>", "</script>"]), "<i>")
+    html = page_html(ring_run(["<b>", "</script>"]).titled("<i>"))
     act = CANVASES + "return [panels(), document.title, document.querySelectorAll('i').length];"
     (panel,), title, italic = in_browser(html, act, tmp_path)
     assert (panel["title"], title, italic) == ("y", "<i>", 0)
@@ -118,7 +129,7 @@ def test_any_system_has_traces(tmp_path: Path) -> None:
 
 
 def test_a_single_recorded_point_is_drawn(tmp_path: Path) -> None:
-    html = page_html(ring_run(["a"], rows=1), "results")
+    html = page_html(ring_run(["a"], rows=1))
     (panel,) = in_browser(html, CANVASES + "return panels();", tmp_path)
     assert panel["low"] == panel["high"] == 0.0
 

@@ -63,7 +63,7 @@ def test_both_runs_their_band_and_their_deviation_are_drawn(
       const texts = (panel, what) => [...panel.querySelectorAll(what)].map((e) => e.textContent);
       return panels.map((panel) => ({
         title: panel.heading.textContent,
-        names: panel.series.map((one) => one.name),
+        names: panel.series.map((one) => one.label),
         dashes: panel.series.map((one) => one.style.dash),
         readings: texts(panel.root, "output"),
         tube: panel.series.map((one) => Boolean(one.tube)),

@@ -57,7 +57,7 @@ class Elements(HTMLParser):
     ids=["grasp", "ring", "paced"],
 )
 def test_the_page_is_whole_and_needs_nothing_from_outside(run: Result) -> None:
-    html = page_html(run, "results")
+    html = page_html(run)
     page = Elements(html)
     for tag, attributes in page.found:
         for name in ("src", "href", "xlink:href", "action", "data", "srcset"):
@@ -77,7 +77,7 @@ def test_the_page_is_whole_and_needs_nothing_from_outside(run: Result) -> None:
 
 def test_the_data_in_the_page_are_those_of_the_run_to_the_bit() -> None:
     run = grasp_run()
-    page = Elements(page_html(run, "results"))
+    page = Elements(page_html(run))
     state = json.loads(page.texts["page"])
     assert state["rows"] == len(run.time)
     assert unpacked(page.texts["time"]).tobytes() == run.time.tobytes()
@@ -91,17 +91,17 @@ def test_the_data_in_the_page_are_those_of_the_run_to_the_bit() -> None:
 
 def test_a_long_run_is_thinned_and_the_page_says_so() -> None:
     run = grasp_run()
-    html = page_html(run, "results", limit=len(run.time) * len(run.signals) // 2)
+    html = page_html(run, limit=len(run.time) * len(run.signals) // 2)
     state = json.loads(Elements(html).texts["page"])
     assert state["rows"] < len(run.time) / 2 + 2
     assert "of each 5, the lowest and the highest value" in Elements(html).visible
     assert "to the last bit" not in html
-    assert "to the last bit" in page_html(run, "results")
+    assert "to the last bit" in page_html(run)
 
 
 def test_names_stay_text() -> None:
     wicked = ["<b>", "</script><script>alert(1)</script>", "\"&'", "<!--"]
-    html = page_html(ring_run(wicked), "<i>run</i> & $title")
+    html = page_html(ring_run(wicked).titled("<i>run</i> & $title"))
     page = Elements(html)
     tags = {tag for tag, _ in page.found}
     assert not tags & {"b", "i"}
@@ -115,7 +115,7 @@ def test_names_stay_text() -> None:
 
 
 def test_metrics_and_settings_are_there() -> None:
-    text = Elements(page_html(grasp_run(), "results")).visible
+    text = Elements(page_html(grasp_run())).visible
     for expected in (
         "2 s in 2\N{NARROW NO-BREAK SPACE}000 steps of 1 ms, sequential",
         "GripperPlant.fmu",
@@ -134,7 +134,7 @@ def test_metrics_and_settings_are_there() -> None:
 def test_a_run_that_was_broken_off_says_so() -> None:
     run = grasp_run()
     broken = replace(run, complete=False)
-    assert "not complete" in Elements(page_html(broken, "results")).visible
+    assert "not complete" in Elements(page_html(broken)).visible
 
 
 SCENE = Scene(
@@ -151,7 +151,7 @@ SCENE = Scene(
 
 
 def test_a_scene_has_its_section_scripts_colours_buttons_and_marks() -> None:
-    html = page_html(grasp_run(), "results", scene=SCENE)
+    html = page_html(grasp_run(), scene=SCENE)
     page = Elements(html)
     assert {"scene", "stage"} <= set(page.ids())
     assert page.found.index(("section", {"id": "scene"})) < page.found.index(
@@ -172,7 +172,7 @@ def test_a_scene_has_its_section_scripts_colours_buttons_and_marks() -> None:
 
 
 def test_without_a_scene_the_page_does_without() -> None:
-    page = Elements(page_html(grasp_run(), "results"))
+    page = Elements(page_html(grasp_run()))
     assert "scene" not in page.ids()
     state = json.loads(page.texts["page"])
     assert (state["scene"], state["colors"]) == (None, {})
@@ -188,7 +188,7 @@ def test_metrics_stand_in_the_columns_of_their_entries() -> None:
         Metric("c_d", lambda _: [0.125, 0.25], unit="s", entries=("left", "right")),
         Metric("e", lambda _: [1.5, 2.5]),
     ]  # fmt: skip
-    html = page_html(replace(ring_run(["a"]), more_metrics=tuple(found)), "results")
+    html = page_html(replace(ring_run(["a"]), more_metrics=tuple(found)))
     table = html[html.index('id="metrics"') : html.index('id="connections"')]
     heads = re.findall(r'<th class="n"><span class="key(\d)">(.*?)</span>', table)
     assert heads == [("1", "x"), ("2", "y"), ("3", "z")]
@@ -207,13 +207,13 @@ def test_lines_of_the_log_with_a_time_are_marked() -> None:
     run = grasp_run()
     log = ["t = 0.25 s: a.u = 1", "b: 3 steps rejected, first at t = 0.7 s", "t = 1e-3 s: fault"]
     logged = replace(run, log=tuple(log))
-    page = Elements(page_html(logged, "results"))
+    page = Elements(page_html(logged))
     marks = [(m["color"], m["t"]) for m in json.loads(page.texts["page"])["marks"]]
     assert marks == [("--fault", 0.25), ("--fault", 0.001)]
 
 
 def test_the_page_is_written_in_one_piece(tmp_path: Path) -> None:
     path = tmp_path / "page.html"
-    write_page(ring_run(["a"]), "r", path)
-    assert path.read_text("utf-8") == page_html(ring_run(["a"]), "r")
+    write_page(ring_run(["a"]), path)
+    assert path.read_text("utf-8") == page_html(ring_run(["a"]))
     assert list(tmp_path.iterdir()) == [path]

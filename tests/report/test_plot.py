@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from grasp_cosim.errors import InputError
 from grasp_cosim.report import plot
 from matplotlib.figure import Figure
 from report.runs import ring_run
@@ -23,13 +24,43 @@ def saved(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
     return figures
 
 
-def test_all_signals_by_unit(tmp_path: Path, saved: list[Figure]) -> None:
+def test_all_signals_by_unit_and_six_in_a_panel(tmp_path: Path, saved: list[Figure]) -> None:
     run = ring_run([f"c{k}" for k in range(15)])
     units = {name: "m" if name < "c1" else None for name in run.signals}
     plot.plot_signals(replace(run, units=units), tmp_path / "signals.png")
-    metres, none = saved[0].axes
-    assert (metres.get_ylabel(), none.get_ylabel()) == ("in m", "no unit")
-    assert [len(a.lines) for a in (metres, none)] == [1, 14]
-    assert metres.get_legend() is not None
-    assert none.get_legend() is None  # it would hide the lines
-    assert (tmp_path / "signals.png").exists()
+    metres, *others = saved[0].axes
+    assert [axes.get_ylabel() for axes in (metres, *others)] == ["in mm", *["no unit"] * 3]
+    assert [len(a.lines) for a in (metres, *others)] == [1, 6, 6, 2]
+    assert metres.lines[0].get_ydata() == pytest.approx(1e3 * run.signals["c0.y"])
+    for axes in (metres, *others):
+        legend = axes.get_legend()
+        assert legend is not None
+        assert [text.get_text() for text in legend.get_texts()] == [
+            line.get_label() for line in axes.lines
+        ]
+        looks = {(line.get_color(), line.get_linestyle()) for line in axes.lines}
+        assert len(looks) == len(axes.lines)
+
+
+@pytest.mark.parametrize(
+    ("suffix", "begins"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF"), ("SVG", b"<?")]
+)
+def test_the_suffix_says_the_format_and_the_bytes_are_the_same(
+    suffix: str, begins: bytes, tmp_path: Path
+) -> None:
+    run = ring_run(["a", "b"])
+    both = [tmp_path / f"{name}.{suffix}" for name in ("one", "two")]
+    for path in both:
+        run.plot(path, title="Ring & <b>")
+    one, two = (path.read_bytes() for path in both)
+    assert one.startswith(begins)
+    assert one == two
+    for trace in (b"CreationDate", b"<dc:date>"):
+        assert trace.lower() not in one.lower()
+
+
+@pytest.mark.parametrize("name", ["ring.jpg", "ring"])
+def test_another_suffix_is_refused(name: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=rf"{name}: must end in \.png, \.svg, \.pdf$"):
+        ring_run(["a"]).plot(tmp_path / name)
+    assert not list(tmp_path.iterdir())

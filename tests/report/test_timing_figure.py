@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from grasp_cosim.realtime.timing import Overrun, Timing
 from grasp_cosim.report import timing as drawn
+from grasp_cosim.report.caption import Caption
 from grasp_cosim.report.plot import RED
 from grasp_cosim.report.timing import draw_timing, looks, timing_svg
 from matplotlib.colors import same_color
@@ -17,12 +18,14 @@ from matplotlib.lines import Line2D
 from report.timings import PERIOD, paced
 from support.slow import slow
 
+SAID = Caption("a run", "from 2026")
+
 
 def figure_of(timing: Timing, monkeypatch: pytest.MonkeyPatch) -> Figure:
     """What would be saved of a run of 3 s."""
     figures: list[Figure] = []
     monkeypatch.setattr(drawn, "save", lambda figure, path: figures.append(figure))
-    draw_timing(timing, 3.0, Path())
+    draw_timing(timing, 3.0, Path(), SAID)
     return figures[0]
 
 
@@ -48,7 +51,7 @@ def broken_off() -> Timing:
     ids=["none", "unlisted", "many", "nothing"],
 )
 def test_any_timing_can_be_drawn(timing: Timing, tmp_path: Path) -> None:
-    draw_timing(timing, 3.0, tmp_path / "timing.png")
+    draw_timing(timing, 3.0, tmp_path / "timing.png", SAID)
     assert [p.name for p in tmp_path.iterdir()] == ["timing.png"]
     head = (tmp_path / "timing.png").read_bytes()[:24]
     assert head.startswith(b"\x89PNG")
@@ -130,5 +133,5 @@ def test_as_svg_it_has_every_name_and_is_an_element_for_a_page(
 @pytest.mark.slow
 def test_the_same_timing_gives_the_same_bytes(tmp_path: Path) -> None:
     for name in ("one.png", "two.png"):
-        draw_timing(paced(steps=3000), 3.0, tmp_path / name)
+        draw_timing(paced(steps=3000), 3.0, tmp_path / name, SAID)
     assert (tmp_path / "one.png").read_bytes() == (tmp_path / "two.png").read_bytes()

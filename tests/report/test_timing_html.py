@@ -23,7 +23,7 @@ def rows(html: str) -> list[list[str]]:
 
 def test_only_a_paced_run_has_the_section() -> None:
     run = grasp_run()
-    plain, timed = (Elements(page_html(r, "r")) for r in (run, replace(run, timing=paced())))
+    plain, timed = (Elements(page_html(r)) for r in (run, replace(run, timing=paced())))
     assert "timing" not in plain.ids()
     assert "Real time" not in plain.visible
     assert timed.ids().count("timing") == 1
@@ -33,7 +33,7 @@ def test_only_a_paced_run_has_the_section() -> None:
 def test_the_entry_of_the_timing_is_no_metric() -> None:
     run = ring_run(["a"])
     timing = paced(steps=50)
-    assert "There are no metrics" in Elements(page_html(replace(run, timing=timing), "r")).visible
+    assert "There are no metrics" in Elements(page_html(replace(run, timing=timing))).visible
 
 
 def test_a_row_for_each_part_with_the_worst_beyond_the_period_marked() -> None:

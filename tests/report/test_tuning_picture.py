@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from grasp_cosim import InputError
-from grasp_cosim.parallel import Crew, progress_bar
+from grasp_cosim.parallel import Crew
+from grasp_cosim.progress import Progress
 from grasp_cosim.report.tuning import check_drawable, draw_tuning
 from grasp_cosim.tuning.search import Point, Search, Tuning
 from support.native_fmus import needs_gcc
@@ -15,7 +16,7 @@ from support.tuned import Computed, known_problem
 @pytest.fixture
 def found(tmp_path: Path) -> Tuning:
     """A search by formulas, and a point that has no figures."""
-    runs = Computed(known_problem(tmp_path), Crew(1), progress_bar("", None, False))
+    runs = Computed(known_problem(tmp_path), Crew(1), Progress("", None, shown=False))
     runs.points([runs.problem.start])
     Search(runs, {"effort": 18.0}, 60, 1, 12).all()
     nothing = Point((1.0, 1.0), {"slowness": None, "effort": None}, "it ran away")

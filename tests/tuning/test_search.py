@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim import InputError
-from grasp_cosim.parallel import Crew, progress_bar
+from grasp_cosim.parallel import Crew
+from grasp_cosim.progress import Progress
 from grasp_cosim.tuning.problem import Gain, Problem
 from grasp_cosim.tuning.search import LEAST, SCALES, Point, Search, Tuning, tune
 from support.native_fmus import needs_gcc
@@ -20,7 +21,7 @@ BEST = 1.0 / 9.0
 
 def computed(problem: Problem, budget: int, seed: int = 1) -> tuple[Tuning, list[int]]:
     """What the search finds without runs, and how many points it asked for at once."""
-    runs = Computed(problem, Crew(1), progress_bar("", None, False))
+    runs = Computed(problem, Crew(1), Progress("", None, shown=False))
     runs.points([problem.start])
     Search(runs, {"effort": LIMIT}, budget, seed, LEAST).all()
     return Tuning(

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import InputError
-from ..files import check_folder
+from ..files import PICTURES, check_folder
 from ..plain import on_one_line
 from ..progress import Progress, phase
 
@@ -50,6 +50,19 @@ workers_option = click.option(
     default=os.cpu_count(),
     show_default="all cores",
     help="Processes that run at the same time.",
+)
+
+format_option = click.option(
+    "--format",
+    "suffix",
+    type=click.Choice(PICTURES),
+    default=PICTURES[0],
+    show_default=True,
+    help="Of the pictures.",
+)
+
+title_option = click.option(
+    "--title", default="", help="Of pictures and pages. Default: system, case and controller."
 )
 
 metrics_option = click.option(

@@ -9,7 +9,7 @@ import click
 
 from ..convergence.step_study import step_study
 from ..errors import InputError
-from ..files import remove, write_json
+from ..files import of_any_format, remove, write_json
 from ..metrics.metric import Metric
 from ..report.step_study import draw_step_study
 from ..system.description import System
@@ -58,10 +58,11 @@ def study_step(
         )
     folder = given["out"] or Path()
     if given["out"]:
-        remove(folder, "step_study.json", "step_study.png")
+        remove(folder, "step_study.json", *of_any_format("step_study"))
         write_json(folder / "step_study.json", study.as_json())
     if given["plot"]:
-        draw_step_study(study, folder / "step_study.png")
-        say(f"drew {folder / 'step_study.png'}")
+        picture = folder / f"step_study.{given['suffix']}"
+        draw_step_study(study, picture)
+        say(f"drew {picture}")
     show(as_json, study.as_json(), study.as_text())
     return 0 if study.holds else NEGATIVE

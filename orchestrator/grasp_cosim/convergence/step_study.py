@@ -1,7 +1,7 @@
 """Is the step small enough? A run repeated over steps, metrics or signals against their limit."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
@@ -14,6 +14,7 @@ from ..metrics.units import in_si
 from ..numerals import fixed
 from ..parallel import run_all
 from ..system.description import System
+from ..system.made_of import changed
 from ..system.parts import NANOSECONDS
 from .extrapolation import Convergence, converge
 
@@ -65,6 +66,8 @@ class StepStudy:
     unit: str | None
     quantities: tuple[str, ...]
     runs: tuple[StepRun, ...]
+    changed: Mapping[str, Any] = field(default_factory=dict)
+    """What of the system was not as it was read: see system.made_of."""
 
     @cached_property
     def limits(self) -> Mapping[str, Convergence]:
@@ -98,8 +101,9 @@ class StepStudy:
 
     @property
     def shown(self) -> tuple[float, str]:
-        """Factor and unit in which errors and the tolerance are shown: times in ms."""
-        return (1e3, "ms") if self.unit == "s" else (1.0, self.unit or "")
+        """Factor and unit in which errors and the tolerance are shown: ms, mm, mm/s."""
+        shown = {"s": (1e3, "ms"), "m": (1e3, "mm"), "m/s": (1e3, "mm/s")}
+        return shown.get(self.unit or "", (1.0, self.unit or ""))
 
     def as_json(self) -> dict[str, Any]:
         """The study as plain values for JSON; times in s, energies in J."""
@@ -324,6 +328,7 @@ def step_study(
         question.unit,
         tuple(found) or question.quantities,
         tuple(runs),
+        changed(system),
     )
 
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..metrics.metric import resolved
 from ..numerals import fixed
 from ..recording.result import Result
-from ..report.plot import BLUE, GREY, RED, finish, kept, new_figure
+from ..report.caption import caption
+from ..report.plot import BLUE, DASHES, GREY, RED, finish, headed, kept, new_figure, one_legend
 from .metrics import CLOSING, FINGERS, first_contact
 
 if TYPE_CHECKING:
@@ -21,8 +21,14 @@ if TYPE_CHECKING:
 COLOR = {1: BLUE, 2: RED}
 """Finger 1, the right one, is blue and finger 2 red, as in the paper's figures."""
 
+MARKS = {1: (".", "o"), 2: ("x", "s")}
+"""Simulated and published values of a finger, where they are no lines."""
+
+TARGET = "#1d2023"
+"""The colour of the target, which is of no finger."""
+
 FORCE_LIMIT = 12.0
-"""Top of the force axes in N; the legend gives the peak of an impact above it."""
+"""Top of the force axes in N; the peak of an impact above it is written there."""
 
 BEFORE, AFTER, NEAR = 0.015, 0.03, 0.05
 """s before and after a contact in a close-up; contacts that are nearer than NEAR share one."""
@@ -31,7 +37,7 @@ BEFORE, AFTER, NEAR = 0.015, 0.03, 0.05
 def draw_grasp(run: Result, path: Path | None = None) -> Figure:
     """Gaps, contact forces, target and closing speed; on the right around the contacts.
 
-    With a `path` the figure is written there as a PNG.
+    With a `path` the figure is written there, see report.plot.save().
     """
     spans = _around_contacts(run)
     figure = new_figure(7.2 + 2.9 * len(spans), 8.0)
@@ -42,17 +48,16 @@ def draw_grasp(run: Result, path: Path | None = None) -> Figure:
     for axes in rows[:, 0]:
         axes.sharex(rows[2, 0])
     _gaps(gaps, run, slice(None), FINGERS)
-    finish(gaps, "gap to the object in mm")
-    draw_contact_forces(contact, [(run, "-", "")])
+    finish(gaps, "gap to the object in mm", legend=False)
+    draw_contact_forces(contact, run)
     draw_targets(target, [(run, "-", "")])
     target.set_xlabel("time in s")
     for (fingers, begin, end), column in zip(spans, rows[:, 1:].T, strict=True):
         _around(column, run, fingers, begin, end)
         for axes in rows[:, 0]:
             axes.axvspan(begin, end, color="#000000", alpha=0.06, linewidth=0.0)
-    controller = resolved("controller.", run.roles)[:-1]
-    fmu = run.settings.get("components", {}).get(controller, {}).get("fmu", "")
-    figure.suptitle(fmu.removesuffix(".fmu"), fontsize=10, parse_math=False)
+    one_legend(figure)
+    headed(figure, caption(run))
     return kept(figure, path)
 
 
@@ -78,8 +83,8 @@ def _around(
     for j in fingers:
         force = abs(run.by_role[f"plant.contact_force[{j}]"][rows])
         speed = 1e3 * CLOSING[j] * run.by_role[f"plant.velocity[{j}]"][rows]
-        forces.plot(time, force, color=COLOR[j], label=f"finger {j}")
-        speeds.plot(time, speed, color=COLOR[j], label=f"finger {j}")
+        forces.plot(time, force, DASHES[j], color=COLOR[j], label=f"finger {j}")
+        speeds.plot(time, speed, DASHES[j], color=COLOR[j], label=f"finger {j}")
     speeds.set_xlabel("time in s")
     for axes, label in (
         (gaps, "gap in mm"),
@@ -89,29 +94,28 @@ def _around(
         axes.sharex(speeds)
         axes.set_xlim(begin, end)
         axes.locator_params(axis="x", nbins=4)
-        finish(axes, label)
+        finish(axes, label, legend=False)
 
 
 def _gaps(axes: Axes, run: Result, rows: slice, fingers: Sequence[int]) -> None:
     for j in fingers:
         gap = 1e3 * run.by_role[f"plant.gap[{j}]"][rows]
-        axes.plot(run.time[rows], gap, color=COLOR[j], label=f"finger {j}")
+        axes.plot(run.time[rows], gap, DASHES[j], color=COLOR[j], label=f"finger {j}")
 
 
-def draw_contact_forces(axes: Axes, runs: Sequence[tuple[Result, str, str]]) -> None:
-    """Magnitude of the contact force on each finger; runs as (result, line style, label)."""
-    highest = 0.0
-    for result, style, label in runs:
-        for j in FINGERS:
-            force = abs(result.by_role[f"plant.contact_force[{j}]"])
-            peak = float(force.max())
-            name = f"{label}, finger {j}" if label else f"finger {j}"
-            if peak > FORCE_LIMIT:
-                name += f", peak {fixed(peak, 0)} N"
-            axes.plot(result.time, force, style, color=COLOR[j], label=name)
-            highest = max(highest, peak)
+def draw_contact_forces(axes: Axes, run: Result) -> None:
+    """Magnitude of the contact force on each finger; peaks above FORCE_LIMIT are said."""
+    peaks = []
+    for j in FINGERS:
+        force = abs(run.by_role[f"plant.contact_force[{j}]"])
+        peaks.append(float(force.max()))
+        axes.plot(run.time, force, DASHES[j], color=COLOR[j], label=f"finger {j}")
+    highest = max(peaks)
     axes.set_ylim(-0.03 * min(highest, FORCE_LIMIT), 1.1 * min(max(highest, 1e-3), FORCE_LIMIT))
-    finish(axes, "contact force in N")
+    if highest > FORCE_LIMIT:
+        text = f"peaks: {' and '.join(fixed(peak, 0) for peak in peaks)} N"
+        axes.text(0.99, 0.95, text, transform=axes.transAxes, ha="right", va="top", fontsize=8)
+    finish(axes, "contact force in N", legend=False)
 
 
 def draw_targets(axes: Axes, runs: Sequence[tuple[Result, str, str]]) -> None:
@@ -119,15 +123,15 @@ def draw_targets(axes: Axes, runs: Sequence[tuple[Result, str, str]]) -> None:
     for result, style, label in runs:
         target = 1e3 * result.by_role["controller.target_position"]
         name = f"target, {label}" if label else "target"
-        axes.plot(result.time, target, style, color=BLUE, label=name)
+        axes.plot(result.time, target, style, color=TARGET, label=name)
     result = runs[0][0]
     centre = 1e3 * result.by_role["plant.object_position"]
     axes.plot(result.time, centre, ":", color=GREY, label="centre of the object")
-    finish(axes, "position in mm")
+    finish(axes, "position in mm", legend=False)
 
 
 def draw_contact_times(axes: Axes, rows: Sequence[Mapping[str, Any]], case: int) -> None:
-    """Published contact times (circles) and simulated ones by the conditions of the rows.
+    """Published contact times (rings, squares) and simulated ones by the conditions of the rows.
 
     These are positions of the object, simulated as lines, or colours of its surfaces, as dots. The
     time axis ends at a whole number of seconds above the times of all cases.
@@ -144,9 +148,10 @@ def draw_contact_times(axes: Axes, rows: Sequence[Mapping[str, Any]], case: int)
         simulated, published = (
             [r[key] for r in of_case if r["finger"] == j] for key in ("simulated", "published")
         )
-        axes.plot(x, simulated, "." if colours else "-", color=COLOR[j], label=f"finger {j}")
-        axes.plot(x, published, "o", color=COLOR[j], mfc="none", label=f"finger {j}, published")
+        (dot, ring), name = MARKS[j], f"finger {j}"
+        axes.plot(x, simulated, dot if colours else DASHES[j], color=COLOR[j], label=name)
+        axes.plot(x, published, ring, color=COLOR[j], mfc="none", label=f"{name}, published")
     axes.set_title(f"Case {case}", fontsize=10)
     latest = max(max(r["simulated"], r["published"]) for r in rows if r["finger"])
     axes.set_ylim(0.0, max(3.0, np.ceil(latest)))
-    finish(axes, "time to contact in s")
+    finish(axes, "time to contact in s", legend=False)

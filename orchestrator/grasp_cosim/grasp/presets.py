@@ -7,7 +7,7 @@ grasp are used, its components found by their roles.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -51,14 +51,33 @@ def case_of(settings: Mapping[str, Any]) -> str:
 
     What is not set is taken to be as in case 2, as the controller starts.
     """
-    roles, presets = settings.get("roles", {}), built_in_presets()
+    presets, given = built_in_presets(), _given(settings)
+    values = {k: given(k, v) for k, v in presets["case_2"].items()}
+    return next((str(case) for case in CASES if presets[f"case_{case}"] == values), "other")
+
+
+def words_of(settings: Mapping[str, Any]) -> list[str]:
+    """What a grasp is in the words of a title: its case, the bench, the FMU of its controller."""
+    bench, given = built_in_presets()["bench"], _given(settings)
+    name = resolved("controller.", settings.get("roles", {}))[:-1]
+    fmu = str(settings["components"].get(name, {}).get("fmu", ""))
+    case = case_of(settings)
+    return [
+        *(["no published case"] if case == "other" else [f"case {case}"]),
+        *(["bench"] if all(given(key) == value for key, value in bench.items()) else []),
+        *([fmu.removesuffix(".fmu")] if fmu else []),
+    ]
+
+
+def _given(settings: Mapping[str, Any]) -> Callable[..., Any]:
+    """What a run sets a variable by role to, or otherwise: (key, otherwise=None)."""
+    roles = settings.get("roles", {})
     given = {
         f"{name}.{variable}": value
         for name, component in settings["components"].items()
         for variable, value in component["values"].items()
     }
-    values = {k: given.get(resolved(k, roles), v) for k, v in presets["case_2"].items()}
-    return next((str(case) for case in CASES if presets[f"case_{case}"] == values), "other")
+    return lambda key, otherwise=None: given.get(resolved(key, roles), otherwise)
 
 
 def with_si_values(system: System, values: Mapping[str, Value], place: str) -> System:

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from importlib.resources import files
 from string import Template
+from typing import TypeVar
 
 import numpy as np
 
@@ -24,6 +25,8 @@ QUANTITIES = {
     "actuator": "actuator force",
 }  # fmt: skip
 """Heads of the table below the animation, by quantity of a finger."""
+
+Look = TypeVar("Look", str, int)
 
 Contact = Mapping[str, float]
 """A moment `t` in s at which a `finger` begins to touch."""
@@ -53,7 +56,9 @@ def grasp_scene(result: Result) -> Scene | None:
             "contacts": contacts,
         },
         shown=[*shown, target],
-        colors=_colors(result),
+        colors=_of_fingers(result, {"1": "--finger1", "2": "--finger2"}),
+        dashes=_of_fingers(result, {"1": 0, "2": 1}),
+        negated=[named["contact_force"][2]],
         marks=[(c["t"], f"--finger{c['finger']}") for c in contacts],
         zooms=_zooms(contacts),
     )
@@ -119,10 +124,10 @@ def _firsts(contacts: Sequence[Contact]) -> dict[int, float]:
     return {j: c["t"] for j in FINGERS for c in contacts[::-1] if c["finger"] == j}
 
 
-def _colors(result: Result) -> dict[str, str]:
-    """The colours of signals that are of one finger: those of an element [1], of a sensor_1."""
+def _of_fingers(result: Result, each: Mapping[str, Look]) -> dict[str, Look]:
+    """What there is for each finger, for signals of it: those of an element [1], of a sensor_1."""
     found = {name: re.search(r"(?:\[([12])\]|_([12])\..*)$", name) for name in result.signals}
-    return {name: f"--finger{m[1] or m[2]}" for name, m in found.items() if m}
+    return {name: each[m[1] or m[2]] for name, m in found.items() if m}
 
 
 def _zooms(contacts: Sequence[Contact]) -> list[Zoom]:
@@ -143,7 +148,7 @@ def _html(named: Mapping[str, Mapping[int, str]], contacts: Sequence[Contact]) -
     shown = {quantity: head for quantity, head in QUANTITIES.items() if named[quantity]}
     rows = [
         f'<tr><td><span class="key{j}">finger {j}</span></td>'
-        + "".join(_cell(named[quantity].get(j)) for quantity in shown)
+        + "".join(_cell(head, named[quantity].get(j)) for quantity, head in shown.items())
         + "</tr>"
         for j in FINGERS
     ]
@@ -152,7 +157,8 @@ def _html(named: Mapping[str, Mapping[int, str]], contacts: Sequence[Contact]) -
     return Template(_text("grasp.html")).substitute(jumps=jumps, heads=heads, rows=rows_html)
 
 
-def _cell(signal: str | None) -> str:
+def _cell(head: str, signal: str | None) -> str:
     if signal is None:
         return "<td></td>"
-    return f'<td class="n"><output data-signal="{escape(signal)}"></output></td>'
+    shown = f'<output data-signal="{escape(signal)}"></output>'
+    return f'<td class="n" data-head="{head}">{shown}</td>'

@@ -27,7 +27,7 @@ from ..recording.result import Result
 from ..system.checks import remarks
 from ..system.description import System
 from ..system.parts import NANOSECONDS, Component, Port
-from ..system.settings import settings
+from ..system.settings import run_settings
 from .engine import Engine
 from .master import Master
 
@@ -249,7 +249,7 @@ class Session:
     def _result(self) -> Result:
         master, signals, asked = self._master, self._dispatch.signals, self._privileges
         return Result(
-            settings(self.system),
+            run_settings(self.system),
             self._memory.time,
             self._memory.signals,
             {s.name: s.unit for s in signals},

@@ -45,7 +45,7 @@ class CsvListener:
                 named = nullcontext(self._path) if self._in_place else in_one_piece(self._path)
                 part = stack.enter_context(named)
                 self._file = stack.enter_context(FileIO(part, "w"))
-                self._append(",".join(map(_quoted, names)) + "\n")
+                self._append(",".join(map(quoted, names)) + "\n")
                 self._finish = stack.pop_all()
                 self._empty = True
         except OSError as error:
@@ -62,7 +62,7 @@ class CsvListener:
                     columns[i] = [*map(int, columns[i])]
                 texts = [map(repr, column) for column in columns]
                 for i, own in self._texts.items():
-                    texts[i] = map(_quoted, own.column(rows[piece, i - 1]))
+                    texts[i] = map(quoted, own.column(rows[piece, i - 1]))
                 self._append("\n".join(map(",".join, zip(*texts, strict=True))) + "\n")
                 self._empty = False
         except OSError as error:
@@ -89,7 +89,8 @@ class CsvListener:
             raise
 
 
-def _quoted(text: str) -> str:
+def quoted(text: str) -> str:
+    """Return a text as a cell of a CSV that is neither a formula nor a line break."""
     return '"{}"'.format(to_cell(text).replace('"', '""'))
 
 

@@ -12,7 +12,7 @@ from ..errors import SimulationError
 from ..system.checks import transforms
 from ..system.description import System
 from ..system.parts import Port
-from ..system.settings import settings
+from ..system.settings import run_settings
 from .divergence import Divergence, largest
 from .energy import ExchangeEnergy, bonds
 from .listener import Experiment, Leisurely, Listener, Signal, Texts
@@ -52,7 +52,7 @@ class Dispatcher:
         self.signals = (*outputs.values(), *self._energy.signals)
         self._block = np.empty((len(self.signals), 0))
         self._pending: tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]] | None = None
-        experiment = Experiment.of(settings(system))
+        experiment = Experiment.of(run_settings(system))
         with ExitStack() as begun:
             for listener in self._listeners:
                 listener.begin(experiment, self.signals)

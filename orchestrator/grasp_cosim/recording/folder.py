@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from .. import extensions
 from ..errors import InputError
-from ..files import remove, unwritable, write_json
+from ..files import of_any_format, remove, unwritable, write_json
 from ..metrics.units import in_si
 from ..system.description import System
 from ..system.parts import Component
@@ -27,7 +27,7 @@ from .load import SETTINGS, SIGNALS, TEXT
 from .memory import TYPES
 from .result import Result, conversions_entry
 
-DRAWN = ("report.html", "timing.png", "signals.mf4")
+DRAWN = ("report.html", "signals.mf4", *of_any_format("timing"))
 """The files that may be made of a run in its folder, beside its picture."""
 
 FIRST_GUESS = 20e3
@@ -47,11 +47,19 @@ class RunFolder:
     """
 
     def __init__(
-        self, folder: Path, system: System, command: Sequence[str] = (), paced: bool = False
+        self,
+        folder: Path,
+        system: System,
+        command: Sequence[str] = (),
+        paced: bool = False,
+        title: str = "",
     ) -> None:
-        """`command` led to the run; if it is `paced`, rows are written in spare() time only."""
+        """`command` led to the run; if it is `paced`, rows are written in spare() time only.
+
+        `title` is what its pictures and pages are called, by default what it is.
+        """
         self._folder, self._paced = folder, paced
-        self._origin = origin(system, command)
+        self._origin = {**origin(system, command), **({"title": title} if title else {})}
         self._to_si = in_si(system, ()).conversions
         self._csv = CsvListener(folder / SIGNALS, in_place=True)
         self._begun, self._broken = False, False
@@ -130,7 +138,8 @@ class RunFolder:
             self._folder.mkdir(parents=True, exist_ok=True)
             self._keep_others_out()
             if settings.is_file() and signals.is_file():
-                remove(self._folder, *DRAWN, *(f"{d.stem}.png" for d in extensions.drawings))
+                stems = (drawing.stem for drawing in extensions.drawings)
+                remove(self._folder, *DRAWN, *of_any_format(*stems))
             remove(self._folder, SETTINGS, SIGNALS)
             if self._signals:
                 self._csv.begin(self._experiment, self._signals)

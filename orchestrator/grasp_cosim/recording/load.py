@@ -37,17 +37,22 @@ SETTING_KEYS: Mapping[str, Any] = {
 }  # fmt: skip
 """Entries of run.json that say how the run was made, and of which types they are."""
 
+MAYBE_SETTINGS = ("roles", "input", "changed")
+"""More of them, which may be there."""
+
 OUTCOME_KEYS: Mapping[str, Any] = {
     "wall_time": MAYBE, "complete": bool, "log": list, "rejections": dict, "units": dict,
 }  # fmt: skip
 """Entries that say what came of it, besides metrics."""
 
-ORIGIN_KEYS: Mapping[str, Any] = {"date": str, "versions": dict, "fmus": dict, "command": list}
+ORIGIN_KEYS: Mapping[str, Any] = {
+    "title": str, "date": str, "versions": dict, "fmus": dict, "command": list,
+}  # fmt: skip
 """Entries that say when the run was made, and with what."""
 
 MORE_KEYS: Mapping[str, Any] = {
     "roles": dict, "types": dict, "descriptions": dict, "metric_units": dict, "to_si": dict,
-    "input": dict, **ORIGIN_KEYS,
+    "input": dict, "changed": dict, **ORIGIN_KEYS,
 }  # fmt: skip
 """Entries that may be there."""
 
@@ -110,7 +115,7 @@ def _result(
 ) -> Result:
     realtime, types = written.get("realtime"), written.get("types", {})
     return Result(
-        settings={key: written[key] for key in (*SETTING_KEYS, "roles", "input") if key in written},
+        settings={key: written[key] for key in (*SETTING_KEYS, *MAYBE_SETTINGS) if key in written},
         time=time,
         signals={
             name: _typed(f"{path}: type of {name}", column, types.get(name, "float64"))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -89,7 +89,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     more_metrics: tuple[Metric, ...] = ()
     """Metrics that were asked for beside those that every result is asked for."""
     origin: Mapping[str, Any] = field(default_factory=dict)
-    """The date, versions and command of a run with a folder: see recording.folder."""
+    """The date, versions, command and title of a run with a folder: see recording.folder."""
     to_si: Mapping[str, Conversion | None] = field(default_factory=dict)
     """The conversions to SI base units of signals in others; None where the unit is in doubt."""
     folder: Path | None = None
@@ -214,13 +214,19 @@ class Result(Mapping[str, npt.NDArray[Any]]):
         }
         write_json(Path(path), report)
 
-    def plot(self, path: str | Path | None = None) -> Figure:
+    def plot(self, path: str | Path | None = None, title: str = "") -> Figure:
         """Draw a grasp as one, of any other system all signals: the figure of matplotlib.
 
-        With a `path` it is written there too, as a PNG. InputError without matplotlib.
+        With a `path` it is written there too, as its suffix says: .png, .svg or .pdf. InputError
+        where that is another one, or without matplotlib.
         """
-        figure: Figure = self.drawing.draw(self, None if path is None else Path(path))
+        run = self.titled(title)
+        figure: Figure = self.drawing.draw(run, None if path is None else Path(path))
         return figure
+
+    def titled(self, title: str) -> Result:
+        """Return the result under another title, which its pictures and pages have; not if ''."""
+        return replace(self, origin={**self.origin, "title": title}) if title else self
 
     def to_pandas(self) -> pd.DataFrame:
         """The signals as a DataFrame, by time in s; its `attrs` have the units, by column.

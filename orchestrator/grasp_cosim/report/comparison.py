@@ -19,8 +19,10 @@ from ..metrics.metric import Metric
 from ..numerals import counted
 from ..qualification.compared import Compared
 from ..qualification.tube import deviation, tube
+from ..recording.result import Result
+from .caption import Caption, about, caption, changes
 from .embed import LIMIT, Shown, fit
-from .page import Scene, data_html, document, moments, scripts, traces_html
+from .page import Scene, data_html, document, looks, moments, scripts, traces_html
 from .tables import bullets, count, number, origin_rows, scaled, summary, table
 
 AT_FIRST = 4
@@ -52,14 +54,19 @@ def comparison_html(c: Comparison, limit: int = LIMIT) -> str:
         "signals-table": ("Signals, the worst first", f'<div class="pairs">{_signals(c)}</div>'),
     }
     return document(
-        f"{c.a.name} and {c.b.name}",
+        Caption(" and ".join(_called(side) for side in (c.a, c.b)), about(None)),
         f'<span class="{"" if c.alike else "warn"}">{escape(verdict(c))}</span>',
         sections,
         _state(c, shown, ids, scene, texts),
         data_html(shown.time, {ids[key]: values for key, values in shown.signals.items()}),
-        [scripts("main", "pairs")],
+        [scripts("main", "save", "pairs")],
         scene.style if scene else "",
     )
+
+
+def _called(side: Side) -> str:
+    """The title that a run was given, else its name."""
+    return str((side.result.origin if side.result else {}).get("title") or side.name)
 
 
 def _drawn(
@@ -101,7 +108,8 @@ def _state(
             for s in c.signals
         ],
         "shown": list(dict.fromkeys([*first, *worst])),
-        "colors": dict(scene.colors) if scene else {},
+        **looks(scene),
+        "about": about(None),
         "marks": [{"t": t, "color": "--fault"} for log in logs for t in moments(log)],
         "scene": None,
     }
@@ -126,6 +134,8 @@ def _runs(c: Comparison) -> str:
     about = [dict(origin_rows(side.result.origin)) if side.result else {} for side in sides]
     rows = [
         _row("from", [escape(side.name) for side in sides]),
+        _row("what", [escape(caption(s.result).title) if s.result else "" for s in sides]),
+        _row("changed", [escape(_changed(s.result)) if s.result else "" for s in sides]),
         _row("run", [_summary(side) for side in sides]),
         *(
             _row(key, [escape(of.get(key, "")) for of in about])
@@ -139,6 +149,11 @@ def _runs(c: Comparison) -> str:
         settings = "<p>The settings of the two runs are the same.</p>"
     notes = bullets("Notes", [*c.notes, *only_lines(c), *basis(c)], "None.")
     return f"{table(heads, rows)}{settings}{notes}"
+
+
+def _changed(run: Result) -> str:
+    """What differs from the defaults, as far as that is known."""
+    return changes(run.settings["changed"]) if "changed" in run.settings else ""
 
 
 def _summary(side: Side) -> str:

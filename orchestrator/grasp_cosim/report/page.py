@@ -24,11 +24,13 @@ import numpy as np
 import numpy.typing as npt
 
 from ..files import write_text
+from ..recording.csv import quoted
 from ..recording.listener import Texts
 from ..recording.result import Result
+from .caption import Caption, caption
 from .diagram import Link, diagram_svg
 from .embed import LIMIT, Shown, fit, packed
-from .tables import count, metrics_table, number, settings_html, summary
+from .tables import count, metrics_table, number, settings_html, summary, svg_button
 from .timing_html import timing_html
 
 AT_FIRST = 6
@@ -64,22 +66,26 @@ class Scene:
     """Signals that are shown first."""
     colors: Mapping[str, str] = field(default_factory=dict)
     """The colours of signals, by name; others get one in turn."""
+    dashes: Mapping[str, int] = field(default_factory=dict)
+    """Their dashes, 0 or 1: 0 where nothing is said."""
+    negated: Sequence[str] = ()
+    """Signals that are shown with the other sign."""
     marks: Sequence[tuple[float, str]] = ()
     """Moments in s that are marked in the traces, and the colours of their lines."""
     zooms: Sequence[Zoom] = ()
 
 
 def write_page(
-    result: Result, title: str, path: Path, *, scene: Scene | None = None, limit: int = LIMIT
+    result: Result, path: Path, *, scene: Scene | None = None, limit: int = LIMIT
 ) -> None:
-    """Write the page of a result.
+    """Write the page of a result, under its title: see caption.caption().
 
     Of more than `limit` values the signals are thinned, and it says so.
     """
-    write_text(path, page_html(result, title, scene=scene, limit=limit))
+    write_text(path, page_html(result, scene=scene, limit=limit))
 
 
-def page_html(result: Result, title: str, *, scene: Scene | None = None, limit: int = LIMIT) -> str:
+def page_html(result: Result, *, scene: Scene | None = None, limit: int = LIMIT) -> str:
     """Return the page as text, see write_page."""
     shown = fit(result.time, {name: _drawn(column) for name, column in result.items()}, limit)
     timing = result.timing
@@ -92,18 +98,18 @@ def page_html(result: Result, title: str, *, scene: Scene | None = None, limit: 
         "settings": ("Settings", settings_html(result)),
     }
     return document(
-        title,
+        caption(result),
         summary(result.metrics),
         {name: section for name, section in sections.items() if section},
-        _state(result, shown, scene),
+        _state(result, shown, scene) | {"about": caption(result).about},
         data_html(shown.time, {f"signal{k}": v for k, v in enumerate(shown.signals.values())}),
-        [scripts("main", "panels"), scene.scripts if scene else ""],
+        [scripts("main", "save", "panels"), scene.scripts if scene else ""],
         scene.style if scene else "",
     )
 
 
 def document(
-    title: str,
+    said: Caption,
     summary: str,
     sections: Mapping[str, tuple[str, str]],
     state: Mapping[str, Any],
@@ -118,7 +124,8 @@ def document(
     start, and `style` what comes after that of the page.
     """
     return Template(_text("page.html")).substitute(
-        title=escape(title),
+        title=escape(said.title),
+        about=escape(said.about),
         style=page_style() + style,
         summary=summary,
         contents="".join(f'<a href="#{name}">{head}</a>' for name, (head, _) in sections.items()),
@@ -160,15 +167,34 @@ def _state(result: Result, shown: Shown, scene: Scene | None) -> dict[str, Any]:
                 "steps": values.dtype.kind != "f",
                 "text": result.descriptions.get(name, ""),
                 "id": f"signal{k}",
-                "texts": list(dict.fromkeys(values)) if values.dtype == object else None,
+                **_texts(values),
             }
             for k, (name, values) in enumerate(result.signals.items())
         ],
         "shown": list(scene.shown if scene else ()) or list(result.signals)[:AT_FIRST],
-        "colors": dict(scene.colors) if scene else {},
+        **looks(scene),
+        "header": ",".join(map(quoted, ("time", *result.signals))),
+        "csv": "signals.csv" if shown.rows_per_pair is None else "signals_thinned.csv",
         "marks": [{"t": t, "color": color} for t, color in marks],
         "scene": scene.state if scene else None,
     }
+
+
+def looks(scene: Scene | None) -> dict[str, Any]:
+    """Return how signals are drawn, for the scripts."""
+    if scene is None:
+        return {"colors": {}, "dashes": {}, "negated": []}
+    return {
+        "colors": dict(scene.colors), "dashes": dict(scene.dashes), "negated": list(scene.negated),
+    }  # fmt: skip
+
+
+def _texts(column: npt.NDArray[Any]) -> dict[str, Any]:
+    """Of Strings the texts that their numbers stand for, and the cells of a CSV with them."""
+    if column.dtype != object:
+        return {"texts": None}
+    texts = list(dict.fromkeys(column))
+    return {"texts": texts, "cells": [*map(quoted, texts)]}
 
 
 def _drawn(column: npt.NDArray[Any]) -> npt.NDArray[Any]:
@@ -209,15 +235,21 @@ def _traces(result: Result, shown: Shown, scene: Scene | None) -> str:
         {name: result.units[name] for name in result.signals},
         result.descriptions,
         scene.zooms if scene else (),
+        '<button id="csv" type="button">CSV</button>',
     )
 
 
 def traces_html(
-    how_exact: str, units: Mapping[str, str | None], texts: Mapping[str, str], zooms: Sequence[Zoom]
+    how_exact: str,
+    units: Mapping[str, str | None],
+    texts: Mapping[str, str],
+    zooms: Sequence[Zoom],
+    csv: str = "",
 ) -> str:
     """Return the traces: buttons, boxes to choose signals, the place where they are drawn.
 
-    `units` are those of the signals by name, `texts` their descriptions.
+    `units` are those of the signals by name, `texts` their descriptions; `csv` is the button that
+    saves them, if there is one.
     """
     buttons = "\n".join(
         f'<button type="button" class="{zoom.kind}" data-from="{zoom.begin!r}" '
@@ -225,7 +257,7 @@ def traces_html(
         for zoom in zooms
     )
     return Template(_text("traces.html")).substitute(
-        zooms=buttons, signals=_choice(units, texts), exactness=how_exact
+        zooms=buttons, csv=csv, signals=_choice(units, texts), exactness=how_exact
     )
 
 
@@ -273,6 +305,7 @@ def _connections(result: Result) -> str:
     boxes = {name: c["fmu"] for name, c in result.settings["components"].items()}
     return (
         f'<div class="diagram">{diagram_svg(boxes, links, result.units)}</div>'
+        f"{svg_button('.diagram svg', 'connections')}"
         '<p class="hint">From left to right in the order of execution. Above: connections past '
         "others. Dashed, below: connections back to a component that steps earlier. Hold the "
         "pointer over one for its name.</p>"

@@ -7,50 +7,86 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from io import StringIO
+from itertools import cycle
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 from ..checks import extra_module
 from ..errors import InputError
-from ..files import in_one_piece
+from ..files import PICTURES, in_one_piece
 from ..recording.result import Result
+from .caption import Caption, caption
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.legend import Legend
 
-BLUE, RED, GREY = "#1f5fa8", "#c0392b", "#7f7f7f"
+BLUE, RED, GREY, MUTED = "#1f5fa8", "#c0392b", "#7f7f7f", "#5b6470"
 COLORS = (BLUE, RED, GREY)
 """The colours of several things, in turn."""
+
+STYLES = ("-", "--", "-.", ":")
+"""Their dashes, so that they can be told apart in grey."""
 
 DPI = 130
 """Of the pictures."""
 
-MOST_NAMED = 12
-"""So many lines at most get a legend."""
+MOST_LINES = 6
+"""So many lines at most are in one panel."""
+
+DASHES = {1: "-", 2: "--"}
+"""How finger 1 and 2 are drawn: they can be told apart in grey."""
+
+SHOWN_UNITS = {"m": (1e3, "mm"), "m/s": (1e3, "mm/s")}
+"""The factor and the unit in which pictures show a quantity; all others are as they are."""
+
+LINE_HEIGHT, LETTER = 11.5 / 72.0, 4.4 / 72.0
+"""In inches: a line of what a picture says below its title, and the width of a letter there."""
 
 
 def plot_signals(run: Result, path: Path | None = None) -> Figure:
-    """Draw all signals of any run but Strings over time, those of the same unit together.
+    """Draw all signals of any run but Strings over time, those of the same unit together, at most
+    MOST_LINES in a panel.
 
-    With a `path` the figure is written there as a PNG. InputError without matplotlib, or where
+    With a `path` the figure is written there, see save(). InputError without matplotlib, or where
     there are no signals.
     """
-    units = list(dict.fromkeys(run.units[name] or "" for name in run.numbers))
-    if not units:
+    panels = _panels(run)
+    if not panels:
         place = run.settings["system"] if path is None else path
         raise InputError(
             f"{place}: nothing to draw; must be a result with signals that are numbers"
         )
-    figure = new_figure(9.0, 1.2 + 2.2 * len(units))
-    rows = figure.subplots(len(units), 1, sharex=True, squeeze=False)[:, 0]
-    for axes, unit in zip(rows, units, strict=True):
-        names = [name for name in run.numbers if (run.units[name] or "") == unit]
-        for name in names:
-            axes.plot(run.time, run.signals[name], linewidth=1.0, label=name)
-        finish(axes, f"in {unit}" if unit else "no unit", len(names) <= MOST_NAMED)
+    figure = new_figure(9.0, 0.9 + 2.2 * len(panels))
+    rows = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, (unit, names) in zip(rows, panels, strict=True):
+        factor, shown = shown_unit(unit)
+        for name, style, color in zip(names, cycle(STYLES), cycle(COLORS), strict=False):
+            values = factor * run.signals[name]
+            axes.plot(run.time, values, style, color=color, linewidth=1.0, label=name)
+        finish(axes, f"in {shown}" if shown else "no unit", legend=False)
+        beside(axes)
     figure.axes[-1].set_xlabel("time in s")
+    headed(figure, caption(run))
     return kept(figure, path)
+
+
+def _panels(run: Result) -> list[tuple[str, list[str]]]:
+    """The unit and the signals of each panel."""
+    units = list(dict.fromkeys(run.units[name] or "" for name in run.numbers))
+    of = {u: [name for name in run.numbers if (run.units[name] or "") == u] for u in units}
+    return [
+        (unit, names[k : k + MOST_LINES])
+        for unit, names in of.items()
+        for k in range(0, len(names), MOST_LINES)
+    ]
+
+
+def shown_unit(unit: str | None) -> tuple[float, str]:
+    """Return the factor and the unit in which a quantity of this unit is shown."""
+    return SHOWN_UNITS.get(unit or "", (1.0, unit or ""))
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -61,6 +97,28 @@ def new_figure(width: float, height: float) -> Figure:
     return Picture(figsize=(width, height), dpi=DPI, layout="constrained")
 
 
+def headed(figure: Figure, said: Caption, *more: str) -> None:
+    """Put a title and what the caption says above all else of a figure, which grows by that.
+
+    `more` are further lines. Text in it is no formula.
+    """
+    width, height = figure.get_size_inches()
+    wide = int((width - 0.2) / LETTER)
+    lines = [line for text in (said.about, *more) for line in wrap(text, wide)]
+    titles = wrap(said.title, int(0.72 * wide)) or [""]
+    top = 1.5 * LINE_HEIGHT * len(titles)
+    head = top + LINE_HEIGHT * len(lines) + 0.12
+    whole = height + head
+    figure.set_size_inches(width, whole)
+    engine: Any = figure.get_layout_engine()
+    engine.set(rect=(0.0, 0.0, 1.0, height / whole))
+    bold: dict[str, Any] = {"fontsize": 11, "fontweight": "bold"}
+    small: dict[str, Any] = {"fontsize": 8, "color": MUTED}
+    for texts, down, style in ((titles, 0.06, bold), (lines, 0.06 + top, small)):
+        at, text = (0.1 / width, 1.0 - down / whole), "\n".join(texts)
+        figure.text(*at, text, va="top", parse_math=False, **style)
+
+
 def kept(figure: Figure, path: Path | None) -> Figure:
     """Return the figure, saved if there is a path."""
     if path is not None:
@@ -68,16 +126,46 @@ def kept(figure: Figure, path: Path | None) -> Figure:
     return figure
 
 
-def save(figure: Figure, path: Path) -> None:
-    """Write the figure as a PNG under a temporary name, then rename it.
+def check_picture(path: Path) -> str:
+    """Return the format of a picture by its suffix; InputError where there is no such format."""
+    found = path.suffix.lower().removeprefix(".")
+    if found not in PICTURES:
+        raise InputError(f"{path}: must end in {', '.join(f'.{f}' for f in PICTURES)}")
+    return found
 
-    Not by savefig(), which draws a figure with a layout twice.
+
+def save(figure: Figure, path: Path) -> None:
+    """Write the figure as its suffix says, under a temporary name, then rename it.
+
+    InputError where that is none of PICTURES. The same figure has the same bytes. Not by savefig(),
+    which draws a figure with a layout twice.
     """
+    kind = check_picture(path)
+    with in_one_piece(path) as part, _any_letter():
+        {"png": _write_png, "svg": _write_svg, "pdf": _write_pdf}[kind](figure, part)
+
+
+def _write_png(figure: Figure, file: Any) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     canvas: Any = FigureCanvasAgg(figure)
-    with in_one_piece(path) as part, _any_letter():
-        canvas.print_png(part, metadata={"Software": None})
+    canvas.print_png(file, metadata={"Software": None})
+
+
+def _write_svg(figure: Figure, file: Any) -> None:
+    from matplotlib import rc_context
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+    canvas: Any = FigureCanvasSVG(figure)
+    with rc_context({"svg.hashsalt": "grasp-cosim", "svg.fonttype": "path"}):
+        canvas.print_svg(file, metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
+
+
+def _write_pdf(figure: Figure, file: Any) -> None:
+    from matplotlib.backends.backend_pdf import FigureCanvasPdf
+
+    canvas: Any = FigureCanvasPdf(figure)
+    canvas.print_pdf(file, metadata=dict.fromkeys(("Creator", "Producer", "CreationDate")))
 
 
 def as_svg(figure: Figure) -> str:
@@ -85,13 +173,9 @@ def as_svg(figure: Figure) -> str:
 
     It takes the width that the page gives it.
     """
-    from matplotlib import rc_context
-    from matplotlib.backends.backend_svg import FigureCanvasSVG
-
-    canvas: Any = FigureCanvasSVG(figure)
     file = StringIO()
-    with rc_context({"svg.hashsalt": "grasp-cosim", "svg.fonttype": "path"}), _any_letter():
-        canvas.print_svg(file, metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
+    with _any_letter():
+        _write_svg(figure, file)
     _, start, text = file.getvalue().partition("<svg ")
     text = re.sub(r'(width|height)="[^"]*pt" ', "", text, count=2)
     return start + text.replace("*{stroke", ".chart *{stroke", 1)  # its rule is for all else
@@ -106,9 +190,33 @@ def _any_letter() -> Iterator[None]:
 
 
 def finish(axes: Axes, label: str, legend: bool = True) -> None:
-    """Give axes a label of the values and a grid, and a legend unless it is too long."""
+    """Give axes a label of the values and a grid, and a legend unless it is to have none."""
     axes.set_ylabel(label)
     axes.grid(True, color="#dddddd", linewidth=0.6)
     if legend:
-        axes.legend(fontsize=8, framealpha=0.9)
+        _plain(axes.legend(fontsize=8, framealpha=0.9))
     axes.spines[["top", "right"]].set_visible(False)
+
+
+def beside(axes: Axes) -> None:
+    """Give axes a legend on their right."""
+    place: dict[str, Any] = {
+        "loc": "upper left",
+        "bbox_to_anchor": (1.01, 1.0),
+        "borderaxespad": 0.0,
+    }
+    _plain(axes.legend(fontsize=8, frameon=False, handlelength=3.0, **place))
+
+
+def one_legend(figure: Figure) -> None:
+    """Give a figure one legend of all that its axes name, below them; each name once."""
+    named = [axes.get_legend_handles_labels() for axes in figure.axes]
+    keys = {label: handle for pair in named for handle, label in zip(*pair, strict=True)}
+    place: dict[str, Any] = {"loc": "outside lower left", "ncols": 4, "handlelength": 3.0}
+    _plain(figure.legend([*keys.values()], [*keys], fontsize=8, frameon=False, **place))
+
+
+def _plain(legend: Legend) -> None:
+    """Take no text of a legend for a formula."""
+    for text in legend.get_texts():
+        text.set_parse_math(False)

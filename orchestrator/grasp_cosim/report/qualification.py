@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..qualification.tube import deviation, tube
+from ..system.made_of import changed
 from ..system.parts import NANOSECONDS
-from .plot import BLUE, GREY, RED, new_figure, save
+from .caption import Caption, about
+from .plot import BLUE, GREY, RED, headed, new_figure, save, shown_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,24 +26,21 @@ ZOOM_SHIFTS, ZOOM_STEPS = 8, 40
 
 
 def draw_qualification(q: Qualification, path: Path) -> None:
-    """The worst signals as a PNG: the run, the worst moment, the deviation beside its band.
+    """The worst signals: the run, the worst moment, the deviation beside its band; see save().
 
     InputError without matplotlib. There must have been a run.
     """
     worst = q.signals[:ROWS]
     figure = new_figure(13.0, 0.6 + 2.5 * len(worst))
-    verdict = "qualified" if q.qualified else "not qualified"
-    figure.suptitle(
-        f"{q.swap.candidate.name} as {q.swap.component}: {verdict}", fontsize=12, fontweight="bold"
-    )
     rows = figure.subplots(len(worst), 3, squeeze=False)
     for compared, (whole, zoom, apart) in zip(worst, rows, strict=True):
         _draw_curves(whole, q, compared)
         _draw_curves(zoom, q, compared)
         _zoom(zoom, q, compared)
         _draw_deviation(apart, q, compared)
-        unit = f" in {compared.unit}" if compared.unit else ""
-        whole.set_ylabel(f"{compared.name}{unit}", fontsize=8)
+        unit = shown_unit(compared.unit)[1]
+        label = f"{compared.name} in {unit}" if unit else compared.name
+        whole.set_ylabel(label, fontsize=8, parse_math=False)
     for axes, title in zip(
         rows[0], ("the run", "the worst moment", "deviation beyond the shift allowed"), strict=True
     ):
@@ -49,6 +48,10 @@ def draw_qualification(q: Qualification, path: Path) -> None:
     for axes in rows[-1]:
         axes.set_xlabel("time in s")
     rows[0][0].legend(fontsize=8, framealpha=0.9)
+    verdict = "qualified" if q.qualified else "not qualified"
+    title = f"{q.swap.candidate.name} as {q.swap.component}: {verdict}"
+    system = q.swap.system
+    headed(figure, Caption(title, f"in {system.name}: {about(changed(system))}"))
     save(figure, path)
 
 
@@ -56,19 +59,23 @@ def _draw_curves(axes: Axes, q: Qualification, compared: Compared) -> None:
     original, candidate = (run[compared.name] for run in q.runs)
     style = "steps-post" if original.held else "default"
     allowed = tube(original, original.time, compared.band.time)
-    width = compared.band.width
+    width, factor = compared.band.width, shown_unit(compared.unit)[0]
     if isfinite(width):
         axes.fill_between(
             allowed.time,
-            allowed.low - width,
-            allowed.high + width,
+            factor * (allowed.low - width),
+            factor * (allowed.high + width),
             color=BLUE,
             alpha=0.2,
             linewidth=0.0,
             label="band",
         )
-    axes.plot(original.time, original.values, color=BLUE, drawstyle=style, label="original")
-    axes.plot(candidate.time, candidate.values, "--", color=RED, drawstyle=style, label="candidate")
+    for run, dashes, color, label in (
+        (original, "-", BLUE, "original"),
+        (candidate, "--", RED, "candidate"),
+    ):
+        values = factor * run.values
+        axes.plot(run.time, values, dashes, color=color, drawstyle=style, label=label)
     _tidy(axes)
 
 
@@ -88,16 +95,18 @@ def _zoom(axes: Axes, q: Qualification, compared: Compared) -> None:
     width = compared.band.width if isfinite(compared.band.width) else 0.0
     margin = width + 0.08 * (high - low) or 1.0
     axes.set_xlim(first, last)
-    axes.set_ylim(low - margin, high + margin)
+    factor = shown_unit(compared.unit)[0]
+    axes.set_ylim(factor * (low - margin), factor * (high + margin))
     axes.axvline(moment, color=GREY, linestyle=":", linewidth=1.0)
 
 
 def _draw_deviation(axes: Axes, q: Qualification, compared: Compared) -> None:
     original, candidate = (run[compared.name] for run in q.runs)
     apart = deviation(original.until(float(candidate.time[-1])), candidate, compared.band.time)
-    axes.plot(apart.time, apart.values, color=RED, linewidth=1.0)
+    factor = shown_unit(compared.unit)[0]
+    axes.plot(apart.time, factor * apart.values, color=RED, linewidth=1.0)
     if isfinite(compared.band.width):
-        axes.axhline(compared.band.width, color=BLUE, linestyle="--", linewidth=1.0)
+        axes.axhline(factor * compared.band.width, color=BLUE, linestyle="--", linewidth=1.0)
     axes.set_ylim(bottom=0.0)
     axes.annotate(
         f"{compared.ratio:.3g} × band" if isfinite(compared.ratio) else "no band",

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING
 
-from .plot import COLORS, GREY, finish, new_figure, save
+from .caption import Caption, about
+from .plot import COLORS, GREY, STYLES, finish, headed, new_figure, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,7 +18,7 @@ MARKERS = ("o", "s", "^", "D", "v", "P")
 
 
 def draw_step_study(study: StepStudy, path: Path) -> None:
-    """Errors of the quantities over the step, below them energies if there are any; a PNG."""
+    """Errors of the quantities over the step, below them energies if there are any; see save()."""
     # A logarithmic axis has no place for 0.
     names = list(dict.fromkeys(n for run in study.runs for n, e in run.energies.items() if e))
     figure = new_figure(7.2, 7.6 if names else 4.4)
@@ -29,6 +30,8 @@ def draw_step_study(study: StepStudy, path: Path) -> None:
         errors = figure.subplots()
         errors.set_xlabel("communication step in ms")
     _draw_errors(errors, study)
+    title = f"{PurePath(study.system).stem}: error over the step, {study.scheme}"
+    headed(figure, Caption(title, about(study.changed)))
     save(figure, path)
 
 
@@ -45,6 +48,7 @@ def _draw_errors(axes: Axes, study: StepStudy) -> None:
         order = "" if convergence.order is None else f", order {convergence.order:.2f}"
         axes.plot(
             *zip(*points, strict=True) if points else ([], []),
+            linestyle=STYLES[i % len(STYLES)],
             marker=MARKERS[i % len(MARKERS)],
             markersize=max(9 - 3 * i, 4),
             color=COLORS[i % len(COLORS)],
@@ -58,7 +62,6 @@ def _draw_errors(axes: Axes, study: StepStudy) -> None:
         _draw_slope(axes, drawn)
     _set_scales(axes, study)
     finish(axes, f"error in {unit}" if unit else "error")
-    axes.set_title(f"{study.system}, {study.scheme}", fontsize=10)
 
 
 def _draw_slope(axes: Axes, points: list[tuple[float, float]]) -> None:
@@ -85,7 +88,8 @@ def _draw_energies(axes: Axes, study: StepStudy, names: list[str]) -> None:
         color = COLORS[i % len(COLORS)]
         ends = [(1e3 * run.step, 1e6 * run.energies.get(name, 0.0)) for run in study.runs]
         found = [(h, e) for h, e in ends if e]
-        axes.plot([h for h, _ in found], [abs(e) for _, e in found], color=color, label=name)
+        steps, sizes = [h for h, _ in found], [abs(e) for _, e in found]
+        axes.plot(steps, sizes, STYLES[i % len(STYLES)], color=color, label=name)
         for h, e in found:
             face = color if e > 0.0 else "none"
             axes.plot([h], [abs(e)], MARKERS[i % len(MARKERS)], color=color, mfc=face)

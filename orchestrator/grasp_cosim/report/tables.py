@@ -103,8 +103,9 @@ def settings_html(result: Result) -> str:
     run = {**result.metrics, **result.settings}
     components = [
         (
-            f"<td>{escape(name)}</td><td>{escape(c['fmu'])}</td>"
-            f'<td class="w">{escape(entries(c["values"])) or "as the FMU starts"}</td>'
+            f'<td>{escape(name)}</td><td data-head="FMU">{escape(c["fmu"])}</td>'
+            f'<td class="w" data-head="start values given">'
+            f"{escape(entries(c['values'])) or 'as the FMU starts'}</td>"
             f"<td>{escape(_how(c))}</td>"
         )
         for name, c in run["components"].items()
@@ -129,7 +130,7 @@ def settings_html(result: Result) -> str:
         ),
     ]
     return (
-        f"<h3>Components, in the order of execution</h3>{table(heads, components)}"
+        f"<h3>Components, in the order of execution</h3>{table(heads, components, 'cards')}"
         f'<div class="two"><section><h3>Experiment</h3>{table("", experiment)}</section>'
         f"{''.join(lists)}</div>"
     )
@@ -145,11 +146,20 @@ def origin_rows(origin: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         yield "command", shlex.join(map(str, origin["command"]))
 
 
-def table(heads: str, rows: Iterable[str]) -> str:
-    """A table of rows of cells that are HTML already."""
+def table(heads: str, rows: Iterable[str], kind: str = "") -> str:
+    """A table of rows of cells that are HTML already; of the kind "cards" each row is a card on a
+    phone, in which the data-head of a cell stands before it.
+    """
     head = f"<thead><tr>{heads}</tr></thead>" if heads else ""
     body = "".join(f"<tr>{row}</tr>" for row in rows)
-    return f'<div class="scroll"><table>{head}<tbody>{body}</tbody></table></div>'
+    of_kind = f' class="{kind}"' if kind else ""
+    return f'<div class="scroll"><table{of_kind}>{head}<tbody>{body}</tbody></table></div>'
+
+
+def svg_button(which: str, name: str) -> str:
+    """Return a button that saves an SVG of the page under a name; `which` selects it."""
+    button = f'<button type="button" data-svg="{which}" data-name="{name}">SVG</button>'
+    return f'<p class="saves">{button}</p>'
 
 
 def bullets(title: str, lines: Iterable[str], none: str) -> str:

@@ -11,12 +11,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import accumulate
 from math import ceil, floor, log10
 from pathlib import Path
-from textwrap import fill
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..realtime.timing import Histogram, Spread, Timing
 from ..recording.result import Result
-from .plot import GREY, RED, as_svg, finish, new_figure, save
+from .caption import Caption, caption
+from .plot import GREY, RED, as_svg, finish, headed, new_figure, save
 from .tables import count
 from .timing_words import (
     BACKLOG,
@@ -50,11 +50,8 @@ SHORTEST = 1e-7
 MOST_STEMS = 100
 """With more overruns there are no lines down to the axis: they would be a wall."""
 
-TIMING = "timing.png"
-"""The file of the chart."""
-
-WIDTH = 120
-"""So many letters of the title fit into a line."""
+TIMING = "timing"
+"""The stem of the file of the chart."""
 
 HANDLE = 5
 """Letters that the line before a text in the legend takes, with the gap after it."""
@@ -92,30 +89,32 @@ OTHERS = {
 """The looks of all that is no component."""
 
 
-def draw_result(result: Result, folder: Path) -> Iterator[Path]:
-    """Draw the picture of a result, and the timing if it was paced; yield each PNG once drawn."""
-    picture = folder / f"{result.drawing.stem}.png"
+def draw_result(result: Result, folder: Path, suffix: str = "png") -> Iterator[Path]:
+    """Draw the picture of a result, and the timing if it was paced; yield each once it is drawn.
+
+    `suffix` is one of files.PICTURES.
+    """
+    picture = folder / f"{result.drawing.stem}.{suffix}"
     result.plot(picture)
     yield picture
     if result.timing:
-        picture = folder / TIMING
-        draw_timing(result.timing, float(result.time[-1]), picture)
+        picture = folder / f"{TIMING}.{suffix}"
+        draw_timing(result.timing, float(result.time[-1]), picture, caption(result))
         yield picture
 
 
-def draw_timing(timing: Timing, end: float, path: Path) -> None:
-    """Draw the chart as a PNG, under a sentence on what was kept.
+def draw_timing(timing: Timing, end: float, path: Path, said: Caption) -> None:
+    """Draw the chart, under its caption and a sentence on what was kept; see plot.save().
 
     `end` is the simulated time in s at the end of the run. InputError without matplotlib.
     """
     figure = _figure(timing, end)
-    title = fill(kept(timing), WIDTH)  # matplotlib's own wrapping takes dollars for formulas
-    figure.suptitle(title, fontsize=11, x=0.01, ha="left", parse_math=False)
+    headed(figure, said._replace(title=f"{said.title}: timing"), kept(timing))
     save(figure, path)
 
 
 def timing_svg(timing: Timing, end: float) -> str:
-    """Return the chart as an SVG element, see draw_timing."""
+    """Return the chart as an SVG element, without a caption: see draw_timing."""
     return as_svg(_figure(timing, end))
 
 

@@ -6,7 +6,7 @@ from html import escape
 
 from ..errors import InputError
 from ..realtime.timing import Timing
-from .tables import bullets, count, number, table
+from .tables import bullets, count, number, svg_button, table
 from .timing import timing_svg
 from .timing_words import QUANTILES, duration, kept, label, quantiles
 
@@ -39,6 +39,7 @@ def _chart(timing: Timing, end: float) -> str:
     text = "how often a part of a step took longer than a time, and how late steps ended"
     return (
         f'<div class="scroll"><div class="chart" role="img" aria-label="{text}">{svg}</div></div>'
+        f"{svg_button('.chart svg', 'timing')}"
     )
 
 

@@ -19,6 +19,7 @@ from .checks import (
     check_solvers,
     check_steps,
 )
+from .made_of import made_of
 from .parts import LONGEST, NANOSECONDS, Isolation
 from .scenario_checks import check_scenario
 from .stimuli import Stimuli, read_stimuli
@@ -48,6 +49,8 @@ class System(Structure):
         check_initialisation(self)
         for role, name in self.roles.items():
             self.component(name, f"{self.name}: [roles]: {role} = {name!r}")
+        if not self.as_read:  # copies keep it
+            object.__setattr__(self, "as_read", made_of(self))
 
     @classmethod
     def load(

@@ -4,9 +4,15 @@ from dataclasses import asdict
 from typing import Any
 
 from .description import System
+from .made_of import changed
 from .parts import NANOSECONDS
 from .scenario import event_entry, fault_entry
 from .stimuli import input_entry
+
+
+def run_settings(system: System) -> dict[str, Any]:
+    """The settings of a run: those of its system, and what of these is not as it was read."""
+    return {**settings(system), "changed": changed(system)}
 
 
 def settings(system: System) -> dict[str, Any]:

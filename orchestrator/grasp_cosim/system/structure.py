@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 from ..errors import InputError, nearest
 from ..interface.interface import Given, Variable
@@ -25,6 +25,7 @@ class Structure:
     name the component that plays a role, such as plant; where they do not, the component of that
     name plays it. presets are values under a name, like {"bench": {"sensor_1.noise.seed": 1}}.
     diverging is what a run does where a signal runs away. input drives inputs without a connection.
+    as_read is what the system was made of when it was read, see system.settings.made_of.
     """
 
     name: str
@@ -41,6 +42,7 @@ class Structure:
     presets: Mapping[str, Mapping[str, Given]] = field(default_factory=dict)
     diverging: Diverging = "stop"
     input: Stimuli | None = None
+    as_read: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
 
     @property
     def total_steps(self) -> int:

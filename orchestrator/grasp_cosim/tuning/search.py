@@ -13,15 +13,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from itertools import repeat
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from tqdm import tqdm
 
 from ..checks import extra_module, number, whole
 from ..errors import InputError
-from ..parallel import Crew, Lost, progress_bar
+from ..parallel import Crew, Lost
+from ..progress import Progress
 from ..sweep.run import Job, Outcome, Task, run_job
 from .problem import Condition, Problem
 
@@ -156,7 +155,7 @@ def tune(
     whole("seed", seed, 0, must="a whole number from 0")
     total = budget * len(problem.conditions) + 2 * len(problem.checks)
     with (
-        progress_bar("tune", total, progress) as bar,
+        Progress("tune", total, shown=progress) as bar,
         Crew(workers or os.cpu_count() or 1) as crew,
     ):
         runs = Runs(problem, crew, bar)
@@ -170,7 +169,7 @@ def tune(
 class Runs:
     """The points of a problem, each run once; workers only compute, what is next is said here."""
 
-    def __init__(self, problem: Problem, crew: Crew, bar: tqdm[Any]) -> None:
+    def __init__(self, problem: Problem, crew: Crew, bar: Progress) -> None:
         self.problem, self._crew, self._bar = problem, crew, bar
         self.known: dict[tuple[float, ...], Point] = {}
 

@@ -138,7 +138,7 @@ def test_a_claim_that_fails_is_exit_1(
 
     def evaluated(system: System, *more: object) -> dict[str, Any]:
         assert system.start("sensor_1.noise.enabled") == 1.0
-        assert more[-1] == "experiment"
+        assert more[-2:] == ("experiment", "png")
         return made
 
     monkeypatch.setattr("grasp_cosim.cli.commands.evaluate.run_evaluation", evaluated)

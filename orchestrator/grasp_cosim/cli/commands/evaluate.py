@@ -8,6 +8,7 @@ import click
 
 from ...files import check_folder
 from ...grasp.presets import with_preset
+from ...grasp.published.evaluate import PICTURES
 from ...grasp.published.evaluate import evaluate as run_evaluation
 from ...grasp.published.store import FOLDER
 from ...grasp.published.tables import Source
@@ -18,6 +19,7 @@ from ..frame import (
     NEGATIVE,
     PATH,
     fail,
+    format_option,
     is_quiet,
     json_option,
     load_system,
@@ -41,6 +43,7 @@ from ..options import controller_option
 )
 @workers_option
 @many_runs_option
+@format_option
 @json_option
 def evaluate(
     bench: bool,
@@ -48,6 +51,7 @@ def evaluate(
     out: Path,
     workers: int,
     native: bool | None,
+    suffix: str,
     as_json: bool,
 ) -> int:
     """Run the published table and figures, and compare.
@@ -64,17 +68,17 @@ def evaluate(
     system = with_preset(system, "bench") if bench else system
     try:
         with natively(system, native) as chosen:
-            report = run_evaluation(chosen, out, workers, not is_quiet(), source)
+            report = run_evaluation(chosen, out, workers, not is_quiet(), source, suffix)
     except KeyboardInterrupt:
         kept = Parts(out / FOLDER).kept()
         goes_on = f"; {counted(kept, 'grasp')} kept in {out / FOLDER}, the same command goes on"
         return fail(f"interrupted{goes_on if kept else ''}", INTERRUPTED)
     holds = all(claim["holds"] for claim in report["claims"])
-    show(as_json, report, _verdict(report, out))
+    show(as_json, report, _verdict(report, out, suffix))
     return 0 if holds else NEGATIVE
 
 
-def _verdict(report: Mapping[str, Any], out: Path) -> str:
+def _verdict(report: Mapping[str, Any], out: Path, suffix: str) -> str:
     rms = ", ".join(
         f"{name.replace('_', ' ')} {fixed(value, 3, rounded=True)}"
         for name, value in report["rms"].items()
@@ -83,7 +87,7 @@ def _verdict(report: Mapping[str, Any], out: Path) -> str:
         [
             *(f"{'holds' if c['holds'] else 'FAILS'}  {c['text']}" for c in report["claims"]),
             f"root mean square of the differences in s: {rms}",
-            f"report: {out / 'report.md'}   pictures: {out / 'contact_forces.png'}, "
-            f"{out / 'target_position.png'}, {out / 'contact_times.png'}",
+            f"report: {out / 'report.md'}   pictures: "
+            + ", ".join(str(out / f"{name}.{suffix}") for name in PICTURES),
         ]
     )

@@ -6,7 +6,7 @@ from typing import Any
 import click
 
 from ...extensions import readers
-from ...files import remove, write_json, write_text
+from ...files import of_any_format, remove, write_json, write_text
 from ...interface.read import check_runs
 from ...qualification import verdict
 from ...qualification.bands import read_bands
@@ -21,6 +21,7 @@ from ..frame import (
     PATH,
     check_outputs,
     chosen_metrics,
+    format_option,
     is_quiet,
     json_option,
     load_system,
@@ -60,6 +61,7 @@ from ..options import chosen_system, names_options, replacements, set_values, sy
     type=PATH,
     help="Folder for qualification.json, qualification.png and bands_used.toml.",
 )
+@format_option
 @json_option
 def qualify(
     candidate: Path,
@@ -69,6 +71,7 @@ def qualify(
     native: bool | None,
     metric_files: tuple[Path, ...],
     out: Path | None,
+    suffix: str,
     as_json: bool,
     **given: Any,
 ) -> int:
@@ -101,15 +104,15 @@ def qualify(
             metrics=chosen_metrics(metric_files),
         )
     if out:
-        _write(found, out)
+        _write(found, out, suffix)
     show(as_json, verdict.as_json(found), verdict.as_text(found))
     return 0 if found.qualified else NEGATIVE
 
 
-def _write(found: Qualification, out: Path) -> None:
+def _write(found: Qualification, out: Path, suffix: str) -> None:
     """What there is: without a run there is no band and no figure, not even an earlier one."""
-    figure, bands = out / "qualification.png", out / "bands_used.toml"
-    remove(out, "qualification.json", figure.name, bands.name)
+    figure, bands = out / f"qualification.{suffix}", out / "bands_used.toml"
+    remove(out, "qualification.json", bands.name, *of_any_format(figure.stem))
     write_json(out / "qualification.json", verdict.as_json(found))
     if found.signals:
         write_text(bands, verdict.as_bands(found))

@@ -5,18 +5,20 @@ from pathlib import Path
 import click
 
 from ...errors import InputError
-from ...files import check_folder, remove_parts
+from ...files import check_folder, of_any_format, remove_parts
 from ...recording.load import load_run, run_folder
 from ...report.page import write_page
 from ...report.timing import TIMING, draw_result
-from ..frame import PATH, json_option, say, show
+from ..frame import PATH, format_option, json_option, say, show, title_option
 
 
 @click.command()
 @click.argument("run", type=PATH)
 @click.option("--out", type=PATH, help="The page. Default: RUN/report.html")
+@title_option
+@format_option
 @json_option
-def report(run: Path, out: Path | None, as_json: bool) -> int:
+def report(run: Path, out: Path | None, title: str, suffix: str, as_json: bool) -> int:
     """Make a page of RUN, a folder that `run --out` wrote.
 
     It has traces, metrics, connections and settings. The page is one file that needs nothing else.
@@ -27,17 +29,17 @@ def report(run: Path, out: Path | None, as_json: bool) -> int:
     Example: grasp-cosim report results
     """
     run = run_folder(run)
-    recorded = load_run(run)
+    recorded = load_run(run).titled(title)
     if recorded.wall_time is None:
         say(f"{run}: unfinished, to t = {recorded.time[-1]:.6g} s")
     page = out or run / "report.html"
     check_folder(page.parent)
-    remove_parts(page.parent, page.name, f"{recorded.drawing.stem}.png", TIMING)
+    remove_parts(page.parent, page.name, *of_any_format(recorded.drawing.stem, TIMING))
     scene = recorded.drawing.scene(recorded)
-    write_page(recorded, run.resolve().name, page, scene=scene)
+    write_page(recorded, page, scene=scene)
     drawn: list[str] = []
     try:
-        drawn += map(str, draw_result(recorded, page.parent))
+        drawn += map(str, draw_result(recorded, page.parent, suffix))
     except InputError as error:
         say(f"no picture: {error}")
     size = page.stat().st_size

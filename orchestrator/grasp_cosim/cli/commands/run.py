@@ -1,5 +1,6 @@
 """The command run."""
 
+from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -24,12 +25,14 @@ from ..frame import (
     check_outputs,
     chosen_metrics,
     fail,
+    format_option,
     is_quiet,
     json_option,
     metrics_option,
     pair,
     say,
     show,
+    title_option,
 )
 from ..native import native_option, natively
 from ..options import (
@@ -65,6 +68,8 @@ from ..step_study import check_step_study, step_study_options, study_step
     is_flag=True,
     help="Draw grasp.png, and timing.png with --realtime, in --out or the current folder.",
 )
+@format_option
+@title_option
 @click.option("--mdf", is_flag=True, help="Write signals.mf4 (ASAM MDF 4) too; needs --out.")
 @click.option(
     "--every", type=click.IntRange(1, MOST), default=1, help="Record each N-th step only."
@@ -95,6 +100,7 @@ def run(
     every: int,
     engine: Engine,
     metric_files: tuple[Path, ...],
+    title: str,
     as_json: bool,
     **given: Any,
 ) -> int:
@@ -115,10 +121,9 @@ def run(
     if mdf:
         check_mdf()
     check_outputs(out, given["plot"])
-    command = ("grasp-cosim", *click.get_current_context().find_root().obj)
     with (
         natively(system, bool(given["native"])) as chosen,
-        RunFolder(out, chosen, command, paced is not None) if out else nullcontext() as folder,
+        _folder(out, chosen, paced is not None, title) as folder,
     ):
         try:
             result = simulate(
@@ -133,16 +138,24 @@ def run(
             )
         except SimulationError as error:
             if error.result:
-                _write(error.result, folder, out, given["plot"], mdf)
+                _write(error.result.titled(title), folder, given, mdf)
                 if out:
                     say(f"kept what was recorded, in {out}")
             raise
-        _write(result, folder, out, given["plot"], mdf)
+        _write(result.titled(title), folder, given, mdf)
     show(as_json, _as_json(result), _summary(result))
     if not result.complete:
         message = f"interrupted at t = {result.time[-1]:.6g} s; kept what was recorded"
         return fail(message, INTERRUPTED)
     return 0 if result.signals else NEGATIVE  # as the log says
+
+
+def _folder(
+    out: Path | None, system: System, paced: bool, title: str
+) -> RunFolder | nullcontext[None]:
+    """The folder of the run, if it is to have one."""
+    command = ("grasp-cosim", *click.get_current_context().find_root().obj)
+    return RunFolder(out, system, command, paced, title) if out else nullcontext()
 
 
 def _chosen(given: dict[str, Any], swaps: tuple[str, ...]) -> System:
@@ -159,16 +172,16 @@ def _chosen(given: dict[str, Any], swaps: tuple[str, ...]) -> System:
     return isolations(swapped, given["isolation"])
 
 
-def _write(
-    result: Result, folder: RunFolder | None, out: Path | None, plot: bool, mdf: bool
-) -> None:
+def _write(result: Result, folder: RunFolder | None, given: Mapping[str, Any], mdf: bool) -> None:
+    out, suffix = given["out"], given["suffix"]
     if folder:
         folder.finish(result)
     if not result.signals:
         return
     if out and mdf:
         result.to_mdf(out / "signals.mf4")
-    for picture in draw_result(result, out or Path()) if plot and result.numbers else ():
+    plot = given["plot"] and result.numbers
+    for picture in draw_result(result, out or Path(), suffix) if plot else ():
         say(f"drew {picture}")
 
 

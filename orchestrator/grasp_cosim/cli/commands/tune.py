@@ -23,6 +23,7 @@ from ..frame import (
     PATH,
     check_outputs,
     chosen_metrics,
+    is_quiet,
     json_option,
     metrics_option,
     pair,
@@ -112,7 +113,7 @@ def tune(as_json: bool, **given: Any) -> int:
                 problem.gains, problem.minimise, problem.limits, tuple(run[:tuned]),
                 tuple(run[tuned:]), problem.metrics,
             ),
-            given["budget"], given["seed"], given["workers"], progress=True,
+            given["budget"], given["seed"], given["workers"], progress=not is_quiet(),
         )  # fmt: skip
     start = "published" if of_grasp.is_published(problem.system, problem.gains) else "as it is"
     _write(found, out, given["plot"], start)

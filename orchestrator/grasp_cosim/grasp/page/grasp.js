@@ -179,7 +179,11 @@ class Grasp {
     pen.restore();
     pen.fillStyle = color("--muted");
     pen.textAlign = "center";
-    pen.fillText(`contact of finger ${j}, ${1e3 * LENS} mm wide`, middle, top + tall + 12);
+    pen.fillText(wide < 200 ? `finger ${j}, ${1e3 * LENS} mm wide`
+      : `contact of finger ${j}, ${1e3 * LENS} mm wide`, middle, top + tall + 12);
+    if (Math.abs(apart) < LENS / 2) return; // else it is not in this window yet: how far away it is
+    pen.fillText(`${text(1e3 * Math.abs(apart), 1)} mm${wide < 200 ? "" : " away"}`, j === 1 ? middle + wide / 4
+      : middle - wide / 4, top + tall / 2);
   }
 
   readings(t) {
@@ -187,9 +191,10 @@ class Grasp {
       const series = this.series.get(cell.dataset.signal);
       const value = valueAt(this.recording.time, series, t);
       const top = series.levels.at(-1); // of the whole run, so that the unit stays the same
+      const sign = (page.negated ?? []).includes(cell.dataset.signal) ? -1 : 1;
       const { factor, unit } = scaled(
         series.unit, Math.max(...top.high.map(Math.abs), ...top.low.map(Math.abs)));
-      cell.textContent = series.steps ? (value ? "yes" : "no") : `${text(value * factor)} ${unit}`;
+      cell.textContent = series.steps ? (value ? "yes" : "no") : `${text(sign * value * factor || 0)} ${unit}`;
     }
   }
 }

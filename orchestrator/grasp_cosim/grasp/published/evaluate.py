@@ -12,28 +12,28 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ...files import remove, write_json, write_text
+from ...files import of_any_format, remove, write_json, write_text
 from ...metrics.metric import registered
 from ...parallel import run_all
 from ...recording.result import UNITS
-from ...report.plot import new_figure, save
+from ...report.caption import Caption, about
+from ...report.plot import headed, new_figure, one_legend, save
 from ...sweep.store import Parts
 from ...system.description import System
+from ...system.made_of import changed
 from ..closing import close
 from ..pictures import draw_contact_forces, draw_contact_times, draw_targets
 from ..presets import CASES, start_in_si, with_case, with_si_values
 from .claims import Evidence, check_claims
 from .grasps import Run, Runs, as_run
-from .report import bench_markdown, markdown, table_csv
+from .report import bench_markdown, controller_fmu, markdown, table_csv
 from .store import FOLDER, Grasps, Job
 from .tables import REFLECTANCE_X_M, Row, Source, published_rows
 
 Deviations = Callable[[Sequence[Row], Sequence[Mapping[str, Any]]], dict[str, float]]
 
-WRITTEN = (
-    "report.md", "evaluation.json", "evaluation.csv", "contact_times.png", "target_position.png",
-    "contact_forces.png",
-)  # fmt: skip
+WRITTEN = ("report.md", "evaluation.json", "evaluation.csv")
+PICTURES = ("contact_times", "target_position", "contact_forces")
 
 BOOKKEEPING = ("wall_time", "real_time_factor")
 """What differs from one repetition of a grasp to the next."""
@@ -43,9 +43,11 @@ BOOKKEEPING = ("wall_time", "real_time_factor")
 class Evaluation:
     """How the figures of one source are run again.
 
-    A grasp lasts `stop` s, or ends `after` s once both fingers touch; figures end at `shown` s.
+    A grasp lasts `stop` s, or ends `after` s once both fingers touch; figures end at `shown` s,
+    `title` is what they begin with.
     """
 
+    title: str
     stop: float
     after: float | None
     shown: float
@@ -55,12 +57,17 @@ class Evaluation:
 
 
 def evaluate(
-    system: System, out: Path, workers: int, progress: bool, source: Source = "simulation"
+    system: System,
+    out: Path,
+    workers: int,
+    progress: bool,
+    source: Source = "simulation",
+    suffix: str = "png",
 ) -> dict[str, Any]:
     """Run Cases 0, 1 and 2 in all published settings of a source and write everything to `out`.
 
-    Writes contact_forces.png, target_position.png, contact_times.png, evaluation.csv,
-    evaluation.json and report.md. Returns what evaluation.json holds. A finished grasp is in a
+    Writes the PICTURES in the format that suffix names, evaluation.csv, evaluation.json and
+    report.md. Returns what evaluation.json holds. A finished grasp is in a
     folder there until all are: after a kill the same call goes on.
 
     InputError without matplotlib or where another process is at it, KeyboardInterrupt at Ctrl-C.
@@ -93,13 +100,15 @@ def evaluate(
             ],
             "units": _units(rows, next(iter(runs.values()))),
         }
-        remove(out, *WRITTEN)
-        _draw_signals(runs, how.shown, out)
-        _draw_times(rows, out / "contact_times.png")
+        remove(out, *WRITTEN, *of_any_format(*PICTURES))
+        said = Caption(f"{how.title}, {controller_fmu(system)}", about(changed(system)))
+        _draw_signals(runs, how.shown, out, said, suffix)
+        _draw_times(rows, out, said, suffix)
         named = [{**r, "finger": r["finger"] or "difference"} for r in rows]
         write_text(out / "evaluation.csv", table_csv(named))
         write_json(out / "evaluation.json", report)
-        write_text(out / "report.md", how.page(report, system))
+        page = how.page(report, system)
+        write_text(out / "report.md", page.replace(".png)", f".{suffix})"))
         grasps.remove()
     return report
 
@@ -191,40 +200,46 @@ def bench_rms(published: Sequence[Row], rows: Sequence[Mapping[str, Any]]) -> di
     return {name: _rms(values) for name, values in sorted(groups.items())}
 
 
-def _draw_signals(runs: Runs, until: float, out: Path) -> None:
+def _draw_signals(runs: Runs, until: float, out: Path, said: Caption, suffix: str) -> None:
     """The figures of contact forces and of the target, the object at REFLECTANCE_X_M."""
     shown = {r.case: r.result for r in runs.values() if r.result}
-    pair = [(shown[1], "--", "Case 1"), (shown[2], "-", "Case 2")]
-    where = f"object at {1e3 * REFLECTANCE_X_M:.0f} mm"
-    forces, targets = new_figure(7.2, 6.4), new_figure(7.2, 4.0)
-    top, bottom = forces.subplots(2, 1, sharex=True)
-    axes = targets.subplots()
-    draw_contact_forces(top, pair)
-    draw_contact_forces(bottom, [(shown[0], "-", "Case 0")])
-    draw_targets(axes, pair)
-    top.set_title(f"Contact forces, {where}", fontsize=10)
-    axes.set_title(f"Target position, {where}", fontsize=10)
-    for lowest in (bottom, axes):
-        lowest.set_xlabel("time in s")
-        lowest.set_xlim(0.0, until)
-    save(forces, out / "contact_forces.png")
-    save(targets, out / "target_position.png")
+    forces, targets = new_figure(7.2, 7.0), new_figure(7.2, 4.0)
+    rows = forces.subplots(len(CASES), 1, sharex=True)
+    for axes, case in zip(rows, CASES, strict=True):
+        draw_contact_forces(axes, shown[case])
+        axes.set_title(f"Case {case}", fontsize=10)
+    lowest = targets.subplots()
+    draw_targets(lowest, [(shown[1], "--", "Case 1"), (shown[2], "-", "Case 2")])
+    for axes in (rows[-1], lowest):
+        axes.set_xlabel("time in s")
+        axes.set_xlim(0.0, until)
+    for figure, what in ((forces, "contact forces"), (targets, "target position")):
+        one_legend(figure)
+        title = f"{said.title}: {what}, object at {1e3 * REFLECTANCE_X_M:.0f} mm"
+        headed(figure, said._replace(title=title))
+        save(figure, out / f"{what.replace(' ', '_')}.{suffix}")
 
 
-def _draw_times(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
+def _draw_times(rows: Sequence[Mapping[str, Any]], out: Path, said: Caption, suffix: str) -> None:
     """The contact times of Cases 1 and 2 side by side, a row of axes for each table."""
     tables = list(dict.fromkeys(r["table"] for r in rows))
-    figure = new_figure(9.0, 4.0) if len(tables) == 1 else new_figure(11.0, 8.0)
+    figure = new_figure(9.0, 4.3) if len(tables) == 1 else new_figure(11.0, 8.3)
     axes = figure.subplots(len(tables), 2, sharey="row", squeeze=False)
     for table, pair in zip(tables, axes, strict=True):
         for case, one in enumerate(pair, start=1):
             draw_contact_times(one, [r for r in rows if r["table"] == table], case)
-    save(figure, path)
+    one_legend(figure)
+    headed(figure, said._replace(title=f"{said.title}: contact times, simulated and published"))
+    save(figure, out / f"contact_times.{suffix}")
 
 
 SOURCES: Mapping[Source, Evaluation] = {
     # The slowest contact is at 2.7 s, and the layers settle with a time constant of 0.2 s.
-    "simulation": Evaluation(4.5, None, 3.0, simulation_rms, True, markdown),
+    "simulation": Evaluation(
+        "Published simulation", 4.5, None, 3.0, simulation_rms, True, markdown
+    ),
     # Twice the slowest published contact; a grasp goes on for 1.5 s once both fingers touch.
-    "experiment": Evaluation(10.0, 1.5, 5.0, bench_rms, False, bench_markdown),
+    "experiment": Evaluation(
+        "Published experiments", 10.0, 1.5, 5.0, bench_rms, False, bench_markdown
+    ),
 }

@@ -105,7 +105,12 @@ on both sides is the row of 0.03 m once more and counts once there.
 
 def _controller(system: System) -> str:
     """The controller, by its FMU."""
-    return f"with {system.component(controller_name(system), system.name).fmu.stem}"
+    return f"with {controller_fmu(system)}"
+
+
+def controller_fmu(system: System) -> str:
+    """Return the name of the controller's FMU."""
+    return system.component(controller_name(system), system.name).fmu.stem
 
 
 def _table(rows: Sequence[Mapping[str, Any]]) -> str:

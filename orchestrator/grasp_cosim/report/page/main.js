@@ -2,22 +2,29 @@
 "use strict";
 
 const recording = new Recording(page);
+const MOST = 6; // lines of a panel
 let chosen = [...page.shown], asked = 0;
 
 // Panels -------------------------------------------------------------------------------------
 const stem = (name) => name.slice(name.indexOf(".") + 1).replace(/\[[^\]]*\]$/, "");
 
-function styles(series) { // the colours that signals have, else colours in turn
+function styles(series) { // the colours and dashes that signals have, else some in turn
   const kinds = [...new Set(series.map((one) => stem(one.name)))];
   return series.map((one, i) => {
-    const own = page.colors[one.name];
-    const dash = own && find("by").value === "unit" ? kinds.indexOf(stem(one.name)) : 0;
+    const own = page.colors[one.name], kind = kinds.indexOf(stem(one.name));
+    const dash = own ? 2 * kind + (page.dashes[one.name] || 0) : i;
     return { ...one,
       style: { color: own || PALETTE[i % PALETTE.length], dash: dash % DASHES.length } };
   });
 }
 
-function grouped(series) { // those of one panel, by its title
+function signed(one) { // with the sign that it has in pictures, which its label says
+  if (!page.negated.includes(one.name)) return one;
+  const values = one.values.map((value) => 0 - value);
+  return { ...one, label: `−${one.name}`, values, levels: pyramid(values) };
+}
+
+function grouped(series, most = MOST) { // those of one panel, by its title; several of more
   const groups = new Map();
   for (const one of series) {
     const unit = one.unit ? ` in ${one.unit}` : "";
@@ -25,7 +32,11 @@ function grouped(series) { // those of one panel, by its title
     const title = find("by").value === "unit" ? one.unit || "no unit" : name + unit;
     groups.set(title, [...(groups.get(title) || []), one]);
   }
-  return [...groups].map(([title, group]) => [title.replace(/ in \S*$/, ""), group]);
+  return [...groups].flatMap(([title, group]) => {
+    const parts = Math.ceil(group.length / most), plain = title.replace(/ in \S*$/, "");
+    return Array.from({ length: parts }, (_, k) => [plain, group.slice(k * most, (k + 1) * most),
+      parts > 1 ? ` (${k + 1} of ${parts})` : ""]);
+  });
 }
 
 function choose(names) {

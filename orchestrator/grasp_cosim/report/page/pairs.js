@@ -15,26 +15,33 @@ async function pair(name) { // the signal of A, and all that is drawn with it
   const signal = recording.byName.get(name), { b, low, high, apart } = signal.pair;
   const found = [signal.id, b, apart, ...(low ? [low, high] : [])].map(part);
   const [first, second, distance, least, most] = await Promise.all(found);
-  return { ...signal, first, second, distance,
-    tube: least && { low: least.levels, high: most.levels } };
+  const tube = least && { low: least.levels, high: most.levels };
+  if (!page.negated.includes(name)) return { ...signal, label: name, first, second, distance, tube };
+  const negative = ({ values }) => {
+    const turned = values.map((value) => 0 - value);
+    return { values: turned, levels: pyramid(turned) };
+  };
+  return { ...signal, label: `−${name}`, first: negative(first), second: negative(second), distance,
+    tube: least && { low: negative(most).levels, high: negative(least).levels } };
 }
 
 function overlaid(one, i) { // several signals of a panel differ in the width of A and the dashes of B
   const { first, second, tube, style } = one, which = i % 3;
   return [
-    { ...one, ...first, tube, name: `A ${one.name}`,
+    { ...one, ...first, tube, label: `A ${one.label}`,
       style: { ...style, dash: 0, width: [5, 2.5, 8][which] } },
-    { ...one, ...second, tube: null, name: `B ${one.name}`,
+    { ...one, ...second, tube: null, label: `B ${one.label}`,
       style: { ...style, dash: 1 + which } },
   ];
 }
 
 function distances(one) {
-  const { distance, width, style } = one, plain = { ...one, tube: null, texts: null };
-  const found = [{ ...plain, ...distance, style: { ...style, dash: 0 } }];
+  const { distance, width, style } = one;
+  const plain = { ...one, label: one.name, tube: null, texts: null };
+  const found = [{ ...plain, ...distance, style }];
   if (width !== null) {
     const values = new Float64Array(recording.rows).fill(width);
-    found.push({ ...plain, values, levels: pyramid(values), name: "its band",
+    found.push({ ...plain, values, levels: pyramid(values), label: "its band",
       style: { ...style, dash: 2 } });
   }
   return found;
@@ -52,13 +59,13 @@ async function show() {
   const series = await Promise.all(chosen.map(pair));
   if (order !== asked) return; // the choice has changed meanwhile
   find("plots").replaceChildren();
-  panels = grouped(series).flatMap(([title, group]) => {
+  panels = grouped(series, MOST / 2).flatMap(([title, group, part]) => {
     const styled = styles(group);
-    const panel = new Panel(recording, title, styled.flatMap(overlaid), find("plots"));
+    const panel = new Panel(recording, title, styled.flatMap(overlaid), find("plots"), part);
     const below = new Panel(
-      recording, `${title}: deviation`, styled.flatMap(distances), find("plots"));
+      recording, `${title}: deviation`, styled.flatMap(distances), find("plots"), part);
     below.root.classList.add("apart");
-    return [panel, below];
+    return [panel, below].map(saving);
   });
   find("none").hidden = panels.length > 0;
   redraw();

@@ -20,6 +20,7 @@ function key(event) {
 
 function connect() {
   gestures();
+  offers();
   document.addEventListener("keydown", key);
   find("by").addEventListener("change", show);
   find("signals").addEventListener("change", (event) => {

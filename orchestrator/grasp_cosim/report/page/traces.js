@@ -4,12 +4,16 @@
 const GUTTER = 66, RIGHT = 12, TOP = 8, AXIS = 20; // px around the plotted area
 const PREFIXED = /^(m|N|V|J|W|A|Pa|Hz|s|rad|m\/s|m\/s2|rad\/s|N\.s|N\.m)$/;
 const PALETTE = ["--c0", "--c1", "--c2", "--c3", "--c4", "--c5", "--c6", "--c7"];
-const DASHES = [[], [6, 3], [2, 2], [8, 3, 2, 3]];
+const DASHES = [[], [6, 3], [2, 2], [8, 3, 2, 3], [12, 4], [1, 4]];
+const HOME = { m: [1e3, "mm"], "m/s": [1e3, "mm/s"], N: [1, "N"], s: [1e3, "ms"] };
 
 const color = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
-// A factor and a unit that make the largest value readable, like 1e3 and mm.
+// A factor and a unit that make the largest value readable: lengths in mm, forces in N and so on
+// where they are neither tiny nor huge there; all else by prefixes.
 function scaled(unit, largest) {
+  const [own, home] = HOME[unit] || [1, ""];
+  if (home && largest * own >= 1e-3 && largest * own < 1e6) return { factor: own, unit: home };
   if (!PREFIXED.test(unit || "") || !(largest > 0) || largest === Infinity) {
     return { factor: 1, unit: unit || "" };
   }
@@ -52,9 +56,11 @@ function fitted(canvas) { // the context of a canvas, cleared, in CSS pixels
 const rows = (begin, end) => Int32Array.from({ length: end - begin + 1 }, (_, i) => begin + i);
 
 class Panel {
-  constructor(recording, title, series, parent) {
+  // Of several panels of one title, part says which this is.
+  constructor(recording, title, series, parent, part = "") {
     this.recording = recording;
-    this.series = series; // each with values, levels, style: {color, dash}, and, if it is fixed, scale
+    this.part = part;
+    this.series = series; // each: values, levels, style: {color, dash}; maybe a fixed scale, a label
     this.root = document.createElement("section");
     this.root.className = "panel";
     this.root.innerHTML = "<header><h3></h3><ul></ul></header><canvas></canvas>";
@@ -67,12 +73,12 @@ class Panel {
       const item = document.createElement("li"), value = document.createElement("output");
       item.style.setProperty("--line", `var(${one.style.color})`);
       item.dataset.dash = one.style.dash;
-      if (one.style.width) {
-        item.classList.add("wide");
-        item.style.setProperty("--width", `${one.style.width}px`);
-      }
+      item.classList.toggle("wide", Boolean(one.style.width));
       item.title = one.text;
-      item.append(one.name, value);
+      const wide = Math.min(one.style.width || 2, 5), dashes = DASHES[one.style.dash].join(" ");
+      item.innerHTML = `<svg width="28" height="8"><line x2="28" y1="4" y2="4" stroke-width="${wide}"
+        stroke-dasharray="${dashes}"/></svg>`;
+      item.append(one.label || one.name, value);
       this.root.querySelector("ul").append(item);
       return value;
     });
@@ -108,8 +114,8 @@ class Panel {
     const y = (v) => plot.bottom - (v - low + margin) / (high - low + 2 * margin)
       * (plot.bottom - plot.top);
     this.axes(pen, plot, view, x, y, [(low - margin) * factor, (high + margin) * factor], factor);
-    this.heading.textContent = unit && this.title !== this.series[0].unit
-      ? `${this.title} in ${unit}` : unit || this.title;
+    this.heading.textContent = (unit && this.title !== this.series[0].unit
+      ? `${this.title} in ${unit}` : unit || this.title) + this.part;
     this.canvas.dataset.low = low;
     this.canvas.dataset.high = high;
     pen.save();

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from grasp_cosim.grasp import pictures
 from grasp_cosim.recording.result import Result
-from report.runs import TOUCH, grasp_run
+from report.runs import TOUCH, component, grasp_run
 from support.slow import slow
 
 
@@ -54,11 +54,42 @@ def test_close_ups_of_the_contacts(
     assert width(tmp_path / "grasp.png") == int(130 * (7.2 + 2.9 * len(close_ups)))
 
 
-def test_the_picture_says_which_controller_it_was() -> None:
+def test_the_picture_says_what_it_shows() -> None:
     run = touching_from(grasp_run(), {})
-    own = {"components": {"controller": {"fmu": "My$Law$.fmu"}}}
-    for settings, title in ((own, "My$Law$"), ({}, "")):
-        assert pictures.draw_grasp(replace(run, settings=settings)).get_suptitle() == title
+    parts = {**run.settings["components"], "controller": component("My$Law$.fmu")}
+    changed = {"plant.object_width": 0.06, "controller.impact_reduction.enabled": False}
+    own = replace(run, settings={**run.settings, "components": parts, "changed": changed})
+    assert said(own) == [
+        "grasp, case 2, My$Law$",
+        "plant.object_width = 0.06, controller.impact_reduction.enabled = false · 2026-01-02 · "
+        "grasp-cosim 1.2.3",
+    ]
+    assert said(own.titled("$Mine$"))[0] == "$Mine$"
+
+
+def said(run: Result) -> list[str]:
+    """What the picture of a run says above its panels, lines joined."""
+    return [text.get_text().replace("\n", " ") for text in pictures.draw_grasp(run).texts]
+
+
+def test_fingers_differ_in_grey_and_there_is_one_legend() -> None:
+    figure = pictures.draw_grasp(grasp_run())
+    for axes in figure.axes:
+        assert axes.get_legend() is None
+        dashes = {line.get_label(): line.get_linestyle() for line in axes.lines}
+        for finger, style in (("finger 1", "-"), ("finger 2", "--")):
+            assert dashes.get(finger, style) == style
+    (legend,) = figure.legends
+    names = [text.get_text() for text in legend.get_texts()]
+    assert names == ["finger 1", "finger 2", "target", "centre of the object"]
+
+
+def test_a_peak_above_the_axes_is_written_there() -> None:
+    run = grasp_run()
+    name = "plant.contact_force[2]"
+    hard = replace(run, signals={**run.signals, name: 40.0 * run.signals[name]})
+    texts = [text.get_text() for text in pictures.draw_grasp(hard).axes[3].texts]
+    assert texts == ["peaks: 3 and 136 N"]
 
 
 def test_a_close_up_shows_the_samples_around_the_contact() -> None:

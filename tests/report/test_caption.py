@@ -1,0 +1,43 @@
+"""What pictures and pages say of themselves."""
+
+from dataclasses import replace
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+from grasp_cosim.recording.load import load_run
+from grasp_cosim.report.caption import about, caption, changes, today
+from report.runs import grasp_run, ring_run, write_run
+
+
+def test_a_title_is_the_one_asked_for_else_that_of_the_run_else_what_it_is(tmp_path: Path) -> None:
+    run = grasp_run()
+    assert caption(run).title == "grasp, case 2, GraspController"
+    assert caption(ring_run(["a"])).title == "grasp"
+    write_run(tmp_path / "results", run.titled("Before lunch"))
+    kept = load_run(tmp_path / "results")
+    assert caption(kept).title == "Before lunch"
+    assert caption(kept, "After").title == caption(kept.titled("After")).title == "After"
+
+
+def test_a_run_without_a_date_says_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1000000000")
+    run = replace(grasp_run(), origin={})
+    fresh = f"2001-09-09 · grasp-cosim {version('grasp-cosim')}"
+    assert caption(run).about == fresh
+    assert not caption(replace(run, folder=Path("results"))).about
+    changed = replace(run, settings={**run.settings, "changed": {}})
+    assert caption(changed).about == f"as in the system file · {fresh}"
+
+
+def test_many_changes_are_counted() -> None:
+    assert changes({}) == "as in the system file"
+    assert changes({"a": True, "b": 0.1, "c": "x.fmu"}) == "a = true, b = 0.1, c = x.fmu"
+    assert changes({f"v{k}": k for k in range(8)}).endswith("v5 = 5, 2 more")
+
+
+def test_the_date_is_that_of_now(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("SOURCE_DATE_EPOCH", raising=False)
+    before = today()
+    said = about({})
+    assert any(f" · {day} · " in said for day in (before, today()))
