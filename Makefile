@@ -4,7 +4,7 @@
 # make check  lint, format, types, import rules
 # make docs   the pages of the Python interface in results/api, and what the notebook in docs/ shows
 # make bench  measurements     make cards    the variable tables of the equation cards
-# make pictures   those in docs/, in minutes; needs Chromium
+# make pictures   those in docs/, in ten minutes; needs Chromium
 # make playground  docs/playground.html; needs zig where the C of the FMUs has changed
 
 PYTHON ?= $(firstword $(foreach p,python3 python3.13 python3.12 python3.11,$(shell \

@@ -2,7 +2,8 @@
 
     .venv/bin/python docs/pictures.py [NAME...]     # in the folder of the checkout; make pictures
 
-Without a NAME, like report or hand, all of them, in three minutes. report.png takes Chromium.
+Without a NAME, like hand or layers, all of them, in ten minutes. report.png takes Chromium, and
+timing.png a machine that is idle.
 """
 
 import re
@@ -11,6 +12,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import redirect_stdout
+from functools import partial
 from importlib.resources import files
 from io import StringIO
 from pathlib import Path
@@ -120,43 +122,41 @@ def draw_evaluation(folder: Path) -> None:
             shutil.copy(Path(kept, name), folder)
 
 
-def draw_colour_map(folder: Path) -> None:
-    """colour_map.png, of the study of that name."""
-    _draw_map("colour_map", folder)
-
-
-def draw_reflectance_map(folder: Path) -> None:
-    """reflectance_map.png, of the study of that name."""
-    _draw_map("reflectance_map", folder)
-
-
-def _draw_map(study: str, folder: Path) -> None:
+def draw_map(folder: Path, study: str) -> None:
+    """The map of a built-in study, by its name."""
     with TemporaryDirectory() as kept:
         do("sweep", study, "--plot", "--out", kept)
         shutil.copy(Path(kept, "map.png"), folder / f"{study}.png")
 
 
-PICTURES: Mapping[Callable[[Path], None], Sequence[str]] = {
-    draw_hand: ("hand.svg",),
-    draw_loop: ("loop.svg",),
-    draw_evaluation: ("contact_times.png", "contact_forces.png"),
-    draw_report: ("report.png",),
-    draw_timing: ("timing.png",),
-    draw_colour_map: ("colour_map.png",),
-    draw_reflectance_map: ("reflectance_map.png",),
-    tutorials.main: ("colour.png", "layers.png", "objects.png", "limits.png", "your_plant.png"),
+def draw_page(folder: Path, name: str) -> None:
+    """The pictures of a tutorial page, and the page's tables anew."""
+    tutorials.build_blocks()
+    tutorials.update(name, folder)
+
+
+PICTURES: Mapping[str, tuple[Callable[[Path], None], Sequence[str]]] = {
+    "hand": (draw_hand, ["hand.svg"]),
+    "loop": (draw_loop, ["loop.svg"]),
+    "evaluation": (draw_evaluation, ["contact_times.png", "contact_forces.png"]),
+    "report": (draw_report, ["report.png"]),
+    "timing": (draw_timing, ["timing.png"]),
+    "colour_map": (partial(draw_map, study="colour_map"), ["colour_map.png"]),
+    "reflectance_map": (partial(draw_map, study="reflectance_map"), ["reflectance_map.png"]),
+    "colour": (partial(draw_page, name="colour"), ["colour.png"]),
+    "layers": (partial(draw_page, name="layers"), ["layers.png", "objects.png"]),
+    "limits": (partial(draw_page, name="limits"), ["limits.png"]),
+    "your_plant": (partial(draw_page, name="your_plant"), ["your_plant.png"]),
 }
-"""What each draws into a folder."""
+"""What draws into a folder, and the files there."""
 
 
 def main(*names: str) -> None:
     """Make the pictures of these names, or all."""
-    known = {Path(picture).stem for pictures in PICTURES.values() for picture in pictures}
-    if wrong := [name for name in names if name not in known]:
-        raise SystemExit(f"{', '.join(wrong)}: must be of {', '.join(sorted(known))}")
-    for draw, pictures in PICTURES.items():
-        if not names or {Path(picture).stem for picture in pictures} & {*names}:
-            draw(HERE)
+    if wrong := [name for name in names if name not in PICTURES]:
+        raise SystemExit(f"{', '.join(wrong)}: must be of {', '.join(PICTURES)}")
+    for draw, _ in (PICTURES[name] for name in names or PICTURES):
+        draw(HERE)
 
 
 if __name__ == "__main__":

@@ -392,18 +392,27 @@ BLOCKS = ("spring_plant.py", "quotient_controller.py", "moving_object.py")
 """What the pages build before they run it."""
 
 
-def main(pictures: Path = HERE) -> None:
-    """Update the pages, and their pictures in a folder."""
+def update(name: str, pictures: Path) -> None:
+    """Work out a page anew, and draw its pictures into a folder."""
+    with TemporaryDirectory() as folder:
+        page = HERE / f"{name}.md"
+        text, tables = worked_out(page.read_text("utf-8"), recorder(Path(folder)))
+        write_text(page, text)
+        PAGES[name](tables, pictures)
+
+
+def main() -> None:
+    """Update the pages and their pictures."""
+    build_blocks()
+    for name in PAGES:
+        update(name, HERE)
+
+
+def build_blocks() -> None:
+    """Build what the pages run; SystemExit where that fails."""
     for block in BLOCKS:
         if code := cli.main(["build", str(HERE / block)]):
             sys.exit(code)
-    with TemporaryDirectory() as folder:
-        do = recorder(Path(folder))
-        for name, draw in PAGES.items():
-            page = HERE / f"{name}.md"
-            text, tables = worked_out(page.read_text("utf-8"), do)
-            write_text(page, text)
-            draw(tables, pictures)
 
 
 if __name__ == "__main__":

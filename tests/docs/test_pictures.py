@@ -3,7 +3,6 @@
 import importlib
 import re
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +24,7 @@ def pictures(checkout: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
 
 
 def test_each_picture_has_a_command(pictures: Any) -> None:
-    made = [picture for some in pictures.PICTURES.values() for picture in some]
+    made = [picture for _, files in pictures.PICTURES.values() for picture in files]
     there = [path.name for kind in ("png", "svg") for path in DOCS.glob(f"*.{kind}")]
     assert sorted(made) == sorted(there)
 
@@ -41,7 +40,7 @@ def test_each_picture_is_shown_somewhere() -> None:
 
 
 def test_a_name_that_is_none(pictures: Any) -> None:
-    with pytest.raises(SystemExit, match=r"^hnad: must be of colour, colour_map, contact_forces"):
+    with pytest.raises(SystemExit, match=r"^hnad: must be of hand, loop, evaluation, "):
         pictures.main("hand", "hnad")
 
 
@@ -53,11 +52,11 @@ def test_it_is_the_one_that_the_command_makes(pictures: Any, tmp_path: Path, nam
     """Those of tutorial pages: test_tutorials.py."""
     if name == "report" and not (shutil.which("chromium") or shutil.which("chromium-browser")):
         pytest.skip("chromium is not installed")
-    draw: Callable[[Path], None] = getattr(pictures, f"draw_{name}")
+    draw, files = pictures.PICTURES[name]
     folder = tmp_path / "drawn"
     folder.mkdir()
     draw(folder)
-    assert {path.name for path in folder.iterdir()} == {*pictures.PICTURES[draw]}
+    assert {path.name for path in folder.iterdir()} == {*files}
     for path in folder.iterdir():
         assert_same_picture(path, DOCS / path.name, "make pictures")
 

@@ -512,7 +512,11 @@ def test_a_file_that_is_no_fmu_is_one_line(tmp_path: Path) -> None:
         (tmp_path / "missing.fmu", "no such FMU file"),
         (tmp_path, f"is a folder; must be an FMU, a file; there is: {empty}, {text}"),
         (text, "not a readable FMU: File is not a zip file"),
-        (empty, "not a readable FMU: no modelDescription.xml at the top of the archive"),
+        (
+            empty,
+            "not a readable FMU: no modelDescription.xml at the top of the archive; must be there, "
+            "and called so: there is Valve/modelDescription.xml",
+        ),
     ):
         with pytest.raises(InputError) as caught:
             inspect_fmu(path)

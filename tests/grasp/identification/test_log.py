@@ -173,10 +173,12 @@ def test_a_sample_that_is_no_number_is_named(
         identified(grasp, log)
 
 
-@pytest.mark.parametrize("size", [0, 1])
-def test_a_log_of_a_sample_is_refused(grasp: System, recorded: Signals, size: int) -> None:
+@pytest.mark.parametrize(("size", "said"), [(0, "0 samples"), (1, "1 sample")])
+def test_a_log_of_a_sample_is_refused(
+    grasp: System, recorded: Signals, size: int, said: str
+) -> None:
     log = Signals(recorded.time[:size], {k: v[:size] for k, v in recorded.items()})
-    with pytest.raises(InputError, match=rf"^test: {size} samples; must be at least two"):
+    with pytest.raises(InputError, match=rf"^test: {said}; must be at least two"):
         identified(grasp, log)
 
 

@@ -37,6 +37,7 @@ from ..frame import (
     say,
     show,
     title_option,
+    waiting,
     with_controller,
     with_preset,
 )
@@ -134,8 +135,10 @@ def sweep(
         kept = sum(Store(folder / v.variant).kept() for v in variants)
         of = f"{kept} of {sum(v.runs for v in variants)} runs are kept in {folder}"
         return fail(f"interrupted; {of}, the same command goes on", INTERRUPTED)
-    for picture in draw_sweep(done, folder, suffix, title) if plot else []:
-        say(f"drew {picture}")
+    if plot:
+        with waiting("drawing"):
+            for picture in draw_sweep(done, folder, suffix, title):
+                say(f"drew {picture}")
     limits = reached(done)
     show(as_json, _as_json(name, folder, done, limits), _as_text(done, limits))
     failed = all(d.failed == d.study.runs for d in done)
