@@ -122,9 +122,18 @@ def draw_evaluation(folder: Path) -> None:
 
 def draw_colour_map(folder: Path) -> None:
     """colour_map.png, of the study of that name."""
+    _draw_map("colour_map", folder)
+
+
+def draw_reflectance_map(folder: Path) -> None:
+    """reflectance_map.png, of the study of that name."""
+    _draw_map("reflectance_map", folder)
+
+
+def _draw_map(study: str, folder: Path) -> None:
     with TemporaryDirectory() as kept:
-        do("sweep", "colour_map", "--plot", "--out", kept)
-        shutil.copy(Path(kept, "map.png"), folder / "colour_map.png")
+        do("sweep", study, "--plot", "--out", kept)
+        shutil.copy(Path(kept, "map.png"), folder / f"{study}.png")
 
 
 PICTURES: Mapping[Callable[[Path], None], Sequence[str]] = {
@@ -134,6 +143,7 @@ PICTURES: Mapping[Callable[[Path], None], Sequence[str]] = {
     draw_report: ("report.png",),
     draw_timing: ("timing.png",),
     draw_colour_map: ("colour_map.png",),
+    draw_reflectance_map: ("reflectance_map.png",),
     tutorials.main: ("colour.png", "layers.png", "objects.png", "limits.png", "your_plant.png"),
 }
 """What each draws into a folder."""

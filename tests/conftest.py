@@ -86,6 +86,12 @@ def _full_collections() -> list[int]:
 
 
 @pytest.fixture(autouse=True)
+def _no_lines_of_progress(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a loaded machine what is short may take 10 s, after which a line says that it goes on."""
+    monkeypatch.setattr("grasp_cosim.progress.EVERY", 3600.0)
+
+
+@pytest.fixture(autouse=True)
 def _frozen(_full_collections: list[int]) -> None:
     """All that thousands of tests are made of is no garbage: a paced run, which collects it before
     it begins, would take half a second for it, and thaws it at its end.

@@ -146,7 +146,9 @@ def test_every_other_module_can_be_imported(python: Python) -> None:
         print(" ".join(refused))
         """
     )
-    assert printed.split() == [f"grasp_cosim.cli.commands.{n}" for n in ("evaluate", "identify")]
+    assert printed.split() == [
+        f"grasp_cosim.cli.commands.{n}" for n in ("evaluate", "identify", "tune")
+    ]
 
 
 def test_the_help_has_the_commands_of_any_system(command: Command) -> None:

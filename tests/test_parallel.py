@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim.errors import InputError, SimulationError
-from grasp_cosim.parallel import Crew, progress_bar, run_all
+from grasp_cosim.parallel import Crew, run_all
+from grasp_cosim.progress import Progress
 from support.processes import ends
 
 
@@ -50,7 +51,7 @@ def test_a_process_that_dies_is_an_error() -> None:
 
 
 def test_batches_share_their_processes() -> None:
-    with Crew(1) as crew, progress_bar("runs", None, progress=False) as bar:
+    with Crew(1) as crew, Progress("runs", shown=False) as bar:
         first, second = (crew.map(_process, range(2), bar) for _ in range(2))
     assert first == second
 

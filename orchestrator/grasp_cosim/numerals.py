@@ -1,7 +1,17 @@
 """Numbers for the eye."""
 
+from math import degrees
+
 MOST = 1e9
 """The size from which a number in a table is written with a power of ten."""
+
+MILLI = {"m": (1e3, "mm"), "m/s": (1e3, "mm/s"), "N.s": (1e3, "mN.s"), "rad": (degrees(1), "deg")}
+"""How values are shown in tables and pictures, by unit: times a factor, in another."""
+
+
+def in_milli(unit: str | None) -> tuple[float, str]:
+    """Return the factor and the unit in which values of `unit` are shown; "" for a mere number."""
+    return MILLI.get(unit or "", (1.0, "" if unit in (None, "1") else str(unit)))
 
 
 def counted(count: int, noun: str) -> str:

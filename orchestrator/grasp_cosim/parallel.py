@@ -19,10 +19,9 @@ from multiprocessing.process import BaseProcess
 from tempfile import gettempdir
 from typing import Any, NamedTuple, Self, TypeVar
 
-from tqdm import tqdm
-
 from . import interruption
 from .errors import SimulationError
+from .progress import Progress, phase
 from .scratch import sweep
 
 Job = TypeVar("Job")
@@ -40,12 +39,6 @@ class Lost(NamedTuple):
     end: str
 
 
-def progress_bar(what: str, total: int | None, progress: bool, initial: int = 0) -> "tqdm[Any]":
-    """A bar labelled `what` on standard error, with `progress` and if that is a terminal."""
-    disable = None if progress else True
-    return tqdm(total=total, initial=initial, desc=what, unit="run", disable=disable)
-
-
 Keep = Callable[[int, Run], None]
 """Gets the index of a job and its result as soon as it is there."""
 
@@ -58,8 +51,9 @@ def run_all(
     what: str,
     keep: Keep[Run] = lambda *_: None,
 ) -> list[Run]:
-    """Return the results of Crew.map; `progress` shows a bar labelled `what`."""
-    with progress_bar(what, len(jobs), progress) as bar, Crew(workers) as crew:
+    """Return the results of Crew.map; `progress` shows how far they are, named `what`."""
+    bar = Progress(what, len(jobs), shown=progress)
+    with phase(f"{what}, {len(jobs)} runs on {workers} processes"), bar, Crew(workers) as crew:
         return crew.map(run, jobs, bar, keep)
 
 
@@ -81,7 +75,7 @@ class Crew:
         self,
         run: Callable[[Job], Run],
         jobs: Iterable[Job],
-        bar: "tqdm[Any]",
+        bar: Progress,
         keep: Keep[Run] = lambda *_: None,
     ) -> list[Run]:
         """Return the results of run(job), in the order of the jobs; `bar` counts them.

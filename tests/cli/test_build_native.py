@@ -50,15 +50,15 @@ def test_one_by_name_and_one_of_ones_own(command: Run) -> None:
     assert (found.version, found.python, found.sources) == ("3.0", False, True)
 
 
-def test_on_a_terminal_it_is_said_before_the_compiler_runs(
+def test_what_is_built_is_said_before_the_compiler_runs(
     command: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def ended(*_: object) -> None:
         raise CompilerError("out of patience")
 
-    monkeypatch.setattr("grasp_cosim.cli.frame.shows_progress", lambda: True)
+    monkeypatch.setattr("grasp_cosim.progress.EVERY", 0.0)
     monkeypatch.setattr("grasp_fmus.native.build.build_native", ended)
-    line = f"building for {here().tuple}\ngrasp-cosim: out of patience\n"
+    line = f"building for {here().tuple}, 0 s\ngrasp-cosim: out of patience\n"
     assert command("build", "--native") == (3, "", line)
 
 

@@ -87,7 +87,10 @@ def test_a_misspelt_column_of_an_input_without_a_source(command: Run, tmp_path: 
     text = driven(tmp_path, TEXT).read_text("utf-8")
     (tmp_path / "driven.toml").write_text(text.replace("values = { u_Real = 0, ", "values = { "))
     for column, said in (
-        ("a.u_Raal", "drive.csv: line 1, column 2, a.u_Raal: no input 'a.u_Raal'; valid: a.u_Real"),
+        (
+            "a.u_Raal",
+            "drive.csv: line 1, column 2, a.u_Raal: no input 'a.u_Raal'; did you mean a.u",
+        ),
         ("b.u_Real", "drive.csv: line 1, column 2, b.u_Real: no component 'b'; valid: a"),
     ):
         Path("drive.csv").write_text(f"time,{column}\n0,7\n", "utf-8")

@@ -47,7 +47,10 @@ WRONG = [
     ((*TWO, "--rename", "a=b"), "several components are swapped; must begin with one of plant., s"),
     ((*TWO, "--units", "sensor_2.gap=mm"), "must begin with one of plant., sensor_1."),
     ((*TWO[:2], "--rename", "gap"), "must be [COMPONENT.]VARIABLE=FMUS_VARIABLE"),
-    ((*TWO[:2], "--rename", "gap[1]=Gap"), "GripperPlant.fmu has no variable 'Gap'; valid: force"),
+    (
+        (*TWO[:2], "--rename", "gap[1]=Gap"),
+        "has no variable 'Gap'; did you mean gap[1], g",
+    ),
     ((*TWO[:2], "--units", "gap[1]=quux"), "units: 'gap[1]' = 'quux': no unit that GripperPlant"),
     (
         ("--swap", "plant=fmus/ProximitySensor.fmu"),

@@ -51,7 +51,9 @@ def test_a_study_leaves_its_runs_and_pictures(command: Run, tmp_path: Path) -> N
     code, out, _ = command(STUDY, "--workers", "1")
     assert code == 0
     assert "study.toml: 4 runs, 4 of them done before, 0 failed; in study/runs.parquet" in out
-    assert re.search(r"^target_position +4 ", out, re.MULTILINE)
+    assert "width: 60 to 70 mm, 2 values" in out.splitlines()
+    greatest = 1e3 * summary["metrics"]["target_position"]["greatest"]
+    assert re.search(rf"^target_position +mm +4 .* {greatest:.4g} +\S+$", out, re.MULTILINE)
     code, out, err = command(STUDY.replace("0.06, ", "0.065, "), "--json")
     assert (code, out) == (2, "")
     assert err.splitlines() == [
@@ -134,7 +136,7 @@ WRONG = [
     (f'system = "no.toml"\n{HEAD}{GRID}{WIDTH}{VALUES}', "no.toml: no such system file"),
     (
         f"{GRID}{WIDTH}{VALUES}".replace("[des", "case = 3\n[des"),
-        "case = 3: .*no preset 'case_3'; valid: case_0, case_1, case_2",
+        "case = 3: .*no preset 'case_3'; did you mean case_0, case_1, case_2",
     ),
     (f"step = 0\n{GRID}{WIDTH}{VALUES}", "study.toml: step = 0 s: must be a number greater than"),
     (f"{HEAD}{GRID}{WIDTH}{VALUES}[swap]\nplant = 3\n", "plant = 3: must be the path of an FMU"),
@@ -177,14 +179,36 @@ def test_wrong_input_is_one_line_and_exit_2(
     assert sorted(p.name for p in tmp_path.iterdir()) == ["study.toml"]
 
 
+FIGURES = [
+    ("distribution = []\n", r"\[figures\]: unknown entry 'distribution'; valid: curve, distrib"),
+    ('curve = { x = "width" }\n', "curve: of = None: must be a name"),
+    ('curve = { x = "width", of = "tilt" }\n', "figures: no column 'tilt' in the results; valid: "),
+    (
+        'curve = { x = "wide", of = "tilt" }\n',
+        "figures.curve: no parameter 'wide' with numbers; val",
+    ),
+    (
+        'curve = [{ x = "width", of = "tilt", y = "x" }]\n',
+        "unknown entry 'y'; valid: cell, limit, o",
+    ),
+    ('curve = { x = "width", of = "object_shift", cell = "most" }\n', "cell = 'most': must be one"),
+]
+
+
+@pytest.mark.parametrize(("text", "message"), FIGURES)
+def test_wrong_figures_are_one_line(command: Run, text: str, message: str) -> None:
+    code, out, err = command(f"{HEAD}{GRID}{WIDTH}{VALUES}[figures]\n{text}")
+    assert (code, out, len(err.splitlines())) == (2, "", 1)
+    assert re.search(message, err), err
+
+
 @pytest.mark.usefixtures("command")
 def test_no_such_study_names_the_built_in_ones(capsys: pytest.CaptureFixture[str]) -> None:
     code = cli.main(["sweep", "map"])
     assert code == 2
     assert capsys.readouterr().err == (
-        "grasp-cosim: map: no such study; must be a .toml file or bench_monte_carlo, colour_bench, "
-        "colour_drift, colour_equal, colour_exponent, colour_free, colour_ideal, colour_map, "
-        "colour_map_free, colour_monte_carlo, colour_offset, grasp_sensitivity, reflectance_map\n"
+        "grasp-cosim: map: no such study, nor .toml file; did you mean colour_map, "
+        "colour_map_free, reflectance_map?\n"
     )
 
 
@@ -205,7 +229,7 @@ def test_no_pyarrow_is_one_line(command: Run, monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     code, _, err = command(STUDY)
     assert code == 2
-    assert err.endswith("-m pip install 'grasp-cosim[sweep]'\n")
+    assert err.endswith("-m pip install 'pyarrow>=26' 'scipy>=1.15'\n")
 
 
 def test_a_study_of_the_bench_is_that_of_run_bench(tmp_path: Path, grasp: System) -> None:
@@ -248,14 +272,14 @@ def test_a_limit_that_is_missed_is_a_negative_result(command: Run) -> None:
     text = STUDY.replace("[figures]", limits + "[figures]")
     code, out, _ = command(text.replace("MOST", "0.1"), "--workers", "1")
     assert code == 0
-    assert "kept    object_shift: greatest 0 m, at most 0" in out.splitlines()
+    assert "kept    object_shift: greatest 0 mm, at most 0 mm" in out.splitlines()
     code, out, _ = command(text.replace("MOST", "-0.1"), "--workers", "1", "--json")
     kept, missed = json.loads(out)["limits"]
     assert (code, kept["kept"], missed["kept"], missed["missing"]) == (1, True, False, 0)
     timed = text.replace("target_position = { p95 = MOST }", "time_difference = { p95 = 9.0 }")
     code, out, _ = command(timed, "--workers", "1")
     assert code == 1
-    assert "MISSED  time_difference: p95 none s, at most 9; 4 runs have none" in out.splitlines()
+    assert "MISSED  time_difference: p95 none, at most 9 s; 4 runs have none" in out.splitlines()
 
 
 @pytest.mark.slow
@@ -272,9 +296,11 @@ def test_variants_are_runs_in_folders_of_their_names(command: Run, tmp_path: Pat
     assert sorted(p.name for p in (tmp_path / "study").iterdir()) == [
         "distributions.png", "heavy", "light", "map.png",
     ]  # fmt: skip
-    assert re.search(r"^target_position +light +4 .*\ntarget_position +heavy +4 ", out, re.M)
     assert re.search(
-        r"^kept    heavy: target_position from light: greatest \S+ m, at most", out, re.M
+        r"^target_position +light +mm +4 .*\ntarget_position +heavy +mm +4 ", out, re.M
+    )
+    assert re.search(
+        r"^kept    heavy: target_position from light: greatest \S+ mm, at most 10 mm$", out, re.M
     )
     code, out, _ = command(text, "--workers", "1", "--json")
     found = json.loads(out)

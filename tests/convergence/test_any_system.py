@@ -121,7 +121,7 @@ def test_nothing_is_asked_of_it_by_default(oscillator: System) -> None:
         (("phase", "phase"), None, "tolerance: must be given for phase, phase, in rad"),
         (("a.y_Real",), None, "tolerance: must be given for a.y_Real, in its unit"),
         (("a.x",), 0.0, "tolerance = 0.0 m: must be a number greater than 0"),
-        (("a.u_Real",), 1.0, "no metric or signal 'a.u_Real'; valid: phase, a.y_Real, "),
+        (("a.u_Real",), 1.0, "no metric or signal 'a.u_Real'; did you mean a.y_Real"),
         (("time_to_contact",), None, "no metric or signal 'time_to_contact'; valid: phase, a.y_R"),
         (("a.y_String",), None, "no metric or signal 'a.y_String'; valid: phase, a.y_Real, "),
     ],

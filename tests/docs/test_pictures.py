@@ -46,7 +46,9 @@ def test_a_name_that_is_none(pictures: Any) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["hand", "loop", "evaluation", "report", "colour_map"])
+@pytest.mark.parametrize(
+    "name", ["hand", "loop", "evaluation", "report", "colour_map", "reflectance_map"]
+)
 def test_it_is_the_one_that_the_command_makes(pictures: Any, tmp_path: Path, name: str) -> None:
     """Those of tutorial pages: test_tutorials.py."""
     if name == "report" and not (shutil.which("chromium") or shutil.which("chromium-browser")):

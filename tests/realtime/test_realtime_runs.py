@@ -120,7 +120,7 @@ def test_a_terminal_shows_how_it_goes(grasp: System, monkeypatch: pytest.MonkeyP
         monkeypatch.setattr(sys, "stderr", stream)
         simulate(grasp, stop=0.05, progress=True, realtime=FAST)
     assert file.getvalue() == ""
-    assert re.search(r"0\.05/0\.05 s .*x, worst step [\d.]+ ms, 500 over", terminal.getvalue())
+    assert re.search(r"0\.05 of 0\.05 s .*x, worst step [\d.]+ ms, 500 over", terminal.getvalue())
 
 
 def test_what_is_refused_is_said_and_the_run_goes_on(

@@ -333,7 +333,7 @@ REFUSED = [
     ("<ssd:ParameterBinding/>", "must have either a source or an inline ssv:ParameterSet"),
     (
         '<ssd:ParameterBinding source="resources/x.ssv"/>',
-        "source 'resources/x.ssv': not in the archive; valid: resources/y.ssv",
+        "source 'resources/x.ssv': not in the archive; did you mean resources/y.ssv?",
     ),
     (
         '<ssd:ParameterBinding source="https://here/x.ssv"/>',

@@ -55,7 +55,7 @@ def test_each_run_sets_elements_and_items(tmp_path: Path) -> None:
         ('"slow", "fast"', '"slow", "quick"', "must be one of slow, fast"),
         ("ss.u[2]", "ss.u", "ss.u: ss.fmu has no variable 'u'"),
         ("[[0, 1], [-1, 0]]", "[[0, 1]]", r"ss.A: A = [[0, 1]]: is [1, 2]; must be [2, 2], or"),
-        ("ss.y[1]", "ss.y[4]", "outputs: no output 'ss.y[4]'; valid: ss.y[1], ss.y[2]"),
+        ("ss.y[1]", "ss.y[4]", "outputs: no output 'ss.y[4]'; did you mean ss.y[1], ss.y[2]"),
     ],
 )
 def test_a_mistake_is_one_line(tmp_path: Path, was: str, now: str, message: str) -> None:

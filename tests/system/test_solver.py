@@ -39,7 +39,10 @@ def test_what_a_system_file_says(tmp_path: Path) -> None:
     ("solver", "message"),
     [
         ("1e-6", r"\[components.x\]: solver: 1e-06; must be a table"),
-        ("{ tolerance = 1e-6 }", "solver: unknown entry 'tolerance'; valid: absolute_tolerance, "),
+        (
+            "{ tolerance = 1e-6 }",
+            "unknown entry 'tolerance'; did you mean absolute_tolerance, ",
+        ),
         ("{ relative_tolerance = 0 }", "relative_tolerance = 0: must be a number from 1e-13 to 0"),
         ("{ relative_tolerance = '1' }", "relative_tolerance = '1': must be a number from"),
         ("{ absolute_tolerance = 0.0 }", "absolute_tolerance = 0.0: must be a number greater than"),

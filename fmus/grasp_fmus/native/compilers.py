@@ -237,7 +237,7 @@ def compiler_for(target: Target, asked: bool) -> Compiler:
     zig = zig_compiler()
     if zig and target.zig:
         return zig._replace(command=(*zig.command, "-target", target.zig, "-s"))
-    install = f"{sys.executable} -m pip install ziglang"
+    install = shlex.join([sys.executable, "-m", "pip", "install", "ziglang"])
     needed = "one of CC, cc, gcc, clang, zig" if target == here() and not asked else "zig"
     raise ValueError(f"no C compiler for {target.tuple}: must be {needed}; {install}")
 

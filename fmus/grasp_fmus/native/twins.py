@@ -9,7 +9,7 @@ import sys
 import zipfile
 import zlib
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import AbstractContextManager, nullcontext, suppress
 from functools import cache
 from pathlib import Path
 
@@ -63,10 +63,13 @@ def is_shipped(name: str) -> bool:
 
 
 @cache
-def shipped_twins(announce: Callable[[str], None] = lambda _: None) -> Path:
+def shipped_twins(
+    during: Callable[[str], AbstractContextManager[object]] = nullcontext,
+) -> Path:
     """The folder of the native FMUs of the blocks that come with the package, built if need be.
 
-    Before they are, announce gets a line that says so. NoTwinsError where that cannot be.
+    That is done in the context that `during` makes of a line that says so. NoTwinsError where it
+    cannot be.
     """
     kept = cache_folder()
     sources = sources_hash()
@@ -77,8 +80,8 @@ def shipped_twins(announce: Callable[[str], None] = lambda _: None) -> Path:
         raise NoTwinsError(f"no folder to keep native FMUs in; {KEPT}")
     try:
         plan = planned()
-        announce("compiling the native FMUs, which takes some seconds, once for these sources")
-        built = build_native(folder, plan, chosen_names())
+        with during("compiling the native FMUs, once for these sources"):
+            built = build_native(folder, plan, chosen_names())
         write_stamp(folder, sources, [fmu.path.name for fmu in built])
     except (ValueError, CompilerError) as error:
         raise NoTwinsError(str(error)) from error

@@ -1,5 +1,6 @@
 """From a command line to an exit code."""
 
+import os
 import signal
 import sys
 from typing import NoReturn
@@ -14,9 +15,15 @@ from .frame import FAILED, INTERRUPTED, TERMINATED, WRONG, fail
 from .group import cli
 from .streams import OutputError, harmless_streams, keep_output_for_us, leave
 
+NAME = "grasp-cosim"
+COMPLETE = "_GRASP_COSIM_COMPLETE"
+"""The environment variable in which click's completion script for a shell says what it wants."""
+
 
 def entry() -> NoReturn:
     """The command grasp-cosim, see __main__.py."""
+    if COMPLETE in os.environ:  # the shell asks what may come next
+        cli.main(prog_name=NAME, complete_var=COMPLETE)
     try:
         keep_output_for_us()
         explain_crashes("--debug" in sys.argv)
@@ -48,7 +55,7 @@ def main(arguments: list[str]) -> int:
 
 def _main(arguments: list[str], debug: bool) -> int:
     try:
-        return int(cli.main(arguments, "grasp-cosim", standalone_mode=False, obj=arguments) or 0)
+        return int(cli.main(arguments, NAME, standalone_mode=False, obj=arguments) or 0)
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.ctx.get_help(), err=True)
         return WRONG

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+import logging
+import os
 import sys
 import traceback
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import contextmanager
 from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +18,7 @@ import click
 from ..errors import InputError
 from ..files import PICTURES, check_folder
 from ..plain import on_one_line
+from ..progress import Progress, phase
 
 if TYPE_CHECKING:
     from ..metrics.metric import Metric
@@ -39,6 +43,14 @@ def together(*options: Command) -> Command:
 
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+
+workers_option = click.option(
+    "--workers",
+    type=click.IntRange(1),
+    default=os.cpu_count(),
+    show_default="all cores",
+    help="Processes that run at the same time.",
+)
 
 format_option = click.option(
     "--format",
@@ -95,8 +107,10 @@ def load_system(
     if path is None:
         from ..grasp.system import grasp_system
 
-        return grasp_system().with_input(stimuli)
-    system = System.load(path, step=step, stop=stop, input=stimuli)
+        with phase("reading the system"):
+            return grasp_system().with_input(stimuli)
+    with phase("reading the system"):
+        system = System.load(path, step=step, stop=stop, input=stimuli)
     for note in system.notes:
         say(note)
     return system
@@ -151,19 +165,75 @@ def show(as_json: bool, report: Any, text: str) -> None:
 
 
 def say(line: str) -> None:
-    """Print one line on standard error, whatever is in it."""
-    click.echo(on_one_line(line), err=True)
+    """Print one line on standard error, whatever is in it; nothing with --quiet."""
+    if not is_quiet():
+        click.echo(on_one_line(line), err=True)
 
 
-def announce(line: str) -> None:
-    """Print one line on standard error of what takes a while: where a progress bar is shown."""
-    if shows_progress():
-        say(line)
+def waiting(what: str) -> Progress:
+    """A context manager for what takes a while: shows how long it has taken, not with --quiet."""
+    return Progress(what, unit="", shown=not is_quiet())
 
 
-def shows_progress() -> bool:
-    """True where progress is shown, on a terminal."""
-    return sys.stderr.isatty()
+def is_quiet() -> bool:
+    """True with --quiet."""
+    context = click.get_current_context(silent=True)
+    return bool(context and context.meta.get(QUIET))
+
+
+QUIET = "grasp_cosim.quiet"
+"""The entry for --quiet in what click keeps of a command line."""
+
+
+def _set_quiet(ctx: click.Context, _: click.Parameter, value: bool) -> None:
+    ctx.meta[QUIET] = value
+
+
+def _set_verbose(ctx: click.Context, _: click.Parameter, value: bool) -> None:
+    if value:
+        ctx.with_resource(_told())
+
+
+class _Said(logging.Handler):
+    """Says what is logged."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        say(record.getMessage())
+
+
+@contextmanager
+def _told() -> Iterator[None]:
+    """Have what our modules log said meanwhile."""
+    handler, loggers = _Said(), [logging.getLogger(n) for n in ("grasp_cosim", "grasp_fmus")]
+    levels = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.addHandler(handler)
+        logger.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.removeHandler(handler)
+            logger.setLevel(level)
+
+
+VERBOSITY = (
+    click.Option(
+        ["-q", "--quiet"],
+        is_flag=True,
+        expose_value=False,
+        callback=_set_quiet,
+        help="No progress and no notes on standard error; errors stay.",
+    ),
+    click.Option(
+        ["-v", "--verbose"],
+        is_flag=True,
+        expose_value=False,
+        callback=_set_verbose,
+        help="Say which FMUs and engine run, and how long each phase takes.",
+    ),
+)
+"""Options that every command has."""
 
 
 def fail(message: str, code: int, debug: bool = False) -> int:
@@ -172,5 +242,5 @@ def fail(message: str, code: int, debug: bool = False) -> int:
         traceback.print_exc()
     elif len(message) > LONGEST:
         message = f"{message[: LONGEST // 2]} [...] {message[-LONGEST // 2 :]}"
-    say(f"grasp-cosim: {message}")
+    click.echo(on_one_line(f"grasp-cosim: {message}"), err=True)
     return code

@@ -9,9 +9,19 @@ import click
 
 from .. import interruption
 from ..early import begin
+from ..errors import nearest
 from ..scratch import sweep
+from .frame import VERBOSITY
 
-OF_THE_GRASP = {"evaluate", "identify", "play"}
+SECTIONS = {
+    "Simulate": ("run", "play", "sweep", "tune", "evaluate", "identify"),
+    "Look at recorded runs": ("report", "compare"),
+    "Make and check FMUs and systems": ("init", "build", "inspect", "doctor", "qualify", "ssp"),
+    "Hardware in the loop": ("proxy", "serve", "relay"),
+}
+"""Where the help lists a command; one that is in none of these is among the others."""
+
+OF_THE_GRASP = {"evaluate", "identify", "play", "tune"}
 """The commands that there are with the room grasp/ only."""
 
 
@@ -24,11 +34,33 @@ class Commands(click.Group):
         names = {n.removesuffix(".py") for n in found if n.endswith(".py") and n[0] != "_"}
         return sorted(names if find_spec("..grasp", __package__) else names - OF_THE_GRASP)
 
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the sections of the help, in which each command is once."""
+        left = self.list_commands(ctx)
+        width = formatter.width - 6 - max(map(len, left))
+        others = {"Other commands": tuple(sorted(set(left).difference(*SECTIONS.values())))}
+        for title, names in (SECTIONS | others).items():
+            found = [(n, self.get_command(ctx, n)) for n in names if n in left]
+            rows = [(n, command.get_short_help_str(width)) for n, command in found if command]
+            if rows:
+                with formatter.section(title):
+                    formatter.write_dl(rows)
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """The command that the arguments name; UsageError with those nearest to it, where none."""
+        if args[0] not in self.list_commands(ctx) and not args[0].startswith("-"):
+            near = nearest(args[0], self.list_commands(ctx), "`grasp-cosim --help`")
+            ctx.fail(f"{args[0]!r}: no such command; {near}")
+        return super().resolve_command(ctx, args)
+
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
         """The command of that name; None where there is none."""
         if name not in self.list_commands(ctx):
             return None
         command: click.Command = getattr(import_module(f"{__package__}.commands.{name}"), name)
+        command.params += [option for option in VERBOSITY if option not in command.params]
         return command
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,7 +13,9 @@ from ..errors import InputError, choices
 from ..files import NATIVE_FOLDER
 from ..system.description import System
 from ..system.parts import Component
-from .frame import Command, announce, say
+from .frame import Command, say, waiting
+
+LOGGER = logging.getLogger(__name__)
 
 FEW = 3
 """Components without a twin that are named at most."""
@@ -62,9 +65,11 @@ def _twins(system: System, asked: bool) -> tuple[dict[str, Path], str]:
     shipped = {c.name for c in system.components if _is_shipped(c)}
     if shipped:
         try:
-            folder = shipped_twins(announce)
+            folder = shipped_twins(waiting)
         except NoTwinsError as error:
             failure = str(error)
+    if folder:
+        LOGGER.info("native FMUs: %s", folder)
     twins = {c.name: twin for c in system.components if (twin := _twin(c, folder))}
     if asked and failure and not twins.keys() >= shipped:
         raise InputError(f"--native: {failure}")

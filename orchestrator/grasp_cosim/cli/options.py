@@ -15,9 +15,17 @@ from ..system.parts import ISOLATIONS
 from ..system.stimuli import INTERPOLATIONS, Stimuli, read_stimuli
 from ..system.structure import DIVERGING, SCHEMES
 from ..system.swap import Replacement
+from .completion import preset_names, variables
 from .frame import PATH, load_system, pair, together, with_controller, with_preset
 
-set_option = click.option("--set", "settings", multiple=True, metavar="COMPONENT.VARIABLE=VALUE")
+set_option = click.option(
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="COMPONENT.VARIABLE=VALUE",
+    shell_complete=variables,
+    help="Start value of a variable, like plant.object_width=0.06.",
+)
 
 controller_option = click.option(
     "--controller",
@@ -27,13 +35,23 @@ controller_option = click.option(
 
 system_options = together(
     controller_option,
-    click.option("--preset", "presets", multiple=True, help="Values that the system file names."),
+    click.option(
+        "--preset",
+        "presets",
+        multiple=True,
+        shell_complete=preset_names,
+        help="Values that the system file names.",
+    ),
     click.option("--case", type=click.IntRange(0, 2), help="Short for --preset case_0, ..._2."),
     click.option("--bench", is_flag=True, help="Short for --preset bench."),
     set_option,
     click.option("--step", type=float, help="Communication step in s."),
     click.option("--stop", type=float, help="Stop time in s."),
-    click.option("--scheme", type=click.Choice(SCHEMES)),
+    click.option(
+        "--scheme",
+        type=click.Choice(SCHEMES),
+        help="Components step one after the other (by default), or all at once.",
+    ),
     click.option(
         "--diverging",
         type=click.Choice(DIVERGING),

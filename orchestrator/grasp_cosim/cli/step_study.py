@@ -13,7 +13,7 @@ from ..files import of_any_format, remove, write_json
 from ..metrics.metric import Metric
 from ..report.step_study import draw_step_study
 from ..system.description import System
-from .frame import NEGATIVE, check_outputs, say, show, together
+from .frame import NEGATIVE, check_outputs, is_quiet, say, show, together
 from .native import natively
 
 step_study_options = together(
@@ -54,7 +54,7 @@ def study_step(
     workers = os.cpu_count() or 1
     with natively(system, given["native"]) as chosen:
         study = step_study(
-            chosen, tolerance, workers=workers, progress=True, of=of, metrics=metrics
+            chosen, tolerance, workers=workers, progress=not is_quiet(), of=of, metrics=metrics
         )
     folder = given["out"] or Path()
     if given["out"]:

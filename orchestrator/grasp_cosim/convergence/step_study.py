@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Any
 
 from ..checks import number
-from ..errors import InputError, SimulationError, choices
+from ..errors import InputError, SimulationError, choices, nearest
 from ..master.simulation import simulate
 from ..metrics.metric import Metric, available, check_portable, measure, registered
 from ..metrics.units import in_si
@@ -267,7 +267,7 @@ def ask(
     for name in names:
         if name not in by_name and name not in units:
             raise InputError(
-                f"{system.name}: no metric or signal {name!r}; valid: {choices([*by_name, *units])}"
+                f"{system.name}: no metric or signal {name!r}; {nearest(name, [*by_name, *units])}"
             )
     asked = {by_name[n].unit if n in by_name else units[n] for n in names}
     if len(asked) > 1:
@@ -317,7 +317,7 @@ def step_study(
         )
     # the finest, which is the longest, first
     jobs = [(replace(system, step_ns=ns), question) for ns in chosen]
-    runs = run_all(run_step, jobs, min(workers, len(jobs)), progress, "steps")
+    runs = run_all(run_step, jobs, min(workers, len(jobs)), progress, "step study")
     found = dict.fromkeys(name for run in runs for name in run.values)
     return StepStudy(
         system.name,

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import wraps
-from math import copysign, degrees
+from math import copysign
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from ..metrics.metric import Metric, Signals, Value, metric
+from ..numerals import in_milli
 
 Floats = npt.NDArray[np.float64]
 
@@ -53,15 +54,12 @@ STEADY_WINDOW = 0.1
 SETTLED = 0.02
 """A force has settled once it stays so near to the steady one, as a share of that."""
 
-MILLI = {"m": (1e3, "mm"), "m/s": (1e3, "mm/s"), "N.s": (1e3, "mN.s"), "rad": (degrees(1), "deg")}
-"""How values are shown in tables, by unit."""
-
 _found: list[Metric] = []
 
 
 def of_grasp(name: str, unit: str | None, **more: Any) -> Callable[[Any], Metric]:
     """Make the function below a metric of the grasp; `more` as for metrics.metric.metric."""
-    factor, shown = MILLI.get(unit or "", (1.0, None))
+    factor, shown = in_milli(unit)
     how = {"factor": factor, "shown_unit": shown, "needs": NEEDS, "group": "grasp", **more}
 
     def enter(function: Callable[[Signals], Any]) -> Metric:

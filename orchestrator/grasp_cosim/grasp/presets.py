@@ -12,6 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from ..checks import known
 from ..interface.interface import Value
 from ..interface.units import IDENTITY
 from ..metrics.metric import resolved
@@ -39,8 +40,9 @@ def with_preset(system: System, name: str) -> System:
 
     InputError where there is neither, or the system lacks what it sets.
     """
-    if name in system.presets or name not in built_in_presets():
+    if name in system.presets:
         return system.with_presets(name)
+    known(f"{system.name}: no preset", name, {**system.presets, **built_in_presets()})
     return with_si_values(system, built_in_presets()[name], f"[presets.{name}] of {SYSTEM.name}:")
 
 

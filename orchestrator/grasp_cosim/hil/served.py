@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, field
 from grasp_fmus.link.message import END, INITIALISE
 from grasp_fmus.link.peer import TOO_LONG, Peer, Request
 
-from ..errors import InputError, SimulationError
+from ..errors import InputError, SimulationError, nearest
 from ..interface.interface import Interface, Value
 from ..system.parts import NANOSECONDS
 from .driven import DrivenFmu
@@ -196,7 +196,7 @@ def _failsafe(interface: Interface, peer: Peer, values: Mapping[str, Value]) -> 
     for name in values:
         if name not in places:
             said = f"failsafe {name}: no such input of {interface.path.name}"
-            raise InputError(f"{said}; valid: {', '.join(places) or 'none'}")
+            raise InputError(f"{said}; {nearest(name, places, interface.listing)}")
     zero: dict[str, Value] = {"Real": 0.0, "Integer": 0, "Boolean": False, "String": ""}
     found: dict[int, Value] = {}
     for name, place in places.items():

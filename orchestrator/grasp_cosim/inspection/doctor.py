@@ -18,6 +18,7 @@ from xml.etree import ElementTree
 
 import fmpy
 
+from ..checks import install_command
 from ..errors import choices
 from ..interface.document import unreadable
 from ..interface.interface import Interface
@@ -366,8 +367,7 @@ def script(fmu: Unpacked) -> Verdict | None:
         return "problem", f"no Python {VERSION}: {errors[0]}", "correct it and build the FMU again"
     outside -= sys.stdlib_module_names
     if missing := sorted(name for name in outside if not _spec(name)):
-        fix = f"{quote(sys.executable)} -m pip install"
-        fix = " ".join([fix, *(_PACKAGES.get(name, name) for name in missing)])
+        fix = install_command(*(_PACKAGES.get(name, name) for name in missing))
         return "problem", f"imports what is neither packed nor installed: {choices(missing)}", fix
     text = f"resources/{name}.py imports, besides the standard library: {choices(sorted(outside))}"
     return "ok", text, None

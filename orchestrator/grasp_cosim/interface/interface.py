@@ -6,6 +6,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from shlex import quote
 from typing import Any, Literal, Protocol, get_args
 
 from ..checks import EXACT, integer, known, real
@@ -307,13 +308,18 @@ class Interface:
             self.made[key] = self._renamed(rename, place)
         return self.made[key] if rename else self
 
+    @property
+    def listing(self) -> str:
+        """The command that shows all variables, for messages."""
+        return f"`grasp-cosim inspect {quote(without_scratch(str(self.path)))}`"
+
     def _renamed(self, rename: Mapping[str, str], place: str) -> "Interface":
         whole = {own: new for new, own in rename.items() if own in self.arrays}
         rename = dict(_by_element(rename, self.arrays))
         names: dict[str, str] = {}
         for new, own in rename.items():
             entry = f"{place}: {new!r} = {own!r}"
-            known(f"{entry}: {self.path.name} has no variable", own, self.by_name)
+            known(f"{entry}: {self.path.name} has no variable", own, self.by_name, see=self.listing)
             if own in names:
                 raise InputError(
                     f"{entry}: {own!r} is renamed to {names[own]!r} already; must have one name"
@@ -367,7 +373,9 @@ class Interface:
         }
         for name, unit in units.items():
             entry = f"{place}: {name!r} = {unit!r}"
-            known(f"{entry}: {self.path.name} has no variable", name, self.by_name)
+            known(
+                f"{entry}: {self.path.name} has no variable", name, self.by_name, see=self.listing
+            )
             if self.by_name[name].kind != "Real":
                 raise InputError(
                     f"{entry}: is of type {self.by_name[name].nature}; must be a Real, as only "
@@ -400,7 +408,8 @@ class Interface:
             if name in self.arrays:
                 first = choices(self.arrays[name].names[:1])
                 raise InputError(f"{place}: {name} is an array; must be an element of it: {first}")
-            known(f"{place}: {self.path.name} has no input or parameter", name, settable)
+            said = f"{place}: {self.path.name} has no input or parameter"
+            known(said, name, settable, see=self.listing)
             raise AssertionError(name)  # pragma: no cover
         if not variable.supported:
             raise InputError(

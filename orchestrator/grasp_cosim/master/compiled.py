@@ -20,6 +20,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from ..checks import install_command
 from ..errors import InputError
 from ..files import in_one_piece
 from ..fmi import instance
@@ -41,7 +42,7 @@ ELEMENTS = (
 FLAGS = ("-std=c99", "-O2", "-fPIC", "-shared", "-ffp-contract=off")
 """Without contraction a*b + c is rounded twice, as in Python."""
 
-REMEDY = "it needs gcc or clang, or `pip install ziglang`; engine python needs none"
+REMEDY = f"it needs gcc or clang, or `{install_command('ziglang')}`; engine python needs none"
 
 _CHECKED = 32
 """Bytes of the check sum at the end of what is kept."""

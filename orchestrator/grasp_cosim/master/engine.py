@@ -5,8 +5,8 @@ once it was built on this machine. A process builds it as soon as what it could 
 run to come, exceeds the time that takes.
 """
 
+import logging
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from typing import Any, Literal, get_args
 
 from ..checks import choice
@@ -15,6 +15,9 @@ from . import compiled, loop
 from .plan import Plan
 
 Engine = Literal["auto", "python", "compiled"]
+LOGGER = logging.getLogger(__name__)
+"""Gets which engine runs, and why, at the level INFO."""
+
 ENGINES: tuple[str, ...] = get_args(Engine)
 
 Loop = Callable[[Any, int, int, int, int], tuple[int, int, int]] | compiled.CompiledLoop
@@ -38,12 +41,25 @@ def make_loop(plan: Plan, engine: Engine, steps: int | None = None) -> Loop:
     InputError where it is to be compiled and cannot be.
     """
     choice("engine", engine, ENGINES)
+    why = "as asked"
     if engine == "compiled":
-        return compiled.CompiledLoop(plan)
-    if engine == "auto" and _pays(plan, steps):
-        with suppress(InputError):  # of a compiler that does not work
-            return compiled.CompiledLoop(plan)
+        return _compiled(plan, why)
+    if engine == "auto":
+        why = "as one in C would not save what building it takes, or there is no compiler"
+        there = compiled.is_there()
+        if _pays(plan, steps):
+            try:
+                return _compiled(plan, "built before" if there else "as the run is long enough")
+            except InputError as error:  # of a compiler that does not work
+                why = str(error)
+    LOGGER.info("engine: the loop in Python, %s", why)
     return _interpreted(plan)
+
+
+def _compiled(plan: Plan, why: str) -> Loop:
+    made = compiled.CompiledLoop(plan)
+    LOGGER.info("engine: the loop in C, %s", why)
+    return made
 
 
 def _pays(plan: Plan, steps: int | None) -> bool:

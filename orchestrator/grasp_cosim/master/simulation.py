@@ -9,14 +9,13 @@ from contextlib import ExitStack, contextmanager
 from numbers import Integral
 from typing import Any
 
-from tqdm import tqdm
-
-from ..errors import InputError, SimulationError, choices
+from ..errors import InputError, SimulationError, nearest
 from ..fmi.load import load
 from ..interface.interface import Value
 from ..interruption import interruptible, interrupts, noticing
 from ..metrics.metric import Function, Metric, chosen, registered
 from ..metrics.units import in_si
+from ..progress import Progress, phase
 from ..realtime.options import Realtime
 from ..realtime.pacer import Pacer
 from ..realtime.privileges import Privileges, privileges
@@ -27,13 +26,13 @@ from ..recording.proxies import proxy_lines
 from ..recording.result import Result
 from ..system.checks import remarks
 from ..system.description import System
-from ..system.parts import NANOSECONDS, Port
+from ..system.parts import NANOSECONDS, Component, Port
 from ..system.settings import run_settings
 from .engine import Engine
 from .master import Master
 
 LOGGER = logging.getLogger(__name__)
-"""Gets what the operating system does not permit."""
+"""Gets what the operating system does not permit, and at the level INFO what a run does."""
 
 MOST = 2**62
 """The highest number of steps, far beyond the longest run."""
@@ -96,9 +95,11 @@ class Session:
     def _begin(self, listeners: Sequence[Listener], every: int, engine: Engine) -> None:
         """Load the FMUs, initialise them and hand on the row of t = 0; the stack undoes it all."""
         instances = []
-        for component in self.system.components:
-            instances.append(load(component))
-            self._stack.callback(instances[-1].close)
+        with phase(f"loading {len(self.system.components)} FMUs"):
+            for component in self.system.components:
+                LOGGER.info("%s", _loaded(component))
+                instances.append(load(component))
+                self._stack.callback(instances[-1].close)
         self._master = Master(
             self.system, instances, lambda *rows: self._dispatch(*rows), engine, self.pacer
         )
@@ -108,7 +109,7 @@ class Session:
         if self.pacer:
             self.pacer.spare = self._dispatch.spare
         self._stack.callback(self._end)
-        with self._failures():  # where the row of t = 0 is not finite
+        with phase("initialising"), self._failures():  # where the row of t = 0 is not finite
             self._master.initialise()
 
     def _ask_for_privileges(self, realtime: Realtime, pacer: Pacer) -> None:
@@ -218,7 +219,7 @@ class Session:
         slots, texts = self._master.slots, self._master.texts
         port = Port(*name.split(".", 1)) if "." in name else None
         if port not in slots:
-            raise InputError(f"{name!r}: no such signal; valid: {choices(slots)}")
+            raise InputError(f"{name!r}: no such signal; {nearest(name, slots)}")
         value = float(self._master.values[slots[port]])
         return texts[port].listed[int(value)] if port in texts else value
 
@@ -309,7 +310,7 @@ class Simulate:
         step: float | None = None,
         stop: float | None = None,
         scheme: str | None = None,
-        progress: bool = False,
+        progress: bool | str = False,
         every: int = 1,
         listeners: Sequence[Listener] = (),
         engine: Engine = "auto",
@@ -320,10 +321,11 @@ class Simulate:
     ) -> Result:
         """Run a system to its stop time and return every output at every communication point.
 
-        step and stop in s and the scheme replace those of the system. progress shows a bar on
-        standard error if that is a terminal. every keeps only each n-th communication point, and
-        the last. listeners get what is kept while it is recorded. engine is "python", "compiled"
-        (needs a C compiler) or "auto", compiled where that pays; the results have the same bits.
+        step and stop in s and the scheme replace those of the system. progress shows on standard
+        error how far it is, by the name of the system or the one given. every keeps only each n-th
+        communication point, and the last. listeners get what is kept while it is recorded. engine
+        is "python", "compiled" (needs a C compiler) or "auto", compiled where that pays; the
+        results have the same bits.
         realtime paces the run by the clock: the result has a timing, and the same bits. metrics are
         worked out beside those that every result is asked for: from @metric, or functions of their
         own name; a name among them says that the result must have that metric. diverging, "stop" or
@@ -347,13 +349,22 @@ class Simulate:
             diverging=diverging,
             note=note,
         ) as session:
-            _drive(session, progress)
+            with phase(f"{system.name} to {session.system.stop_ns / NANOSECONDS:g} s"):
+                _drive(session, progress)
             return session.result()
 
     session = Session
 
 
 simulate = Simulate()
+
+
+def _loaded(component: Component) -> str:
+    """Which FMU runs as a component, and how, in words."""
+    fmu = component.loaded
+    kind = "Python" if fmu.python else "a binary"
+    place = ", in a process of its own" if component.isolation == "process" else ""
+    return f"{component.name}: {fmu.path}, FMI {fmu.version}, {kind}{place}"
 
 
 def _check_count(name: str, count: object) -> None:
@@ -372,16 +383,17 @@ def _folder_kept() -> Iterator[None]:
             os.chdir(here)
 
 
-def _drive(session: Session, progress: bool) -> None:
+def _drive(session: Session, progress: bool | str) -> None:
     total = session.system.stop_ns / NANOSECONDS
     with (
         interrupts(session.halt),
-        tqdm(
-            total=total,
+        Progress(
+            progress if isinstance(progress, str) else session.system.name,
+            total,
             unit="s",
-            desc="simulated",
-            disable=None if progress else True,
-            bar_format="{l_bar}{bar}| {n:.2f}/{total:.2f} s [{elapsed}<{remaining}]{postfix}",
+            shown=bool(progress),
+            at_once=session.pacer is not None,
+            ticking=False,  # a thread more would be felt in real time
         ) as bar,
     ):
 

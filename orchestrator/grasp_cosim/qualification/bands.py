@@ -22,7 +22,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..checks import known, number, toml_table
-from ..errors import InputError, choices
+from ..errors import InputError, choices, nearest
 from .tube import Curve, deviation
 
 SHARE = 1e-3
@@ -100,7 +100,7 @@ def check_patterns(place: str, entries: Mapping[str, Given], names: Sequence[str
     """InputError for a pattern that no name fits: most likely it is misspelt."""
     for pattern in entries:
         if not any(_fits(pattern, name) for name in names):
-            raise InputError(f"{place}: nothing is called {pattern!r}; valid: {choices(names)}")
+            raise InputError(f"{place}: nothing is called {pattern!r}; {nearest(pattern, names)}")
 
 
 def signal_band(

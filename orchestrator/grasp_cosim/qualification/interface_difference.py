@@ -13,7 +13,7 @@ from math import isclose
 from typing import Any, Literal
 
 from ..checks import is_number
-from ..errors import choices
+from ..errors import choices, nearest
 from ..interface.capabilities import KINDS
 from ..interface.interface import SETTABLE, Interface, Value, Variable, as_float
 from ..interface.units import IDENTITY, Conversion
@@ -131,9 +131,10 @@ def _missing(old: Variable, use: Use, candidate: Interface) -> Difference:
     if use.uses(name):
         alike = [v.name for v in candidate.of(causality)]
         how = "connected" if name in use.connected else "set" if name in use.values else "used"
+        found = nearest(name, alike, candidate.listing)
         text = (
             f"{causality} is {how} in the system, but missing; if it has another name: "
-            f"--rename '{name}=NAME'; its {causality}s: {choices(alike, 8)}"
+            f"--rename '{name}=NAME'; {found}"
         )
         return Difference("blocks", "missing", name, text)
     severity: Severity = "warns" if causality == "output" else "notes"

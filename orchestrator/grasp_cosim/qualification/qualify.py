@@ -104,7 +104,7 @@ def qualify(
         return Qualification(swap)
     asked = tuple(m for m in registered(metrics) if not m.reason)
     more = _conversions_of_candidate(swap.swapped, asked)
-    reference = _run(swap.system, progress)
+    reference = _run(swap.system, progress and "original")
     asked += (END,) if _ended_early(reference) else ()
     original = _reference(swap, reference, asked, more)
     signals, singles = original.entries(bands, metrics=(END.name,))
@@ -140,7 +140,7 @@ def _reference(
 def _tried(swapped: System, progress: bool) -> tuple[Result | None, str | None]:
     """The candidate's run as far as it got, and why it did not get to the end."""
     try:
-        return _run(swapped, progress), None
+        return _run(swapped, progress and "candidate"), None
     except SimulationError as error:
         return error.result, str(error)
     except InputError as error:  # does not load, or refuses its initialisation
@@ -157,7 +157,7 @@ def _conversions_of_candidate(
         raise InputError(f"{error}; of the candidate: --units 'VARIABLE=UNIT'") from error
 
 
-def _run(system: System, progress: bool) -> Result:
+def _run(system: System, progress: str | bool) -> Result:
     result = simulate(system, progress=progress)
     if not result.complete:
         raise KeyboardInterrupt
@@ -180,7 +180,7 @@ def _other_numerics(
     said = ["every second sample"]
     for name, other in _variants(system):
         try:
-            runs.append(curves_of(_run(other, progress)))
+            runs.append(curves_of(_run(other, progress and f"original, {name}")))
             said.append(name)
         except (InputError, SimulationError) as error:
             said.append(f"not {name}: {error}")

@@ -144,7 +144,7 @@ def _check_renamed(rename: Mapping[str, str], ours: Interface, theirs: Interface
     for new, name in rename.items():
         for called in theirs.arrays[new].names if new in theirs.arrays else (new,):
             entry = f"--rename: {new!r} = {name!r}"
-            known(f"{entry}: the original has no variable", called, ours.by_name)
+            known(f"{entry}: the original has no variable", called, ours.by_name, see=ours.listing)
 
 
 def _nominals(interfaces: Mapping[str, Interface]) -> dict[str, float | None]:

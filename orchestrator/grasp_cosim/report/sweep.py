@@ -1,8 +1,9 @@
-"""Pictures of a study: a metric over two parameters, and the distributions of metrics."""
+"""Pictures of a study: metrics over two parameters or one, and the distributions of metrics."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,21 +11,33 @@ import numpy as np
 import numpy.typing as npt
 
 from ..files import remove_parts
-from ..sweep.study import Map, Study
+from ..sweep.study import Cell, Curve, Map, Study
 from ..sweep.sweep import Sweep
-from .plot import BLUE, GREY, RED, finish, new_figure, save
+from .plot import BLUE, COLORS, GREY, RED, finish, new_figure, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
+    from matplotlib.figure import Figure
+    from matplotlib.patheffects import AbstractPathEffect
 
 Floats = npt.NDArray[np.float64]
 
 COLOURS = "viridis"
 """The colours of a map, by the name that matplotlib knows them by."""
 
-MISSING = "#cccccc"
-"""The colour of runs without a value."""
+LIMIT = "black"
+"""The colour of the line of a limit."""
+
+MISSING, HATCH = "#dddddd", "////"
+"""The colour and the hatches of cells without a value."""
+
+DASHES = ("-", "--", "-.", ":")
+MARKERS = ("o", "s", "^", "D", "v")
+"""Of the curves of one picture, in turn, so that they differ without colours, too."""
+
+MOST_TICKS = 12
+"""So many values at uneven distances each have a mark on their axis."""
 
 CONSTANT = 1e-9
 """Values that are so near to each other, as a share of the greatest, are drawn as one."""
@@ -41,126 +54,270 @@ def draw_sweep(sweeps: Sequence[Sweep], folder: Path) -> list[Path]:
     """
     drawn = []
     pictures = sweeps[0].study.pictures
-    remove_parts(folder, "map.png", "distributions.png")
+    remove_parts(folder, "map.png", "curve.png", "distributions.png")
     if pictures.maps:
         drawn.append(folder / "map.png")
         _draw_maps(sweeps, pictures.maps, drawn[-1])
+    if pictures.curves:
+        drawn.append(folder / "curve.png")
+        _draw_curves(sweeps, pictures.curves, drawn[-1])
     if pictures.distributions:
         drawn.append(folder / "distributions.png")
         _draw_distributions(sweeps, pictures.distributions, drawn[-1])
     return drawn
 
 
+# Maps
+
+
+@dataclass(frozen=True, slots=True)
+class _Points:
+    """What a map shows, in the units shown: x and y of its cells, or of its runs, and the metric.
+
+    In cells z has a row for each y; a value is NaN where there is none.
+    """
+
+    x: Floats
+    y: Floats
+    z: Floats
+    in_cells: bool
+
+    @property
+    def missing(self) -> int:
+        """The number of cells or runs without a value."""
+        return int(np.size(self.z) - np.isfinite(self.z).sum())
+
+
 def _draw_maps(sweeps: Sequence[Sweep], maps: Sequence[Map], path: Path) -> None:
     """A row for each map, with one scale of colours, a column for each variant."""
     across, along = len(sweeps), len(maps)
     alone = across == along == 1
-    figure = new_figure(*((7.2, 5.0) if alone else (1.6 + 3.0 * across, 0.6 + 2.9 * along)))
-    rows = figure.subplots(along, across, squeeze=False, sharex=True)
+    figure = new_figure(*((7.2, 5.4) if alone else (1.8 + 3.0 * across, 1.2 + 2.9 * along)))
+    rows = figure.subplots(along, across, squeeze=False, sharex=across > 1)
     for wanted, row in zip(maps, rows, strict=True):
-        found = [_shown(sweep, wanted) for sweep in sweeps]
-        norm = _norm(np.concatenate([np.ma.filled(z, np.nan).ravel() for _, _, z in found]))
+        found = [_points(sweep, wanted) for sweep in sweeps]
+        norm = _norm(np.concatenate([points.z.ravel() for points in found]))
         for sweep, axes, points in zip(sweeps, row, found, strict=True):
             _draw_map(axes, sweep, wanted, points, norm)
-        if any(np.isfinite(np.ma.filled(z, np.nan)).any() for _, _, z in found):
-            label = _what_of_a_cell(sweeps[0], wanted) + _label(sweeps[0].study, wanted.of)
-            bar = figure.colorbar(_scale(norm), ax=[*row], label=label)
-            if bar.ax.get_yscale() == "log":
-                _plain_ticks(bar.ax.yaxis, (1.0, 2.0, 5.0))
+        if any(np.isfinite(points.z).any() for points in found):
+            label = _what_of_a_cell(sweeps[0], found[0].z.size, wanted.cell)
+            _colour_bar(figure, row, norm, found, label + _label(sweeps[0].study, wanted.of))
         for axes in row[1:]:
             axes.set_ylabel("")
     for axes, sweep in zip(rows[-1], sweeps, strict=True):
-        axes.set_xlabel(_label(sweep.study, maps[0].x))
+        axes.set_xlabel(_label(sweep.study, maps[-1].x))
     for axes, sweep in zip(rows[0], sweeps, strict=True):
-        axes.set_title(_plain(sweep.study.variant or sweep.study.name), fontsize=10)
+        axes.set_title(_plain(sweep.study.variant), fontsize=10)
+    figure.suptitle(_heading(sweeps), fontsize=10)
     named = [axes.get_legend_handles_labels() for axes in rows.flat]
     keys = {label: handle for pair in named for handle, label in zip(*pair, strict=True)}
-    if alone and keys:
-        rows[0, 0].legend(fontsize=8, framealpha=0.9)
-    elif keys:  # beside small axes, not over their cells
-        figure.legend([*keys.values()], [*keys], loc="outside lower left", ncols=4, fontsize=8)
+    if keys:  # beside the axes, not over their cells
+        figure.legend([*keys.values()], [*keys], loc="outside lower left", ncols=3, fontsize=8)
     save(figure, path)
 
 
-def _shown(sweep: Sweep, wanted: Map) -> tuple[Floats, Floats, npt.NDArray[Any]]:
-    """Values of x, of y and of the metric over both: in cells where the design is a grid."""
-    x, y, z = (sweep.numbers(name) for name in (wanted.x, wanted.y, wanted.of))
-    return _cells(wanted, x, y, z) if sweep.study.design.kind == "grid" else (x, y, z)
+def _points(sweep: Sweep, wanted: Map) -> _Points:
+    """What a map shows of a study: cells where its design is a grid, else a point for each run."""
+    x, y, z = (_numbers(sweep, name) for name in (wanted.x, wanted.y, wanted.of))
+    if sweep.study.design.kind != "grid":
+        return _Points(x, y, z, False)
+    return _Points(*_cells(wanted.cell, x, y, z), True)
 
 
-def _what_of_a_cell(sweep: Sweep, wanted: Map) -> str:
+def _what_of_a_cell(sweep: Sweep, cells: int, cell: Cell) -> str:
     """Say which of the runs of a cell is shown, where there are several."""
-    cells = _shown(sweep, wanted)[2].size
-    return f"{wanted.cell} of " if len(sweep.outcomes) > cells else ""
+    return f"{cell} of " if len(sweep.outcomes) > cells else ""
 
 
-def _draw_map(
-    axes: Axes,
-    sweep: Sweep,
-    wanted: Map,
-    points: tuple[Floats, Floats, npt.NDArray[Any]],
-    norm: Any,
-) -> None:
-    """Cells where the design is a grid, else a dot per run; grey where there is no value."""
+def _draw_map(axes: Axes, sweep: Sweep, wanted: Map, points: _Points, norm: Any) -> None:
+    """Cells or points; hatched, or crosses, where there is no value. Nothing beyond the runs."""
     study = sweep.study
-    x, y, z = points
     axes.set_axisbelow(True)
-    cells = study.design.kind == "grid"
-    if cells:
-        axes.set_facecolor(MISSING)
-        axes.pcolormesh(x, y, z, shading="nearest", norm=norm, cmap=COLOURS)
-        for values, scale, axis in (
-            (x, axes.set_xscale, axes.xaxis),
-            (y, axes.set_yscale, axes.yaxis),
-        ):
-            if _geometric(values):
-                scale("log")
-                _plain_ticks(axis)
-        if wanted.limit is not None and _crosses(z, wanted.limit):
-            axes.contour(x, y, z, levels=[wanted.limit], colors=RED, linewidths=1.5)
-            unit = study.unit(wanted.of) or ""
-            label = f"{_title(study, wanted.of)} = {wanted.limit:g} {unit}".rstrip()
-            axes.plot([], [], color=RED, label=label)
+    if points.in_cells:
+        _draw_cells(axes, points, norm)
+        if wanted.limit is not None:
+            factor, unit = study.shown(wanted.of)
+            label = f"{_title(study, wanted.of)} = {factor * wanted.limit:g} {unit}".rstrip()
+            _draw_limit(axes, points, factor * wanted.limit, label)
     else:
-        there = np.isfinite(z)
-        axes.scatter(x[~there], y[~there], s=14, color=MISSING)
-        axes.scatter(x[there], y[there], c=z[there], s=14, norm=norm, cmap=COLOURS)
-    if not np.isfinite(np.ma.filled(z, np.nan)).all():
-        axes.fill([], [], color=MISSING, label=f"no {_title(study, wanted.of)}")
+        there = np.isfinite(points.z)
+        axes.scatter(points.x[~there], points.y[~there], s=14, color=GREY, marker="x")
+        x, y, z = (values[there] for values in (points.x, points.y, points.z))
+        axes.scatter(x, y, c=z, s=14, norm=norm, cmap=COLOURS)
+    if points.missing:
+        of = "cells" if points.in_cells else "runs"
+        label = f"no {_title(study, wanted.of)}: {points.missing} of {points.z.size} {of}"
+        _name_missing(axes, points.in_cells, label)
     finish(axes, _label(study, wanted.y), legend=False)
-    if cells:
+    if points.in_cells:
         axes.grid(visible=False)  # which would be on top of them
 
 
-def _scale(norm: Any) -> Any:
+def _draw_cells(axes: Axes, points: _Points, norm: Any) -> None:
+    """A cell around each run, up to halfway to the next; as wide outside as inside."""
+    axes.patch.set(facecolor=MISSING, hatch=HATCH, edgecolor=GREY, linewidth=0.0)
+    borders = []
+    for values, scale, axis in (
+        (points.x, axes.set_xscale, axes.xaxis),
+        (points.y, axes.set_yscale, axes.yaxis),
+    ):
+        logarithmic = _geometric(values)
+        borders.append(_borders(values, logarithmic))
+        if logarithmic:
+            scale("log")
+            _plain_ticks(axis)
+        elif len(values) <= MOST_TICKS and not _even(values):
+            axis.set_ticks(values.tolist(), [f"{v:g}" for v in values])
+    across, along = borders
+    axes.pcolormesh(across, along, np.ma.masked_invalid(points.z), norm=norm, cmap=COLOURS)
+    axes.set_xlim(across[0], across[-1])
+    axes.set_ylim(along[0], along[-1])
+    if not all(_even(v) or _geometric(v) for v in (points.x, points.y)):
+        x, y = np.meshgrid(points.x, points.y)
+        axes.plot(x.ravel(), y.ravel(), ".", color="white", markeredgecolor="black", markersize=5)
+
+
+def _draw_limit(axes: Axes, points: _Points, limit: float, label: str) -> None:
+    """A line where the metric is at the limit, between the runs, if it runs there at all."""
+    from matplotlib.patheffects import withStroke
+
+    z = np.ma.masked_invalid(points.z)
+    if min(z.shape) < 2 or not np.ma.count(z) or not z.min() < limit < z.max():
+        return
+    halo: list[AbstractPathEffect] = [
+        withStroke(linewidth=3.5, foreground="white")
+    ]  # so that it shows in grey, too
+    line = axes.contour(points.x, points.y, z, levels=[limit], colors=LIMIT, linewidths=1.5)
+    line.set_path_effects(halo)
+    axes.plot([], [], color=LIMIT, label=label, path_effects=halo)
+
+
+def _name_missing(axes: Axes, in_cells: bool, label: str) -> None:
+    if in_cells:
+        axes.fill([], [], facecolor=MISSING, hatch=HATCH, edgecolor=GREY, linewidth=0, label=label)
+    else:
+        axes.plot([], [], "x", color=GREY, markersize=4, label=label)
+
+
+def _colour_bar(
+    figure: Figure, row: Sequence[Axes], norm: Any, found: Sequence[_Points], label: str
+) -> None:
+    """The scale of a row of maps; an arrow where values are below its lower end."""
     from matplotlib.cm import ScalarMappable
 
-    return ScalarMappable(norm, COLOURS)
+    below = any((points.z < norm.vmin).any() for points in found)
+    scale = ScalarMappable(norm, COLOURS)
+    bar = figure.colorbar(scale, ax=[*row], label=label, extend="min" if below else "neither")
+    if bar.ax.get_yscale() == "log":
+        _plain_ticks(bar.ax.yaxis, (1.0, 2.0, 5.0))
 
 
-def _cells(wanted: Map, x: Floats, y: Floats, z: Floats) -> tuple[Floats, Floats, npt.NDArray[Any]]:
-    """Values of x, of y and the metric over both; of runs that share a cell, the mean of those with
-    a value, or the greatest of all, which is none where one has none.
+def _borders(centres: Floats, logarithmic: bool) -> Floats:
+    """The borders of cells around rising centres: halfway, or in ratio, as far outside as in."""
+    if logarithmic:
+        return np.asarray(np.exp(_borders(np.log(centres), False)))
+    halves = 0.5 * np.diff(centres) if len(centres) > 1 else [0.05 * abs(centres[0]) or 0.5]
+    return np.concatenate(
+        [
+            centres[:1] - halves[0],
+            centres[:-1] + halves[: len(centres) - 1],
+            centres[-1:] + halves[-1],
+        ]
+    )
+
+
+# Curves
+
+
+def _draw_curves(sweeps: Sequence[Sweep], curves: Sequence[Curve], path: Path) -> None:
+    """Axes for each curve, below each other; in each a line for each column and variant."""
+    figure = new_figure(7.2, 1.2 + 2.8 * len(curves))
+    rows = figure.subplots(len(curves), 1, squeeze=False, sharex=len({c.x for c in curves}) == 1)
+    for wanted, axes in zip(curves, rows[:, 0], strict=True):
+        lines = [
+            (sweep, column)
+            for sweep in sweeps
+            for column in sweep.study.columns_of(wanted.of, "figures.curve")
+        ]
+        for i, (sweep, column) in enumerate(lines):
+            _draw_curve(axes, sweep, wanted, column, i)
+        study = sweeps[0].study
+        factor, unit = study.shown(lines[0][1])
+        if wanted.limit is not None:
+            label = f"limit, {factor * wanted.limit:g} {unit}".rstrip()
+            axes.axhline(factor * wanted.limit, color=LIMIT, linestyle=":", label=label)
+        cell = _what_of_a_cell(
+            sweeps[0], len(_curve(sweeps[0], wanted, lines[0][1])[0]), wanted.cell
+        )
+        title = _title(study, lines[0][1]).partition(",")[0]
+        finish(axes, f"{cell}{title}{f' in {unit}' if unit else ''}")
+        axes.set_xlabel(_label(study, wanted.x))
+    for axes in rows[:-1, 0] if len({c.x for c in curves}) == 1 else ():
+        axes.set_xlabel("")
+    figure.suptitle(_heading(sweeps), fontsize=10)
+    save(figure, path)
+
+
+def _draw_curve(axes: Axes, sweep: Sweep, wanted: Curve, column: str, place: int) -> None:
+    """Markers at the runs, a line between them in a grid; crosses where there is no value."""
+    x, values = _curve(sweep, wanted, column)
+    style = DASHES[place % len(DASHES)] if sweep.study.design.kind == "grid" else ""
+    colour, marker = COLORS[place % len(COLORS)], MARKERS[place % len(MARKERS)]
+    name = _plain(", ".join(filter(None, [sweep.study.variant, _title(sweep.study, column)])))
+    axes.plot(x, values, linestyle=style, marker=marker, ms=4, color=colour, label=name)
+    missing = ~np.isfinite(values)
+    if missing.any():
+        axes.plot(
+            x[missing], np.full(missing.sum(), 0.03 + 0.04 * place), "x", color=colour,
+            transform=axes.get_xaxis_transform(), label=f"no {name}: {missing.sum()} of {len(x)}",
+        )  # fmt: skip
+
+
+def _curve(sweep: Sweep, wanted: Curve, column: str) -> tuple[Floats, Floats]:
+    """Values of x and of a column there: in a grid one for each x, else one for each run."""
+    x, z = _numbers(sweep, wanted.x), _numbers(sweep, column)
+    if sweep.study.design.kind != "grid":
+        return x, z
+    x, _, values = _cells(wanted.cell, x, np.zeros_like(x), z)
+    return x, values[0]
+
+
+# What they share
+
+
+def _numbers(sweep: Sweep, name: str) -> Floats:
+    """A column of the results in the unit in which it is shown."""
+    return sweep.study.shown(name)[0] * sweep.numbers(name)
+
+
+def _heading(sweeps: Sequence[Sweep]) -> str:
+    """What was run: the study, the number of its runs, of each variant, and what they vary."""
+    study, count = sweeps[0].study, len(sweeps[0].outcomes)
+    each = f"{len(sweeps)} times " if len(sweeps) > 1 else ""
+    names = [_plain(p.name) for p in study.parameters]
+    over = " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
+    over = over if len(names) <= 3 else f"{len(names)} parameters"
+    failed = sum(sweep.failed for sweep in sweeps)
+    failures = f", {failed} failed" if failed else ""
+    return f"{_plain(study.title)}: {each}{_runs(count)}{failures}\nover {over}"
+
+
+def _cells(cell: Cell, x: Floats, y: Floats, z: Floats) -> tuple[Floats, Floats, Floats]:
+    """Values of x, of y and the metric over both, NaN where there is none; of runs that share a
+    cell, the mean of those with a value, or the greatest of all, which is none where one has none.
     """
     across, column = np.unique(x, return_inverse=True)
     along, row = np.unique(y, return_inverse=True)
     shape = len(along), len(across)
-    if wanted.cell == "greatest":
+    if cell == "greatest":
         most = np.full(shape, -np.inf)
         np.maximum.at(most, (row, column), np.where(np.isfinite(z), z, np.inf))
-        return across, along, np.ma.masked_invalid(most)
+        return across, along, np.where(np.isfinite(most), most, np.nan)
     total, count = np.zeros((2, *shape))
     there = np.isfinite(z)
     np.add.at(total, (row[there], column[there]), z[there])
     np.add.at(count, (row[there], column[there]), 1.0)
-    mean = np.divide(total, count, out=np.full_like(total, np.nan), where=count > 0.0)
-    return across, along, np.ma.masked_invalid(mean)
-
-
-def _crosses(values: npt.NDArray[Any], limit: float) -> bool:
-    """True if a line at the limit runs through the cells."""
-    wide = min(values.shape) > 1 and bool(np.ma.count(values))
-    return bool(wide and values.min() < limit < values.max())
+    return across, along, np.divide(total, count, out=np.full_like(total, np.nan), where=count > 0)
 
 
 def _plain_ticks(axis: Axis, steps: Sequence[float] = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)) -> None:
@@ -178,6 +335,12 @@ def _geometric(values: Floats) -> bool:
         return False
     ratios = values[1:] / values[:-1]
     return bool(np.ptp(ratios) < 1e-9 * ratios[0])
+
+
+def _even(values: Floats) -> bool:
+    """True if rising values are at equal distances."""
+    steps = np.diff(values)
+    return not len(steps) or bool(np.ptp(steps) < 1e-9 * abs(values).max())
 
 
 def _norm(values: Floats) -> Any:
@@ -207,9 +370,7 @@ def _draw_distributions(sweeps: Sequence[Sweep], metrics: Sequence[str], path: P
         axes.set_title(_plain(sweep.study.variant), fontsize=10)
     for axes in grid[len(panels) :]:
         axes.set_visible(False)
-    if len(sweeps) == 1:
-        name = _plain(sweeps[0].study.name)
-        figure.suptitle(f"{name}, {_runs(len(sweeps[0].outcomes))}", fontsize=10)
+    figure.suptitle(_heading(sweeps), fontsize=10)
     save(figure, path)
 
 
@@ -217,7 +378,7 @@ def _draw_distribution(axes: Axes, sweep: Sweep, name: str) -> None:
     """A histogram, with the median and the span that 90 % of the runs are in."""
     from matplotlib.ticker import MaxNLocator
 
-    values = sweep.numbers(name)
+    values = _numbers(sweep, name)
     there = values[np.isfinite(values)]
     axes.set_xlabel(_label(sweep.study, name))
     axes.set_axisbelow(True)
@@ -254,8 +415,8 @@ def _runs(count: int) -> str:
 
 def _label(study: Study, name: str) -> str:
     """A parameter or metric with its unit."""
-    unit, title = study.unit(name), _title(study, name)
-    return f"{title} in {unit}" if unit and unit != "1" else title
+    unit, title = study.shown(name)[1], _title(study, name)
+    return f"{title} in {unit}" if unit else title
 
 
 def _title(study: Study, name: str) -> str:

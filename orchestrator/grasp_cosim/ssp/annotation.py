@@ -15,7 +15,7 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from lxml import etree  # type: ignore[import-untyped]
 
-from ..errors import InputError, choices
+from ..errors import InputError, choices, nearest
 from ..interface.interface import Value
 from ..system.description import System
 from ..system.parts import Event, Fault, Initialisation, Isolation, Port, Solver
@@ -115,7 +115,7 @@ def _typed(kind: Any, value: Any) -> Any:
         hints = get_type_hints(kind)
         unknown = [key for key in _typed(dict, value) if key not in hints]
         if unknown:
-            raise ValueError(f"unknown entry {unknown[0]!r}; valid: {choices(hints)}")
+            raise ValueError(f"unknown entry {unknown[0]!r}; {nearest(unknown[0], hints)}")
         return kind(**{key: _typed(hints[key], entry) for key, entry in value.items()})
     if origin is not None and isinstance(origin, type) and issubclass(origin, Mapping):
         return {

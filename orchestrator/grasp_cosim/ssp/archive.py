@@ -15,7 +15,7 @@ from pathlib import Path
 from threading import Lock
 from urllib.parse import unquote, urlsplit
 
-from ..errors import InputError, choices
+from ..errors import InputError, nearest
 from ..files import in_one_piece
 from ..interface.document import check_size
 from ..scratch import ScratchFolder
@@ -79,7 +79,7 @@ class Archive:
                 return entry
         suffix = posixpath.splitext(parts.path)[1]
         valid = [n for n in self.names if n.endswith(suffix) and not n.endswith("/")]
-        raise InputError(f"{place}: source {uri!r}: not in the archive; valid: {choices(valid)}")
+        raise InputError(f"{place}: source {uri!r}: not in the archive; {nearest(uri, valid)}")
 
     def extract(self, entry: str) -> Path:
         """The entry as a file, until the process ends."""

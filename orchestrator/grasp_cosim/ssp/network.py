@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from ..errors import InputError, choices
+from ..errors import InputError, nearest
 from ..interface.interface import Interface, Variable
 from ..interface.units import Unit
 from .tree import Element, Hop, Node, Path
@@ -156,9 +156,10 @@ def _check_connectors(part: Part) -> None:
         place = f"{connector.place}: {part.element.name}: connector {connector.name!r}"
         variable = part.interface.by_name.get(connector.name)
         if variable is None or variable.causality != connector.kind:
+            names = [v.name for v in part.interface.of(connector.kind)]
             raise InputError(
                 f"{place}: {part.interface.path.name} has no {connector.kind} of that name; "
-                f"valid: {choices(v.name for v in part.interface.of(connector.kind))}"
+                f"{nearest(connector.name, names)}"
             )
         kind = connector.value_kind
         if kind is not None and kind != variable.kind:

@@ -1,6 +1,6 @@
 """Designs: which points of the unit cube the runs of a study take, a row per run.
 
-The kinds are in orchestrator/README.md. Every point is a pure function of kind, runs, seed, the
+The kinds are in docs/studies.md. Every point is a pure function of kind, runs, seed, the
 levels of the parameters, and its index.
 """
 

@@ -43,7 +43,7 @@ def reached(sweeps: Sequence[Sweep]) -> list[Reached]:
         _reached(sweep, by_variant[limit.reference] if limit.reference else None, limit, column)
         for sweep in sweeps
         for limit in sweep.study.limits
-        for column in sweep.study.limited(limit.metric)
+        for column in sweep.study.columns_of(limit.metric, "limits")
     ]
 
 

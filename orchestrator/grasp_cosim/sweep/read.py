@@ -1,4 +1,4 @@
-"""A study from a TOML file, in the format that orchestrator/README.md describes."""
+"""A study from a TOML file, in the format that docs/studies.md describes."""
 
 import math
 import re
@@ -19,13 +19,13 @@ from ..checks import (
     toml_table,
     whole,
 )
-from ..errors import InputError, choices
+from ..errors import InputError, choices, nearest
 from ..interface.interface import Value
 from ..metrics.metric import Metric, load_metrics
 from ..system.description import System
 from .design import Design
 from .distributions import Distribution, Listed, Normal, Uniform, spaced
-from .study import CELLS, STATISTICS, Limit, Map, Parameter, Pictures, Study
+from .study import CELLS, STATISTICS, Curve, Limit, Map, Parameter, Pictures, Study
 
 OF_A_VARIANT = {
     "presets", "bench", "case", "controller", "step", "stop", "swap", "values", "limits",
@@ -84,7 +84,7 @@ def study_file(name: str, folder: Path) -> Path:
     if path.suffix != ".toml" and name in known:
         return folder / f"{name}.toml"
     if not path.is_file():
-        raise InputError(f"{path}: no such study; must be a .toml file or {choices(known)}")
+        raise InputError(f"{path}: no such study, nor .toml file; {nearest(name, known)}")
     return path
 
 
@@ -285,7 +285,8 @@ def _values(place: str, entry: Any) -> Listed:
     return Listed(tuple(_value(place, value) for value in entry))
 
 
-def _spaced(logarithmic: bool, place: str, entry: Any) -> Listed:
+def spaced_values(logarithmic: bool, place: str, entry: Any) -> Listed:
+    """The values of a table like { from = 0.5, to = 2.0, count = 21 }; InputError if it is none."""
     first, last, count = _numbers(place, entry, ["from", "to", "count"])
     if not count.is_integer() or not 2 <= count <= MOST_LEVELS:
         raise InputError(f"{place}: count = {count:g}: must be a whole number 2 to {MOST_LEVELS}")
@@ -303,8 +304,8 @@ def _bounded(kind: type[Normal | Uniform], place: str, entry: Any) -> Distributi
 
 FORMS: Mapping[str, Callable[[str, Any], Distribution]] = {
     "values": _values,
-    "linspace": partial(_spaced, False),
-    "geomspace": partial(_spaced, True),
+    "linspace": partial(spaced_values, False),
+    "geomspace": partial(spaced_values, True),
     "uniform": partial(_bounded, Uniform),
     "normal": partial(_bounded, Normal),
 }
@@ -313,21 +314,27 @@ FORMS: Mapping[str, Callable[[str, Any], Distribution]] = {
 
 def _pictures(place: str, table: Any) -> Pictures:
     table = as_table(place, table)
-    check_keys(place, table, {"map", "distributions"})
+    check_keys(place, table, {"map", "distributions", "curve"})
     distributions = _names(f"{place}: distributions", table.get("distributions", []))
-    entries = table.get("map", [])
-    entries = entries if isinstance(entries, list) else [entries]
-    return Pictures(tuple(_map(f"{place}: map", entry) for entry in entries), distributions)
+    maps = _each(f"{place}: map", table.get("map", []), ("x", "y", "of"))
+    curves = _each(f"{place}: curve", table.get("curve", []), ("x", "of"))
+    return Pictures(tuple(Map(**m) for m in maps), distributions, tuple(Curve(**c) for c in curves))
 
 
-def _map(place: str, entry: Any) -> Map:
+def _each(place: str, entry: Any, names: Sequence[str]) -> list[dict[str, Any]]:
+    """A table, or each of a list of such, with these names and what maps and curves may have."""
+    return [_over(place, e, names) for e in (entry if isinstance(entry, list) else [entry])]
+
+
+def _over(place: str, entry: Any, names: Sequence[str]) -> dict[str, Any]:
     entry = as_table(place, entry)
-    check_keys(place, entry, Map.__slots__)
-    x, y, of = (text(f"{place}: {key}", entry.get(key), "a name") for key in ("x", "y", "of"))
+    check_keys(place, entry, (*names, "limit", "cell"))
+    named = {name: text(f"{place}: {name}", entry.get(name), "a name") for name in names}
     limit = entry.get("limit")
     if limit is not None:
         limit = number(f"{place}: limit", limit)
-    return Map(x, y, of, limit, choice(f"{place}: cell", entry.get("cell", "mean"), CELLS))
+    cell = choice(f"{place}: cell", entry.get("cell", "mean"), CELLS)
+    return {**named, "limit": limit, "cell": cell}
 
 
 def _limits(place: str, table: Any) -> tuple[Limit, ...]:

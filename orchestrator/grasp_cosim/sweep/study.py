@@ -11,11 +11,12 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from ..checks import known
-from ..errors import InputError, choices
+from ..errors import InputError, choices, nearest
 from ..interface.interface import Value, Variable
 from ..interface.units import IDENTITY, Conversion
 from ..metrics.metric import Metric, available, check_portable, registered
 from ..metrics.units import in_si
+from ..numerals import in_milli
 from ..system.description import System
 from ..system.parts import Port
 from ..system.readings import between
@@ -62,11 +63,22 @@ class Map:
 
 
 @dataclass(frozen=True, slots=True)
+class Curve:
+    """A picture of a metric, or of one of its columns, of, over the parameter x; else as a Map."""
+
+    x: str
+    of: str
+    limit: float | None = None
+    cell: Cell = "mean"
+
+
+@dataclass(frozen=True, slots=True)
 class Pictures:
-    """The pictures of a study: maps, and the distributions of metrics."""
+    """The pictures of a study: maps, the distributions of metrics, and curves."""
 
     maps: tuple[Map, ...] = ()
     distributions: tuple[str, ...] = ()
+    curves: tuple[Curve, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,12 +135,18 @@ class Study:
             self._check_values(parameter)
         self._check_pictures()
         for limit in self.limits:
-            self.limited(limit.metric)
+            self.columns_of(limit.metric, "limits")
         try:
             self.design.total(self._levels)
         except InputError as error:
             raise InputError(f"{self.name}: {error}") from error
         self.system.with_values(self.values(0))
+
+    @property
+    def title(self) -> str:
+        """The name of its file without the suffix; without a file, that of the system."""
+        name = self.name.removesuffix(f", {self.variant}")
+        return name.removesuffix(".toml") if name.endswith(".toml") else self.system.name
 
     @property
     def runs(self) -> int:
@@ -155,7 +173,7 @@ class Study:
         component, _, variable = name.partition(".")
         interface = self.system.component(component, f"{self.name}: {name}").interface
         said = f"{self.name}: {name}: {interface.path.name} has no variable"
-        known(said, variable, interface.by_name)
+        known(said, variable, interface.by_name, see=interface.listing)
         return interface.by_name[variable]
 
     @cached_property
@@ -286,19 +304,29 @@ class Study:
         ]
         results = [*(c for m in self.expected for c in m.columns), *self.outputs]
         columns = [*numeric, *self.seeds, *results]
+        for kind, name in self._varied_in_pictures():
+            known(f"{self.name}: figures.{kind}: no parameter", name, numeric, " with numbers")
         for picture in self.pictures.maps:
-            for name in (picture.x, picture.y):
-                known(f"{self.name}: figures.map: no parameter", name, numeric, " with numbers")
             if picture.x == picture.y:
                 raise InputError(
                     f"{self.name}: figures.map: x = y = {picture.x!r}; must be two parameters"
                 )
-        for name in (*(m.of for m in self.pictures.maps), *self.pictures.distributions):
+        whole = {m.name for m in self.expected}
+        curves = [c.of for c in self.pictures.curves if c.of not in whole]
+        for name in (*(m.of for m in self.pictures.maps), *self.pictures.distributions, *curves):
             if not (name in columns or name.startswith(PROXIES) or self.metric_of(name)):
                 raise InputError(
-                    f"{self.name}: figures: no column {name!r} in the results; valid: "
-                    f"{choices(columns)}"
+                    f"{self.name}: figures: no column {name!r} in the results; "
+                    f"{nearest(name, columns)}"
                 )
+
+    def _varied_in_pictures(self) -> Iterator[tuple[str, str]]:
+        """The parameters that pictures are over, after what kind of picture that is."""
+        for picture in self.pictures.maps:
+            yield "map", picture.x
+            yield "map", picture.y
+        for curve in self.pictures.curves:
+            yield "curve", curve.x
 
     @cached_property
     def expected(self) -> list[Metric]:
@@ -313,8 +341,8 @@ class Study:
             return found
         return None
 
-    def limited(self, name: str) -> tuple[str, ...]:
-        """The columns that a limit of that name is for; InputError where there is no such result.
+    def columns_of(self, name: str, place: str) -> tuple[str, ...]:
+        """The columns of a result of that name; InputError, which begins with the place, if none.
 
         Those are all entries of a metric, one entry like impact_velocity[1], or an output.
         """
@@ -322,7 +350,7 @@ class Study:
             if name in (metric.name, *metric.columns):
                 return metric.columns if name == metric.name else (name,)
         known(
-            f"{self.name}: limits: no result",
+            f"{self.name}: {place}: no result",
             name,
             [*(m.name for m in self.expected), *self.outputs],
         )
@@ -338,6 +366,11 @@ class Study:
             return self.variable(column).unit
         metric = self.metric_of(column)
         return metric.unit if metric else None
+
+    def shown(self, column: str) -> tuple[float, str]:
+        """The factor and the unit in which tables and pictures show a column, "" for a number."""
+        metric = self.metric_of(column)
+        return (metric.factor, metric.display_unit) if metric else in_milli(self.unit(column))
 
     @property
     def _declared(self) -> list[str]:

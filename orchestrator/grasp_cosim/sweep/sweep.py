@@ -14,7 +14,8 @@ import numpy.typing as npt
 
 from ..errors import InputError
 from ..files import remove_parts, write_text
-from ..parallel import Crew, Lost, progress_bar
+from ..parallel import Crew, Lost
+from ..progress import Progress, phase
 from .cluster import run_on_cluster
 from .run import Job, Outcome, Task, run_job
 from .sensitivity import Sensitivity, sensitivity
@@ -90,8 +91,8 @@ def sweep(
 
     workers are processes on this machine, by default as many as it has processors; with scheduler,
     the address of a Dask cluster, the runs are done there. The results are the same to the bit.
-    A finished run is in the folder at once: after a kill the same call goes on. progress shows a
-    bar on standard error if that is a terminal.
+    A finished run is in the folder at once: after a kill the same call goes on. progress shows
+    on standard error how far it is.
 
     InputError where the folder has another study's runs, or another process is at it, or an extra
     is missing; SimulationError where workers do not start, the cluster fails or a run cannot be
@@ -112,7 +113,9 @@ def sweep(
             results = run_on_cluster(scheduler, task, jobs)
         else:
             results = run_here(task, jobs, min(workers or os.cpu_count() or 1, len(left)))
-        with progress_bar(study.name, study.runs, progress, resumed) as bar, closing(results):
+        what = f"{study.name}, {study.variant}" if study.variant else study.name
+        bar = Progress(what, study.runs, shown=progress, initial=resumed)
+        with phase(f"{what}, {len(left)} runs"), bar, closing(results):
             for outcome in results:
                 store.keep(outcome)
                 done[outcome.index] = outcome

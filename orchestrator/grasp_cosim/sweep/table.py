@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..checks import extra_module
-from ..errors import InputError, choices
+from ..errors import InputError, nearest
 from ..files import in_one_piece
 from .run import Outcome
 from .study import STATISTICS, Study
@@ -33,8 +33,8 @@ class Table:
     def numbers(self, name: str) -> npt.NDArray[np.float64]:
         """A column as numbers, NaN where there is none; InputError where there is no such one."""
         if name not in self.columns:
-            known = choices([*self.parameters, *self.metrics])
-            raise InputError(f"{name!r}: no such column of the results; valid: {known}")
+            found = nearest(name, [*self.parameters, *self.metrics])
+            raise InputError(f"{name!r}: no such column of the results; {found}")
         values = self.columns[name]
         return np.array([np.nan if v is None or isinstance(v, str) else float(v) for v in values])
 

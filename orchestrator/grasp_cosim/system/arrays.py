@@ -39,7 +39,8 @@ def by_element(system: Structure) -> tuple[Connection, ...]:
             interface = system.component(port.component, place).interface
             if array is None:
                 valid = [v.name for v in interface.of(causality)]
-                known(f"{place}: {port.component} has no {causality}", port.variable, valid)
+                said = f"{place}: {port.component} has no {causality}"
+                known(said, port.variable, valid, see=interface.listing)
                 v = interface.by_name[port.variable]
                 has.append(f"{port} is {v.nature if v.shape else 'no array'}")
             else:

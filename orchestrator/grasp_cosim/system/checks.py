@@ -241,8 +241,8 @@ def _ends(system: Structure, connection: Connection) -> tuple[_End, _End]:
         found = interface.by_name.get(port.variable)
         if found is None or found.causality != causality:
             valid = [v.name for v in interface.of(causality)]
-            place = _Place(system, connection)
-            known(f"{place}: {port.component} has no {causality}", port.variable, valid)
+            said = f"{_Place(system, connection)}: {port.component} has no {causality}"
+            known(said, port.variable, valid, see=interface.listing)
             raise AssertionError(port)  # pragma: no cover
         return _End(port, interface, found)
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from .. import extensions
 from ..checks import choice, is_number, number
-from ..errors import InputError, choices
+from ..errors import InputError, nearest
 from ..files import check_nature
 from ..interface.interface import Given
 from .arrays import as_written, by_element, check_arrays
@@ -125,7 +125,12 @@ class System(Structure):
         components, notes = {c.name: c for c in self.components}, [*self.notes]
         given: dict[str, dict[str, Given]] = {}
         for key, value in values.items():
-            name, _, variable = key.partition(".")
+            name, dot, variable = key.partition(".")
+            if not dot:
+                ports = [f"{c.name}.{v}" for c in self.components for v in c.interface.by_name]
+                raise InputError(
+                    f"{places[1]} {key}: must be COMPONENT.VARIABLE; {nearest(key, ports)}"
+                )
             self.component(name, f"{places[1]} {key}")
             given.setdefault(name, {})[variable] = value
         for name, fmu in fmus.items():
@@ -155,7 +160,7 @@ class System(Structure):
         for name in names:
             if name not in self.presets:
                 raise InputError(
-                    f"{self.name}: no preset {name!r}; valid: {choices(self.presets)}; a system "
+                    f"{self.name}: no preset {name!r}; {nearest(name, self.presets)}; a system "
                     "file has them as [presets.NAME]"
                 )
             place = f"{self.name}: [presets.{name}]"

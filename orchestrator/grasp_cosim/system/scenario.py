@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from ..checks import as_table, check_keys, real
-from ..errors import InputError, choices
+from ..errors import InputError, nearest
 from .description import in_nanoseconds
 from .faults import RANDOM
 from .parts import NANOSECONDS, Condition, Connection, Event, Fault, Port
@@ -100,8 +100,8 @@ def _target(place: str, text: Any, connections: Sequence[Connection]) -> Port:
         )
     ends = [_port(place, part) for part in parts]
     if len(ends) == 2 and ends not in [[c.source, c.target] for c in connections]:
-        valid = choices(connections)
-        raise InputError(f"{place}: connection = {text!r}: no such connection; valid: {valid}")
+        found = nearest(text, connections)
+        raise InputError(f"{place}: connection = {text!r}: no such connection; {found}")
     return ends[-1]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ..checks import choice, exact, known, whole
-from ..errors import InputError, choices
+from ..errors import InputError, choices, nearest
 from ..interface.interface import Interface, Value
 from .faults import FAULTS
 from .parts import RELATIONS, Condition, Event, Fault, Port, first_step, seconds
@@ -66,7 +66,7 @@ def check_setting(system: Structure, port: Port, value: Value, place: str) -> No
             own = [p for p in own if p.variable in names]
         raise InputError(
             f"{place}: {found}; must be a tunable parameter or an input without a connection; "
-            f"valid: {choices(own or settable)}"
+            f"{nearest(port, own or settable, interface.listing)}"
         )
     interface.parse(place, port.variable, value)
 
@@ -75,7 +75,8 @@ def _check_condition(system: Structure, condition: Condition, place: str) -> Non
     interface = system.component(condition.port.component, place).interface
     valid = [v.name for v in interface.of("output") if v.is_number]
     component, variable = condition.port.component, condition.port.variable
-    known(f"{place}: {component} has no numeric output", variable, valid)
+    said = f"{place}: {component} has no numeric output"
+    known(said, variable, valid, see=interface.listing)
     kind, items = interface.by_name[variable].kind, interface.by_name[variable].items
     relations = {"Real": RELATIONS[:4], "Boolean": RELATIONS[4:]}.get(kind, RELATIONS)
     if condition.relation not in relations:
@@ -99,7 +100,7 @@ def _check_fault(system: Structure, fault: Fault, place: str) -> None:
     if fault.target not in targets:
         raise InputError(
             f"{place}: connection = '{fault.target}': no connection ends there; "
-            f"valid: {choices(targets)}"
+            f"{nearest(fault.target, targets)}"
         )
     choice(f"{place}: kind", fault.kind, FAULTS)
     interface = system.component(fault.target.component, place).interface
@@ -130,8 +131,8 @@ def _check_parameters(fault: Fault, interface: Interface, place: str) -> None:
         if name not in kind.parameters:
             others = ["connection", "kind", "from", "until", "when", *["seed"] * kind.random]
             raise InputError(
-                f"{place}: unknown entry {name!r}; valid for {fault.kind}: "
-                f"{choices([*kind.parameters, *others])}"
+                f"{place}: unknown entry {name!r} of {fault.kind}; "
+                f"{nearest(name, [*kind.parameters, *others])}"
             )
     for name, valid in kind.parameters.items():
         if valid is not None and (valid.needed or name in fault.parameters):

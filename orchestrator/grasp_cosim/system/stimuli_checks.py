@@ -39,7 +39,7 @@ def check_stimuli(system: Structure, whole: bool = False) -> None:
         place = stimuli.place(port)
         interface = system.component(port.component, place).interface
         inputs = [Port(port.component, v.name) for v in interface.of("input")]
-        known(f"{place}: no input", str(port), [*map(str, inputs)])
+        known(f"{place}: no input", str(port), [*map(str, inputs)], see=interface.listing)
         variable = interface.by_name[port.variable]
         if not variable.is_number:
             raise InputError(

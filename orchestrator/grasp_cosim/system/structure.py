@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, get_args
 
-from ..errors import InputError, choices
+from ..errors import InputError, nearest
 from ..interface.interface import Given, Variable
 from .parts import Component, Connection, Event, Fault, Initialisation, Port
 from .stimuli import Stimuli
@@ -69,6 +69,5 @@ class Structure:
         for component in self.components:
             if component.name == name:
                 return component
-        raise InputError(
-            f"{place}: no component {name!r}; valid: {choices(c.name for c in self.components)}"
-        )
+        names = [c.name for c in self.components]
+        raise InputError(f"{place}: no component {name!r}; {nearest(name, names)}")

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from shlex import quote
 
-from ..errors import InputError, choices
+from ..errors import InputError, nearest
 from ..interface.interface import Interface, Value
 from ..interface.read import describe
 from ..interface.units import IDENTITY
@@ -65,10 +65,10 @@ def _check_ends(system: Structure, was: Component, after: Interface, place: str)
     if lacking:
         causality = was.interface.by_name[lacking[0]].causality
         more = f", and {len(lacking) - 1} more that are connected" if lacking[1:] else ""
-        its = choices([v.name for v in after.of(causality)])
+        its = nearest(lacking[0], [v.name for v in after.of(causality)], after.listing)
         fmu = quote(str(after.path))
         raise InputError(
-            f"{place}: {after.path.name} has no {causality} {lacking[0]!r}{more}; valid: {its}; if "
+            f"{place}: {after.path.name} has no {causality} {lacking[0]!r}{more}; {its}; if "
             f"they have other names: --rename '{lacking[0]}=NAME', or `grasp-cosim init "
             f"my_system.toml --as {was.name}={fmu}` finds them"
         )

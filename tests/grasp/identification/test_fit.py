@@ -109,5 +109,5 @@ def test_a_fit_that_does_not_come_to_rest_says_so(monkeypatch: pytest.MonkeyPatc
 
 def test_no_scipy_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "scipy", None)
-    with pytest.raises(InputError, match=r"pip install 'grasp-cosim\[identify\]'"):
+    with pytest.raises(InputError, match=r"pip install 'scipy>="):
         fitted(decay(3.0, 0.7))

@@ -139,7 +139,9 @@ def test_a_log_is_read_from_both_kinds_of_file(grasp: System, tmp_path: Path, ki
 
 def test_a_signal_that_is_missing_is_named(grasp: System, recorded: Signals) -> None:
     signals = {k: v for k, v in recorded.items() if k != "controller.force[2]"}
-    with pytest.raises(InputError, match=r"^test: no signal 'controller.force\[2\]'; it has "):
+    with pytest.raises(
+        InputError, match=r"^test: no signal 'controller.force\[2\]'; did you mean con"
+    ):
         identified(grasp, replace(recorded, by_name=signals))
 
 

@@ -8,7 +8,7 @@ import click
 
 from ...errors import InputError, SimulationError
 from ...files import FMU_FOLDER, NATIVE_FOLDER, check_folder
-from ..frame import PATH, announce, bind_python_option, json_option, say, show
+from ..frame import PATH, bind_python_option, json_option, say, show, waiting
 
 if TYPE_CHECKING:
     from grasp_fmus.folder import Built
@@ -47,9 +47,10 @@ def build(
     c_only: Path | None,
     as_json: bool,
 ) -> int:
-    """Build the FMUs: the plants, GripperPlant*, ProximitySensor, and the GraspController*.
+    """Build the FMUs, of Python or as C.
 
-    With BLOCK, a Python file: the FMU of that block alone, spring_plant.py becomes SpringPlant.fmu.
+    These are the plants, GripperPlant*, ProximitySensor, and the GraspController*. With BLOCK, a
+    Python file: the FMU of that block alone, spring_plant.py becomes SpringPlant.fmu.
     docs/your_plant.md shows one. With --native, BLOCK may be the name of one of ours as well.
 
     Says what is not as it was built last. --bind-python adds the libpython of PYTHON, by default
@@ -93,7 +94,10 @@ def _in_python(block: Path | None, folder: Path, bind_python: str | None) -> "Se
     from grasp_fmus.block_build import build_block
     from grasp_fmus.build import build as build_fmus
 
-    return [build_block(block, folder, bind_python)] if block else build_fmus(folder, bind_python)
+    with waiting(f"building {block or 'the FMUs'}"):
+        if block:
+            return [build_block(block, folder, bind_python)]
+        return build_fmus(folder, bind_python)
 
 
 def _native(
@@ -106,13 +110,14 @@ def _native(
 
     plan = planned(targets(target.split(",")) if target is not None else (), fmi)
     notes = [plan.note] if plan.note else []
-    announce(f"building for {', '.join(t.tuple for t in plan.places)}{FIRST if target else ''}")
+    places = ", ".join(t.tuple for t in plan.places)
     try:
-        if block is None:
-            return build_native(folder, plan), [*notes, *python_only().values()]
-        if _is_name(block):
-            return build_native(folder, plan, [str(block)]), notes
-        return [build_native_block(block, folder, plan)], notes
+        with waiting(f"building for {places}{FIRST if target else ''}"):
+            if block is None:
+                return build_native(folder, plan), [*notes, *python_only().values()]
+            if _is_name(block):
+                return build_native(folder, plan, [str(block)]), notes
+            return [build_native_block(block, folder, plan)], notes
     except CompilerError as error:
         raise SimulationError(str(error)) from error
 

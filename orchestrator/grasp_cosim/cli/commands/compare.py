@@ -27,12 +27,12 @@ def compare(
     metric_files: tuple[Path, ...],
     as_json: bool,
 ) -> int:
-    """Compare two recorded runs, A and B: signals, metrics and settings.
+    """Compare two recorded runs, A and B.
 
-    Each is a folder that `run --out` wrote, or a file of signals from elsewhere: CSV with the
-    column time and names like plant.gap[1], with a unit in brackets where it is another one,
-    "plant.gap[1] [mm]"; or ASAM MDF (.mf4). Runs of unlike length are compared where both are.
-    Exit code 0: all that both have is inside its band; 1: not.
+    Compared are signals, metrics and settings. Each is a folder that `run --out` wrote, or a file
+    of signals from elsewhere: CSV with the column time and names like plant.gap[1], with a unit in
+    brackets where it is another one, "plant.gap[1] [mm]"; or ASAM MDF (.mf4). Runs of unlike length
+    are compared where both are. Exit code 0: all that both have is inside its band; 1: not.
 
     \b
     Example: grasp-cosim compare results_a results_b -o compare.html

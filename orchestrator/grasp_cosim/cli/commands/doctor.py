@@ -13,9 +13,9 @@ from ..frame import NEGATIVE, PATH, json_option, show
 @click.argument("fmu", required=False, type=PATH)
 @json_option
 def doctor(fmu: Path | None, as_json: bool) -> int:
-    """Find out whether this machine will load FMU, and what to do if not.
+    """Find out whether this machine will load FMU.
 
-    Without FMU: whether it will load Python FMUs at all.
+    If not, it says what to do. Without FMU: whether it will load Python FMUs at all.
 
     \b
     Example: grasp-cosim doctor vendor.fmu

@@ -1,6 +1,5 @@
 """The command evaluate."""
 
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -21,10 +20,12 @@ from ..frame import (
     PATH,
     fail,
     format_option,
+    is_quiet,
     json_option,
     load_system,
     show,
     with_controller,
+    workers_option,
 )
 from ..native import many_runs_option, natively
 from ..options import controller_option
@@ -33,8 +34,14 @@ from ..options import controller_option
 @click.command()
 @click.option("--bench", is_flag=True, help="The experiments, with friction and electronics.")
 @controller_option
-@click.option("--out", type=PATH, default=Path("results"), show_default=True)
-@click.option("--workers", type=click.IntRange(1), default=os.cpu_count(), show_default="all cores")
+@click.option(
+    "--out",
+    type=PATH,
+    default=Path("results"),
+    show_default=True,
+    help="Folder for report.md, pictures and numbers.",
+)
+@workers_option
 @many_runs_option
 @format_option
 @json_option
@@ -47,9 +54,10 @@ def evaluate(
     suffix: str,
     as_json: bool,
 ) -> int:
-    """Run the published simulation table and figures and compare; --bench: the experiments.
+    """Run the published table and figures, and compare.
 
-    Finished grasps are kept until all are done: the same command goes on where it was ended.
+    With --bench these are the experiments, else the simulations. Finished grasps are kept until all
+    are done: the same command goes on where it was ended.
 
     \b
     Example: grasp-cosim evaluate --out results
@@ -60,7 +68,7 @@ def evaluate(
     system = with_preset(system, "bench") if bench else system
     try:
         with natively(system, native) as chosen:
-            report = run_evaluation(chosen, out, workers, True, source, suffix)
+            report = run_evaluation(chosen, out, workers, not is_quiet(), source, suffix)
     except KeyboardInterrupt:
         kept = Parts(out / FOLDER).kept()
         goes_on = f"; {counted(kept, 'grasp')} kept in {out / FOLDER}, the same command goes on"

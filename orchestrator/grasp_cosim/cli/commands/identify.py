@@ -1,6 +1,5 @@
 """The command identify."""
 
-import os
 from pathlib import Path
 
 import click
@@ -20,7 +19,7 @@ from ...grasp.identification.parameters import DEFAULT, GROUPS, chosen
 from ...numerals import counted
 from ...recording.load import load_log
 from ...system.description import System
-from ..frame import PATH, json_option, load_system, say, show
+from ..frame import PATH, is_quiet, json_option, load_system, say, show, workers_option
 from ..native import many_runs_option, natively
 from ..options import set_option, set_values
 
@@ -39,7 +38,7 @@ from ..options import set_option, set_values
 )
 @set_option
 @click.option("--out", type=PATH, help="Folder for values and residuals.")
-@click.option("--workers", type=click.IntRange(1), default=os.cpu_count(), show_default="all cores")
+@workers_option
 @many_runs_option
 @json_option
 def identify(
@@ -52,7 +51,9 @@ def identify(
     native: bool | None,
     as_json: bool,
 ) -> int:
-    """Fit the fingers' friction to contact times, by default the published experimental ones.
+    """Fit the fingers' friction to contact times.
+
+    By default these are the published experimental ones.
 
     \b
     Example: grasp-cosim identify --fit coulomb --fit viscous --out identified
@@ -93,7 +94,7 @@ def _from_times(
     contacts = read_contacts(path) if path else published_contacts()
     parameters = chosen(groups, tuple(GROUPS), "identify")
     with natively(system, native) as run:
-        fit = identify_from_times(run, contacts, parameters, workers, progress=True)
+        fit = identify_from_times(run, contacts, parameters, workers, progress=not is_quiet())
     rows = [
         {"condition": c.label, "case": c.case, "finger": c.finger, "measured": c.time}
         for c in contacts

@@ -18,6 +18,7 @@ from ...interface.read import read_interface
 from ...numerals import counted
 from ...system.description import System
 from ...system.toml import to_do
+from ..completion import components
 from ..frame import PATH, json_option, pair, say, show
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ MOST = 24
     "candidates",
     multiple=True,
     metavar="COMPONENT=FMU",
+    shell_complete=components("="),
     help="A foreign FMU in the place of a component of the grasp: its names, units and values.",
 )
 @click.option(
@@ -46,6 +48,7 @@ MOST = 24
     type=click.Choice(("published", "adaptive")),
     default="published",
     show_default=True,
+    help="Which of our controllers it has.",
 )
 @click.option("--native", is_flag=True, help="Our FMUs as C, which need no Python.")
 @click.option("--force", is_flag=True, help="Write over a file that is there already.")
@@ -59,10 +62,10 @@ def init(
     force: bool,
     as_json: bool,
 ) -> int:
-    """Write FILE, a system file to start from: the grasp, its FMUs in fmus/build beside FILE.
+    """Write FILE, a system file to start from.
 
-    With --as, one of its components is filled in for an FMU of another vendor. What cannot be told
-    is a TODO there; a run names it.
+    It is the grasp, with its FMUs in fmus/build beside FILE. With --as, one of its components is
+    filled in for an FMU of another vendor. What cannot be told is a TODO there; a run names it.
 
     \b
     Example: grasp-cosim init my_system.toml --as plant=vendor.fmu

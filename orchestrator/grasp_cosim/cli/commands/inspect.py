@@ -14,7 +14,9 @@ from ..frame import PATH, json_option, show
 @click.argument("fmu", type=PATH)
 @json_option
 def inspect(fmu: Path, as_json: bool) -> int:
-    """Show the interface of any FMU: variables, units, ranges, dependencies, capabilities.
+    """Show the interface of any FMU.
+
+    That is its variables with units, ranges and dependencies, and its capabilities.
 
     \b
     Example: grasp-cosim inspect fmus/build/GripperPlant.fmu

@@ -12,11 +12,11 @@ from ..frame import PATH, json_option, show
 @click.option("-o", "--out", type=PATH, default="play.html", show_default=True, help="The page.")
 @json_option
 def play(out: Path, as_json: bool) -> int:
-    """Write a page in which the grasp is simulated anew for every setting: the playground.
+    """Write a page that simulates the grasp in the browser.
 
-    It is one file that needs no network and no server: a browser runs the C of the native FMUs, as
-    WebAssembly, with the numbers of `run`. Its settings are in its address, and the command that
-    does the same is on it.
+    The playground is one file that needs no network and no server: a browser runs the C of the
+    native FMUs, as WebAssembly, with the numbers of `run`. Its settings are in its address, and the
+    command that does the same is on it.
 
     \b
     Example: grasp-cosim play -o play.html

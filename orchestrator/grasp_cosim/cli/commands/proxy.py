@@ -17,7 +17,7 @@ from ...hil.protocol import link_signature
 from ...interface.interface import Interface, Value, Variable
 from ...interface.read import read_interface
 from ...interface.units import BASE
-from ..frame import PATH, announce, bind_python_option, json_option, say, show
+from ..frame import PATH, bind_python_option, json_option, say, show, waiting
 from .build import FIRST
 
 if TYPE_CHECKING:
@@ -31,7 +31,13 @@ KINDS: Mapping[str, type[Value]] = {"Real": float, "Integer": int, "Boolean": bo
 @click.argument("fmu", type=PATH)
 @click.option("-o", "--out", type=PATH, help="The proxy to write, an .fmu.")
 @click.option("--host", default=DEFAULTS.host, show_default=True, help="Where its peer is.")
-@click.option("--port", type=click.IntRange(1, 65535), default=DEFAULTS.port, show_default=True)
+@click.option(
+    "--port",
+    type=click.IntRange(1, 65535),
+    default=DEFAULTS.port,
+    show_default=True,
+    help="UDP port of the peer.",
+)
 @click.option(
     "--timeout",
     type=float,
@@ -62,12 +68,13 @@ def proxy(
     c_header: Path | None,
     as_json: bool,
 ) -> int:
-    """Make a proxy of FMU: an FMU with the same variables that gets its outputs from a peer.
+    """Make a proxy of FMU, whose outputs come from a peer.
 
-    It sends inputs and parameters in one UDP datagram per step and waits --timeout for the outputs.
-    What happens without an answer is up to its parameters proxy.*, where --host, --port and
-    --timeout are start values. The peer: grasp-cosim serve, or a bench with the header of
-    --c-header. With --native it is C, for hosts and machines without Python.
+    It is an FMU with the same variables. It sends inputs and parameters in one UDP datagram per
+    step and waits --timeout for the outputs. What happens without an answer is up to its parameters
+    proxy.*, where --host, --port and --timeout are start values. The peer: grasp-cosim serve, or a
+    bench with the header of --c-header. With --native it is C, for hosts and machines without
+    Python.
 
     \b
     Example: grasp-cosim proxy fmus/build/GripperPlant.fmu -o GripperPlantProxy.fmu --timeout 0.001
@@ -143,9 +150,9 @@ def _built_native(
     from grasp_fmus.native.targets import targets
 
     plan = planned(targets(target.split(",")) if target is not None else (), 3 if fmi == "3" else 2)
-    first = FIRST if target else ""
-    announce(f"building for {', '.join(t.tuple for t in plan.places)}{first}")
-    built = build_native_proxy(out, original, plan, settings)
+    places = ", ".join(t.tuple for t in plan.places)
+    with waiting(f"building for {places}{FIRST if target else ''}"):
+        built = build_native_proxy(out, original, plan, settings)
     return built, [plan.note] if plan.note else []
 
 

@@ -15,12 +15,14 @@ from ...qualification.qualify import qualify as run_qualification
 from ...qualification.swap import component_of
 from ...report.qualification import draw_qualification
 from ...system.parts import ISOLATIONS, Isolation
+from ..completion import components
 from ..frame import (
     NEGATIVE,
     PATH,
     check_outputs,
     chosen_metrics,
     format_option,
+    is_quiet,
     json_option,
     load_system,
     metrics_option,
@@ -33,7 +35,14 @@ from ..options import chosen_system, names_options, replacements, set_values, sy
 
 @click.command()
 @click.argument("candidate", type=PATH)
-@click.option("--as", "component", required=True, metavar="COMPONENT", help="Whose place it takes.")
+@click.option(
+    "--as",
+    "component",
+    required=True,
+    metavar="COMPONENT",
+    shell_complete=components(),
+    help="Whose place it takes.",
+)
 @click.option("--system", type=PATH, help="Default: the built-in grasp.")
 @system_options
 @click.option("--bands", type=PATH, help="TOML; default: derived.")
@@ -66,9 +75,9 @@ def qualify(
     as_json: bool,
     **given: Any,
 ) -> int:
-    """Find out whether CANDIDATE, an FMU or a system file with it, may take the place of COMPONENT.
+    """Find out whether CANDIDATE may take the place of COMPONENT.
 
-    Of a system file it is the FMU of the component of that name, as it is there.
+    It is an FMU, or a system file: then the FMU of the component of that name, as it is there.
 
     Compares the interfaces, then the closed loops with the original and with the candidate, signal
     by signal and metric by metric. Exit code 0: qualified; 1: not.
@@ -91,7 +100,7 @@ def qualify(
             values=set_values(given["settings"]),
             bands=read_bands(bands) if bands else None,
             isolation=isolation,
-            progress=True,
+            progress=not is_quiet(),
             metrics=chosen_metrics(metric_files),
         )
     if out:

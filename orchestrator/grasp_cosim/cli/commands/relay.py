@@ -52,7 +52,13 @@ def _number(name: str, unit: str, text: str, default: float = 0.0) -> Command:
     metavar="FROM:UNTIL",
     help="Nothing gets through: numbers of requests, or s since the first as in 0.5s:2s.",
 )
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+@click.option(
+    "--seed",
+    type=click.IntRange(0),
+    default=0,
+    show_default=True,
+    help="Of another seed other datagrams are lost, late or doubled.",
+)
 @click.option(
     "--capacity",
     type=click.IntRange(1),
@@ -75,11 +81,11 @@ def relay(
     as_json: bool,
     **conditions: float,
 ) -> int:
-    """Relay UDP datagrams to a peer and back through a nasty network, until Ctrl-C.
+    """Relay UDP datagrams through a nasty network, until Ctrl-C.
 
-    The n-th datagram of a direction has the same fate whenever the seed is the same. Both
-    directions have the same conditions. Counts are printed at the end. Exit code 130 where a
-    --duration was cut short.
+    They go to a peer and back. The n-th datagram of a direction has the same fate whenever the seed
+    is the same. Both directions have the same conditions. Counts are printed at the end. Exit code
+    130 where a --duration was cut short.
 
     \b
     Example: grasp-cosim relay --port 5600 --to 127.0.0.1:5501 --delay 0.001 --loss 0.01 --seed 1

@@ -19,11 +19,11 @@ from ..frame import PATH, format_option, json_option, say, show, title_option
 @format_option
 @json_option
 def report(run: Path, out: Path | None, title: str, suffix: str, as_json: bool) -> int:
-    """Make a page of RUN, a folder that `run --out` wrote: traces, metrics, connections, settings.
+    """Make a page of RUN, a folder that `run --out` wrote.
 
-    The page is one file that needs nothing else. A picture is drawn beside it with matplotlib, the
-    extra plot, and one more of the timing of a run in real time; without it there is the page
-    alone.
+    It has traces, metrics, connections and settings. The page is one file that needs nothing else.
+    A picture is drawn beside it with matplotlib, the extra plot, and one more of the timing of a
+    run in real time; without it there is the page alone.
 
     \b
     Example: grasp-cosim report results

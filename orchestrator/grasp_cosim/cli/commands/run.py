@@ -17,6 +17,7 @@ from ...recording.mdf import check_mdf
 from ...recording.result import Result
 from ...report.timing import draw_result
 from ...system.description import System
+from ..completion import components
 from ..frame import (
     INTERRUPTED,
     NEGATIVE,
@@ -25,6 +26,7 @@ from ..frame import (
     chosen_metrics,
     fail,
     format_option,
+    is_quiet,
     json_option,
     metrics_option,
     pair,
@@ -50,7 +52,14 @@ from ..step_study import check_step_study, step_study_options, study_step
 @click.command()
 @click.argument("system", required=False, type=PATH)
 @system_options
-@click.option("--swap", "swaps", multiple=True, metavar="COMPONENT=FMU")
+@click.option(
+    "--swap",
+    "swaps",
+    multiple=True,
+    metavar="COMPONENT=FMU",
+    shell_complete=components("="),
+    help="Another FMU in the place of a component.",
+)
 @names_options
 @input_options
 @click.option("--out", type=PATH, help="Folder for signals.csv and run.json.")
@@ -70,10 +79,17 @@ from ..step_study import check_step_study, step_study_options, study_step
     "isolation",
     multiple=True,
     metavar="[COMPONENT=]none|process",
+    shell_complete=components("="),
     help="Where all FMUs run, or one: in a process of its own, or none. Default: as SYSTEM says.",
 )
 @native_option("as SYSTEM names them; with --step-study, native where there is a C compiler.")
-@click.option("--engine", type=click.Choice(ENGINES), default="auto", show_default=True)
+@click.option(
+    "--engine",
+    type=click.Choice(ENGINES),
+    default="auto",
+    show_default=True,
+    help="The loop over the steps in Python, or in C; auto: in C where that pays.",
+)
 @metrics_option
 @step_study_options
 @realtime_options
@@ -112,7 +128,7 @@ def run(
         try:
             result = simulate(
                 chosen,
-                progress=True,
+                progress=not is_quiet(),
                 every=every,
                 listeners=[folder] if folder else (),
                 engine=engine,

@@ -26,7 +26,11 @@ PATIENCE = 2.0
 @click.argument("fmu", type=PATH)
 @click.option("--host", default=DEFAULT_ADDRESS[0], show_default=True, help="Address to listen at.")
 @click.option(
-    "--port", type=click.IntRange(0, 65535), default=DEFAULT_ADDRESS[1], show_default=True
+    "--port",
+    type=click.IntRange(0, 65535),
+    default=DEFAULT_ADDRESS[1],
+    show_default=True,
+    help="UDP port to listen at; 0 takes one that is free.",
 )
 @click.option("--lockstep", is_flag=True, help="Step when asked, not by the clock.")
 @click.option("--step", type=float, help="Own step in s; default: that of the proxy.")
@@ -59,7 +63,7 @@ def serve(
     """Serve FMU to a proxy, as a bench would, until interrupted.
 
     It runs in real time, or with --lockstep one step at a request: then a loop over the proxy gives
-    the same values as one without. Port 0 takes one that is free. What came is counted, and said
+    the same values as one without. What came is counted, and said
     in the end. Exit code 1: --duration was over before --sessions; 130 or 143: cut short.
 
     \b

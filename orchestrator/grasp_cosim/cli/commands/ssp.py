@@ -17,7 +17,9 @@ from ..frame import PATH, json_option, load_system, say, show
 def ssp(
     system: Path | None, out: Path, step: float | None, stop: float | None, as_json: bool
 ) -> int:
-    """Write SYSTEM, a .toml or .ssp file, as an SSP 1.0 archive; by default the built-in grasp.
+    """Write SYSTEM as an SSP 1.0 archive.
+
+    It is a .toml or .ssp file, by default the built-in grasp.
 
     \b
     Example: grasp-cosim ssp my_system.toml -o my_system.ssp

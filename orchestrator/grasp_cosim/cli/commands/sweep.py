@@ -1,13 +1,13 @@
 """The command sweep."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import click
 
-from ...errors import InputError
+from ...errors import InputError, choices
 from ...files import FMU_FOLDER, check_nature
 from ...numerals import fixed
 from ...report.sweep import draw_sweep
@@ -15,9 +15,12 @@ from ...sweep.limits import Reached, reached
 from ...sweep.read import Made, read_studies, study_file
 from ...sweep.sensitivity import Sensitivity
 from ...sweep.store import Store
-from ...sweep.study import STATISTICS, Pictures, Study
+from ...sweep.study import STATISTICS, Parameter, Pictures, Study
 from ...sweep.sweep import RUNS, Sweep
 from ...sweep.sweep import sweep as run_study
+from ...sweep.vary import VARY, varied
+from ...system.description import System
+from ..completion import studies
 from ..frame import (
     INTERRUPTED,
     NEGATIVE,
@@ -25,70 +28,100 @@ from ..frame import (
     check_outputs,
     chosen_metrics,
     fail,
+    is_quiet,
     json_option,
     load_system,
     metrics_option,
+    pair,
     say,
     show,
     with_controller,
     with_preset,
 )
 from ..native import all_natively, many_runs_option
-from ..options import controller_option
+from ..options import chosen_system, set_values, system_options
+
+OF_VARY = {
+    "--system": "system", "--of": "of", "--preset": "presets", "--case": "case", "--bench": "bench",
+    "--set": "settings", "--step": "step", "--stop": "stop", "--scheme": "scheme",
+    "--diverging": "diverging", "--swap": "swaps",
+}  # fmt: skip
+"""Options that a study without a file has, by their names, and what their values are called."""
+
+SWAP = "COMPONENT=FMU"
 
 
 @click.command()
-@click.argument("study")
-@controller_option
+@click.argument("study", required=False, shell_complete=studies)
+@click.option(
+    "--vary",
+    "varying",
+    multiple=True,
+    metavar="COMPONENT.VARIABLE=START:END:COUNT",
+    help="In place of STUDY: so many values, or those of a list like 0.3,0.57,1.2, in the FMU's "
+    "unit. Of several, every combination.",
+)
+@click.option("--system", type=PATH, help="With --vary: a .toml or .ssp file. Default: the grasp.")
+@click.option(
+    "--of",
+    multiple=True,
+    metavar="NAME",
+    help="With --vary: a metric or signal that --plot draws; of a signal its last value.",
+)
+@system_options
+@click.option(
+    "--swap", "swaps", multiple=True, metavar="COMPONENT=FMU", help="Another FMU in its place."
+)
 @click.option("--seed", type=click.IntRange(0), help="Draw other runs than the study's own seed.")
-@click.option("--out", type=PATH, help="Folder of the runs; by default the study's name, here.")
+@click.option(
+    "--out", type=PATH, help="Folder of the runs; by default the study's name, or sweep, here."
+)
 @click.option(
     "--workers", type=click.IntRange(1), help="Processes; by default one for each processor."
 )
 @click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster, like tcp://host:8786.")
-@click.option("--plot", is_flag=True, help="Draw what the study asks for under [figures].")
+@click.option(
+    "--plot",
+    is_flag=True,
+    help="Draw what the study asks for under [figures], or --of over what --vary varies.",
+)
 @metrics_option
 @many_runs_option
 @json_option
 def sweep(
-    study: str,
-    controller: str | None,
-    seed: int | None,
-    out: Path | None,
+    study: str | None,
     workers: int | None,
     scheduler: str | None,
     plot: bool,
-    metric_files: tuple[Path, ...],
     native: bool | None,
     as_json: bool,
+    **given: Any,
 ) -> int:
-    """Do all runs of STUDY: a .toml file, or the name of one that is built in.
+    """Do all runs of STUDY, a .toml file or a built-in one.
 
     Built in: reflectance_map, grasp_sensitivity, bench_monte_carlo, and those of the adaptive
-    controller, which docs/colour.md tells of.
+    controller. docs/studies.md tells of all, and how to write one's own.
 
-    Finished runs are kept in the folder: the same command goes on where it was ended. Exit code 1:
-    a limit that the study sets is missed, or every run failed.
+    Without a file, --vary says what varies. Finished runs are kept in the folder: the same command
+    goes on where it was ended. Exit code 1: a limit that the study sets is missed, or every run
+    failed.
 
     \b
     Example: grasp-cosim sweep reflectance_map --out map --plot
+    Without a file: grasp-cosim sweep --vary plant.initial_object_position=0:0.05:11 --case 1 --plot
     """
     if workers is not None and scheduler is not None:
         raise InputError("--workers: must not come with --scheduler, whose workers there are")
-    path, built_in = _file(study)
-    folder = out or Path(path.stem if seed is None else f"{path.stem}-{seed}")
-    fmus = FMU_FOLDER if built_in else None
-    made = Made(load_system, with_preset, with_controller, fmus, controller)
-    variants = read_studies(path, made, chosen_metrics(metric_files), seed)
-    if plot and variants[0].pictures == Pictures():
-        raise InputError(f"--plot: {path.name} has no [figures]; must say what to draw")
+    name, folder, variants = _chosen(study, plot, given)
     check_outputs(folder, plot)
     if scheduler is not None and native is None:  # whose machines may be others
         native = False
     try:
         with all_natively([v.system for v in variants], native) as systems:
             done = [
-                run_study(replace(v, system=s), folder / v.variant, workers, scheduler, True)
+                run_study(
+                    replace(v, system=s), folder / v.variant, workers, scheduler, not is_quiet()
+                )
                 for v, s in zip(variants, systems, strict=True)
             ]
     except KeyboardInterrupt:
@@ -98,19 +131,61 @@ def sweep(
     for picture in draw_sweep(done, folder) if plot else []:
         say(f"drew {picture}")
     limits = reached(done)
-    show(as_json, _as_json(path.name, folder, done, limits), _as_text(done, limits))
+    show(as_json, _as_json(name, folder, done, limits), _as_text(done, limits))
     failed = all(d.failed == d.study.runs for d in done)
     return NEGATIVE if failed or not all(limit.kept for limit in limits) else 0
 
 
+def _chosen(
+    study: str | None, plot: bool, given: Mapping[str, Any]
+) -> tuple[str, Path, tuple[Study, ...]]:
+    """The name of a study, the folder of its runs, and its variants; of a file or of --vary."""
+    metrics, seed, out = chosen_metrics(given["metric_files"]), given["seed"], given["out"]
+    if given["varying"]:
+        if study is not None:
+            raise InputError(f"{study}: must not come with {VARY}, which is a study without a file")
+        if seed is not None:
+            raise InputError(f"--seed {seed}: {VARY} has nothing that is random; must be left out")
+        made = varied(_system(given), given["varying"], given["of"], metrics, plot=plot)
+        return VARY, out or Path("sweep"), (made,)
+    if study is None:
+        raise InputError(f"no STUDY; must be a .toml file, the name of a built-in one, or {VARY}")
+    for option, key in OF_VARY.items():
+        value = given[key]
+        if not (value is None or value is False or value == ()):
+            raise InputError(f"{option}: must come with {VARY}; a study says it itself")
+    path, built_in = _file(study)
+    fmus = FMU_FOLDER if built_in else None
+    reader = Made(load_system, with_preset, with_controller, fmus, given["controller"])
+    variants = read_studies(path, reader, metrics, seed)
+    if plot and variants[0].pictures == Pictures():
+        raise InputError(f"--plot: {path.name} has no [figures]; must say what to draw")
+    return path.name, out or Path(path.stem if seed is None else f"{path.stem}-{seed}"), variants
+
+
+def _system(given: Mapping[str, Any]) -> System:
+    """The system with what is the same in all runs that --vary asks for."""
+    fmus = {name: Path(fmu) for name, fmu in (pair("--swap", t, SWAP) for t in given["swaps"])}
+    fixed = set_values(given["settings"])
+    for name in (text.partition("=")[0] for text in given["varying"]):
+        if name in fixed:
+            raise InputError(f"--set {name}: {VARY} varies it, too; must be in one of them")
+    return chosen_system(given, fmus).revised(fmus, fixed, ("--swap", "--set"))
+
+
 def _file(study: str) -> tuple[Path, bool]:
-    """The file of a study, given by its path or by its name, where it is a built-in one."""
+    """The file of a study, given by its path or by its name, where it is a built-in one.
+
+    Its runs may be in a folder of that name.
+    """
     path = Path(study)
-    check_nature(path, "study")
     if path.suffix == ".toml" and path.is_file():
+        check_nature(path, "study")
         return path, False
     from ...grasp.presets import STUDIES
 
+    if not (STUDIES / f"{study}.toml").is_file():
+        check_nature(path, "study")
     return study_file(study, STUDIES), True
 
 
@@ -128,22 +203,36 @@ def _as_json(
 def _as_text(done: Sequence[Sweep], limits: Sequence[Reached]) -> str:
     lines = [line for d in done for line in _head(d)]
     wide = max(len(d.study.variant) for d in done) + 2 if len(done) > 1 else 0
-    lines.append(f"{'':28s}{'':{wide}s}" + "".join(f"{h:>11s}" for h in ("runs", *STATISTICS)))
+    lines += [_varied(done[0].study, p) for p in done[0].study.parameters]
+    heads = "".join(f"{h:>11s}" for h in ("runs", *STATISTICS))
+    lines.append(f"{'':28s}{'':{wide}s}{'':5s}{heads}")
     summaries = [(d.study.variant, d.table.summary()) for d in done]
     for name in dict.fromkeys(name for _, summary in summaries for name in summary):
+        factor, unit = done[0].study.shown(name)
         for variant, summary in summaries:
             row = summary.get(name, {"runs": 0})
-            numbers = (
-                "-" if (n := row.get(h)) is None else f"{n:.4g}" for h in ("runs", *STATISTICS)
-            )
-            lines.append(
-                f"{name:28s}{variant if wide else '':{wide}s}"
-                + "".join(f"{n:>11s}" for n in numbers)
-            )
+            numbers = "".join(f"{_number(row.get(h), factor):>11s}" for h in STATISTICS)
+            of = variant if wide else ""
+            lines.append(f"{name:28s}{of:{wide}s}{unit:5s}{row['runs']:>11}{numbers}")
     for d in done:
         for found in d.sensitivities:
             lines += _sensitivity_lines(found)
     return "\n".join([*lines, *(_limit_line(done[0].study, limit) for limit in limits)])
+
+
+def _varied(study: Study, parameter: Parameter) -> str:
+    """Like "object position: 0 to 50 mm, 11 values"."""
+    of = parameter.distribution
+    factor, unit = study.shown(parameter.name)
+    if any(isinstance(x, bool | str) for x in of.extremes):
+        return f"{parameter.name}: {choices(of.extremes)}"
+    low, high = (factor * float(end(of.extremes)) for end in (min, max))
+    count = f", {of.levels} values" if of.levels else ""
+    return f"{parameter.name}: {low:g} to {high:g} {unit}".rstrip() + count
+
+
+def _number(value: float | None, factor: float) -> str:
+    return "-" if value is None else f"{factor * value:.4g}"
 
 
 def _head(done: Sweep) -> list[str]:
@@ -158,16 +247,17 @@ def _head(done: Sweep) -> list[str]:
 
 
 def _limit_line(study: Study, found: Reached) -> str:
-    """Like "kept    adaptive: time_difference: greatest 0.02806 s, at most 0.03"."""
+    """Like "kept    adaptive: time_difference: greatest 0.02806 s, at most 0.03 s"."""
     limit = found.limit
     of = f"{found.variant}: " if found.variant else ""
     beside = f" from {limit.reference}" if limit.reference else ""
-    value = "none" if found.value is None else f"{found.value:.4g}"
-    unit = study.unit(found.column) or ""
+    factor, unit = study.shown(found.column)
+    value = "none" if found.value is None else f"{_number(found.value, factor)} {unit}".rstrip()
+    most = f"{factor * limit.most:g} {unit}".rstrip()
     missing = f"; {found.missing} runs have none" if found.missing else ""
     return (
         f"{'kept' if found.kept else 'MISSED':8s}{of}{found.column}{beside}: {limit.statistic} "
-        f"{value} {unit}, at most {limit.most:g}{missing}"
+        f"{value}, at most {most}{missing}"
     )
 
 

@@ -16,7 +16,8 @@ import numpy as np
 from ...checks import real
 from ...errors import InputError, SimulationError, choices
 from ...numerals import counted
-from ...parallel import Crew, progress_bar
+from ...parallel import Crew
+from ...progress import Progress
 from ...system.description import System
 from ..closing import close
 from ..metrics import FINGERS
@@ -105,10 +106,10 @@ def identify_from_times(
 ) -> Fit:
     """Fit the parameters to contact times, grasps in parallel; the residuals are in s.
 
-    progress counts the grasps on standard error if that is a terminal.
+    progress counts the grasps on standard error.
     """
     system = system.with_experiment(STEP, STOP)
-    with progress_bar("grasps", None, progress) as bar, Crew(workers) as crew:
+    with Progress("identify", unit="grasp", shown=progress) as bar, Crew(workers) as crew:
 
         def simulate(grasps: Sequence[Grasp]) -> Iterable[Times]:
             return crew.map(contact_times, [(system, grasp) for grasp in grasps], bar)

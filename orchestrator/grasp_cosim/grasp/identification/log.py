@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...errors import InputError, choices
+from ...errors import InputError, nearest
 from ...metrics.metric import Signals
 from ...numerals import counted
 from ...system.description import System
@@ -114,7 +114,7 @@ def _residuals(system: System, values: Mapping[str, float], w: Windows) -> Vecto
 
 def _signal(log: Signals, name: str, place: str) -> Vector:
     if name not in log:
-        raise InputError(f"{place}: no signal {name!r}; it has {choices(log)}")
+        raise InputError(f"{place}: no signal {name!r}; {nearest(name, log)}")
     signal = log[name]
     wrong = np.flatnonzero(~np.isfinite(signal))
     if len(wrong):

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from ...errors import InputError, choices
+from ...errors import InputError, nearest
 from ..metrics import FINGERS
 from .fit import Parameter
 
@@ -33,5 +33,5 @@ def chosen(groups: Sequence[str], valid: Sequence[str], place: str) -> list[Para
     """The parameters of the groups; InputError for a group that the data say nothing about."""
     for group in groups:
         if group not in valid:
-            raise InputError(f"{place}: --fit {group}: must be one of {choices(valid)}")
+            raise InputError(f"{place}: --fit {group}: cannot be fitted; {nearest(group, valid)}")
     return [p for name in GROUPS if name in groups for p in GROUPS[name]]

@@ -23,6 +23,7 @@ from grasp_fmus.native.compilers import BITS, LIBM, zig_compiler
 from grasp_fmus.native.sources import native_sources
 from grasp_fmus.native.translation import translated
 
+from ...checks import install_command
 from ...errors import InputError
 from .system import MODELS, WASM, model, shipped
 
@@ -91,7 +92,7 @@ def made() -> bytes:
     if zig is None or found != ZIG:
         raise InputError(
             f"ziglang: {found}; must be {ZIG}, which makes the same bytes everywhere: "
-            f"{sys.executable} -m pip install ziglang=={ZIG}"
+            f"{install_command(f'ziglang=={ZIG}')}"
         )
     with tempfile.TemporaryDirectory() as folder:
         for name, data in sources().items():

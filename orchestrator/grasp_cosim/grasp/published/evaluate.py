@@ -121,7 +121,7 @@ def _all(grasps: Grasps, workers: int, progress: bool) -> list[Run]:
     def keep(index: int, run: Run) -> None:
         grasps.keep(left[index], run)
 
-    new = run_all(_run, [grasps.jobs[i] for i in left], workers, progress, "grasps", keep)
+    new = run_all(_run, [grasps.jobs[i] for i in left], workers, progress, "evaluate", keep)
     done.update(zip(left, new, strict=True))
     return [done[i] for i in sorted(done)]
 
