@@ -285,14 +285,14 @@ def draw_layers(tables: Sequence[Runs], folder: Path) -> None:
     figure = new_figure(9.0, 3.4)
     left, middle, right = figure.subplots(1, 3)
     _over_time(left, box, "plant.object_position", 1e3, "Case {}")
-    _label(left, "time in s", "position of the box in mm", "light box")
+    _label(left, "time in s", "position of the box in mm", "light box", legend=False)
     _over_time(middle, tall, "plant.tilt", math.degrees(1.0), "Case {}")
     middle.axhline(-math.degrees(math.atan2(0.07, 0.1)), color="black", ls=":", label="balance")
-    _label(middle, "time in s", "tilt of the box in °", "tall box, rough floor")
+    _label(middle, "time in s", "tilt of the box in °", "tall box, rough floor", legend=False)
     _over_time(right, cup, "plant.squeeze", 1e3, "Case {}")
     right.axhline(8.0, color="black", ls=":", label="damaged above")
-    right.set_ylim(top=14.0)  # room for the legend
-    _label(right, "time in s", "squeeze of the cup in mm", "soft cup")
+    _label(right, "time in s", "squeeze of the cup in mm", "soft cup", legend=False)
+    one_legend(figure)
     _saved(figure, folder / "objects.png", "What each layer does to objects that move or give")
 
 
