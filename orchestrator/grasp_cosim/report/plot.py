@@ -205,7 +205,7 @@ def one_legend(figure: Figure) -> None:
     """Give a figure one legend of all that its axes name, below them; each name once."""
     named = [axes.get_legend_handles_labels() for axes in figure.axes]
     keys = {label: handle for pair in named for handle, label in zip(*pair, strict=True)}
-    place: dict[str, Any] = {"loc": "outside lower left", "ncols": 4, "handlelength": 3.0}
+    place: dict[str, Any] = {"loc": "outside lower left", "ncols": 5, "handlelength": 3.0}
     _plain(figure.legend([*keys.values()], [*keys], fontsize=8, frameon=False, **place))
 
 

@@ -117,6 +117,7 @@ def _draw_deviation(axes: Axes, q: Qualification, compared: Compared) -> None:
         va="top",
         fontsize=9,
         color=GREY if compared.inside else RED,
+        bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.8},
     )
     _tidy(axes)
 
