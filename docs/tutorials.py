@@ -26,7 +26,19 @@ from grasp_cosim.grasp.metrics import CLOSING, FINGERS
 from grasp_cosim.grasp.pictures import COLOR, draw_contact_forces, draw_targets
 from grasp_cosim.recording.load import load_run
 from grasp_cosim.recording.result import Result
-from grasp_cosim.report.plot import BLUE, GREY, RED, finish, new_figure, save
+from grasp_cosim.report.caption import Caption, about
+from grasp_cosim.report.plot import (
+    BLUE,
+    DASHES,
+    GREY,
+    RED,
+    finish,
+    headed,
+    new_figure,
+    one_legend,
+    save,
+)
+from matplotlib.figure import Figure
 
 HERE = Path(__file__).parent
 
@@ -256,8 +268,8 @@ def draw_layers(tables: Sequence[Runs], folder: Path) -> None:
         gaps, forces, target = column
         for j in FINGERS:
             gap = 1e3 * run.signals[f"plant.gap[{j}]"]
-            gaps.plot(run.time, gap, "-" if j == 1 else "--", color=COLOR[j], label=f"finger {j}")
-        finish(gaps, "gap in mm")
+            gaps.plot(run.time, gap, DASHES[j], color=COLOR[j], label=f"finger {j}")
+        finish(gaps, "gap in mm", legend=False)
         draw_contact_forces(forces, run)
         draw_targets(target, [(run, "-", "")])
         gaps.set_title(f"Case {case}: {_LAYERS[case]}", fontsize=10)
@@ -267,20 +279,27 @@ def draw_layers(tables: Sequence[Runs], folder: Path) -> None:
     rows[1, 0].set_ylim(-0.2, 6.0)
     rows[2, 0].set_ylim(-5.0, 45.0)
     rows[2, 0].set_xlim(0.0, 3.0)
-    save(figure, folder / "layers.png")
+    one_legend(figure)
+    _saved(figure, folder / "layers.png", "What each layer does, object fixed at 30 mm")
 
     figure = new_figure(9.0, 3.4)
     left, middle, right = figure.subplots(1, 3)
     _over_time(left, box, "plant.object_position", 1e3, "Case {}")
-    _label(left, "time in s", "position of the box in mm", "light box")
+    _label(left, "time in s", "position of the box in mm", "light box", legend=False)
     _over_time(middle, tall, "plant.tilt", math.degrees(1.0), "Case {}")
     middle.axhline(-math.degrees(math.atan2(0.07, 0.1)), color="black", ls=":", label="balance")
-    _label(middle, "time in s", "tilt of the box in °", "tall box, rough floor")
+    _label(middle, "time in s", "tilt of the box in °", "tall box, rough floor", legend=False)
     _over_time(right, cup, "plant.squeeze", 1e3, "Case {}")
     right.axhline(8.0, color="black", ls=":", label="damaged above")
-    right.set_ylim(top=14.0)  # room for the legend
-    _label(right, "time in s", "squeeze of the cup in mm", "soft cup")
-    save(figure, folder / "objects.png")
+    _label(right, "time in s", "squeeze of the cup in mm", "soft cup", legend=False)
+    one_legend(figure)
+    _saved(figure, folder / "objects.png", "What each layer does to objects that move or give")
+
+
+def _saved(figure: Figure, path: Path, title: str) -> None:
+    """Save a picture under its title, the date and the version."""
+    headed(figure, Caption(title, about(None)))
+    save(figure, path)
 
 
 def _over_time(axes: Any, runs: Runs, name: str, factor: float, label: str) -> None:
@@ -337,7 +356,7 @@ def draw_limits(tables: Sequence[Runs], folder: Path) -> None:
     bottom_right.set_ylim(-1.0, 30.0)
     bottom_right.set_xlim(0.0, 8.0)
     _label(bottom_right, "time in s", "gap of finger 1 in mm", "Coulomb friction of the fingers")
-    save(figure, folder / "limits.png")
+    _saved(figure, folder / "limits.png", "Where the method fails")
 
 
 def draw_colour(tables: Sequence[Runs], folder: Path) -> None:
@@ -346,14 +365,14 @@ def draw_colour(tables: Sequence[Runs], folder: Path) -> None:
     rows = figure.subplots(2, 2, sharex=True, sharey="row")
     for (law, run), column in zip(tables[0].items(), rows.T, strict=True):
         gaps, forces = column
-        for j, style in zip(FINGERS, ("-", "--"), strict=True):
+        for j, style in DASHES.items():
             face = "black" if j == 1 else "white"
             label = f"finger {j}, {face} face"
             gap = 1e3 * run.signals[f"plant.gap[{j}]"]
             force = abs(run.signals[f"plant.contact_force[{j}]"])
             gaps.plot(run.time, gap, style, color=COLOR[j], label=label)
             forces.plot(run.time, force, style, color=COLOR[j], label=label)
-        finish(gaps, "gap in mm")
+        finish(gaps, "gap in mm", legend=False)
         finish(forces, "contact force in N", legend=False)
         apart = run.metrics["time_difference"]
         gaps.set_title(f"black and white, {law} law: {apart:.2f} s apart", fontsize=10)
@@ -362,7 +381,8 @@ def draw_colour(tables: Sequence[Runs], folder: Path) -> None:
         axes.set_ylabel("")
     rows[0, 0].set_ylim(-0.5, 20.0)
     rows[1, 0].set_xlim(0.5, 4.0)
-    save(figure, folder / "colour.png")
+    one_legend(figure)
+    _saved(figure, folder / "colour.png", "Black and white faces under both laws")
 
 
 def _plain(runs: Runs) -> Runs:
@@ -377,7 +397,7 @@ def draw_your_plant(tables: Sequence[Runs], folder: Path) -> None:
     axes = figure.subplots()
     _over_time(axes, cases, "plant.object_position", 1e3, "Case {}")
     _label(axes, "time in s", "position of the object in mm")
-    save(figure, folder / "your_plant.png")
+    _saved(figure, folder / "your_plant.png", "The object on a spring")
 
 
 PAGES: Mapping[str, Callable[[Sequence[Runs], Path], None]] = {

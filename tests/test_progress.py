@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import pytest
 from grasp_cosim import progress
-from grasp_cosim.progress import Progress, span
+from grasp_cosim.progress import Progress, span, write
 
 
 class Terminal(io.StringIO):
@@ -98,6 +98,8 @@ def test_it_says_what_is_at_work(
     update: Callable[[], Progress], said: str, stream: io.StringIO, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sys, "stderr", stream)
+    monkeypatch.setattr(progress, "DELAY", 0.0)
+    monkeypatch.setattr(progress, "EVERY", 0.0)
     with update() as bar:
         bar.refresh()
         assert said in stream.getvalue()
@@ -135,6 +137,18 @@ def test_without_a_terminal_there_are_whole_lines(monkeypatch: pytest.MonkeyPatc
     lines = stream.getvalue().splitlines()
     assert {"map: run 2 of 3, 0 s", "map: run 3 of 3, 0 s"} <= set(lines)
     assert all(re.fullmatch(r"map: run \d of 3, \d+ s", line) for line in lines)
+
+
+def test_what_is_said_meanwhile_stands_above_the_bar(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stderr", stream := Terminal())
+    monkeypatch.setattr(progress, "DELAY", 0.0)
+    with still("map", 3) as bar:
+        bar.update()
+        write("drew map.png")
+    lines = [line.rpartition("\r")[2].rstrip() for line in stream.getvalue().split("\n")]
+    assert lines[0] == "drew map.png"
+    assert re.fullmatch(r"map: run 2 of 3 \S+ +0 s", lines[1])
+    assert lines[2:] == [""]
 
 
 def test_time_is_seen_to_go_by_while_one_run_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:

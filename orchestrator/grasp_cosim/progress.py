@@ -62,7 +62,7 @@ class Progress(tqdm):  # type: ignore[type-arg]  # subscripted, it is no class
             unit=unit,
             initial=initial,
             disable=not shown,
-            leave=not self._lines,
+            leave=bool(unit) and not self._lines,
             delay=self._delay,
             mininterval=EVERY if self._lines else 0.1,
             miniters=0,
@@ -94,7 +94,7 @@ class Progress(tqdm):  # type: ignore[type-arg]  # subscripted, it is no class
         found = super().format_dict
         took = [span(found["elapsed"])]
         if (left := self.left) is not None:
-            took.append(f"about {span(left)} left")
+            took.append(f"about {span(max(left, 1.0))} left")
         if self.postfix:
             took.append(str(self.postfix))
         count = self._count()
@@ -102,7 +102,9 @@ class Progress(tqdm):  # type: ignore[type-arg]  # subscripted, it is no class
         return {**found, "what": what, "took": ", ".join(took)}
 
     def display(self, msg: str | None = None, pos: int | None = None) -> bool:  # type: ignore[override]
-        """Draw the bar, or write a line."""
+        """Draw the bar, or write a line, once the delay is over."""
+        if hasattr(self, "start_t") and time.time() - self.start_t < self._delay:
+            return False
         if not self._lines:
             return bool(super().display(msg, pos))
         if msg is None:
@@ -111,7 +113,7 @@ class Progress(tqdm):  # type: ignore[type-arg]  # subscripted, it is no class
         return False
 
     def close(self) -> None:
-        """End it; a bar that was there stays."""
+        """End it; a bar that counts something stays."""
         self._over.set()
         if self._ticker:
             self._ticker.join()
@@ -132,6 +134,14 @@ class Progress(tqdm):  # type: ignore[type-arg]  # subscripted, it is no class
             if now - self.start_t >= self._delay and now - self.last_print_t >= wait:
                 self.last_print_t = now
                 self.refresh()
+
+
+def write(line: str) -> None:
+    """Write a line on standard error, above a bar that is there."""
+    if sys.stderr.isatty():
+        tqdm.write(line, file=sys.stderr)
+    else:
+        sys.stderr.write(line + "\n")
 
 
 @contextmanager

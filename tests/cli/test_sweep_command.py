@@ -180,12 +180,15 @@ def test_wrong_input_is_one_line_and_exit_2(
 
 
 FIGURES = [
-    ("distribution = []\n", r"\[figures\]: unknown entry 'distribution'; valid: curve, distrib"),
+    (
+        "distribution = []\n",
+        r"\[figures\]: unknown entry 'distribution'; did you mean distributions",
+    ),
     ('curve = { x = "width" }\n', "curve: of = None: must be a name"),
     ('curve = { x = "width", of = "tilt" }\n', "figures: no column 'tilt' in the results; valid: "),
     (
         'curve = { x = "wide", of = "tilt" }\n',
-        "figures.curve: no parameter 'wide' with numbers; val",
+        "figures.curve: no parameter 'wide' with numbers; did you mean width",
     ),
     (
         'curve = [{ x = "width", of = "tilt", y = "x" }]\n',

@@ -108,10 +108,37 @@ def test_variants_and_maps_are_beside_each_other(grasp: System, figures: list[Fi
     ]  # fmt: skip
     assert [axes.get_title() for axes in distributions.axes] == ["a", "b"]
     for figure in figures:
-        assert (
-            figure.get_suptitle()
-            == "grasp.toml: 2 times 20 runs, 20 failed\nover ratio and position"
-        )
+        title, about = (text.get_text() for text in figure.texts)
+        assert title == "grasp: 2 times 20 runs, 20 failed, over ratio and position"
+        assert about.startswith("as in the system file · ")
+
+
+def test_it_says_what_differs_in_all_variants_and_takes_a_title(
+    grasp: System, figures: list[Figure]
+) -> None:
+    """But not what varies anyway, here the reflectance."""
+    width = {"plant.object_width": 0.06, "sensor_1.reflectance": 0.5}
+    mass = {"plant.finger_mass[1]": 0.4}
+    both = [
+        made(grasp.with_values(values), GRID, Pictures((MAP,)))
+        for values in (width | mass, width | {"plant.finger_mass[1]": 0.6})
+    ]
+    draw_sweep(both, Path(), title="Before $5 of _lunch_")
+    title, about = (text.get_text() for text in figures[0].texts)
+    assert title == "Before $5 of _lunch_"
+    assert about.startswith("plant.object_width = 0.06 · ")
+
+
+@pytest.mark.parametrize(
+    ("suffix", "begin"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")]
+)
+def test_it_is_in_the_format_asked_for(
+    grasp: System, tmp_path: Path, suffix: str, begin: bytes
+) -> None:
+    sweep = made(grasp, GRID, Pictures((MAP,), (), (Curve("position", "time_difference"),)), 4)
+    for path in draw_sweep([sweep], tmp_path, suffix):
+        assert path.read_bytes().startswith(begin)
+    assert {p.name for p in tmp_path.iterdir()} == {f"map.{suffix}", f"curve.{suffix}"}
 
 
 def test_a_cell_shows_the_mean_or_the_greatest_of_its_runs() -> None:

@@ -91,10 +91,7 @@ def test_a_declared_unit_is_replaced_and_that_is_said(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("units", "message"),
     [
-        (
-            '{ gab = "mm" }',
-            "units: 'gab' = 'mm': plant.fmu has no variable 'gab'; did",
-        ),
+        ('{ gab = "mm" }', "units: 'gab' = 'mm': plant.fmu has no variable 'gab'; did"),
         ('{ gap = "mmm" }', "units: 'gap' = 'mmm': no unit that plant.fmu defines, or that is kno"),
         ('{ gap = "" }', "units: 'gap' = '': no unit that plant.fmu defines, or that is known; mu"),
         ('{ touching = "1" }', "units: 'touching' = '1': is of type Boolean; must be a Real, as o"),
@@ -107,6 +104,16 @@ def test_a_name_that_is_wrong_is_one_line(tmp_path: Path, units: str, message: s
         load(tmp_path, BARE, f"units = {units}")
     assert str(caught.value).startswith(f"loop.toml: [components.plant]: {message}")
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("unit", "end"),
+    [("CM", "did you mean cm?"), ("-mM", "did you mean mm, Mm?"), ("DEGC", "did you mean degC?")],
+)
+def test_a_unit_in_other_capitals_is_asked_about(tmp_path: Path, unit: str, end: str) -> None:
+    with pytest.raises(InputError, match=r"or that is known; ") as caught:
+        load(tmp_path, BARE, f'units = {{ gap = "{unit}" }}')
+    assert str(caught.value).endswith(f"; {end}")
 
 
 def test_keys_are_the_names_of_the_system(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ import click
 from ..errors import InputError
 from ..files import PICTURES, check_folder
 from ..plain import on_one_line
-from ..progress import Progress, phase
+from ..progress import Progress, phase, write
 
 if TYPE_CHECKING:
     from ..metrics.metric import Metric
@@ -167,7 +167,7 @@ def show(as_json: bool, report: Any, text: str) -> None:
 def say(line: str) -> None:
     """Print one line on standard error, whatever is in it; nothing with --quiet."""
     if not is_quiet():
-        click.echo(on_one_line(line), err=True)
+        write(on_one_line(line))
 
 
 def waiting(what: str) -> Progress:

@@ -13,7 +13,7 @@ from ..files import of_any_format, remove, write_json
 from ..metrics.metric import Metric
 from ..report.step_study import draw_step_study
 from ..system.description import System
-from .frame import NEGATIVE, check_outputs, is_quiet, say, show, together
+from .frame import NEGATIVE, check_outputs, is_quiet, say, show, together, waiting
 from .native import natively
 
 step_study_options = together(
@@ -62,7 +62,8 @@ def study_step(
         write_json(folder / "step_study.json", study.as_json())
     if given["plot"]:
         picture = folder / f"step_study.{given['suffix']}"
-        draw_step_study(study, picture)
+        with waiting("drawing"):
+            draw_step_study(study, picture)
         say(f"drew {picture}")
     show(as_json, study.as_json(), study.as_text())
     return 0 if study.holds else NEGATIVE

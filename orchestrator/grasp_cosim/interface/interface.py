@@ -13,7 +13,7 @@ from ..checks import EXACT, integer, known, real
 from ..errors import InputError, choices
 from ..scratch import without_scratch
 from .arrays import MOST_ELEMENTS, Array, Element, element_names, size_of
-from .units import IDENTITY, Conversion, Unit, conversion, known_unit
+from .units import IDENTITY, Conversion, Unit, conversion, known_unit, spelt_like
 
 Value = float | int | bool | str
 
@@ -381,20 +381,27 @@ class Interface:
                     f"{entry}: is of type {self.by_name[name].nature}; must be a Real, as only "
                     "these have units"
                 )
-            plain = unit[1:] if unit.startswith("-") else unit
-            found = defined.get(unit) or known_unit(unit) or defined.get(plain) or known_unit(plain)
-            if found is None:
-                raise InputError(
-                    f"{entry}: no unit that {self.path.name} defines, or that is known; must be "
-                    "like 'mm', 'm/s', 'N.s/m', 'deg', 'degC', '1', or '-mm' for what counts the "
-                    "other way"
-                )
-            defined[unit] = found if found.name == unit else found.reversed(unit)
+            defined[unit] = self._unit(entry, unit, defined)
         variables = (
             replace(v, unit=units[v.name], display_unit=None) if v.name in units else v
             for v in self.variables
         )
         return replace(self, variables=tuple(variables), units=defined)
+
+    def _unit(self, entry: str, name: str, defined: Mapping[str, Unit]) -> Unit:
+        """The unit of a name that is defined or known, with a minus reversed; else InputError."""
+        plain = name[1:] if name.startswith("-") else name
+        found = defined.get(name) or known_unit(name) or defined.get(plain) or known_unit(plain)
+        if found is None:
+            alike = spelt_like(plain, defined)
+            like = (
+                "'mm', 'm/s', 'N.s/m', 'deg', 'degC', '1', or '-mm' for what counts the other way"
+            )
+            meant = f"did you mean {choices(alike)}?" if alike else f"must be like {like}"
+            raise InputError(
+                f"{entry}: no unit that {self.path.name} defines, or that is known; {meant}"
+            )
+        return found if found.name == name else found.reversed(name)
 
     def parse(self, place: str, name: str, value: Value, text: bool = False) -> Value:
         """The value for input or parameter name, checked against type, range and finiteness.

@@ -2,6 +2,7 @@
 
 import math
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
@@ -148,6 +149,13 @@ def known_unit(name: str) -> Unit | None:
             exponents[i] += sign * power * base.get(key, 0)
     scale *= float(f"1e{ten}")
     return Unit(name, tuple(exponents), scale, offset) if 0.0 < scale < math.inf else None
+
+
+def spelt_like(name: str, defined: Iterable[str]) -> list[str]:
+    """The units, of those defined or known, that differ from a name in capitals only: kN of KN."""
+    known = (f"{prefix}{symbol}" for symbol in _SI for prefix in PREFIXES)
+    found = (unit for unit in (*defined, *known, *_OTHER) if unit.lower() == name.lower())
+    return [*dict.fromkeys(found)]
 
 
 def between_units(ratio: float) -> bool:

@@ -35,10 +35,11 @@ from ..interface.units import Conversion
 
 Value = float | bool | None
 RESERVED = frozenset((
-    "command", "complete", "components", "connections", "date", "descriptions", "diverging",
-    "error", "events", "faults", "fmus", "index", "initialisation", "log", "metric_units",
-    "missing_metrics", "proxies", "real_time_factor", "realtime", "rejections", "roles", "scheme",
-    "step", "steps", "stop", "system", "to_si", "types", "units", "versions", "wall_time",
+    "changed", "command", "complete", "components", "connections", "date", "descriptions",
+    "diverging", "error", "events", "faults", "fmus", "index", "initialisation", "log",
+    "metric_units", "missing_metrics", "proxies", "real_time_factor", "realtime", "rejections",
+    "roles", "scheme", "step", "steps", "stop", "system", "title", "to_si", "types", "units",
+    "versions", "wall_time",
 ))  # fmt: skip
 """Names beside metrics in run.json and in the table of a sweep."""
 

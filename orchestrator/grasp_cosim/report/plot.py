@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from ..checks import extra_module
 from ..errors import InputError
 from ..files import PICTURES, in_one_piece
+from ..numerals import in_milli
 from ..recording.result import Result
 from .caption import Caption, caption
 
@@ -39,9 +40,6 @@ MOST_LINES = 6
 DASHES = {1: "-", 2: "--"}
 """How finger 1 and 2 are drawn: they can be told apart in grey."""
 
-SHOWN_UNITS = {"m": (1e3, "mm"), "m/s": (1e3, "mm/s")}
-"""The factor and the unit in which pictures show a quantity; all others are as they are."""
-
 LINE_HEIGHT, LETTER = 11.5 / 72.0, 4.4 / 72.0
 """In inches: a line of what a picture says below its title, and the width of a letter there."""
 
@@ -62,7 +60,7 @@ def plot_signals(run: Result, path: Path | None = None) -> Figure:
     figure = new_figure(9.0, 0.9 + 2.2 * len(panels))
     rows = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
     for axes, (unit, names) in zip(rows, panels, strict=True):
-        factor, shown = shown_unit(unit)
+        factor, shown = in_milli(unit)
         for name, style, color in zip(names, cycle(STYLES), cycle(COLORS), strict=False):
             values = factor * run.signals[name]
             axes.plot(run.time, values, style, color=color, linewidth=1.0, label=name)
@@ -82,11 +80,6 @@ def _panels(run: Result) -> list[tuple[str, list[str]]]:
         for unit, names in of.items()
         for k in range(0, len(names), MOST_LINES)
     ]
-
-
-def shown_unit(unit: str | None) -> tuple[float, str]:
-    """Return the factor and the unit in which a quantity of this unit is shown."""
-    return SHOWN_UNITS.get(unit or "", (1.0, unit or ""))
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -212,7 +205,7 @@ def one_legend(figure: Figure) -> None:
     """Give a figure one legend of all that its axes name, below them; each name once."""
     named = [axes.get_legend_handles_labels() for axes in figure.axes]
     keys = {label: handle for pair in named for handle, label in zip(*pair, strict=True)}
-    place: dict[str, Any] = {"loc": "outside lower left", "ncols": 4, "handlelength": 3.0}
+    place: dict[str, Any] = {"loc": "outside lower left", "ncols": 5, "handlelength": 3.0}
     _plain(figure.legend([*keys.values()], [*keys], fontsize=8, frameon=False, **place))
 
 

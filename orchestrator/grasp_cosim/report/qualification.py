@@ -6,11 +6,12 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..numerals import in_milli
 from ..qualification.tube import deviation, tube
 from ..system.made_of import changed
 from ..system.parts import NANOSECONDS
 from .caption import Caption, about
-from .plot import BLUE, GREY, RED, headed, new_figure, save, shown_unit
+from .plot import BLUE, GREY, RED, headed, new_figure, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -38,7 +39,7 @@ def draw_qualification(q: Qualification, path: Path) -> None:
         _draw_curves(zoom, q, compared)
         _zoom(zoom, q, compared)
         _draw_deviation(apart, q, compared)
-        unit = shown_unit(compared.unit)[1]
+        unit = in_milli(compared.unit)[1]
         label = f"{compared.name} in {unit}" if unit else compared.name
         whole.set_ylabel(label, fontsize=8, parse_math=False)
     for axes, title in zip(
@@ -59,7 +60,7 @@ def _draw_curves(axes: Axes, q: Qualification, compared: Compared) -> None:
     original, candidate = (run[compared.name] for run in q.runs)
     style = "steps-post" if original.held else "default"
     allowed = tube(original, original.time, compared.band.time)
-    width, factor = compared.band.width, shown_unit(compared.unit)[0]
+    width, factor = compared.band.width, in_milli(compared.unit)[0]
     if isfinite(width):
         axes.fill_between(
             allowed.time,
@@ -95,7 +96,7 @@ def _zoom(axes: Axes, q: Qualification, compared: Compared) -> None:
     width = compared.band.width if isfinite(compared.band.width) else 0.0
     margin = width + 0.08 * (high - low) or 1.0
     axes.set_xlim(first, last)
-    factor = shown_unit(compared.unit)[0]
+    factor = in_milli(compared.unit)[0]
     axes.set_ylim(factor * (low - margin), factor * (high + margin))
     axes.axvline(moment, color=GREY, linestyle=":", linewidth=1.0)
 
@@ -103,7 +104,7 @@ def _zoom(axes: Axes, q: Qualification, compared: Compared) -> None:
 def _draw_deviation(axes: Axes, q: Qualification, compared: Compared) -> None:
     original, candidate = (run[compared.name] for run in q.runs)
     apart = deviation(original.until(float(candidate.time[-1])), candidate, compared.band.time)
-    factor = shown_unit(compared.unit)[0]
+    factor = in_milli(compared.unit)[0]
     axes.plot(apart.time, factor * apart.values, color=RED, linewidth=1.0)
     if isfinite(compared.band.width):
         axes.axhline(factor * compared.band.width, color=BLUE, linestyle="--", linewidth=1.0)
@@ -116,6 +117,7 @@ def _draw_deviation(axes: Axes, q: Qualification, compared: Compared) -> None:
         va="top",
         fontsize=9,
         color=GREY if compared.inside else RED,
+        bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.8},
     )
     _tidy(axes)
 

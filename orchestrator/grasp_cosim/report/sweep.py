@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from ..files import remove_parts
+from ..files import of_any_format, remove_parts
 from ..sweep.study import Cell, Curve, Map, Study
 from ..sweep.sweep import Sweep
-from .plot import BLUE, COLORS, GREY, RED, finish, new_figure, save
+from ..system.made_of import changed
+from .caption import Caption, about
+from .plot import BLUE, COLORS, GREY, RED, STYLES, finish, headed, new_figure, one_legend, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,9 +34,8 @@ LIMIT = "black"
 MISSING, HATCH = "#dddddd", "////"
 """The colour and the hatches of cells without a value."""
 
-DASHES = ("-", "--", "-.", ":")
 MARKERS = ("o", "s", "^", "D", "v")
-"""Of the curves of one picture, in turn, so that they differ without colours, too."""
+"""Of the curves of one picture, in turn, beside STYLES: so they differ without colours, too."""
 
 MOST_TICKS = 12
 """So many values at uneven distances each have a mark on their axis."""
@@ -46,25 +47,30 @@ DECADES = 1.5
 """A metric above 0 that spans more has a logarithmic colour scale."""
 
 
-def draw_sweep(sweeps: Sequence[Sweep], folder: Path) -> list[Path]:
-    """Draw the pictures that a study asks for, as PNGs in folder; where they are.
+def draw_sweep(
+    sweeps: Sequence[Sweep], folder: Path, suffix: str = "png", title: str = ""
+) -> list[Path]:
+    """Draw the pictures that a study asks for in folder, in the format of the suffix; where they
+    are.
 
-    The variants of a study are beside each other. A metric that no run has is drawn as that.
-    InputError without matplotlib.
+    The variants of a study are beside each other. A metric that no run has is drawn as that. The
+    title is by default the study, its runs and what they vary. InputError without matplotlib.
     """
-    drawn = []
     pictures = sweeps[0].study.pictures
-    remove_parts(folder, "map.png", "curve.png", "distributions.png")
+    remove_parts(folder, *of_any_format("map", "curve", "distributions"))
+    drawn: dict[str, Figure] = {}
     if pictures.maps:
-        drawn.append(folder / "map.png")
-        _draw_maps(sweeps, pictures.maps, drawn[-1])
+        drawn["map"] = _maps(sweeps, pictures.maps)
     if pictures.curves:
-        drawn.append(folder / "curve.png")
-        _draw_curves(sweeps, pictures.curves, drawn[-1])
+        drawn["curve"] = _curves(sweeps, pictures.curves)
     if pictures.distributions:
-        drawn.append(folder / "distributions.png")
-        _draw_distributions(sweeps, pictures.distributions, drawn[-1])
-    return drawn
+        drawn["distributions"] = _distributions(sweeps, pictures.distributions)
+    said = Caption(title or _made_title(sweeps), about(_changed(sweeps)))
+    paths = {folder / f"{stem}.{suffix}": figure for stem, figure in drawn.items()}
+    for path, figure in paths.items():
+        headed(figure, said)
+        save(figure, path)
+    return [*paths]
 
 
 # Maps
@@ -88,11 +94,11 @@ class _Points:
         return int(np.size(self.z) - np.isfinite(self.z).sum())
 
 
-def _draw_maps(sweeps: Sequence[Sweep], maps: Sequence[Map], path: Path) -> None:
+def _maps(sweeps: Sequence[Sweep], maps: Sequence[Map]) -> Figure:
     """A row for each map, with one scale of colours, a column for each variant."""
     across, along = len(sweeps), len(maps)
     alone = across == along == 1
-    figure = new_figure(*((7.2, 5.4) if alone else (1.8 + 3.0 * across, 1.2 + 2.9 * along)))
+    figure = new_figure(*((7.2, 5.0) if alone else (1.8 + 3.0 * across, 0.8 + 2.9 * along)))
     rows = figure.subplots(along, across, squeeze=False, sharex=across > 1)
     for wanted, row in zip(maps, rows, strict=True):
         found = [_points(sweep, wanted) for sweep in sweeps]
@@ -108,12 +114,9 @@ def _draw_maps(sweeps: Sequence[Sweep], maps: Sequence[Map], path: Path) -> None
         axes.set_xlabel(_label(sweep.study, maps[-1].x))
     for axes, sweep in zip(rows[0], sweeps, strict=True):
         axes.set_title(_plain(sweep.study.variant), fontsize=10)
-    figure.suptitle(_heading(sweeps), fontsize=10)
-    named = [axes.get_legend_handles_labels() for axes in rows.flat]
-    keys = {label: handle for pair in named for handle, label in zip(*pair, strict=True)}
-    if keys:  # beside the axes, not over their cells
-        figure.legend([*keys.values()], [*keys], loc="outside lower left", ncols=3, fontsize=8)
-    save(figure, path)
+    if any(axes.get_legend_handles_labels()[0] for axes in rows.flat):
+        one_legend(figure)  # not over the cells
+    return figure
 
 
 def _points(sweep: Sweep, wanted: Map) -> _Points:
@@ -143,7 +146,7 @@ def _draw_map(axes: Axes, sweep: Sweep, wanted: Map, points: _Points, norm: Any)
         there = np.isfinite(points.z)
         axes.scatter(points.x[~there], points.y[~there], s=14, color=GREY, marker="x")
         x, y, z = (values[there] for values in (points.x, points.y, points.z))
-        axes.scatter(x, y, c=z, s=14, norm=norm, cmap=COLOURS)
+        axes.scatter(x, y, c=z, s=16, norm=norm, cmap=COLOURS, edgecolors="black", linewidths=0.3)
     if points.missing:
         of = "cells" if points.in_cells else "runs"
         label = f"no {_title(study, wanted.of)}: {points.missing} of {points.z.size} {of}"
@@ -229,9 +232,9 @@ def _borders(centres: Floats, logarithmic: bool) -> Floats:
 # Curves
 
 
-def _draw_curves(sweeps: Sequence[Sweep], curves: Sequence[Curve], path: Path) -> None:
+def _curves(sweeps: Sequence[Sweep], curves: Sequence[Curve]) -> Figure:
     """Axes for each curve, below each other; in each a line for each column and variant."""
-    figure = new_figure(7.2, 1.2 + 2.8 * len(curves))
+    figure = new_figure(7.2, 0.8 + 2.8 * len(curves))
     rows = figure.subplots(len(curves), 1, squeeze=False, sharex=len({c.x for c in curves}) == 1)
     for wanted, axes in zip(curves, rows[:, 0], strict=True):
         lines = [
@@ -250,25 +253,24 @@ def _draw_curves(sweeps: Sequence[Sweep], curves: Sequence[Curve], path: Path) -
             sweeps[0], len(_curve(sweeps[0], wanted, lines[0][1])[0]), wanted.cell
         )
         title = _title(study, lines[0][1]).partition(",")[0]
-        finish(axes, f"{cell}{title}{f' in {unit}' if unit else ''}")
+        finish(axes, _plain(f"{cell}{title}{f' in {unit}' if unit else ''}"))
         axes.set_xlabel(_label(study, wanted.x))
     for axes in rows[:-1, 0] if len({c.x for c in curves}) == 1 else ():
         axes.set_xlabel("")
-    figure.suptitle(_heading(sweeps), fontsize=10)
-    save(figure, path)
+    return figure
 
 
 def _draw_curve(axes: Axes, sweep: Sweep, wanted: Curve, column: str, place: int) -> None:
     """Markers at the runs, a line between them in a grid; crosses where there is no value."""
     x, values = _curve(sweep, wanted, column)
-    style = DASHES[place % len(DASHES)] if sweep.study.design.kind == "grid" else ""
+    style = STYLES[place % len(STYLES)] if sweep.study.design.kind == "grid" else ""
     colour, marker = COLORS[place % len(COLORS)], MARKERS[place % len(MARKERS)]
-    name = _plain(", ".join(filter(None, [sweep.study.variant, _title(sweep.study, column)])))
+    name = ", ".join(filter(None, [sweep.study.variant, _title(sweep.study, column)]))
     axes.plot(x, values, linestyle=style, marker=marker, ms=4, color=colour, label=name)
     missing = ~np.isfinite(values)
     if missing.any():
         axes.plot(
-            x[missing], np.full(missing.sum(), 0.03 + 0.04 * place), "x", color=colour,
+            x[missing], np.full(missing.sum(), 0.03 + 0.04 * (place % 5)), "x", color=colour,
             transform=axes.get_xaxis_transform(), label=f"no {name}: {missing.sum()} of {len(x)}",
         )  # fmt: skip
 
@@ -290,16 +292,25 @@ def _numbers(sweep: Sweep, name: str) -> Floats:
     return sweep.study.shown(name)[0] * sweep.numbers(name)
 
 
-def _heading(sweeps: Sequence[Sweep]) -> str:
-    """What was run: the study, the number of its runs, of each variant, and what they vary."""
+def _made_title(sweeps: Sequence[Sweep]) -> str:
+    """The study, the number of its runs, of each variant, and what they vary."""
     study, count = sweeps[0].study, len(sweeps[0].outcomes)
     each = f"{len(sweeps)} times " if len(sweeps) > 1 else ""
-    names = [_plain(p.name) for p in study.parameters]
-    over = " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
-    over = over if len(names) <= 3 else f"{len(names)} parameters"
+    *names, last = (p.name for p in study.parameters)
+    over = " and ".join(filter(None, [", ".join(names), last]))
+    over = over if len(names) < 3 else f"{len(names) + 1} parameters"
     failed = sum(sweep.failed for sweep in sweeps)
     failures = f", {failed} failed" if failed else ""
-    return f"{_plain(study.title)}: {each}{_runs(count)}{failures}\nover {over}"
+    return f"{study.title}: {each}{_runs(count)}{failures}, over {over}"
+
+
+def _changed(sweeps: Sequence[Sweep]) -> dict[str, Any]:
+    """What of the system differs from its file, and is the same in all variants and runs."""
+    study = sweeps[0].study
+    varied = {*study.seeds, *(v for p in study.parameters for v in p.variables)}
+    first, *others = (changed(sweep.study.system) for sweep in sweeps)
+    same = {k: v for k, v in first.items() if all(o.get(k) == v for o in others)}
+    return {k: v for k, v in same.items() if k not in varied}
 
 
 def _cells(cell: Cell, x: Floats, y: Floats, z: Floats) -> tuple[Floats, Floats, Floats]:
@@ -358,7 +369,7 @@ def _norm(values: Floats) -> Any:
     return Normalize(least, most)
 
 
-def _draw_distributions(sweeps: Sequence[Sweep], metrics: Sequence[str], path: Path) -> None:
+def _distributions(sweeps: Sequence[Sweep], metrics: Sequence[str]) -> Figure:
     """Axes for each metric; with variants a row for each, and a column for each variant."""
     panels = [(name, sweep) for name in metrics for sweep in sweeps]
     columns = len(sweeps) if len(sweeps) > 1 else min(len(metrics), 2)
@@ -370,8 +381,7 @@ def _draw_distributions(sweeps: Sequence[Sweep], metrics: Sequence[str], path: P
         axes.set_title(_plain(sweep.study.variant), fontsize=10)
     for axes in grid[len(panels) :]:
         axes.set_visible(False)
-    figure.suptitle(_heading(sweeps), fontsize=10)
-    save(figure, path)
+    return figure
 
 
 def _draw_distribution(axes: Axes, sweep: Sweep, name: str) -> None:
@@ -416,13 +426,13 @@ def _runs(count: int) -> str:
 def _label(study: Study, name: str) -> str:
     """A parameter or metric with its unit."""
     unit, title = study.shown(name)[1], _title(study, name)
-    return f"{title} in {unit}" if unit else title
+    return _plain(f"{title} in {unit}" if unit else title)
 
 
 def _title(study: Study, name: str) -> str:
     metric = study.metric_of(name)
     known = metric is not None and name in metric.columns
-    return _plain(metric.column_title(name) if metric and known else name)
+    return metric.column_title(name) if metric and known else name
 
 
 def _plain(name: str) -> str:

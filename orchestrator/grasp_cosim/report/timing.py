@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 COLORS = (
     "#1b7f79", "#b26b00", "#7a4fa3", "#4c7a1f", "#a83279", "#5b6470", "#2f6fb3", "#8c4a2f",
 )  # fmt: skip
-"""Those of components; then come the same ones dashed."""
+"""Those of components; each next one is dashed in another way, so that grey tells them too."""
 
 INK, MUTED = "#1d2023", "#8a9098"
 
@@ -131,7 +131,7 @@ def looks(timing: Timing) -> dict[str, Look]:
     """Return the look of every part and culprit: components in colours, all else black and grey."""
     components = [name for name in (*timing.parts, *timing.culprits) if name not in OTHERS]
     return OTHERS | {
-        name: Look(COLORS[k % len(COLORS)], k // len(COLORS) % len(DASHES))
+        name: Look(COLORS[k % len(COLORS)], k % len(DASHES))
         for k, name in enumerate(dict.fromkeys(components))
     }
 

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
+from pathlib import PurePath
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -144,9 +145,9 @@ class Study:
 
     @property
     def title(self) -> str:
-        """The name of its file without the suffix; without a file, that of the system."""
+        """The name of its file without the suffix; without a file, that of the system's."""
         name = self.name.removesuffix(f", {self.variant}")
-        return name.removesuffix(".toml") if name.endswith(".toml") else self.system.name
+        return PurePath(name if name.endswith(".toml") else self.system.name).stem
 
     @property
     def runs(self) -> int:

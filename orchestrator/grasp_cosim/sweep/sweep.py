@@ -113,9 +113,8 @@ def sweep(
             results = run_on_cluster(scheduler, task, jobs)
         else:
             results = run_here(task, jobs, min(workers or os.cpu_count() or 1, len(left)))
-        what = f"{study.name}, {study.variant}" if study.variant else study.name
-        bar = Progress(what, study.runs, shown=progress, initial=resumed)
-        with phase(f"{what}, {len(left)} runs"), bar, closing(results):
+        bar = Progress(study.name, study.runs, shown=progress, initial=resumed)
+        with phase(f"{study.name}, {len(left)} runs"), bar, closing(results):
             for outcome in results:
                 store.keep(outcome)
                 done[outcome.index] = outcome

@@ -9,7 +9,7 @@ from ...comparison.compare import compare as compare_runs
 from ...files import check_folder
 from ...qualification.bands import read_bands
 from ...report.comparison import write_comparison
-from ..frame import NEGATIVE, PATH, chosen_metrics, json_option, metrics_option, say, show
+from ..frame import NEGATIVE, PATH, chosen_metrics, json_option, metrics_option, say, show, waiting
 
 
 @click.command()
@@ -39,14 +39,12 @@ def compare(
     """
     if out:
         check_folder(out.parent)
-    found = compare_runs(
-        a,
-        b,
-        bands=read_bands(bands) if bands else None,
-        metrics=chosen_metrics(metric_files),
-    )
+    given, metrics = read_bands(bands) if bands else None, chosen_metrics(metric_files)
+    with waiting(f"comparing {a} and {b}"):
+        found = compare_runs(a, b, bands=given, metrics=metrics)
+        if out:
+            write_comparison(found, out)
     if out:
-        write_comparison(found, out)
         say(f"wrote {out}: {out.stat().st_size / 1e6:.1f} MB")
     show(as_json, words.as_json(found), words.as_text(found))
     return 0 if found.alike else NEGATIVE

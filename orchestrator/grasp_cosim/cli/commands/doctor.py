@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from ...inspection.doctor import as_text, examine
-from ..frame import NEGATIVE, PATH, json_option, show
+from ..frame import NEGATIVE, PATH, json_option, show, waiting
 
 
 @click.command()
@@ -20,6 +20,7 @@ def doctor(fmu: Path | None, as_json: bool) -> int:
     \b
     Example: grasp-cosim doctor vendor.fmu
     """
-    findings = examine(fmu)
+    with waiting(f"examining {fmu or 'this Python'}"):
+        findings = examine(fmu)
     show(as_json, {"findings": [asdict(f) for f in findings]}, as_text(findings))
     return NEGATIVE if any(f.status == "problem" for f in findings) else 0

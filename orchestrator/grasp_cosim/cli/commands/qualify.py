@@ -28,6 +28,7 @@ from ..frame import (
     metrics_option,
     say,
     show,
+    waiting,
 )
 from ..native import many_runs_option, natively
 from ..options import chosen_system, names_options, replacements, set_values, system_options
@@ -116,5 +117,6 @@ def _write(found: Qualification, out: Path, suffix: str) -> None:
     write_json(out / "qualification.json", verdict.as_json(found))
     if found.signals:
         write_text(bands, verdict.as_bands(found))
-        draw_qualification(found, figure)
+        with waiting("drawing"):
+            draw_qualification(found, figure)
         say(f"drew {figure}")

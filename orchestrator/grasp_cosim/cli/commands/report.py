@@ -9,7 +9,7 @@ from ...files import check_folder, of_any_format, remove_parts
 from ...recording.load import load_run, run_folder
 from ...report.page import write_page
 from ...report.timing import TIMING, draw_result
-from ..frame import PATH, format_option, json_option, say, show, title_option
+from ..frame import PATH, format_option, json_option, say, show, title_option, waiting
 
 
 @click.command()
@@ -29,10 +29,20 @@ def report(run: Path, out: Path | None, title: str, suffix: str, as_json: bool) 
     Example: grasp-cosim report results
     """
     run = run_folder(run)
+    page = out or run / "report.html"
+    with waiting(f"drawing {page}"):
+        drawn = _draw(run, page, title, suffix)
+    size = page.stat().st_size
+    written = {"page": str(page), "bytes": size, "pictures": drawn}
+    show(as_json, written, "\n".join([f"{page}: {size / 1e6:.1f} MB", *drawn]))
+    return 0
+
+
+def _draw(run: Path, page: Path, title: str, suffix: str) -> list[str]:
+    """Write the page of a run; the pictures that were drawn beside it."""
     recorded = load_run(run).titled(title)
     if recorded.wall_time is None:
         say(f"{run}: unfinished, to t = {recorded.time[-1]:.6g} s")
-    page = out or run / "report.html"
     check_folder(page.parent)
     remove_parts(page.parent, page.name, *of_any_format(recorded.drawing.stem, TIMING))
     scene = recorded.drawing.scene(recorded)
@@ -42,7 +52,4 @@ def report(run: Path, out: Path | None, title: str, suffix: str, as_json: bool) 
         drawn += map(str, draw_result(recorded, page.parent, suffix))
     except InputError as error:
         say(f"no picture: {error}")
-    size = page.stat().st_size
-    written = {"page": str(page), "bytes": size, "pictures": drawn}
-    show(as_json, written, "\n".join([f"{page}: {size / 1e6:.1f} MB", *drawn]))
-    return 0
+    return drawn

@@ -33,6 +33,7 @@ from ..frame import (
     say,
     show,
     title_option,
+    waiting,
 )
 from ..native import native_option, natively
 from ..options import (
@@ -180,9 +181,10 @@ def _write(result: Result, folder: RunFolder | None, given: Mapping[str, Any], m
         return
     if out and mdf:
         result.to_mdf(out / "signals.mf4")
-    plot = given["plot"] and result.numbers
-    for picture in draw_result(result, out or Path(), suffix) if plot else ():
-        say(f"drew {picture}")
+    if given["plot"] and result.numbers:
+        with waiting("drawing"):
+            for picture in draw_result(result, out or Path(), suffix):
+                say(f"drew {picture}")
 
 
 def _as_json(result: Result) -> dict[str, Any]:

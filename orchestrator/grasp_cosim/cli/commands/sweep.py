@@ -28,6 +28,7 @@ from ..frame import (
     check_outputs,
     chosen_metrics,
     fail,
+    format_option,
     is_quiet,
     json_option,
     load_system,
@@ -35,6 +36,8 @@ from ..frame import (
     pair,
     say,
     show,
+    title_option,
+    waiting,
     with_controller,
     with_preset,
 )
@@ -85,6 +88,8 @@ SWAP = "COMPONENT=FMU"
     is_flag=True,
     help="Draw what the study asks for under [figures], or --of over what --vary varies.",
 )
+@format_option
+@title_option
 @metrics_option
 @many_runs_option
 @json_option
@@ -93,6 +98,8 @@ def sweep(
     workers: int | None,
     scheduler: str | None,
     plot: bool,
+    suffix: str,
+    title: str,
     native: bool | None,
     as_json: bool,
     **given: Any,
@@ -128,8 +135,10 @@ def sweep(
         kept = sum(Store(folder / v.variant).kept() for v in variants)
         of = f"{kept} of {sum(v.runs for v in variants)} runs are kept in {folder}"
         return fail(f"interrupted; {of}, the same command goes on", INTERRUPTED)
-    for picture in draw_sweep(done, folder) if plot else []:
-        say(f"drew {picture}")
+    if plot:
+        with waiting("drawing"):
+            for picture in draw_sweep(done, folder, suffix, title):
+                say(f"drew {picture}")
     limits = reached(done)
     show(as_json, _as_json(name, folder, done, limits), _as_text(done, limits))
     failed = all(d.failed == d.study.runs for d in done)

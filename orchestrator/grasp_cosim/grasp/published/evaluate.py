@@ -15,6 +15,7 @@ from typing import Any
 from ...files import of_any_format, remove, write_json, write_text
 from ...metrics.metric import registered
 from ...parallel import run_all
+from ...progress import Progress
 from ...recording.result import UNITS
 from ...report.caption import Caption, about
 from ...report.plot import headed, new_figure, one_legend, save
@@ -102,8 +103,9 @@ def evaluate(
         }
         remove(out, *WRITTEN, *of_any_format(*PICTURES))
         said = Caption(f"{how.title}, {controller_fmu(system)}", about(changed(system)))
-        _draw_signals(runs, how.shown, out, said, suffix)
-        _draw_times(rows, out, said, suffix)
+        with Progress("drawing", unit="", shown=progress):
+            _draw_signals(runs, how.shown, out, said, suffix)
+            _draw_times(rows, out, said, suffix)
         named = [{**r, "finger": r["finger"] or "difference"} for r in rows]
         write_text(out / "evaluation.csv", table_csv(named))
         write_json(out / "evaluation.json", report)
