@@ -75,7 +75,13 @@ PICTURE = "tuning.png"
     show_default=True,
     help="Sets of gains at most, each run in each condition.",
 )
-@click.option("--seed", type=click.IntRange(0), default=1, show_default=True)
+@click.option(
+    "--seed",
+    type=click.IntRange(0),
+    default=1,
+    show_default=True,
+    help="Another seed makes another search.",
+)
 @click.option(
     "--workers", type=click.IntRange(1), help="Processes; by default one for each processor."
 )
@@ -85,7 +91,7 @@ PICTURE = "tuning.png"
 @many_runs_option
 @json_option
 def tune(as_json: bool, **given: Any) -> int:
-    """Search for the gains that make the grasp of SYSTEM fastest within limits.
+    """Search for the gains that make the grasp fastest within limits.
 
     SYSTEM is a .toml or .ssp file; by default the built-in grasp. Fast is the time until the forces
     of both fingers have settled; what counts of it, and of each limit, is the worst over fingers
