@@ -15,7 +15,7 @@ from grasp_cosim.grasp.tuning import (
     grasp_time,
     is_published,
 )
-from grasp_cosim.tuning.problem import Problem
+from grasp_cosim.tuning.problem import Condition, Problem
 
 
 @pytest.mark.parametrize("law", ["published", "adaptive"])
@@ -40,12 +40,19 @@ def test_both_controllers_have_a_problem_about_their_published_gains(
     assert tuned_for == {0.0, 0.02, 0.05}
 
 
-def test_the_bench_has_noise_in_two_checks_and_friction_in_one(grasp: System) -> None:
+def noise(condition: Condition) -> tuple[bool, float, float]:
+    """If there is noise, of which seed, and how much friction."""
+    system = condition.system
+    there = system.component("sensor_1", "").values.get("noise.enabled", False)
+    seed, friction = "sensor_1.noise.seed", "plant.friction.viscous[1]"
+    return bool(there), system.start(seed) if there else 0.0, system.start(friction)
+
+
+def test_noise_is_tuned_for_and_checked_with_another_seed_and_with_friction(grasp: System) -> None:
     checks, _ = default_checks(grasp)
-    noisy = [c for c in checks if c.system.component("sensor_1", "").values.get("noise.enabled")]
-    friction = [c.system.start("plant.friction.viscous[1]") for c in noisy]
-    assert [f > 0.0 for f in friction] == [False, True]
-    assert any(c.system.step_ns == 100_000 and c not in noisy for c in checks)
+    assert [noise(c) for c in default_conditions(grasp) if noise(c)[0]] == [(True, 1.0, 0.0)]
+    assert [noise(c) for c in checks if noise(c)[0]] == [(True, 11.0, 0.0), (True, 1.0, 35.7696)]
+    assert any(c.system.step_ns == 100_000 and not noise(c)[0] for c in checks)
 
 
 def test_a_check_that_a_system_cannot_have_is_left_out_and_said(grasp: System) -> None:

@@ -16,7 +16,7 @@ from support.tuned import Computed, known_problem
 @pytest.fixture
 def found(tmp_path: Path) -> Tuning:
     """A search by formulas, and a point that has no figures."""
-    runs = Computed(known_problem(tmp_path), Crew(1), Progress("", None, shown=False))
+    runs = Computed(known_problem(tmp_path), Crew(1), Progress("", shown=False))
     runs.points([runs.problem.start])
     Search(runs, {"effort": 18.0}, 60, 1, 12).all()
     nothing = Point((1.0, 1.0), {"slowness": None, "effort": None}, "it ran away")
@@ -41,7 +41,10 @@ def test_it_has_all_points_the_front_the_limit_and_both_sets_of_gains(
     assert labels[2] == "published: 5, 0.5"
     assert labels[3].startswith("tuned: 1")
     assert labels[4:] == ["limit: 18"]
-    beyond = int(axes.get_title().partition("seed 1; ")[2].split()[0])
+    said = " ".join(" ".join(text.get_text() for text in figure.texts).split())
+    assert said.startswith("system, tuned: slowness against effort")
+    assert "the worst of: as it is" in said
+    beyond = int(said.partition("seed 1; ")[2].split()[0])
     (low, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     shown = [low <= x <= right and bottom <= y <= top for x, y in places]
     assert beyond == len(found.points) - sum(shown) >= 1

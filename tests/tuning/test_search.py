@@ -21,7 +21,7 @@ BEST = 1.0 / 9.0
 
 def computed(problem: Problem, budget: int, seed: int = 1) -> tuple[Tuning, list[int]]:
     """What the search finds without runs, and how many points it asked for at once."""
-    runs = Computed(problem, Crew(1), Progress("", None, shown=False))
+    runs = Computed(problem, Crew(1), Progress("", shown=False))
     runs.points([problem.start])
     Search(runs, {"effort": LIMIT}, budget, seed, LEAST).all()
     return Tuning(

@@ -48,9 +48,9 @@ def default_gains(system: System) -> tuple[Gain, ...]:
     return tuple(found)
 
 
-def default_limits() -> dict[str, float | None]:
-    """The limits of tuning.toml, None for what the gains of the system reach."""
-    return {k: v if isinstance(v, float) else None for k, v in defaults()["limits"].items()}
+def default_limits() -> dict[str, None]:
+    """The limits of tuning.toml: what the gains of the system reach."""
+    return dict.fromkeys(defaults()["limits"])
 
 
 def default_conditions(system: System) -> tuple[Condition, ...]:

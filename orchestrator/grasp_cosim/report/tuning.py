@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
+from ..metrics.metric import Metric
 from ..tuning.search import Point, Tuning
-from .plot import BLUE, GREY, RED, finish, kept, new_figure
+from .caption import Caption, about
+from .plot import BLUE, GREY, RED, finish, headed, kept, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,7 +23,7 @@ REACH = 1.25
 def draw_tuning(found: Tuning, path: Path | None = None, start: str = "start") -> Figure:
     """Draw what is to be least over what the first limit is on, a mark per point.
 
-    `start` names the gains of the system. With a path it is written there as a PNG. InputError
+    `start` names the gains of the system. With a path it is written there. InputError
     without matplotlib, and where there is no limit.
     """
     check_drawable(found.problem.limits)
@@ -47,7 +49,9 @@ def draw_tuning(found: Tuning, path: Path | None = None, start: str = "start") -
                 x, y, mark, markersize=size, label=f"{name}: {x:.3g}, {y:.3g}", linestyle="none",
                 markerfacecolor="white", markeredgecolor=RED, markeredgewidth=1.8, zorder=5,
             )  # fmt: skip
-    _frame(axes, found, front)
+    beyond = _frame(axes, found, front)
+    tried = f"{len(found.points)} sets of {len(found.problem.gains)} gains, seed {found.seed}"
+    headed(figure, _caption(found), f"{tried}; {beyond} are beyond the axes, or have no value")
     return kept(figure, path)
 
 
@@ -72,24 +76,31 @@ def _places(found: Tuning, points: Sequence[Point]) -> list[tuple[float, float]]
     return [(a * x.factor, b * y.factor) for a, b in pairs if a is not None and b is not None]
 
 
-def _frame(axes: Axes, found: Tuning, front: Sequence[tuple[float, float]]) -> None:
-    """The limit, the axes and the title, which says how much of it is not shown."""
+def _frame(axes: Axes, found: Tuning, front: Sequence[tuple[float, float]]) -> int:
+    """Draw the limit, and set the axes; return how many points are not within them."""
     y, x = (found.problem.metric(name) for name in found.problem.names[:2])
     most = found.limits[x.name] * x.factor
-    unit = x.display_unit and f" {x.display_unit}"
-    axes.axvline(most, color="k", linestyle="--", linewidth=1.0, label=f"limit: {most:.3g}{unit}")
+    label = f"limit: {most:.3g} {x.display_unit}".rstrip()
+    axes.axvline(most, color="k", linestyle="--", linewidth=1.0, label=label)
     seen = [*front, *_places(found, [found.start])]
     right = REACH * max([most, *(a for a, _ in seen)])
     top = REACH * max([b for _, b in seen], default=1.0)
     axes.set_xlim(min(0.0, *(a for a, _ in seen), 0.0), right)
     axes.set_ylim(min(0.0, *(b for _, b in seen), 0.0), top)
-    inside = sum(a <= right and b <= top for a, b in _places(found, found.points))
-    axes.set_xlabel(f"{x.title}, worst case" + (unit and f", in{unit}"))
-    axes.set_title(
-        f"{y.title} against {x.title}, the worst of: "
-        f"{', '.join(c.name for c in found.problem.conditions)}\n"
-        f"{len(found.points)} sets of {len(found.problem.gains)} gains, seed {found.seed}; "
-        f"{len(found.points) - inside} beyond the axes, or without a value",
-        fontsize=9,
+    axes.set_xlabel(_label(x))
+    finish(axes, _label(y))
+    return len(found.points) - sum(a <= right and b <= top for a, b in _places(found, found.points))
+
+
+def _label(metric: Metric) -> str:
+    return f"{metric.title}, worst case" + (metric.display_unit and f", in {metric.display_unit}")
+
+
+def _caption(found: Tuning) -> Caption:
+    """The title: of which system, what, and what it is the worst of."""
+    y, x = (found.problem.metric(name).title for name in found.problem.names[:2])
+    system = PurePath(found.problem.system.name).stem
+    conditions = "; ".join(c.name for c in found.problem.conditions)
+    return Caption(
+        f"{system}, tuned: {y} against {x}", f"the worst of: {conditions} · {about(None)}"
     )
-    finish(axes, f"{y.title}, worst case" + (y.display_unit and f", in {y.display_unit}"))

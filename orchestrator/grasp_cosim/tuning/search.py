@@ -34,7 +34,7 @@ LEAST = 12
 """Points of a generation at least: fewer are soon all alike."""
 
 SPREAD = 0.4
-"""Of the first generation about the gains of the system, as a share of the way between bounds."""
+"""Of a first generation about the best point so far, as a share of the way between the bounds."""
 
 EVOLUTION = {"strategy": "best1bin", "mutation": (0.4, 0.9), "recombination": 0.9}
 """Of the method: greedy, as there are few generations; gains act together, so that most cross."""
@@ -143,7 +143,7 @@ def tune(
     """Search for the best gains with at most `budget` points, each a run in each condition.
 
     workers are processes, by default as many as there are processors; the result is the same to
-    the bit on any number. progress shows a bar on standard error if that is a terminal.
+    the bit on any number. progress shows on standard error how far it is.
 
     InputError without scipy, where the budget is less than a generation, or where a limit is to be
     what the system's own gains reach, and these reach nothing.
@@ -292,27 +292,24 @@ class Search:
     def _shares(self, gains: tuple[float, ...]) -> list[float]:
         return [g.share(x) for g, x in zip(self._problem.gains, gains, strict=True)]
 
-    def _about(self, middle: Sequence[float], count: int, rng: np.random.Generator) -> Shares:
-        """So many points, spread evenly about one."""
-        from scipy.stats import qmc
-
-        spread = qmc.LatinHypercube(len(middle), rng=rng).random(count) - 0.5
-        return np.asarray(np.clip(np.array(middle) + SPREAD * spread, 0.0, 1.0))
-
     def _first(self, limits: Mapping[str, float], rng: np.random.Generator) -> Shares:
-        """A first generation: half the best points so far, as far as there are, half others about
-        the best of them, as points that are all alike stay so.
+        """A first generation: half the best points so far, half others about the best of them.
 
-        Best are those that exceed the limits least, then those with the least.
+        Best are those that exceed the limits least, then those with the least. Points that are all
+        alike stay so, hence the others; the first ones of all are anywhere between the bounds.
         """
+        from scipy.stats import qmc
 
         def rank(point: Point) -> tuple[float, float]:
             excess = sum(max(x, 0.0) for x in self._excess(point, limits))
             return excess, _value(point, self._problem.minimise)
 
         best = sorted(self._runs.known.values(), key=rank)[: self._size // 2]
-        shares = [self._shares(point.gains) for point in best]
-        return np.vstack([shares, self._about(shares[0], self._size - len(shares), rng)])
+        shares = np.array([self._shares(point.gains) for point in best])
+        spread = qmc.LatinHypercube(shares.shape[1], rng=rng).random(self._size - len(best))
+        if len(best) > 1:
+            spread = np.clip(shares[0] + SPREAD * (spread - 0.5), 0.0, 1.0)
+        return np.vstack([shares, spread])
 
     def _excess(self, point: Point, limits: Mapping[str, float]) -> list[float]:
         """How far a point is above each limit, as a share of it; last, if there is a value at all.

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from ..numerals import fixed
 from .problem import Gain
 from .search import Point, Tuning
 
-OBJECTIVE = "what counts of a metric is the greatest of its values, over fingers and conditions"
+OBJECTIVE = "of a metric the greatest value counts, over its entries and the conditions"
 
 
 def as_json(found: Tuning) -> dict[str, Any]:
@@ -46,10 +46,10 @@ def as_text(found: Tuning, start: str) -> str:
     """Tables of the figures, the gains and the checks; `start` names the gains of the system."""
     problem, best = found.problem, found.tuned
     lines = [
-        f"least {problem.metric(problem.minimise).title} over {len(problem.conditions)} conditions "
-        f"({', '.join(c.name for c in problem.conditions)})",
-        f"{OBJECTIVE}; {len(found.points)} points of {len(problem.gains)} gains, seed "
-        f"{found.seed}, {len(found.points) * len(problem.conditions)} runs",
+        f"least {problem.metric(problem.minimise).title}, the worst of: "
+        f"{'; '.join(c.name for c in problem.conditions)}",
+        f"{len(found.points)} sets of {len(problem.gains)} gains, seed {found.seed}, "
+        f"{len(found.points) * len(problem.conditions)} runs; {OBJECTIVE}",
         "",
         f"{'':40s}{start:>11s}{'tuned':>11s}{'at most':>11s}",
     ]
@@ -82,7 +82,7 @@ def preset_toml(found: Tuning, point: Point, name: str = "tuned") -> str:
     lines = [
         f"# Least {problem.minimise}, {point.figures[problem.minimise]:.6g}; limits: "
         f"{limits or 'none'}; SI units.",
-        f"# The worst of: {', '.join(c.name for c in problem.conditions)}.",
+        f"# The worst of: {'; '.join(c.name for c in problem.conditions)}.",
         f"# The best of {len(found.points)} points, seed {found.seed}: no proof of a best one.",
         f"# At the end of a system file it is for: grasp-cosim run FILE --preset {name}",
         f"[presets.{name}]",
@@ -125,20 +125,26 @@ def _check_lines(found: Tuning, start: str) -> list[str]:
     """A line per check: what was and is reached there, and loudly, which limits are broken."""
     if not found.checks:
         return []
-    names = found.problem.names
-    lines = ["", f"where it was not tuned, {start} -> tuned:"]
-    heads = [
-        f"{m.title}{m.display_unit and f', {m.display_unit}'}"
-        for m in map(found.problem.metric, names)
+    metrics = [found.problem.metric(name) for name in found.problem.names]
+    wide = [max(17, len(m.title) + 2) for m in metrics]
+
+    def line(name: str, cells: Iterable[str]) -> str:
+        return f"{name:28s}" + "".join(f"{c:>{w}s}" for c, w in zip(cells, wide, strict=True))
+
+    lines = [
+        "",
+        f"where it was not tuned, {start} -> tuned:",
+        line("", (m.title for m in metrics)),
+        line("", (m.display_unit or "1" for m in metrics)),
     ]
-    lines.append(f"{'':28s}" + "".join(f"{h:>24s}" for h in heads))
     for c in found.checks:
-        cells = [
-            f"{_shown(found, n, c.start.figures[n])} -> {_shown(found, n, c.tuned.figures[n])}"
-            for n in names
-        ]
-        lines.append(f"{c.name:28s}" + "".join(f"{cell:>24s}" for cell in cells))
-        lines += [f"  {line}" for line in broken_lines(found, c.start, c.tuned, start)]
+        both = (
+            f"{_shown(found, m.name, c.start.figures[m.name])} -> "
+            f"{_shown(found, m.name, c.tuned.figures[m.name])}"
+            for m in metrics
+        )
+        lines.append(line(c.name, both))
+        lines += [f"  {broken}" for broken in broken_lines(found, c.start, c.tuned, start)]
     return lines
 
 

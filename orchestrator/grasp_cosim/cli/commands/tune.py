@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,18 +24,19 @@ from ..frame import (
     PATH,
     check_outputs,
     chosen_metrics,
+    format_option,
     is_quiet,
     json_option,
     metrics_option,
     pair,
     say,
     show,
+    workers_option,
 )
 from ..native import all_natively, many_runs_option
 from ..options import chosen_system, set_values, system_options
 
 FILES = ("tuning.json", "tuned.toml", "points.csv")
-PICTURE = "tuning.png"
 
 
 @click.command()
@@ -51,7 +53,7 @@ PICTURE = "tuning.png"
     "--vary",
     multiple=True,
     metavar="VARIABLE[,VARIABLE]=LOW:HIGH",
-    help="A gain and its bounds; others keep their ratio to it. Default: seven, within a factor 5.",
+    help="A gain and its bounds; others keep their ratio to it. Default: seven, within a factor 3.",
 )
 @click.option(
     "--limit",
@@ -59,19 +61,20 @@ PICTURE = "tuning.png"
     multiple=True,
     metavar="METRIC[=MOST]",
     help="The most that a metric may be, in SI units; without it, what the system's own gains "
-    "reach. Default: impact_velocity, time_difference, force_overshoot=0.01; =none drops one.",
+    "reach. Default: impact_velocity, time_difference and force_overshoot; =none drops one.",
 )
 @click.option(
     "--condition",
     "conditions",
     multiple=True,
     metavar="VARIABLE=VALUE[,...]",
-    help="What the gains are for; the worst counts. Default: an object at 0, 20 and 50 mm.",
+    help="What the gains are for; the worst counts. Default: an object at 0 and 50 mm, and at "
+    "20 mm with noisy sensors.",
 )
 @click.option(
     "--budget",
     type=int,
-    default=1500,
+    default=1000,
     show_default=True,
     help="Sets of gains at most, each run in each condition.",
 )
@@ -80,25 +83,25 @@ PICTURE = "tuning.png"
     type=click.IntRange(0),
     default=1,
     show_default=True,
-    help="Another seed makes another search.",
+    help="Of the search: another one, other gains.",
 )
-@click.option(
-    "--workers", type=click.IntRange(1), help="Processes; by default one for each processor."
-)
+@workers_option
 @click.option("--out", type=PATH, help=f"Folder for {', '.join(FILES)}.")
-@click.option("--plot", is_flag=True, help=f"Draw {PICTURE}, in --out or the current folder.")
+@click.option("--plot", is_flag=True, help="Draw tuning.png, in --out or the current folder.")
+@format_option
 @metrics_option
 @many_runs_option
 @json_option
 def tune(as_json: bool, **given: Any) -> int:
-    """Search for the gains that make the grasp fastest within limits.
+    """Find the gains that grasp fastest within limits.
 
     SYSTEM is a .toml or .ssp file; by default the built-in grasp. Fast is the time until the forces
     of both fingers have settled; what counts of it, and of each limit, is the worst over fingers
     and conditions. The runs are of 4 s in steps of 1 ms, unless --step and --stop say otherwise.
+
     The search is a differential evolution: the same seed and budget, the same result, on any number
     of workers; a better one may exist. What was found is then run where it was not tuned, with
-    noise and friction, too. Exit code 1: no gains keep the limits, or a limit breaks in those
+    other noise and friction, too. Exit code 1: no gains keep the limits, or one breaks in those
     checks that the system's own gains keep there.
 
     \b
@@ -109,20 +112,18 @@ def tune(as_json: bool, **given: Any) -> int:
     if given["plot"]:
         check_drawable(problem.limits)
     check_outputs(out, given["plot"])
-    systems = [c.system for c in (*problem.conditions, *problem.checks)]
-    with all_natively(systems, given["native"]) as chosen:
-        names = [c.name for c in (*problem.conditions, *problem.checks)]
-        run = [Condition(n, s) for n, s in zip(names, chosen, strict=True)]
-        tuned = len(problem.conditions)
-        found = search(
-            Problem(
-                problem.gains, problem.minimise, problem.limits, tuple(run[:tuned]),
-                tuple(run[tuned:]), problem.metrics,
-            ),
-            given["budget"], given["seed"], given["workers"], progress=not is_quiet(),
-        )  # fmt: skip
+    conditions = (*problem.conditions, *problem.checks)
+    with all_natively([c.system for c in conditions], given["native"]) as systems:
+        chosen = tuple(Condition(c.name, s) for c, s in zip(conditions, systems, strict=True))
+        count = len(problem.conditions)
+        run = replace(problem, conditions=chosen[:count], checks=chosen[count:])
+        found = search(run, given["budget"], given["seed"], given["workers"], not is_quiet())
     start = "published" if of_grasp.is_published(problem.system, problem.gains) else "as it is"
-    _write(found, out, given["plot"], start)
+    _write(found, out)
+    if given["plot"]:
+        picture = (out or Path()) / f"tuning.{given['suffix']}"
+        draw_tuning(found, picture, start)
+        say(f"drew {picture}")
     show(as_json, words.as_json(found), words.as_text(found, start))
     return NEGATIVE if found.tuned is None or _worse(found) else 0
 
@@ -190,14 +191,10 @@ def _worse(found: Tuning) -> bool:
     )
 
 
-def _write(found: Tuning, out: Path | None, plot: bool, start: str) -> None:
+def _write(found: Tuning, out: Path | None) -> None:
     if out:
         remove(out, *FILES)
         write_json(out / "tuning.json", words.as_json(found))
         write_text(out / "points.csv", table_csv(words.rows(found)))
         if found.tuned:
             write_text(out / "tuned.toml", words.preset_toml(found, found.tuned))
-    if plot:
-        picture = (out or Path()) / PICTURE
-        draw_tuning(found, picture, start)
-        say(f"drew {picture}")
