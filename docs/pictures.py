@@ -6,6 +6,7 @@ Without a NAME, like hand or layers, all of them, in ten minutes. report.png tak
 timing.png a machine that is idle.
 """
 
+import os
 import re
 import shutil
 import subprocess
@@ -163,6 +164,7 @@ def main(*names: str) -> None:
     """Make the pictures of these names, or all."""
     if wrong := [name for name in names if name not in PICTURES]:
         raise SystemExit(f"{', '.join(wrong)}: must be of {', '.join(PICTURES)}")
+    os.environ["SOURCE_DATE_EPOCH"] = tutorials.DATE
     for draw, _ in (PICTURES[name] for name in names or PICTURES):
         draw(HERE)
 

@@ -8,6 +8,7 @@ headings say what is taken from the run: COLUMNS. Below a study, a row may be on
 
 import json
 import math
+import os
 import re
 import shlex
 import sys
@@ -41,6 +42,9 @@ from grasp_cosim.report.plot import (
 from matplotlib.figure import Figure
 
 HERE = Path(__file__).parent
+
+DATE = "1795435200"
+"""On the pictures, as SOURCE_DATE_EPOCH, so that they are the same at any time: 2026-11-23."""
 
 Runs = Mapping[str, Result]
 """The runs of a table by the values in its first column."""
@@ -423,6 +427,7 @@ def update(name: str, pictures: Path) -> None:
 
 def main() -> None:
     """Update the pages and their pictures."""
+    os.environ["SOURCE_DATE_EPOCH"] = DATE
     build_blocks()
     for name in PAGES:
         update(name, HERE)

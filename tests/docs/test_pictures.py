@@ -20,7 +20,9 @@ DOCS = Path(__file__).parents[2] / "docs"
 def pictures(checkout: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     """The script that makes them, in a checkout."""
     monkeypatch.syspath_prepend(DOCS)
-    return importlib.import_module("pictures")
+    module = importlib.import_module("pictures")
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", module.tutorials.DATE)
+    return module
 
 
 def test_each_picture_has_a_command(pictures: Any) -> None:

@@ -65,11 +65,13 @@ def checked(name: str, checkout: Path) -> tuple[list[Any], Any]:
     """
     tutorials = load_tutorials()
     do = tutorials.recorder(checkout / "recorded")
-    text, tables = tutorials.worked_out(page(name), do)
-    assert text == page(name), "run: docs/tutorials.py"
     drawn = checkout / "drawn"
     drawn.mkdir()
-    tutorials.PAGES[name](tables, drawn)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SOURCE_DATE_EPOCH", tutorials.DATE)
+        text, tables = tutorials.worked_out(page(name), do)
+        assert text == page(name), "run: docs/tutorials.py"
+        tutorials.PAGES[name](tables, drawn)
     pictures = [p.name for p in drawn.iterdir()]
     maps = {f"{study}.png" for study in re.findall(r"grasp-cosim sweep (\w+) --plot", page(name))}
     shown = re.findall(r"!\[.*?\]\((.*?)\)", page(name))

@@ -5,8 +5,10 @@ from importlib.metadata import version
 from pathlib import Path
 
 import pytest
+from grasp_cosim.errors import InputError
+from grasp_cosim.recording.folder import now
 from grasp_cosim.recording.load import load_run
-from grasp_cosim.report.caption import about, caption, changes, today
+from grasp_cosim.report.caption import about, caption, changes
 from report.runs import grasp_run, ring_run, write_run
 
 
@@ -38,6 +40,13 @@ def test_many_changes_are_counted() -> None:
 
 def test_the_date_is_that_of_now(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("SOURCE_DATE_EPOCH", raising=False)
-    before = today()
+    before = now()
     said = about({})
-    assert any(f" · {day} · " in said for day in (before, today()))
+    assert any(f" · {moment.date()} · " in said for moment in (before, now()))
+
+
+@pytest.mark.parametrize("epoch", ["today", "1e9", "-1" + 30 * "0"])
+def test_a_date_that_is_none(epoch: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", epoch)
+    with pytest.raises(InputError, match=rf"^SOURCE_DATE_EPOCH={epoch}: must be the seconds"):
+        about({})

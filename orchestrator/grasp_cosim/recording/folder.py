@@ -7,7 +7,7 @@ import time
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
-from datetime import datetime
+from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Self
@@ -183,10 +183,24 @@ class RunFolder:
         }
 
 
+def now() -> datetime:
+    """Return the time, or that of SOURCE_DATE_EPOCH, where the environment has it.
+
+    InputError where that is not the seconds since 1970.
+    """
+    epoch = os.environ.get("SOURCE_DATE_EPOCH")
+    if not epoch:
+        return datetime.now().astimezone()
+    try:
+        return datetime.fromtimestamp(int(epoch), UTC)
+    except (ValueError, OverflowError, OSError) as error:
+        raise InputError(f"SOURCE_DATE_EPOCH={epoch}: must be the seconds since 1970") from error
+
+
 def origin(system: System, command: Sequence[str]) -> dict[str, Any]:
     """The date now, the versions of what makes the run, which FMUs those are, and the command."""
     return {
-        "date": datetime.now().astimezone().isoformat(timespec="seconds"),
+        "date": now().isoformat(timespec="seconds"),
         "versions": {
             "python": platform.python_version(),
             **{name: version(name) for name in ("grasp-cosim", "numpy", "fmpy")},

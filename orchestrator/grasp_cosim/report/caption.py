@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
-from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import PurePath
 from typing import Any, NamedTuple
 
+from ..recording.folder import now
 from ..recording.result import Result
 from .tables import number
 
@@ -34,7 +33,7 @@ def caption(result: Result, title: str = "") -> Caption:
     origin, settings = result.origin, result.settings
     words = result.drawing.words(result)
     made = ", ".join([PurePath(str(settings["system"])).stem, *words])
-    date = str(origin.get("date", "" if result.folder else today()))[:10]
+    date = str(origin.get("date", "" if result.folder else now().date().isoformat()))[:10]
     own = origin.get("versions", {}).get("grasp-cosim", "" if result.folder else None)
     chosen = title or str(origin.get("title", "")) or made
     return Caption(chosen, about(settings.get("changed"), date, own))
@@ -48,7 +47,7 @@ def about(
 
     By default those of now; an empty text is left out.
     """
-    date = today() if date is None else date
+    date = now().date().isoformat() if date is None else date
     own_version = version("grasp-cosim") if own_version is None else own_version
     what = None if changed is None else changes(changed)
     return " · ".join(filter(None, [what, date, own_version and f"grasp-cosim {own_version}"]))
@@ -63,10 +62,3 @@ def changes(changed: Mapping[str, Any]) -> str:
 
 def _text(value: Any) -> str:
     return str(value).lower() if isinstance(value, bool) else number(value)
-
-
-def today() -> str:
-    """Return the date, like 2026-11-23: now, or SOURCE_DATE_EPOCH where the environment has it."""
-    epoch = os.environ.get("SOURCE_DATE_EPOCH")
-    now = datetime.fromtimestamp(int(epoch), UTC) if epoch else datetime.now().astimezone()
-    return now.date().isoformat()
