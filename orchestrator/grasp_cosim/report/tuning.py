@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
+from ..system.made_of import changed
 from ..tuning.search import Point, Tuning
-from .plot import BLUE, GREY, RED, finish, kept, new_figure
+from .caption import Caption, about
+from .plot import BLUE, GREY, RED, finish, headed, kept, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,7 +23,7 @@ REACH = 1.25
 def draw_tuning(found: Tuning, path: Path | None = None, start: str = "start") -> Figure:
     """Draw what is to be least over what the first limit is on, a mark per point.
 
-    `start` names the gains of the system. With a path it is written there as a PNG. InputError
+    `start` names the gains of the system. With a path it is written there, see save(). InputError
     without matplotlib, and where there is no limit.
     """
     check_drawable(found.problem.limits)
@@ -48,6 +50,8 @@ def draw_tuning(found: Tuning, path: Path | None = None, start: str = "start") -
                 markerfacecolor="white", markeredgecolor=RED, markeredgewidth=1.8, zorder=5,
             )  # fmt: skip
     _frame(axes, found, front)
+    system = found.problem.system
+    headed(figure, Caption(f"{PurePath(system.name).stem}: gains tuned", about(changed(system))))
     return kept(figure, path)
 
 
