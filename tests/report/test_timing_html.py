@@ -98,7 +98,7 @@ def test_without_matplotlib_a_line_says_what_the_chart_needs(
     html = timing_html(timing, 3.0)
     assert (drawn.count('class="chart"'), html.count("<svg")) == (1, 0)
     assert "No chart: matplotlib is not installed" in html
-    assert "grasp-cosim[plot]" in html
+    assert "pip install &#x27;matplotlib&gt;=" in html
     assert html[html.index('<div class="paced">') :] == drawn[drawn.index('<div class="paced">') :]
     assert html.partition("</p>")[0] == drawn.partition("</p>")[0]
 

@@ -23,7 +23,7 @@ REACH = 1.25
 def draw_tuning(found: Tuning, path: Path | None = None, start: str = "start") -> Figure:
     """Draw what is to be least over what the first limit is on, a mark per point.
 
-    `start` names the gains of the system. With a path it is written there. InputError
+    `start` names the gains of the system. With a path it is written there, see save(). InputError
     without matplotlib, and where there is no limit.
     """
     check_drawable(found.problem.limits)

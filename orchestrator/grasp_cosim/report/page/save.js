@@ -18,7 +18,7 @@ function offer(name, blob) {
 function written(pen, items, y, width, draws) {
   let x = EDGE, bottom = y;
   for (const { text, style } of items) {
-    const room = (style ? 32 : 0) + pen.measureText(text).width + 14;
+    const room = (style ? 46 : 4) + pen.measureText(text).width;
     if (x > EDGE && x + room > width) [x, bottom] = [EDGE, bottom + LINE];
     if (draws && style) {
       pen.strokeStyle = color(style.color);
