@@ -47,7 +47,7 @@ def test_the_best_grasp_is_found_checked_written_and_can_be_pasted(
 
     start, tuned, limits = found["start"], found["tuned"], found["limits"]
     assert limits["impact_velocity"] == start["impact_velocity"]
-    assert tuned["grasp_time"] < 0.95 * start["grasp_time"]
+    assert tuned["grasp_time"] < start["grasp_time"]
     assert all(tuned[name] <= most for name, most in limits.items())
     gains = tuned["gains"]
     assert (
