@@ -137,11 +137,12 @@ class Progress(tqdm):  # type: ignore[type-arg]  # subscripted, it is no class
 
 
 def write(line: str) -> None:
-    """Write a line on standard error, above a bar that is there."""
+    """Write a line on standard error, now, above a bar that is there."""
     if sys.stderr.isatty():
         tqdm.write(line, file=sys.stderr)
     else:
         sys.stderr.write(line + "\n")
+    sys.stderr.flush()
 
 
 @contextmanager
