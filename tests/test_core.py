@@ -184,7 +184,7 @@ def test_a_run_is_written_read_back_drawn_and_reported(python: Python, folder: P
         assert back.metric_units == result.metric_units
         assert back.roles == {"left": "a", "right": "b"}
         back.plot("signals.png")
-        write_page(back, "oscillator", Path("page.html"))
+        write_page(back, Path("page.html"))
         """
     )
     assert (folder / "signals.png").read_bytes().startswith(b"\x89PNG")

@@ -95,7 +95,8 @@ def test_with_roles_they_are_the_same_to_the_bit(
 def test_a_run_read_back_is_the_result_it_was(original: Result, fmus: Path, tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     system = System.load(written(fmus, tmp_path, NAMES, roles=True, presets=False))
-    result = simulate(with_case(system, 0), step=1e-3, stop=0.5)
+    run = simulate(with_case(system, 0), step=1e-3, stop=0.5)
+    result = replace(run, origin={"date": "2026-11-23T12:00:00", "versions": {"grasp-cosim": "1"}})
     result.to_csv(tmp_path / "out/signals.csv")
     result.to_json(tmp_path / "out/run.json")
     back = load_run(tmp_path / "out")
