@@ -141,7 +141,8 @@ def test_the_first_screen_is_the_hand_and_two_commands_of_which_one_ends_with_it
     make = shutil.which("make")
     if make is None:
         pytest.skip("make is not installed")
-    done = subprocess.run([make, "-n", "run"], cwd=ROOT, capture_output=True, text=True, check=True)
+    command = [make, "--no-print-directory", "-n", "run"]  # which `make test` would have printed
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1].endswith("grasp-cosim play -o results/play.html")
     assert "then open results/play.html" in first
 
