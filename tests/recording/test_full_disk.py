@@ -39,7 +39,7 @@ def test_what_is_beside_it(tmp_path: Path, result: Result, kind: str) -> None:
         pytest.importorskip("matplotlib")
         result.plot(tmp_path / "before.png")  # matplotlib may write a cache of its own
         (tmp_path / "before.png").unlink()
-    path = tmp_path / kind
+    path = tmp_path / {"json": "run.json", "plot": "run.png"}[kind]
     writers: dict[str, Callable[[Path], object]] = {"json": result.to_json, "plot": result.plot}
     with full_disk(100), pytest.raises(OSError, match="too large") as caught:
         writers[kind](path)
