@@ -15,7 +15,7 @@ from ..system.parts import ISOLATIONS
 from ..system.stimuli import INTERPOLATIONS, Stimuli, read_stimuli
 from ..system.structure import DIVERGING, SCHEMES
 from ..system.swap import Replacement
-from .completion import preset_names, variables
+from .completion import components, preset_names, variables
 from .frame import PATH, load_system, pair, together, with_controller, with_preset
 
 set_option = click.option(
@@ -25,6 +25,15 @@ set_option = click.option(
     metavar="COMPONENT.VARIABLE=VALUE",
     shell_complete=variables,
     help="Start value of a variable, like plant.object_width=0.06.",
+)
+
+swap_option = click.option(
+    "--swap",
+    "swaps",
+    multiple=True,
+    metavar="COMPONENT=FMU",
+    shell_complete=components("="),
+    help="Another FMU in the place of a component.",
 )
 
 controller_option = click.option(
@@ -159,6 +168,11 @@ def chosen_stimuli(given: Mapping[str, Any]) -> Stimuli | None:
 def set_values(settings: Sequence[str]) -> dict[str, Any]:
     """The values of --set by the names of their variables."""
     return dict(pair("--set", text, "COMPONENT.VARIABLE=VALUE") for text in settings)
+
+
+def swapped_fmus(swaps: Sequence[str]) -> dict[str, Path]:
+    """The FMUs of --swap by the components whose place they take."""
+    return {name: Path(fmu) for name, fmu in (pair("--swap", t, "COMPONENT=FMU") for t in swaps)}
 
 
 def chosen_system(

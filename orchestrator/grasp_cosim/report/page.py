@@ -97,11 +97,12 @@ def page_html(result: Result, *, scene: Scene | None = None, limit: int = LIMIT)
         "connections": ("Connections", _connections(result)),
         "settings": ("Settings", settings_html(result)),
     }
+    said = caption(result)
     return document(
-        caption(result),
+        said,
         summary(result.metrics),
         {name: section for name, section in sections.items() if section},
-        _state(result, shown, scene) | {"about": caption(result).about},
+        _state(result, shown, scene) | {"about": said.about},
         data_html(shown.time, {f"signal{k}": v for k, v in enumerate(shown.signals.values())}),
         [scripts("main", "save", "panels"), scene.scripts if scene else ""],
         scene.style if scene else "",

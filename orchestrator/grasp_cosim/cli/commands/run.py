@@ -29,7 +29,6 @@ from ..frame import (
     is_quiet,
     json_option,
     metrics_option,
-    pair,
     say,
     show,
     title_option,
@@ -44,6 +43,8 @@ from ..options import (
     names_options,
     replacements,
     set_values,
+    swap_option,
+    swapped_fmus,
     system_options,
 )
 from ..realtime import chosen_realtime, realtime_options, timing_lines
@@ -53,14 +54,7 @@ from ..step_study import check_step_study, step_study_options, study_step
 @click.command()
 @click.argument("system", required=False, type=PATH)
 @system_options
-@click.option(
-    "--swap",
-    "swaps",
-    multiple=True,
-    metavar="COMPONENT=FMU",
-    shell_complete=components("="),
-    help="Another FMU in the place of a component.",
-)
+@swap_option
 @names_options
 @input_options
 @click.option("--out", type=PATH, help="Folder for signals.csv and run.json.")
@@ -161,7 +155,7 @@ def _folder(
 
 def _chosen(given: dict[str, Any], swaps: tuple[str, ...]) -> System:
     """The system with the FMUs and values of the command line; what is left out is said."""
-    fmus = {name: Path(fmu) for name, fmu in (pair("--swap", t, "COMPONENT=FMU") for t in swaps)}
+    fmus = swapped_fmus(swaps)
     stimuli = chosen_stimuli(given)
     system = chosen_system(given, fmus, stimuli)
     new = replacements(given, fmus)

@@ -33,7 +33,6 @@ from ..frame import (
     json_option,
     load_system,
     metrics_option,
-    pair,
     say,
     show,
     title_option,
@@ -42,7 +41,13 @@ from ..frame import (
     with_preset,
 )
 from ..native import all_natively, many_runs_option
-from ..options import chosen_system, set_values, system_options
+from ..options import (
+    chosen_system,
+    set_values,
+    swap_option,
+    swapped_fmus,
+    system_options,
+)
 
 OF_VARY = {
     "--system": "system", "--of": "of", "--preset": "presets", "--case": "case", "--bench": "bench",
@@ -50,8 +55,6 @@ OF_VARY = {
     "--diverging": "diverging", "--swap": "swaps",
 }  # fmt: skip
 """Options that a study without a file has, by their names, and what their values are called."""
-
-SWAP = "COMPONENT=FMU"
 
 
 @click.command()
@@ -72,9 +75,7 @@ SWAP = "COMPONENT=FMU"
     help="With --vary: a metric or signal that --plot draws; of a signal its last value.",
 )
 @system_options
-@click.option(
-    "--swap", "swaps", multiple=True, metavar="COMPONENT=FMU", help="Another FMU in its place."
-)
+@swap_option
 @click.option("--seed", type=click.IntRange(0), help="Draw other runs than the study's own seed.")
 @click.option(
     "--out", type=PATH, help="Folder of the runs; by default the study's name, or sweep, here."
@@ -174,7 +175,7 @@ def _chosen(
 
 def _system(given: Mapping[str, Any]) -> System:
     """The system with what is the same in all runs that --vary asks for."""
-    fmus = {name: Path(fmu) for name, fmu in (pair("--swap", t, SWAP) for t in given["swaps"])}
+    fmus = swapped_fmus(given["swaps"])
     fixed = set_values(given["settings"])
     for name in (text.partition("=")[0] for text in given["varying"]):
         if name in fixed:

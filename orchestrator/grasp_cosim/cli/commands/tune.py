@@ -152,9 +152,9 @@ def _problem(given: dict[str, Any]) -> Problem:
 
 def _gain(text: str) -> Gain:
     names, bounds = pair("--vary", text, "VARIABLE[,VARIABLE]=LOW:HIGH")
-    low, colon, high = bounds.partition(":")
     try:
-        return Gain(tuple(names.split(",")), float(low), float(high if colon else "none"))
+        low, high = map(float, bounds.split(":"))
+        return Gain(tuple(names.split(",")), low, high)
     except ValueError as error:
         raise InputError(f"--vary {text!r}: must be VARIABLE[,VARIABLE]=LOW:HIGH") from error
 
