@@ -1,5 +1,6 @@
 # make run    the published grasp from FMUs: .venv, build, evaluate, pictures and playground in results/
-# make test   the quick tests, in three minutes; make test-slow: the others; each runs in one of them
+# make test   the quick tests; each test runs in one of this and the next three
+# make test-slow  what takes longer; make platforms: other machines; make interop: other makers' tools
 # make explore  the properties, on new random examples and more of them; a failure prints its recipe
 # make check  lint, format, types, import rules
 # make docs   the pages of the Python interface in results/api, and what the notebook in docs/ shows
@@ -15,7 +16,7 @@ PIP := PIP_CONSTRAINT=constraints.txt PIP_DISABLE_PIP_VERSION_CHECK=1 $(BIN)/pyt
 # Tests start hundreds of Pythons: none should compile all modules anew, whatever the environment.
 PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 2 --maxschedchunk 1
 
-.PHONY: run test test-slow explore check docs bench cards pictures playground clean
+.PHONY: run test test-slow platforms interop explore check docs bench cards pictures playground clean
 
 run: .venv/run
 	$(BIN)/grasp-cosim build
@@ -23,10 +24,16 @@ run: .venv/run
 	$(BIN)/grasp-cosim play -o results/play.html
 
 test: .venv/dev
-	$(PYTEST) -m "not slow"
+	$(PYTEST) -m "not slow and not platforms and not interop"
 
 test-slow: .venv/dev
-	$(PYTEST) -m slow
+	$(PYTEST) -m "slow and not platforms and not interop"
+
+platforms: .venv/dev
+	$(PYTEST) -m platforms
+
+interop: .venv/dev
+	$(PYTEST) -m interop
 
 explore: .venv/dev
 	$(PYTEST) -m hypothesis --hypothesis-profile explore
