@@ -358,7 +358,7 @@ class Program:
             initial = text or self.initialiser(value, t)
             if isinstance(node, ast.AnnAssign):
                 try:
-                    hint = self.of_hint(typing.get_type_hints(_Holder(source))[name], "")
+                    hint = self.of_hint(typing.get_type_hints(source.module)[name], "")
                     t = hint if fits(t, hint) else t
                 except (NameError, TypeError, KeyError, UntranslatableError):
                     pass
@@ -501,28 +501,18 @@ def _hints(of: Any) -> dict[str, Any]:
     typing makes new ones, by which an alias could not be told from another.
     """
     found: dict[str, Any] = {}
-    for base in reversed(of.__mro__) if isinstance(of, type) else (of,):
-        found |= (
-            vars(base).get("__annotations__", {}) if isinstance(base, type) else of.__annotations__
-        )
-    if any(isinstance(hint, str | typing.ForwardRef) for hint in found.values()):
-        try:
+    try:
+        for each in reversed(of.__mro__) if isinstance(of, type) else (of,):
+            found |= inspect.get_annotations(each)
+        if any(isinstance(hint, str | typing.ForwardRef) for hint in found.values()):
             return typing.get_type_hints(of)
-        except (NameError, TypeError, AttributeError):
-            return {}
+    except (NameError, TypeError, AttributeError):
+        return {}
     return found
 
 
 def _lines(text: str) -> str:
     return "".join(f"{line}\n" for line in wrapped(text))
-
-
-class _Holder:
-    """So that typing reads the annotations of a module that may be in no sys.modules."""
-
-    def __init__(self, source: Source) -> None:
-        self.__annotations__ = source.names.get("__annotations__", {})
-        self.__globals__ = source.names
 
 
 def _about_members(source: Source, cls: type[Any]) -> dict[str, str]:

@@ -20,8 +20,9 @@ class UntranslatableError(ValueError):
 class Source:
     """One module: its names in memory, its text as a tree, its comments by line."""
 
-    def __init__(self, name: str, names: dict[str, Any], file: Path, text: str) -> None:
-        self.name, self.names, self.file = name, names, file
+    def __init__(self, name: str, module: ModuleType, file: Path, text: str) -> None:
+        self.name, self.module, self.file = name, module, file
+        self.names = vars(module)
         self.tree = ast.parse(text)
         self.comments, self.own_line = _comments(text)
         self._lines = re.split("\r\n?|\n", text)
@@ -147,7 +148,7 @@ class Sources:
             if path is None or Path(path).suffix != ".py":
                 return None
             text = Path(path).read_text("utf-8-sig")
-            source = Source(name, vars(module), Path(path), text)
+            source = Source(name, module, Path(path), text)
             taken = [other.prefix.lower() for other in self._read.values()]
             if source.prefix.lower() in taken:
                 source.prefix = f"{identifier(name.replace('.', '_'))}"
