@@ -301,7 +301,7 @@ class Search:
         from scipy.stats import qmc
 
         def rank(point: Point) -> tuple[float, float]:
-            excess = sum(max(x, 0.0) for x in self._excess(point, limits))
+            excess = math.fsum(max(x, 0.0) for x in self._excess(point, limits))
             return excess, _value(point, self._problem.minimise)
 
         best = sorted(self._runs.known.values(), key=rank)[: self._size // 2]

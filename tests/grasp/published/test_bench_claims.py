@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from grasp_cosim import System
 from grasp_cosim.grasp.published.claims import Evidence, check_claims
-from grasp_cosim.grasp.published.evaluate import bench_rms
+from grasp_cosim.grasp.published.evaluate import bench_rms, simulation_rms
 from grasp_cosim.grasp.published.grasps import Run, Runs
 from grasp_cosim.grasp.published.tables import Row, Setting, published_rows
 
@@ -144,3 +144,13 @@ def test_the_root_mean_squares_are_by_table_and_count_white_once(runs: Runs) -> 
     assert rms({("white/white", 1, 2): 0.8})["contact_times"] == 0.0
     assert rms({("brown/white", 1, 2): 0.8})["mixed_colours"] == pytest.approx(0.8 / 8**0.5)
     assert rms({(0.02, 1, None): 0.8})["time_differences"] == pytest.approx(0.8 / 26**0.5)
+
+
+def test_the_root_mean_squares_are_the_same_in_every_order() -> None:
+    """Correctly rounded sums: sum() of 3.12 and later is not that of 3.11."""
+    rows = [
+        {"finger": finger, "difference": 0.1 * i, "difference_at_0.37_mm": 0.7 * i}
+        for i in range(1, 40)
+        for finger in (None, 1)
+    ]
+    assert simulation_rms([], rows) == simulation_rms([], rows[::-1])

@@ -149,7 +149,7 @@ def scatter(contacts: Sequence[Contact]) -> float | None:
     repeated = [np.array(times) for times in equal.values() if len(times) > 1]
     if not repeated:
         return None
-    squares = sum(float(np.sum((times - times.mean()) ** 2)) for times in repeated)
+    squares = math.fsum(float(np.sum((times - times.mean()) ** 2)) for times in repeated)
     return math.sqrt(squares / sum(len(times) - 1 for times in repeated))
 
 

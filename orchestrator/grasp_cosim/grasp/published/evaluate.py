@@ -169,7 +169,7 @@ def _compared(row: Row, runs: Runs, at_sensor_contact: bool) -> dict[str, Any]:
 
 
 def _rms(values: Sequence[float]) -> float:
-    return math.sqrt(sum(v * v for v in values) / len(values))
+    return math.sqrt(math.fsum(v * v for v in values) / len(values))
 
 
 def simulation_rms(published: Sequence[Row], rows: Sequence[Mapping[str, Any]]) -> dict[str, float]:
