@@ -1,7 +1,6 @@
 """The loop in C: built at the first need, kept, shared by processes; Python's lock, Ctrl-C."""
 
 import ctypes
-import os
 import signal
 import subprocess
 import sys
@@ -14,7 +13,7 @@ import pytest
 from grasp_cosim import InputError, System, simulate
 from grasp_cosim.fmi.instance import STEP_2, Call, Native
 from grasp_cosim.master import compiled, loop
-from grasp_cosim.master.engine import make_loop
+from grasp_cosim.master.engine import Loop, make_loop
 from grasp_cosim.master.plan import Plan
 from support.both_engines import needs_compiler
 
@@ -165,46 +164,42 @@ def test_it_compiles_without_warnings(tmp_path: Path) -> None:
         subprocess.run([*command, "-o", tmp_path / "loop.so", compiled.SOURCE], check=True)
 
 
-def spinning(keeps_lock: bool) -> Plan:
-    """A native call that takes a while: usleep(20 ms), by the shape of a step."""
-    usleep = ctypes.cast(ctypes.CDLL(None).usleep, ctypes.c_void_p).value or 0
-    call = Call(lambda: 0, Native(STEP_2, usleep, 20_000), keeps_lock)
-    return Plan(np.zeros(1), np.zeros(2), [(loop.CALL, 0, 1, 1, 0)], calls=[call])
+def calling(function: str, argument: int, keeps_lock: bool = False) -> Loop:
+    """A loop of one native call, function(argument) of the C library, by the shape of a step."""
+    address = ctypes.cast(ctypes.CDLL(None)[function], ctypes.c_void_p).value or 0
+    call = Call(lambda: 0, Native(STEP_2, address, argument), keeps_lock)
+    plan = Plan(np.zeros(1), np.zeros(2), [(loop.CALL, 0, 1, 1, 0)], calls=[call])
+    return make_loop(plan, "compiled")
 
 
 @pytest.mark.parametrize("keeps_lock", [False, True])
 def test_other_threads_run_meanwhile_unless_a_component_is_python(keeps_lock: bool) -> None:
-    run = make_loop(spinning(keeps_lock), "compiled")
-    during, inside, done = [0], threading.Event(), threading.Event()
+    run = calling("usleep", 1000, keeps_lock)
+    begun, ran = threading.Event(), threading.Event()
 
-    def count() -> None:
-        inside.wait()
-        while not done.is_set():
-            during[0] += 1
+    def other() -> None:
+        begun.wait()
+        ran.set()
 
-    thread = threading.Thread(target=count)
+    thread = threading.Thread(target=other)
     thread.start()
     interval = sys.getswitchinterval()
-    sys.setswitchinterval(1.0)  # only who gives the lock away loses it
+    sys.setswitchinterval(3600.0)  # only who gives the lock away loses it
     try:
-        inside.set()
-        before = during[0]
-        run(np.zeros((5, 1)), 0, 0, 5, 1000)
-        counted = during[0] - before
+        begun.set()
+        for _ in range(1 if keeps_lock else 10_000):  # the other's turn comes when the system likes
+            run(np.zeros((5, 1)), 0, 0, 5, 1000)
+            if seen := ran.is_set():
+                break
     finally:
         sys.setswitchinterval(interval)
-        done.set()
     thread.join()
-    assert (counted == 0) is keeps_lock
+    assert seen is not keeps_lock
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_in_the_loop_is_raised_behind_it() -> None:
-    def interrupt() -> None:
-        os.kill(os.getpid(), signal.SIGINT)
-
-    timer = threading.Timer(0.05, interrupt)
-    timer.start()
-    run = make_loop(spinning(False), "compiled")
+    run = calling("raise", signal.SIGINT)
+    rows = np.zeros((5, 1))
     with pytest.raises(KeyboardInterrupt):
-        run(np.zeros((5, 1)), 0, 0, 5, 1000)
-    timer.join()
+        run(rows, 0, 0, 5, 1000)

@@ -3,6 +3,7 @@
 import os
 import signal
 import threading
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -47,18 +48,22 @@ def system(
     return System.load(path)
 
 
-class Kills:
-    """A listener that sends this process a signal with the first step that it hears of."""
+class Once:
+    """A listener that does something with the first step that it hears of."""
 
-    def __init__(self, number: int) -> None:
-        self.number: int | None = number
+    def __init__(self, act: Callable[[], object]) -> None:
+        self.left = [act]
 
     def begin(self, *_: Any) -> None: ...
     def end(self, *_: Any) -> None: ...
     def block(self, steps: Any, _: Any) -> None:
-        if steps[-1] > 0 and self.number is not None:
-            number, self.number = self.number, None
-            os.kill(os.getpid(), number)
+        if steps[-1] > 0 and self.left:
+            self.left.pop()()
+
+
+def kills(number: int) -> Once:
+    """Sends this process a signal."""
+    return Once(lambda: os.kill(os.getpid(), number))
 
 
 def same_bits(one: Result, two: Result) -> bool:
@@ -157,15 +162,15 @@ def test_ctrl_c_ends_it_soon_and_keeps_what_was_recorded(tmp_path: Path, waits: 
     """While it sleeps between steps, and where it never does."""
     long = system(tmp_path).with_experiment(stop=1e5)
     realtime = Realtime(factor=1.0 if waits else 1e6)
-    result = simulate(long, realtime=realtime, every=10, listeners=[Kills(signal.SIGINT)])
+    result = simulate(long, realtime=realtime, every=10, listeners=[kills(signal.SIGINT)])
     assert not result.complete
     assert 0 < result.time[-1] < 1e5
 
 
 def test_ctrl_c_in_a_session_is_raised_and_keeps_what_was_recorded(tmp_path: Path) -> None:
     long = system(tmp_path).with_experiment(stop=1e5)
-    kills = Kills(signal.SIGINT)
-    with simulate.session(long, realtime=Realtime(), listeners=[kills]) as session:
+    ends = kills(signal.SIGINT)
+    with simulate.session(long, realtime=Realtime(), listeners=[ends]) as session:
         with pytest.raises(KeyboardInterrupt):
             session.step(10**8)
         result = session.result()
@@ -176,11 +181,18 @@ def test_ctrl_c_in_a_session_is_raised_and_keeps_what_was_recorded(tmp_path: Pat
 
 def test_a_halt_from_another_thread_ends_it(tmp_path: Path) -> None:
     long = system(tmp_path).with_experiment(stop=1e5)
-    with simulate.session(long, realtime=Realtime(), every=100) as session:
-        timer = threading.Timer(0.2, session.halt.set)
-        timer.start()
+    begun = threading.Event()
+    ends = Once(begun.set)
+    with simulate.session(long, realtime=Realtime(), every=100, listeners=[ends]) as session:
+
+        def halt() -> None:
+            begun.wait()
+            session.halt.set()
+
+        other = threading.Thread(target=halt)
+        other.start()
         assert session.step(10**8)
-        timer.join()
+        other.join()
         assert not session.complete
         assert not session.step(1)
 
@@ -190,7 +202,7 @@ def test_another_signal_does_not_end_it(tmp_path: Path) -> None:
     before = signal.signal(signal.SIGUSR1, lambda number, _: seen.append(number))
     try:
         two = system(tmp_path).with_experiment(stop=0.3)
-        assert simulate(two, realtime=Realtime(), listeners=[Kills(signal.SIGUSR1)]).complete
+        assert simulate(two, realtime=Realtime(), listeners=[kills(signal.SIGUSR1)]).complete
     finally:
         signal.signal(signal.SIGUSR1, before)
     assert seen == [signal.SIGUSR1]

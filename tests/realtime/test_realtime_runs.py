@@ -7,7 +7,6 @@ import os
 import re
 import signal
 import sys
-import threading
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,6 +19,7 @@ from grasp_cosim.realtime.pacer import HAS_CLOCK
 from grasp_cosim.realtime.timing import Timing
 from grasp_cosim.recording.load import load_run
 from grasp_cosim.report.tables import metrics_table
+from realtime.fake import Fake
 from support.both_engines import ENGINES
 from support.mocks import Mock, make_system
 from support.slow import slow
@@ -145,17 +145,12 @@ def test_ctrl_c_does_not_wait_for_the_next_step(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, engine: Engine
 ) -> None:
     """Which would begin only after 1000 s."""
-    timer = threading.Timer(0.1, lambda: os.kill(os.getpid(), signal.SIGINT))
-
-    def output(u: float, t: float) -> float:
-        if t > 0.0:
-            timer.start()
-        return t
-
-    mock = Mock(tmp_path, "a", output)
+    mock, fake = Mock(tmp_path, "a", lambda u, t: t), Fake()
+    fake.on_sleep = lambda: os.kill(os.getpid(), signal.SIGINT)
     monkeypatch.setattr("grasp_cosim.master.simulation.load", lambda component: mock)
+    monkeypatch.setattr("grasp_cosim.realtime.pacer.Clock", lambda: fake.clock)
     result = simulate(make_system([mock], [], 10), engine=engine, realtime=Realtime(factor=1e-4))
-    timer.join()
+    assert len(fake.sleeps) == 1
     assert not result.complete
     assert result.time.tolist() == [0.0, 0.1]
 
