@@ -4,6 +4,7 @@ import fcntl
 import gc
 import importlib
 import os
+import random
 import shutil
 import signal
 import sys
@@ -52,9 +53,25 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """What CI gives a new seed: a test must not need another one before it."""
+    order = "run the files, and the tests of each, in an order drawn by this seed"
+    parser.addoption("--shuffle", type=int, metavar="SEED", help=order)
+
+
+def pytest_report_header(config: pytest.Config) -> str | None:
+    """The seed that draws the same order again."""
+    seed = config.getoption("shuffle")
+    return None if seed is None else f"order: --shuffle {seed}"
+
+
 @pytest.hookimpl(tryfirst=True)  # before those that are slow are chosen, or left out
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """The slow ones first: in the end no process waits for another for long."""
+    if (seed := config.getoption("shuffle")) is not None:
+        drawn_by = random.Random(seed)
+        files = {item.path: drawn_by.random() for item in items}
+        items.sort(key=lambda item: (files[item.path], drawn_by.random()))
     for item in [*items]:
         drawn: dict[str, Any] = getattr(getattr(item, "callspec", None), "params", {})
         kind, name = drawn.get("kind", "python"), str(drawn.get("name"))
