@@ -1,6 +1,5 @@
 """What the tests of instances share: an instance of a native FMU, driven as the loop does."""
 
-import signal
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -8,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import pytest
 from grasp_cosim.fmi.instance import Instance, dtype
 from grasp_cosim.fmi.load import load
 from grasp_cosim.interface.interface import Value, Variable
@@ -71,20 +69,3 @@ def variable(instance: Instance, name: str) -> Variable:
 def real(version: str) -> str:
     """The double precision type of a version."""
     return next(iter(TYPES[version]))
-
-
-@contextmanager
-def interrupted_after(seconds: float) -> Iterator[None]:
-    """Raises KeyboardInterrupt in the main thread, as Ctrl-C does, and expects it."""
-
-    def interrupt(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGALRM, interrupt)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
-    try:
-        with pytest.raises(KeyboardInterrupt):
-            yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)

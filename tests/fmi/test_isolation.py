@@ -7,18 +7,17 @@ import signal
 import subprocess
 import sys
 import tempfile
-import time
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from fmi.instances import Bound, interrupted_after, real, running
+from fmi.instances import Bound, real, running
 from grasp_cosim import InputError, SimulationError, System, simulate
 from grasp_cosim.fmi import process
 from grasp_cosim.fmi.instance import OK
 from support.native_fmus import TYPES, build, needs_gcc
-from support.processes import ends
+from support.processes import alive, ends
 
 pytestmark = needs_gcc
 versions = pytest.mark.parametrize("version", ["2.0", "3.0"])
@@ -107,10 +106,10 @@ def test_a_crash_ends_the_run_with_the_recording_kept(
 
 @versions
 def test_a_hang_is_bounded(tmp_path: Path, version: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(process, "TIMEOUT", 0.5)
     with running(tmp_path, version, "process", {"hang_at": 0.25}) as part:
         bound = Bound(part, 0.2)
         assert bound.step() == OK
+        monkeypatch.setattr(process, "TIMEOUT", 0.5)
         bound.clock[0] = 0.2
         message = (
             r"^part: the process of native.fmu did not answer within 0.5 s and was ended "
@@ -123,12 +122,14 @@ def test_a_hang_is_bounded(tmp_path: Path, version: str, monkeypatch: pytest.Mon
         assert not workers()
 
 
+@pytest.mark.usefixtures("ctrl_c")
 @versions
 def test_an_interrupted_call_is_not_answered_later(tmp_path: Path, version: str) -> None:
     """What it answers would be taken for the answer to the next call."""
-    with running(tmp_path, version, "process", {"hang_at": 0.1}) as part:
+    values = {"interrupt_at": 0.1, "interrupted": os.getpid(), "hang_at": 0.1}
+    with running(tmp_path, version, "process", values) as part:
         bound = Bound(part, 0.2)
-        with interrupted_after(0.1):
+        with pytest.raises(KeyboardInterrupt):
             bound.step()
         message = r"^part: the process of native.fmu was interrupted and ended at t = 0 s"
         with pytest.raises(SimulationError, match=message):
@@ -238,14 +239,10 @@ part.stepper(np.zeros(2), 0.2).python()
         env={**os.environ, "TMPDIR": str(tmp_path)},  # it has no chance to tidy up
     ) as master:
         assert master.stdout is not None
-        worker = Path("/proc", master.stdout.readline().decode().strip())
-        assert worker.exists()
+        worker = int(master.stdout.readline())
+        assert alive(worker)
         master.kill()
-    for _ in range(1000):
-        if not worker.exists() or "Z" in (worker / "stat").read_text().rpartition(")")[2][:3]:
-            return
-        time.sleep(0.01)
-    pytest.fail("the process of the component lives on")
+    assert ends(worker)
 
 
 def test_values_that_are_pending_are_passed_on_in_order(tmp_path: Path) -> None:

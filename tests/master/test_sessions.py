@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fmi.instances import KINDS, interrupted_after
+from fmi.instances import KINDS
 from fmi.test_rejected_steps import alone
 from grasp_cosim import InputError, SimulationError, System, simulate
 from grasp_cosim.master import master, simulation
@@ -56,14 +56,16 @@ def test_a_value_that_does_not_fit_breaks_nothing(tmp_path: Path) -> None:
         assert session.complete
 
 
+@pytest.mark.usefixtures("ctrl_c")
 @pytest.mark.parametrize(("version", "isolation"), KINDS)
 def test_an_interrupted_session_does_not_go_on(
     tmp_path: Path, version: str, isolation: Isolation
 ) -> None:
     """Its FMU is further than its rows."""
-    system = replace(alone(tmp_path, version, isolation), step_ns=1000, stop_ns=100_000_000_000)
+    part = alone(tmp_path, version, isolation, interrupt_at=0.001_000_5, interrupted=os.getpid())
+    system = replace(part, step_ns=1000, stop_ns=100_000_000_000)
     with simulate.session(system, engine="python") as session:
-        with interrupted_after(0.05):
+        with pytest.raises(KeyboardInterrupt):
             session.step(100_000_000)
         with pytest.raises(InputError, match="the session is broken off by a failure or an"):
             session.step()

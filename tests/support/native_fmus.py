@@ -3,7 +3,8 @@
 Both versions have inputs u_T and outputs y_T = u_T for each type T of theirs, the outputs x (the
 integral of gain * u_Real or u_Float64), now and steps, and the parameters gain and, as times in s
 in a step that then goes wrong: crash_at, exit_at, hang_at, error_at, discard_at (no part of the
-step is done), early_at and terminate_at (the step ends there).
+step is done), early_at, terminate_at (the step ends there) and interrupt_at (SIGINT for the process
+whose number is the parameter interrupted).
 """
 
 import shutil
@@ -29,6 +30,7 @@ TYPES = {
 
 PARAMETERS = (
     "crash_at", "exit_at", "hang_at", "error_at", "discard_at", "early_at", "terminate_at", "gain",
+    "interrupt_at", "interrupted",
 )  # fmt: skip
 UNITS = {
     "m": 'm="1"',

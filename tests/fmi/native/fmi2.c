@@ -2,7 +2,9 @@
  *
  * y_T = u_T for each type T; x integrates gain * u_Real. The parameters *_at are times in s at which
  * the step that contains them goes wrong.
+ * interrupt_at has the process of the number in interrupted get SIGINT from within that step.
  */
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,7 +12,7 @@
 
 #include "fmi2Functions.h"
 
-enum { CRASH = 1, EXIT, HANG, ERROR, DISCARD, EARLY, TERMINATE, GAIN, LAST };
+enum { CRASH = 1, EXIT, HANG, ERROR, DISCARD, EARLY, TERMINATE, GAIN, INTERRUPT, INTERRUPTED, LAST };
 enum { X = 20, TIME, STEPS = 30, IN = 100, OUT = 200 };
 
 typedef struct {
@@ -134,6 +136,8 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real step, fmi2Boolean
     if (!m->running) return fail(m, fmi2Error, "not in step mode");
     if (within(m, CRASH, time, step)) *(volatile int *)0 = 1;
     if (within(m, EXIT, time, step)) _exit(7);
+    if (within(m, INTERRUPT, time, step)) kill((pid_t)m->p[INTERRUPTED], SIGINT);
+    if (within(m, HANG, time, step)) dprintf(STDERR_FILENO, "native FMU hangs\n");
     while (within(m, HANG, time, step)) pause();
     if (within(m, ERROR, time, step)) return fail(m, fmi2Error, "the lamp\nis broken");
     if (within(m, DISCARD, time, step)) {

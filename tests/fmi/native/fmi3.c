@@ -3,8 +3,10 @@
  * y_T = u_T for each type T; x integrates gain * u_Float64. The parameters *_at are times in s at
  * which the step that contains them goes wrong.
  * Functions that this kind of FMU does not need are left out, as vendors do.
+ * interrupt_at has the process of the number in interrupted get SIGINT from within that step.
  */
 #include <math.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,7 +14,7 @@
 
 #include "fmi3Functions.h"
 
-enum { CRASH = 1, EXIT, HANG, ERROR, DISCARD, EARLY, TERMINATE, GAIN, LAST };
+enum { CRASH = 1, EXIT, HANG, ERROR, DISCARD, EARLY, TERMINATE, GAIN, INTERRUPT, INTERRUPTED, LAST };
 enum { X = 20, TIME, STEPS = 30, SIZE = 40, SIZE_OUT, IN = 100, OUT = 200 };
 
 typedef struct {
@@ -176,6 +178,8 @@ fmi3Status fmi3DoStep(
     if (!m->running) return fail(m, fmi3Error, "not in step mode");
     if (within(m, CRASH, time, step)) *(volatile int *)0 = 1;
     if (within(m, EXIT, time, step)) _exit(7);
+    if (within(m, INTERRUPT, time, step)) kill((pid_t)m->p[INTERRUPTED], SIGINT);
+    if (within(m, HANG, time, step)) dprintf(STDERR_FILENO, "native FMU hangs\n");
     while (within(m, HANG, time, step)) pause();
     if (within(m, ERROR, time, step)) return fail(m, fmi3Error, "the lamp\nis broken");
     if (within(m, DISCARD, time, step)) return fail(m, fmi3Discard, "the step is too long");
