@@ -145,6 +145,24 @@ def test_a_crash_in_the_initialisation_is_a_wrong_input(tmp_path: Path) -> None:
             part.enter_initialization({}, 1.0)
 
 
+def test_what_a_lost_process_leaves_is_cleared_away_in_silence(tmp_path: Path) -> None:
+    """Where it ends between a command and its arguments; since 3.13 Python tells of all it met."""
+    with running(tmp_path, "3.0", "process") as part:
+        assert isinstance(part, process.ProcessInstance)
+        pid, send = part._process.pid, part._connection.send_bytes
+
+        def send_and_kill(data: bytes) -> None:
+            send(data)
+            os.kill(pid, signal.SIGKILL)
+            os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)
+
+        part._connection.send_bytes = send_and_kill  # type: ignore[method-assign, assignment]
+        with pytest.raises(SimulationError, match=r"^part: the process of .* signal SIGKILL at t"):
+            part.get([part.interface.by_name["x"]])
+    del part
+    gc.collect()
+
+
 def test_nothing_stays_behind(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -5,6 +5,7 @@ process is lost.
 """
 
 import os
+import pickle
 import select
 import signal
 import socket
@@ -224,7 +225,9 @@ class ProcessInstance:
         try:
             self._connection.send_bytes(command)
             if call is not None:
-                self._connection.send(call)
+                # not send(), whose buffer would be in the traceback of an error, and be complained
+                # of when that is cleared away
+                self._connection.send_bytes(pickle.dumps(call))
             if not self._poll.poll(1000.0 * timeout):
                 self._process.kill()
                 raise self._lose(f"did not answer within {timeout:g} s and was ended")
