@@ -43,6 +43,7 @@ MACHINE_CHECKS = ["python", "temp folder", "libpython", "python3", "environment"
 
 NATIVE = """\
 static int model;
+int lost(void);
 void *fmi2Instantiate(void) { INSTANTIATE; return &model; }
 """
 DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
