@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import pytest
 
-VERSIONS = ["3.11", "3.12", "3.13"]
+VERSIONS = ["3.11", "3.12", "3.13", "3.14", "3.15"]
 
 _ASK = (
     "import sys, sysconfig as s; print('{}.{}'.format(*sys.version_info), sys.base_prefix,"
