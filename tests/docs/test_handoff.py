@@ -4,7 +4,6 @@ import csv
 import os
 import re
 import shlex
-import socket
 import subprocess
 import sys
 from contextlib import ExitStack
@@ -16,6 +15,7 @@ from typing import Self
 import pytest
 from grasp_cosim import cli
 from support import native_fmus
+from support.ports import kept_port
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs/handoff.md").read_text("utf-8")
@@ -63,19 +63,12 @@ class Bench:
         self._processes.clear()
 
 
-def free_ports(ports: list[str]) -> dict[str, str]:
-    """For each port of the page one that is free here."""
-    with ExitStack() as stack:
-        sockets = [stack.enter_context(socket.socket(type=socket.SOCK_DGRAM)) for _ in ports]
-        for s in sockets:
-            s.bind(("127.0.0.1", 0))
-        return {p: str(s.getsockname()[1]) for p, s in zip(ports, sockets, strict=True)}
-
-
 def rehearse(system: Path) -> None:
     """All blocks of the page, in order."""
-    ports = free_ports(sorted(set(re.findall(r"\b5[56]0\d\b", PAGE))))
-    with Bench() as bench:
+    with ExitStack() as stack:
+        named = sorted(set(re.findall(r"\b5[56]0\d\b", PAGE)))
+        ports = {port: str(stack.enter_context(kept_port())) for port in named}
+        bench = stack.enter_context(Bench())
         for kind, block in BLOCKS:
             if kind == "toml":
                 change(system, block)

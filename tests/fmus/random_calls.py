@@ -4,9 +4,9 @@
 
 Each seed makes so many calls on each FMU, all of them in this one process: in any order, with wrong
 references, numbers of any size and none, states of other instances and other FMUs, and bytes that
-were changed. Prints a JSON object: the longest call in s and what it was, the calls by their name
-and status, and the resident memory in bytes after each seed. Before each call its name is written
-to FOLDER/last, so that one which ends the process is known.
+were changed. Prints a JSON object: the longest call in s of the processor and what it was, the
+calls by their name and status, and the resident memory in bytes after each seed. Before each call
+its name is written to FOLDER/last, so that one which ends the process is known.
 """
 
 import ctypes
@@ -123,9 +123,9 @@ class Caller:
         self._last.write(f"{self.fmu.name} {name} {arguments}\n")
         self._last.truncate()
         self._last.flush()
-        began = time.perf_counter()
+        began = time.thread_time()
         status = (on or self._instance).call(name, *arguments)
-        took = time.perf_counter() - began
+        took = time.thread_time() - began
         if took > self.longest[0]:
             self.longest = (took, f"{self.fmu.name} {name} {[str(a) for a in arguments]}")
         self.calls[f"{name} {status if name != 'FreeInstance' else ''}"] += 1

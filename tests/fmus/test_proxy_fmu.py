@@ -22,6 +22,7 @@ from grasp_fmus.proxy_build import Original
 from support import kinds
 from support.fmi2 import ERROR, OK, WARNING, Fmu, Instance
 from support.kinds import Kind, all_kinds, python_only
+from support.ports import kept_port
 from support.scripted_peer import VARIABLES, ScriptedPeer, fail
 
 _C: dict[str, Any] = {
@@ -133,9 +134,7 @@ def test_what_is_refused_has_its_reason_in_the_log(
 
 
 def test_a_peer_that_is_not_there(fmu: Fmu) -> None:
-    with ScriptedPeer() as peer:
-        port = peer.port
-    with Instance(fmu, "bench") as instance:
+    with kept_port() as port, Instance(fmu, "bench") as instance:
         assert put(instance, "Integer", "proxy.port", port) == OK
         assert put(instance, "Real", "proxy.connect_timeout", 0.05) == OK
         assert instance.enter() == ERROR

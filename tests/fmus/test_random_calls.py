@@ -23,7 +23,7 @@ from support.slow import slow
 CALLER = Path(__file__).with_name("random_calls.py")
 
 LONGEST = 10.0
-"""s that a call may take; it is below 1 s on a machine with nothing else to do."""
+"""s of the processor that a call may take."""
 
 GROWTH = 4e6
 """Bytes by which the process may grow over the second half of ten seeds or more."""

@@ -17,6 +17,7 @@ from grasp_cosim.interface.interface import Value
 from grasp_cosim.master.engine import Engine
 from grasp_cosim.recording.result import Result
 from support.kinds import Kind, native_slowly, proxy_options
+from support.ports import kept_port
 from support.proxies import build_proxy, relaying, serving, wait_until
 from support.slow import slow
 
@@ -165,25 +166,25 @@ def test_the_peer_started_anew(
         "plant.proxy.failsafe.gap[2]": 0.25,
         "plant.proxy.resume": resume,
     }
-    with serving(fmu, Service(lockstep=True)) as first:
-        address = first.address
-        options = proxy_options(kind)
-        proxy = build_proxy(fmu, tmp_path / "plant_bench.fmu", address[1], *options)
+    with kept_port() as port:
+        proxy = build_proxy(fmu, tmp_path / "plant_bench.fmu", port, *proxy_options(kind))
         system = slow_grasp.swap("plant", proxy).with_values(values)
-        session = simulate.session(system, engine=ENGINE)
-        session.step(20)
-    with session:
-        gap = session["plant.gap[1]"]
-        session.step(10)
-        assert session["plant.proxy.state"] == 3
-        assert (session["plant.gap[1]"], session["plant.gap[2]"]) == (gap, 0.25)
-        with serving(fmu, Service(lockstep=True), address):
-            session.step(5)
-            assert session["plant.proxy.state"] == (1 if resume else 3)
-            session.step(5)
-        result = session.result()
-    assert len(result.time) == 41
+        with serving(fmu, Service(lockstep=True), ("127.0.0.1", port)):
+            session = simulate.session(system, engine=ENGINE)
+            session.step(20)
+        with session:
+            gap = session["plant.gap[1]"]
+            session.step(10)
+            assert session["plant.proxy.state"] == 3
+            assert (session["plant.gap[1]"], session["plant.gap[2]"]) == (gap, 0.25)
+            with serving(fmu, Service(lockstep=True), ("127.0.0.1", port)):
+                session.step(5)
+                while resume and session["plant.proxy.state"] != 1:  # as a busy machine has it
+                    assert session.step(1)
+            result = session.result()
+    assert result["plant.proxy.state"][-1] == (1 if resume else 3)
     assert (result["plant.gap[2]"][-1] == 0.25) != resume
-    assert result.metrics["proxies"]["plant"]["sessions"] == 1 + resume
+    sessions = result.metrics["proxies"]["plant"]["sessions"]
+    assert sessions >= 2 if resume else sessions == 1
     assert any("plant: the peer was lost at t = " in line for line in result.log)
     assert any("started anew" in line for line in result.log) == resume

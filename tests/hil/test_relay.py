@@ -20,6 +20,7 @@ from grasp_cosim.hil.network import DIRECTIONS, Conditions, Network, Outage
 from grasp_cosim.hil.relay import MOST_CLIENTS, Relay
 from grasp_cosim.hil.traffic import Counters, Entry
 from support.echo_peer import EchoPeer, client
+from support.ports import kept_port
 from support.proxies import relaying, wait_until
 
 NASTY = Conditions(jitter=0.002, loss=0.2, duplicate=0.2, reorder=0.2, reorder_by=0.005)
@@ -101,15 +102,14 @@ def test_any_content_goes_through_unchanged() -> None:
 
 def test_a_peer_that_is_away_and_comes_back() -> None:
     """What nobody takes is lost on the way; the first datagram after the return gets through."""
-    peer = EchoPeer()
-    with relaying(peer.address) as relay, client() as mine:
-        with peer:
+    with kept_port() as port, relaying(("127.0.0.1", port)) as relay, client() as mine:
+        with EchoPeer(port):
             mine.sendto(b"here", relay.address)
             assert mine.recv(100) == b"here"
         for number in range(2, 6):
             mine.sendto(b"away", relay.address)
             wait_until(partial(delivered, relay, number))
-        with EchoPeer(peer.address[1]):
+        with EchoPeer(port):
             mine.sendto(b"back", relay.address)
             assert mine.recv(100) == b"back"
     assert relay.counters["request"] == Counters(received=6, delivered=6)
