@@ -1,35 +1,47 @@
 """A sweep that is killed goes on: no finished run is lost, none is done again."""
 
 import json
-import os
 import random
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
 from grasp_cosim.sweep.sweep import sweep
 from support.made_studies import GAIN, HEAD, native_study, write_native
 from support.native_fmus import needs_gcc
-from support.processes import alive
+from support.processes import ends
 
 pytestmark = [needs_gcc, pytest.mark.slow]
 
 RUNS = 160
-ENDLESS = 2000
-"""Runs that nobody waits for."""
+STUDY = (
+    f'{HEAD}[design]\nkind = "random"\nruns = {RUNS}\nseed = 1\n'
+    f"{GAIN}uniform = {{ low = 1.0, high = 2.0 }}\n"
+)
+ARGUMENTS = ["sweep", "study.toml", "--out", "out", "--json", "--workers"]
 
+PROGRAM = """
+import os, signal, sys
+from grasp_cosim.cli import entry
+from grasp_cosim.sweep.store import Store
 
-def study_of(runs: int) -> str:
-    return (
-        f'{HEAD}[design]\nkind = "random"\nruns = {runs}\nseed = 1\n'
-        f"{GAIN}uniform = {{ low = 1.0, high = 2.0 }}\n"
-    )
+keep, parts = Store.keep, []
 
+def keep_and_act(store, outcome):
+    keep(store, outcome)
+    parts.append(outcome)
+    if len(parts) == COUNT:
+        ACT
 
-COMMAND = [sys.executable, "-m", "grasp_cosim", "sweep", "study.toml", "--out", "out", "--json"]
+Store.keep = keep_and_act
+entry()
+"""
+KILL = (
+    "print(open(f'/proc/self/task/{os.getpid()}/children').read(), flush=True); "
+    "os.kill(os.getpid(), signal.SIGKILL)"
+)
 
 Parts = dict[str, tuple[int, int]]
 
@@ -40,46 +52,32 @@ def parts(folder: Path) -> Parts:
     return {p.name: (p.stat().st_ino, p.stat().st_mtime_ns) for p in found}
 
 
-def start(folder: Path, workers: int) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        [*COMMAND, "--workers", str(workers)], cwd=folder, text=True, start_new_session=True,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+def sweeping(folder: Path, workers: int, count: int = 0, act: str = "") -> tuple[int, str, str]:
+    """Exit code and output of a command that acts right after it has kept so many runs."""
+    program = PROGRAM.replace("COUNT", str(count)).replace("ACT", act or "pass")
+    done = subprocess.run(
+        [sys.executable, "-c", program, *ARGUMENTS, str(workers)], cwd=folder, text=True,
+        start_new_session=True, capture_output=True, check=False,
     )  # fmt: skip
-
-
-def wait_for(process: subprocess.Popen[str], folder: Path, count: int) -> None:
-    """Return once there are so many parts."""
-    while sum(1 for _ in (folder / "out/parts").glob("*.json")) < count:
-        assert process.poll() is None, process.communicate()
-        time.sleep(0.005)
-
-
-def children(process: subprocess.Popen[str]) -> list[int]:
-    listed = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text()
-    return [int(pid) for pid in listed.split()]
+    return done.returncode, done.stdout, done.stderr
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="this system has no /proc")
 def test_killed_at_any_moment_it_goes_on(tmp_path: Path) -> None:
-    study = native_study(write_native(tmp_path), study_of(RUNS))
+    study = native_study(write_native(tmp_path), STUDY)
     generator, kept = random.Random(20), Parts()
     for workers in (2, 1):
-        process = start(tmp_path, workers)
-        wait_for(process, tmp_path, len(kept) + generator.randint(1, 40))
-        started = children(process)
-        process.kill()
-        process.communicate()
-        assert process.returncode == -signal.SIGKILL
-        assert started
-        while any(map(alive, started)):
-            time.sleep(0.01)
+        more = generator.randint(1, 40)
+        code, started, _ = sweeping(tmp_path, workers, more, KILL)
+        assert code == -signal.SIGKILL
+        assert len(started.split()) >= workers
+        assert all(ends(int(pid)) for pid in started.split())
         now = parts(tmp_path)
         assert kept.items() <= now.items()
-        assert len(kept) < len(now) < RUNS
+        assert len(now) == len(kept) + more
         kept = now
-    process = start(tmp_path, 2)
-    out, err = process.communicate()
-    assert process.returncode == 0, err
+    code, out, err = sweeping(tmp_path, 2)
+    assert code == 0, err
     summary = json.loads(out)
     assert (summary["runs"], summary["resumed"], summary["failed"]) == (RUNS, len(kept), 0)
     final = parts(tmp_path)
@@ -91,20 +89,15 @@ def test_killed_at_any_moment_it_goes_on(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("ctrl_c")
-@pytest.mark.parametrize("group", [True, False])
-def test_ctrl_c_keeps_what_is_done(tmp_path: Path, group: bool) -> None:
-    native_study(write_native(tmp_path), study_of(ENDLESS))
-    process = start(tmp_path, 2)
-    wait_for(process, tmp_path, 5)
-    if group:  # as a terminal does
-        os.killpg(process.pid, signal.SIGINT)
-    else:
-        process.send_signal(signal.SIGINT)
-    out, err = process.communicate()
+@pytest.mark.parametrize("whom", ["0", "os.getpid()"])
+def test_ctrl_c_keeps_what_is_done(tmp_path: Path, whom: str) -> None:
+    """It is for all processes, as from a terminal, or for the command alone."""
+    native_study(write_native(tmp_path), STUDY)
+    code, out, err = sweeping(tmp_path, 2, 5, f"os.kill({whom}, signal.SIGINT)")
     count = len(parts(tmp_path))
-    assert (process.returncode, out) == (130, "")
+    assert (code, out) == (130, "")
     # Lines of several workers may come as one, with the ends of all of them after it.
     last = [line for line in err.splitlines() if line and "native FMU" not in line]
-    kept = f"{count} of {ENDLESS} runs are kept in out"
+    kept = f"{count} of {RUNS} runs are kept in out"
     assert last == [f"grasp-cosim: interrupted; {kept}, the same command goes on"]
     assert not list((tmp_path / "out/parts").glob("*.part"))
