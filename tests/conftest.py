@@ -20,7 +20,8 @@ from grasp_cosim import System, cli
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_fmus.build import build
 from grasp_fmus.native.build import build_native
-from hypothesis import settings
+from hypothesis import find, settings
+from hypothesis import strategies as st
 from support import kinds
 from support.fmi2 import Fmu
 from support.kinds import Kind
@@ -100,6 +101,12 @@ def kind(request: pytest.FixtureRequest) -> Kind:
 def _full_collections() -> list[int]:
     """How many there were when what is frozen was last looked at: at most one number."""
     return []
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _used_hypothesis() -> None:
+    """It makes its generator at its first use, and complains if what holds that is frozen."""
+    find(st.booleans(), bool)
 
 
 @pytest.fixture(autouse=True)

@@ -136,10 +136,13 @@ class Progress(tqdm):  # type: ignore[type-arg]  # subscripted, it is no class
                 self.refresh()
 
 
+Progress.set_lock(threading.RLock())  # tqdm's own is of multiprocessing, which may start a process
+
+
 def write(line: str) -> None:
     """Write a line on standard error, now, above a bar that is there."""
     if sys.stderr.isatty():
-        tqdm.write(line, file=sys.stderr)
+        Progress.write(line, file=sys.stderr)
     else:
         sys.stderr.write(line + "\n")
     sys.stderr.flush()

@@ -304,10 +304,8 @@ def test_arithmetic_that_fails_in_a_step_is_discarded(
         instance.initialise(gap=0.02)
         assert instance.set({"gap": 0.005}) == OK
         assert instance.step(0.0, 1e-3) == DISCARD
-        assert instance.log[0].text.removeprefix("eye, t = 0 s: step of 0.001 s: ") in (
-            "ZeroDivisionError: float division by zero: must be finite",
-            "OverflowError: (34, 'Numerical result out of range'): must be finite",
-        )
+        error = r"(ZeroDivisionError|OverflowError): .+: must be finite"
+        assert re.fullmatch(rf"eye, t = 0 s: step of 0\.001 s: {error}", instance.log[0].text)
 
 
 def test_an_output_that_is_not_finite_is_not_given(altered: Altered, tmp_path: Path) -> None:

@@ -25,6 +25,8 @@ from support.models import build_model
 Changes = dict[str, bytes | None]
 Opened = Callable[..., Unpacked]
 
+NOWHERE = str(Path(__file__, "nowhere"))
+
 SCRIPT = """\
 from pythonfmu import Fmi2Causality, Fmi2Slave, Real
 
@@ -210,8 +212,8 @@ def test_python3_on_the_path(tmp_path: Path) -> None:
     [
         ({}, None),
         ({"PYTHONHOME": sys.base_prefix, "PYTHONPATH": f"{Path.cwd()}{os.pathsep}"}, None),
-        ({"PYTHONHOME": "/nowhere"}, "unset PYTHONHOME"),
-        ({"PYTHONPATH": "/nowhere"}, "unset PYTHONPATH"),
+        ({"PYTHONHOME": NOWHERE}, "unset PYTHONHOME"),
+        ({"PYTHONPATH": NOWHERE}, "unset PYTHONPATH"),
         ({"PYTHONPATH": "."}, "unset PYTHONPATH"),
         ({"PYTHONPATH": "/usr/lib/python3.1/site-packages"}, "unset PYTHONPATH"),
     ],

@@ -173,7 +173,8 @@ def test_a_metric_in_a_sweep_that_raises_fails_its_run_alone(grasp: System) -> N
 
     outcome = run_job(Task(short, (), (made("late", late),)), Job(3, {}))
     assert (outcome.index, outcome.metrics) == (3, {})
-    assert outcome.error == "metric 'late': ZeroDivisionError: float division by zero"
+    assert outcome.error
+    assert outcome.error.startswith("metric 'late': ZeroDivisionError: ")
 
 
 # ------------------------------------------------------------------------- what is missing

@@ -46,8 +46,8 @@ END_TIMEOUT = 10.0
 OUTPUT_TIMEOUT = 1.0
 """s of wall time to wait for the last of what it printed, which a daemon of its may keep open."""
 
-LINES = 40
-"""The last lines of what an FMU printed that are kept for the error."""
+LINES = 80
+"""The last lines of what an FMU printed that are kept for the error: of a crash both stacks."""
 
 
 class ProcessInstance:

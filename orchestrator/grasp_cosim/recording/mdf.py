@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 from xml.etree import ElementTree
@@ -77,16 +78,15 @@ class MdfListener:
     def end(self, complete: bool) -> None:
         """Make the file; SimulationError where that fails, and there is none."""
         try:
-            self._flush()
-            if self._mdf.groups[0].channel_group.cycles_nr:
-                self._mdf.header.comment = _comment(self._experiment, complete)
-                self._convert_texts()
-                with in_one_piece(self._path) as part, part.open("wb+") as file:
-                    self._mdf.save(file, compression=TRANSPOSED_DEFLATE)
-        except OSError as error:
+            with closing(self._mdf):
+                self._flush()
+                if self._mdf.groups[0].channel_group.cycles_nr:
+                    self._mdf.header.comment = _comment(self._experiment, complete)
+                    self._convert_texts()
+                    with in_one_piece(self._path) as part, part.open("wb+") as file:
+                        self._mdf.save(file, compression=TRANSPOSED_DEFLATE)
+        except OSError as error:  # also of close(), which writes what is still in a buffer
             raise SimulationError(unwritable(self._said, error)) from error
-        finally:
-            self._mdf.close()
 
     def _convert_texts(self) -> None:
         from asammdf.blocks.conversion_utils import from_dict

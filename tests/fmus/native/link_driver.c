@@ -21,7 +21,7 @@ typedef struct {
     uint32_t event, alive, fresh, size;
 } Record;
 
-static const uint8_t RANDOM[EVERY_KIND_RANDOM_SIZE] = "not at random...";
+static const uint8_t RANDOM[] = "not at random...";
 
 static void write_bytes(const void *data, size_t size)
 {

@@ -76,7 +76,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    static const uint8_t random[EVERY_KIND_RANDOM_SIZE] = "not at random...";
+    static const uint8_t random[] = "not at random...";
     static const uint8_t key[] = "a key of thirty-two bytes, or so";
     static every_kind_link link;
     uint64_t counted = 0, judged = 0;
