@@ -112,6 +112,16 @@ def test_the_orchestrator_imports_no_physics_and_no_pythonfmu() -> None:
     assert not found
 
 
+def test_fmpy_is_imported_in_one_room_which_keeps_it_from_printing() -> None:
+    room = {f for f, module in modules(ROOT / "orchestrator/grasp_cosim/fmi") if is_fmpy(module)}
+    users = {f for f, module in modules(ROOT / "orchestrator/grasp_cosim") if is_fmpy(module)}
+    assert users == room > {"__init__.py"}
+
+
+def is_fmpy(module: str) -> bool:
+    return module.partition(".")[0] == "fmpy"
+
+
 def test_the_orchestrator_builds_fmus_at_six_places_only() -> None:
     builders = {
         f

@@ -20,26 +20,33 @@ from fmpy.fmi2 import (
     fmi2LastSuccessfulTime,
     fmi2Terminated,
 )
-from fmpy.logging import addLoggerProxy
 
 from ..interface.interface import Value
 from ..scratch import ScratchFolder
 from .instance import STEP_2, TRANSFER_2, Call, Native
 from .loaded import KEPT, LoadedInstance, keep_message, know_signatures
+from .variadic import formatted, logger_type
 
 _messages: defaultdict[str, deque[str]] = defaultdict(lambda: deque(maxlen=KEPT))
-"""Messages that FMUs logged, by instance. FMPy's logger proxy is one per process, so is this."""
+"""Messages that FMUs logged, by instance: all have one logger."""
 
 
-def _log(_: Any, instance: bytes | None, status: int, category: Any, message: bytes | None) -> None:
-    keep_message(_messages[(instance or b"").decode(errors="replace")], status, message)
+def _log(
+    _: Any,
+    instance: bytes | None,
+    status: int,
+    category: Any,
+    message: bytes | None,
+    *arguments: float,
+) -> None:
+    text = formatted(message or b"", arguments)
+    keep_message(_messages[(instance or b"").decode(errors="replace")], status, text)
 
 
 _callbacks = fmi2CallbackFunctions()
-_callbacks.logger = fmi2CallbackLoggerTYPE(_log)
+_callbacks.logger = ctypes.cast(logger_type()(_log), fmi2CallbackLoggerTYPE)
 _callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
 _callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(fmpy.free)
-addLoggerProxy(ctypes.byref(_callbacks))
 
 
 class FmuInstance(LoadedInstance):

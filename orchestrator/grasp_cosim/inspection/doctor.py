@@ -16,10 +16,9 @@ from shutil import which
 from typing import Literal
 from xml.etree import ElementTree
 
-import fmpy
-
 from ..checks import install_command
 from ..errors import choices
+from ..fmi import fmpy
 from ..interface.document import unreadable
 from ..interface.interface import Interface
 from ..interface.obstacles import of_binary, of_kind, of_loading, this_machine

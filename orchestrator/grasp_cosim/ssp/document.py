@@ -6,10 +6,10 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import fmpy
 from lxml import etree  # type: ignore[import-untyped]
 
 from ..errors import InputError
+from ..fmi import fmpy
 from .notes import Notes
 from .version2 import as_version_1
 
