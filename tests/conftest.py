@@ -19,6 +19,7 @@ import pytest
 from grasp_cosim import System, cli
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_fmus.build import build
+from grasp_fmus.native import compilers, twins
 from grasp_fmus.native.build import build_native
 from hypothesis import find, settings
 from hypothesis import strategies as st
@@ -247,6 +248,18 @@ def command(
         return code, out, err
 
     return run
+
+
+@pytest.fixture
+def no_compiler(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[None]:
+    """A machine without a compiler, on which nothing was built yet."""
+    monkeypatch.setenv("PATH", str(tmp_path / "nothing"))
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setattr(compilers, "zig_compiler", lambda: None)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    twins.shipped_twins.cache_clear()
+    yield
+    twins.shipped_twins.cache_clear()
 
 
 @pytest.fixture

@@ -5,7 +5,6 @@ import json
 import os
 import shutil
 import zipfile
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from grasp_cosim import System
 from grasp_cosim.cli.native import natively
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_fmus.block_build import build_block
-from grasp_fmus.native import compilers, twins
+from grasp_fmus.native import twins
 from grasp_fmus.native.build import build_native_block
 from grasp_fmus.native.compilers import CompilerError
 from grasp_fmus.native.targets import here
@@ -39,18 +38,6 @@ kind = "grid"
 variables = ["plant.object_width"]
 values = [0.06, 0.07, 0.08]
 """
-
-
-@pytest.fixture
-def no_compiler(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[None]:
-    """A machine without a compiler, on which nothing was built yet."""
-    monkeypatch.setenv("PATH", str(tmp_path / "nothing"))
-    monkeypatch.delenv("CC", raising=False)
-    monkeypatch.setattr(compilers, "zig_compiler", lambda: None)
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    twins.shipped_twins.cache_clear()
-    yield
-    twins.shipped_twins.cache_clear()
 
 
 def ran(folder: str) -> dict[str, Any]:

@@ -21,7 +21,14 @@ from ..errors import choices
 from ..fmi import fmpy
 from ..interface.document import unreadable
 from ..interface.interface import Interface
-from ..interface.obstacles import of_binary, of_kind, of_loading, this_machine
+from ..interface.obstacles import (
+    HEAD,
+    of_binary,
+    of_kind,
+    of_loading,
+    processor,
+    this_machine,
+)  # fmt: skip
 from ..interface.read import describe
 from ..scratch import ScratchFolder
 from .packed_imports import imports
@@ -35,9 +42,8 @@ VERSION = f"{sys.version_info.major}.{sys.version_info.minor}"
 LIBPYTHON = f"libpython{VERSION}{getattr(sys, 'abiflags', '')}.so.1.0"
 """What a host that is not Python needs of this Python."""
 
-_PROCESSORS = {3: "x86", 40: "ARM", 62: "x86-64", 183: "AArch64", 243: "RISC-V"}
 _PACKAGES = {"cv2": "opencv-python", "sklearn": "scikit-learn", "yaml": "pyyaml"}
-"""Processors by their number in ELF; packages that are not called as their module."""
+"""Packages that are not called as their module."""
 
 _TRIAL = """
 import sys
@@ -101,6 +107,9 @@ def _machine(python: bool) -> Iterator[Finding]:
         yield Finding("python3", *python_on_path(which("python3")))
     if python:
         yield Finding("environment", *environment(os.environ))
+    if python and LINUX and not HERE.startswith("x86-64"):
+        text = f"{HERE}: pythonfmu has no binary for it; native twins run in the place of our FMUs"
+        yield Finding("processor", "warning", text, "grasp-cosim build --native BLOCK")
 
 
 def interpreter(version: tuple[int, ...], largest: int) -> Verdict:
@@ -173,13 +182,10 @@ def _processor(path: Path) -> str:
     if not path.is_file():
         return ""
     with path.open("rb") as file:
-        header = file.read(20)
+        head = file.read(HEAD)
     if not LINUX:
         return "a binary"
-    if header[:4] != b"\x7fELF" or len(header) < 20:
-        return "no ELF file"
-    number = int.from_bytes(header[18:], "little")
-    return f"{_PROCESSORS.get(number, f'ELF machine {number}')}, {32 * header[4]} bit"
+    return f"{its}, {32 * head[4]} bit" if (its := processor(head)) else "no ELF file"
 
 
 HERE = _processor(Path(sys.executable))
@@ -273,7 +279,9 @@ def binary(fmu: Unpacked) -> Verdict:
         folders = choices(dict.fromkeys(path.parent.name for path in there))
         return "ok", f"{wanted}, {its}; there is: {folders}; this machine: {ours}", None
     if its:
-        return "problem", f"{wanted} is {its}; must be {HERE}", f"build it again for {HERE}"
+        fix = f"build it again for {HERE}"
+        fix += ", or as a native FMU: grasp-cosim build --native" if fmu.python else ""
+        return "problem", f"{wanted} is {its}; must be {HERE}", fix
     fix = f"build it again for {ours}"
     if obstacle := of_binary(fmu.declared):
         again = fmu.python and not fmu.declared.sources

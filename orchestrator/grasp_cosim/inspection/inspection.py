@@ -7,7 +7,7 @@ from typing import Any
 from ..errors import choices
 from ..interface.capabilities import KINDS
 from ..interface.interface import Variable
-from ..interface.obstacles import this_machine
+from ..interface.obstacles import this_platform
 from ..interface.read import describe
 
 COLUMNS = (
@@ -34,7 +34,7 @@ def inspect_fmu(path: Path) -> dict[str, Any]:
         "guid": found.guid or None,
         "default_experiment": dict(found.experiment),
         "platforms": list(found.platforms),
-        "this_machine": this_machine(found.version),
+        "this_machine": this_platform(found.version),
         "sources": found.sources,
         "python": found.python,
         "capabilities": dict(found.capabilities),

@@ -4,6 +4,7 @@ Limits are checked before anything is unpacked: what the directory of the archiv
 its files can yield.
 """
 
+import re
 import zipfile
 from pathlib import Path
 from typing import Any, NoReturn
@@ -12,6 +13,7 @@ from xml.parsers import expat
 
 from ..errors import InputError
 from ..files import check_fmu_file
+from .obstacles import HEAD
 
 NAME = "modelDescription.xml"
 LARGEST = 100_000_000
@@ -21,12 +23,15 @@ LARGEST_UNPACKED, MOST_EXPANSION = 500_000_000, 50
 and tables pack 2 to 20 times, a bomb hundreds of times."""
 DEEPEST = 256
 """Elements within each other: the standard needs 6, the annotations of tools some more."""
+_BINARY = re.compile(r"binaries/linux64/[^/]+\.so")
 MOST_ELEMENTS = 1_000_000
 """Two or three to a variable."""
 
 
-def read_document(path: Path) -> tuple[ElementTree.Element, tuple[str, ...]]:
-    """Return the root of the description in the FMU at `path`, and the names of all its files.
+def read_document(path: Path) -> tuple[ElementTree.Element, dict[str, bytes]]:
+    """Return the root of the description in the FMU at `path`, and its files by their names.
+
+    Of a binary for Linux that is its head, of another file nothing.
 
     InputError where there is no FMU.
     """
@@ -46,11 +51,15 @@ def read_document(path: Path) -> tuple[ElementTree.Element, tuple[str, ...]]:
                 raise ValueError(f"{NAME} has {description} bytes; must have at most {LARGEST}")
             check_size(archive, path)
             root = _parsed(archive.read(NAME))
+            files = dict.fromkeys(entries, b"")
+            for name in filter(_BINARY.fullmatch, entries):
+                with archive.open(entries[name]) as file:
+                    files[name] = file.read(HEAD)
         if not root.get("fmiVersion"):
             raise ValueError(f"no fmiVersion in {NAME}")
     except Exception as error:  # zipfile and its decompressors raise whatever they like
         raise unreadable(path, error) from error
-    return root, tuple(entries)
+    return root, files
 
 
 def check_size(archive: zipfile.ZipFile, path: Path) -> None:

@@ -6,6 +6,8 @@ The one place that says so: reading a system, loading an instance and `doctor` a
 import platform
 import re
 import sys
+from functools import cache
+from pathlib import Path
 from typing import NamedTuple
 
 from ..errors import choices
@@ -14,6 +16,12 @@ from .interface import Interface
 
 RUN = ("CoSimulation", "ModelExchange")
 """The kinds that the master runs, the one it prefers first."""
+
+HEAD = 20
+"""Bytes of an ELF file that say which processor it is for."""
+
+_PROCESSORS = {3: "x86", 40: "ARM", 62: "x86-64", 183: "AArch64", 243: "RISC-V"}
+"""By their number in ELF."""
 
 _LICENCE = re.compile(r"licen[cs]|dongle|flexlm|activation|not activated", re.IGNORECASE)
 
@@ -40,6 +48,30 @@ def this_machine(version: str) -> str:
     return f"{processor}-{platform.system().lower()}"
 
 
+def processor(head: bytes) -> str:
+    """The processor that an ELF file is for, by its first bytes; "" of another kind of file."""
+    if head[:4] != b"\x7fELF" or len(head) < HEAD:
+        return ""
+    number = int.from_bytes(head[18:20], "little")
+    return _PROCESSORS.get(number, f"ELF machine {number}")
+
+
+def platform_of(folder: str, head: bytes) -> str:
+    """The platform of a binary in a folder of an FMU, as others than x86-64 are told apart.
+
+    FMI 2.0 has one folder for all processors of 64 bit.
+    """
+    its = processor(head) if folder == "linux64" else ""
+    return f"{folder} ({its})" if its not in ("", "x86-64") else folder
+
+
+@cache
+def this_platform(version: str) -> str:
+    """That of this Python."""
+    with Path(sys.executable).open("rb") as python:
+        return platform_of(this_machine(version), python.read(HEAD))
+
+
 def of_kind(fmu: Interface) -> Obstacle | None:
     """The obstacle that no machine removes: a version of FMI or a kind that no master here runs."""
     wanted = " or ".join(KINDS[kind] for kind in RUN)
@@ -54,13 +86,15 @@ def of_kind(fmu: Interface) -> Obstacle | None:
 
 def of_binary(fmu: Interface) -> Obstacle | None:
     """The obstacle on this machine: the FMU has no binary for it."""
-    here = this_machine(fmu.version)
+    here = this_platform(fmu.version)
     if here in fmu.platforms:
         return None
     what = f"has a binary for {choices(fmu.platforms)} only"
     if not fmu.platforms:
         what = "is source-only, C without a binary" if fmu.sources else "has no binary at all"
     remedy = f"ask the vendor for an FMU with a binary for {here}"
+    if fmu.python:
+        remedy += ", or make a native one of its block: grasp-cosim build --native"
     if fmu.sources:
         remedy += ", or compile its sources: LDFLAGS=-Wl,--no-as-needed,-lm fmpy compile FMU"
     return Obstacle(f"{what}; this machine: {here}", remedy)

@@ -6,7 +6,7 @@ read_interface() refuses the FMU, but describe() does not.
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import lru_cache
@@ -30,7 +30,7 @@ from .interface import (
     limits,
     typed,
 )
-from .obstacles import of_binary, of_kind
+from .obstacles import of_binary, of_kind, platform_of
 from .units import BASE, Unit, known_unit
 
 NUMERIC = ("Real", "Integer")
@@ -135,10 +135,11 @@ def describe(path: Path) -> Interface:
     )
 
 
-def _platforms(files: Iterable[str]) -> tuple[str, ...]:
-    """The folders with a shared library right inside."""
-    parts = [name.split("/") for name in files if name.endswith((".so", ".dll", ".dylib"))]
-    return tuple(sorted({p[1] for p in parts if p[0] == "binaries" and len(p) == 3}))
+def _platforms(files: Mapping[str, bytes]) -> tuple[str, ...]:
+    """Those of the folders with a shared library right inside."""
+    parts = {name: name.split("/") for name in files if name.endswith((".so", ".dll", ".dylib"))}
+    inside = {n: p[1] for n, p in parts.items() if p[0] == "binaries" and len(p) == 3}
+    return tuple(sorted({platform_of(folder, files[name]) for name, folder in inside.items()}))
 
 
 class _Reader:

@@ -9,6 +9,7 @@ from typing import Literal, get_args
 
 from ..interface.expansion import expanded
 from ..interface.interface import Interface, Value, Variable
+from ..interface.obstacles import of_binary
 from ..interface.read import read_interface
 
 Isolation = Literal["none", "process"]
@@ -101,6 +102,12 @@ class Component:
     def loaded(self) -> Interface:
         """The interface of the FMU that runs: of its native twin, where it has one."""
         return replace(self, fmu=self.native or self.fmu).interface
+
+    @property
+    def needs_native(self) -> bool:
+        """True if no native twin is chosen, and the FMU is in Python, without a binary for here."""
+        fmu = read_interface(self.fmu)
+        return self.native is None and fmu.python and of_binary(fmu) is not None
 
     def names_unit(self, variable: Variable) -> bool:
         """True if units name the one of a variable, or of the array that it is in."""

@@ -8,6 +8,8 @@ import click
 
 from ...errors import InputError, SimulationError
 from ...files import FMU_FOLDER, NATIVE_FOLDER, check_folder
+from ...interface.obstacles import of_binary
+from ...interface.read import describe
 from ..frame import PATH, bind_python_option, json_option, say, show, waiting
 
 if TYPE_CHECKING:
@@ -53,7 +55,8 @@ def build(
     Python file: the FMU of that block alone, spring_plant.py becomes SpringPlant.fmu.
     docs/your_plant.md shows one. With --native, BLOCK may be the name of one of ours as well.
 
-    Says what is not as it was built last. --bind-python adds the libpython of PYTHON, by default
+    Says what is not as it was built last. Where pythonfmu has no binary for this machine, native
+    FMUs are built beside them, too. --bind-python adds the libpython of PYTHON, by default
     of this one, to what the FMUs load. --native translates the blocks to C and compiles them.
 
     \b
@@ -79,6 +82,10 @@ def build(
             built, notes = _native(block, folder, target, 3 if fmi == "3" else 2)
         else:
             built = _in_python(block, folder, bind_python)
+            if not bind_python and (obstacle := of_binary(describe(built[0].path))):
+                twins = folder.parent / NATIVE_FOLDER.name
+                built = [*built, *_native(block, twins, None, 2)[0]]
+                notes = [f"built native FMUs, too: {built[0].path} {obstacle.what}"]
     except ValueError as error:
         raise InputError(f"build: {error}") from error
     for note in notes:

@@ -117,7 +117,7 @@ def run(
         check_mdf()
     check_outputs(out, given["plot"])
     with (
-        natively(system, bool(given["native"])) as chosen,
+        natively(system, given["native"], as_named=True) as chosen,
         _folder(out, chosen, paced is not None, title) as folder,
     ):
         try:

@@ -1,0 +1,140 @@
+"""Commands on a machine for which pythonfmu has no binary: they run the native twins."""
+
+import json
+import shutil
+import zipfile
+from pathlib import Path
+
+import pytest
+from conftest import Run
+from grasp_cosim import InputError, System, simulate
+from grasp_cosim.grasp.presets import SYSTEM
+from grasp_cosim.interface.obstacles import this_platform
+from grasp_fmus import fmu
+from support.both_engines import needs_compiler
+
+HERE = this_platform("2.0")
+LACKS = f"has a binary for linux64 (RISC-V), win64 only; this machine: {HERE}"
+SHORT = ("--step", "1e-3", "--stop", "0.3")
+SPRING = Path(__file__).parents[2] / "docs/spring_plant.py"
+
+
+def for_another(binary: bytes) -> bytes:
+    """A library as it would be for another processor."""
+    return binary[:18] + (243).to_bytes(2, "little") + binary[20:]
+
+
+@pytest.fixture
+def foreign(fmus: Path, tmp_path: Path) -> Path:
+    """The FMUs of the grasp, and one that has no twin, as if pythonfmu's binary were for another
+    processor than this.
+    """
+    folder = tmp_path / "foreign"
+    folder.mkdir()
+    for name in ("GripperPlant", "ProximitySensor", "GraspController", "GripperPlantMuJoCo"):
+        file = f"{name}.fmu"
+        with zipfile.ZipFile(fmus / file) as whole, zipfile.ZipFile(folder / file, "w") as made:
+            for member in whole.namelist():
+                data = whole.read(member)
+                made.writestr(member, for_another(data) if member.endswith(".so") else data)
+    return folder
+
+
+@pytest.fixture
+def other_machine(
+    command: Run, foreign: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> Run:
+    """Runs a command line where the FMUs of the built-in grasp are those."""
+    system = System.load(SYSTEM, foreign)
+    monkeypatch.setattr("grasp_cosim.grasp.system.grasp_system", lambda: system)
+    return command
+
+
+@needs_compiler
+def test_run_takes_the_native_twins_and_says_so(
+    other_machine: Run, grasp: System, foreign: Path
+) -> None:
+    code, out, err = other_machine("run", *SHORT, "--json", "--out", "run")
+    assert (code, err) == (0, f"ran native FMUs: {foreign}/GripperPlant.fmu {LACKS}\n")
+    assert json.loads(out)["steps"] == 300
+    ran = json.loads(Path("run/run.json").read_text())["fmus"]
+    assert all("native_twin_of" in component for component in ran.values())
+    simulate(grasp, step=1e-3, stop=0.3).to_csv(Path("python.csv"))
+    assert Path("run/signals.csv").read_bytes() == Path("python.csv").read_bytes()
+
+
+@needs_compiler
+def test_nothing_is_said_where_they_were_asked_for(other_machine: Run) -> None:
+    assert other_machine("run", "--step", "1e-3", "--stop", "0.01", "--native")[::2] == (0, "")
+
+
+@needs_compiler
+@pytest.mark.slow
+def test_many_runs_say_it_once(other_machine: Run, foreign: Path) -> None:
+    vary = "plant.initial_object_position=0.01,0.02"
+    code, out, err = other_machine("sweep", "--vary", vary, *SHORT, "--workers", "1", "--json")
+    assert (code, json.loads(out)["failed"]) == (0, 0)
+    assert err.count("\n") == err.count(f"ran native FMUs: {foreign}/GripperPlant.fmu {LACKS}") == 1
+
+
+def test_python_is_refused(other_machine: Run, foreign: Path) -> None:
+    assert other_machine("run", *SHORT, "--python") == (
+        2,
+        "",
+        f"grasp-cosim: --python: plant: {foreign}/GripperPlant.fmu {LACKS}; must be without "
+        "--python\n",
+    )
+
+
+@pytest.mark.usefixtures("no_compiler")
+@pytest.mark.parametrize("arguments", [("run",), ("evaluate",), ("run", "--step-study")])
+def test_without_a_compiler_one_line_says_what_brings_one(
+    other_machine: Run, foreign: Path, arguments: tuple[str, ...]
+) -> None:
+    code, out, err = other_machine(*arguments)
+    assert (code, out) == (2, "")
+    assert err.startswith(f"grasp-cosim: plant: {foreign}/GripperPlant.fmu {LACKS}; no C compiler")
+    assert err.endswith("pip install ziglang\n")
+    assert err.count("\n") == 1
+
+
+@needs_compiler
+def test_from_python_too(foreign: Path, grasp: System) -> None:
+    here = simulate(System.load(SYSTEM, foreign), step=1e-3, stop=0.3)
+    there = simulate(grasp, step=1e-3, stop=0.3)
+    assert all((here[name] == there[name]).all() for name in there.signals)
+
+
+@needs_compiler
+def test_what_has_no_twin_does_not_load(foreign: Path) -> None:
+    system = System.load(SYSTEM, foreign).swap("plant", foreign / "GripperPlantMuJoCo.fmu")
+    with pytest.raises(InputError) as error:
+        simulate(system, stop=0.1)
+    assert str(error.value) == (
+        f"plant: {foreign}/GripperPlantMuJoCo.fmu {LACKS}; ask the vendor for an FMU with a binary "
+        f"for {HERE}, or make a native one of its block: grasp-cosim build --native"
+    )
+
+
+@needs_compiler
+@pytest.mark.slow
+def test_build_makes_native_ones_too(command: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    theirs = for_another(fmu._linux_binary(None))
+    monkeypatch.setattr(fmu, "_linux_binary", lambda _: theirs)
+    shutil.copy(SPRING, ".")
+    code, out, err = command("build", SPRING.name)
+    assert (code, out) == (0, "fmus/build/SpringPlant.fmu: new\nfmus/native/SpringPlant.fmu: new\n")
+    assert err == f"built native FMUs, too: fmus/build/SpringPlant.fmu {LACKS}\n"
+    swap = ("--swap", "plant=fmus/build/SpringPlant.fmu", *SHORT)
+    code, _, err = command("run", *swap)
+    assert code == 0
+    assert err.startswith(f"ran native FMUs: fmus/build/SpringPlant.fmu {LACKS}")
+
+
+def test_inspect_tells_the_processor(other_machine: Run, foreign: Path) -> None:
+    found = json.loads(other_machine("inspect", foreign / "GripperPlant.fmu", "--json")[1])
+    assert (found["platforms"], found["this_machine"]) == (["linux64 (RISC-V)", "win64"], HERE)
+    code, out, _ = other_machine("doctor", foreign / "GripperPlant.fmu")
+    assert code == 1
+    assert "GripperPlant.so is RISC-V, 64 bit; must be " in out
+    assert "or as a native FMU: grasp-cosim build --native" in out
