@@ -1,12 +1,20 @@
 """CVode behind our calls: accurate, never beyond its stop, with the errors of its functions."""
 
 from ctypes import c_double
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 import pytest
-from grasp_cosim.fmi.cvode import Cvode, CvodeError
 from grasp_cosim.system.parts import Solver
+from support.models import needs_cvode
+
+pytestmark = needs_cvode
+
+
+def cvode(*arguments: Any) -> Any:
+    from grasp_cosim.fmi.cvode import Cvode  # here, as it may not be there
+
+    return Cvode(*arguments)
 
 
 class Decay:
@@ -14,7 +22,7 @@ class Decay:
 
     def __init__(self) -> None:
         self.latest, self.count = 0.0, 0
-        self.solver = Cvode(1, 1, self.slopes, self.crossings, Solver())
+        self.solver = cvode(1, 1, self.slopes, self.crossings, Solver())
         self.solver.x[0] = 1.0
 
     def slopes(self, time: float, states: int, slopes: int) -> int:
@@ -59,7 +67,7 @@ def test_what_a_function_raises_is_raised(error: type[BaseException]) -> None:
     def fail(*_: object) -> NoReturn:
         raise error
 
-    solver = Cvode(1, 0, fail, fail, Solver())
+    solver = cvode(1, 0, fail, fail, Solver())
     solver.restart(0.0)
     with pytest.raises(error):
         solver.step(1.0)
@@ -67,7 +75,9 @@ def test_what_a_function_raises_is_raised(error: type[BaseException]) -> None:
 
 
 def test_what_it_cannot_do_it_says(capfd: pytest.CaptureFixture[str]) -> None:
-    solver = Cvode(1, 0, lambda *_: 1, lambda *_: 1, Solver())
+    from grasp_cosim.fmi.cvode import CvodeError
+
+    solver = cvode(1, 0, lambda *_: 1, lambda *_: 1, Solver())
     solver.restart(0.0)
     with pytest.raises(CvodeError, match="right-hand side"):
         solver.step(1.0)

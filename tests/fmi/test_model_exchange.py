@@ -13,11 +13,11 @@ from grasp_cosim.system.parts import Component, Connection, Event, Isolation, Po
 from scipy.integrate import solve_ivp
 from support.analytic import bouncing_ball, held_input
 from support.both_engines import ENGINES
-from support.models import build_model
+from support.models import build_model, needs_cvode
 from support.native_fmus import needs_gcc
 from support.state_space import state_space
 
-pytestmark = needs_gcc
+pytestmark = [needs_gcc, needs_cvode]
 EXCHANGE = ("ModelExchange",)
 WITHIN = 1e-6
 """Relative, of the exact solution, with the tolerance that a solver has where none is given."""

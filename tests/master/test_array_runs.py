@@ -16,6 +16,7 @@ from grasp_cosim.recording.result import Result
 from grasp_cosim.system.parts import Isolation
 from scipy.linalg import expm
 from support.both_engines import engines
+from support.models import needs_cvode
 from support.native_fmus import needs_gcc
 from support.state_space import TYPES, state_space
 
@@ -91,6 +92,7 @@ def test_a_state_space_model_is_exact(
     assert list(result.signals) == [f"ss.y[{i}]" for i in range(1, sizes[2] + 1)]
 
 
+@needs_cvode
 @pytest.mark.parametrize("sizes", [(3, 3, 3), (7, 2, 5)])
 @pytest.mark.parametrize("isolation", ["none", pytest.param("process", marks=pytest.mark.slow)])
 def test_it_is_as_exact_by_a_solver(

@@ -11,11 +11,11 @@ from grasp_cosim.realtime.options import Realtime
 from grasp_cosim.recording.load import load_run
 from grasp_cosim.system.parts import Component, Connection, Port
 from support.both_engines import ENGINES
-from support.models import build_model
+from support.models import build_model, needs_cvode
 from support.native_fmus import needs_gcc
 
 pytestmark = needs_gcc
-KINDS = ["ModelExchange", "CoSimulation"]
+KINDS = [pytest.param("ModelExchange", marks=needs_cvode), "CoSimulation"]
 BEFORE = "; its values there are in the last row, that of t = "
 
 
@@ -51,6 +51,7 @@ def test_a_run_ends_with_the_last_sample(
         assert result[name].tolist() == whole[name][: len(result.time)].tolist()
 
 
+@needs_cvode
 def test_the_end_at_the_very_beginning(tmp_path: Path) -> None:
     """In the event at the end of the initialisation."""
     system = stair(tmp_path, "ModelExchange", last=1)

@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
+import fmpy
+import pytest
 from fmpy.fmi2 import FMU2Model, FMU2Slave
 from fmpy.fmi3 import FMU3Model
 
@@ -16,6 +18,10 @@ from .compiled import pack, shared_library
 
 SOURCES = Path(__file__).with_name("models")
 KINDS = ("ModelExchange", "CoSimulation")
+needs_cvode = pytest.mark.skipif(
+    not Path(fmpy.__file__).with_name("sundials").joinpath(fmpy.platform_tuple).is_dir(),
+    reason="NO CVode: FMPy has none for this machine",
+)
 TYPES_2 = {"Float64": "Real", "Int32": "Integer"}
 """The types of FMI 2.0, where they have other names than in 3.0."""
 
