@@ -482,7 +482,8 @@ def test_fmus_from_elsewhere(interface: str) -> None:
 
 def test_every_row_has_its_test_and_its_pinned_version() -> None:
     source = Path(__file__).read_text("utf-8")
-    pins = dict(line.split("==") for line in (ROOT / "constraints.txt").read_text().split())
+    lines = (ROOT / "constraints.txt").read_text().splitlines()
+    pins = dict(line.partition(";")[0].split("==") for line in lines)
     pinned = {name.lower().replace("_", "-"): version for name, version in pins.items()}
     assert len(ROWS) > 12
     for tool_name, version, _, _, _, by in ROWS:

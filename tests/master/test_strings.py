@@ -156,6 +156,7 @@ def unrecordable(tmp_path: Path) -> Path:
 def test_a_run_that_records_nothing_is_no_success(
     unrecordable: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
+    pytest.importorskip("asammdf")
     out = tmp_path / "out"
     assert main(["run", str(unrecordable), "--out", str(out), "--json", "--plot", "--mdf"]) == 1
     said = capfd.readouterr()

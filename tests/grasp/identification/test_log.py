@@ -210,7 +210,7 @@ def test_whatever_asammdf_stumbles_over_is_one_line(
     def stumble(path: Path) -> None:
         raise error
 
-    monkeypatch.setattr("asammdf.MDF", stumble)
+    monkeypatch.setattr(pytest.importorskip("asammdf"), "MDF", stumble)
     (tmp_path / "log.mf4").touch()
     name = type(error).__name__
     with pytest.raises(InputError, match=rf"log.mf4: is damaged, no MDF file: {name}: ") as caught:
