@@ -15,6 +15,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import fmpy
 import pytest
 from grasp_cosim import System, cli
 from grasp_cosim.grasp.presets import SYSTEM
@@ -43,6 +44,11 @@ Altered = Callable[[str, str, str, str], Path]
 
 os.environ["XDG_CACHE_HOME"] = str(Path(sys.prefix, "cache_of_the_tests"))
 """Native FMUs are compiled once for all test processes and runs, too."""
+
+_FMUS = Path(sys.prefix, "python_fmus_of_the_tests")
+
+gc.set_threshold(50_000, 20, 20)
+"""Many tests read sources: each time after 700 nodes those that there are would be gone over."""
 
 settings.register_profile("usual", deadline=None, derandomize=True, max_examples=100)
 settings.register_profile(
@@ -98,12 +104,6 @@ def kind(request: pytest.FixtureRequest) -> Kind:
     return chosen
 
 
-@pytest.fixture(scope="session")
-def _full_collections() -> list[int]:
-    """How many there were when what is frozen was last looked at: at most one number."""
-    return []
-
-
 @pytest.fixture(scope="session", autouse=True)
 def _used_hypothesis() -> None:
     """It makes its generator at its first use, and complains if what holds that is frozen."""
@@ -116,18 +116,48 @@ def _no_lines_of_progress(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("grasp_cosim.progress.EVERY", 3600.0)
 
 
+_collections = 0
+"""How many there had been of all objects when it was last looked what is not frozen."""
+
+
 @pytest.fixture(autouse=True)
-def _frozen(_full_collections: list[int]) -> None:
+def _frozen() -> None:
     """All that thousands of tests are made of is no garbage: a paced run, which collects it before
     it begins, would take half a second for it, and thaws it at its end.
-
-    What is frozen is counted one by one, 30 ms for all: only where such a run may have been.
     """
-    collections = [gc.get_stats()[2]["collections"]]
-    if collections != _full_collections:
-        _full_collections[:] = collections
-        if not gc.get_freeze_count():
+    global _collections
+    collections = gc.get_stats()[2]["collections"]
+    if collections != _collections:
+        _collections = collections
+        if len(gc.get_objects(generation=2)) > 100_000:
             gc.freeze()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _unpacked_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Of the FMUs that Python runs, one and the same file is unpacked once per test process; what
+    unpacks it again is given links: to make 20 files takes longer than most runs.
+
+    The binary is copied, as the system loads a file once, whatever its paths.
+    """
+    kept: dict[Path, Path] = {}
+    unpack = fmpy.extract
+
+    def place(source: str, target: str) -> None:
+        (shutil.copyfile if source.endswith((".so", ".dylib")) else os.link)(source, target)
+
+    def extract(path: Path, folder: Path, include: Callable[[str], bool]) -> None:
+        if path.parent != _FMUS:
+            unpack(path, folder, include)
+            return
+        if path not in kept:
+            kept[path] = tmp_path_factory.mktemp("unpacked")
+            unpack(path, kept[path], include)
+        shutil.copytree(kept[path], folder, copy_function=place, dirs_exist_ok=True)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("fmpy.extract", extract)
+        yield
 
 
 @pytest.fixture
@@ -169,7 +199,7 @@ def folder_of() -> Folder:
 
     def folder(kind: Kind) -> Path:
         if kind not in done:
-            at = Path(sys.prefix, f"{kind}_fmus_of_the_tests".replace(" ", "_"))
+            at = _FMUS.with_name(_FMUS.name.replace("python", kind.replace(" ", "_")))
             plan = None if kind == "python" else kinds.plan(kind)
             at.mkdir(exist_ok=True)
             with (at.parent / f"{at.name}.lock").open("w") as lock:
