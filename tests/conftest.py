@@ -50,7 +50,7 @@ _FMUS = Path(sys.prefix, "python_fmus_of_the_tests")
 gc.set_threshold(50_000, 20, 20)
 """Many tests read sources: each time after 700 nodes those that there are would be gone over."""
 
-settings.register_profile("usual", deadline=None, derandomize=True, max_examples=100)
+settings.register_profile("usual", deadline=None, derandomize=True, max_examples=25)
 settings.register_profile(
     "explore", deadline=None, derandomize=False, max_examples=1000, print_blob=True
 )  # a profile inherits what it leaves out, and where CI is set hypothesis derandomizes
@@ -146,13 +146,13 @@ def _unpacked_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     def place(source: str, target: str) -> None:
         (shutil.copyfile if source.endswith((".so", ".dylib")) else os.link)(source, target)
 
-    def extract(path: Path, folder: Path, include: Callable[[str], bool]) -> None:
-        if path.parent != _FMUS:
-            unpack(path, folder, include)
+    def extract(path: Path, folder: Path, *include: Callable[[str], bool]) -> None:
+        if path.parent != _FMUS or not include:
+            unpack(path, folder, *include)
             return
         if path not in kept:
             kept[path] = tmp_path_factory.mktemp("unpacked")
-            unpack(path, kept[path], include)
+            unpack(path, kept[path], *include)
         shutil.copytree(kept[path], folder, copy_function=place, dirs_exist_ok=True)
 
     with pytest.MonkeyPatch.context() as patch:
@@ -308,21 +308,22 @@ def unpack_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> UnpackIn:
 @pytest.fixture
 def altered(tmp_path: Path, kind: Kind) -> Altered:
     """Builds the FMU of a script with one place in one source file changed."""
+    return lambda *change: alter(tmp_path, kind, *change)
 
-    def build_altered(script: str, source: str, before: str, after: str) -> Path:
-        package = source.partition("/")[0]
-        sources = tmp_path / "sources"
-        shutil.rmtree(sources, ignore_errors=True)
-        original = Path(importlib.import_module(package).__file__ or "").parent
-        shutil.copytree(original, sources / package, ignore=shutil.ignore_patterns("__pycache__"))
-        shutil.copy(original.parent / "README.md", sources)
-        text = (sources / source).read_text("utf-8")
-        assert text.count(before) == 1
-        (sources / source).write_text(text.replace(before, after), "utf-8")
-        with _imported_from(sources, package):
-            return kinds.build_shipped(script, kind, tmp_path / "altered")
 
-    return build_altered
+def alter(folder: Path, kind: Kind, script: str, source: str, before: str, after: str) -> Path:
+    """Build in the folder the FMU of a script with one place in one source file changed."""
+    package = source.partition("/")[0]
+    sources = folder / "sources"
+    shutil.rmtree(sources, ignore_errors=True)
+    original = Path(importlib.import_module(package).__file__ or "").parent
+    shutil.copytree(original, sources / package, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(original.parent / "README.md", sources)
+    text = (sources / source).read_text("utf-8")
+    assert text.count(before) == 1
+    (sources / source).write_text(text.replace(before, after), "utf-8")
+    with _imported_from(sources, package):
+        return kinds.build_shipped(script, kind, folder / "altered")
 
 
 @contextmanager

@@ -44,6 +44,7 @@ from grasp_fmus.link.message import (
 from grasp_fmus.link.peer import ALIVE, Peer, PeerCounters, Request
 from grasp_fmus.link.signature import Causality, Kind, LinkVariable, Signature
 from gripper_plant import rigid
+from support import compiled
 from support.slow import slow
 
 NATIVE = Path(__file__).parent / "native"
@@ -106,11 +107,7 @@ def compile_c(
     if isinstance(source, str):
         (folder / "source.c").write_text(source, "ascii")
         source = folder / "source.c"
-    program = folder / "program"
-    command = [*C99, "-I", folder, *options, source, "-o", program, "-lm"]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert (done.returncode, done.stderr) == (0, "")
-    return program
+    return compiled.compile_c([*C99, f"-I{folder}", *options, source, "-lm"], folder / "program")
 
 
 @pytest.fixture(scope="session")

@@ -18,6 +18,7 @@ from grasp_fmus.proxy import Settings
 from grasp_fmus.proxy_build import Original, build_proxy
 from grasp_fmus.shipped import SCRIPTS
 from support import kinds
+from support.compiled import compile_c
 from support.fmi2 import ERROR, OK, Fmu, Instance
 from support.pythons import VERSIONS, python
 from support.scripted_peer import SIGNATURE, VARIABLES, ScriptedPeer
@@ -53,10 +54,8 @@ Bind = Callable[[str, str], Fmu]
 
 @pytest.fixture(scope="session")
 def host(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    program = tmp_path_factory.mktemp("host") / "host"
     strict = ["-std=c99", "-Wall", "-Wextra", "-Werror"]
-    subprocess.run(["gcc", *strict, str(SOURCE), "-ldl", "-o", str(program)], check=True)
-    return program
+    return compile_c(["gcc", *strict, SOURCE, "-ldl"], tmp_path_factory.mktemp("host") / "host")
 
 
 @pytest.fixture

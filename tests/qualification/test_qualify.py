@@ -6,11 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from conftest import Altered
+from conftest import Altered, alter
 from grasp_cosim import InputError, SimulationError, System
 from grasp_cosim.qualification.bands import Bands, Given, read_bands
 from grasp_cosim.qualification.compared import Compared
-from grasp_cosim.qualification.qualify import qualify
+from grasp_cosim.qualification.qualify import Qualification, qualify
 from grasp_cosim.qualification.verdict import as_bands, as_json, as_text
 from support.cases import CASES
 
@@ -19,18 +19,31 @@ OF_OBJECT = ("object_tilt", "toppled", "squeeze", "damaged")
 NUMERICS = ("every second sample", "step 0.002 s", "scheme jacobi")
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def short(grasp: System) -> System:
     """The beginning of the grasp."""
     return grasp.with_experiment(step=1e-3, stop=0.05)
 
 
-@pytest.fixture
-def heavy(altered: Altered) -> Path:
+@pytest.fixture(scope="module")
+def heavy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The plant with a heavier second finger, which its model description tells."""
     before = "high=1e3, tunable=True)\n    ] = (0.5, 0.5)"
     after = before.replace("0.5)", "0.6)")
-    return altered("GripperPlant", "gripper_plant/fingers.py", before, after)
+    folder = tmp_path_factory.mktemp("heavy")
+    return alter(folder, "python", "GripperPlant", "gripper_plant/fingers.py", before, after)
+
+
+@pytest.fixture(scope="module")
+def copied(short: System) -> Qualification:
+    """The qualification of the plant that is there already."""
+    return qualify(short, "plant", own_plant(short), isolation="none")
+
+
+@pytest.fixture(scope="module")
+def heavier(short: System, heavy: Path) -> Qualification:
+    """That of the heavier finger."""
+    return qualify(short, "plant", heavy, isolation="none")
 
 
 def by_name(compared: tuple[Compared, ...]) -> dict[str, Compared]:
@@ -41,8 +54,8 @@ def own_plant(system: System) -> Path:
     return system.component("plant", "test").fmu
 
 
-def test_a_copy_is_qualified_without_any_deviation(short: System) -> None:
-    found = qualify(short, "plant", own_plant(short), isolation="none")
+def test_a_copy_is_qualified_without_any_deviation(copied: Qualification) -> None:
+    found = copied
     assert found.qualified
     assert found.swap.differences == ()
     assert found.numerics == NUMERICS
@@ -55,17 +68,16 @@ def test_a_copy_is_qualified_without_any_deviation(short: System) -> None:
     assert as_text(found).startswith("QUALIFIED: GripperPlant.fmu as plant")
 
 
-def test_without_anything_to_compare_there_is_no_qualification(short: System) -> None:
-    run = qualify(short, "plant", own_plant(short), isolation="none")
-    assert replace(run, signals=()).qualified
-    found = replace(run, signals=(), metrics=())
+def test_without_anything_to_compare_there_is_no_qualification(copied: Qualification) -> None:
+    assert replace(copied, signals=()).qualified
+    found = replace(copied, signals=(), metrics=())
     assert not found.qualified
     assert as_text(found).startswith("NOT QUALIFIED")
     assert as_json(found)["reason"].startswith("nothing was compared: no output")
 
 
-def test_a_heavier_finger_is_not_qualified(short: System, heavy: Path) -> None:
-    found = qualify(short, "plant", heavy, isolation="none")
+def test_a_heavier_finger_is_not_qualified(heavier: Qualification) -> None:
+    found = heavier
     assert not found.qualified
     assert [(d.severity, d.kind, d.variable) for d in found.swap.differences] == [
         ("warns", "start", "finger_mass[2]")
@@ -118,11 +130,9 @@ def test_a_band_for_nothing_is_a_wrong_input(short: System, table: str) -> None:
 
 
 def test_a_written_band_file_gives_the_same_verdict(
-    short: System, heavy: Path, tmp_path: Path
+    short: System, heavy: Path, heavier: Qualification, tmp_path: Path
 ) -> None:
-    from grasp_cosim.qualification.bands import read_bands
-
-    first = qualify(short, "plant", heavy, isolation="none")
+    first = heavier
     (tmp_path / "bands.toml").write_text(as_bands(first))
     bands = read_bands(tmp_path / "bands.toml")
     second = qualify(short, "plant", heavy, bands=bands, isolation="none")
@@ -243,9 +253,8 @@ def test_a_grasp_with_another_stabilisation_of_the_contact(grasp: System, altere
     assert metrics["time_to_contact[1]"].original == pytest.approx(1.887, abs=2e-3)
 
 
-def test_json_holds_all_of_it(short: System, heavy: Path) -> None:
-    found = qualify(short, "plant", heavy, isolation="none")
-    report = json.loads(json.dumps(as_json(found), allow_nan=False))
+def test_json_holds_all_of_it(heavy: Path, heavier: Qualification) -> None:
+    report = json.loads(json.dumps(as_json(heavier), allow_nan=False))
     assert set(report) == {
         "qualified", "reason", "component", "original", "candidate", "system", "step", "stop",
         "scheme", "failure", "differences", "signals", "metrics", "uncompared", "numerics", "log",

@@ -1,14 +1,41 @@
-"""Compiles the C of test FMUs with gcc, each once in a test process, and packs it as an FMU."""
+"""Compiles the C of tests, and packs that of test FMUs; what was compiled is kept between runs."""
 
+import os
+import shutil
 import subprocess
 import tempfile
 import zipfile
+from collections.abc import Sequence
 from functools import cache
+from hashlib import sha256
 from pathlib import Path
 
 import fmpy
 
 HEADERS = Path(fmpy.__file__).with_name("c-code")
+
+
+def compile_c(command: Sequence[str | Path], out: Path) -> Path:
+    """What the compiler makes of C files at out, unless it has made it before, then that again.
+
+    It must say nothing. The same are the same options and, after the preprocessor, the same text.
+    """
+    program = shutil.which(command[0])
+    assert program is not None
+    plain = [str(word) for word in command]
+    text = subprocess.run([*plain, "-w", "-E", "-P"], check=True, capture_output=True).stdout
+    options = [word for word in plain if not word.startswith(("-I", "-D", "/"))]
+    version = os.path.realpath(program), Path(program).stat().st_mtime_ns
+    name = sha256(repr((options, version, text)).encode()).hexdigest()
+    kept = Path(os.environ["XDG_CACHE_HOME"], "compiled", name)
+    if not kept.exists():
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        part = kept.with_suffix(f".{os.getpid()}")
+        done = subprocess.run([*plain, "-o", part], capture_output=True, text=True)
+        assert (done.returncode, done.stderr) == (0, "")
+        part.replace(kept)
+    shutil.copy(kept, out)
+    return out
 
 
 @cache
@@ -27,9 +54,8 @@ def shared_library(
         more.write_text(code, "utf-8")
         rest.write_text("".join(lacked), "utf-8")
         command = ["gcc", "-shared", "-fPIC", "-O1", "-ffp-contract=off", f"-I{HEADERS}"]
-        command += [*map(str, sources), str(more), str(rest), *options, "-o", str(out)]
-        subprocess.run(command, check=True)
-        return out.read_bytes()
+        command += [*map(str, sources), str(more), str(rest), *options]
+        return compile_c(command, out).read_bytes()
 
 
 def pack(path: Path, version: str, name: str, description: str, library: bytes) -> Path:

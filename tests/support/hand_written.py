@@ -5,7 +5,6 @@ It does all that a block can do, and goes wrong in all ways; its C is not made b
 
 import importlib.util
 import platform
-import subprocess
 import zipfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,6 +17,8 @@ from grasp_fmus.contract import declared, variables
 from grasp_fmus.model_description import Description
 from grasp_fmus.native.description import build_description, native_description
 from grasp_fmus.native.sources import native_sources
+
+from .compiled import compile_c
 
 NAME = "HandWritten"
 PYTHON = Path(__file__).parents[1] / "fmus" / "native" / "hand_written.py"
@@ -60,10 +61,7 @@ def compile_in(
     """The shared library of sources in a folder; without warnings."""
     library = folder / f"{NAME}.so"
     plain = f"-DFMI{fmi}_OVERRIDE_FUNCTION_PREFIX"
-    command = [cc, *FLAGS, *STRICT, plain, *options, f"{NAME}.c", "-o", library.name, "-lm"]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    return library
+    return compile_c([cc, *FLAGS, *STRICT, plain, *options, folder / f"{NAME}.c", "-lm"], library)
 
 
 def native_fmu(folder: Path, fmi: Literal[2, 3] = 2, content: str = "0123456789abcdef") -> Path:

@@ -15,6 +15,7 @@ from grasp_fmus.native.compilers import Compiler, Job, compile_all, compiler_for
 from grasp_fmus.native.targets import LINUX_ARM, LINUX_X86, WINDOWS, Target, here
 
 from .c_host import HEADERS, SOURCE, Host, Unpacked
+from .compiled import compile_c
 from .compilers import needs_zig
 
 ZIG = ("zig",)
@@ -99,15 +100,14 @@ def host_of(target: Target, folder: Path, options: Sequence[str] = ()) -> Host:
     """The host in C for a platform, compiled into a folder, and what runs it here."""
     strict = ["-std=c99", "-O1", "-Wall", "-Wextra", "-Werror", f"-I{HEADERS}", *options]
     program = folder / ("host.exe" if target == WINDOWS else "host")
-    rest = [str(SOURCE), "-o", str(program)]
     if target == WINDOWS:
         mingw = shutil.which(MINGW)
         command = [mingw] if mingw else [*compiler_for(WINDOWS, asked=True).command]
-        subprocess.run([*command, *strict, *rest], check=True)
+        subprocess.run([*command, *strict, SOURCE, "-o", program], check=True)
         return Host(program, ("wine",), windows())
     compiler = "gcc" if target == here() else "aarch64-linux-gnu-gcc"
     posix = ["-D_POSIX_C_SOURCE=200809L", "-pthread", "-ldl"]
-    subprocess.run([compiler, *strict, *rest, *posix], check=True)
+    compile_c([compiler, *strict, SOURCE, *posix], program)
     if target == here():
         return Host(program)
     return Host(program, ("qemu-aarch64", "-L", str(ARM_LIBRARIES)))

@@ -2,7 +2,6 @@
 
 import ctypes
 import shutil
-import subprocess
 from collections.abc import Mapping
 from dataclasses import dataclass
 from dis import opname
@@ -15,6 +14,7 @@ from grasp_fmus.contract import variables as scalar_variables
 from grasp_fmus.native import translation
 from grasp_fmus.native.compilers import LIBM
 from grasp_fmus.snapshot import _scalars, _shaped
+from support.compiled import compile_c
 
 HERE = Path(__file__).parent
 HEADERS = Path(translation.__file__).parent / "c"
@@ -51,11 +51,7 @@ def library(files: Mapping[str, str], folder: Path, cc: str = "gcc", *flags: str
         f"-I{folder}",
         f"-I{HEADERS}",
     ]
-    done = subprocess.run(
-        [*command, str(HERE / "shim.c"), "-o", str(out), "-lm"], capture_output=True, text=True
-    )
-    assert done.returncode == 0, done.stderr
-    return out
+    return compile_c([*command, str(HERE / "shim.c"), "-lm"], out)
 
 
 class CBlock:

@@ -3,7 +3,6 @@
 import ctypes
 import math
 import struct
-import subprocess
 from ctypes import c_double
 from hashlib import blake2b
 
@@ -11,6 +10,7 @@ import pytest
 from grasp_fmus.native.sources import C
 from hypothesis import example, given
 from hypothesis import strategies as st
+from support.compiled import compile_c
 from support.examples import examples
 from support.native_fmus import needs_gcc
 
@@ -37,9 +37,8 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
     folder = tmp_path_factory.mktemp("text")
     (folder / "text.c").write_text(SOURCE, "utf-8")
     strict = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-shared", "-fPIC"]
-    command = ["gcc", *strict, f"-I{C}", "text.c", "-o", "text.so"]
-    subprocess.run(command, cwd=folder, check=True)
-    return ctypes.CDLL(str(folder / "text.so"))
+    text = compile_c(["gcc", *strict, f"-I{C}", folder / "text.c"], folder / "text.so")
+    return ctypes.CDLL(str(text))
 
 
 def general(library: ctypes.CDLL, v: float, digits: int) -> str:
