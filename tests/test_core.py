@@ -124,6 +124,7 @@ def test_there_is_no_grasp_in_these_processes(python: Python) -> None:
     )
 
 
+@pytest.mark.slow
 def test_every_other_module_can_be_imported(python: Python) -> None:
     """Those of the commands of a grasp cannot: its figures, its friction."""
     printed = python(
@@ -160,6 +161,7 @@ def test_the_help_has_the_commands_of_any_system(command: Command) -> None:
     assert "Default: fmus/build" in command("build", "--help")
 
 
+@pytest.mark.slow
 def test_a_run_is_written_read_back_drawn_and_reported(python: Python, folder: Path) -> None:
     python(
         """
@@ -193,6 +195,7 @@ def test_a_run_is_written_read_back_drawn_and_reported(python: Python, folder: P
     assert "a.x" in page
 
 
+@pytest.mark.slow
 def test_a_study_is_swept(python: Python) -> None:
     python(
         """
@@ -213,6 +216,7 @@ def test_a_study_is_swept(python: Python) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_swap_is_qualified(python: Python) -> None:
     python(
         """

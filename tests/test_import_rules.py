@@ -14,6 +14,7 @@ from support.imports import (
     calls,
     circles,
     graph,
+    parsed,
     read_imports,
     read_modules,
     room,
@@ -46,7 +47,7 @@ def modules(folder: Path) -> list[tuple[str, str]]:
     return [
         (file.name, name)
         for file in files
-        for node in ast.walk(ast.parse(file.read_text("utf-8")))
+        for node in parsed(file.read_text("utf-8"))[0]
         for name in imported(node)
     ]
 
@@ -158,7 +159,7 @@ def test_what_is_packed_into_fmus_imports_the_standard_library_only() -> None:
     foreign = {
         (file, name)
         for file, source in packed.items()
-        for node in ast.walk(ast.parse(source))
+        for node in parsed(source.decode())[0]
         for name in imported(node)
         if name.partition(".")[0] not in sys.stdlib_module_names | ours
     }

@@ -8,6 +8,7 @@ import ast
 import re
 import sys
 from collections.abc import Iterator, Mapping
+from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -56,8 +57,10 @@ def card_file(package: str) -> Path:
     return inside if inside.exists() else inside.parents[1] / "README.md"
 
 
-def _imported(path: str, source: bytes) -> Iterator[str]:
-    """Yield the modules to pack that a source imports, and names in them that may be modules."""
+@cache
+def _imported(path: str, source: bytes) -> list[str]:
+    """Return the modules to pack that a source imports, and names in them that may be modules."""
+    found: list[str] = []
     *package, _ = path.split("/")
     for node in _run(ast.parse(source, path)):
         if not isinstance(node, ast.ImportFrom):
@@ -67,13 +70,15 @@ def _imported(path: str, source: bytes) -> Iterator[str]:
         if node.level or not (
             node.col_offset or module.partition(".")[0] in sys.stdlib_module_names
         ):
-            yield from (module, *(f"{module}.{alias.name}" for alias in node.names))
+            found += [module, *(f"{module}.{alias.name}" for alias in node.names)]
+    return found
 
 
 def _run(tree: ast.AST) -> Iterator[ast.AST]:
-    """Yield all nodes but those that only a type checker looks at."""
+    """Yield all statements and what holds some, but those that only a type checker looks at."""
     for node in ast.iter_child_nodes(tree):
-        if not (isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"):
+        checked = isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+        if not (checked or isinstance(node, ast.expr)):
             yield node
             yield from _run(node)
 

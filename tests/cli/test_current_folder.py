@@ -104,6 +104,7 @@ def test_a_command(
     not_imported(everything, installed, *(word.format(**places) for word in line.split()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "arguments", [("--stop", "0.001"), slow(("--stop", "0.0064", "--step-study"))]
 )

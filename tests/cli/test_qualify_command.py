@@ -87,6 +87,7 @@ def test_the_adaptive_controller_is_another_law_behind_the_same_interface(
     assert report["uncompared"] == []
 
 
+@pytest.mark.slow
 def test_all_that_it_writes(qualify: Run, altered: Altered) -> None:
     heavy = altered(
         "GripperPlant", "gripper_plant/fingers.py", BEFORE, BEFORE.replace("0.5)", "0.6)")

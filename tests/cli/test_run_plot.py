@@ -38,6 +38,7 @@ def test_what_there_is_to_draw_is_drawn(
         assert f"drew results/{name}\n" in err
 
 
+@pytest.mark.slow
 def test_the_timing_goes_to_the_current_folder_without_out(command: Run, tmp_path: Path) -> None:
     assert command("run", "sensor.toml", "--realtime", "--plot")[0] == 0
     found = sorted(p.name for p in tmp_path.iterdir())
@@ -54,6 +55,7 @@ def test_without_matplotlib_a_run_in_real_time_is_refused_at_once(
     assert not (tmp_path / "results").exists()
 
 
+@pytest.mark.slow
 def test_a_run_that_stops_at_an_overrun_is_drawn_as_far_as_it_got(
     command: Run, tmp_path: Path
 ) -> None:
@@ -62,6 +64,7 @@ def test_a_run_that_stops_at_an_overrun_is_drawn_as_far_as_it_got(
     assert (tmp_path / "results/timing.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_a_title_and_a_format_are_kept_and_drawn(command: Run, tmp_path: Path) -> None:
     options = ["--plot", "--format", "svg", "--title", "Dim light", "--out", "results"]
     assert command("run", "sensor.toml", *options)[0] == 0

@@ -129,6 +129,7 @@ def test_a_second_signal_ends_a_run_that_hangs(
     assert not left(tmp_path)
 
 
+@pytest.mark.slow
 @needs_gcc
 def test_a_killed_run_is_on_disk_and_its_folders_are_swept(start: Start, tmp_path: Path) -> None:
     alive = tempfile.mkdtemp(prefix=PREFIX, dir=tmp_path / "tmp")

@@ -36,6 +36,7 @@ def command(command: Run, tmp_path: Path) -> Run:
     return run
 
 
+@pytest.mark.slow
 def test_a_study_leaves_its_runs_and_pictures(command: Run, tmp_path: Path) -> None:
     code, out, err = command(STUDY, "--workers", "1", "--plot", "--json")
     summary = json.loads(out)

@@ -79,6 +79,7 @@ def test_command(user: Path, command: str) -> None:
     assert cli.main(arguments[1:]) == (0 if touches else 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("example", EXAMPLES)
 def test_example(user: Path, capsys: pytest.CaptureFixture[str], example: str) -> None:
     assert "stop=3.0" in example
@@ -90,6 +91,7 @@ def test_example(user: Path, capsys: pytest.CaptureFixture[str], example: str) -
     assert (user / "results/signals.csv").is_file()
 
 
+@pytest.mark.slow
 def test_what_a_run_ends_with(user: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """All but how fast it was."""
     (shown,) = OUTPUTS

@@ -35,6 +35,7 @@ def numbers(title: str) -> list[float]:
     return [float(x) for x in re.findall(r"(?<= )-?[\d.]+(?= |$)", row)]
 
 
+@pytest.mark.slow
 def test_both_sets_of_gains_reach_what_the_page_says(natives: Path) -> None:
     system = System.load(SYSTEM, natives).with_experiment(defaults()["step"], defaults()["stop"])
     conditions = default_conditions(system)

@@ -81,6 +81,7 @@ def checked(name: str, checkout: Path) -> tuple[list[Any], Any]:
     return tables, do
 
 
+@pytest.mark.slow
 def test_the_commands_at_the_beginnings_work(checkout: Path) -> None:
     assert {command.split()[1] for command in INDENTED} == {"build", "run"}
     for command in INDENTED:

@@ -163,6 +163,7 @@ def test_what_a_lost_process_leaves_is_cleared_away_in_silence(tmp_path: Path) -
     gc.collect()
 
 
+@pytest.mark.slow
 def test_nothing_stays_behind(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -183,6 +184,7 @@ def test_nothing_stays_behind(
     assert capfd.readouterr() == ("", "")  # of what the FMU prints
 
 
+@pytest.mark.slow
 def test_what_an_fmu_started_ends_with_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Such as a fork, which would keep open what the FMU printed to."""
     python, child = tmp_path / "python", tmp_path / "child"

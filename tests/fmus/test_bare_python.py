@@ -58,6 +58,7 @@ def without_fmu(case: Case) -> dict[str, list[str]]:
     return {name: [row[name].hex() for row in rows] for name in rows[0]}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("version", [VERSIONS[0], *map(slow, VERSIONS[1:])])
 def test_runs_where_nothing_is_installed(fmus: Path, tmp_path: Path, version: str) -> None:
     """Bit for bit what the block gives, in every version the same."""

@@ -128,6 +128,7 @@ def numbers(printed: str) -> list[list[float]]:
     return [[float(word) for word in line.split()] for line in printed.splitlines()[:STEPS]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("name", ["GripperPlant", *map(slow, sorted({*INPUT} - {"GripperPlant"}))])
 def test_a_bound_fmu_runs_in_c(host: Path, bound: Bind, name: str, version: str) -> None:
@@ -187,6 +188,7 @@ def test_an_fmu_that_is_not_bound_needs_libpython_from_elsewhere(
     assert numbers(helped.stdout) == in_this_process(fmu, values)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("version", VERSIONS)
 def test_the_modules_are_those_of_the_python_it_is_bound_to(
     host: Path, bound: Bind, tmp_path: Path, version: str

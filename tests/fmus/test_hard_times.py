@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 from support.fmi2 import ERROR, OK, Fmu, Instance
 from support.packages import runnable
+from support.slow import slow
 
 ROUNDS = 10
 MANY = 200
@@ -105,7 +106,7 @@ HOSTS: dict[str, Any] = {
 }
 
 
-@pytest.mark.parametrize("host", HOSTS)
+@pytest.mark.parametrize("host", [slow(h) if h == "in_threads" else h for h in HOSTS])
 def test_the_host_lives(fmus: Path, tmp_path: Path, host: str) -> None:
     hosted(host, tmp_path, runnable(fmus))
 

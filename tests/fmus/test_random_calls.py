@@ -51,7 +51,7 @@ def called(folder: Path, seeds: int, calls: int, fmus: Sequence[Path]) -> dict[s
 
 
 @all_kinds
-@pytest.mark.parametrize(("seeds", "calls"), [(2, 400), slow(12, 1500)])
+@pytest.mark.parametrize(("seeds", "calls"), [(1, 100), slow(12, 1500)])
 def test_the_fmus_live(
     folder_of: Folder, kind: Kind, tmp_path: Path, seeds: int, calls: int
 ) -> None:
@@ -62,7 +62,7 @@ def test_the_fmus_live(
 
 
 @native_slowly
-@pytest.mark.parametrize(("seeds", "calls"), [(1, 150), slow(10, 500)])
+@pytest.mark.parametrize(("seeds", "calls"), [(1, 60), slow(10, 500)])
 def test_proxies_live(fmus: Path, kind: Kind, tmp_path: Path, seeds: int, calls: int) -> None:
     """With a peer, and one without."""
     with ExitStack() as stack:

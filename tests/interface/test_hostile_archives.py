@@ -12,6 +12,7 @@ from grasp_cosim.inspection.doctor import examine, unpack
 from grasp_cosim.inspection.inspection import inspect_fmu
 from grasp_cosim.interface import document, read
 from grasp_cosim.interface.read import describe, read_interface
+from support.slow import slow
 
 HEAD = '<fmiModelDescription fmiVersion="2.0" modelName="M" guid="{1}">'
 TAIL = '<CoSimulation modelIdentifier="m"/></fmiModelDescription>'
@@ -237,7 +238,7 @@ def test_more_dependencies_than_an_fmu_has(write: Write, monkeypatch: pytest.Mon
     refused(write(text), "Outputs/Unknown: 120 dependencies; must have at most 100")
 
 
-@pytest.mark.parametrize("length", [read.LONGEST_NAME + 1, 10_000_000])
+@pytest.mark.parametrize("length", [read.LONGEST_NAME + 1, slow(10_000_000)])
 def test_a_name_that_nobody_reads(write: Write, length: int) -> None:
     path = write(described(variable(f'name="{"x" * length}" valueReference="1"')))
     refused(path, f"{length} characters; must have at most {read.LONGEST_NAME}")

@@ -189,6 +189,7 @@ def test_runs_in_another_thread(grasp: System) -> None:
     assert results == [True]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_keeps_what_was_recorded(fmus: Path, tmp_path: Path) -> None:
     """On a terminal there is a progress bar; Ctrl-C is sent once it has begun to move."""

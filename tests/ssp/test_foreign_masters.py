@@ -116,6 +116,7 @@ def check(theirs: npt.NDArray[np.float64], system: System) -> None:
     np.testing.assert_allclose(theirs, ours, rtol=0.0, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not importlib.util.find_spec("ecospy"), reason="ecospy is not installed")
 @pytest.mark.skipif(not find_library("tbb"), reason="libtbb12, which ecospy needs, is missing")
 def test_ecos_finds_the_same_contacts(jacobi: System, tmp_path: Path) -> None:

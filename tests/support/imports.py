@@ -6,6 +6,7 @@ up; a room may import from its own floor and from those below, as far as nothing
 
 import ast
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -35,6 +36,15 @@ def packages(names: Sequence[str]) -> set[str]:
     return {name for name in names if any(other.startswith(f"{name}.") for other in names)}
 
 
+@cache
+def parsed(text: str) -> tuple[list[ast.Import | ast.ImportFrom], set[str]]:
+    """The imports of a source, and the names by which it calls functions."""
+    nodes = [*ast.walk(ast.parse(text))]
+    called = (node.func for node in nodes if isinstance(node, ast.Call))
+    names = {str(getattr(f, "attr", None) or getattr(f, "id", None)) for f in called}
+    return [node for node in nodes if isinstance(node, ast.Import | ast.ImportFrom)], names
+
+
 def read_imports(sources: Mapping[str, str]) -> list[Import]:
     """Every import among these modules: in functions and under TYPE_CHECKING, too."""
     folders = packages(list(sources))
@@ -50,16 +60,14 @@ def read_imports(sources: Mapping[str, str]) -> list[Import]:
 def _imports(
     name: str, text: str, folder: bool, known: Mapping[str, str]
 ) -> Iterator[tuple[int, str]]:
-    for node in ast.walk(ast.parse(text)):
+    for node in parsed(text)[0]:
         if isinstance(node, ast.Import):
             wanted = [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
+        else:
             parts = name.split(".")
             above = parts[: len(parts) - node.level + (1 if folder else 0)] if node.level else []
             base = ".".join([*above, *([node.module] if node.module else [])])
             wanted = [f"{base}.{alias.name}" for alias in node.names]
-        else:
-            continue
         for module in wanted:
             while module and module not in known:  # a name in a module: the module
                 module = module.rpartition(".")[0]
@@ -69,13 +77,7 @@ def _imports(
 
 def calls(sources: Mapping[str, str], names: frozenset[str]) -> set[str]:
     """The modules that call a function by one of these names."""
-    return {
-        module
-        for module, text in sources.items()
-        for node in ast.walk(ast.parse(text))
-        if isinstance(node, ast.Call)
-        and (getattr(node.func, "attr", None) or getattr(node.func, "id", None)) in names
-    }
+    return {module for module, text in sources.items() if parsed(text)[1] & names}
 
 
 def room(module: str) -> str:

@@ -90,6 +90,7 @@ def test_a_run_that_is_refused_is_a_row(tmp_path: Path) -> None:
     assert "gain = 'much': must be" in str(outcome.error)
 
 
+@pytest.mark.slow
 def test_a_process_that_does_not_start_ends_the_sweep(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -41,6 +41,7 @@ def test_the_known_best_is_found_and_the_limit_kept(tmp_path: Path, seed: int) -
     assert tuned.gains == pytest.approx((3.0, 3.0), rel=0.15)  # as flat as it is there
 
 
+@pytest.mark.slow
 def test_the_front_is_the_known_one(tmp_path: Path) -> None:
     """Least 1/(g·u) at an effort e is 2/e; no point is below, and there are some near it."""
     found, _ = computed(known_problem(tmp_path), 1200)

@@ -208,6 +208,7 @@ def test_what_is_refused_leaves_the_state(
     assert bytes(c.state) == before
 
 
+@pytest.mark.slow
 def test_a_parameter_out_of_its_range_is_named(tmp_path: Path) -> None:
     """As the FMU names it."""
     made = shipped_model(SCRIPTS / "GripperPlant.py")

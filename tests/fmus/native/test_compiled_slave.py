@@ -119,6 +119,7 @@ def has_fma() -> bool:
     return cpu.is_file() and " fma " in cpu.read_text()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="NO x86-64")
 @pytest.mark.parametrize("cc", ["gcc", slow("clang")])
 @pytest.mark.parametrize(

@@ -223,6 +223,7 @@ def test_a_start_that_is_refused_leaves_the_time(instance: Instance) -> None:
     instance.initialise(5.0)
 
 
+@pytest.mark.slow
 def test_states_are_those_of_fmi_2(instance: Instance, tmp_path: Path) -> None:
     fmu = Fmu(native_fmu(tmp_path, 2), tmp_path / "two")
     with Instance2(fmu) as two:

@@ -302,6 +302,7 @@ def loaded_again(fmu: Path, folder: Path, lives: int) -> Iterator[list[float]]:
         assert str(folder) not in Path("/proc/self/maps").read_text()
 
 
+@pytest.mark.slow
 def test_load_run_free_unload_load(tmp_path: Path) -> None:
     first, *others = loaded_again(native_fmu(tmp_path), tmp_path / "unpacked", 3)
     assert others == [first, first]
