@@ -29,7 +29,7 @@ from support.fmi2 import Fmu
 from support.kinds import Kind
 from support.packages import skip_where_it_cannot_run
 
-pytest_plugins = ("support.hosts",)
+pytest_plugins = ("support.hosts", "support.budget")
 
 Run = Callable[..., tuple[int, str, str]]
 """A command line without its program; exit code, standard output, standard error."""
