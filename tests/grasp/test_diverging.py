@@ -15,7 +15,6 @@ from grasp_cosim.qualification.qualify import qualify
 from grasp_cosim.ssp.write import write_ssp
 from grasp_cosim.system.parts import Port
 from grasp_cosim.system.toml import read_toml
-from support.both_engines import engines
 from support.slow import slow
 
 AWAY = r"^controller\.force\[1\] ran away: -1e\+06 N at t = 0\.413\d s, ten times as much every "
@@ -47,8 +46,9 @@ def as_file(folder: Path, fmus: Path, more: str = "") -> Path:
     return path
 
 
-@engines
-@pytest.mark.parametrize("every", [1, slow(100)])
+@pytest.mark.parametrize(
+    ("engine", "every"), [("compiled", 1), slow("python", 1), slow("python", 100)]
+)
 def test_it_is_kept_up_to_there_the_same_bits_in_both_engines(
     grasp: System, engine: Engine, every: int
 ) -> None:

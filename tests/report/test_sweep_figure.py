@@ -14,6 +14,7 @@ from grasp_cosim.sweep.run import Outcome
 from grasp_cosim.sweep.study import Curve, Map, Parameter, Pictures, Study
 from grasp_cosim.sweep.sweep import Sweep
 from matplotlib.figure import Figure
+from support.slow import slow
 
 RATIO = Parameter(
     "ratio", ("sensor_1.reflectance",), spaced(0.5, 2.0, 5, True), "sensor_2.reflectance"
@@ -57,8 +58,17 @@ def drawn(sweep: Sweep, folder: Path) -> list[str]:
     return [path.name for path in paths]
 
 
-@pytest.mark.parametrize("design", [GRID, POINTS])
-@pytest.mark.parametrize("failed", [(), (0, 7), tuple(range(20))])
+@pytest.mark.parametrize(
+    ("design", "failed"),
+    [
+        slow(GRID, ()),
+        (GRID, (0, 7)),
+        slow(GRID, tuple(range(20))),
+        slow(POINTS, ()),
+        slow(POINTS, (0, 7)),
+        (POINTS, tuple(range(20))),
+    ],
+)
 def test_a_map_comes_out_whatever_was_found(
     grasp: System, design: Design, failed: tuple[int, ...], tmp_path: Path
 ) -> None:
@@ -130,7 +140,7 @@ def test_it_says_what_differs_in_all_variants_and_takes_a_title(
 
 
 @pytest.mark.parametrize(
-    ("suffix", "begin"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")]
+    ("suffix", "begin"), [slow("png", b"\x89PNG"), ("svg", b"<?xml"), slow("pdf", b"%PDF")]
 )
 def test_it_is_in_the_format_asked_for(
     grasp: System, tmp_path: Path, suffix: str, begin: bytes
@@ -158,8 +168,8 @@ NEARLY = ONE * (1.0 + 2e-16)
     ("design", "values"),
     [
         (GRID, (ONE, NEARLY)),
-        (GRID, (math.inf, 1.0)),
-        (POINTS, (0.0,)),
+        slow(GRID, (math.inf, 1.0)),
+        slow(POINTS, (0.0,)),
         (POINTS, (math.nan, -math.inf)),
     ],
 )
@@ -173,6 +183,7 @@ def test_a_metric_that_is_one_value_or_none_is_drawn(
     assert drawn(replace(sweep, outcomes=outcomes), tmp_path) == both
 
 
+@pytest.mark.slow
 def test_one_run_is_drawn(grasp: System, tmp_path: Path) -> None:
     sweep = made(grasp, Design("random", 1, 1), Pictures((MAP,), ("time_difference",)))
     only = replace(sweep, outcomes=sweep.outcomes[3:4])

@@ -21,6 +21,13 @@ def rows(html: str) -> list[list[str]]:
     ]
 
 
+@pytest.fixture
+def no_chart(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is beside the chart, which takes a quarter of a second."""
+    monkeypatch.setattr("grasp_cosim.report.timing_html._chart", lambda *_: "")
+
+
+@pytest.mark.usefixtures("no_chart")
 def test_only_a_paced_run_has_the_section() -> None:
     run = grasp_run()
     plain, timed = (Elements(page_html(r)) for r in (run, replace(run, timing=paced())))
@@ -30,12 +37,14 @@ def test_only_a_paced_run_has_the_section() -> None:
     assert ("a", {"href": "#timing"}) in timed.found
 
 
+@pytest.mark.usefixtures("no_chart")
 def test_the_entry_of_the_timing_is_no_metric() -> None:
     run = ring_run(["a"])
     timing = paced(steps=50)
     assert "There are no metrics" in Elements(page_html(replace(run, timing=timing))).visible
 
 
+@pytest.mark.usefixtures("no_chart")
 def test_a_row_for_each_part_with_the_worst_beyond_the_period_marked() -> None:
     timing = paced(steps=3000, hiccups=0)
     plant = Spread(24.04e-6, 31e-6, 90e-6, 1.2345678e-3, 0.125)
@@ -59,6 +68,7 @@ def test_a_row_for_each_part_with_the_worst_beyond_the_period_marked() -> None:
     assert "The overrun</summary>" in html
 
 
+@pytest.mark.usefixtures("no_chart")
 def test_a_culprit_that_is_no_part_has_a_row_too() -> None:
     late = Overrun(125, 0.125, 3e-4, "backlog", 2e-3)
     timing = replace(
@@ -67,6 +77,7 @@ def test_a_culprit_that_is_no_part_has_a_row_too() -> None:
     assert ["backlog", "", "", "", "", "", "1"] in rows(timing_html(timing, 3.0))
 
 
+@pytest.mark.usefixtures("no_chart")
 @pytest.mark.parametrize(
     ("hiccups", "listed", "title", "shown"),
     [
@@ -83,6 +94,7 @@ def test_the_first_overruns_are_listed(hiccups: int, listed: int, title: str, sh
     assert len([row for row in rows(html) if len(row) == 5]) == shown
 
 
+@pytest.mark.usefixtures("no_chart")
 def test_without_overruns_there_is_no_list_of_them() -> None:
     html = timing_html(paced(steps=3000, hiccups=0), 3.0)
     assert "<summary>" not in html
@@ -103,6 +115,7 @@ def test_without_matplotlib_a_line_says_what_the_chart_needs(
     assert html.partition("</p>")[0] == drawn.partition("</p>")[0]
 
 
+@pytest.mark.usefixtures("no_chart")
 def test_pace_and_what_the_machine_granted_and_refused() -> None:
     text = Elements(timing_html(paced(steps=3000), 3.0)).visible
     for expected in (
@@ -114,6 +127,7 @@ def test_pace_and_what_the_machine_granted_and_refused() -> None:
         assert expected in text
 
 
+@pytest.mark.usefixtures("no_chart")
 def test_a_run_that_was_broken_off_in_its_first_step() -> None:
     timing = replace(paced(steps=10, hiccups=0), steps=0, parts={}, histograms={})
     assert "All 0 steps" in Elements(timing_html(timing, 0.0)).visible

@@ -19,6 +19,7 @@ from grasp_fmus.fmu import Model, shipped_model
 from grasp_fmus.native.c_only import called_of_libm, write_c
 from grasp_fmus.native.compilers import BITS
 from grasp_fmus.shipped import SCRIPTS, blocks
+from support.compiled import compile_c
 from support.kinds import TRANSLATED
 from support.native_fmus import needs_gcc
 from support.slow import slow
@@ -119,14 +120,18 @@ def test_the_example_runs_by_the_command_at_its_top(
             x = block.step(p, x, u, 0.01)
 
 
+def shared(source: Path, *options: str) -> ctypes.CDLL:
+    command = ["gcc", *STRICT, *options, "-shared", "-fPIC"]
+    return ctypes.CDLL(str(compile_c([*command, source, "-lm"], source.with_suffix(".so"))))
+
+
 class InC:
     """The block in C, called from here; its structs are of doubles but for those of `packing`."""
 
     def __init__(self, model: Model, folder: Path) -> None:
         name = model.description.name
         write_c(folder, model)
-        compiled(folder, *BITS, "-shared", "-fPIC", "-o", "block.so", f"{name}.c", "-lm")
-        library = ctypes.CDLL(str(folder / "block.so"))
+        library = shared(folder / f"{name}.c", *BITS)
         self.call: Callable[[str], Any] = lambda function: getattr(library, f"{name}_{function}")
         self.state = (ctypes.c_double * 64)()
         self.why = ctypes.create_string_buffer(2000)
@@ -149,8 +154,7 @@ def controller(tmp_path_factory: pytest.TempPathFactory) -> Controller:
             f"const {name}_Parameters defaults = {name.upper()}_PARAMETERS_DEFAULTS;\n"
             "int size = sizeof defaults;\n"
         )
-        compiled(folder, "-shared", "-fPIC", "-o", "p.so", "p.c")
-        library = ctypes.CDLL(str(folder / "p.so"))
+        library = shared(folder / "p.c")
         size = ctypes.c_int.in_dll(library, "size").value
         return c, (ctypes.c_char * size).in_dll(library, "defaults")
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Literal
 
 import pytest
+from support.compiled import compile_c
 from support.fmi2 import ERROR, OK, Fmu, Instance
 from support.hand_written import GUID, NAME, STRICT, compile_in, native_fmu, write_sources
 from support.native_fmus import needs_gcc
@@ -60,24 +61,24 @@ def test_names_of_functions(
 ) -> None:
     write_sources(tmp_path / "c", fmi)
     defined = [text.format(fmi) for text in define]
-    command = ["gcc", "-std=c99", "-O0", "-fPIC", "-shared", *defined, f"{NAME}.c"]
-    subprocess.run([*command, "-o", "found.so", "-lm"], cwd=tmp_path / "c", check=True)
-    names = exported(tmp_path / "c" / "found.so")
+    source = tmp_path / "c" / f"{NAME}.c"
+    command = ["gcc", "-std=c99", "-O0", "-fPIC", "-shared", *defined]
+    names = exported(compile_c([*command, source, "-lm"], tmp_path / "found.so"))
     assert len(names) == {2: 44, 3: 75}[fmi]
     assert all(name.startswith(f"{prefix}fmi{fmi}") for name in names)
 
 
 def test_two_fmus_in_one_program(tmp_path: Path) -> None:
     """All but the functions is static: there is no clash, and each has its own."""
-    objects = []
+    objects: list[str | Path] = []
     for prefix in (f"{NAME}_", "Other_"):
         write_sources(tmp_path / prefix)
-        command = ["gcc", "-std=c99", "-O0", f"-DFMI2_FUNCTION_PREFIX={prefix}", "-c", f"{NAME}.c"]
-        subprocess.run(command, cwd=tmp_path / prefix, check=True)
-        objects.append(f"{prefix}/{NAME}.o")
+        source = tmp_path / prefix / f"{NAME}.c"
+        alone = ["gcc", "-std=c99", "-O0", f"-DFMI2_FUNCTION_PREFIX={prefix}", "-c"]
+        objects.append(compile_c([*alone, source], source.with_suffix(".o")))
     include = f"-I{tmp_path}/{NAME}_"
-    command = ["gcc", "-std=c99", *STRICT, f'-DGUID="{GUID}"', include, str(LINK), *objects, "-lm"]
-    subprocess.run([*command, "-o", "both"], cwd=tmp_path, check=True)
+    linked = ["gcc", "-std=c99", *STRICT, f'-DGUID="{GUID}"', include, str(LINK)]
+    subprocess.run([*linked, *objects, "-lm", "-o", "both"], cwd=tmp_path, check=True)
     done = subprocess.run([tmp_path / "both"], capture_output=True, text=True, check=True)
     assert done.stdout == "0.5 1\n"
 
