@@ -47,7 +47,7 @@ os.environ["XDG_CACHE_HOME"] = str(Path(sys.prefix, "cache_of_the_tests"))
 
 _FMUS = Path(sys.prefix, "python_fmus_of_the_tests")
 
-gc.set_threshold(50_000, 20, 20)
+gc.set_threshold(50_000, 10, 10)
 """Many tests read sources: each time after 700 nodes those that there are would be gone over."""
 
 settings.register_profile("usual", deadline=None, derandomize=True, max_examples=25)
@@ -90,6 +90,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     items.sort(key=lambda item: item.get_closest_marker("slow") is None)
 
 
+def pytest_collection_finish() -> None:
+    """All that thousands of tests are made of is no garbage, and not to be looked at for some."""
+    gc.freeze()
+
+
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """A test that loads FMUs runs on each kind that it, or its module, is marked with."""
     marker = metafunc.definition.get_closest_marker("kinds")
@@ -122,9 +127,7 @@ _collections = 0
 
 @pytest.fixture(autouse=True)
 def _frozen() -> None:
-    """All that thousands of tests are made of is no garbage: a paced run, which collects it before
-    it begins, would take half a second for it, and thaws it at its end.
-    """
+    """A paced run thaws at its end what is frozen, and the next would take half a second for it."""
     global _collections
     collections = gc.get_stats()[2]["collections"]
     if collections != _collections:

@@ -12,14 +12,14 @@ TESTS = Path(__file__).parent
 def test_only_exploring_draws_other_examples_and_more() -> None:
     usual, explore = (settings.get_profile(name) for name in ("usual", "explore"))
     assert (usual.derandomize, explore.derandomize) == (True, False)
-    assert explore.max_examples == 10 * usual.max_examples
+    assert explore.max_examples == 40 * usual.max_examples
     assert explore.print_blob
 
 
 def test_a_count_of_examples_is_that_of_the_usual_profile() -> None:
     current = settings.get_current_profile_name()
     try:
-        for name, count in (("usual", 60), ("explore", 600)):
+        for name, count in (("usual", 15), ("explore", 600)):
             settings.load_profile(name)
             assert examples(60).max_examples == count
             assert examples(60).derandomize is settings.get_profile(name).derandomize

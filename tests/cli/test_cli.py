@@ -221,6 +221,7 @@ def test_build_names_what_it_built(command: Run, tmp_path: Path) -> None:
     assert all((tmp_path / p).is_file() for p in built)
 
 
+@pytest.mark.slow
 def test_the_built_in_grasp_builds_its_fmus(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -81,6 +81,7 @@ def test_a_metric_of_ones_own(oscillator: System) -> None:
     assert mixed.limits["amplitude"] == study.limits["amplitude"]
 
 
+@pytest.mark.slow
 def test_a_metric_of_several_values_that_it_does_not_name(oscillator: System) -> None:
     study = step_study(oscillator, 5e-3, of=("both",), metrics=(both,), workers=1)
     assert study.quantities == ("both[1]", "both[2]")
@@ -93,6 +94,7 @@ def test_a_time_has_a_tolerance_by_default(oscillator: System) -> None:
     assert ask(oscillator, ("a.now",), 0.5).tolerance == 0.5
 
 
+@pytest.mark.slow
 def test_a_metric_that_fails_is_one_line(oscillator: System) -> None:
     with pytest.raises(InputError, match=r"^metric 'broken': ValueError: no good$"):
         step_study(oscillator, 1.0, of=("broken",), metrics=(broken,), workers=1)

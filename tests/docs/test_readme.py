@@ -135,6 +135,7 @@ def test_the_keys_of_a_component_are_read(user: Path) -> None:
     assert (plant.step_ns, plant.isolation, len(plant.rename)) == (1_000_000, "process", 2)
 
 
+@pytest.mark.slow
 def test_the_first_screen_is_the_hand_and_two_commands_of_which_one_ends_with_it_moving() -> None:
     """Within 25 lines of the README; the last thing that `make run` does is to write the page."""
     first = "\n".join(README.splitlines()[:25])

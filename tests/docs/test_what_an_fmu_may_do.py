@@ -68,6 +68,7 @@ def test_what_only_reads(folder: Path) -> None:
     assert not loaded(folder, "report", "results")
 
 
+@pytest.mark.slow
 @needs_gcc
 def test_what_loads_it_in_another_process(folder: Path) -> None:
     assert "| `doctor FMU` |" in PAGE

@@ -47,6 +47,7 @@ def test_builds_the_fmus_with_their_cross_check_files(fmus: Path) -> None:
     assert sorted(path.name for path in fmus.iterdir()) == FILES
 
 
+@pytest.mark.slow
 def test_says_what_it_built(tmp_path: Path) -> None:
     folder = tmp_path / "not" / "there yet"
     assert build(folder) == [Built(folder / name, "new", ()) for name in FMUS]
@@ -119,6 +120,7 @@ def test_an_up_to_date_folder_costs_no_import_of_what_builds(fmus: Path, tmp_pat
     assert done.stdout == f"{{'unchanged'}}\n{needed}\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("data", [None, *map(slow, [b"{", b"", b"[]", b'{"sources": 1}', b"{}"])])
 def test_without_a_stamp_that_can_be_read_all_is_looked_at(
     fmus: Path, tmp_path: Path, data: bytes | None
@@ -201,6 +203,7 @@ def test_an_fmu_with_the_same_content_is_left_alone(fmus: Path, tmp_path: Path) 
     assert times(tmp_path) == before
 
 
+@pytest.mark.slow
 def test_a_damaged_fmu_is_built_again(fmus: Path, tmp_path: Path) -> None:
     """The others are not, and nothing is left beside them."""
     for path in fmus.iterdir():

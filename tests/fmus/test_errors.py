@@ -232,7 +232,7 @@ def test_a_host_with_ever_new_lists_of_references_fills_no_memory(load: Load) ->
             return sys.getallocatedblocks()
 
         before = read(200)
-        assert read(3000) - before < 1500
+        assert read(1200) - before < 700
 
 
 def test_time_may_be_multiplied(load: Load) -> None:

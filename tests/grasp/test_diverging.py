@@ -77,6 +77,7 @@ def test_how_the_rows_come_does_not_matter(grasp: System, monkeypatch: pytest.Mo
     assert len(texts) == 1
 
 
+@pytest.mark.slow
 def test_the_command_keeps_the_recording_and_is_3(command: Run, fmus: Path, tmp_path: Path) -> None:
     path = as_file(tmp_path, fmus)
     code, out, err = command("run", path, "--out", "out")

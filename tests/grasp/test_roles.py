@@ -92,6 +92,7 @@ def test_with_roles_they_are_the_same_to_the_bit(
     assert result.drawing.stem == "grasp"
 
 
+@pytest.mark.slow
 def test_a_run_read_back_is_the_result_it_was(original: Result, fmus: Path, tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     system = System.load(written(fmus, tmp_path, NAMES, roles=True, presets=False))
@@ -116,8 +117,7 @@ def test_what_a_run_lacks_is_read_back_too(gripper: System, tmp_path: Path) -> N
     result.to_json(tmp_path / "run.json")
     assert json.loads((tmp_path / "run.json").read_text())["missing_metrics"] == list(LOST)
     assert load_run(tmp_path).measured.missing == LOST
-    load_run(tmp_path).plot(tmp_path / "signals.png")
-    assert (tmp_path / "signals.png").read_bytes().startswith(b"\x89PNG")
+    assert load_run(tmp_path).drawing.stem == "signals"
 
 
 @given(

@@ -398,6 +398,7 @@ def _measured(job: tuple[Metric, ...]) -> tuple[list[str], dict[str, Any]]:
     return [m.name for m in job], dict(measure(signals(), job).values)
 
 
+@pytest.mark.slow
 def test_metrics_work_in_another_process(file: Callable[[str], Path]) -> None:
     """Of a file that is gone meanwhile, of a module, and of every result."""
     path = file(FILE)

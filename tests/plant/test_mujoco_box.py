@@ -239,7 +239,7 @@ def test_a_push_beyond_the_floors_friction_carries_finger_and_box_away() -> None
 
 def test_a_push_within_it_does_not() -> None:
     p = replace(FREE, friction=friction.Params(viscous=(100.0, 100.0)), contact_height=0.02)
-    x = after(p, start(p), (0.0, 0.1), 2e-3, 4000)
+    x = after(p, start(p), (0.0, 0.1), 2e-3, 2700)
     assert x.contact_force[1] == pytest.approx(-0.1, rel=1e-3)
     assert abs(x.q[2]) < 1e-5
 
@@ -254,7 +254,7 @@ def test_it_topples_above_m_g_w_over_2_h(share: float, topples: bool) -> None:
         initial_position=(5.0, -0.035),
         friction=friction.Params(viscous=(0.0, 3.0)),
     )
-    x = after(p, start(p), (0.0, share * WEIGHT * 0.07 / (2.0 * 0.08)), 1e-3, 6000)
+    x = after(p, start(p), (0.0, share * WEIGHT * 0.07 / (2.0 * 0.08)), 1e-3, 4000)
     assert x.toppled is topples
     assert (abs(x.q[4]) > 0.5) is topples
 

@@ -44,7 +44,7 @@ def broken_off() -> Timing:
     "timing",
     [
         paced(steps=3000, hiccups=0),
-        paced(steps=3000, hiccups=300, listed=100),
+        slow(paced(steps=3000, hiccups=300, listed=100)),
         slow(paced(steps=3000, components={rf"_$\no_formula_{k}$": 1e-6 for k in range(20)})),
         broken_off(),
     ],

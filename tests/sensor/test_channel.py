@@ -220,7 +220,7 @@ def test_it_starts_settled(gap: float, stage: str) -> None:
 def test_the_noise_is_there_from_the_start() -> None:
     """Over the seeds, the first value is scattered as much as a late one."""
     first, late = [], []
-    for seed in range(300):
+    for seed in range(150):
         p = replace(ON, noise=gaussian_noise.Params(True, seed=seed))
         values = run(p, [0.05] * 60, 1e-4)
         first.append(values[0])

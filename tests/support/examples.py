@@ -5,7 +5,7 @@ from typing import Any
 from hypothesis import settings
 
 USUAL = 100
-"""Examples in the profile of `make test`, and the unit in which others count."""
+"""Examples of a property that asks for no other count, four times those of `make test`."""
 
 
 def examples(count: int = USUAL, **more: Any) -> settings:
