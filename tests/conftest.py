@@ -90,11 +90,6 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     items.sort(key=lambda item: item.get_closest_marker("slow") is None)
 
 
-def pytest_collection_finish() -> None:
-    """All that thousands of tests are made of is no garbage, and not to be looked at for some."""
-    gc.freeze()
-
-
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """A test that loads FMUs runs on each kind that it, or its module, is marked with."""
     marker = metafunc.definition.get_closest_marker("kinds")
@@ -121,19 +116,21 @@ def _no_lines_of_progress(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("grasp_cosim.progress.EVERY", 3600.0)
 
 
-_collections = 0
-"""How many there had been of all objects when it was last looked what is not frozen."""
+_collections = -1
+"""How many there had been of all objects when it was last looked what is not frozen, if it was."""
 
 
 @pytest.fixture(autouse=True)
 def _frozen() -> None:
-    """A paced run thaws at its end what is frozen, and the next would take half a second for it."""
+    """All that thousands of tests are made of is no garbage, nor to be looked at for some: a paced
+    run, which collects it before it begins, would take half a second, and thaws it at its end.
+    """
     global _collections
     collections = gc.get_stats()[2]["collections"]
     if collections != _collections:
-        _collections = collections
-        if len(gc.get_objects(generation=2)) > 100_000:
+        if _collections < 0 or len(gc.get_objects(generation=2)) > 100_000:
             gc.freeze()
+        _collections = collections
 
 
 @pytest.fixture(scope="session", autouse=True)
