@@ -46,14 +46,15 @@ _PACKAGES = {"cv2": "opencv-python", "sklearn": "scikit-learn", "yaml": "pyyaml"
 """Packages that are not called as their module."""
 
 _TRIAL = """
-import sys
+import os, sys
 from pathlib import Path
 from grasp_cosim.fmi.load import load_here
 from grasp_cosim.interface.read import read_interface
 try:
     load_here("trial", read_interface(Path(sys.argv[1]))).close()
 except Exception as error:
-    sys.exit(str(error))
+    print(error)
+    os._exit(1)  # pythonfmu's binary reads freed memory where the process then ends as usual
 print("freed")
 """
 
