@@ -34,7 +34,7 @@ ENDS = {-signal.SIGKILL, -signal.SIGTERM, -signal.SIGINT, 130, 143, 0}
 ROUNDS = int(os.environ.get("KILLS", "2"))
 """So many of each signal."""
 
-ORPHANED = 5.0
+ORPHANED = 60.0
 """s after which no process of a command that has ended may be there."""
 
 

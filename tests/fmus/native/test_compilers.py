@@ -8,6 +8,7 @@ import struct
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -216,18 +217,22 @@ def test_a_compiler_that_has_just_started_ends_with_us(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Ctrl-C that comes while a compiler is being started does not lose it."""
-    begin, begun = compilers._started, []
+    begin, begun, heard = compilers._started, [], threading.Event()
+
+    def interrupt(*_: object) -> None:
+        heard.set()
+        raise KeyboardInterrupt
 
     def slowly(job: Job, folder: Path) -> compilers._Running:
         running = begin(job, folder)
         begun.append(running.process)
         os.kill(os.getpid(), signal.SIGINT)
-        time.sleep(0.3)
+        assert heard.wait(60.0)
         return running
 
     monkeypatch.setattr(compilers, "_started", slowly)
     compiler = Compiler((str(program(tmp_path / "cc", "#!/bin/sh\nexec sleep 3600\n")),), "1")
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    before = signal.signal(signal.SIGINT, interrupt)
     try:
         with pytest.raises(KeyboardInterrupt):
             compile_all([Job(SOURCES, "Sum", LINUX_X86, compiler)])
