@@ -1,7 +1,8 @@
 # make run    the published grasp from FMUs: .venv, build, evaluate, pictures and playground in results/
 # make test   the quick tests; each test runs in one of this and the next three
-# make test-slow  what takes longer; make platforms: other machines; make interop: other makers' tools
-# make explore  the properties, on new random examples and more of them; a failure prints its recipe
+# make test-slow  what takes longer, campaigns in a tenth of their size
+# make platforms  other machines and compilers, FMI 3.0     make interop  other makers' tools
+# make explore    whole campaigns and properties, with new seeds; to repeat one: make explore SEED=...
 # make check  lint, format, types, import rules
 # make docs   the pages of the Python interface in results/api, and what the notebook in docs/ shows
 # make bench  measurements     make cards    the variable tables of the equation cards
@@ -16,6 +17,8 @@ PIP := PIP_CONSTRAINT=constraints.txt PIP_DISABLE_PIP_VERSION_CHECK=1 $(BIN)/pyt
 # Tests start hundreds of Pythons: none should compile all modules anew, whatever the environment.
 PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 2 --maxschedchunk 1
 
+SEED ?= $(shell date +%s)
+
 .PHONY: run test test-slow platforms interop explore check docs bench cards pictures playground clean
 
 run: .venv/run
@@ -29,14 +32,14 @@ test: .venv/dev
 test-slow: .venv/dev
 	$(PYTEST) -m "slow and not platforms and not interop"
 
-platforms: .venv/dev
+platforms: .venv/platforms
 	$(PYTEST) -m platforms
 
-interop: .venv/dev
+interop: .venv/interop
 	$(PYTEST) -m interop
 
 explore: .venv/dev
-	$(PYTEST) -m hypothesis --hypothesis-profile explore
+	$(PYTEST) -m "hypothesis or campaign" --hypothesis-profile explore --hypothesis-seed $(SEED)
 
 check: .venv/dev
 	$(BIN)/ruff check .
@@ -72,6 +75,13 @@ playground: .venv/run
 .venv/dev: .venv/run
 	$(PIP) --editable '.[plot,dev]'
 	@touch $@
+
+# What cannot be installed is said, and the tests that need it are skipped, by name.
+.venv/platforms: TOOLS := ziglang
+.venv/interop: TOOLS := pyssp-standard pythonfmu3 fmu-manipulation-toolbox
+.venv/platforms .venv/interop: .venv/dev
+	@for tool in $(TOOLS); do $(PIP) $$tool || { echo "not installed: $$tool"; without=$$tool; }; done; \
+	[ -n "$$without" ] || touch $@
 
 clean:
 	rm -rf .venv fmus/build fmus/native results dist .mypy_cache .ruff_cache .pytest_cache .hypothesis

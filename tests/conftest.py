@@ -24,7 +24,7 @@ from grasp_fmus.native import compilers, twins
 from grasp_fmus.native.build import build_native
 from hypothesis import find, settings
 from hypothesis import strategies as st
-from support import kinds
+from support import campaign, kinds
 from support.fmi2 import Fmu
 from support.kinds import Kind
 from support.packages import skip_where_it_cannot_run
@@ -73,6 +73,11 @@ def pytest_report_header(config: pytest.Config) -> str | None:
     return None if seed is None else f"order: --shuffle {seed}"
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Campaigns draw from the seed that hypothesis is given."""
+    campaign.first_seed = int(config.getoption("hypothesis_seed") or 0)
+
+
 @pytest.hookimpl(tryfirst=True)  # before those that are slow are chosen, or left out
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """The slow ones first: in the end no process waits for another for long."""
@@ -85,8 +90,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         kind, name = drawn.get("kind", "python"), str(drawn.get("name"))
         if not kinds.exists(name, kind):
             items.remove(item)
-        elif kinds.is_slow(name, kind, "altered" in getattr(item, "fixturenames", ())):
-            item.add_marker("slow")
+        else:
+            tier = kinds.tier(name, kind, "altered" in getattr(item, "fixturenames", ()))
+            if tier != "quick":
+                item.add_marker(tier)
     items.sort(key=lambda item: item.get_closest_marker("slow") is None)
 
 

@@ -145,7 +145,7 @@ def test_c_alone(command: Run) -> None:
 
 
 @needs_zig
-@pytest.mark.slow
+@pytest.mark.platforms
 def test_for_others(command: Run) -> None:
     """The first time in a folder for what is kept, the libraries of zig are made."""
     targets = "linux64,win64,darwin64,aarch64-linux"

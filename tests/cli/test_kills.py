@@ -1,8 +1,4 @@
-"""Commands ended at random moments: nothing torn, nothing mixed, and the same command goes on.
-
-KILLS=34 does what takes too long for every day: so many rounds of each signal for each command, and
-evaluate, too.
-"""
+"""Commands ended at random moments: nothing torn, nothing mixed, and the same command goes on."""
 
 import json
 import os
@@ -14,6 +10,7 @@ import sys
 import time
 import zipfile
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
@@ -23,16 +20,25 @@ import pytest
 from grasp_cosim.recording.load import load_run
 from grasp_cosim.scratch import sweep
 from grasp_fmus.folder import STAMP
+from support import campaign
 from support.native_fmus import build, needs_gcc
 
-pytestmark = [needs_gcc, pytest.mark.slow, pytest.mark.usefixtures("ctrl_c")]
+pytestmark = [
+    needs_gcc,
+    pytest.mark.slow,
+    pytest.mark.campaign,
+    pytest.mark.usefixtures("ctrl_c"),
+]
 
 HOW = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 ENDS = {-signal.SIGKILL, -signal.SIGTERM, -signal.SIGINT, 130, 143, 0}
 """A signal that comes before a command has begun ends it as it does any process."""
 
-ROUNDS = int(os.environ.get("KILLS", "2"))
+ROUNDS = campaign.part(20)
 """So many of each signal."""
+
+LIMIT = 20
+"""Rounds more in which none came before the command had ended: then something is wrong."""
 
 ORPHANED = 60.0
 """s after which no process of a command that has ended may be there."""
@@ -43,10 +49,19 @@ class Rounds:
     """Starts a command again and again in a folder, and ends it at random moments."""
 
     folder: Path
-    chance: random.Random = field(default_factory=lambda: random.Random(14))
-    codes: Counter[int] = field(default_factory=Counter)
+    chance: random.Random = field(default_factory=lambda: random.Random(campaign.first_seed))
+    came: Counter[int] = field(default_factory=Counter)
+    """How often each signal came before the command had ended."""
     whole: float = 0.0
-    """The longest moment, in s."""
+    """The longest moment, in s: what the last one took that no signal ended."""
+
+    def signals(self) -> Iterator[int]:
+        """ROUNDS of each, and more until each has come in time."""
+        yield from HOW * ROUNDS
+        for how in HOW * LIMIT:
+            if not self.came[how]:
+                yield how
+        assert all(self.came[how] for how in HOW), self.came
 
     def start(self, *words: str) -> subprocess.Popen[bytes]:
         """Start a command with a TMPDIR of its own, which all its processes know."""
@@ -70,13 +85,15 @@ class Rounds:
 
     def ended(self, how: int, *words: str) -> int:
         """The exit code of a command that gets a signal at a random moment, unless it has ended."""
+        began = time.monotonic()
         process = self.start(*words)
         try:
             code = process.wait(self.chance.uniform(0.0, self.whole))
+            self.whole = time.monotonic() - began
         except subprocess.TimeoutExpired:
             process.send_signal(how)
             code = process.wait(60)
-        self.codes[code] += 1
+        self.came[how] += code != 0
         assert code in ENDS, words
         self.nothing_left()
         return code
@@ -162,12 +179,11 @@ def test_run(tmp_path: Path) -> None:
         return ("run", system, "--out", "out", "--set", f"a.gain={gain}")
 
     rounds.done(*run(0.5))
-    for k, how in enumerate(HOW * ROUNDS):
+    for k, how in enumerate(rounds.signals()):
         if k % 5 == 4:
             assert rounds.start("report", "out").wait(60) in (0, 2)  # 2 where there is no run
         rounds.ended(how, *run(k + 1))
         check_run(out)
-    assert len(rounds.codes) > 2
     rounds.done(*run(2))
     check_run(out)
     assert set(contents(out)) == {"run.json", "signals.csv"}
@@ -181,13 +197,12 @@ def test_report(tmp_path: Path, built: None) -> None:
     rounds.done("report", "out")
     made = contents(out)
     assert set(made) == {"run.json", "signals.csv", "report.html", "grasp.png"}
-    for k, how in enumerate(HOW * ROUNDS):
+    for k, how in enumerate(rounds.signals()):
         if k % 2:
             for name in ("report.html", "grasp.png"):
                 (out / name).unlink(missing_ok=True)
         rounds.ended(how, "report", "out")
         assert all(made[name] == (out / name).read_bytes() for name in whole_files(out))
-    assert len(rounds.codes) > 2
     rounds.done("report", "out")
     assert contents(out) == made
 
@@ -216,7 +231,7 @@ def test_sweep(tmp_path: Path, built: None) -> None:
     rounds.done(*words, "whole")
     made = {k: v for k, v in contents(tmp_path / "whole").items() if k != "lock"}
     assert set(made) == {"study.json", "runs.parquet", "distributions.png"}
-    for how in HOW * ROUNDS:
+    for how in rounds.signals():
         code = rounds.ended(how, *words, "out")
         now, written = parts(out), whole_files(out) - {"lock"}
         assert kept.items() <= now.items()
@@ -226,20 +241,19 @@ def test_sweep(tmp_path: Path, built: None) -> None:
             assert (written, len(kept)) == (set(made), 6)
             shutil.rmtree(out)
             kept = {}
-    assert len(rounds.codes) > 2
     rounds.done(*words, "out")
     last = contents(out)
     assert {name: last[name] for name in set(last) - {"lock"}} == made
 
 
-@pytest.mark.skipif("KILLS" not in os.environ, reason="takes minutes; see test_evaluate_resume.py")
+@campaign.only_whole("takes minutes; see test_evaluate_resume.py")
 def test_evaluate(tmp_path: Path, built: None) -> None:
     """As a sweep, but finished grasps go with the end."""
     rounds, out, kept = Rounds(tmp_path), tmp_path / "out", Parts()
     rounds.done("evaluate", "--out", "whole")
     made, finished = contents(tmp_path / "whole"), 0
     rounds.whole *= 0.6
-    for how in HOW * ROUNDS:
+    for how in rounds.signals():
         code = rounds.ended(how, "evaluate", "--out", "out")
         now, written = parts(out / "grasps"), whole_files(out)
         assert all(made[name] == (out / name).read_bytes() for name in written)
@@ -251,7 +265,6 @@ def test_evaluate(tmp_path: Path, built: None) -> None:
             assert code
             assert kept.items() <= now.items()
         kept = now
-    assert len(rounds.codes) > 2
     if not finished:
         rounds.done("evaluate", "--out", "out")
         assert contents(out) == made
@@ -260,11 +273,11 @@ def test_evaluate(tmp_path: Path, built: None) -> None:
 
 def test_build(tmp_path: Path) -> None:
     """Each file is the one that was there or the new one, and none is taken for another."""
-    rounds, out, choice = Rounds(tmp_path), tmp_path / "out", random.Random(15)
+    rounds, out, choice = Rounds(tmp_path), tmp_path / "out", random.Random(campaign.first_seed + 1)
     rounds.done("build", "--out", "out")
     made = contents(out)
     old = {name: older(name, data) for name, data in made.items() if name != STAMP}
-    for how in HOW * ROUNDS:
+    for how in rounds.signals():
         for name in choice.sample(sorted(old), 6):
             (out / name).write_bytes(old[name])
         for name in (STAMP, *choice.sample(sorted(old), 6)):
@@ -274,7 +287,6 @@ def test_build(tmp_path: Path) -> None:
         assert all(now[name] in (made[name], old.get(name)) for name in written)
         if code == 0 or STAMP in written:
             assert now == made
-    assert len(rounds.codes) > 2
     rounds.done("build", "--out", "out")
     assert contents(out) == made
 

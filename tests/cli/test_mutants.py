@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from support import campaign
 from support.mutants import complaints, make
 
 TESTS = Path(__file__).parents[1]
@@ -30,9 +31,10 @@ def test_a_few(kind: str, count: int, fmus: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "count"), [("toml", 120), ("fmu", 20), ("ssp", 30)])
+@pytest.mark.campaign
+@pytest.mark.parametrize(("kind", "count"), [("toml", 800), ("fmu", 100), ("ssp", 200)])
 def test_more(kind: str, count: int, fmus: Path, tmp_path: Path) -> None:
-    found = tried(kind, 5000, count, fmus, tmp_path)
+    found = tried(kind, campaign.first_seed, campaign.part(count), fmus, tmp_path)
     assert [e for e in found if e["wrong"]] == []
     assert {0, 2} <= {e["code"] for e in found}  # neither all well nor all refused
 

@@ -32,7 +32,7 @@ from support.foreign_tools import (
     run_in,
     script_of,
 )
-from support.slow import slow
+from support.slow import interop, slow
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs/interoperability.md").read_text("utf-8")
@@ -100,8 +100,12 @@ def kinds(folder_of: Folder, made_once: MadeOnce) -> Mapping[str, Path]:
 
 
 ALL = ("python", "bound", "native", "native FMI 3")
-all_slow = pytest.mark.parametrize("kind", [slow(kind) for kind in ALL])
-of_fmi_2 = pytest.mark.parametrize("kind", [slow(kind) for kind in ALL[:3]])
+every_kind = pytest.mark.parametrize("kind", [interop(kind) for kind in ALL])
+of_fmi_2 = pytest.mark.parametrize("kind", [interop(kind) for kind in ALL[:3]])
+by_fmpy = pytest.mark.parametrize(
+    "kind", [slow(kind) if kind in ("python", "native") else interop(kind) for kind in ALL]
+)
+"""FMPy is there wherever we are."""
 
 
 def grasp_of(folder: Path) -> System:
@@ -148,7 +152,7 @@ def found(python: str, program: str, folder: Path, given: dict[str, object]) -> 
 # From us to them
 
 
-@all_slow
+@every_kind
 @pytest.mark.skipif(not find_library("tbb"), reason="libtbb12, which ecospy needs, is missing")
 def test_ecospy(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
     python = tool("test_ecospy")
@@ -165,7 +169,7 @@ def test_libcosimpy(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> Non
     kept("test_libcosimpy", found(python, COSIM, tmp_path, given), force(system)[1:])
 
 
-@pytest.mark.slow
+@pytest.mark.interop
 def test_libcosimpy_knows_no_fmi_3(kinds: Mapping[str, Path], tmp_path: Path) -> None:
     """Where it does, the page has one kind more to tell of."""
     python = tool("test_libcosimpy")
@@ -175,7 +179,7 @@ def test_libcosimpy_knows_no_fmi_3(kinds: Mapping[str, Path], tmp_path: Path) ->
         run_in(python, COSIM, tmp_path, given)
 
 
-@all_slow
+@every_kind
 def test_cofmupy(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
     python = tool("test_cofmupy")
     system = grasp_of(kinds[kind])
@@ -189,7 +193,7 @@ def test_cofmupy(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
     kept("test_cofmupy", found(python, COFMUPY, tmp_path, given), force(system)[1:])
 
 
-@all_slow
+@by_fmpy
 def test_fmpy(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
     tool("test_fmpy")
     fmu = kinds[kind] / "GripperPlant.fmu"
@@ -197,7 +201,7 @@ def test_fmpy(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
     kept("test_fmpy", result["contact_force[1]"], pushed(fmu, tmp_path))
 
 
-@all_slow
+@by_fmpy
 def test_fmpy_on_the_command_line(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
     python = tool("test_fmpy_on_the_command_line")
     fmu = kinds[kind] / "GripperPlant.fmu"
@@ -210,7 +214,7 @@ def test_fmpy_on_the_command_line(kinds: Mapping[str, Path], kind: str, tmp_path
     kept("test_fmpy_on_the_command_line", column, pushed(fmu, tmp_path))
 
 
-@all_slow
+@by_fmpy
 def test_fmpy_finds_no_problem(kinds: Mapping[str, Path], kind: str) -> None:
     tool("test_fmpy_finds_no_problem")
     shipped = [fmu for fmu in sorted(kinds[kind].glob("*.fmu")) if "MuJoCo" not in fmu.name]
@@ -218,7 +222,7 @@ def test_fmpy_finds_no_problem(kinds: Mapping[str, Path], kind: str) -> None:
     assert [validate_fmu(fmu) for fmu in shipped] == [[]] * len(shipped)
 
 
-@pytest.mark.slow
+@pytest.mark.interop
 def test_pyssp_standard_reads(kinds: Mapping[str, Path], tmp_path: Path) -> None:
     python = tool("test_pyssp_standard_reads")
     system = grasp_of(kinds["python"])
@@ -229,7 +233,7 @@ def test_pyssp_standard_reads(kinds: Mapping[str, Path], tmp_path: Path) -> None
     assert connections == len(system.connections)
 
 
-@all_slow
+@every_kind
 def test_fmutool(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
     python = tool("test_fmutool")
     for name in ("GripperPlant", "ProximitySensor", "GraspController"):
@@ -243,7 +247,7 @@ def test_fmutool(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
 # From them to us
 
 
-@pytest.mark.parametrize("kind", [slow("python"), slow("native FMI 3")])
+@pytest.mark.parametrize("kind", [interop("python"), interop("native FMI 3")])
 def test_pyssp_standard_writes(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
     python = tool("test_pyssp_standard_writes")
     path = archived(grasp_of(kinds[kind]), tmp_path)
@@ -253,7 +257,7 @@ def test_pyssp_standard_writes(kinds: Mapping[str, Path], kind: str, tmp_path: P
     kept("test_pyssp_standard_writes", force(System.load(path)), force(grasp_of(kinds[kind])))
 
 
-@pytest.mark.parametrize("kind", [slow("python"), slow("native FMI 3")])
+@pytest.mark.parametrize("kind", [interop("python"), interop("native FMI 3")])
 def test_pyssp_standard_makes(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
     python = tool("test_pyssp_standard_makes")
     system, path = grasp_of(kinds[kind]), tmp_path / "grasp.ssp"
@@ -268,7 +272,12 @@ SIDE = ("position", "velocity", "contact_force", "gap")
 
 @pytest.mark.parametrize(
     ("kind", "version"),
-    [slow("python", 2), slow("native", 2), slow("native FMI 3", 2), slow("native FMI 3", 3)],
+    [
+        interop("python", 2),
+        interop("native", 2),
+        interop("native FMI 3", 2),
+        interop("native FMI 3", 3),
+    ],
 )
 def test_fmucontainer(kinds: Mapping[str, Path], kind: str, version: int, tmp_path: Path) -> None:
     """Plant and sensors in one container, which hands nothing on before its first step."""
@@ -349,7 +358,10 @@ def alone(fmu: str, folder: Path, values: str, isolation: str = "none") -> Syste
 
 @pytest.mark.parametrize(
     ("package", "fmi", "real", "whole"),
-    [slow("pythonfmu", "Fmi2", "Real", "Integer"), slow("pythonfmu3", "Fmi3", "Float64", "Int32")],
+    [
+        interop("pythonfmu", "Fmi2", "Real", "Integer"),
+        interop("pythonfmu3", "Fmi3", "Float64", "Int32"),
+    ],
 )
 def test_slave_of(package: str, fmi: str, real: str, whole: str, tmp_path: Path) -> None:
     name = f"test_slave_of[{package}]"
@@ -384,7 +396,7 @@ class StateSpace(Fmi3Slave):
 """
 
 
-@pytest.mark.slow
+@pytest.mark.interop
 def test_arrays_of_pythonfmu3(tmp_path: Path) -> None:
     name = "test_arrays_of_pythonfmu3"
     python = tool(name, "numpy")
@@ -429,7 +441,7 @@ class Ball(Fmi3SlaveBase, ModelExchange):
 """
 
 
-@pytest.mark.slow
+@pytest.mark.interop
 def test_model_exchange_of_pythonfmu3(tmp_path: Path) -> None:
     """A ball of 1 m, and its first bounce, against the solution in closed form."""
     name = "test_model_exchange_of_pythonfmu3"
@@ -444,7 +456,7 @@ def test_model_exchange_of_pythonfmu3(tmp_path: Path) -> None:
     kept(name, force(system, "it.h"), np.where(later < 0.0, 1.0 - g * t**2 / 2.0, after))
 
 
-@pytest.mark.slow
+@pytest.mark.interop
 def test_unifmu(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its example, an adder of all types in Python, which it runs in a process behind a socket."""
     python = tool("test_unifmu", "pyzmq", "toml")
@@ -463,7 +475,7 @@ def test_unifmu(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert (result["it.integer_c"][-1], result["it.string_c"][-1]) == (5, "xy")
 
 
-@pytest.mark.parametrize("interface", [slow("CoSimulation"), slow("ModelExchange")])
+@pytest.mark.parametrize("interface", [interop("CoSimulation"), interop("ModelExchange")])
 def test_fmus_from_elsewhere(interface: str) -> None:
     """All FMUs below the folder GRASP_COSIM_FMUS that FMPy runs: the same values in our master."""
     folder = os.environ.get("GRASP_COSIM_FMUS")

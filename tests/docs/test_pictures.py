@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from grasp_cosim import System, simulate
 from report.javascript import in_browser
+from support.campaign import only_whole
 from support.cases import CASES
 from support.pictures import assert_same_picture
 
@@ -47,8 +48,13 @@ def test_a_name_that_is_none(pictures: Any) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize(
-    "name", ["hand", "loop", "evaluation", "report", "colour_map", "reflectance_map"]
+    "name",
+    [
+        *("hand", "loop", "evaluation", "report", "reflectance_map"),
+        pytest.param("colour_map", marks=only_whole("takes more than a minute")),
+    ],
 )
 def test_it_is_the_one_that_the_command_makes(pictures: Any, tmp_path: Path, name: str) -> None:
     """Those of tutorial pages: test_tutorials.py."""

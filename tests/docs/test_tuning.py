@@ -19,6 +19,7 @@ from grasp_cosim.parallel import Crew
 from grasp_cosim.progress import Progress
 from grasp_cosim.tuning.problem import Problem
 from grasp_cosim.tuning.search import Runs
+from support.campaign import only_whole
 from support.pictures import assert_same_picture
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -55,6 +56,8 @@ def test_both_sets_of_gains_reach_what_the_page_says(natives: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.campaign
+@only_whole("takes more than a minute")
 def test_the_command_prints_and_draws_what_is_on_the_page(command: Run, tmp_path: Path) -> None:
     """The search is the same to the bit."""
     _, out, _ = command(*COMMANDS[0].split())

@@ -15,10 +15,10 @@ from typing import Any
 import pytest
 from conftest import Folder
 from grasp_cosim.hil.served import Service
+from support import campaign
 from support.kinds import Kind, all_kinds, native_slowly, proxy_options
 from support.packages import runnable
 from support.proxies import build_proxy, serving
-from support.slow import slow
 
 CALLER = Path(__file__).with_name("random_calls.py")
 
@@ -29,11 +29,11 @@ GROWTH = 4e6
 """Bytes by which the process may grow over the second half of ten seeds or more."""
 
 
-def called(folder: Path, seeds: int, calls: int, fmus: Sequence[Path]) -> dict[str, Any]:
+def called(folder: Path, seeds: range, calls: int, fmus: Sequence[Path]) -> dict[str, Any]:
     """What random_calls.py reports."""
     folder.mkdir()
     done = subprocess.run(
-        [sys.executable, CALLER, folder, "0", str(seeds), str(calls), *fmus],
+        [sys.executable, CALLER, folder, *map(str, (seeds[0], len(seeds), calls)), *fmus],
         cwd=folder, env={**os.environ, "PYTHONPATH": str(CALLER.parents[1])},
         capture_output=True, text=True, timeout=1800,
     )  # fmt: skip
@@ -44,16 +44,23 @@ def called(folder: Path, seeds: int, calls: int, fmus: Sequence[Path]) -> dict[s
     statuses = {name.rpartition(" ")[2] for name in report["calls"]}
     assert statuses <= {"", "0", "2", "3"}  # neither a warning nor fatal
     assert min(report["calls"][f"{name} 0"] for name in ("DoStep", "SetReal")) > 0
-    if seeds >= 10:
+    if len(seeds) >= 10:
         memory = report["memory"]
-        assert memory[-1] - memory[seeds // 2] < GROWTH, memory
+        assert memory[-1] - memory[len(seeds) // 2] < GROWTH, memory
     return report
 
 
+a_campaign = [pytest.mark.slow, pytest.mark.campaign]
+
+
 @all_kinds
-@pytest.mark.parametrize(("seeds", "calls"), [(1, 100), slow(12, 1500)])
+@pytest.mark.parametrize(
+    ("seeds", "calls"),
+    [(range(1), 100), pytest.param(campaign.seeds(120), 800, marks=a_campaign)],
+    ids=["few", "many"],
+)
 def test_the_fmus_live(
-    folder_of: Folder, kind: Kind, tmp_path: Path, seeds: int, calls: int
+    folder_of: Folder, kind: Kind, tmp_path: Path, seeds: range, calls: int
 ) -> None:
     report = called(tmp_path / "host", seeds, calls, runnable(folder_of(kind)))
     for name in ("SetFMUstate", "DeSerializeFMUstate"):
@@ -62,8 +69,12 @@ def test_the_fmus_live(
 
 
 @native_slowly
-@pytest.mark.parametrize(("seeds", "calls"), [(1, 60), slow(10, 500)])
-def test_proxies_live(fmus: Path, kind: Kind, tmp_path: Path, seeds: int, calls: int) -> None:
+@pytest.mark.parametrize(
+    ("seeds", "calls"),
+    [(range(1), 60), pytest.param(campaign.seeds(100), 250, marks=a_campaign)],
+    ids=["few", "many"],
+)
+def test_proxies_live(fmus: Path, kind: Kind, tmp_path: Path, seeds: range, calls: int) -> None:
     """With a peer, and one without."""
     with ExitStack() as stack:
         proxies = []

@@ -23,7 +23,7 @@ from grasp_cosim.hil.served import Service
 from grasp_cosim.ssp.write import write_ssp
 from support.cases import CASES
 from support.proxies import build_proxy, serving
-from support.slow import slow
+from support.slow import interop
 
 STEP = 1e-3  # s
 GAPS = ("plant.gap[1]", "plant.gap[2]")
@@ -60,7 +60,7 @@ json.dump(rows, open(sys.argv[4], "w"))
 """
 
 
-@pytest.fixture(scope="module", params=["python", "native", slow("native proxy")])
+@pytest.fixture(scope="module", params=["python", interop("native"), interop("native proxy")])
 def jacobi(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[System]:
@@ -138,14 +138,14 @@ needs_libcosim = pytest.mark.skipif(
 )
 
 
-@pytest.mark.slow
+@pytest.mark.interop
 @needs_libcosim
 def test_libcosim_finds_the_same_contacts(jacobi: System, tmp_path: Path) -> None:
     """In the step that our archive names for it."""
     check(gaps(COSIM, unpacked(jacobi, tmp_path), jacobi), jacobi)
 
 
-@pytest.mark.slow
+@pytest.mark.interop
 @needs_libcosim
 def test_libcosim_takes_the_step_of_a_component(fmus: Path, tmp_path: Path) -> None:
     grasp = System.load(SYSTEM, fmus).with_experiment(STEP, 2.5, scheme="jacobi")

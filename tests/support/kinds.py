@@ -18,6 +18,7 @@ from grasp_fmus.proxy_build import build_proxy as build_python_proxy
 from grasp_fmus.shipped import SCRIPTS, blocks
 
 from .packages import PACKAGES
+from .slow import platforms, slow
 
 Kind = Literal["python", "native", "native FMI 3"]
 
@@ -25,11 +26,9 @@ NATIVE: dict[Kind, Version] = {"native": 2, "native FMI 3": 3}
 
 all_kinds = pytest.mark.kinds("python", "native", "native FMI 3")
 native_slowly = pytest.mark.parametrize(
-    "kind",
-    ["python", *(pytest.param(k, marks=pytest.mark.slow) for k in NATIVE)],
-    indirect=True,
+    "kind", ["python", slow("native"), platforms("native FMI 3")], indirect=True
 )
-"""All kinds, of which only `make test-slow` takes the native ones."""
+"""All kinds, of which `make test-slow` takes one that is native and `make platforms` the other."""
 both_of_fmi_2 = pytest.mark.kinds("python", "native")
 python_only = pytest.mark.kinds("python")
 
@@ -51,9 +50,14 @@ def exists(name: str, kind: Kind) -> bool:
     return kind == "python" or name not in PACKAGES
 
 
-def is_slow(name: str, kind: Kind, compiles: bool) -> bool:
-    """Whether the quick tests do without: native are one FMU, for FMI 2.0, and no altered ones."""
-    return kind != "python" and (kind != "native" or compiles or (name != QUICK and name in NAMES))
+def tier(name: str, kind: Kind, compiles: bool) -> Literal["quick", "slow", "platforms"]:
+    """Where it is tested: of FMI 2.0 one in the quick tests, unless it is altered, and all in the
+    slow ones; of FMI 3.0 one in the slow ones, and all before a release.
+    """
+    if kind == "native FMI 3":
+        return "slow" if name == QUICK and not compiles else "platforms"
+    others = compiles or (name != QUICK and name in NAMES)
+    return "slow" if kind == "native" and others else "quick"
 
 
 def plan(kind: Kind) -> Plan:

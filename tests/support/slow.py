@@ -1,4 +1,4 @@
-"""Single cases of a parametrised test that take more than about a second."""
+"""Single cases of a parametrised test that the quick tests do without."""
 
 from typing import Any
 
@@ -8,3 +8,13 @@ import pytest
 def slow(*values: Any) -> Any:
     """A case that only `make test-slow` runs."""
     return pytest.param(*values, marks=pytest.mark.slow)
+
+
+def platforms(*values: Any) -> Any:
+    """A case that only `make platforms` runs."""
+    return pytest.param(*values, marks=pytest.mark.platforms)
+
+
+def interop(*values: Any) -> Any:
+    """A case that only `make interop` runs."""
+    return pytest.param(*values, marks=pytest.mark.interop)

@@ -22,7 +22,7 @@ from grasp_fmus.shipped import SCRIPTS, blocks
 from support.compiled import compile_c
 from support.kinds import TRANSLATED
 from support.native_fmus import needs_gcc
-from support.slow import slow
+from support.slow import platforms, slow
 
 ROOT = Path(__file__).parents[3]
 SPRING = ROOT / "docs/spring_plant.py"
@@ -66,7 +66,7 @@ def compiled(folder: Path, *options: str, compiler: str = "gcc") -> None:
 
 
 @pytest.mark.parametrize("level", ["-O0", slow("-O3")])
-@pytest.mark.parametrize("compiler", ["gcc", slow("clang")])
+@pytest.mark.parametrize("compiler", ["gcc", platforms("clang")])
 @pytest.mark.parametrize("name", [*map(slow, TRANSLATED[1:]), TRANSLATED[0], "SpringPlant"])
 def test_compiles_without_a_warning_and_calls_what_it_lists(
     name: str, compiler: str, level: str, written: Callable[[str], Path]

@@ -16,7 +16,7 @@ from support.compiled import compile_c
 from support.fmi2 import ERROR, OK, Fmu, Instance
 from support.hand_written import GUID, NAME, STRICT, compile_in, native_fmu, write_sources
 from support.native_fmus import needs_gcc
-from support.slow import slow
+from support.slow import platforms, slow
 
 pytestmark = needs_gcc
 
@@ -32,7 +32,7 @@ def compiler(name: str) -> str:
 
 
 @pytest.mark.parametrize("cc", COMPILERS)
-@pytest.mark.parametrize("level", ["-O0", slow("-O2"), slow("-O3")])
+@pytest.mark.parametrize("level", ["-O0", platforms("-O2"), slow("-O3")])
 def test_no_warning(cc: str, level: str, tmp_path: Path) -> None:
     for fmi in VERSIONS:
         write_sources(tmp_path / str(fmi), fmi)
@@ -122,7 +122,7 @@ def has_fma() -> bool:
 
 @pytest.mark.slow
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="NO x86-64")
-@pytest.mark.parametrize("cc", ["gcc", slow("clang")])
+@pytest.mark.parametrize("cc", ["gcc", platforms("clang")])
 @pytest.mark.parametrize(
     ("options", "reason"),
     [

@@ -105,7 +105,7 @@ def test_works_where_nothing_can_be_kept(place: str, monkeypatch: pytest.MonkeyP
 
 
 @needs_zig
-@pytest.mark.slow
+@pytest.mark.platforms
 def test_zig_needs_no_folder_to_keep_its_libraries_in(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -302,7 +302,7 @@ def test_one_library_for_both_processors_of_macos() -> None:
 
 
 @needs_zig
-@pytest.mark.slow
+@pytest.mark.platforms
 @pytest.mark.parametrize("target", [LINUX_X86, LINUX_ARM, MAC_X86, MAC_ARM])
 def test_zig_compiles_for_others(target: Target) -> None:
     magic = b"\x7fELF" if target.suffix == ".so" else struct.pack("<I", 0xFEEDFACF)

@@ -740,7 +740,7 @@ def test_each_construct_gives_the_bits_and_the_faults_of_python(blocks: Both) ->
 
 
 @pytest.mark.slow
-@examples(8_000)
+@examples(2_000)
 @given(
     st.integers(0, len(NAMES) - 1),
     st.tuples(numbers, numbers, numbers),

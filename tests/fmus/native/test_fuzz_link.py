@@ -1,7 +1,4 @@
-"""libFuzzer on the C of both sides of the link, with the sanitisers, from inputs that make sense.
-
-FUZZ_SECONDS=600 has it go on for that long, on each side.
-"""
+"""libFuzzer on the C of both sides of the link, with sanitisers, from inputs that make sense."""
 
 import os
 import shutil
@@ -18,10 +15,13 @@ from grasp_fmus.model_description import Experiment
 from grasp_fmus.native.proxy import proxy_members
 from grasp_fmus.proxy import DEFAULTS
 from grasp_fmus.proxy_build import Original
+from support import campaign
 from support.scripted_peer import SIGNATURE, VARIABLES
 
 FUZZ = Path(__file__).parent / "fuzz"
-SECONDS = os.environ.get("FUZZ_SECONDS", "15")
+RUNS = campaign.part(60_000)
+"""Inputs that each side is given."""
+
 FLAGS = [
     "-std=c99",
     "-g",
@@ -32,6 +32,7 @@ FLAGS = [
 
 pytestmark = [
     pytest.mark.slow,
+    pytest.mark.campaign,
     pytest.mark.skipif(not shutil.which("clang"), reason="NO clang"),
 ]
 
@@ -56,14 +57,14 @@ def fuzzer(folder: Path, source: Path) -> Path:
 
 
 def fuzzed(program: Path, seeds: Iterator[bytes]) -> None:
-    """Nothing is found, and no more memory needed, in the time that there is."""
+    """Nothing is found, and no more memory needed, in so many runs."""
     corpus, found = program.parent / "corpus", program.parent / "found"
     for folder in (corpus, found):
         folder.mkdir()
     for i, seed in enumerate(seeds):
         (corpus / f"{i}").write_bytes(seed)
-    options = [f"-max_total_time={SECONDS}", "-seed=1", "-rss_limit_mb=600", "-max_len=6000"]
-    options += [f"-artifact_prefix={found}/", "-print_final_stats=1"]
+    options = [f"-runs={RUNS}", f"-seed={campaign.first_seed + 1}", "-rss_limit_mb=600"]
+    options += ["-max_len=6000", f"-artifact_prefix={found}/", "-print_final_stats=1"]
     # By a shell: a process inherits the peak of memory of the one that starts it, here of tests.
     command = ["/bin/sh", "-c", '"$@"; exit $?', "sh", str(program), *options, str(corpus)]
     # What was freed is kept to find its use, and counts as memory: how much depends on speed.
@@ -72,7 +73,7 @@ def fuzzed(program: Path, seeds: Iterator[bytes]) -> None:
     assert done.returncode == 0, done.stderr[-3000:]
     assert not [*found.iterdir()]
     runs = next(line for line in done.stderr.splitlines() if "number_of_executed_units" in line)
-    assert int(runs.split()[-1]) > 1000
+    assert int(runs.split()[-1]) >= RUNS
 
 
 def sized(data: bytes) -> bytes:

@@ -37,7 +37,7 @@ IN_WINDOWS = re.compile(r"KERNEL32\.dll|ntdll\.dll|api-ms-win-crt-[a-z]+-l1-1-0\
 
 pytestmark = [
     needs_zig,
-    pytest.mark.slow,
+    pytest.mark.platforms,
     pytest.mark.skipif(not shutil.which("objdump"), reason="NO objdump"),
 ]
 

@@ -32,6 +32,10 @@ def members(fmu: Path) -> dict[str, bytes]:
     return read_members(fmu.read_bytes())
 
 
+TWO = ["GraspController", "ProximitySensor"]
+"""Names of FMUs that are soon compiled."""
+
+
 def contents(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
@@ -134,9 +138,9 @@ def test_the_same_bytes_without_a_cache(
     natives: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    build_native(tmp_path / "out")
-    assert contents(tmp_path / "out") == contents(natives)
-    assert len([*(tmp_path / "cache/grasp-cosim/native").iterdir()]) == len(TRANSLATED)
+    for built in build_native(tmp_path / "out", names=TWO):
+        assert built.path.read_bytes() == (natives / built.path.name).read_bytes()
+    assert len([*(tmp_path / "cache/grasp-cosim/native").iterdir()]) == len(TWO)
 
 
 @pytest.mark.slow
@@ -146,7 +150,7 @@ def test_another_compiler_makes_another_binary_and_nothing_else_anew(
 ) -> None:
     shutil.copytree(natives, tmp_path / "out")
     monkeypatch.setenv("CC", "clang")
-    for built in build_native(tmp_path / "out"):
+    for built in build_native(tmp_path / "out", names=TWO):
         assert built.changes == (f"{BINARY.format(built.path.stem)}: changed",)
 
 

@@ -16,6 +16,7 @@ from grasp_fmus.native.targets import Version
 from grasp_fmus.proxy import DEFAULTS
 from grasp_fmus.proxy_build import Original
 from support import kinds, scripted_peer
+from support.campaign import seeds
 from support.fmi2 import Fmu
 from support.kinds import Kind
 from support.native_proxies import STRICT
@@ -30,7 +31,7 @@ from support.scripted_peer import (
     miss,
     send_kept_and_miss,
 )
-from support.slow import slow
+from support.slow import platforms
 
 ACTS = (answer, answer, answer, miss, keep, send_kept_and_miss, forget, fail)
 KEY = b"sixteen bytes of key, and some more"
@@ -62,21 +63,25 @@ def exchanged(kind: Kind, seed: int, key: Path | None, patch: pytest.MonkeyPatch
 
 @pytest.mark.parametrize("with_key", [False, True])
 @pytest.mark.parametrize(
-    ("kind", "seed"), [("native", 1), *(slow("native", s) for s in range(2, 30))]
+    "drawn",
+    [range(1), pytest.param(seeds(60), marks=[pytest.mark.slow, pytest.mark.campaign])],
+    ids=["one", "many"],
 )
 def test_the_same_datagrams_to_the_byte(
-    kind: Kind, seed: int, with_key: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    drawn: range, with_key: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     key = tmp_path / "key" if with_key else None
     if key:
         key.write_bytes(KEY)
         key.chmod(0o600)
-    theirs = exchanged(kind, seed, key, monkeypatch)
-    sessions = dict.fromkeys(int.from_bytes(d[24:32], "little") for d in theirs)
-    assert {d[6] for d in theirs} == {HELLO, INITIALISE, STEP, END}
-    drawn = iter(sessions)
-    monkeypatch.setattr(connection, "randbits", lambda bits: next(drawn))
-    assert exchanged("python", seed, key, monkeypatch) == theirs
+    for seed in drawn:
+        with monkeypatch.context() as patch:
+            theirs = exchanged("native", seed, key, patch)
+            found = dict.fromkeys(int.from_bytes(d[24:32], "little") for d in theirs)
+            assert {d[6] for d in theirs} == {HELLO, INITIALISE, STEP, END}, seed
+            sessions = iter(found)
+            patch.setattr(connection, "randbits", lambda bits, known=sessions: next(known))
+            assert exchanged("python", seed, key, patch) == theirs, seed
 
 
 def write_sources(folder: Path, fmi: Version) -> None:
@@ -91,7 +96,7 @@ def write_sources(folder: Path, fmi: Version) -> None:
 @pytest.mark.parametrize("level", ["-O0", "-O3"])
 @pytest.mark.parametrize(
     ("compiler", "libraries"),
-    [("gcc", ""), ("clang", ""), ("x86_64-w64-mingw32-gcc", "-lws2_32")],
+    [("gcc", ""), ("clang", ""), platforms("x86_64-w64-mingw32-gcc", "-lws2_32")],
 )
 def test_the_sources_compile_without_a_warning(
     tmp_path: Path, compiler: str, libraries: str, level: str, fmi: Version

@@ -19,7 +19,7 @@ HOST = Path(__file__).with_name("platform_host.c")
 ARM = Path("/usr/aarch64-linux-gnu")
 ENDING = {LINUX_X86: "", LINUX_ARM: "", WINDOWS: ".exe"}
 
-pytestmark = [needs_zig, pytest.mark.slow]
+pytestmark = [needs_zig, pytest.mark.platforms]
 
 Ends = list[list[float]]
 """Status and two outputs at both ends."""

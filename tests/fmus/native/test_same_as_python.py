@@ -18,6 +18,7 @@ from xml.etree import ElementTree
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
+from support.campaign import seeds
 from support.examples import examples
 from support.fmi2 import DISCARD, ERROR, OK, Fmu, Instance, Logged, State
 from support.hand_written import content, native_fmu, python_fmu
@@ -185,7 +186,11 @@ class Drawn:
 
 
 @pytest.mark.parametrize("name", TRANSLATED)
-@pytest.mark.parametrize("seeds", [range(20), pytest.param(range(20, 600), marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "seeds",
+    [range(20), pytest.param(seeds(600), marks=[pytest.mark.slow, pytest.mark.campaign])],
+    ids=["few", "many"],
+)
 def test_any_calls_of_the_blocks_that_come_with_the_package(
     name: str, seeds: range, fmus: Path, natives: Path, tmp_path: Path
 ) -> None:

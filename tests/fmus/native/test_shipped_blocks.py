@@ -14,6 +14,8 @@ from fmus.native.c_block import CBlock, PythonBlock, compiler, library, same
 from grasp_fmus.block_build import _parsed, _run
 from grasp_fmus.native.translation import translated
 from grasp_fmus.shipped import SCRIPTS, slave_class
+from support.campaign import seeds
+from support.slow import platforms
 
 SHIPPED = [script.stem for script in sorted(SCRIPTS.glob("*.py")) if "MuJoCo" not in script.stem]
 NAMES = [*SHIPPED, "SpringPlant"]
@@ -115,17 +117,25 @@ def test_c_gives_the_bits_and_the_faults_of_python(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("flag", ["-O0", "-O2", "-O3"])
-@pytest.mark.parametrize("cc", ["gcc", "clang"])
+@pytest.mark.campaign
+@pytest.mark.parametrize(
+    ("cc", "flag"),
+    [
+        *[("gcc", "-O3"), ("clang", "-O2")],
+        *(platforms("gcc", flag) for flag in ("-O0", "-O2")),
+        *(platforms("clang", flag) for flag in ("-O0", "-O3")),
+    ],
+)
 @pytest.mark.parametrize("name", NAMES)
 def test_any_compiler_gives_the_bits_of_python(
     built: dict[str, Built], folder: Path, name: str, cc: str, flag: str
 ) -> None:
     python, files = built[name]
-    _many(CBlock(library(files, folder / name, cc, flag)), python, range(1000, 1150))
+    _many(CBlock(library(files, folder / name, cc, flag)), python, seeds(400))
 
 
 @pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", NAMES)
 def test_the_sanitizers_find_nothing(built: dict[str, Built], folder: Path, name: str) -> None:
     """With the library in a Python that has them preloaded."""
@@ -138,7 +148,7 @@ def test_the_sanitizers_find_nothing(built: dict[str, Built], folder: Path, name
         "import sys; from pathlib import Path\n"
         "from fmus.native import test_shipped_blocks as t\n"
         f"python = t.python_block({name!r})\n"
-        f"t._many(t.CBlock(Path({str(path)!r})), python, range(2000, 2040))\n"
+        f"t._many(t.CBlock(Path({str(path)!r})), python, {seeds(200)})\n"
     )
     environment = {
         **os.environ,

@@ -48,7 +48,7 @@ def test_the_wasm_is_made_from_the_sources_at_hand() -> None:
     assert wasm.made_from(zlib.decompress(shipped())) == wasm.hash_at_hand()
 
 
-@pytest.mark.slow
+@pytest.mark.platforms
 @needs_zig
 def test_zig_makes_the_same_wasm_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Bit for bit, of the sources at hand."""

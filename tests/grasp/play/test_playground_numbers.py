@@ -12,8 +12,10 @@ from grasp_cosim import cli
 from grasp_cosim.grasp.play.page import playground_html
 from grasp_cosim.grasp.play.system import LAWS, PLANTS, page_system
 from report.javascript import in_browser
+from support import campaign
+from support.native_fmus import needs_gcc
 
-pytestmark = pytest.mark.slow
+pytestmark = [needs_gcc, pytest.mark.slow]
 
 VISIT = """
 const seen = [];
@@ -37,11 +39,11 @@ def visited(addresses: Sequence[str], folder: Path) -> list[dict[str, Any]]:
 
 
 def assert_equal_to_a_run(page: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
-    """Run the command that the page shows; each of its metrics is the page's."""
+    """Run the command that the page shows, in C; each of its metrics is the page's."""
     assert page["said"] == ""
     name, *words = shlex.split(page["command"])
     assert name == "grasp-cosim"
-    assert cli.main([*words, "--json"]) == 0, page["command"]
+    assert cli.main([*words, "--json", "--native"]) == 0, page["command"]
     run = json.loads(capsys.readouterr().out)
     metrics = {k: v for k, v in page["metrics"].items() if v != [None, None] or k in run}
     assert set(metrics) == set(run) & set(page["metrics"]), page["command"]
@@ -87,7 +89,8 @@ def drawn(choose: random.Random) -> str:
     return "&".join(parts)
 
 
+@pytest.mark.campaign
 def test_of_settings_drawn_at_random(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    choose = random.Random(19)
-    for page in visited([drawn(choose) for _ in range(30)], tmp_path):
+    addresses = [drawn(random.Random(seed)) for seed in campaign.seeds(300)]
+    for page in visited(addresses, tmp_path):
         assert_equal_to_a_run(page, capsys)

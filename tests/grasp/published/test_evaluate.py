@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from conftest import MadeOnce
 from grasp_cosim import System, simulate
+from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.grasp.published.evaluate import evaluate
 from support.cases import CASES
 
@@ -15,11 +16,11 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="session")
-def made(grasp: System, made_once: MadeOnce) -> Path:
+def made(natives: Path, made_once: MadeOnce) -> Path:
     """The folder with what is written, and what is returned beside it. At 0.5 ms."""
 
     def fill(folder: Path) -> None:
-        system = grasp.with_experiment(step=5e-4)
+        system = System.load(SYSTEM, natives).with_experiment(step=5e-4)
         report = evaluate(system, folder / "out", workers=2, progress=False)
         (folder / "returned.json").write_text(json.dumps(report))
 

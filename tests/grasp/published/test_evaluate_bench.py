@@ -10,7 +10,7 @@ import pytest
 from conftest import MadeOnce, Run
 from grasp_cosim import InputError, System
 from grasp_cosim.grasp.closing import close
-from grasp_cosim.grasp.presets import with_preset
+from grasp_cosim.grasp.presets import SYSTEM, with_preset
 from grasp_cosim.grasp.published.evaluate import evaluate
 from support.cases import CASES
 
@@ -19,8 +19,8 @@ QUIET = {f"sensor_{j}.noise.enabled": False for j in (1, 2)}
 
 
 @pytest.fixture(scope="session")
-def bench(grasp: System) -> System:
-    return with_preset(grasp, "bench")
+def bench(natives: Path) -> System:
+    return with_preset(System.load(SYSTEM, natives), "bench")
 
 
 @pytest.fixture(scope="session")

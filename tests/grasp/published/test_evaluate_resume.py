@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from conftest import MadeOnce
 from grasp_cosim import InputError, System
-from grasp_cosim.grasp.presets import CASES
+from grasp_cosim.grasp.presets import CASES, SYSTEM
 from grasp_cosim.grasp.published import evaluate as module
 from grasp_cosim.grasp.published.evaluate import evaluate
 from grasp_cosim.grasp.published.grasps import Run
@@ -23,17 +23,17 @@ SHOWN = 10
 Keep = Callable[[int, Run], None]
 
 
-@pytest.fixture
-def coarse(grasp: System) -> System:
-    return grasp.with_experiment(step=1e-3)
+@pytest.fixture(scope="session")
+def coarse(natives: Path) -> System:
+    return System.load(SYSTEM, natives).with_experiment(step=1e-3)
 
 
 @pytest.fixture(scope="session")
-def at_once(grasp: System, made_once: MadeOnce) -> Path:
+def at_once(coarse: System, made_once: MadeOnce) -> Path:
     """What an evaluation writes that nobody breaks off."""
 
     def fill(folder: Path) -> None:
-        evaluate(grasp.with_experiment(step=1e-3), folder, workers=2, progress=False)
+        evaluate(coarse, folder, workers=2, progress=False)
 
     return made_once("evaluate_at_once", fill)
 

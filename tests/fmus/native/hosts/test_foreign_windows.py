@@ -17,7 +17,7 @@ from grasp_fmus.native.targets import WINDOWS
 from support.compilers import needs_zig
 from support.platforms import needs_programs, windows
 
-pytestmark = [pytest.mark.slow, needs_programs("wine"), needs_zig]
+pytestmark = [pytest.mark.platforms, needs_programs("wine"), needs_zig]
 
 NAMES = ("GraspController", "GripperPlant", "GripperPlantMovable", "ProximitySensor")
 

@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 from grasp_fmus.native.targets import here
+from support import campaign
 from support.c_host import BENCH, Grasp, Host, Part, Rows, Script, bits, good, rows_in_python
 from support.hosts import Parts
 from support.platforms import host_of
-from support.slow import slow
+from support.slow import platforms, slow
 
 pytestmark = pytest.mark.skipif(not shutil.which("gcc"), reason="NO gcc")
 
@@ -63,7 +64,13 @@ def started(grasp: Grasp, **how: Any) -> Script:
         *(slow(3000, 1e-3, plant, values) for plant in PLANTS for values in ({}, BENCH)),
         slow(30_000, 1e-4, "GripperPlantMovable", BENCH),
         slow(300, 0.01, "GripperPlantCompliant", BENCH),
-        slow(100_000, 1e-3, "GripperPlant", BENCH),
+        pytest.param(
+            campaign.part(100_000),
+            1e-3,
+            "GripperPlant",
+            BENCH,
+            marks=[pytest.mark.slow, pytest.mark.campaign],
+        ),
     ],
 )
 def test_the_loop_is_that_of_the_blocks_to_the_bit(
@@ -273,10 +280,14 @@ def test_memory_is_asked_for_at_the_start_and_for_states_alone(
     assert (first - start, loop - first, saved - loop, again - saved) == (0, 0, 4, 0)
 
 
+fmi_2_first = pytest.mark.parametrize(
+    "parts", [2, platforms(3)], ids=["FMI 2", "FMI 3"], indirect=True
+)
 SANITIZERS = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
 
 
 @pytest.mark.slow
+@fmi_2_first
 def test_sanitizers_find_nothing(parts: Parts, tmp_path: Path) -> None:
     everything(_sanitized(parts, tmp_path), host_of(here(), tmp_path, SANITIZERS), tmp_path)
 
@@ -296,6 +307,7 @@ def _sanitized(parts: Parts, folder: Path) -> Parts:
 
 
 @pytest.mark.slow
+@fmi_2_first
 @pytest.mark.skipif(not shutil.which("valgrind"), reason="NO valgrind")
 def test_valgrind_finds_nothing(parts: Parts, host: Host, tmp_path: Path) -> None:
     """No error, and nothing that was not freed."""

@@ -15,7 +15,7 @@ from support.c_host import BENCH, Grasp, Host, Rows, Script, bits, good, rows_in
 from support.hosts import Parts
 from support.platforms import ARM, WIN, X86, Platform, cases
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.platforms
 
 H = 1e-3
 CLOSE = 1e-12

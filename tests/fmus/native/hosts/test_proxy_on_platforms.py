@@ -12,7 +12,7 @@ from support.fmi2 import Fmu, Instance
 from support.platforms import needs_programs
 from support.proxies import build_proxy, serving, wait_until
 
-pytestmark = [pytest.mark.slow, needs_zig]
+pytestmark = [pytest.mark.platforms, needs_zig]
 
 ON_WINDOWS = needs_programs("wine")
 ON_ARM = needs_programs("qemu-aarch64", "aarch64-linux-gnu-gcc")
