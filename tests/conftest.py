@@ -92,7 +92,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             items.remove(item)
         else:
             tier = kinds.tier(name, kind, "altered" in getattr(item, "fixturenames", ()))
-            if tier != "quick":
+            if tier != "quick" and not item.get_closest_marker("interop"):
                 item.add_marker(tier)
     items.sort(key=lambda item: item.get_closest_marker("slow") is None)
 
