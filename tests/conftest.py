@@ -27,7 +27,7 @@ from hypothesis import strategies as st
 from support import campaign, kinds
 from support.fmi2 import Fmu
 from support.kinds import Kind
-from support.packages import skip_where_it_cannot_run
+from support.packages import skip_where_it_cannot_run, skip_without_pythonfmu
 
 pytest_plugins = ("support.hosts", "support.budget")
 
@@ -320,6 +320,8 @@ def altered(tmp_path: Path, kind: Kind) -> Altered:
 
 def alter(folder: Path, kind: Kind, script: str, source: str, before: str, after: str) -> Path:
     """Build in the folder the FMU of a script with one place in one source file changed."""
+    if kind == "python":
+        skip_without_pythonfmu()
     package = source.partition("/")[0]
     sources = folder / "sources"
     shutil.rmtree(sources, ignore_errors=True)

@@ -21,6 +21,9 @@ from grasp_cosim.qualification.qualify import qualify
 from grasp_cosim.recording.load import load_log
 from grasp_cosim.recording.result import UNITS
 from support.milli import milli_plant
+from support.packages import needs_pythonfmu
+
+pytestmark = needs_pythonfmu
 
 STEP, STOP = 1e-3, 3.0
 VALUES = (

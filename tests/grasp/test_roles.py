@@ -22,6 +22,7 @@ from grasp_cosim.metrics.metric import Signals, measure
 from grasp_cosim.recording.result import UNITS
 from hypothesis import given
 from hypothesis import strategies as st
+from support.packages import needs_pythonfmu
 
 LOST = (
     'no metrics of the grasp: no component is the plant; name it under [roles]: plant = "gripper"',
@@ -333,6 +334,7 @@ def test_a_user_s_metrics_have_bands_in_a_qualification(
     assert judged["lazy"][1] == "derived"
 
 
+@needs_pythonfmu
 @pytest.mark.parametrize(
     ("more", "code", "ends"),
     [

@@ -20,6 +20,7 @@ from conftest import Altered, UnpackIn
 from grasp_cosim import InputError, SimulationError, System, simulate
 from grasp_cosim.grasp.presets import SYSTEM
 from support.cases import CASES
+from support.packages import needs_pythonfmu
 
 SHORT = 0.05
 
@@ -133,6 +134,7 @@ def test_a_value_that_is_not_finite_ends_the_run_where_it_arises(
     assert np.isfinite(result["sensor_1.intensity"][:-1]).all()
 
 
+@needs_pythonfmu
 def test_a_damaged_archive_is_a_wrong_input(grasp: System, fmus: Path, tmp_path: Path) -> None:
     data = bytearray((fmus / "GripperPlant.fmu").read_bytes())
     data[len(data) // 4] ^= 0xFF  # in the compressed binary
@@ -142,6 +144,7 @@ def test_a_damaged_archive_is_a_wrong_input(grasp: System, fmus: Path, tmp_path:
         simulate(grasp.swap("plant", damaged), stop=1e-3)
 
 
+@needs_pythonfmu
 def test_a_library_that_does_not_load_leaves_the_working_folder(
     grasp: System, fmus: Path, tmp_path: Path
 ) -> None:
@@ -167,6 +170,7 @@ def test_nothing_stays_in_the_temporary_folder_or_on_the_path(
     assert sys.path == before
 
 
+@needs_pythonfmu
 def test_a_temporary_folder_that_crashes_pythonfmu_is_refused(
     grasp: System, unpack_in: UnpackIn
 ) -> None:

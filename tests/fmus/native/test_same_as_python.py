@@ -24,8 +24,9 @@ from support.fmi2 import DISCARD, ERROR, OK, Fmu, Instance, Logged, State
 from support.hand_written import content, native_fmu, python_fmu
 from support.kinds import TRANSLATED
 from support.native_fmus import needs_gcc
+from support.packages import needs_pythonfmu
 
-pytestmark = needs_gcc
+pytestmark = [needs_gcc, needs_pythonfmu]
 
 FAULT, SEED, NOISY, HELD = 9, 8, 10, 1
 REALS = {"force": 0, "position": 2, "velocity": 3, "mass": 5, "gain": 6, "start": 7}
