@@ -15,7 +15,10 @@ BIN := .venv/bin
 PIP := PIP_CONSTRAINT=constraints.txt PIP_DISABLE_PIP_VERSION_CHECK=1 $(BIN)/python -m pip install --quiet
 
 # Tests start hundreds of Pythons: none should compile all modules anew, whatever the environment.
-PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 2 --maxschedchunk 1
+PYTEST = PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 2 --maxschedchunk 1 $(TESTS)
+
+# What there is of another processor, emulated, where all tests would take hours
+ON_ARM := tests/fmi tests/master tests/grasp tests/fmus/native
 
 SEED ?= $(shell date +%s)
 
@@ -32,8 +35,12 @@ test: .venv/dev
 test-slow: .venv/dev
 	$(PYTEST) -m "slow and not platforms and not interop"
 
-platforms: .venv/platforms
+platforms: .venv/platforms run
 	$(PYTEST) -m platforms
+	.ci/platform trixie amd64 make run test
+	.ci/platform sid amd64 make run test
+	.ci/platform sid amd64 make run test PYTHON=python3.15
+	.ci/platform bookworm arm64 make run test TESTS="$(ON_ARM)"
 
 interop: .venv/interop
 	$(PYTEST) -m interop
