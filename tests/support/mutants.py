@@ -112,7 +112,7 @@ def _paths(node: Any) -> Iterator[tuple[Any, ...]]:
 
 def _mutate_tree(node: Any, rng: Random) -> Any:
     """One place of a tree of tables and lists changed."""
-    if isinstance(node, dict | list) and rng.random() < 0.5:
+    if isinstance(node, dict | list) and rng.random() < 0.5 and node:
         path = rng.choice(list(_paths(node)))
         inner = node
         for key in path[:-1]:
