@@ -40,6 +40,9 @@ def test_without_cvode_it_is_refused_by_name(
     monkeypatch.setattr(fmpy, "platform_tuple", "riscv64-linux")
     for module in ("fmpy.sundials.libraries", *SOLVING):
         monkeypatch.delitem(sys.modules, module, raising=False)
+        package, _, name = module.rpartition(".")
+        if package in sys.modules:
+            monkeypatch.delattr(sys.modules[package], name, raising=False)
     build_model("dahlquist", tmp_path, "2.0", ["ModelExchange"])
     path = tmp_path / "system.toml"
     part = '[components.part]\nfmu = "dahlquist.fmu"\nvalues = { u = 0.0 }\n'
