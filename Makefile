@@ -14,8 +14,10 @@ PYTHON ?= $(firstword $(foreach p,python3 python3.15 python3.14 python3.13 pytho
 BIN := .venv/bin
 PIP := PIP_CONSTRAINT=constraints.txt PIP_DISABLE_PIP_VERSION_CHECK=1 $(BIN)/python -m pip install --quiet
 
-# Tests start hundreds of Pythons: none should compile all modules anew, whatever the environment.
-PYTEST = PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 2 --maxschedchunk 1 $(TESTS)
+# Tests start hundreds of Pythons: none should compile all modules anew, whatever the environment, nor
+# start threads for large matrices. Limits on CI's machine: tests/support/budget.py.
+PYTEST = PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 \
+	$(BIN)/python -m pytest -n 2 --dist worksteal $(TESTS)
 
 # What there is of another processor, emulated, where all tests would take hours
 ON_ARM := tests/fmi tests/master tests/grasp tests/fmus/native

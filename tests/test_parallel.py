@@ -90,6 +90,7 @@ def _clear(error: type[BaseException]) -> None:
     _Cleared(error)
 
 
+@pytest.mark.slow
 def test_ctrl_c_while_a_process_clears_away_is_no_traceback(
     capfd: pytest.CaptureFixture[str],
 ) -> None:

@@ -250,6 +250,7 @@ def test_inspect_of_what_is_no_fmu(command: Run, tmp_path: Path) -> None:
     assert err.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_doctor_finds_nothing_wrong_with_ours(command: Run, fmus: Path) -> None:
     code, out, err = command("doctor", str(fmus / "ProximitySensor.fmu"), "--json")
     assert (code, err) == (0, "")

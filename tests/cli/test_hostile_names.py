@@ -10,6 +10,7 @@ import pytest
 from grasp_cosim import load_run
 from grasp_cosim.cli import main
 from support.native_fmus import TYPES, build, needs_gcc
+from support.slow import slow
 
 NAMES = {
     "y_Float64": "=cmd|' /C calc'!A0",
@@ -78,7 +79,7 @@ def test_every_writer(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
 
 
 @needs_gcc
-@pytest.mark.parametrize("command", ["inspect", "doctor"])
+@pytest.mark.parametrize("command", ["inspect", slow("doctor")])
 def test_what_is_printed(folder: Path, command: str, capsys: pytest.CaptureFixture[str]) -> None:
     main([command, str(folder / "hostile.fmu")])
     said = capsys.readouterr()

@@ -99,12 +99,13 @@ def test_run_takes_the_fmus_as_they_are_named(command: Run) -> None:
     assert not any("pythonfmu" in fmu["tool"] for fmu in ran("a").values())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "arguments",
     [
-        slow(("run", "--step-study", "--step", "3.2e-3", "--stop", "0.64", "--of", "plant.gap[1]",
-              "--tolerance", "1")),
-        slow(("sweep", "study.toml", "--workers", "1")),
+        ("run", "--step-study", "--step", "3.2e-3", "--stop", "0.64", "--of", "plant.gap[1]",
+         "--tolerance", "1"),
+        ("sweep", "study.toml", "--workers", "1"),
         ("qualify", "plant.fmu", "--as", "plant", *SHORT, "--isolation", "none"),
     ],
     ids=lambda arguments: arguments[0],

@@ -36,6 +36,7 @@ def test_what_an_fmu_prints_does_not_get_into_the_json(tmp_path: Path) -> None:
     assert "native FMU 2.0 instantiated" in done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not FULL.exists(), reason="this system has no /dev/full")
 def test_a_full_disk_is_no_wrong_input(fmus: Path, tmp_path: Path) -> None:
     text = SYSTEM.read_text("utf-8").replace('fmu = "', f'fmu = "{fmus}/')

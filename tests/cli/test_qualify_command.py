@@ -133,6 +133,7 @@ def test_a_candidate_that_does_not_fit_is_not_run_nor_drawn(qualify: Run, fmus: 
     assert json.loads(Path("results/qualification.json").read_text())["qualified"] is False
 
 
+@pytest.mark.slow
 def test_bands_and_values_are_taken(qualify: Run, altered: Altered, tmp_path: Path) -> None:
     heavy = altered(
         "GripperPlant", "gripper_plant/fingers.py", BEFORE, BEFORE.replace("0.5)", "0.6)")

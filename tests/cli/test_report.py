@@ -20,6 +20,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path / "results"
 
 
+@pytest.mark.slow
 def test_the_page_and_the_picture_are_beside_the_run(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

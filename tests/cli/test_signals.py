@@ -107,8 +107,9 @@ def test_a_signal_keeps_what_a_run_recorded(
 
 
 @needs_gcc
-@pytest.mark.parametrize("engine", ["python", slow("compiled")])
-@pytest.mark.parametrize("number", [signal.SIGINT, slow(signal.SIGTERM)])
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["python", "compiled"])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_second_signal_ends_a_run_that_hangs(
     start: Start, tmp_path: Path, engine: str, number: int
 ) -> None:

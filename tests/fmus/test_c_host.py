@@ -206,6 +206,7 @@ def test_the_modules_are_those_of_the_python_it_is_bound_to(
     assert (done.returncode, done.stderr) == (0, ""), done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("version", VERSIONS)
 def test_what_is_refused_in_c_is_an_error_to_go_on_from(
     host: Path, bound: Bind, version: str
@@ -227,6 +228,7 @@ def assert_a_proxy_ran(done: subprocess.CompletedProcess[str], peer: ScriptedPee
     assert peer.kinds() == [HELLO, INITIALISE, *[STEP] * (STEPS - 1), END]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("version", VERSIONS)
 def test_a_bound_proxy_runs_in_c(host: Path, tmp_path: Path, version: str) -> None:
     wire = Signature(tuple(v for v in SIGNATURE.variables if v.name in NUMBERS))

@@ -60,9 +60,9 @@ CALLBACKS = ("NULL callbacks", "NULL logger", "NULL logger with logging on")
 LIVES = (*FOUND, *NAMES, *FOLDERS, *CALLBACKS)
 
 
-def a_third(cases: Iterable[str]) -> list[Any]:
-    """The cases, every third of them in the quick tests: each starts a process."""
-    return [case if i % 3 == 0 else slow(case) for i, case in enumerate(cases)]
+def a_sixth(cases: Iterable[str]) -> list[Any]:
+    """The cases, every sixth of them in the quick tests: each starts a process."""
+    return [case if i % 6 == 0 else slow(case) for i, case in enumerate(cases)]
 
 
 def usual(path: str) -> str:
@@ -115,7 +115,7 @@ def hosted(case: str, folder: Path, tmp_path: Path) -> dict[str, Any]:
     return reported
 
 
-@pytest.mark.parametrize("case", a_third(LIVES))
+@pytest.mark.parametrize("case", a_sixth(LIVES))
 def test_an_instance_lives_where_the_meaning_is_clear(
     case: str, fmus: Path, tmp_path: Path
 ) -> None:
@@ -137,7 +137,7 @@ def test_a_native_fmu_reads_nothing_and_lives_all_the_same(
     lives(case, hosted(case, natives, tmp_path))
 
 
-@pytest.mark.parametrize("case", a_third(NOT_FOUND))
+@pytest.mark.parametrize("case", a_sixth(NOT_FOUND))
 def test_without_its_resources_there_is_no_instance_but_a_line(
     case: str, fmus: Path, tmp_path: Path
 ) -> None:

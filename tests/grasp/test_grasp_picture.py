@@ -28,7 +28,7 @@ def touching_from(run: Result, moments: dict[int, float]) -> Result:
 @pytest.mark.parametrize(
     ("moments", "close_ups"),
     [
-        ({}, []),
+        slow({}, []),
         slow({1: 1.0}, [[1]]),
         slow({1: 1.0, 2: 1.2}, [[1], [2]]),
         ({1: 1.03, 2: 1.0}, [[1, 2]]),

@@ -290,6 +290,7 @@ def test_a_user_s_metrics_are_wherever_those_of_the_grasp_are(
     assert back.metrics["reach"][0] == expected > 0.0
 
 
+@pytest.mark.slow
 def test_a_user_s_metrics_are_columns_of_a_sweep(command: Run, own: Path, tmp_path: Path) -> None:
     import pyarrow.parquet as pq  # type: ignore[import-untyped]
 

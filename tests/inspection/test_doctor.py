@@ -29,6 +29,7 @@ NOWHERE = str(Path(__file__, "nowhere"))
 
 SCRIPT = """\
 from pythonfmu import Fmi2Causality, Fmi2Slave, Real
+from support.slow import slow
 
 class Stock(Fmi2Slave):
     def __init__(self, **kwargs):
@@ -352,7 +353,7 @@ def test_sources_can_be_compiled(
 
 
 @gcc
-@pytest.mark.parametrize("version", ["2.0", "3.0"])
+@pytest.mark.parametrize("version", [slow("2.0"), "3.0"])
 def test_a_native_fmu_of_either_version_is_tried(version: str, tmp_path: Path) -> None:
     found = {
         f.check: f for f in examine(native_fmus.build(tmp_path, version=version, complete=True))
@@ -552,6 +553,7 @@ def test_a_module_whose_name_another_has(
         assert f"'twin', which is in {other} too" in verdict[1]
 
 
+@pytest.mark.slow
 def test_a_temporary_folder_that_crashes_is_predicted_and_found(
     stock: Path, unpack_in: UnpackIn
 ) -> None:

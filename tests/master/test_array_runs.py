@@ -138,6 +138,7 @@ def test_fmpy_finds_the_same_bits(tmp_path: Path, engine: Engine) -> None:
     np.testing.assert_array_equal(signals(result, "ss.y", 3), theirs["y"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["compiled", pytest.param("python", marks=pytest.mark.slow)])
 def test_a_process_of_its_own_changes_no_bit(tmp_path: Path, engine: Engine) -> None:
     more = '[[events]]\nat = 0.5\nset = { "b.u[3]" = 4.0, "b.A[1,2]" = 0.5 }\n'

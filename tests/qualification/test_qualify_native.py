@@ -8,6 +8,7 @@ from grasp_cosim.qualification.qualify import Qualification, qualify
 from grasp_cosim.qualification.verdict import as_text
 from grasp_cosim.system.parts import Isolation
 from support.native_fmus import build, needs_gcc
+from support.slow import slow
 
 pytestmark = needs_gcc
 
@@ -105,7 +106,8 @@ def going_wrong(loop: System, folder: Path, what: str, isolation: Isolation) -> 
 
 
 @pytest.mark.parametrize(
-    ("what", "text"), [("crash_at", "SIGSEGV"), ("exit_at", "exit"), ("error_at", "lamp is broken")]
+    ("what", "text"),
+    [("crash_at", "SIGSEGV"), slow("exit_at", "exit"), slow("error_at", "lamp is broken")],
 )
 def test_a_candidate_that_ends_on_the_way(
     loop: System, tmp_path: Path, what: str, text: str

@@ -208,6 +208,7 @@ def test_another_signal_does_not_end_it(tmp_path: Path) -> None:
     assert seen == [signal.SIGUSR1]
 
 
+@pytest.mark.slow
 def test_a_python_call_in_the_plan_keeps_the_pacer_in_python(tmp_path: Path) -> None:
     """An event, say: nobody would hand the rows on in its wait otherwise."""
     system(tmp_path)

@@ -9,6 +9,7 @@ import numpy.typing as npt
 import pytest
 from grasp_cosim.report.embed import fit, packed
 from report.javascript import run_node
+from support.slow import slow
 
 AWKWARD = [0.0, -0.0, 1.0, -1.0, 5e-324, 1.7976931348623157e308, np.inf, -np.inf, np.nan, 0.1, 1e-9]
 
@@ -86,7 +87,7 @@ def test_a_thinned_run_keeps_the_extremes_of_each_block_and_the_end(rows: int) -
         assert (thin.min(), thin.max()) == (values.min(), values.max())
 
 
-@pytest.mark.parametrize("rows", [1, 17, 1000])
+@pytest.mark.parametrize("rows", [slow(1), slow(17), 1000])
 def test_extremes_of_pixel_columns_are_those_of_their_rows(rows: int, tmp_path: Path) -> None:
     """Those of each column's rows, and of at most a quarter of a column beside it."""
     values = np.random.default_rng(rows).normal(size=rows)

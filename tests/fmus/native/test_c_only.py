@@ -98,6 +98,7 @@ def test_what_is_written(name: str, written: Callable[[str], Path]) -> None:
     assert not re.search(r"\bfmi[23]", text)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*map(slow, TRANSLATED[1:]), TRANSLATED[0], slow("SpringPlant")])
 def test_the_example_runs_by_the_command_at_its_top(
     name: str, written: Callable[[str], Path]
