@@ -105,9 +105,10 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 
 @pytest.fixture(scope="module")
-def kind(request: pytest.FixtureRequest) -> Kind:
-    """The kind of FMUs that load and altered give; by default those that Python runs."""
+def kind(request: pytest.FixtureRequest, folder_of: Folder) -> Kind:
+    """The kind of FMUs that load and altered give, built; by default those that Python runs."""
     chosen: Kind = getattr(request, "param", "python")
+    folder_of(chosen)
     return chosen
 
 

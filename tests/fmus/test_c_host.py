@@ -144,6 +144,7 @@ def test_a_bound_fmu_runs_in_c(host: Path, bound: Bind, name: str, version: str)
 
 
 @pytest.mark.parametrize("name", INPUT)
+@pytest.mark.usefixtures("natives")
 def test_a_native_fmu_runs_in_c(host: Path, load_as: LoadAs, name: str) -> None:
     """As it is; to the last bit like the one that Python runs, here."""
     values = {INPUT[name]: VALUE[name]}
@@ -153,6 +154,7 @@ def test_a_native_fmu_runs_in_c(host: Path, load_as: LoadAs, name: str) -> None:
     assert numbers(done.stdout) == in_this_process(load_as(name, "python"), values)
 
 
+@pytest.mark.usefixtures("natives")
 def test_what_a_native_fmu_refuses_in_c(host: Path, load_as: LoadAs) -> None:
     done = run(host, load_as("GripperPlant", "native"), {"object_width": 99.0})
     assert (done.returncode, done.stderr) == (ERROR, "")

@@ -16,7 +16,6 @@ from grasp_fmus.packing import package_folder
 from support.fmi2 import OK, Fmu, Instance
 from support.kinds import all_kinds
 from support.packages import runnable
-from support.slow import slow
 
 TESTS = Path(__file__).parents[1]
 ROOT = TESTS.parent
@@ -292,7 +291,8 @@ def plain(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
     return printed
 
 
-@pytest.mark.parametrize("host", [h if "other modules" in h else slow(h) for h in HOSTS])
+@pytest.mark.slow
+@pytest.mark.parametrize("host", HOSTS)
 def test_a_host_does_not_change_what_an_fmu_computes(
     fmus: Path, plain: str, tmp_path: Path, host: str
 ) -> None:

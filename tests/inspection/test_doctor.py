@@ -21,6 +21,7 @@ from grasp_cosim.inspection import doctor
 from grasp_cosim.inspection.doctor import Finding, Unpacked, Verdict, examine, unpack
 from support import native_fmus
 from support.models import build_model
+from support.slow import slow
 
 Changes = dict[str, bytes | None]
 Opened = Callable[..., Unpacked]

@@ -732,7 +732,7 @@ def test_each_construct_gives_the_bits_and_the_faults_of_python(blocks: Both) ->
     """All in one test, as they are compiled together."""
     for which in range(len(NAMES)):
         random = Random(which)
-        for _ in range(50):
+        for _ in range(30):
             small = [random.uniform(-4.0, 4.0) for _ in range(3)]
             reals = [random.choice([x, random.choice(EXTREME)]) for x in small]
             n, flag = random.randint(-20, 20), random.random() < 0.5
