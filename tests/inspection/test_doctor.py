@@ -30,7 +30,6 @@ NOWHERE = str(Path(__file__, "nowhere"))
 
 SCRIPT = """\
 from pythonfmu import Fmi2Causality, Fmi2Slave, Real
-from support.slow import slow
 
 class Stock(Fmi2Slave):
     def __init__(self, **kwargs):
