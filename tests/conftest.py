@@ -47,9 +47,6 @@ os.environ["XDG_CACHE_HOME"] = str(Path(sys.prefix, "cache_of_the_tests"))
 
 _FMUS = Path(sys.prefix, "python_fmus_of_the_tests")
 
-gc.set_threshold(50_000, 10, 10)
-"""Many tests read sources: each time after 700 nodes those that there are would be gone over."""
-
 settings.register_profile("usual", deadline=None, derandomize=True, max_examples=25)
 settings.register_profile(
     "explore", deadline=None, derandomize=False, max_examples=1000, print_blob=True
@@ -74,8 +71,12 @@ def pytest_report_header(config: pytest.Config) -> str | None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Campaigns draw from the seed that hypothesis is given."""
+    """Campaigns draw from the seed that hypothesis is given.
+
+    Many tests read sources: each time after 700 nodes those that there are would be gone over.
+    """
     campaign.first_seed = int(config.getoption("hypothesis_seed") or 0)
+    gc.set_threshold(50_000, 10, 10)
 
 
 @pytest.hookimpl(tryfirst=True)  # before those that are slow are chosen, or left out

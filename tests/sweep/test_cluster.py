@@ -39,7 +39,7 @@ def test_a_shipment_is_the_task(study: Study) -> None:
 def test_a_local_cluster_gives_the_same_bits(study: Study, tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed", reason="dask is not installed")
     with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=2, dashboard_address=None, host="127.0.0.1"
+        n_workers=2, threads_per_worker=2, dashboard_address="127.0.0.1:0", host="127.0.0.1"
     ) as cluster:
         address = cluster.scheduler_address
         jobs = (Job(k, study.values(k)) for k in range(study.runs))
