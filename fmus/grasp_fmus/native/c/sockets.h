@@ -32,6 +32,7 @@
 typedef SOCKET Socket;
 #define NO_SOCKET INVALID_SOCKET
 typedef CRITICAL_SECTION NetLock;
+typedef HANDLE NetThread;
 #define net_lock_begin(lock) InitializeCriticalSection(lock)
 #define net_lock(lock) EnterCriticalSection(lock)
 #define net_unlock(lock) LeaveCriticalSection(lock)
@@ -53,6 +54,7 @@ typedef CRITICAL_SECTION NetLock;
 typedef int Socket;
 #define NO_SOCKET (-1)
 typedef pthread_mutex_t NetLock;
+typedef pthread_t NetThread;
 #define net_lock_begin(lock) pthread_mutex_init(lock, NULL)
 #define net_lock(lock) pthread_mutex_lock(lock)
 #define net_unlock(lock) pthread_mutex_unlock(lock)
@@ -261,6 +263,7 @@ static void net_stay(void)
 
 typedef struct {
     NetLock lock;
+    NetThread thread;
     int done, abandoned, error;
     char host[NET_HOST_SIZE];
     struct sockaddr_in address;
@@ -312,17 +315,25 @@ static DWORD WINAPI net_thread(LPVOID lookup)
 
 static int net_start_thread(NetLookup *lookup)
 {
-    HANDLE thread;
     if (net_begin()) {
         return 0;
     }
-    thread = CreateThread(NULL, 0, net_thread, lookup, 0, NULL);
-    if (thread) {
-        CloseHandle(thread);
-    } else {
+    lookup->thread = CreateThread(NULL, 0, net_thread, lookup, 0, NULL);
+    if (!lookup->thread) {
         net_end();
     }
-    return thread != NULL;
+    return lookup->thread != NULL;
+}
+
+static void net_leave_thread(HANDLE thread)
+{
+    CloseHandle(thread);
+}
+
+static void net_join_thread(HANDLE thread)
+{
+    WaitForSingleObject(thread, INFINITE);
+    CloseHandle(thread);
 }
 
 #else
@@ -335,31 +346,40 @@ static void *net_thread(void *lookup)
 
 static int net_start_thread(NetLookup *lookup)
 {
-    pthread_t thread;
-    if (pthread_create(&thread, NULL, net_thread, lookup)) {
-        return 0;
-    }
+    return !pthread_create(&lookup->thread, NULL, net_thread, lookup);
+}
+
+static void net_leave_thread(pthread_t thread)
+{
     pthread_detach(thread);
-    return 1;
+}
+
+static void net_join_thread(pthread_t thread)
+{
+    pthread_join(thread, NULL);
 }
 
 #endif
 
-/* Wait for a look-up in a thread; 0 where the deadline was first, and the thread has it now */
+/* Wait for a look-up in a thread, and for the end of that, as its code may be unloaded after this; 0
+   where the deadline was first, and the thread has it now */
 static int net_await(NetLookup *lookup, int64_t deadline)
 {
     for (;;) {
         int done;
+        NetThread thread = lookup->thread;
         net_lock(&lookup->lock);
         done = lookup->done;
         lookup->abandoned = !done && net_now() >= deadline;
         if (lookup->abandoned) {
-            net_unlock(&lookup->lock);
             net_stay();
+            net_leave_thread(thread);
+            net_unlock(&lookup->lock);
             return 0;
         }
         net_unlock(&lookup->lock);
         if (done) {
+            net_join_thread(thread);
             return 1;
         }
         net_pause();
