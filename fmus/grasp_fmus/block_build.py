@@ -9,9 +9,10 @@ import sys
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
+from importlib.machinery import ModuleSpec, SourceFileLoader
+from importlib.util import module_from_spec
 from math import isfinite, isnan
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 from .cards import BEGIN, variable_tables
@@ -126,7 +127,7 @@ def _run(file: Path, tree: ast.Module) -> Iterator[Any]:
     What it prints goes to standard error.
     """
     name = f"{file.stem}_block"
-    module = ModuleType(name)
+    module = module_from_spec(ModuleSpec(name, SourceFileLoader(name, str(file))))
     before = sys.modules.get(name)
     sys.modules[name] = module
     try:
