@@ -10,7 +10,7 @@ from typing import Annotated, NamedTuple
 
 from block_variables import Parameter
 from gripper_plant import fingers, rigid
-from gripper_plant.rigid import MOST_SUBSTEPS as MOST_SUBSTEPS
+from gripper_plant.rigid import LONGEST_STEP as LONGEST_STEP
 from gripper_plant.rigid import Inputs as Inputs
 from gripper_plant.rigid import Outputs as Outputs
 
@@ -41,11 +41,6 @@ def initial_state(p: Params, u: Inputs) -> State:
     """Both fingers at rest: the object sees them come with its own speed."""
     at_rest = rigid.initial_state(p, u)
     return State(at_rest._replace(velocity=(-p.object_velocity, -p.object_velocity)), 0.0)
-
-
-def substeps(p: Params, x: State, u: Inputs, h: float) -> float:
-    """As many sub-steps as GripperPlant has."""
-    return rigid.substeps(p, x.seen, u, h)
 
 
 def step(p: Params, x: State, u: Inputs, h: float) -> State:

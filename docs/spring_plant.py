@@ -21,6 +21,9 @@ from block_variables import Input, Output, Parameter, check
 Pair = tuple[float, float]
 """A value per finger: right, left."""
 
+LONGEST_STEP = 0.1
+"""s; with forces held for longer, nothing of this would be right, and the sub-steps are many."""
+
 
 @dataclass(frozen=True, slots=True)
 class Params:

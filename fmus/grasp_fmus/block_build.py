@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from .cards import BEGIN, variable_tables
-from .contract import bound, declared, unpacker, variables
+from .contract import declared, longest_step, unpacker, variables
 from .fmu import HASH, Model, write_fmu
 from .folder import Built
 from .model_description import Description
@@ -154,14 +154,10 @@ def _variables(file: Path, block: Any) -> list[Variable]:
         fields = declared(block)
         found = variables(fields)
         _check_declaration(found)
-        limit = bound(block)
+        longest_step(block)
     with _tried(file, "initial_state()"):
         first = block.initial_state(p, u)
         kinds = _kinds(first)
-    if limit:
-        with _tried(file, "substeps()"):
-            if not isinstance(limit.substeps(p, first, u, 1e-3), int | float):
-                raise TypeError("must return a number")
     with _tried(file, "step()"):
         second = block.step(p, first, u, 1e-3)
         _check_kinds(_kinds(second), kinds)

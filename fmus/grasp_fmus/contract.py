@@ -9,9 +9,8 @@ from dataclasses import fields as dataclass_fields
 from enum import IntEnum
 from functools import cache
 from itertools import count, islice
-from math import floor, inf, log10
-from types import ModuleType
-from typing import Annotated, Any, NamedTuple, Protocol, get_args, get_origin, get_type_hints
+from math import inf
+from typing import Annotated, Any, Protocol, get_args, get_origin, get_type_hints
 
 from block_variables import Input, Output, Parameter
 
@@ -27,8 +26,7 @@ DECLARATIONS: dict[Causality, type[Parameter | Input | Output]] = {
 class Block(Protocol):
     """The shape of a block module.
 
-    One that divides a step by itself also has `substeps(p, x, u, h)`, how many parts h seconds
-    have, and `MOST_SUBSTEPS`, how many it takes in one step.
+    One that does not take a step of any length also has `LONGEST_STEP`, in s.
     """
 
     Params: type[Any]
@@ -82,39 +80,12 @@ class Field:
         return "continuous" if self.kind is float else "discrete"
 
 
-class Bound(NamedTuple):
-    """How a block bounds its own sub-steps: their number from Params, State, Inputs and h in s."""
-
-    substeps: Callable[[Any, Any, Any, float], float]
-    most: float
-
-    def excess(self, p: Any, x: Any, u: Any, h: float) -> str:
-        """Say why a step of h seconds has too many, and how long it may be."""
-        longest, too_long = 0.0, h
-        while longest < (middle := 0.5 * (longest + too_long)) < too_long:
-            if self.substeps(p, x, u, middle) <= self.most:
-                longest = middle
-            else:
-                too_long = middle
-        said = f"needs {self.substeps(p, x, u, h):.3g} sub-steps, more than {self.most:g}"
-        if longest == 0.0:
-            return said
-        digit = 10.0 ** (floor(log10(longest)) - 2)  # the third
-        rounded_down = floor(longest / digit * (1.0 + 1e-9)) * digit
-        return f"{said}; must be at most {rounded_down:.3g} s"
-
-
-def bound(block: Block) -> Bound | None:
-    """The bound that a block declares, None without one; TypeError where it is half of one."""
-    substeps, most = (getattr(block, name, None) for name in ("substeps", "MOST_SUBSTEPS"))
-    if most is None and (substeps is None or isinstance(substeps, ModuleType)):  # an import
-        return None
-    if not callable(substeps) or not isinstance(most, int | float) or not most >= 1:
-        raise TypeError(
-            f"substeps = {substeps!r}, MOST_SUBSTEPS = {most!r}: must be both there, a function of "
-            "(p, x, u, h) and a number from 1"
-        )
-    return Bound(substeps, most)
+def longest_step(block: Block) -> float:
+    """The longest communication step in s that a block takes, its LONGEST_STEP; inf without one."""
+    longest = getattr(block, "LONGEST_STEP", inf)
+    if type(longest) not in (float, int) or not longest > 0.0:
+        raise TypeError(f"LONGEST_STEP = {longest!r}: must be a positive number, in s")
+    return float(longest)
 
 
 def declared(block: Block) -> list[Field]:

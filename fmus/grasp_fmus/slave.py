@@ -8,11 +8,10 @@ from typing import Any, ClassVar
 from .base import INSTANTIATED, PHASES, STEPPING, TIME_TOLERANCE, RefusalError, Slave, reported
 from .contract import (
     Block,
-    Bound,
     Field,
-    bound,
     build_params,
     declared,
+    longest_step,
     packer,
     unpacker,
     variables,
@@ -21,18 +20,15 @@ from .host_log import DISCARD
 from .snapshot import Snapshot, from_bytes, to_bytes
 from .variable import Variable
 
-_UNBOUNDED = Bound(lambda *_: 0.0, inf)
-"""That of a block without sub-steps."""
-
 
 @cache
 def _shape(
     block: Block,
-) -> tuple[list[Field], list[Variable], Bound, tuple[Callable[..., Any], ...]]:
+) -> tuple[list[Field], list[Variable], float, tuple[Callable[..., Any], ...]]:
     """Made once for all instances: that takes longer than all the rest of one."""
     fields = declared(block)
     functions = (block.step, block.outputs, packer(block.Inputs, fields), unpacker(fields))
-    return fields, variables(fields), bound(block) or _UNBOUNDED, functions
+    return fields, variables(fields), longest_step(block), functions
 
 
 class Fmi2Slave(Slave):
@@ -43,7 +39,7 @@ class Fmi2Slave(Slave):
     """Packages that the block imports when its first state is made; not packed."""
 
     def _prepare(self) -> None:
-        self._fields, self._variables, self._bound, self._functions = _shape(
+        self._fields, self._variables, self._longest, self._functions = _shape(
             self.block  # type: ignore[arg-type]  # a module can be hashed
         )
         self._values = [v.start for v in self._variables]
@@ -57,8 +53,8 @@ class Fmi2Slave(Slave):
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Advance the block by step_size seconds with the inputs as they are.
 
-        Returns False, and stays where it is, if the block would need more sub-steps than it takes,
-        if the outputs would not be finite, or if the block gives a reason of its own: a plain
+        Returns False, and stays where it is, if the step is longer than the block takes, if the
+        outputs would not be finite, or if the block gives a reason of its own: a plain
         ArithmeticError.
         """
         try:
@@ -68,6 +64,8 @@ class Fmi2Slave(Slave):
                 and -TIME_TOLERANCE <= current_time - self._time <= TIME_TOLERANCE
             ):
                 self._check_step(current_time, step_size)
+            if step_size > self._longest:
+                return self._discard(step_size, f"must be at most {self._longest:g} s")
             step, evaluate, pack, unpack = self._functions
             params, inputs = self._params, self._inputs
             if inputs is None:
@@ -75,10 +73,6 @@ class Fmi2Slave(Slave):
                     params = self._read_params()
                 self._inputs = inputs = pack(self._values)
             try:
-                substeps, most = self._bound
-                if not substeps(params, self._state, inputs, step_size) <= most:
-                    text = self._bound.excess(params, self._state, inputs, step_size)
-                    return self._discard(step_size, text)
                 state = step(params, self._state, inputs, step_size)
                 values = unpack(evaluate(params, state, inputs))
             except ArithmeticError as error:

@@ -17,8 +17,7 @@ from .fingers import Inputs as Inputs
 from .fingers import Pair as Pair
 from .fingers import Side
 
-MOST_SUBSTEPS = own.MOST
-"""In a communication step; a longer one is discarded."""
+LONGEST_STEP = own.LONGEST_STEP
 
 ITERATIONS = 8
 """To find the contact force: each leaves 1/19 of the error, or less."""
@@ -41,12 +40,6 @@ class Params(fingers.Params):
     def law(self) -> contact_laws.Law:
         """The contact law that is chosen."""
         return contact_laws.law(self.kelvin_voigt, self.hunt_crossley)
-
-    @cached_property
-    def fastest(self) -> float:
-        """The rate that sub-steps resolve where a finger is as deep as can be, 1/s."""
-        deep = contact_laws.rate(self.law, contact_laws.DEEPEST, min(self.finger_mass))
-        return max(deep, self.friction_rate)
 
 
 class State(NamedTuple):
@@ -84,21 +77,17 @@ def initial_state(p: Params, u: Inputs) -> State:
     return State(p.initial_position, (0.0, 0.0), (0.0, 0.0), False)
 
 
-def substeps(p: Params, x: State, u: Inputs, h: float) -> float:
-    """At most so many sub-steps are in h seconds."""
-    most = own.needed(p.fastest, h)
-    return most if most <= MOST_SUBSTEPS else own.needed(_rate(p, x, u, h), h)
-
-
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
     """Advance both fingers by h seconds (h > 0), the forces held; each in its opening direction."""
+    n = own.count(_rate(p, x, u, h), h)
+    if n > own.MOST:
+        return x._replace(position=fingers.UNRESOLVED)
     x_1, x_2 = x.position
     v_1, v_2 = x.velocity
     f_1, f_2 = x.contact_force
     u_1, u_2 = fingers.forces(p.actuator, u)
     right, left = p.sides
     s_2, v_2, u_2, f_2, damaged = -x_2, -v_2, -u_2, -f_2, x.damaged
-    n = own.count(_rate(p, x, u, h), h)
     for _ in range(n):
         x_1, v_1, f_1 = _press(right, p.law, x_1, v_1, u_1, h / n, f_1)
         s_2, v_2, f_2 = _press(left, p.law, s_2, v_2, u_2, h / n, f_2)

@@ -4,7 +4,7 @@ Everything is counted in the direction in which the finger opens, the gap g = s 
 m·g'' = f + f_c, with the actuator's force f and the contact's f_c >= 0. Card: plant/README.md
 """
 
-from math import inf, sqrt
+from math import inf, nan, sqrt
 from typing import NamedTuple
 
 from . import friction
@@ -13,6 +13,9 @@ from .fingers import Side
 
 Finger = tuple[float, float, float]
 """Position s in m and velocity in m/s (opening positive), contact force in N (>= 0)."""
+
+UNRESOLVED: Finger = (nan, nan, nan)
+"""One that would take more sub-steps than there are: the step is refused."""
 
 
 class Rates(NamedTuple):
@@ -32,11 +35,6 @@ def fastest(rates: Rates) -> float:
     return max(2.0 * alpha, beta)
 
 
-def substeps(rates: Rates, h: float) -> int:
-    """Number of equal sub-steps that resolve the contact within h seconds."""
-    return own.count(fastest(rates), h)
-
-
 def time_to_contact(gap: float, rate: float, acceleration: float) -> float:
     """Seconds until g + g'·t + g''·t^2/2 next reaches zero from above; inf if it never does.
 
@@ -52,12 +50,6 @@ def time_to_contact(gap: float, rate: float, acceleration: float) -> float:
     return (sqrt(discriminant) + rate) / -acceleration if acceleration < 0.0 else inf
 
 
-def flies(side: Side, s: float, v: float, f: float, h: float) -> bool:
-    """True if a finger without friction does not touch within h seconds."""
-    surface, m, rub = side
-    return not friction.acts(rub) and time_to_contact(s - surface, v, f / m) >= h
-
-
 def advance(side: Side, rates: Rates, s: float, v: float, f: float, h: float) -> Finger:
     """Advance a finger at s m with v m/s by h seconds, the actuator force f in N held.
 
@@ -68,8 +60,10 @@ def advance(side: Side, rates: Rates, s: float, v: float, f: float, h: float) ->
         return _advance_rubbing(side, rates, s, v, f, h)
     if time_to_contact(s - surface, v, f / m) >= h:
         return _fly(s, v, f / m, h)
+    n = own.count(fastest(rates), h)
+    if n > own.MOST:
+        return UNRESOLVED
     contact_force = 0.0
-    n = substeps(rates, h)
     d = h / n
     for _ in range(n):
         free = time_to_contact(s - surface, v, f / m)
@@ -86,8 +80,10 @@ def advance(side: Side, rates: Rates, s: float, v: float, f: float, h: float) ->
 def _advance_rubbing(side: Side, rates: Rates, s: float, v: float, f: float, h: float) -> Finger:
     """advance() of a finger with friction, which acts beside the contact force."""
     surface, m, rub = side
-    contact_force = 0.0
     n = own.count(max(fastest(rates), friction.rate(rub, m)), h)
+    if n > own.MOST:
+        return UNRESOLVED
+    contact_force = 0.0
     d = h / n
     for _ in range(n):
         after, rate = friction.move(s, v, m, f, rub, d)

@@ -6,13 +6,17 @@ u_1 < 0 and the object pushes it back with f_c1 >= 0. Finger 2 mirrors it. Card:
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import copysign
+from math import copysign, nan
 from typing import Annotated, NamedTuple, TypeAlias
 
 from block_variables import Group, Input, Output, Parameter, check
 
 from . import friction as finger_friction
 from .friction import Pair as Pair
+
+UNRESOLVED = (nan, nan)
+"""Where the fingers are after more sub-steps than a plant takes: nowhere, so the step is refused.
+"""
 
 
 @dataclass(frozen=True, slots=True)

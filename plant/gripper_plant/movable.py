@@ -17,12 +17,10 @@ from .contact_laws import HuntCrossley, KelvinVoigt
 from .fingers import Inputs as Inputs
 from .fingers import Pair as Pair
 
+LONGEST_STEP = own.LONGEST_STEP
+
 ITERATIONS = 16
 """To find the contact forces: each leaves 1/19 of the error, or less; 1/5 where the box tilts."""
-
-
-MOST_SUBSTEPS = 2_000
-"""In a communication step: fewer than of the other plants, as each takes longer."""
 
 
 @dataclass(frozen=True)
@@ -42,12 +40,6 @@ class Params(standing.Params):
         """The mass with which a finger and the box move against each other, at least, kg."""
         return 1.0 / (1.0 / min(self.finger_mass) + 2.0 / self.object_mass)
 
-    @cached_property
-    def fastest(self) -> float:
-        """The rate that sub-steps resolve where a finger is as deep as can be, 1/s."""
-        deep = contact_laws.rate(self.law, contact_laws.DEEPEST, self.lightest)
-        return max(deep, self.friction_rate)
-
 
 class State(NamedTuple):
     """Fingertip positions in m, velocities in m/s, contact forces in N; the box; toppled so far."""
@@ -65,16 +57,12 @@ def initial_state(p: Params, u: Inputs) -> State:
     return State(p.initial_position, (0.0, 0.0), (0.0, 0.0), box, False)
 
 
-def substeps(p: Params, x: State, u: Inputs, h: float) -> float:
-    """At most so many sub-steps are in h seconds."""
-    most = own.needed(p.fastest, h)
-    return most if most <= MOST_SUBSTEPS else own.needed(_rate(p, standing.shape(p), x, u, h), h)
-
-
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
     """Advance fingers and box by h seconds (h > 0), the forces held."""
     q = standing.shape(p)
     n = own.count(_rate(p, q, x, u, h), h)
+    if n > own.MOST:
+        return x._replace(position=fingers.UNRESOLVED)
     forces = fingers.forces(p.actuator, u)
     for _ in range(n):
         x = _substep(p, q, x, forces, h / n)

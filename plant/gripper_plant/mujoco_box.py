@@ -14,14 +14,13 @@ from block_variables import Parameter
 
 from . import box as standing
 from . import fingers
-from . import substeps as own
 from .box import Outputs as Outputs
 from .box import Shape
 from .fingers import Inputs as Inputs
 from .fingers import Pair as Pair
 
-MOST_SUBSTEPS = own.MOST
-"""In a communication step; a longer one is discarded."""
+LONGEST_STEP = 0.2
+"""s; a longer communication step is discarded: 20,000 of the shortest timesteps."""
 
 IMPEDANCE = 0.9999
 """MuJoCo's d of every constraint: the share of a force that it answers before it gives."""
@@ -111,11 +110,6 @@ def initial_state(p: Params, u: Inputs) -> State:
     q = (x_1, x_2, p.initial_object_position, 0.5 * p.object_height, 0.0)
     none = (0.0, 0.0, 0.0, 0.0, 0.0)
     return State(q, none, none, (0.0, 0.0), False)
-
-
-def substeps(p: Params, x: State, u: Inputs, h: float) -> float:
-    """So many timesteps are in h seconds."""
-    return h / p.timestep
 
 
 def step(p: Params, x: State, u: Inputs, h: float) -> State:

@@ -14,8 +14,7 @@ from . import substeps as own
 from .fingers import Inputs as Inputs
 from .fingers import Pair as Pair
 
-MOST_SUBSTEPS = own.MOST
-"""In a communication step; a longer one is discarded."""
+LONGEST_STEP = own.LONGEST_STEP
 
 
 @dataclass(frozen=True)
@@ -51,11 +50,6 @@ class Params(fingers.Params):
         """Those of the contact."""
         return contact.Rates(self.baumgarte_alpha, self.baumgarte_beta)
 
-    @cached_property
-    def fastest(self) -> float:
-        """The rate that sub-steps resolve, 1/s."""
-        return max(contact.fastest(self.rates), self.friction_rate)
-
 
 class State(NamedTuple):
     """Fingertip positions in m, velocities in m/s and contact forces in N."""
@@ -79,12 +73,6 @@ class Outputs(NamedTuple):
 def initial_state(p: Params, u: Inputs) -> State:
     """Both fingers at rest at their initial positions, free of the object."""
     return State(p.initial_position, (0.0, 0.0), (0.0, 0.0))
-
-
-def substeps(p: Params, x: State, u: Inputs, h: float) -> float:
-    """At most so many sub-steps are in h seconds; none where both fingers fly freely."""
-    most = own.needed(p.fastest, h)
-    return 0.0 if most > MOST_SUBSTEPS and _both_fly(p, x, u, h) else most
 
 
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
@@ -111,12 +99,3 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
         (gap_1 <= 0.0, gap_2 <= 0.0),
         p.initial_object_position,
     )
-
-
-def _both_fly(p: Params, x: State, u: Inputs, h: float) -> bool:
-    """True if neither finger touches within h seconds, nor rubs."""
-    x_1, x_2 = x.position
-    v_1, v_2 = x.velocity
-    u_1, u_2 = fingers.forces(p.actuator, u)
-    right, left = p.sides
-    return contact.flies(right, x_1, v_1, u_1, h) and contact.flies(left, -x_2, -v_2, -u_2, h)

@@ -31,8 +31,8 @@ Outputs = optics.Outputs
 GIVEN_WITH_CUSTOM_ONLY = optics.Params().reflectance
 """The reflectance beside a surface that is chosen by name, which has its own."""
 
-MOST_SUBSTEPS = 20_000
-"""Samples in a communication step; a longer one is discarded."""
+LONGEST_STEP = 10.0
+"""s; a longer communication step is discarded."""
 
 WARM_UP = 100
 """Samples of noise that are in filter and median at the start."""
@@ -117,11 +117,6 @@ SILENT = Chain(0.0, (0.0,) * 6, 0.0, (0.0,) * 5, (0.0,) * 10)
 def initial_state(p: Params, u: Inputs) -> State:
     """As after the first gap for a long time: filter and median have settled, on noise as well."""
     return State(0.0, _settled(p, _light(p, u)) if p.sampled else SILENT)
-
-
-def substeps(p: Params, x: State, u: Inputs, h: float) -> float:
-    """So many samples are in h seconds."""
-    return h * p.sampling.rate - x.wait if p.sampled else 0.0
 
 
 def step(p: Params, x: State, u: Inputs, h: float) -> State:

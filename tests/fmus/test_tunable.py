@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from conftest import Load
 from grasp_fmus.block_build import build_block
-from grasp_fmus.contract import Field, bound, build_params, declared, unpacker
+from grasp_fmus.contract import Field, build_params, declared, longest_step, unpacker
 from grasp_fmus.shipped import blocks
 from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
@@ -77,8 +77,7 @@ class Twin:
     def step(self, h: float) -> None:
         """ArithmeticError where it cannot, ValueError where the parameters do not go together."""
         p, before = self.params, self.state
-        limit = bound(self.block)
-        if limit and not limit.substeps(p, self.state, self.inputs, h) <= limit.most:
+        if h > longest_step(self.block):
             raise ArithmeticError
         self.state = self.block.step(p, self.state, self.inputs, h)
         try:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from fractions import Fraction
 from itertools import islice, pairwise
-from math import ceil, exp, floor, inf, isclose, pi, sqrt
+from math import ceil, exp, floor, inf, isclose, isfinite, pi, sqrt
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +12,8 @@ from gripper_plant import contact, friction, rigid
 from gripper_plant.contact import Finger, Rates, time_to_contact
 from gripper_plant.fingers import Side
 from gripper_plant.rigid import Inputs, Pair, Params, State
+from gripper_plant.substeps import MOST
+from gripper_plant.substeps import count as substeps_of
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
@@ -44,7 +46,7 @@ def advance(
 
 
 def substeps(alpha: float, beta: float, h: float) -> int:
-    return contact.substeps(Rates(alpha, beta), h)
+    return substeps_of(contact.fastest(Rates(alpha, beta)), h)
 
 
 def run(
@@ -496,6 +498,17 @@ def test_sub_steps_resolve_the_contact_and_are_no_more_than_needed(
 )
 def test_sub_steps_of_round_numbers(alpha: float, beta: float, h: float, n: int) -> None:
     assert substeps(alpha, beta, h) == n
+
+
+@pytest.mark.parametrize("viscous", [0.0, 1e-6])
+@pytest.mark.parametrize(("share", "finite"), [(0.999, True), (1.001, False)])
+def test_a_finger_with_too_many_sub_steps_has_no_result(
+    viscous: float, share: float, finite: bool
+) -> None:
+    side = Side(0.0, 0.5, (0.0, 0.0, viscous, 1.0))
+    rates = Rates(0.5 * share * MOST, 1.0)
+    after = contact.advance(side, rates, 0.0, 0.0, -1.0, 0.1)
+    assert all(map(isfinite, after)) == finite
 
 
 def test_both_fingers_feel_their_own_side_of_the_object() -> None:

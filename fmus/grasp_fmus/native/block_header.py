@@ -2,10 +2,11 @@
 
 from collections.abc import Iterator
 from dataclasses import fields
+from math import inf
 from types import FunctionType
 from typing import Any
 
-from ..contract import Field, bound, declared, variables
+from ..contract import Field, declared, longest_step, variables
 from . import names
 from .layout import wrapped
 from .program import Function, Key, Program
@@ -55,17 +56,11 @@ def block_header(program: Program, name: str, block: Any) -> tuple[str, set[Key]
         raise _error(
             program, block, "outputs", f"returns {said(evaluate.returns)}; must be Outputs"
         )
-    limit = bound(block)
-    substeps = _part(program, block, "substeps", [params, state, inputs, REAL]) if limit else None
-    if substeps and substeps.returns not in NUMBERS:
-        raise _error(
-            program, block, "substeps", f"returns {said(substeps.returns)}; must be a number"
-        )
     checks = list(_checks(program, block.Params, "p"))
     described = declared(block)
     scalars = list(_scalars(program, state, "x"))
     parts = [
-        _table(name, described, len(scalars), bool(limit)),
+        _table(name, described, len(scalars), longest_step(block)),
         f"typedef {program.shape(params)} BlockParams;\n"
         f"typedef {program.shape(inputs)} BlockInputs;\n"
         f"typedef {program.shape(state)} BlockState;\n"
@@ -73,7 +68,7 @@ def block_header(program: Program, name: str, block: Any) -> tuple[str, set[Key]
         _conversions(program, block, described),
         _check(checks),
         _states(scalars),
-        _functions(first, step, evaluate, substeps, limit.most if limit else 0.0),
+        _functions(first, step, evaluate),
     ]
     return "\n".join(parts), needed
 
@@ -136,7 +131,7 @@ def _function(head: str, body: str) -> str:
     return f"{head}\n{{\n{body}}}\n"
 
 
-def _table(name: str, described: list[Field], states: int, has_substeps: bool) -> str:
+def _table(name: str, described: list[Field], states: int, longest: float) -> str:
     found = variables(described)
     counts = [sum(v.causality == c for v in found) for c in ("input", "output", "parameter")]
     rows = []
@@ -156,7 +151,7 @@ def _table(name: str, described: list[Field], states: int, has_substeps: bool) -
         "N_PARAMETERS": counts[2],
         "N_VARIABLES": "(N_INPUTS + N_OUTPUTS + N_PARAMETERS)",
         "N_STATE": states,
-        "BLOCK_HAS_SUBSTEPS": int(has_substeps),
+        "BLOCK_LONGEST_STEP": "HUGE_VAL" if longest == inf else names.real(longest),
     }
     return (
         "".join(f"#define {n} {v}\n" for n, v in defined.items())
@@ -246,9 +241,7 @@ def _states(scalars: list[tuple[str, Type]]) -> str:
     )
 
 
-def _functions(
-    first: Function, step: Function, evaluate: Function, substeps: Function | None, most: float
-) -> str:
+def _functions(first: Function, step: Function, evaluate: Function) -> str:
     head = "const BlockParams *p, const BlockState *x, const BlockInputs *u"
     texts = [
         (
@@ -268,21 +261,7 @@ def _functions(
             evaluate,
         ),
     ]
-    found = [_function(h, _quiet(f) + f"    {text};\n") for h, text, f in texts]
-    call = _call(substeps, "p, *x, *u, h") if substeps else "0.0"
-    quiet = (
-        _quiet(substeps)
-        if substeps
-        else "".join(f"    (void){n};\n" for n in ("p", "x", "u", "h", "fault"))
-    )
-    found.append(
-        _function(
-            f"static double block_substeps(\n    {head}, double h,\n    Fault *fault)",
-            f"{quiet}    return {call};\n",
-        )
-    )
-    found.append(f"static const double block_most_substeps = {names.real(float(most))};\n")
-    return "\n".join(found)
+    return "\n".join(_function(h, _quiet(f) + f"    {text};\n") for h, text, f in texts)
 
 
 def _call(f: Function, arguments: str) -> str:

@@ -14,7 +14,7 @@ CHAR INT DELETE CONST OPTIONAL Fault fault
 isnan isinf isfinite isnormal signbit fpclassify isgreater isless
 sqrt floor ceil fabs copysign fmod atan sinh asinh cbrt exp2 tanh strlen memcpy frexp round pow
 MAXFLOAT SNAN SNANF SNANL math_errhandling MATH_ERRNO MATH_ERREXCEPT SIZE_MAX RAND_MAX EXIT_SUCCESS
-EXIT_FAILURE BIG_ENDIAN LITTLE_ENDIAN PDP_ENDIAN BYTE_ORDER BLOCK_NAME BLOCK_HAS_SUBSTEPS
+EXIT_FAILURE BIG_ENDIAN LITTLE_ENDIAN PDP_ENDIAN BYTE_ORDER BLOCK_NAME BLOCK_LONGEST_STEP
 N_INPUTS N_OUTPUTS N_PARAMETERS N_VARIABLES N_STATE N_REFERENCES
 atan2 ldexp log log2 log10 log1p exp expm1 sin cos tan asin acos acosh atanh cosh
 """

@@ -59,10 +59,9 @@ class CBlock:
 
     def __init__(self, path: Path) -> None:
         self._lib = ctypes.CDLL(str(path))
-        self._lib.shim_most.restype = ctypes.c_double
-        sizes = (ctypes.c_int * 4)()
+        sizes = (ctypes.c_int * 3)()
         self._lib.shim_sizes(sizes)
-        self.n_variables, self.n_outputs, self.n_state, self.has_substeps = list(sizes)
+        self.n_variables, self.n_outputs, self.n_state = list(sizes)
 
     def _run(self, name: str, v: list[float], *rest: Any, size: int) -> Outcome:
         out = (ctypes.c_double * max(size, 1))()
@@ -88,9 +87,6 @@ class CBlock:
 
     def outputs(self, v: list[float], state: list[float]) -> Outcome:
         return self._run("outputs", v, state, size=self.n_outputs)
-
-    def substeps(self, v: list[float], state: list[float], h: float) -> Outcome:
-        return self._run("substeps", v, state, h, size=1)
 
 
 @dataclass
@@ -142,10 +138,6 @@ class PythonBlock:
         return outcome(
             lambda: self._unpack(self.block.outputs(p, _shaped(self._like, iter(state)), u))
         )
-
-    def substeps(self, v: list[float], state: list[float], h: float) -> Outcome:
-        p, u = self._given(v)
-        return outcome(lambda: [self.block.substeps(p, _shaped(self._like, iter(state)), u, h)])
 
 
 def outcome(run: Any) -> Outcome:

@@ -6,7 +6,7 @@
 #define N_PARAMETERS 6
 #define N_VARIABLES (N_INPUTS + N_OUTPUTS + N_PARAMETERS)
 #define N_STATE 4
-#define BLOCK_HAS_SUBSTEPS 1
+#define BLOCK_LONGEST_STEP 1.0
 
 enum { KIND_REAL, KIND_BOOLEAN, KIND_INTEGER, KIND_STRING };
 enum { INPUT, OUTPUT, PARAMETER };
@@ -54,8 +54,6 @@ typedef struct {
     double position, velocity;
     int moves;
 } BlockOutputs;
-
-static const double block_most_substeps = 1000.0;
 
 static void block_params(const double v[N_VARIABLES], BlockParams *p)
 {
@@ -151,11 +149,4 @@ static void block_outputs(const BlockParams *p, const BlockState *x, const Block
     } else if (p->fault == 6.0) {
         y->velocity = HUGE_VAL - HUGE_VAL;
     }
-}
-
-static double block_substeps(const BlockParams *p, const BlockState *x, const BlockInputs *u,
-                             double h, Fault *fault)
-{
-    (void)p, (void)x, (void)u, (void)fault;
-    return h / 1e-3;
 }

@@ -6,7 +6,7 @@ from typing import Annotated, NamedTuple
 
 from block_variables import Input, Output, Parameter, check
 
-MOST_SUBSTEPS = 1000
+LONGEST_STEP = 1.0
 
 
 @dataclass(frozen=True)
@@ -75,8 +75,3 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     if p.fault == 4:
         raise KeyError("50 %n")
     return Outputs(x.position, nan if p.fault == 6 else x.velocity, x.moves)
-
-
-def substeps(p: Params, x: State, u: Inputs, h: float) -> float:
-    """One per millisecond."""
-    return h / 1e-3

@@ -15,13 +15,7 @@ int shim_sizes(int *sizes)
     sizes[0] = N_VARIABLES;
     sizes[1] = N_OUTPUTS;
     sizes[2] = N_STATE;
-    sizes[3] = BLOCK_HAS_SUBSTEPS;
     return (int)sizeof variables / (int)sizeof variables[0];
-}
-
-double shim_most(void)
-{
-    return block_most_substeps;
 }
 
 int shim_check(const double *v, char *type, char *text)
@@ -76,19 +70,5 @@ int shim_outputs(const double *v, const double *state, double *outputs, char *ty
     block_load(state, &x, &fault);
     block_outputs(&p, &x, &u, &y, &fault);
     block_outputs_to(&y, outputs);
-    return reported(&fault, type, text);
-}
-
-int shim_substeps(const double *v, const double *state, double h, double *parts, char *type, char *text)
-{
-    BlockParams p;
-    BlockInputs u;
-    BlockState x;
-    Fault fault;
-    fault.kind = FAULT_NONE;
-    block_params(v, &p);
-    block_inputs(v, &u);
-    block_load(state, &x, &fault);
-    *parts = block_substeps(&p, &x, &u, h, &fault);
     return reported(&fault, type, text);
 }

@@ -136,14 +136,13 @@ def outputs(p, x, u): return Outputs(x, (u.f, not u.f))
         """from gripper_plant import friction, contact
 from gripper_plant.friction import Pair as P2
 from proximity_sensor import optics as seeing
-MOST_SUBSTEPS = 100
+LONGEST_STEP = 100
 """,
         PARAMS
         + INPUTS
         + """
 class State(NamedTuple):
     m: friction.Motion
-def substeps(p, x, u, h): return h * 1e3
 """
         + OUTPUTS
         + """

@@ -216,56 +216,6 @@ static Status slave_end_step(Slave *s, double h, const Fault *fault)
     return slave_discarded(s);
 }
 
-static double slave_substeps(const Slave *s, double h, Fault *fault)
-{
-    return block_substeps(&s->model.params, &s->model.state, &s->model.inputs, h, fault);
-}
-
-/* Discard a step that has too many sub-steps, and say how long it may be */
-static Status slave_end_long_step(Slave *s, double h)
-{
-    double longest = 0.0, too_long = h, middle, substeps, digit = 0.0;
-    Fault fault;
-    slave_no_fault(&fault);
-    for (;;) {
-        middle = 0.5 * (longest + too_long);
-        if (!(longest < middle && middle < too_long)) {
-            break;
-        }
-        substeps = slave_substeps(s, middle, &fault);
-        if (fault.kind != FAULT_NONE) {
-            return slave_end_step(s, h, &fault);
-        }
-        if (substeps <= block_most_substeps) {
-            longest = middle;
-        } else {
-            too_long = middle;
-        }
-    }
-    substeps = slave_substeps(s, h, &fault);
-    if (fault.kind != FAULT_NONE) {
-        return slave_end_step(s, h, &fault);
-    }
-    if (longest != 0.0) {
-        digit = pow(10.0, floor(log10(longest)) - 2.0);  /* the third */
-        if (digit == 0.0) {
-            py_fault(&fault, FAULT_ARITHMETIC, "ZeroDivisionError", "float division by zero");
-            return slave_end_step(s, h, &fault);
-        }
-    }
-    slave_begin_discard(s, h);
-    slave_put(s, "needs ");
-    slave_put_general(s, substeps, 3);
-    slave_put(s, " sub-steps, more than ");
-    slave_put_general(s, block_most_substeps, 6);
-    if (longest != 0.0) {
-        slave_put(s, "; must be at most ");
-        slave_put_general(s, floor(longest / digit * (1.0 + 1e-9)) * digit, 3);
-        slave_put(s, " s");
-    }
-    return slave_discarded(s);
-}
-
 /* Advance the block by h seconds with the inputs as they are; it stays where it is if not OK */
 static Status slave_do_step(Slave *s, double time, double h)
 {
@@ -274,11 +224,17 @@ static Status slave_do_step(Slave *s, double time, double h)
     BlockState after;
     BlockOutputs y;
     Fault fault;
-    int few;
     if (!(s->phase == STEPPING && 0.0 < h && h <= DBL_MAX && -SLAVE_TIME_TOLERANCE <= apart
           && apart <= SLAVE_TIME_TOLERANCE)
         && slave_check_step(s, time, h) != SLAVE_OK) {
         return SLAVE_ERROR;
+    }
+    if (h > BLOCK_LONGEST_STEP) {
+        slave_begin_discard(s, h);
+        slave_put(s, "must be at most ");
+        slave_put_general(s, BLOCK_LONGEST_STEP, 6);
+        slave_put(s, " s");
+        return slave_discarded(s);
     }
     if (!s->outputs_follow) {
         if (!s->params_are_read && slave_read_params(s) != SLAVE_OK) {
@@ -287,13 +243,6 @@ static Status slave_do_step(Slave *s, double time, double h)
         block_inputs(s->values, &s->model.inputs);
     }
     slave_no_fault(&fault);
-    few = slave_substeps(s, h, &fault) <= block_most_substeps;  /* one without a bound has none */
-    if (fault.kind != FAULT_NONE) {
-        return slave_end_step(s, h, &fault);
-    }
-    if (!few) {
-        return slave_end_long_step(s, h);
-    }
     block_step(&s->model.params, &s->model.state, &s->model.inputs, h, &after, &fault);
     if (fault.kind == FAULT_NONE) {
         block_outputs(&s->model.params, &after, &s->model.inputs, &y, &fault);
