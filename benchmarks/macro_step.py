@@ -14,7 +14,7 @@ from grasp_cosim import simulate
 from grasp_cosim.fmi.instance import Call
 from grasp_cosim.fmi.load import load
 from grasp_cosim.grasp.system import grasp_system
-from grasp_cosim.master.compiled import compiler
+from grasp_cosim.master.compiled import has_compiler
 from grasp_cosim.master.engine import Engine, make_loop
 from grasp_cosim.master.loop import STEP
 from grasp_cosim.master.master import Master
@@ -87,7 +87,7 @@ def _timed(call: Callable[[], int], name: str, spent: dict[str, float]) -> Calla
 
 
 if __name__ == "__main__":
-    if compiler():
+    if has_compiler():
         whole_runs("compiled")
     whole_runs("python")
     parts()

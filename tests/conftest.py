@@ -15,12 +15,13 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import c_compilers
 import fmpy
 import pytest
 from grasp_cosim import System, cli
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_fmus.build import build
-from grasp_fmus.native import compilers, twins
+from grasp_fmus.native import twins
 from grasp_fmus.native.build import build_native
 from hypothesis import find, settings
 from hypothesis import strategies as st
@@ -294,7 +295,7 @@ def no_compiler(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Non
     """A machine without a compiler, on which nothing was built yet."""
     monkeypatch.setenv("PATH", str(tmp_path / "nothing"))
     monkeypatch.delenv("CC", raising=False)
-    monkeypatch.setattr(compilers, "zig_compiler", lambda: None)
+    monkeypatch.setattr(c_compilers, "find_zig", lambda: None)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     twins.shipped_twins.cache_clear()
     yield

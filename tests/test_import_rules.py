@@ -27,7 +27,7 @@ BLOCKS = {
     "sensor": "proximity_sensor",
     "controller": "grasp_controller",
 }
-OURS = {*BLOCKS.values(), "block_variables", "grasp_fmus", "grasp_cosim"}
+OURS = {*BLOCKS.values(), "block_variables", "c_compilers", "grasp_fmus", "grasp_cosim"}
 
 
 LINK = "grasp_fmus.link"
@@ -144,7 +144,7 @@ def test_the_fmu_adapter_knows_no_physics_but_for_the_scripts() -> None:
     found = {
         (f, n)
         for f, n in imports(ROOT / "fmus/grasp_fmus")
-        if n in OURS - {"grasp_fmus", "block_variables"}
+        if n in OURS - {"grasp_fmus", "block_variables", "c_compilers"}
     }
     assert found == {
         (f"{name}.py", block.__name__.partition(".")[0]) for name, block in blocks().items()
@@ -166,8 +166,9 @@ def test_what_is_packed_into_fmus_imports_the_standard_library_only() -> None:
     assert foreign == {("gripper_plant/mujoco_box.py", "mujoco")}
 
 
-def test_the_declaration_of_variables_imports_the_standard_library_only() -> None:
-    found = {name for _, name in imports(ROOT / "fmus/block_variables")}
+@pytest.mark.parametrize("package", ["block_variables", "c_compilers"])
+def test_what_fmus_and_orchestrator_share_imports_the_standard_library_only(package: str) -> None:
+    found = {name for _, name in imports(ROOT / "fmus" / package)}
     assert found
     assert found <= sys.stdlib_module_names
 

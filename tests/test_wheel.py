@@ -56,6 +56,6 @@ def test_wheel_runs_in_an_empty_folder(tmp_path: Path) -> None:
         python("-m", "grasp_cosim", *alone, cwd=empty, path=site)
         assert (empty / "c/python_arithmetic.h").is_file()
     assert {p.name for p in site.iterdir() if p.is_dir() and "-" not in p.name} == {
-        "bin", "block_variables", "grasp_cosim", "grasp_controller", "grasp_fmus", "gripper_plant",
-        "proximity_sensor",
+        "bin", "block_variables", "c_compilers", "grasp_cosim", "grasp_controller", "grasp_fmus",
+        "gripper_plant", "proximity_sensor",
     }  # fmt: skip

@@ -4,11 +4,11 @@ import json
 import sys
 from pathlib import Path
 
+import c_compilers
 import pytest
+from c_compilers import CompilerError
 from conftest import Run
 from grasp_cosim.interface.read import describe
-from grasp_fmus.native import compilers
-from grasp_fmus.native.compilers import CompilerError
 from grasp_fmus.native.targets import here
 from support.compilers import needs_zig
 from support.kinds import TRANSLATED
@@ -105,11 +105,11 @@ def test_what_cannot_be_translated_is_named_with_its_line(command: Run, tmp_path
 def test_no_compiler_is_one_line_with_its_fix(
     command: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(compilers, "zig_compiler", lambda: None)
+    monkeypatch.setattr(c_compilers, "find_zig", lambda: None)
     code, _, err = command("build", "--native", "--target", "win64")
     assert (code, err.count("\n")) == (2, 1)
     fix = f"must be zig; {sys.executable} -m pip install ziglang\n"
-    assert err == f"grasp-cosim: build: no C compiler for x86_64-windows: {fix}"
+    assert err == f"grasp-cosim: build: no C compiler for x86_64-windows-gnu: {fix}"
     monkeypatch.setenv("PATH", str(tmp_path))
     code, _, err = command("build", "--native")
     assert (code, err.count("\n")) == (2, 1)
@@ -122,9 +122,7 @@ def test_a_compiler_that_fails_is_a_failure_on_the_way(
     monkeypatch.setenv("CC", "gcc --no-such-option")
     code, out, err = command("build", "--native", "GripperPlant")
     assert (code, out, err.count("\n")) == (3, "", 1)
-    assert err.startswith(
-        "grasp-cosim: GripperPlant.c for x86_64-linux: gcc --no-such-option: exit code 1: "
-    )
+    assert err.startswith("grasp-cosim: GripperPlant.c: gcc --no-such-option: exit code 1: ")
     assert "error: unrecognized command-line option" in err
     assert not Path("fmus").exists()
 

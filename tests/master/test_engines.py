@@ -203,6 +203,6 @@ def test_what_is_built_already_is_taken_at_once() -> None:
 
 @pytest.mark.usefixtures("not_there")
 def test_without_a_compiler_auto_runs_in_python(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compiled, "compiler", lambda: None)
+    monkeypatch.setattr(compiled, "has_compiler", lambda: False)
     assert not engines._pays(plan(native(10)), 10 * ENOUGH)
     assert not engines._pays(plan(native(10)), None)

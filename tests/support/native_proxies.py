@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from c_compilers import Compiler, compile_all
 from grasp_fmus.base import LoggedError, Message
 from grasp_fmus.folder import write_file
 from grasp_fmus.model_description import Experiment
-from grasp_fmus.native.compilers import Compiler, Job, compile_all, compiler_for
+from grasp_fmus.native.build import compiler_for, job
 from grasp_fmus.native.proxy import proxy_members
 from grasp_fmus.native.targets import Version, here
 from grasp_fmus.proxy import DEFAULTS, bounded, own_variables
@@ -45,17 +46,14 @@ def _fmu(variables: tuple[Variable, ...], fmi: Version) -> Fmu:
         compiler = compiler_for(here(), asked=False)
     except ValueError as error:
         pytest.skip(f"NO compiler: {error}")
-    shimmed = Compiler(
-        (*compiler.command, *STRICT, "-include", SHIM.name),
-        compiler.identity, compiler.environment,
-    )  # fmt: skip
-    job = Job({**sources, SHIM.name: SHIM.read_bytes()}, NAME, here(), shimmed, networked=True)
+    shimmed = Compiler((*compiler.command, *STRICT, "-include", SHIM.name))
+    sources = {**sources, SHIM.name: SHIM.read_bytes()}
     folder = Path(tempfile.mkdtemp(prefix="native_proxy_"))
-    (binary,) = compile_all([job])
+    made = compile_all([job(NAME, sources, here(), shimmed, networked=True)], folder)
     place = here().folder if fmi == 2 else here().tuple
     with zipfile.ZipFile(folder / f"{NAME}.fmu", "w") as archive:
         archive.writestr("modelDescription.xml", files["modelDescription.xml"])
-    write_file(folder / f"u/binaries/{place}/{NAME}.so", binary)
+    write_file(folder / f"u/binaries/{place}/{NAME}.so", made[0].read_bytes())
     return Fmu(folder / f"{NAME}.fmu", folder / "u")
 
 

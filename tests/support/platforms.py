@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from grasp_fmus.native.compilers import Compiler, Job, compile_all, compiler_for
+from c_compilers import Compiler, compile_all
+from grasp_fmus.native.build import compiler_for, job
 from grasp_fmus.native.targets import LINUX_ARM, LINUX_X86, WINDOWS, Target, here
 
 from .c_host import HEADERS, SOURCE, Host, Unpacked
@@ -46,10 +47,11 @@ class Platform:
         """The library of an FMU in a folder, made from its sources alone."""
         library = folder / f"{fmu.name}{self.target.suffix}"
         if self.compiler == ZIG:
-            job = Job(fmu.sources(), fmu.name, self.target, compiler_for(self.target, asked=True))
-            library.write_bytes(*compile_all([job]))
+            zig = compiler_for(self.target, asked=True)
+            (made,) = compile_all([job(fmu.name, fmu.sources(), self.target, zig)], folder)
+            library.write_bytes(made.read_bytes())
             return library
-        line = Compiler(self.compiler, "").line(fmu.name, self.target)
+        line = job(fmu.name, {}, self.target, Compiler(self.compiler)).command
         command = [self.level if word == "-O2" else word for word in line]
         done = subprocess.run(
             [*command, "-o", str(library)],

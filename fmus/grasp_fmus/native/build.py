@@ -5,18 +5,27 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from hashlib import sha256
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, NamedTuple
+
+from c_compilers import Compiler, Job, compile_all, find_compiler
 
 from ..folder import Built, is_current, sources_hash, write_file, write_stamp
 from ..shipped import SCRIPTS, slave_class
-from .compilers import Compiler, Job, compile_all, compiler_for, universal
-from .targets import Target, Version, folders
+from .targets import Target, Version, folders, here, universal
 
 if TYPE_CHECKING:
     from ..fmu import Model
 
 Members = Mapping[str, bytes]
 """The files in an FMU, by name."""
+
+
+UNPREFIXED = tuple(f"FMI{fmi}_OVERRIDE_FUNCTION_PREFIX" for fmi in (2, 3))
+"""What is defined for a shared library, in which functions are called as the standard does."""
+
+NETWORKED = {".so": ("-lpthread", "-ldl"), ".dll": ("-lws2_32",)}
+"""The libraries of sockets and threads, by the suffix of a shared library; cl is told in the C."""
 
 
 class Plan(NamedTuple):
@@ -31,7 +40,9 @@ class Plan(NamedTuple):
     @property
     def key(self) -> str:
         """A hash of all that decides the binaries, but for the sources."""
-        known = [(self.fmi, *item, self.compilers[item[0]]) for item in self.places.items()]
+        known = [
+            (self.fmi, *item, self.compilers[item[0]].identity) for item in self.places.items()
+        ]
         return sha256(repr(known).encode()).hexdigest()
 
 
@@ -42,6 +53,14 @@ def planned(asked: Sequence[Target] = (), fmi: Version = 2) -> Plan:
     """
     places, note = folders(asked, fmi)
     return Plan(fmi, places, {t: compiler_for(t, t in asked) for t in places}, note)
+
+
+def compiler_for(target: Target, asked: bool) -> Compiler:
+    """Return the compiler for a target; ValueError where there is none, with what to install.
+
+    Where the target was asked for by name, to go to machines with an older libc, it is zig.
+    """
+    return find_compiler("" if target == here() and not asked else target.zig)
 
 
 def python_only() -> dict[str, str]:
@@ -131,11 +150,12 @@ def with_binaries(
     `networked` ones are linked with what sockets need.
     """
     jobs = [
-        Job(_sources(files), name, target, plan.compilers[target], networked)
+        job(name, _sources(files), target, plan.compilers[target], networked)
         for name, files in fmus.items()
         for target in plan.places
     ]
-    made = iter(compile_all(jobs))
+    with TemporaryDirectory(prefix="grasp_fmus_") as scratch:
+        made = iter([library.read_bytes() for library in compile_all(jobs, Path(scratch))])
     for name, files in fmus.items():
         thin: dict[str, list[bytes]] = {}
         for target, folder in plan.places.items():
@@ -145,6 +165,18 @@ def with_binaries(
             for place, several in thin.items()
         }
         yield name, {**files, **binaries}
+
+
+def job(
+    name: str,
+    sources: Mapping[str, bytes],
+    target: Target,
+    compiler: Compiler,
+    networked: bool = False,
+) -> Job:
+    """Return what makes the library of an FMU, in which functions are called as in the standard."""
+    libraries = NETWORKED.get(target.suffix, ()) if networked else ()
+    return Job(name, sources, compiler, target.suffix, UNPREFIXED, libraries)
 
 
 def _sources(files: Members) -> dict[str, bytes]:

@@ -10,13 +10,14 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from string import Template
 
+from c_compilers import BITS, LIBM
+
 from ..c_header import Group, Member, comment, members, structs
 from ..fmu import Model
 from ..folder import write_file
 from ..link.message import Value
 from ..link.signature import ORDER, Causality, Kind, LinkVariable, Signature
 from ..variable import Scalar, Variable
-from .compilers import BITS, LIBM
 from .translation import translated
 
 FOLDER = Path(__file__).parent

@@ -3,6 +3,8 @@
 from typing import Literal
 from xml.etree.ElementTree import Element, SubElement
 
+from c_compilers import BITS, LIBM
+
 from ..model_description import (
     Description,
     add_categories_and_experiment,
@@ -18,7 +20,6 @@ from ..model_description import (
     unknowns,
 )
 from ..variable import Scalar, Variable
-from .compilers import BITS, LIBM
 
 TYPES: dict[type[Scalar], str] = {
     float: "Float64",

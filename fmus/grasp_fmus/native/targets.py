@@ -1,8 +1,9 @@
 """The platforms that a native FMU may have a binary for."""
 
 import platform
+import struct
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Literal, NamedTuple
 
 Version = Literal[2, 3]
@@ -85,3 +86,15 @@ def folders(asked: Iterable[Target], fmi: Version) -> tuple[dict[Target, str], s
             "has one folder for both; --fmi 3 has two"
         )
     return places, ""
+
+
+def universal(thin: Sequence[bytes]) -> bytes:
+    """Return libraries for processors of macOS as one that serves them all."""
+    page = 1 << 14
+    head, body, place = struct.pack(">II", 0xCAFEBABE, len(thin)), b"", page
+    for binary in thin:
+        processor = struct.unpack_from("<II", binary, 4)
+        head += struct.pack(">5I", *processor, place, len(binary), 14)
+        body += binary + bytes(-len(binary) % page)
+        place = page + len(body)
+    return head + bytes(page - len(head)) + body

@@ -5,18 +5,19 @@ latter. Those of the blocks that come with the package are built where they are 
 content, in the user's folder for what can be made again.
 """
 
+import functools
 import sys
 import zipfile
 import zlib
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext, suppress
-from functools import cache
 from pathlib import Path
+
+from c_compilers import CompilerError, cache
 
 from ..folder import is_current, sources_hash, write_stamp
 from ..shipped import SCRIPTS
 from .build import build_native, chosen_names, planned
-from .compilers import CompilerError, cache_folder, can_write
 from .targets import here
 
 UNREADABLE = (OSError, EOFError, ValueError, RuntimeError, zipfile.BadZipFile, zlib.error)
@@ -62,7 +63,7 @@ def is_shipped(name: str) -> bool:
     return (SCRIPTS / f"{name}.py").is_file()
 
 
-@cache
+@functools.cache
 def shipped_twins(
     during: Callable[[str], AbstractContextManager[object]] = nullcontext,
 ) -> Path:
@@ -71,12 +72,12 @@ def shipped_twins(
     That is done in the context that `during` makes of a line that says so. NoTwinsError where it
     cannot be.
     """
-    kept = cache_folder()
+    kept = cache.folder()
     sources = sources_hash()
     folder = kept / "fmus" / here().tuple / sources[:16] if kept else None
     if folder and is_current(folder, sources):
         return folder
-    if not folder or not can_write(folder):
+    if not folder or not cache.writable(str(folder)):
         raise NoTwinsError(f"no folder to keep native FMUs in; {KEPT}")
     try:
         plan = planned()

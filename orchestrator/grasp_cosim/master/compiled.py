@@ -1,28 +1,20 @@
 """The hot loop in C: compiled by the user's compiler at the first need, kept, and loaded.
 
-What is kept is a file of its own for each state of the source, in the user's cache folder, with a
-check sum at its end; it serves every later process, also one without a compiler. Where no component
-is Python the loop runs without Python's lock (the GIL), which callbacks take for themselves.
+What is kept serves every later process: a file for each state of the source and the compiler. Where
+no component is Python the loop runs without Python's lock (the GIL), which callbacks take for
+themselves.
 """
 
 import ctypes
-import hashlib
-import os
-import platform
-import shlex
-import shutil
-import subprocess
-import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import lru_cache
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from ..checks import install_command
+from c_compilers import CompilerError, Job, cache, compile_all, find_compiler
+
 from ..errors import InputError
-from ..files import in_one_piece
 from ..fmi import instance
 from ..fmi.instance import PYTHON, Native
 from ..realtime import meter, pacer
@@ -39,13 +31,7 @@ ELEMENTS = (
 )
 """The element types of buffers; the source has them in capitals."""
 
-FLAGS = ("-std=c99", "-O2", "-fPIC", "-shared", "-ffp-contract=off")
-"""Without contraction a*b + c is rounded twice, as in Python."""
-
-REMEDY = f"it needs gcc or clang, or `{install_command('ziglang')}`; engine python needs none"
-
-_CHECKED = 32
-"""Bytes of the check sum at the end of what is kept."""
+REMEDY = "engine python needs no compiler"
 
 
 class _Operation(ctypes.Structure):
@@ -165,20 +151,19 @@ def _table(row: type[ctypes.Structure], rows: Sequence[Any]) -> Any:
 
 
 @lru_cache(maxsize=1)
-def _file() -> Path | ScratchFolder:
-    """The library on disk: the one that is kept, or else built anew; InputError as of library().
+def _file() -> tuple[Path, ScratchFolder | None]:
+    """The library on disk, built where it is not kept; InputError as of library().
 
-    A folder that ends with this process where nothing can be kept.
+    With a folder that ends with this process, in which it is where nothing can be kept.
     """
-    if kept := _kept():
-        return kept
-    folder = ScratchFolder()
-    made = Path(folder.name, "loop.so")
-    _build(made)
-    content = made.read_bytes()
-    with suppress(OSError, RuntimeError), in_one_piece(_place()) as part:
-        part.write_bytes(content + _check_sum(content))
-    return _kept() or folder
+    try:
+        if kept := cache.kept(_job().kept_as):
+            return kept, None
+        scratch = ScratchFolder()
+        (made,) = compile_all([_job()], Path(scratch.name))
+        return made, scratch
+    except (ValueError, CompilerError) as error:
+        raise InputError(f"engine compiled: {error}; {REMEDY}") from error
 
 
 @lru_cache(maxsize=2)
@@ -187,10 +172,9 @@ def library(locked: bool) -> ctypes.CDLL:
 
     InputError where it has to be built and there is no compiler, or it fails.
     """
-    file = _file()
-    path = str(file) if isinstance(file, Path) else f"{file.name}/loop.so"
+    path, _ = _file()
     try:
-        found: ctypes.CDLL = (ctypes.PyDLL if locked else ctypes.CDLL)(path)
+        found: ctypes.CDLL = (ctypes.PyDLL if locked else ctypes.CDLL)(str(path))
     except OSError as error:
         raise InputError(f"{path}: the compiled loop does not load: {error}; {REMEDY}") from error
     found.run.restype = ctypes.c_int64
@@ -201,36 +185,25 @@ def library(locked: bool) -> ctypes.CDLL:
 
 def is_there() -> bool:
     """Return True if the compiled loop need not be built."""
-    return bool(library.cache_info().currsize or _kept())
+    with suppress(ValueError):
+        return bool(library.cache_info().currsize or cache.kept(_job().kept_as))
+    return False
 
 
-def compiler() -> list[str] | None:
-    """The command of a C compiler: that of CC, cc, gcc, clang, or the package ziglang."""
-    named: list[str] = []
-    with suppress(ValueError):  # a quote without the other
-        named = shlex.split(os.environ.get("CC", ""))
-    for command in (named, ["cc"], ["gcc"], ["clang"]):
-        if command and shutil.which(command[0]):
-            return command
-    return [sys.executable, "-m", "ziglang", "cc"] if find_spec("ziglang") else None
+def has_compiler() -> bool:
+    """Return True if there is a C compiler."""
+    with suppress(ValueError):
+        return bool(find_compiler())
+    return False
 
 
-def _build(out: Path) -> None:
-    command = compiler()
-    if command is None:
-        raise InputError(f"engine compiled: there is no C compiler (CC, cc, gcc, clang); {REMEDY}")
-    done = subprocess.run(  # noqa: S603 - the user's compiler
-        [*command, *FLAGS, *_constants(), "-o", out, SOURCE],
-        capture_output=True, text=True, errors="replace",
-    )  # fmt: skip
-    if done.returncode:
-        lines = done.stderr.splitlines()
-        said = next((line for line in lines if "error" in line), f"exit code {done.returncode}")
-        raise InputError(f"engine compiled: {shlex.join(command)}: {said}; {REMEDY}")
+def _job() -> Job:
+    """What the library is made of; ValueError where there is no compiler."""
+    return Job("loop", {SOURCE.name: SOURCE.read_bytes()}, find_compiler(), defined=_constants())
 
 
 def _constants() -> list[str]:
-    """The numbers that the source shares with the other modules, as options of a compiler."""
+    """The numbers that the source shares with the other modules, as macros of a compiler."""
     shared = {
         **{n: getattr(loop, n) for n in ("COPY", "SCALE", "STORE", "LOAD", "LOAD_LONG", "DRIVE")},
         **{n: getattr(loop, n) for n in ("CALL", "STEP", "TOO_LONG", "EXACT", "WORST")},
@@ -242,27 +215,4 @@ def _constants() -> list[str]:
         "NAP": round(pacer.NAP * NANOSECONDS),
         **{name.upper(): code for code, name in enumerate(ELEMENTS)},
     }
-    return [f"-D{name}={value!r}" for name, value in shared.items()]
-
-
-def _place() -> Path:
-    """Where it is kept; RuntimeError where the user has no home."""
-    made_of = [SOURCE.read_text("utf-8"), *FLAGS, *_constants(), sys.platform, platform.machine()]
-    name = hashlib.blake2b("\0".join(made_of).encode(), digest_size=8).hexdigest()
-    base = Path(os.environ.get("XDG_CACHE_HOME", ""))  # by its standard, relative ones do not count
-    return (
-        (base if base.is_absolute() else Path.home() / ".cache") / "grasp-cosim" / name / "loop.so"
-    )
-
-
-def _kept() -> Path | None:
-    """What is kept, if it is there and not damaged."""
-    try:
-        content = (place := _place()).read_bytes()
-    except (OSError, RuntimeError):
-        return None
-    return place if content[-_CHECKED:] == _check_sum(content[:-_CHECKED]) else None
-
-
-def _check_sum(content: bytes) -> bytes:
-    return hashlib.blake2b(content, digest_size=_CHECKED).digest()
+    return [f"{name}={value!r}" for name, value in shared.items()]

@@ -73,7 +73,7 @@ def _pays(plan: Plan, steps: int | None) -> bool:
         if kind >= loop.CALL and plan.calls[call].native
     ]
     _forgone += SAVED * sum(rates) * (steps or 0)
-    return (steps is None or _forgone > BUILDING) and compiled.compiler() is not None
+    return (steps is None or _forgone > BUILDING) and compiled.has_compiler()
 
 
 def _interpreted(plan: Plan) -> Loop:

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from c_compilers import LIBM
 from grasp_fmus.contract import build_params, declared, packer, unpacker
 from grasp_fmus.contract import variables as scalar_variables
 from grasp_fmus.native import translation
-from grasp_fmus.native.compilers import LIBM
 from grasp_fmus.snapshot import _scalars, _shaped
 from support.compiled import compile_c
 

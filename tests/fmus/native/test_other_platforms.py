@@ -9,9 +9,9 @@ from pathlib import Path
 
 import fmpy
 import pytest
+from c_compilers import environment as of_compiler
 from grasp_fmus.changes import read_members
-from grasp_fmus.native.build import build_native, planned
-from grasp_fmus.native.compilers import compiler_for
+from grasp_fmus.native.build import build_native, compiler_for, planned
 from grasp_fmus.native.targets import LINUX_ARM, LINUX_X86, WINDOWS, Target
 from support.compilers import needs_zig
 
@@ -46,7 +46,7 @@ def ends(fmu: dict[str, bytes], target: Target, folder: Path, *emulator: str) ->
     zig = compiler_for(target, asked=True)
     headers = Path(fmpy.__file__).parent / "c-code"
     command = [*zig.command, "-w", "-ffp-contract=off", "-I", str(headers), "-o", host, str(HOST)]
-    subprocess.run(command, cwd=folder, check=True, env={**os.environ, **zig.environment})
+    subprocess.run(command, cwd=folder, check=True, env=of_compiler(folder))
     place = target.tuple if target == LINUX_ARM else target.folder
     binary = folder / f"fmu{target.suffix}"
     binary.write_bytes(fmu[f"binaries/{place}/{name}{target.suffix}"])

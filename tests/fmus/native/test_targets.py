@@ -1,6 +1,7 @@
 """Which folders of an FMU hold which binaries, on any machine."""
 
 import platform
+import struct
 import sys
 
 import pytest
@@ -16,6 +17,7 @@ from grasp_fmus.native.targets import (
     folders,
     here,
     targets,
+    universal,
 )  # fmt: skip
 
 Machine = tuple[str, str]
@@ -103,6 +105,19 @@ def test_fmi_3_has_a_folder_for_each_platform(monkeypatch: pytest.MonkeyPatch) -
         {LINUX_X86: "x86_64-linux", LINUX_ARM: "aarch64-linux"}, ""
     )  # fmt: skip
     assert folders(KNOWN, 3) == ({t: t.tuple for t in KNOWN}, "")
+
+
+def test_one_library_for_both_processors_of_macos() -> None:
+    """Mach-O files are told apart by their processor; each begins on a page."""
+    thin = [struct.pack("<III", 0xFEEDFACF, cpu, sub) + bytes(n) for cpu, sub, n in
+            ((0x01000007, 3, 5), (0x0100000C, 0, 20_000))]  # fmt: skip
+    fat = universal(thin)
+    magic, count = struct.unpack_from(">II", fat)
+    assert (magic, count) == (0xCAFEBABE, 2)
+    for i, binary in enumerate(thin):
+        cpu, sub, place, size, align = struct.unpack_from(">5I", fat, 8 + 20 * i)
+        assert (cpu, sub) == struct.unpack_from("<II", binary, 4)
+        assert (place % (1 << align), fat[place : place + size]) == (0, binary)
 
 
 def test_what_a_shared_library_is_called() -> None:

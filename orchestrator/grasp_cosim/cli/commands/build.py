@@ -111,8 +111,8 @@ def _native(
     block: Path | None, folder: Path, target: str | None, fmi: Literal[2, 3]
 ) -> "tuple[Sequence[Built], list[str]]":
     """What was built, and what is to be said of it."""
+    from c_compilers import CompilerError
     from grasp_fmus.native.build import build_native, build_native_block, planned, python_only
-    from grasp_fmus.native.compilers import CompilerError
     from grasp_fmus.native.targets import targets
 
     plan = planned(targets(target.split(",")) if target is not None else (), fmi)

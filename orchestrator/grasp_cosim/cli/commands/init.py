@@ -184,8 +184,8 @@ def _grasp(
 
 def _natives(folder: Path) -> Path:
     """Where native FMUs are below a folder, built first."""
+    from c_compilers import CompilerError
     from grasp_fmus.native.build import build_native
-    from grasp_fmus.native.compilers import CompilerError
 
     try:
         build_native(folder / NATIVE_FOLDER)

@@ -80,7 +80,7 @@ def proxy(
     Example: grasp-cosim proxy fmus/build/GripperPlant.fmu -o GripperPlantProxy.fmu --timeout 0.001
     Native: grasp-cosim proxy vendor.fmu -o Bench.fmu --native --target linux64,win64
     """
-    from grasp_fmus.native.compilers import CompilerError  # only here: they take time to load
+    from c_compilers import CompilerError  # only here: they take time to load
     from grasp_fmus.proxy_build import build_proxy
 
     _check_paths(fmu, out, c_header)

@@ -7,7 +7,6 @@ with the package, so that a page needs no compiler. It names the sources that it
 that it can be told without zig if they are those at hand.
 """
 
-import os
 import re
 import subprocess
 import sys
@@ -18,8 +17,8 @@ from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from c_compilers import BITS, LIBM, environment, find_zig
 from grasp_fmus.folder import write_file
-from grasp_fmus.native.compilers import BITS, LIBM, zig_compiler
 from grasp_fmus.native.sources import native_sources
 from grasp_fmus.native.translation import translated
 
@@ -88,7 +87,7 @@ def made() -> bytes:
         found = version("ziglang")
     except PackageNotFoundError:
         found = "missing"
-    zig = zig_compiler()
+    zig = find_zig()
     if zig is None or found != ZIG:
         raise InputError(
             f"ziglang: {found}; must be {ZIG}, which makes the same bytes everywhere: "
@@ -100,7 +99,7 @@ def made() -> bytes:
             file.parent.mkdir(exist_ok=True)
             file.write_bytes(data)
         done = subprocess.run(  # noqa: S603 - zig of its package
-            [*zig.command, *OPTIONS], cwd=folder, env={**os.environ, **zig.environment},
+            [*zig.command, *OPTIONS], cwd=folder, env=environment(Path(folder)),
             stdin=subprocess.DEVNULL, capture_output=True, check=False,
         )  # fmt: skip
         if done.returncode:

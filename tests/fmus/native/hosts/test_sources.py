@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from grasp_fmus.native.compilers import LIBM
+from c_compilers import LIBM
 from support.c_host import HEADERS, Unpacked, number, rows_in_python
 from support.hosts import Parts
 from support.kinds import TRANSLATED

@@ -1,0 +1,197 @@
+"""C compilers: which there is, what decides the bits of results, and how they are run.
+
+For the native FMUs and for the compiled loop of the master; the standard library only. What was
+compiled is kept under a name made of its sources, the compiler and the flags: see cache.py.
+"""
+
+import importlib.util
+import os
+import re
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from pathlib import Path
+from tempfile import mkdtemp
+from typing import NamedTuple
+
+from . import cache
+
+LIBM = (
+    "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "cbrt", "cos", "cosh", "erf",
+    "erfc", "exp", "exp2", "expm1", "fmod", "frexp", "hypot", "ldexp", "lgamma", "log", "log10",
+    "log1p", "log2", "modf", "pow", "sin", "sinh", "tan", "tanh", "tgamma",
+)  # fmt: skip
+"""Functions whose calls no compiler may work out by itself: it rounds otherwise than libm."""
+
+BITS = ("-std=c99", "-O2", "-ffp-contract=off")
+"""What decides the bits, besides -fno-builtin-NAME for the functions in LIBM."""
+
+OWN = ("cc", "gcc", "clang", "cl")
+"""Compilers of this machine, the first that is there, unless CC names one."""
+
+INSTALL = shlex.join([sys.executable, "-m", "pip", "install", "ziglang"])
+
+
+class CompilerError(Exception):
+    """A compiler failed: of what, which, its exit code, and its first error, in one line."""
+
+
+class Compiler(NamedTuple):
+    """A program that compiles, with its first arguments."""
+
+    command: tuple[str, ...]
+
+    @property
+    def identity(self) -> str:
+        """What tells it from others, and from itself after an update."""
+        files = [Path(found) for word in self.command if (found := shutil.which(word))]
+        return repr((self.command, [(f.stat().st_size, f.stat().st_mtime_ns) for f in files]))
+
+
+class Job(NamedTuple):
+    """A shared library to make, of NAME.c among sources, which may include the others."""
+
+    name: str
+    sources: Mapping[str, bytes]
+    compiler: Compiler
+    suffix: str = ".so"
+    defined: Sequence[str] = ()
+    """NAME or NAME=VALUE."""
+    libraries: Sequence[str] = ()
+    """Options of the linker."""
+
+    @property
+    def command(self) -> list[str]:
+        """What is run in a folder with the sources."""
+        out = f"{self.name}{self.suffix}"
+        if Path(self.compiler.command[0]).stem.lower() == "cl":
+            return [
+                *self.compiler.command, "/nologo", "/O2", "/fp:precise", "/MT", "/LD",
+                *(f"/D{macro}" for macro in self.defined), f"{self.name}.c", f"/Fe:{out}",
+            ]  # fmt: skip
+        return [
+            *self.compiler.command, *BITS, *(f"-fno-builtin-{function}" for function in LIBM),
+            *(f"-D{macro}" for macro in self.defined), "-shared",
+            *(() if self.suffix == ".dll" else ("-fPIC",)), "-o", out, f"{self.name}.c", "-lm",
+            *self.libraries,
+        ]  # fmt: skip
+
+    @property
+    def kept_as(self) -> str:
+        """The name in the cache, made of all that decides the library."""
+        sources = (part for item in sorted(self.sources.items()) for part in item)
+        parts = (self.compiler.identity, sys.platform, *self.command, *sources)
+        return f"compiled/{cache.key(parts)}{self.suffix}"
+
+
+def find_compiler(zig_target: str = "") -> Compiler:
+    """Return CC, or the first of cc, gcc, clang and cl, else zig; for a target of zig's, zig.
+
+    ValueError, one line, where there is none.
+    """
+    if zig_target:
+        if zig := find_zig():
+            return Compiler((*zig.command, "-target", zig_target, "-s"))
+        raise ValueError(f"no C compiler for {zig_target}: must be zig; {INSTALL}")
+    if given := os.environ.get("CC"):
+        command: list[str] = []
+        with suppress(ValueError):  # a quote without the other
+            command = shlex.split(given)
+        if not command or not shutil.which(command[0]):
+            raise ValueError(f"CC={given}: no such program; must be a C compiler, or unset")
+        return Compiler(tuple(command))
+    if own := next(filter(shutil.which, OWN), None):
+        return Compiler((own,))
+    if zig := find_zig():
+        return zig
+    raise ValueError(f"no C compiler: must be one of CC, {', '.join(OWN)}, zig; {INSTALL}")
+
+
+def find_zig() -> Compiler | None:
+    """Return zig of the package ziglang; None without."""
+    spec = importlib.util.find_spec("ziglang")
+    places = spec.submodule_search_locations if spec else None
+    program = shutil.which("zig", path=places[0]) if places else None
+    return Compiler((program, "cc")) if program else None
+
+
+def environment(scratch: Path) -> dict[str, str]:
+    """Return that of a compiler which leaves nothing but in scratch, and zig's libraries, kept."""
+    zig = str(cache.writable("zig") or scratch)
+    own = {"ZIG_GLOBAL_CACHE_DIR": zig, "ZIG_LOCAL_CACHE_DIR": zig, "TMPDIR": str(scratch)}
+    return {**os.environ, **own, "LC_ALL": "C"}
+
+
+def compile_all(jobs: Sequence[Job], scratch: Path) -> list[Path]:
+    """Return the library of each job, which is compiled in scratch where it is not kept.
+
+    It stays there where nothing can be kept. CompilerError where a compiler fails.
+    """
+    made = {name: cache.kept(name) for name in (job.kept_as for job in jobs)}
+    missing = {job.kept_as: job for job in jobs if not made[job.kept_as]}
+    compiled = zip(missing, _compiled([*missing.values()], scratch), strict=True)
+    made |= {name: cache.keep(library, name) for name, library in compiled}
+    return [place for job in jobs if (place := made[job.kept_as])]
+
+
+def _compiled(jobs: Sequence[Job], scratch: Path) -> list[Path]:
+    """Return the libraries of jobs, as many at once as there are processors.
+
+    However this ends, no compiler runs on.
+    """
+    most = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    started: list[subprocess.Popen[str]] = []
+    ended = threading.Event()
+
+    def run(job: Job) -> Path:
+        folder = Path(mkdtemp(dir=scratch))
+        process = _started(job, folder)
+        started.append(process)
+        if ended.is_set():
+            _end(process)
+        said, _ = process.communicate()
+        library = folder / f"{job.name}{job.suffix}"
+        if process.returncode or not library.is_file():
+            command = f"{shlex.join(job.compiler.command)}: exit code {process.returncode}"
+            raise CompilerError(f"{job.name}.c: {command}: {_first_error(said)}")
+        return library
+
+    with ThreadPoolExecutor(most) as pool:
+        try:
+            return [*pool.map(run, jobs)]
+        finally:  # on Ctrl-C, too, which comes to the main thread alone
+            ended.set()
+            for process in started:
+                _end(process)
+
+
+def _started(job: Job, folder: Path) -> subprocess.Popen[str]:
+    try:
+        for file, data in job.sources.items():
+            (folder / file).write_bytes(data)
+        return subprocess.Popen(  # noqa: S603 - the user's compiler
+            job.command, cwd=folder, env=environment(folder), stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
+            start_new_session=True,
+        )  # fmt: skip
+    except OSError as error:
+        said = f"{error.filename or folder}: {error.strerror}"
+        raise CompilerError(f"{job.name}.c: {said}") from error
+
+
+def _first_error(text: str) -> str:
+    lines = [line.strip() for line in text.splitlines() if line.strip()] or ["no message"]
+    return next((line for line in lines if re.search(r"\berror\b", line, re.I)), lines[-1])
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    """End a compiler with what it has started."""
+    with suppress(ProcessLookupError):
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL) if hasattr(os, "killpg") else process.kill()

@@ -1,0 +1,252 @@
+"""Compilers: found or named as missing, heard when they fail, ended with us, asked once."""
+
+import ctypes
+import errno
+import os
+import signal
+import struct
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Mapping
+from pathlib import Path
+
+import c_compilers
+import pytest
+from c_compilers import Compiler, CompilerError, Job, cache, compile_all, find_compiler
+from grasp_fmus.native.build import compiler_for, job
+from grasp_fmus.native.targets import LINUX_ARM, LINUX_X86, MAC_ARM, MAC_X86, Target
+from support.compilers import needs_zig
+from support.native_fmus import needs_gcc
+from support.processes import ends
+
+SOURCES = {
+    "Sum.c": b'#include "terms.h"\nint sum(void) { return hidden(); }\n',
+    "terms.h": b"static int hidden(void) { return 40 + 2; }\n",
+}
+CHANGED = {**SOURCES, "terms.h": SOURCES["terms.h"].replace(b"2", b"3")}
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="NO Linux")
+
+
+@pytest.fixture(autouse=True)
+def _own_cache(
+    request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An empty one, but for zig, which would make its libraries anew."""
+    if "zig_" not in request.node.name:
+        monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.delenv("CC", raising=False)
+
+
+def program(path: Path, text: str) -> Compiler:
+    path.write_text(f"#!/bin/sh\n{text}\n")
+    path.chmod(0o755)
+    return Compiler((str(path),))
+
+
+def made(
+    scratch: Path, sources: Mapping[str, bytes] = SOURCES, compiler: Compiler | None = None
+) -> Path:
+    (library,) = compile_all([Job("Sum", sources, compiler or find_compiler())], scratch)
+    return library
+
+
+@needs_gcc
+def test_what_is_compiled_is_kept_until_something_differs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log = tmp_path / "log"
+    counting = program(tmp_path / "counting", f'echo >> {log}\nexec gcc "$@"')
+    other = Compiler((*counting.command, "-O1"))
+    runs = []
+    for sources, cc in ((SOURCES, counting), (SOURCES, counting), (CHANGED, counting),
+                        (SOURCES, counting), (SOURCES, other), (CHANGED, counting)):  # fmt: skip
+        library = made(tmp_path, sources, cc)
+        runs.append(len(log.read_text().splitlines()))
+        assert library.is_relative_to(tmp_path / "cache/grasp-cosim/compiled")
+    assert runs == [1, 1, 2, 2, 3, 3]
+    assert ctypes.CDLL(str(library)).sum() == 43
+    os.utime(tmp_path / "counting", ns=(1, 1))  # as after an update
+    made(tmp_path, CHANGED, counting)
+    assert len(log.read_text().splitlines()) == 4
+    assert not [path for path in library.parent.iterdir() if path.suffix != ".so"]
+
+
+@needs_gcc
+@pytest.mark.parametrize("place", ["/dev/null", "/proc"], ids=["a file", "read-only"])
+def test_where_nothing_can_be_kept_it_stays_in_scratch(
+    tmp_path: Path, place: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", place)
+    library = made(tmp_path)
+    assert library.is_relative_to(tmp_path)
+    assert ctypes.CDLL(str(library)).sum() == 42
+
+
+@needs_gcc
+def test_a_cache_that_cannot_be_written_to_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = made(tmp_path)
+    monkeypatch.setattr(cache, "writable", lambda _: None)
+    assert made(tmp_path) == before
+    assert not made(tmp_path, CHANGED).is_relative_to(tmp_path / "cache")
+
+
+def test_a_folder_is_kept_as_a_file_is_and_the_first_stays(tmp_path: Path) -> None:
+    """Two processes may make the same at once."""
+    for text in ("one", "two"):
+        (tmp_path / text).mkdir()
+        (tmp_path / text / "file").write_text(text)
+        assert (cache.keep(tmp_path / text, "all/key") / "file").read_text() == "one"
+    assert [path.name for path in (tmp_path / "cache/grasp-cosim/all").iterdir()] == ["key"]
+
+
+def test_no_two_lists_of_parts_have_one_key() -> None:
+    lists: list[list[str | bytes]] = [["ab", "c"], ["a", "bc"], ["abc"], ["abc", ""], [b"2\0ab"]]
+    assert len({cache.key(parts) for parts in lists}) == len(lists)
+
+
+def test_a_relative_folder_does_not_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It would be another one in each folder, and what a stranger left there would be loaded."""
+    monkeypatch.setenv("XDG_CACHE_HOME", "here")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert cache.folder() == tmp_path / ".cache/grasp-cosim"
+    monkeypatch.setenv("HOME", "there")
+    assert cache.folder() is None
+
+
+@pytest.mark.parametrize("given", ["cc 'half a quote", "   ", "no-such-compiler -m64"])
+def test_a_compiler_that_is_none_is_named(given: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CC", given)
+    with pytest.raises(ValueError, match=rf"^CC={given}: no such program; must be a C compiler"):
+        find_compiler()
+
+
+def test_cc_comes_first_then_what_there_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setattr(c_compilers, "find_zig", lambda: None)
+    fix = f"{sys.executable} -m pip install ziglang"
+    with pytest.raises(ValueError, match=r"^no C compiler: must be one of CC, cc, ") as error:
+        find_compiler()
+    assert str(error.value).endswith(fix)
+    with pytest.raises(ValueError, match=f"^no C compiler for wasm32-wasi: must be zig; {fix}$"):
+        find_compiler("wasm32-wasi")
+    monkeypatch.setattr(c_compilers, "find_zig", lambda: Compiler(("/zig", "cc")))
+    assert find_compiler().command == ("/zig", "cc")
+    assert find_compiler("wasm32-wasi").command == ("/zig", "cc", "-target", "wasm32-wasi", "-s")
+    for name in ("clang", "gcc", "cc"):
+        program(tmp_path / name, "exit 0")
+        assert find_compiler().command == (name,)
+    monkeypatch.setenv("CC", "clang 'of mine'")
+    assert find_compiler().command == ("clang", "of mine")
+
+
+def test_a_full_folder_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(CompilerError, match=rf"^Sum.c: {tmp_path}/.*: No space left on device$"):
+        made(tmp_path, compiler=Compiler(("cc",)))
+
+
+ERROR = "M.c:3:1: error: expected ';'"
+
+
+@pytest.mark.parametrize(
+    ("said", "code", "line"),
+    [
+        (f"In file x:\n{ERROR}\nerror: 2 more", 1, f"exit code 1: {ERROR}"),
+        ("cannot go on", 7, "exit code 7: cannot go on"),
+        ("", 0, "exit code 0: no message"),
+        (None, 0, "No such file or directory"),
+    ],
+)
+def test_a_compiler_that_fails_is_heard_in_one_line(
+    said: str | None, code: int, line: str, tmp_path: Path
+) -> None:
+    compiler = program(tmp_path / "cc", f"printf '%s' \"{said}\" >&2\nexit {code}")
+    if said is None:
+        (tmp_path / "cc").write_text("#!/no/such/shell\n")
+    with pytest.raises(CompilerError) as error:
+        made(tmp_path, compiler=compiler)
+    assert str(error.value) == f"Sum.c: {tmp_path}/cc: {line}"
+    assert not (tmp_path / "cache/grasp-cosim/compiled").exists()
+
+
+def test_a_compiler_that_has_just_started_ends_with_us(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ctrl-C that comes while a compiler is being started does not lose it."""
+    begin, begun, heard = c_compilers._started, [], threading.Event()
+
+    def interrupt(*_: object) -> None:
+        heard.set()
+        raise KeyboardInterrupt
+
+    def slowly(job: Job, folder: Path) -> subprocess.Popen[str]:
+        begun.append(begin(job, folder))
+        os.kill(os.getpid(), signal.SIGINT)
+        assert heard.wait(60.0)
+        return begun[-1]
+
+    monkeypatch.setattr(c_compilers, "_started", slowly)
+    before = signal.signal(signal.SIGINT, interrupt)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            made(tmp_path, compiler=program(tmp_path / "cc", "exec sleep 3600"))
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert [process.returncode for process in begun] == [-signal.SIGKILL]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_no_compiler_outlives_us(number: signal.Signals, tmp_path: Path) -> None:
+    """Nor what it has started, nor its files."""
+    pid = tmp_path / "pid"
+    program(tmp_path / "cc", f"sleep 3600 & echo $! > {pid}; wait")
+    command = [sys.executable, "-m", "grasp_cosim", "build", "--native", "--out", "out"]
+    environment = {
+        **os.environ, "CC": f"{tmp_path}/cc", "PYTHONPATH": os.pathsep.join(sys.path),
+        "TMPDIR": str(tmp_path),
+    }  # fmt: skip
+    us = subprocess.Popen(
+        command, cwd=tmp_path, env=environment, stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )  # fmt: skip
+    end = time.monotonic() + 60.0
+    while not (pid.exists() and pid.read_text()) and time.monotonic() < end:
+        time.sleep(0.05)
+    child = int(pid.read_text())
+    us.send_signal(number)
+    _, said = us.communicate(timeout=60.0)
+    code = 130 if number == signal.SIGINT else 143
+    assert (us.returncode, said.strip()) == (code, "grasp-cosim: interrupted")
+    assert ends(child)
+    assert not (tmp_path / "out").exists()
+    assert not list(tmp_path.glob("grasp_*"))
+
+
+@needs_zig
+@pytest.mark.platforms
+@pytest.mark.parametrize("target", [LINUX_X86, LINUX_ARM, MAC_X86, MAC_ARM])
+def test_zig_compiles_for_others(target: Target, tmp_path: Path) -> None:
+    magic = b"\x7fELF" if target.suffix == ".so" else struct.pack("<I", 0xFEEDFACF)
+    task = job("Sum", SOURCES, target, compiler_for(target, asked=True))
+    first, second = (p.read_bytes() for p in c_compilers._compiled([task, task], tmp_path))
+    assert first[:4] == magic
+    assert first == second
+
+
+@needs_zig
+@pytest.mark.platforms
+def test_zig_needs_no_folder_to_keep_its_libraries_in(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Its own default is below the same folder, and it stops where that cannot be written to."""
+    monkeypatch.setenv("XDG_CACHE_HOME", "/dev/null")
+    assert made(tmp_path, compiler=find_compiler("x86_64-linux-gnu.2.17")).is_relative_to(tmp_path)
