@@ -1,0 +1,120 @@
+/* The controller on a Cortex-M without an operating system: a step of its C each millisecond.
+ *
+ * Here its inputs are those of a recorded run, with whose outputs it compares its own. On a board
+ * put your converters into read_inputs() and write_outputs(), your clock into CLOCK, your memory
+ * into cortex_m.ld. It speaks to the debugger (semihosting). Commands: docs/handoff.md.
+ */
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "GraspController.h"
+
+enum { CLOCK = 25000000, PERIOD = CLOCK / 1000 }; /* Hz, of the core; its ticks in a step */
+static const double h = 1e-3;                     /* s, a step */
+
+/* A row a step: the inputs, then the outputs */
+__attribute__((section(".recorded"))) static const double recorded[] = {
+#include "recorded.h"
+};
+enum { ROW = (sizeof(GraspController_Inputs) + sizeof(GraspController_Outputs)) / sizeof(double) };
+enum { STEPS = sizeof recorded / sizeof(double) / ROW };
+static double difference; /* the largest from a recorded output */
+
+static void read_inputs(uint32_t k, GraspController_Inputs *u)
+{
+    memcpy(u, recorded + k * ROW, sizeof *u); /* Here: what is measured */
+}
+
+static void write_outputs(uint32_t k, const GraspController_Outputs *y)
+{
+    const double *output = (const double *)(y + 1), *expected = recorded + (k + 1) * ROW;
+    while (output > (const double *)y) /* Here: to the actuators */
+        if (!(fabs(*--output - *--expected) <= difference))
+            difference = fabs(*output - *expected);
+}
+
+/* Call the debugger: 0x04 writes a text, 0x18 ends. */
+static void semihosting(uintptr_t operation, uintptr_t argument)
+{
+    register uintptr_t r0 __asm("r0") = operation, r1 __asm("r1") = argument;
+    __asm volatile("bkpt 0xab" : "+r"(r0) : "r"(r1) : "memory");
+}
+
+static void say(const char *what, uint32_t number)
+{
+    char text[] = "0000000000\n", *digit = text + 10;
+    do
+        *--digit = (char)('0' + number % 10);
+    while (number /= 10);
+    semihosting(0x04, (uintptr_t)what);
+    semihosting(0x04, (uintptr_t)digit);
+}
+
+static void fail(const char *why)
+{
+    semihosting(0x04, (uintptr_t)why); /* Here: actuators off */
+    semihosting(0x04, (uintptr_t) "\n");
+    for (;;) semihosting(0x18, 0x20023);
+}
+
+#define TIMER ((volatile uint32_t *)0xE000E010) /* control, reload, and a value that counts down */
+#define PENDING (*(volatile uint32_t *)0xE000ED04)
+enum { DUE = 1 << 26, SEEN = 1 << 25 }; /* the timer's, in PENDING */
+extern char stack_low[], stack_top[], data_low[], data_top[], data_in_flash[], bss_low[], bss_top[];
+
+int main(void)
+{
+    static const GraspController_Parameters p = GRASPCONTROLLER_PARAMETERS_DEFAULTS;
+    static char why[GRASPCONTROLLER_WHY_SIZE];
+    uint32_t k, ticks, all = 0, longest = 0, late = 0;
+    const char *unused = stack_low;
+    GraspController_Inputs u;
+    GraspController_State x;
+    GraspController_Outputs y;
+    if (GraspController_check(&p, why))
+        fail(why);
+    TIMER[1] = PERIOD - 1;
+    TIMER[0] = 7; /* on, by the clock of the core, pending at its end */
+    for (k = 0; k < STEPS; k++) {
+        late += (PENDING & DUE) != 0;
+        while (!(PENDING & DUE)) __asm volatile("wfi");
+        PENDING = SEEN;
+        ticks = TIMER[2];
+        read_inputs(k, &u);
+        if ((k == 0 ? GraspController_initial_state(&p, &u, &x, why)
+                    : GraspController_step(&p, &u, h, &x, why)) ||
+            GraspController_outputs(&p, &u, &x, &y, why))
+            fail(why);
+        ticks = (ticks + PERIOD - TIMER[2]) % PERIOD;
+        write_outputs(k, &y);
+        all += ticks;
+        longest = ticks > longest ? ticks : longest;
+    }
+    while (*unused == 0x55)
+        unused++;
+    say("steps: ", STEPS);
+    say("steps begun late: ", late);
+    say("ticks of the clock a step: ", all / STEPS);
+    say("ticks of the longest: ", longest);
+    say("bytes of stack: ", (uint32_t)(stack_top - unused));
+    say("largest difference, 1e-18: ", (uint32_t)fmin(difference * 1e18, UINT32_MAX));
+    semihosting(0x18, 0x20026);
+}
+
+static void fault(void) { fail("fault"); }
+
+static void reset(void)
+{
+    *(volatile uint32_t *)0xE000ED88 |= 0xF << 20; /* the unit for floating point is on */
+    __asm volatile("cpsid i\n dsb\n isb"); /* interrupts end wfi, none is taken */
+    memcpy(data_low, data_in_flash, (size_t)(data_top - data_low));
+    memset(bss_low, 0, (size_t)(bss_top - bss_low));
+    memset(stack_low, 0x55, (size_t)(stack_top - stack_low - 128)); /* to see how far it goes */
+    main();
+}
+
+/* What the core calls, from vector 1 on: cortex_m.ld puts the stack before them. */
+__attribute__((section(".vectors"), used)) static void (*const vectors[15])(void) = {
+    reset, fault, fault, fault, fault, fault, 0, 0, 0, 0, fault, fault, 0, fault, fault,
+};

@@ -1,0 +1,128 @@
+"""The controllers' C on a Cortex-M4F and M7, in qemu: Python's outputs, without a heap."""
+
+import re
+import shlex
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from grasp_controller import series
+from grasp_cosim import cli
+from gripper_plant import rigid
+from proximity_sensor import optics
+from support.compiled import compile_c
+from support.direct import closed_loop
+
+ROOT = Path(__file__).parents[3]
+PAGE = (ROOT / "docs/handoff.md").read_text("utf-8")
+SECTION = PAGE.partition("## The controller on a Cortex-M\n")[2].partition("\n## ")[0]
+COMMANDS = re.findall(r"^ {4}(.+)", SECTION, re.MULTILINE)
+TABLE = [line.split(" | ") for line in re.findall(r"^\|(.*) \|$", SECTION, re.MULTILINE)]
+ADAPTIVE = {
+    "GraspController": "GraspControllerAdaptive",
+    "GRASPCONTROLLER": "GRASPCONTROLLERADAPTIVE",
+    "published": "adaptive",
+    "13-22": "13-27",
+    "docs/cortex_m.c": "cortex_m.c",
+}
+M7 = {"cortex-m4": "cortex-m7", "fpv4-sp-d16": "fpv5-d16", "mps2-an386": "mps2-an500"}
+"""What the page has replaced for the other controller, and for the other core."""
+
+TICK = 5
+"""Instructions in a tick of the timer, as the page says."""
+
+TOOLS = ("arm-none-eabi-gcc", "qemu-system-arm")
+
+pytestmark = [pytest.mark.skipif(shutil.which(tool) is None, reason=f"NO {tool}") for tool in TOOLS]
+
+
+def replaced(text: str, words: dict[str, str]) -> str:
+    for old, new in words.items():
+        text = text.replace(old, new)
+    return text
+
+
+def run(command: str) -> str:
+    """What a command of the page says."""
+    if command.startswith("grasp-cosim "):
+        assert cli.main(shlex.split(command)[1:]) == 0
+        return ""
+    done = subprocess.run(
+        command, shell=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=60
+    )
+    assert done.returncode == 0, done.stdout
+    return done.stdout
+
+
+def said(image: str) -> dict[str, int]:
+    return {what: int(number) for what, number in re.findall(r"^(.+): (\d+)$", image, re.MULTILINE)}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("controller", ["published", "adaptive"])
+def test_the_figures_of_the_page(checkout: Path, controller: str) -> None:
+    words = ADAPTIVE if controller == "adaptive" else {}
+    source = (ROOT / "docs/cortex_m.c").read_text("utf-8")
+    (checkout / "cortex_m.c").write_text(replaced(source, words), "utf-8")
+    *before, compiled, size, emulated = [replaced(command, words) for command in COMMANDS]
+    for command in before:
+        run(command)
+    for core, other in ("M4F", {}), ("M7", M7):
+        assert run(replaced(compiled, other)) == ""
+        symbols = run("arm-none-eabi-nm controller.elf").split()
+        assert {"exp", "main"} <= {*symbols}
+        assert not [name for name in symbols if re.search("alloc|sbrk|free", name)]
+        bytes_of = dict(re.findall(r"^(\.\w+) +(\d+)", run(size), re.MULTILINE))
+        image = said(run(replaced(emulated, other)))
+        assert image["steps"] == 3001
+        assert image["steps begun late"] == 0
+        difference = image["largest difference, 1e-18"] * 1e-18
+        assert difference < 1e-12
+        column = TABLE[0].index(f"{core}, {controller}")
+        page = [float(row[column].replace(",", "")) for row in TABLE[1:]]
+        found = [
+            image["ticks of the clock a step"] * TICK,
+            image["ticks of the longest"] * TICK,
+            image["bytes of stack"],
+            int(bytes_of[".data"]) + int(bytes_of[".bss"]),
+            int(bytes_of[".text"]),
+        ]
+        assert found == pytest.approx(page[:-1], rel=0.1)
+        assert difference == pytest.approx(page[-1], rel=0.1, abs=1e-18)
+
+
+@pytest.fixture
+def rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
+    """A short record, as `cut` makes it; the current folder has the C of the controller."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "docs").symlink_to(ROOT / "docs")
+    run(COMMANDS[0])
+    sensors = optics.Params(), optics.Params()
+    signals = closed_loop(rigid.Params(), sensors, series.Params(), 1e-3, 50)
+    columns = [*signals.values()]
+    return [
+        [*map(repr, map(float, row))] for row in zip(*columns[1:5], *columns[12:22], strict=True)
+    ]
+
+
+def said_of(rows: list[list[str]]) -> str:
+    """What the M7's image says of a record; the controller in it is compiled once."""
+    Path("controller_c/recorded.h").write_text("".join(f"{','.join(row)},\n" for row in rows))
+    command, emulator = (replaced(command, M7) for command in (COMMANDS[3], COMMANDS[-1]))
+    compiler, controller = shlex.split(command), "controller_c/GraspController.c"
+    options = [word for word in compiler if word.startswith(("-m", "-std", "-O", "-f"))]
+    compile_c([compiler[0], *options, "-c", controller], Path("controller.o"))
+    return run(f"{command.replace(controller, 'controller.o')} && {emulator} || echo failed")
+
+
+def test_an_image_finds_a_difference(rows: list[list[str]]) -> None:
+    rows[-1][-1] = repr(float(rows[-1][-1]) + 1e-9)
+    found = said(said_of(rows))
+    assert found["steps"] == len(rows) == 51
+    assert found["largest difference, 1e-18"] == pytest.approx(1e9, rel=1e-3)
+
+
+def test_an_image_ends_where_an_input_is_none(rows: list[list[str]]) -> None:
+    rows[-1][0] = "NAN"
+    assert said_of(rows).splitlines() == ["position[1] = nan m: must be a finite number", "failed"]
