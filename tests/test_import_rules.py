@@ -250,6 +250,15 @@ HOUSE = {"house": "", "house.attic": "", "house.attic.a": "", "house.cellar": ""
 STOREYS = (("pipe",), ("cellar",), ("attic",), ("__init__",))
 
 
+@pytest.mark.parametrize("root", ["fmus", *BLOCKS])
+def test_no_files_of_fmus_or_of_a_block_go_in_a_circle(root: str) -> None:
+    packages = [file.parent for file in (ROOT / root).glob("*/__init__.py")]
+    sources = {name: text for p in packages for name, text in read_modules(p).items()}
+    found = circles(graph(read_imports(sources)))
+    assert len(sources) > 1
+    assert found in ([], ["grasp_fmus.base -> grasp_fmus.loader -> grasp_fmus.base"])
+
+
 @pytest.mark.parametrize(
     "line",
     [
