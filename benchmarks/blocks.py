@@ -2,7 +2,7 @@
 
     python -m benchmarks.blocks
 
-Each block runs through the inputs of its cross-check, 3 s of a grasp, at 8192 Hz: the sub-steps
+Each block runs through the inputs of its cross-check, 3 s, at 8192 Hz: the sub-steps
 asked for, the step and the outputs, without the FMU around them. ns of CPU time, means over a run.
 """
 

@@ -145,7 +145,7 @@ def licences(files: Mapping[str, str] | None = None) -> dict[str, bytes]:
 
 
 def icon(name: str) -> bytes | None:
-    """Return model.png of the FMU `name`; None where fmus/draw_icons.py draws none for it."""
+    """Return model.png of the FMU `name`; None where there is none for it."""
     file = ICONS / f"{name}.png"
     return file.read_bytes() if file.exists() else None
 

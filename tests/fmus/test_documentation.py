@@ -1,7 +1,6 @@
 """The page, the licences and the icon that every FMU holds."""
 
 import re
-import runpy
 import struct
 import zipfile
 from importlib import metadata
@@ -293,18 +292,6 @@ def test_an_fmu_need_not_have_an_icon(tmp_path: Path, monkeypatch: pytest.Monkey
     built = build_fmu(SCRIPTS / "GripperPlant.py", tmp_path)
     with zipfile.ZipFile(built.path) as archive:
         assert "model.png" not in archive.namelist()
-
-
-@pytest.mark.parametrize("name", ICONS)
-def test_the_script_draws_the_icons(tmp_path: Path, name: str) -> None:
-    image = pytest.importorskip("matplotlib.image")
-    runpy.run_path(str(ROOT / "fmus" / "draw_icons.py"))["main"](tmp_path)
-    drawn = image.imread(tmp_path / f"{name}.png")
-    kept = image.imread(documentation.ICONS / f"{name}.png")
-    assert drawn.shape == kept.shape == (256, 256, 4)
-    assert abs(drawn - kept).max() < 0.02  # another matplotlib may smooth edges differently
-    assert kept[0, 0, 3] == 0.0
-    assert kept[..., 3].max() == 1.0
 
 
 def test_the_fmu_holds_page_licences_and_icon(fmus: Path, name: str) -> None:
