@@ -17,23 +17,8 @@ from .statements import function
 KINDS = {float: "KIND_REAL", bool: "KIND_BOOLEAN", int: "KIND_INTEGER"}
 
 
-VARIABLE = """
-enum { KIND_REAL, KIND_BOOLEAN, KIND_INTEGER, KIND_STRING };
-enum { INPUT, OUTPUT, PARAMETER };
-
-typedef struct {
-    const char *name;
-    const char *in_unit; /* as after a number: " kg" */
-    int kind;
-    int causality;
-    int fixed;   /* 0: it may change at run time */
-    int limited; /* from low to high */
-    double low, high;
-    double start;
-} Variable;
-
-"""
-"""A row of the table of variables."""
+VARIABLE = '#include "variable.h"\n\n'
+"""Before the table of variables."""
 
 
 def block_header(program: Program, name: str, block: Any) -> tuple[str, set[Key]]:

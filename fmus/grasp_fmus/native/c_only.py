@@ -21,7 +21,7 @@ from ..variable import Scalar, Variable
 from .translation import translated
 
 FOLDER = Path(__file__).parent
-HELPERS = ("python_arithmetic.h", "number_text.h")
+HELPERS = ("python_arithmetic.h", "number_text.h", "variable.h")
 """What the C of a block includes, from the folder c."""
 
 EXACT = frozenset({"ceil", "copysign", "fabs", "floor", "sqrt"})

@@ -7,9 +7,9 @@ from typing import Literal
 from .names import string
 
 C = Path(__file__).with_name("c")
-COMMON = ("number_text.h", "slave.h")
+COMMON = ("variable.h", "slave.h")
 """Of every slave."""
-BLOCK = ("python_arithmetic.h", "blake2b.h", "block_slave.h")
+OLD = ("python_arithmetic.h", "number_text.h", "old_block.h")
 PROXY = ("sockets.h", "client.h", "connection.h", "proxy_slave.h")
 HEADERS = {
     2: ("fmi2TypesPlatform.h", "fmi2FunctionTypes.h", "fmi2Functions.h"),
@@ -37,7 +37,7 @@ _MAIN = """\
 {defined}
 #define TOKEN "{guid}"
 {included}
-#include "fmi{fmi}_interface.h"
+#include "fmi{fmi}.h"
 """
 
 _BLOCK = """\
@@ -58,24 +58,26 @@ _SYSTEM = """
 
 
 def native_sources(
-    name: str, translation: Mapping[str, str], content: str, guid: str, fmi: Literal[2, 3]
+    name: str, translation: Mapping[str, str] | str, content: str, guid: str, fmi: Literal[2, 3]
 ) -> dict[str, bytes]:
     """Return the files of sources/ by name, for FMI `fmi`; NAME.c is the one to compile.
 
     `translation` is the block in C, by file name. `content` is the content hash of the FMU of the
     same block in Python, 16 hexadecimal digits, which is in states; `guid` is that of this FMU.
     """
+    files = {"block.h": translation} if isinstance(translation, str) else translation
+    is_old = "Fault *fault" in files["block.h"]
+    own = OLD if is_old else ("arithmetic.h",) if '"arithmetic.h"' in files["block.h"] else ()
     included = (
         f'#define CONTENT "{content}" /* of the FMU in Python with which states are exchanged */'
-        "\n\n"
-        f'#include "fmi{fmi}_host.h"\n#include "python_arithmetic.h"\n#include "block.h"\n'
-        '#include "block_slave.h"'
+        '\n\n#include "block.h"'
     )
+    included += '\n#include "old_block.h"' if is_old else ""
     main = _MAIN.format(name=name, fmi=fmi, guid=guid, how=_BLOCK, defined="", included=included)
     return {
         f"{name}.c": main.encode(),
-        **{file: text.encode() for file, text in translation.items()},
-        **_files(*BLOCK, fmi=fmi),
+        **{file: text.encode() for file, text in files.items()},
+        **_files("block_slave.h", *own, fmi=fmi),
     }
 
 
@@ -87,9 +89,7 @@ def proxy_sources(
     `own` are the files that only this proxy has: its variables, the wire with its signature.
     """
     included = (
-        f"#define PROXY_ORIGINAL {string(original)}\n\n"
-        f'#include "fmi{fmi}_host.h"\n#include "wire.h"\n#include "variables.h"\n'
-        '#include "proxy_slave.h"'
+        f'#define PROXY_ORIGINAL {string(original)}\n\n#include "wire.h"\n#include "variables.h"'
     )
     main = _MAIN.format(
         name=name, fmi=fmi, guid=guid, how=_PROXY, defined=_SYSTEM, included=included
@@ -103,6 +103,6 @@ def proxy_sources(
 
 def _files(*names: str, fmi: Literal[2, 3]) -> dict[str, bytes]:
     """Return files that are the same in every FMU, and those of every slave."""
-    files = [C / file for file in (*COMMON, *names, f"fmi{fmi}_host.h", f"fmi{fmi}_interface.h")]
+    files = [C / file for file in (*COMMON, *names, f"fmi{fmi}.h")]
     files += [C / "headers" / file for file in HEADERS[fmi]]
     return {file.name: file.read_bytes() for file in files}

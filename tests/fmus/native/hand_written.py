@@ -1,7 +1,7 @@
 """A mass that is pushed, with a fault on demand; hand_written.h is the same in C."""
 
 from dataclasses import dataclass
-from math import nan, sqrt
+from math import inf, nan
 from typing import Annotated, NamedTuple
 
 from block_variables import Input, Output, Parameter, check
@@ -17,7 +17,7 @@ class Params:
     gain: Annotated[float, Parameter("K", unit="1", low=0.0, high=10.0, tunable=True)] = 1.0
     start: Annotated[float, Parameter("x_0", unit="m")] = 0.0
     seed: Annotated[int, Parameter("seed", low=0, high=2147483647)] = 1
-    fault: Annotated[int, Parameter("what goes wrong", low=0, high=6, tunable=True)] = 0
+    fault: Annotated[int, Parameter("what goes wrong", low=0, high=3, tunable=True)] = 0
     noisy: Annotated[bool, Parameter("has noise")] = False
 
     def __post_init__(self) -> None:
@@ -52,26 +52,16 @@ class Outputs(NamedTuple):
 
 def initial_state(p: Params, u: Inputs) -> State:
     """At rest."""
-    if p.fault == 5:
-        raise LookupError("no lamp")
-    return State(p.start, 0.0, 0, not u.held)
+    return State(nan if p.fault == 2 else p.start, 0.0, 0, not u.held)
 
 
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
     """Pushed for h seconds."""
     acceleration = 0.0 if u.held else p.gain * u.force / p.mass
-    if p.fault == 1:
-        raise ArithmeticError("too fast: must be slower")
-    if p.fault == 2:
-        acceleration = 1.0 / 0.0
-    if p.fault == 3:
-        acceleration = sqrt(-1.0)
-    velocity = x.velocity + h * acceleration
+    velocity = inf if p.fault == 1 else x.velocity + h * acceleration
     return State(x.position + h * velocity, velocity, x.steps + 1, velocity != 0.0)
 
 
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     """What is seen."""
-    if p.fault == 4:
-        raise KeyError("50 %n")
-    return Outputs(x.position, nan if p.fault == 6 else x.velocity, x.moves)
+    return Outputs(x.position, nan if p.fault == 3 else x.velocity, x.moves)

@@ -11,7 +11,7 @@
 #include <string.h>
 
 #define TEXT_WORDS 40         /* 1280 bits: a double needs 1130 of them */
-#define TEXT_DIGITS 768       /* no double has more */
+#define OLD_TEXT_DIGITS 768       /* no double has more */
 #define TEXT_WHOLE 310        /* the largest double, as a whole number, has 309 */
 #define TEXT_SIZE 340         /* what a text with up to so many digits needs, with its NUL */
 
@@ -46,7 +46,7 @@ static TextNumber text_shifted(uint64_t m, int shift)
 }
 
 /* -1, 0, 1 as a + b is below, equal to or above c */
-static int text_compare(const TextNumber *a, const TextNumber *b, const TextNumber *c)
+static int old_text_compare(const TextNumber *a, const TextNumber *b, const TextNumber *c)
 {
     int64_t difference = 0;  /* of the words from i up, in units of the word i */
     int i;
@@ -87,7 +87,7 @@ static int text_round_up(char *digits, int n)
 /* The digits d of a number above 0, which is 0.d * 10**point; returns the point. `most` digits,
    correctly rounded, ties to even; where it is 0, the fewest that are read as the same double, of
    those the closest. Zeros at the end are left out. */
-static int text_digits(char *digits, int *count, double v, int most)
+static int old_text_digits(char *digits, int *count, double v, int most)
 {
     TextNumber zero, left, whole, above, below;
     uint64_t bits, m;
@@ -111,7 +111,7 @@ static int text_digits(char *digits, int *count, double v, int most)
     if (most > 0) {
         above = below = zero;  /* the digits do not depend on them */
     }
-    while (text_compare(&left, &above, &whole) >= (most == 0 && !even)) {
+    while (old_text_compare(&left, &above, &whole) >= (most == 0 && !even)) {
         text_multiply(&whole, 10);
         point++;
     }
@@ -119,30 +119,30 @@ static int text_digits(char *digits, int *count, double v, int most)
         text_multiply(&left, 10);
         text_multiply(&above, 10);
         text_multiply(&below, 10);
-        if (text_compare(&left, &above, &whole) >= (most == 0 && !even)) {
+        if (old_text_compare(&left, &above, &whole) >= (most == 0 && !even)) {
             break;
         }
         point--;
     }
     for (;;) {
         digits[n] = '0';
-        while (text_compare(&left, &zero, &whole) >= 0) {
+        while (old_text_compare(&left, &zero, &whole) >= 0) {
             text_subtract(&left, &whole);
             digits[n]++;
         }
         n++;
         if (most == 0) {
-            low = text_compare(&left, &zero, &below) < even;  /* these digits are close enough */
-            high = text_compare(&left, &above, &whole) >= !even;  /* one more in the last is */
+            low = old_text_compare(&left, &zero, &below) < even;  /* these digits are close enough */
+            high = old_text_compare(&left, &above, &whole) >= !even;  /* one more in the last is */
         }
-        if (low || high || n == most || text_compare(&left, &zero, &zero) == 0) {
+        if (low || high || n == most || old_text_compare(&left, &zero, &zero) == 0) {
             break;
         }
         text_multiply(&left, 10);
         text_multiply(&above, 10);
         text_multiply(&below, 10);
     }
-    half = text_compare(&left, &left, &whole);
+    half = old_text_compare(&left, &left, &whole);
     if (low != high ? high : half > 0 || (half == 0 && (digits[n - 1] - '0') % 2 == 1)) {
         point += text_round_up(digits, n);
     }
@@ -195,9 +195,9 @@ static const char *text_special(double v)
 }
 
 /* With `most` significant digits, no zeros at the end; the fewest that identify v for 0 */
-static size_t text_number(char *to, double v, int most)
+static inline size_t old_text_number(char *to, double v, int most)
 {
-    char digits[TEXT_DIGITS];
+    char digits[OLD_TEXT_DIGITS];
     const char *special = text_special(v);
     int n, point;
     uint64_t bits;
@@ -212,14 +212,14 @@ static size_t text_number(char *to, double v, int most)
         strcpy(to + sign, special);
         return sign + strlen(special);
     }
-    point = text_digits(digits, &n, v, most);
+    point = old_text_digits(digits, &n, v, most);
     return sign + text_placed(to + sign, digits, n, point, most > 0 ? most : 16);
 }
 
 /* repr(float): at most 25 bytes with the NUL */
 static size_t text_repr(char *to, double v)
 {
-    size_t n = text_number(to, v, 0);
+    size_t n = old_text_number(to, v, 0);
     if (v - v == 0.0 && strcspn(to, ".e") == n) {
         strcpy(to + n, ".0");
         n += 2;
@@ -228,9 +228,9 @@ static size_t text_repr(char *to, double v)
 }
 
 /* format(v, ".{digits}g"), digits from 1; TEXT_WHOLE writes out a whole number of any size */
-static size_t text_general(char *to, double v, int digits)
+static inline size_t old_text_general(char *to, double v, int digits)
 {
-    return text_number(to, v, digits);
+    return old_text_number(to, v, digits);
 }
 
 #endif

@@ -10,10 +10,11 @@
 #define PROXY_SLAVE_H
 
 #define SLAVE_HAS_STATES 0
-#define SLAVE_NO_STATE(function) SLAVE_FMI function ": a proxy has no state, it is the peer's"
+#define SLAVE_LONGEST_STEP WIRE_LONGEST_STEP
 #define CLIENT_KIND(i) variables[i].kind
 
 #include "connection.h"
+#include "variable.h"
 
 enum { NOT_CONNECTED, CONNECTED, MISSING, LOST };  /* proxy.state */
 enum { HOLD, FAILSAFE, STOP };                     /* proxy.on_loss */
@@ -44,13 +45,12 @@ enum {
 };
 
 #define PROXY_MOST 2147483647.0
-#define PROXY_LOSS_SIZE 8192
 
 typedef struct {
     int state, on_loss;
     uint64_t missed, sessions;  /* in a row; begun, when it last answered */
     uint8_t request[REQUEST_SIZE + 1];  /* the values that go to the peer */
-    char loss[PROXY_LOSS_SIZE];
+    Text loss;  /* why the peer is lost */
     int is_connected;
     char host[NET_HOST_SIZE], key_file[NET_HOST_SIZE];  /* to what */
     double port;
@@ -63,11 +63,33 @@ static const char *const proxy_on_loss[] = {"hold", "failsafe", "stop"};
 
 /* Texts */
 
+static void slave_put(Slave *s, const char *text)
+{
+    text_put(&s->said, text);
+}
+
+static void slave_put_part(Slave *s, const char *from, const char *to)
+{
+    text_put_part(&s->said, from, (size_t)(to - from));
+}
+
+static void slave_put_quoted(Slave *s, const char *text)
+{
+    slave_put(s, "'");
+    slave_put(s, text);
+    slave_put(s, "'");
+}
+
+static void slave_put_general(Slave *s, double v, int digits)
+{
+    text_general(&s->said, v, digits);
+}
+
 static void proxy_put_peer(Slave *s)
 {
     slave_put(s, slave_string(s, PROXY_HOST));
     slave_put(s, ":");
-    slave_put_general(s, s->values[PROXY_PORT], TEXT_WHOLE);
+    slave_put_general(s, s->values[PROXY_PORT], 17);
 }
 
 static void proxy_put_trouble(Slave *s)
@@ -75,7 +97,7 @@ static void proxy_put_trouble(Slave *s)
     const char *trouble = s->model.connection.trouble;
     if (trouble[0]) {
         slave_put(s, " (");
-        slave_put_decoded(s, trouble);
+        slave_put(s, trouble);
         slave_put(s, ")");
     }
 }
@@ -230,7 +252,7 @@ static void proxy_put_difference(Slave *s, const char *ours, const char *theirs)
     }
     if (count > 4) {
         slave_put(s, "; and ");
-        slave_put_general(s, count - 4, TEXT_WHOLE);
+        slave_put_general(s, count - 4, 17);
         slave_put(s, " more");
     }
     if (count == 0) {
@@ -288,7 +310,7 @@ static Status proxy_read_settings(Slave *s)
             return SLAVE_OK;
         }
     }
-    slave_begin_text(s);
+    slave_say(s);
     slave_put(s, "proxy.on_loss = ");
     slave_put_quoted(s, chosen);
     slave_put(s, ": must be hold, failsafe, stop");
@@ -297,11 +319,11 @@ static Status proxy_read_settings(Slave *s)
 
 static Status proxy_refuse_key(Slave *s, const char *reason)
 {
-    slave_begin_text(s);
+    slave_say(s);
     slave_put(s, "proxy.key_file = ");
     slave_put_quoted(s, slave_string(s, PROXY_KEY_FILE));
     slave_put(s, ": ");
-    slave_put_decoded(s, reason);
+    slave_put(s, reason);
     return slave_refused(s);
 }
 
@@ -312,7 +334,7 @@ static Status proxy_warn_of_rights(Slave *s, const char *file, unsigned mode)
     for (i = 3; i >= 0; i--, mode >>= 3) {
         digits[i] = (char)('0' + (mode & 7));
     }
-    slave_begin_text(s);
+    slave_say(s);
     slave_put(s, file);
     slave_put(s, ": others have access to this key, mode ");
     slave_put(s, digits[0] == '0' ? digits + 1 : digits);
@@ -328,6 +350,7 @@ static Status proxy_read_key(Slave *s)
     Client *client = &s->model.connection.client;
     uint8_t data[WIRE_LARGEST_KEY + 1];
     char text[NET_TEXT_SIZE];
+    Text few;
     size_t first, size;
     long n;
     if (!*file) {
@@ -343,10 +366,11 @@ static Status proxy_read_key(Slave *s)
     }
     size = wire_key(data, (size_t)n, &first);
     if (!client_begin(client, data + first, size)) {
-        memcpy(text, "key of ", 7);
-        n = 7 + (long)text_general(text + 7, (double)size, TEXT_WHOLE);
-        memcpy(text + n, " bytes: must have 16 or more", sizeof " bytes: must have 16 or more");
-        return proxy_refuse_key(s, text);
+        text_clear(&few);
+        text_put(&few, "key of ");
+        text_general(&few, (double)size, 17);
+        text_put(&few, " bytes: must have 16 or more");
+        return proxy_refuse_key(s, few.at);
     }
     return net_exposed(file) ? proxy_warn_of_rights(s, file, net_exposed(file)) : SLAVE_OK;
 }
@@ -374,7 +398,7 @@ static Status proxy_give_up(Slave *s)
 {
     Connection *c = &s->model.connection;
     slave_end(s);
-    slave_begin_text(s);
+    slave_say(s);
     if (c->refused) {
         proxy_put_peer(s);
         slave_put(s, ": ");
@@ -390,16 +414,16 @@ static Status proxy_give_up(Slave *s)
     slave_put(s, ": is the peer running there, and has it ");
     slave_put(s, *slave_string(s, PROXY_KEY_FILE) ? "the same" : "no");
     slave_put(s, " key? e.g. grasp-cosim serve " PROXY_ORIGINAL " --port ");
-    slave_put_general(s, s->values[PROXY_PORT], TEXT_WHOLE);
+    slave_put_general(s, s->values[PROXY_PORT], 17);
     return slave_refused(s);
 }
 
 static Status proxy_refuse_connection(Slave *s, const char *reason)
 {
-    slave_begin_text(s);
+    slave_say(s);
     proxy_put_peer(s);
     slave_put(s, ": no connection: ");
-    slave_put_decoded(s, reason);
+    slave_put(s, reason);
     return slave_refused(s);
 }
 
@@ -585,7 +609,7 @@ static void proxy_note_answer(Slave *s)
 {
     Model *m = &s->model;
     if (m->state == LOST) {
-        slave_begin_text(s);
+        slave_say(s);
         proxy_put_peer(s);
         slave_put(s, ": the peer answers again");
         slave_put(s, m->connection.sessions > m->sessions
@@ -601,12 +625,10 @@ static void proxy_note_answer(Slave *s)
 static void proxy_note_loss(Slave *s)
 {
     Model *m = &s->model;
-    char *end = s->text_end;
-    s->text_at = m->loss;
-    s->text_end = m->loss + sizeof m->loss;
+    text_clear(&s->said);
     proxy_put_peer(s);
     slave_put(s, " is lost, ");
-    slave_put_general(s, (double)m->missed, TEXT_WHOLE);
+    slave_put_general(s, (double)m->missed, 17);
     slave_put(s, " missed in a row: ");
     if (m->connection.refused) {
         proxy_put_refusal(s);
@@ -616,15 +638,14 @@ static void proxy_note_loss(Slave *s)
         slave_put(s, " s");
         proxy_put_trouble(s);
     }
-    s->text_end = end;
+    m->loss = s->said;
 }
 
 /* A text with that, to which more may be put */
 static void proxy_begin_loss(Slave *s)
 {
-    slave_begin_text(s);
-    strcpy(s->text_at, s->model.loss);  /* there is room for it, whatever the name is */
-    s->text_at += strlen(s->text_at);
+    slave_say(s);
+    slave_put(s, s->model.loss.at);
 }
 
 static void proxy_lose(Slave *s)
@@ -662,15 +683,9 @@ static void proxy_note_miss(Slave *s)
 static Status slave_do_step(Slave *s, double time, double h)
 {
     Model *m = &s->model;
-    if (slave_check_step(s, time, h) != SLAVE_OK) {
-        return SLAVE_ERROR;
-    }
-    if (h > WIRE_LONGEST_STEP) {
-        slave_begin_discard(s, h);
-        slave_put(s, "must be at most ");
-        slave_put_general(s, WIRE_LONGEST_STEP, 6);
-        slave_put(s, " s");
-        return slave_discarded(s);
+    Status status = slave_check_step(s, time, h);
+    if (status != SLAVE_OK) {
+        return status;
     }
     if (!s->outputs_follow && slave_refresh(s) != SLAVE_OK) {
         return SLAVE_ERROR;

@@ -63,7 +63,7 @@ static inline void py_say_repr(Fault *fault, double v)
 static inline void py_say_general(Fault *fault, double v, int digits)
 {
     char text[800];
-    text_general(text, v, digits);
+    old_text_general(text, v, digits);
     py_say(fault, text);
 }
 
@@ -71,7 +71,7 @@ static inline void py_say_general(Fault *fault, double v, int digits)
 static inline void py_say_whole(Fault *fault, double n)
 {
     char text[TEXT_SIZE];
-    text_general(text, n, TEXT_WHOLE);
+    old_text_general(text, n, TEXT_WHOLE);
     py_say(fault, text);
 }
 
