@@ -19,7 +19,7 @@ from c_compilers import BITS, LIBM
 from grasp_fmus.contract import declared, variables
 from grasp_fmus.cross_check import STEP_SIZE, cross_check_files
 from grasp_fmus.native.c_only import FOLDER, HELPERS
-from grasp_fmus.native.translation import translated
+from grasp_fmus.native.old.translation import translated
 from grasp_fmus.shipped import blocks
 
 from benchmarks.harness import head, row

@@ -18,7 +18,7 @@ from ..folder import write_file
 from ..link.message import Value
 from ..link.signature import ORDER, Causality, Kind, LinkVariable, Signature
 from ..variable import Scalar, Variable
-from .translation import translated
+from .old.translation import translated
 
 FOLDER = Path(__file__).parent
 HELPERS = ("python_arithmetic.h", "number_text.h", "variable.h")

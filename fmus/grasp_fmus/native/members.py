@@ -6,10 +6,10 @@ from string import Template
 from ..documentation import OURS, framed, licences
 from ..fmu import HASH, Model, hashed, python_members
 from ..model_description import version
+from .blocks import translated
 from .description import build_description, native_description
 from .sources import native_sources
 from .targets import Version
-from .translation import translated
 
 TEMPLATE = Path(__file__).with_name("native.html.in")
 ICONS = {2: "model.png", 3: "terminalsAndIcons/icon.png"}

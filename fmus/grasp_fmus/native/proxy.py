@@ -14,11 +14,11 @@ from ..model_description import version
 from ..proxy import DEFAULTS, Settings, bounded, shared_signature
 from ..proxy_build import Original, proxy_model
 from ..variable import Variable
-from .block_header import KINDS, VARIABLE
 from .build import Plan, with_binaries
 from .description import build_description, native_description
 from .members import ICONS
-from .names import real, string
+from .old.block_header import KINDS, VARIABLE
+from .old.names import real, string
 from .sources import proxy_sources
 from .targets import Version
 

@@ -12,12 +12,12 @@ import pytest
 from c_compilers import LIBM
 from grasp_fmus.contract import build_params, declared, packer, unpacker
 from grasp_fmus.contract import variables as scalar_variables
-from grasp_fmus.native import translation
+from grasp_fmus.native.old import translation
 from grasp_fmus.snapshot import _scalars, _shaped
 from support.compiled import compile_c
 
 HERE = Path(__file__).parent
-HEADERS = Path(translation.__file__).parent / "c"
+HEADERS = Path(translation.__file__).parents[1] / "c"
 FLAGS = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-ffp-contract=off"]
 FLAGS += [f"-fno-builtin-{name}" for name in LIBM]
 

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from fmus.native.c_block import CBlock, PythonBlock, library, same
 from grasp_fmus.block_build import _run
-from grasp_fmus.native.translation import translated
+from grasp_fmus.native.old.translation import translated
 from hypothesis import given
 from hypothesis import strategies as st
 from support.examples import examples

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from fmus.native.test_constructs import HEAD
 from grasp_fmus.block_build import _run
-from grasp_fmus.native.translation import UntranslatableError, translated
+from grasp_fmus.native.old.translation import UntranslatableError, translated
 
 STEP = """
 

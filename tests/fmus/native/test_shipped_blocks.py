@@ -13,7 +13,7 @@ import pytest
 from fmus.native.c_block import CBlock, PythonBlock, compiler, library, same
 from grasp_fmus.block_build import _parsed, _run
 from grasp_fmus.contract import longest_step
-from grasp_fmus.native.translation import translated
+from grasp_fmus.native.old.translation import translated
 from grasp_fmus.shipped import SCRIPTS, slave_class
 from support.campaign import seeds
 from support.slow import platforms
@@ -167,7 +167,7 @@ def python_block(name: str) -> PythonBlock:
 @pytest.mark.slow
 def test_the_same_sources_give_the_same_bytes() -> None:
     code = (
-        "from grasp_fmus.native.translation import translated\n"
+        "from grasp_fmus.native.old.translation import translated\n"
         "from grasp_fmus.shipped import blocks\n"
         "for name in ('GripperPlantMovable', 'ProximitySensor', 'GraspController'):\n"
         "    print(translated(name, blocks()[name]))\n"

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from fmus.native.c_block import CBlock, PythonBlock, library, same
 from grasp_fmus.block_build import _run
-from grasp_fmus.native.translation import translated
+from grasp_fmus.native.old.translation import translated
 
 BASE = '''"""Doc "with" */ odd ??/ chars \\\\ \\
 and a line."""

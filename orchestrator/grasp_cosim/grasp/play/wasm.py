@@ -19,8 +19,8 @@ from pathlib import Path
 
 from c_compilers import BITS, LIBM, environment, find_zig
 from grasp_fmus.folder import write_file
+from grasp_fmus.native.blocks import translated
 from grasp_fmus.native.sources import native_sources
-from grasp_fmus.native.translation import translated
 
 from ...checks import install_command
 from ...errors import InputError

@@ -6,7 +6,7 @@ from math import inf
 from types import FunctionType
 from typing import Any
 
-from ..contract import Field, declared, longest_step, variables
+from ...contract import Field, declared, longest_step, variables
 from . import names
 from .layout import wrapped
 from .program import Function, Key, Program

@@ -1,0 +1,1 @@
+"""The translator of before, until its last user has gone."""
