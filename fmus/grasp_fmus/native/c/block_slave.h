@@ -27,7 +27,7 @@ static Status slave_read_params(Slave *s)
     text_clear(&why);
     block_params(s->values, &s->model.params);
     s->params_are_read = block_check(&s->model.params, &why);
-    return s->params_are_read ? SLAVE_OK : slave_refuse(s, why.at, "");
+    return s->params_are_read ? SLAVE_OK : slave_refuse(s, "%s", why.at);
 }
 
 static int slave_outputs_are_finite(const double *outputs)
@@ -35,14 +35,9 @@ static int slave_outputs_are_finite(const double *outputs)
     double sum = 0.0;
     int i;
     for (i = 0; i < N_OUTPUTS; i++) {
-        sum += outputs[i];
+        sum += outputs[i] - outputs[i];  /* NaN where one is not */
     }
-    for (i = 0; i < N_OUTPUTS && !slave_finite(sum); i++) {
-        if (!slave_finite(outputs[i])) {
-            return 0;
-        }
-    }
-    return 1;
+    return sum == 0.0;
 }
 
 static void slave_put_not_finite(Text *said, const double *outputs)
@@ -116,7 +111,7 @@ static Status slave_start(Slave *s)
 {
     const char *wrong = slave_arithmetic_fault();
     if (wrong) {
-        return slave_refuse(s, wrong, "");
+        return slave_refuse(s, "%s", wrong);
     }
     slave_start_values(s);
     block_inputs(s->values, &s->model.inputs);
@@ -170,20 +165,37 @@ static Status slave_do_step(Slave *s, double time, double h)
     return SLAVE_OK;
 }
 
-/* States: everything else follows from these numbers */
+/* States. What the host gets is the bytes that are also those of the Python slave, the same on every
+   machine: a tag, then numbers, little-endian, from which all else follows */
 
 enum { STATE_PHASE, STATE_TIME, STATE_VALUES };  /* inputs, then parameters; then the block's state */
 #define STATE_BLOCK (STATE_VALUES + N_INPUTS + N_PARAMETERS)
-#define STATE_NUMBERS (STATE_BLOCK + N_STATE)
-
-typedef struct {
-    char tag[24];  /* tells it from what is none, and from those of other FMUs */
-    double numbers[STATE_NUMBERS];
-} State;
-
-#define STATE_SIZE (sizeof ((State *)0)->tag + 8 * STATE_NUMBERS)  /* as bytes */
+#define STATE_TAG 24
+#define STATE_SIZE ((size_t)(STATE_TAG + 8 * (STATE_BLOCK + N_STATE)))
 
 static const char state_tag[] = "graspFMU" CONTENT;
+
+static void state_put(unsigned char *state, int number, double value)
+{
+    uint64_t bits;
+    int i;
+    memcpy(&bits, &value, sizeof bits);
+    for (i = 0; i < 8; i++) {
+        state[STATE_TAG + 8 * number + i] = (unsigned char)(bits >> 8 * i);
+    }
+}
+
+static double state_number(const unsigned char *state, int number)
+{
+    uint64_t bits = 0;
+    double value;
+    int i;
+    for (i = 0; i < 8; i++) {
+        bits |= (uint64_t)state[STATE_TAG + 8 * number + i] << 8 * i;
+    }
+    memcpy(&value, &bits, sizeof value);
+    return value;
+}
 
 /* The variable whose value is the i-th in a state */
 static int state_variable(int i)
@@ -191,180 +203,146 @@ static int state_variable(int i)
     return i < N_INPUTS ? i : i + N_OUTPUTS;
 }
 
-static Status slave_check_state(Slave *s, const State *state)
+static Status slave_check_state(Slave *s, const void *state)
 {
     if (!state) {
-        return slave_refuse(s, "state NULL: must be one of " SLAVE_FMI, SLAVE_GET_STATE);
+        return slave_refuse(s, "state NULL: must be one of " SLAVE_FMI SLAVE_GET_STATE);
     }
-    if (memcmp(state->tag, state_tag, sizeof state->tag) != 0) {
-        return slave_refuse(s, "state of another FMU: must be of this one, ", CONTENT);
+    if (memcmp(state, state_tag, STATE_TAG) != 0) {
+        return slave_refuse(s, "state of another FMU: must be of this one, " CONTENT);
     }
     return SLAVE_OK;
 }
 
-static State *slave_new_state(Slave *s)
+static Status slave_new_state(Slave *s, void **place)
 {
-    State *state = (State *)slave_allocate(&s->host, sizeof *state);
-    if (!state) {
-        slave_refuse(s, "there is no memory for a state", "");
-    }
-    return state;
+    *place = slave_allocate(&s->host, STATE_SIZE);
+    return *place ? SLAVE_OK : slave_refuse(s, "there is no memory for a state");
 }
 
 /* Save into new memory, or into the state that is there already */
 static Status slave_get_state(Slave *s, void **place)
 {
-    State *state = (State *)*place;
+    Status status = *place ? slave_check_state(s, *place) : slave_new_state(s, place);
+    double numbers[N_STATE + 1];
+    unsigned char *state = (unsigned char *)*place;
     int i;
-    if (state && slave_check_state(s, state) != SLAVE_OK) {
-        return SLAVE_ERROR;
+    if (status != SLAVE_OK) {
+        return status;
     }
-    if (!state && !(state = slave_new_state(s))) {
-        return SLAVE_ERROR;
-    }
-    memcpy(state->tag, state_tag, sizeof state->tag);
-    state->numbers[STATE_PHASE] = s->phase;
-    state->numbers[STATE_TIME] = s->values[SLAVE_TIME];
+    memcpy(state, state_tag, STATE_TAG);
+    state_put(state, STATE_PHASE, s->phase);
+    state_put(state, STATE_TIME, s->values[SLAVE_TIME]);
     for (i = 0; i < N_INPUTS + N_PARAMETERS; i++) {
-        state->numbers[STATE_VALUES + i] = s->values[state_variable(i)];
+        state_put(state, STATE_VALUES + i, s->values[state_variable(i)]);
     }
-    block_save(&s->model.state, state->numbers + STATE_BLOCK);
-    *place = state;
+    block_save(&s->model.state, numbers);
+    for (i = 0; i < N_STATE; i++) {
+        state_put(state, STATE_BLOCK + i, numbers[i]);
+    }
     return SLAVE_OK;
 }
 
 static Status slave_set_state(Slave *s, const void *memory)
 {
-    const State *state = (const State *)memory;
+    const unsigned char *state = (const unsigned char *)memory;
+    double numbers[N_STATE + 1];
     int i;
     if (slave_check_state(s, state) != SLAVE_OK) {
         return SLAVE_ERROR;
     }
-    s->phase = (int)state->numbers[STATE_PHASE];
-    s->values[SLAVE_TIME] = state->numbers[STATE_TIME];
+    s->phase = (int)state_number(state, STATE_PHASE);
+    s->values[SLAVE_TIME] = state_number(state, STATE_TIME);
     for (i = 0; i < N_INPUTS + N_PARAMETERS; i++) {
-        s->values[state_variable(i)] = state->numbers[STATE_VALUES + i];
+        s->values[state_variable(i)] = state_number(state, STATE_VALUES + i);
     }
-    block_load(state->numbers + STATE_BLOCK, &s->model.state);
+    for (i = 0; i < N_STATE; i++) {
+        numbers[i] = state_number(state, STATE_BLOCK + i);
+    }
+    block_load(numbers, &s->model.state);
     s->params_are_read = s->outputs_follow = 0;
     return SLAVE_OK;
 }
 
 static Status slave_free_state(Slave *s, void **place)
 {
-    if (!place || !*place) {
-        return SLAVE_OK;
+    if (place && *place) {
+        if (slave_check_state(s, *place) != SLAVE_OK) {
+            return SLAVE_ERROR;
+        }
+        slave_release(&s->host, *place);
+        *place = NULL;
     }
-    if (slave_check_state(s, (State *)*place) != SLAVE_OK) {
-        return SLAVE_ERROR;
-    }
-    slave_release(&s->host, *place);
-    *place = NULL;
     return SLAVE_OK;
 }
 
 static Status slave_state_size(Slave *s, const void *state, size_t *size)
 {
     *size = STATE_SIZE;
-    return slave_check_state(s, (const State *)state);
+    return slave_check_state(s, state);
 }
 
 static Status slave_refuse_size(Slave *s, size_t size)
 {
-    text_put(slave_say(s), "state of ");
-    text_general(&s->said, (double)size, 17);
-    text_put(&s->said, " bytes: must have ");
-    text_general(&s->said, (double)STATE_SIZE, 17);
-    return slave_refused(s);
+    return slave_refuse(s, "state of %d bytes: must have %d", (int)size, (int)STATE_SIZE);
 }
 
-/* To bytes: the same on every machine, and as those of the Python slave */
-static Status slave_serialise(Slave *s, const void *memory, unsigned char *bytes, size_t size)
+static Status slave_serialise(Slave *s, const void *state, void *bytes, size_t size)
 {
-    const State *state = (const State *)memory;
-    int i, k;
     if (slave_check_state(s, state) != SLAVE_OK) {
         return SLAVE_ERROR;
     }
     if (size < STATE_SIZE) {
         return slave_refuse_size(s, size);
     }
-    memcpy(bytes, state->tag, sizeof state->tag);
-    bytes += sizeof state->tag;
-    for (i = 0; i < STATE_NUMBERS; i++) {
-        uint64_t bits;
-        memcpy(&bits, &state->numbers[i], sizeof bits);
-        for (k = 0; k < 8; k++) {
-            *bytes++ = (unsigned char)(bits >> 8 * k);
-        }
-    }
+    memcpy(bytes, state, STATE_SIZE);
     return SLAVE_OK;
 }
 
-static int slave_is_whole(const Variable *v, double value)
+static int slave_may_be(const Variable *v, double value)
 {
-    return v->kind == KIND_REAL || value == (v->kind == KIND_BOOLEAN ? value != 0.0 : floor(value));
+    return slave_in_range(v, value)
+           && (v->kind == KIND_REAL
+               || value == (v->kind == KIND_BOOLEAN ? value != 0.0 : floor(value)));
 }
 
-/* That the numbers of a state could be those of an instance */
-static Status slave_check_numbers(Slave *s, const double *numbers)
+/* That bytes could be those of an instance of this FMU */
+static Status slave_check_bytes(Slave *s, const unsigned char *bytes, size_t size)
 {
-    double phase = numbers[STATE_PHASE], time = numbers[STATE_TIME];
+    double phase, time;
     int i;
-    for (i = 0; i < N_INPUTS + N_PARAMETERS; i++) {
-        const Variable *v = &variables[state_variable(i)];
-        double value = numbers[STATE_VALUES + i];
-        if (!slave_in_range(v, value) || !slave_is_whole(v, value)) {
-            return slave_refuse_value(s, v, value);
-        }
-    }
-    if (!(INSTANTIATED <= phase && phase <= TERMINATED && phase == floor(phase)
-          && slave_finite(time))) {
-        text_put(slave_say(s), "state in phase ");
-        text_number(&s->said, phase);
-        text_put(&s->said, " at ");
-        text_number(&s->said, time);
-        text_put(&s->said, " s: is none");
-        return slave_refused(s);
-    }
-    return SLAVE_OK;
-}
-
-static Status slave_read_bytes(Slave *s, const unsigned char *bytes, size_t size, State *state)
-{
-    int i, k;
-    if (size < sizeof state->tag) {
-        return slave_refuse_size(s, size);
-    }
-    memcpy(state->tag, bytes, sizeof state->tag);
-    if (slave_check_state(s, state) != SLAVE_OK) {
+    if (size >= STATE_TAG && slave_check_state(s, bytes) != SLAVE_OK) {
         return SLAVE_ERROR;
     }
     if (size != STATE_SIZE) {
         return slave_refuse_size(s, size);
     }
-    bytes += sizeof state->tag;
-    for (i = 0; i < STATE_NUMBERS; i++) {
-        uint64_t bits = 0;
-        for (k = 0; k < 8; k++) {
-            bits |= (uint64_t)*bytes++ << 8 * k;
+    for (i = 0; i < N_INPUTS + N_PARAMETERS; i++) {
+        const Variable *v = &variables[state_variable(i)];
+        double value = state_number(bytes, STATE_VALUES + i);
+        if (!slave_may_be(v, value)) {
+            return slave_refuse_value(s, v, value);
         }
-        memcpy(&state->numbers[i], &bits, sizeof bits);
     }
-    return slave_check_numbers(s, state->numbers);
+    phase = state_number(bytes, STATE_PHASE);
+    time = state_number(bytes, STATE_TIME);
+    if (INSTANTIATED <= phase && phase <= TERMINATED && phase == floor(phase)
+        && slave_finite(time)) {
+        return SLAVE_OK;
+    }
+    return slave_refuse(s, "state in phase %.17g at %.17g s: is none", phase, time);
 }
 
 /* A new state from bytes */
-static Status slave_deserialise(Slave *s, const unsigned char *bytes, size_t size, void **place)
+static Status slave_deserialise(Slave *s, const void *bytes, size_t size, void **place)
 {
-    State *state = slave_new_state(s);
-    Status status = state ? slave_read_bytes(s, bytes, size, state) : SLAVE_ERROR;
-    if (status == SLAVE_OK) {
-        *place = state;
-    } else if (state) {
-        slave_release(&s->host, state);
+    void *state;
+    if (slave_check_bytes(s, (const unsigned char *)bytes, size) != SLAVE_OK
+        || slave_new_state(s, &state) != SLAVE_OK) {
+        return SLAVE_ERROR;
     }
-    return status;
+    *place = memcpy(state, bytes, STATE_SIZE);
+    return SLAVE_OK;
 }
 
 #endif

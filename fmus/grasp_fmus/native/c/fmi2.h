@@ -82,7 +82,7 @@ static void slave_release(const Host *host, void *memory)
 
 #define FMI2_NOT_THERE(Name, arguments)                                                            \
     FMI2_FUNCTION(Name, arguments,                                                                 \
-                  slave_refuse((Slave *)c, "fmi2" #Name, ": is not supported by this FMU"))
+                  slave_refuse((Slave *)c, "fmi2" #Name ": is not supported by this FMU"))
 
 #define FMI2_REFERENCES const fmi2ValueReference vr[], size_t n
 
@@ -186,10 +186,10 @@ FMI2_OF_STATES(SerializedFMUstateSize, (fmi2Component c, fmi2FMUstate state, siz
                slave_state_size((Slave *)c, state, size))
 FMI2_OF_STATES(SerializeFMUstate,
                (fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size),
-               slave_serialise((Slave *)c, state, (unsigned char *)bytes, size))
+               slave_serialise((Slave *)c, state, bytes, size))
 FMI2_OF_STATES(DeSerializeFMUstate,
                (fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state),
-               slave_deserialise((Slave *)c, (const unsigned char *)bytes, size, state))
+               slave_deserialise((Slave *)c, bytes, size, state))
 
 /* Steps */
 

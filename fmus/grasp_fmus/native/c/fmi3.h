@@ -67,7 +67,7 @@ static void slave_release(const Host *host, void *memory)
 
 #define FMI3_NOT_THERE(Name, arguments)                                                            \
     FMI3_FUNCTION(Name, arguments,                                                                 \
-                  slave_refuse((Slave *)c, "fmi3" #Name, ": is not supported by this FMU"))
+                  slave_refuse((Slave *)c, "fmi3" #Name ": is not supported by this FMU"))
 
 #define FMI3_REFERENCES const fmi3ValueReference vr[], size_t n
 
@@ -156,8 +156,7 @@ FMI3_FUNCTION(Reset, (fmi3Instance c), slave_reset((Slave *)c))
 
 static Status fmi3_refuse_count(Slave *s)
 {
-    return slave_refuse(s, "not as many values as value references: ",
-                        "must be so, all variables are scalars");
+    return slave_refuse(s, "not as many values as value references: all are scalars");
 }
 
 #define FMI3_VALUES(Type)                                                                          \

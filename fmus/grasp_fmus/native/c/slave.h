@@ -75,22 +75,21 @@ static Status slave_refused(Slave *s)
     return SLAVE_ERROR;
 }
 
-static Status slave_refuse(Slave *s, const char *what, const char *why)
+/* Refuse a call, with its reason as text_say() has it */
+TEXT_LIKE_PRINTF static Status slave_refuse(Slave *s, const char *format, ...)
 {
-    Text *said = slave_say(s);
-    text_put(said, what);
-    text_put(said, why);
+    va_list list;
+    va_start(list, format);
+    text_put_list(slave_say(s), format, list);
+    va_end(list);
     return slave_refused(s);
 }
 
-/* A message about a step that is not taken */
+/* A message about a step that is not taken, to be completed */
 static Text *slave_say_step(Slave *s, double h)
 {
-    Text *said = slave_say(s);
-    text_put(said, "step of ");
-    text_number(said, h);
-    text_put(said, " s: ");
-    return said;
+    text_say(slave_say(s), "step of %.17g s: ", h);
+    return &s->said;
 }
 
 static Status slave_discarded(Slave *s)
@@ -102,8 +101,7 @@ static Status slave_discarded(Slave *s)
 /* name = value unit */
 static void slave_put_value(Text *said, const Variable *v, double value)
 {
-    text_put(said, v->name);
-    text_put(said, " = ");
+    text_say(said, "%s = ", v->name);
     if (v->kind == KIND_REAL) {
         text_number(said, value);
     } else if (v->kind == KIND_INTEGER) {
@@ -149,12 +147,10 @@ static Slave *slave_new(const Host *host, const char *name, const char *token, c
     name = name ? name : "";
     memcpy(s->name, name, text_fitting(name, sizeof s->name - 1));
     if (refusal) {
-        status = slave_refuse(s, refusal, "");
+        status = slave_refuse(s, "%s", refusal);
     } else if (!token || strcmp(token, TOKEN) != 0) {
-        text_put(slave_say(s), SLAVE_TOKEN " = ");
-        text_put(&s->said, token ? token : "NULL");
-        text_put(&s->said, ": must be that of this FMU, " TOKEN);
-        status = slave_refused(s);
+        status = slave_refuse(s, SLAVE_TOKEN " = %s: must be that of this FMU, %s",
+                              token ? token : "NULL", TOKEN);
     } else {
         status = slave_start(s);
     }
@@ -177,25 +173,17 @@ static Status slave_require(Slave *s, const char *function, int phase)
     if (s->phase == phase) {
         return SLAVE_OK;
     }
-    text_put(slave_say(s), SLAVE_FMI);
-    text_put(&s->said, function);
-    text_put(&s->said, " ");
-    text_put(&s->said, slave_phases[s->phase]);
-    text_put(&s->said, ": must be ");
-    text_put(&s->said, slave_phases[phase]);
-    return slave_refused(s);
+    return slave_refuse(s, SLAVE_FMI "%s %s: must be %s", function, slave_phases[s->phase],
+                        slave_phases[phase]);
 }
 
 static Status slave_begin_at(Slave *s, double start)
 {
-    if (slave_finite(start)) {
-        s->values[SLAVE_TIME] = start;
-        return SLAVE_OK;
+    if (!slave_finite(start)) {
+        return slave_refuse(s, "start time = %.17g s: must be a finite number", start);
     }
-    text_put(slave_say(s), "start time = ");
-    text_number(&s->said, start);
-    text_put(&s->said, " s: must be a finite number");
-    return slave_refused(s);
+    s->values[SLAVE_TIME] = start;
+    return SLAVE_OK;
 }
 
 /* From a phase to the next, if the values set so far go together */
@@ -237,21 +225,13 @@ static const Variable *slave_variable(uint32_t vr)
 /* Refuse a reference that is out of range, or of another kind */
 static Status slave_refuse_reference(Slave *s, uint32_t vr, const char *kind)
 {
-    Text *said = slave_say(s);
-    if (vr < N_REFERENCES) {
-        const Variable *v = slave_variable(vr);
-        text_put(said, v->name);
-        text_put(said, ": accessed as ");
-        text_put(said, kind);
-        text_put(said, ": must be as ");
-        text_put(said, slave_kinds[v->kind]);
-    } else {
-        text_put(said, "value reference ");
-        text_general(said, vr, 10);
-        text_put(said, ": must be from 0 to ");
-        text_general(said, N_REFERENCES - 1, 10);
+    const Variable *v = slave_variable(vr);
+    if (vr >= N_REFERENCES) {
+        return slave_refuse(s, "value reference %d: must be from 0 to %d", (int)vr,
+                            N_REFERENCES - 1);
     }
-    return slave_refused(s);
+    return slave_refuse(s, "%s: accessed as %s: must be as %s", v->name, kind,
+                        slave_kinds[v->kind]);
 }
 
 static int slave_is(uint32_t vr, int kind)
@@ -275,13 +255,12 @@ static Status slave_read(Slave *s, const uint32_t *vrs, size_t n, int kind)
 
 static Status slave_refuse_set(Slave *s, const Variable *v)
 {
-    return slave_refuse(
-        s, v->name,
-        v->causality == OUTPUT ? ": output set: must be an input or a parameter"
-        : s->phase == TERMINATED
-            ? ": set after " SLAVE_FMI "Terminate: must be before"
-            : ": fixed parameter set in step mode: must be before " SLAVE_FMI
-              "ExitInitializationMode");
+    return slave_refuse(s, "%s: %s", v->name,
+                        v->causality == OUTPUT ? "output set: must be an input or a parameter"
+                        : s->phase == TERMINATED
+                            ? "set after " SLAVE_FMI "Terminate: must be before"
+                            : "fixed parameter set in step mode: must be before " SLAVE_FMI
+                              "ExitInitializationMode");
 }
 
 /* Before variables are set */
@@ -306,23 +285,15 @@ static int slave_in_range(const Variable *v, double value)
     return slave_finite(value) && (!v->limited || (v->low <= value && value <= v->high));
 }
 
-static void slave_put_out_of_range(Text *said, const Variable *v, double value)
+static Status slave_refuse_value(Slave *s, const Variable *v, double value)
 {
+    Text *said = slave_say(s);
     slave_put_value(said, v, value);
     if (v->limited) {
-        text_put(said, ": must be from ");
-        text_general(said, v->low, 6);
-        text_put(said, " to ");
-        text_general(said, v->high, 6);
-        text_put(said, v->in_unit);
+        text_say(said, ": must be from %g to %g%s", v->low, v->high, v->in_unit);
     } else {
         text_put(said, ": must be a finite number");
     }
-}
-
-static Status slave_refuse_value(Slave *s, const Variable *v, double value)
-{
-    slave_put_out_of_range(slave_say(s), v, value);
     return slave_refused(s);
 }
 
@@ -391,12 +362,8 @@ static Status slave_set_String(Slave *s, const uint32_t *vrs, size_t n, const ch
     for (i = 0; i < n; i++) {
         const Variable *v = &variables[vrs[i]];
         if (!values[i] || strlen(values[i]) > (size_t)v->high) {
-            text_put(slave_say(s), v->name);
-            text_put(&s->said, values[i] ? ": too long" : " = NULL");
-            text_put(&s->said, ": must have 0 to ");
-            text_general(&s->said, v->high, 6);
-            text_put(&s->said, " bytes");
-            return slave_refused(s);
+            return slave_refuse(s, "%s%s: must have 0 to %g bytes", v->name,
+                                values[i] ? ": too long" : " = NULL", v->high);
         }
     }
     for (i = 0; i < n; i++) {
@@ -416,23 +383,13 @@ static Status slave_check_odd_step(Slave *s, double time, double h)
         return SLAVE_ERROR;
     }
     if (!(0.0 < h && h <= DBL_MAX)) {
-        text_put(slave_say(s), "step size = ");
-        text_number(&s->said, h);
-        text_put(&s->said, " s: must be a finite number above 0");
-        return slave_refused(s);
+        return slave_refuse(s, "step size = %.17g s: must be a finite number above 0", h);
     }
     if (!(apart <= SLAVE_TIME_TOLERANCE || apart <= 1e-12 * fabs(own))) {
-        text_put(slave_say(s), "step from ");
-        text_number(&s->said, time);
-        text_put(&s->said, " s: must be from ");
-        text_number(&s->said, own);
-        text_put(&s->said, " s");
-        return slave_refused(s);
+        return slave_refuse(s, "step from %.17g s: must be from %.17g s", time, own);
     }
     if (h > SLAVE_LONGEST_STEP) {
-        text_put(slave_say_step(s, h), "must be at most ");
-        text_general(&s->said, SLAVE_LONGEST_STEP, 6);
-        text_put(&s->said, " s");
+        text_say(slave_say_step(s, h), "must be at most %g s", SLAVE_LONGEST_STEP);
         return slave_discarded(s);
     }
     return SLAVE_OK;

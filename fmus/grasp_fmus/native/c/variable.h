@@ -3,6 +3,7 @@
 #ifndef VARIABLE_H
 #define VARIABLE_H
 
+#include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <string.h>
@@ -198,6 +199,46 @@ static inline void text_number(Text *text, double v)
     if (v - v == 0.0 && strcspn(text->at + from, ".e") == text->length - from) {
         text_put(text, ".0");
     }
+}
+
+/* As printf has it: %s, %d, %g, %%, and %.17g for text_number(); no others */
+static inline void text_put_list(Text *text, const char *format, va_list list)
+{
+    const char *at;
+    for (; (at = strchr(format, '%')) != NULL; format = at + (at[1] == '.' ? 5 : 2)) {
+        text_put_part(text, format, (size_t)(at - format));
+        switch (at[1]) {
+        case 's':
+            text_put(text, va_arg(list, const char *));
+            break;
+        case 'd':
+            text_general(text, va_arg(list, int), 10);
+            break;
+        case 'g':
+            text_general(text, va_arg(list, double), 6);
+            break;
+        case '.':
+            text_number(text, va_arg(list, double));
+            break;
+        default:
+            text_put(text, "%");
+        }
+    }
+    text_put(text, format);
+}
+
+#ifdef __GNUC__
+#define TEXT_LIKE_PRINTF __attribute__((format(printf, 2, 3)))
+#else
+#define TEXT_LIKE_PRINTF
+#endif
+
+TEXT_LIKE_PRINTF static inline void text_say(Text *text, const char *format, ...)
+{
+    va_list list;
+    va_start(list, format);
+    text_put_list(text, format, list);
+    va_end(list);
 }
 
 #endif
