@@ -6,7 +6,7 @@ structs of both are the same.
 """
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from string import Template
 
@@ -18,14 +18,15 @@ from ..folder import write_file
 from ..link.message import Value
 from ..link.signature import ORDER, Causality, Kind, LinkVariable, Signature
 from ..variable import Scalar, Variable
-from .old.translation import translated
+from .blocks import translated
 
 FOLDER = Path(__file__).parent
-HELPERS = ("python_arithmetic.h", "number_text.h", "variable.h")
+HELPERS = ("arithmetic.h", "variable.h")
 """What the C of a block includes, from the folder c."""
 
-EXACT = frozenset({"ceil", "copysign", "fabs", "floor", "sqrt"})
-"""Functions of libm whose results IEEE 754 fixes: every compiler may work them out."""
+EXACT = {"ceil": "ceiled", "copysign": "copysign", "fabs": "fabs", "floor": "floored"}
+EXACT |= {"sqrt": "sqrt", "trunc": "truncated", "ldexp": "scaled"}
+"""Functions that IEEE 754 fixes, so every compiler may work them out: as the block calls them."""
 
 _MEANINGS: dict[Causality, str] = {
     "input": "What the block gets with every step; held meanwhile",
@@ -33,11 +34,6 @@ _MEANINGS: dict[Causality, str] = {
     "output": "What it gives",
 }
 _KINDS: dict[type[Scalar], Kind] = {float: "Real", int: "Integer", bool: "Boolean"}
-_COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
-_FUNCTION = re.compile(
-    r"^static [^;{}#]*?\b(\w+)\([^;{}]*\)\s*\{([^\n]*\}$|.*?^\})", re.MULTILINE | re.DOTALL
-)
-"""A function with its name and body, which ends on its line, or with a brace that begins one."""
 
 
 def c_only(model: Model) -> dict[str, bytes]:
@@ -46,13 +42,13 @@ def c_only(model: Model) -> dict[str, bytes]:
     UntranslatableError, one line, where the block holds what cannot be translated.
     """
     name, variables = model.description.name, model.description.variables
-    included = translated(name, model.block, model.file)
-    included |= {file: (FOLDER / "c" / file).read_text("utf-8") for file in HELPERS}
-    libm = called_of_libm(included.values())
+    block = translated(name, model.block, model.file)
+    helpers = {file: (FOLDER / "c" / file).read_text("utf-8") for file in HELPERS}
     signature = Signature(tuple(map(_link_variable, variables)))
     groups = [Group(name, c, f"{name}_{c.title()}s", *members(signature, c)) for c in ORDER]
     places = {v.name: i for i, v in enumerate(variables)}
     inputs, parameters, outputs = ([*group.members] for group in groups)
+    libm = called_of_libm(block)
     flags = (*BITS, *(f"-fno-builtin-{f}" for f in libm if f in LIBM))
     starts: dict[str, Value] = {v.name: v.start for v in variables if v.start is not None}
     texts = {
@@ -60,7 +56,7 @@ def c_only(model: Model) -> dict[str, bytes]:
         "summary": comment(model.description.summary),
         "libm": ", ".join(libm) or "nothing",
         "structs": structs(groups, _MEANINGS, starts, {v.name: v.description for v in variables}),
-        "state_size": str(max(1, _state_size(included["block.h"]))),
+        "state_size": str(max(1, int(re.findall(r"N_STATE = (\d+)", block)[0]))),
         "get_inputs": _body([_got(m, "u", places) for m in inputs], "u, (void)v"),
         "get_parameters": _body([_got(m, "p", places) for m in parameters], "p, (void)v"),
         "put_outputs": _body([_put(m, i) for i, m in enumerate(outputs)], "v, (void)y"),
@@ -70,7 +66,7 @@ def c_only(model: Model) -> dict[str, bytes]:
     }
     files = {f"{name}.h": "c_only.h.in", f"{name}.c": "c_only.c.in", "main.c": "c_only_main.c.in"}
     written = {file: _filled(FOLDER / template, texts) for file, template in files.items()}
-    return {file: text.encode() for file, text in {**included, **written}.items()}
+    return {file: text.encode() for file, text in {"block.h": block, **helpers, **written}.items()}
 
 
 def write_c(folder: Path, model: Model) -> list[Path]:
@@ -81,43 +77,25 @@ def write_c(folder: Path, model: Model) -> list[Path]:
     return [*files]
 
 
-def called_of_libm(texts: Iterable[str]) -> list[str]:
-    """Return the functions of libm that the functions in texts called block_... reach, sorted."""
-    known = {*LIBM, *EXACT}
-    plain = (_COMMENT.sub("", text) for text in texts)
-    bodies = {name: body for text in plain for name, body in _FUNCTION.findall(text)}
-    waiting = [name for name in bodies if name.startswith("block_")]
-    found: set[str] = set()
-    while waiting:
-        for name in re.findall(r"\w+(?=\()", bodies[waiting.pop()]):
-            if name not in found and (name in known or name in bodies):
-                found.add(name)
-                waiting += [name] if name in bodies else []
-    return sorted(found & known)
+def called_of_libm(block: str) -> list[str]:
+    """Return the functions of libm that a block calls, sorted."""
+    called = {*re.findall(r"\w+(?=\()", re.sub(r"/\*.*?\*/", "", block, flags=re.DOTALL))}
+    exact = {name for name, as_called in EXACT.items() if as_called in called}
+    return sorted(exact | (called & {*LIBM}))
 
 
 def _link_variable(v: Variable) -> LinkVariable:
     return LinkVariable(v.name, _KINDS[v.kind], v.causality, v.unit or None)
 
 
-def _state_size(block: str) -> int:
-    found = re.search(r"^#define N_STATE (\d+)", block, re.MULTILINE)
-    if found is None:
-        raise ValueError("block.h: must have #define N_STATE")
-    return int(found[1])
-
-
 def _got(m: Member, struct: str, places: Mapping[str, int]) -> str:
     value = f"{struct}->{m.identifier}"
-    value = {"Boolean": f"{value} ? 1.0 : 0.0", "Integer": f"(double){value}"}.get(
-        m.variable.kind, value
-    )
+    value = f"{value} ? 1.0 : 0.0" if m.variable.kind == "Boolean" else value
     return f"v[{places[m.variable.name]}] = {value};"
 
 
 def _put(m: Member, place: int) -> str:
-    value = f"v[{place}] != 0.0" if m.variable.kind == "Boolean" else f"v[{place}]"
-    return f"y->{m.identifier} = {value};"
+    return f"y->{m.identifier} = v[{place}]{' != 0.0' if m.variable.kind == 'Boolean' else ''};"
 
 
 def _body(lines: list[str], unused: str) -> str:

@@ -18,7 +18,7 @@ from .build import Plan, with_binaries
 from .description import build_description, native_description
 from .members import ICONS
 from .old.block_header import KINDS, VARIABLE
-from .old.names import real, string
+from .text import real, string
 from .sources import proxy_sources
 from .targets import Version
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal
 
-from .old.names import string
+from .text import string
 
 C = Path(__file__).with_name("c")
 COMMON = ("variable.h", "slave.h")

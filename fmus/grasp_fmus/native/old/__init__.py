@@ -1,1 +1,0 @@
-"""The translator of before, until its last user has gone."""
