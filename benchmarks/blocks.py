@@ -18,8 +18,8 @@ from typing import Any
 from c_compilers import BITS, LIBM
 from grasp_fmus.contract import declared, variables
 from grasp_fmus.cross_check import STEP_SIZE, cross_check_files
+from grasp_fmus.native.blocks import translated
 from grasp_fmus.native.c_only import FOLDER, HELPERS
-from grasp_fmus.native.old.translation import translated
 from grasp_fmus.shipped import blocks
 
 from benchmarks.harness import head, row
@@ -51,7 +51,7 @@ def rows(name: str, block: Any) -> str:
 
 def built(name: str, block: Any, folder: Path) -> Path:
     """The program that runs a block. FileNotFoundError without gcc."""
-    sources = translated(name, block) | {"rows.h": rows(name, block)}
+    sources = {"block.h": translated(name, block), "rows.h": rows(name, block)}
     sources |= {helper: (FOLDER / "c" / helper).read_text("utf-8") for helper in HELPERS}
     for file, text in sources.items():
         (folder / file).write_text(text)

@@ -54,7 +54,7 @@ def test_wheel_runs_in_an_empty_folder(tmp_path: Path) -> None:
         assert (empty / "native/GripperPlant.fmu").is_file()
         alone = ("build", "--native", "--c-only", "c", "GraspController")
         python("-m", "grasp_cosim", *alone, cwd=empty, path=site)
-        assert (empty / "c/python_arithmetic.h").is_file()
+        assert (empty / "c/arithmetic.h").is_file()
     assert {p.name for p in site.iterdir() if p.is_dir() and "-" not in p.name} == {
         "bin", "block_variables", "c_compilers", "grasp_cosim", "grasp_controller", "grasp_fmus",
         "gripper_plant", "proximity_sensor",

@@ -50,7 +50,7 @@ def content(fmu: Path) -> str:
 def write_sources(folder: Path, fmi: Literal[2, 3] = 2, content: str = "0123456789abcdef") -> None:
     """The C sources, in a folder that is made."""
     folder.mkdir(parents=True)
-    translation = {"block.h": PYTHON.with_suffix(".h").read_text("utf-8")}
+    translation = PYTHON.with_suffix(".h").read_text("utf-8")
     for file, data in native_sources(NAME, translation, content, GUID, fmi).items():
         (folder / file).write_bytes(data)
 

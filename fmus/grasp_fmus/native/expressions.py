@@ -196,7 +196,7 @@ class Expressions:
         return Value(text, kind, is_int=is_int, span=(found, found + 1) if is_int else None)
 
     def _of_math(self, name: str, value: float) -> Value:
-        names = {"pi": "PI", "tau": "TAU", "e": "E", "inf": "INF"}
+        names = {"pi": "PI", "tau": "TAU", "e": "E", "inf": "HUGE_VAL"}
         return Value(names.get(name) or number(value), REAL)
 
     def literal(self, value: Any) -> Value:

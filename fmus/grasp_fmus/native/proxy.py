@@ -14,13 +14,13 @@ from ..model_description import version
 from ..proxy import DEFAULTS, Settings, bounded, shared_signature
 from ..proxy_build import Original, proxy_model
 from ..variable import Variable
+from .blocks import KINDS
 from .build import Plan, with_binaries
 from .description import build_description, native_description
 from .members import ICONS
-from .old.block_header import KINDS, VARIABLE
-from .text import real, string
 from .sources import proxy_sources
 from .targets import Version
+from .text import number, string
 
 TEMPLATE = Path(__file__).with_name("native_proxy.html.in")
 
@@ -94,7 +94,7 @@ def _table(signature: Signature, variables: Sequence[Variable]) -> str:
         elif v.start is not None:
             start = float(v.start)
         fixed = int(v.variability == "fixed")
-        numbers = ", ".join(real(float(x)) for x in (low, high, start))
+        numbers = ", ".join(number(float(x)) for x in (low, high, start))
         rows.append(
             f"    {{{string(v.name)}, {string(v.in_unit)}, {_KINDS[v.kind]}, "
             f"{v.causality.upper()}, {fixed},\n"
@@ -111,7 +111,8 @@ def _table(signature: Signature, variables: Sequence[Variable]) -> str:
     return (
         "/* The variables of a proxy, in the order of their value references. */\n"
         + "".join(f"#define {name} {value}\n" for name, value in defined.items())
-        + f"{VARIABLE}static const Variable variables[N_VARIABLES] = {{\n{''.join(rows)}}};\n\n"
+        + '#include "variable.h"\n\n'
+        + f"static const Variable variables[N_VARIABLES] = {{\n{''.join(rows)}}};\n\n"
         + "static const char *const texts[N_TEXTS + 1] = {\n"
         + "".join(f"    {text},\n" for text in texts)
         + '    ""};\n'

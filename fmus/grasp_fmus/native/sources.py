@@ -9,7 +9,6 @@ from .text import string
 C = Path(__file__).with_name("c")
 COMMON = ("variable.h", "slave.h")
 """Of every slave."""
-OLD = ("python_arithmetic.h", "number_text.h", "old_block.h")
 PROXY = ("sockets.h", "client.h", "connection.h", "proxy_slave.h")
 HEADERS = {
     2: ("fmi2TypesPlatform.h", "fmi2FunctionTypes.h", "fmi2Functions.h"),
@@ -58,26 +57,22 @@ _SYSTEM = """
 
 
 def native_sources(
-    name: str, translation: Mapping[str, str] | str, content: str, guid: str, fmi: Literal[2, 3]
+    name: str, block: str, content: str, guid: str, fmi: Literal[2, 3]
 ) -> dict[str, bytes]:
     """Return the files of sources/ by name, for FMI `fmi`; NAME.c is the one to compile.
 
-    `translation` is the block in C, by file name. `content` is the content hash of the FMU of the
+    `block` is the block in C, block.h. `content` is the content hash of the FMU of the
     same block in Python, 16 hexadecimal digits, which is in states; `guid` is that of this FMU.
     """
-    files = {"block.h": translation} if isinstance(translation, str) else translation
-    is_old = "Fault *fault" in files["block.h"]
-    own = OLD if is_old else ("arithmetic.h",) if '"arithmetic.h"' in files["block.h"] else ()
     included = (
         f'#define CONTENT "{content}" /* of the FMU in Python with which states are exchanged */'
         '\n\n#include "block.h"'
     )
-    included += '\n#include "old_block.h"' if is_old else ""
     main = _MAIN.format(name=name, fmi=fmi, guid=guid, how=_BLOCK, defined="", included=included)
     return {
         f"{name}.c": main.encode(),
-        **{file: text.encode() for file, text in files.items()},
-        **_files("block_slave.h", *own, fmi=fmi),
+        "block.h": block.encode(),
+        **_files("arithmetic.h", "block_slave.h", fmi=fmi),
     }
 
 

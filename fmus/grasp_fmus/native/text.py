@@ -21,7 +21,7 @@ _RESERVED = frozenset(
     unsigned void volatile while asm fortran bool true false nullptr alignas alignof constexpr
     static_assert thread_local typeof complex imaginary I unix linux near far huge small min max
     interface errno assert stdin stdout stderr signbit isnormal fpclassify isnan isinf isfinite
-    NULL EOF PI TAU E INF NAN INFINITY HUGE_VAL IN OUT TRUE FALSE BOOL VOID ERROR CONST
+    NULL EOF PI TAU E NAN INFINITY HUGE_VAL IN OUT TRUE FALSE BOOL VOID ERROR CONST
     acos acosh asin asinh atan atan2 atanh ceil copysign cos cosh exp expm1 fabs floor fmod ldexp
     log log10 log1p log2 pow sin sinh sqrt tan tanh trunc larger smaller floored ceiled truncated
     scaled variables Variable Text text_put text_number text_general INPUT OUTPUT PARAMETER why
@@ -121,7 +121,7 @@ def number(value: float) -> str:
     if isnan(value):
         return "(double)NAN"
     if isinf(value):
-        return "INF" if value > 0 else "-INF"
+        return "HUGE_VAL" if value > 0 else "-HUGE_VAL"
     return repr(float(value))
 
 

@@ -27,13 +27,14 @@ from support.slow import platforms, slow
 ROOT = Path(__file__).parents[3]
 SPRING = ROOT / "docs/spring_plant.py"
 STRICT = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
-OF_THE_COMPILER = {"memcpy", "memset", "memmove", "memcmp", "strlen", "strcpy", "strcspn"}
+OF_THE_COMPILER = {"memcpy", "memset", "memmove", "memcmp", "strlen", "strcpy"}
+OF_THE_COMPILER |= {"strcmp", "strcspn", "strchr"}
 """Functions of string.h, which a compiler without an operating system has as well."""
 
 pytestmark = needs_gcc
 
 
-ALLOWED = {"float.h", "math.h", "stdbool.h", "stddef.h", "stdint.h", "string.h"}
+ALLOWED = {"float.h", "math.h", "stdarg.h", "stdbool.h", "stddef.h", "stdint.h", "string.h"}
 """Headers without input and output, memory, or time."""
 
 
@@ -90,7 +91,7 @@ def test_compiles_without_a_warning_and_calls_what_it_lists(
 @pytest.mark.parametrize("name", [*TRANSLATED, "SpringPlant"])
 def test_what_is_written(name: str, written: Callable[[str], Path]) -> None:
     files = {path.name: path for path in written(name).glob("*.[ch]")}
-    assert {f"{name}.h", f"{name}.c", "main.c", "block.h", "python_arithmetic.h"} <= files.keys()
+    assert {f"{name}.h", f"{name}.c", "main.c", "block.h", "arithmetic.h"} <= files.keys()
     texts = [path.read_text("ascii") for file, path in files.items() if file != "main.c"]
     text = "\n".join(texts)
     assert {*re.findall(r"#include <(.*)>", text)} <= ALLOWED
@@ -195,8 +196,8 @@ def test_the_same_bits_as_the_block_over_changing_inputs(
     [
         ([nan, 0, 0, 0, 0, 0], 1e-3, 1, "position[1] = nan m: must be a finite number"),
         ([0, 0, 0, 0, 0, -inf], 1e-3, 1, "intensity[2] = -inf V: must be a finite number"),
-        ([0, 0, 0, 0, 0, 0], 0.0, 1, "step: must be over 0 s, and finite"),
-        ([0, 0, 0, 0, 0, 0], nan, 1, "step: must be over 0 s, and finite"),
+        ([0, 0, 0, 0, 0, 0], 0.0, 1, "step of 0.0 s: must be over 0 s"),
+        ([0, 0, 0, 0, 0, 0], nan, 1, "step of nan s: must be over 0 s"),
     ],
 )
 def test_what_is_refused_leaves_the_state(
@@ -227,18 +228,6 @@ def test_a_parameter_out_of_its_range_is_named(tmp_path: Path) -> None:
     assert c.why.value.decode() == "finger_mass[1] = -1.0 kg: must be from 0.001 to 1000 kg"
 
 
-def test_libm_is_what_is_reached() -> None:
-    text = """\
-static inline double one(double x) { return acos(x); }
-static double two(double x)
-{
-    return exp(x); /* not log(x) */
-}
-static void block_step(
-    double *x)
-{
-    *x = two(*x) + sqrt(*x);
-}
-"""
-    assert called_of_libm([text]) == ["exp", "sqrt"]
-    assert called_of_libm([text.replace("two(*x)", "one(*x)")]) == ["acos", "sqrt"]
+def test_libm_is_what_the_block_calls() -> None:
+    text = "x = two(floored(x)) + exp(sqrt(x)); /* not log(x) */"
+    assert called_of_libm(text) == ["exp", "floor", "sqrt"]

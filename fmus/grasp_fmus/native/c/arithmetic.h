@@ -16,7 +16,6 @@
 #define PI 3.141592653589793
 #define TAU 6.283185307179586
 #define E 2.718281828459045
-#define INF ((double)HUGE_VAL)
 
 /* max(a, b): the first of equals, and of what cannot be compared */
 static inline double larger(double a, double b)
