@@ -1,9 +1,7 @@
-# ruff: noqa: E501, S101, SIM905, PT018, SIM102
-# mypy: disable-error-code="union-attr, arg-type, attr-defined, str-bytes-safe"
 """Expressions of a block in C: the same operations in the same order.
 
-A block is pure functions of numbers, so what C cannot say within an expression is worked out before
-its statement.
+A block is pure functions of numbers: what C cannot say within an expression is worked out before
+its statement. Where Python would raise, C has the value of IEEE 754.
 """
 
 import ast
@@ -11,47 +9,39 @@ import builtins
 import inspect
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from enum import IntEnum
 from functools import cached_property
-from itertools import product
 from types import FunctionType, ModuleType
-from typing import Any
+from typing import Any, NoReturn
 
-from .structs import Function, Program, is_constant
-from .text import Source, UntranslatableError, identifier, number
-from .types import (
-    BOOLEAN,
-    NUMBER,
-    NUMBERS,
-    REAL,
-    TEXT,
-    WHOLE,
-    Group,
-    Member,
-    Record,
-    Tuple,
-    Type,
-    Value,
-    fields,
-    is_record,
-    joined,
-    of_items,
-    said,
-)
+from . import types
+from .structs import Function, Program
+from .text import Source, identifier, number
+from .types import BOOLEAN, NUMBERS, REAL, WHOLE, Group, Record, Scalar, Tuple, Type, Value, said
 
-CHOICE, OR, AND, EQUAL, SUM, PRODUCT, SIGN, WORD = 1, 2, 3, 4, 6, 7, 8, 9
+CHOICE, OR, AND, EQUAL, LESS, SUM, PRODUCT, SIGN, WORD = range(1, 10)
 """How tightly operators bind in C; WORD is what needs no parentheses."""
 
-MATH: dict[Any, tuple[str, int]] = {
-    getattr(math, name): (name, 1)
-    for name in "acos acosh asin asinh atan atanh cos cosh exp expm1 fabs log10 log1p log2 sin sinh "
-    "sqrt tan tanh".split()
+OPERATORS = {ast.Add: ("+", SUM), ast.Sub: ("-", SUM), ast.Mult: ("*", PRODUCT)}
+OPERATORS[ast.Div] = "/", PRODUCT
+COMPARISONS = {
+    ast.Lt: "<",
+    ast.LtE: "<=",
+    ast.Gt: ">",
+    ast.GtE: ">=",
+    ast.Eq: "==",
+    ast.NotEq: "!=",
 }
-MATH |= {getattr(math, name): (name, 2) for name in ("atan2", "copysign", "fmod", "pow")}
-MATH |= {math.ldexp: ("scaled", 2), math.log: ("log", 1)}
-TESTS = {math.isfinite: "isfinite", math.isnan: "isnan", math.isinf: "isinf"}
-WHOLES = {math.floor: "floored", math.ceil: "ceiled", math.trunc: "truncated", int: "truncated"}
+FUNCTIONS = {
+    getattr(math, name): name
+    for name in re.findall(
+        r"\w+",
+        "acos acosh asin asinh atan atan2 atanh copysign cos cosh exp expm1 fabs fmod log log10 "
+        "log1p log2 pow sin sinh sqrt tan tanh",
+    )
+}
+TO_WHOLE = {math.floor: "floored", math.ceil: "ceiled", math.trunc: "truncated", int: "truncated"}
 
 ADVICE: dict[Any, str] = {
     "Lambda": "lambda is not in the subset; use a function of the module",
@@ -61,652 +51,447 @@ ADVICE: dict[Any, str] = {
     "Set": "a set is not in the subset; use a tuple",
     "NamedExpr": ":= is not in the subset; assign before",
     "JoinedStr": "a text is only for the reason of a raise",
-    "Starred": "a star is only for a tuple, or among arguments",
     "GeneratorExp": "a generator is only for any, all and tuple",
+    "FloorDiv": "// is not in the subset; write floor(a / b)",
+    "Mod": "% is not in the subset; write fmod(a, b)",
     sum: "sum: its rounding depends on the version of Python; write a + b, or a loop",
     math.fsum: "math.fsum is not in the subset; write a + b, or a loop",
     math.hypot: "math.hypot is CPython's own; write sqrt(x * x + y * y)",
     math.dist: "math.dist is CPython's own; write sqrt(x * x + y * y)",
     round: "round is not in the subset; write floor(x + 0.5)",
     print: "print is not in the subset: a block has no output",
-    isinstance: "isinstance is not in the subset; leave it out: types are fixed",
 }
 
-_OPERATORS = {ast.Add: ("+", SUM), ast.Sub: ("-", SUM), ast.Mult: ("*", PRODUCT)}
-_OPERATORS[ast.Div] = "/", PRODUCT
-_COMPARISONS = {
-    ast.Lt: "<",
-    ast.LtE: "<=",
-    ast.Gt: ">",
-    ast.GtE: ">=",
-    ast.Eq: "==",
-    ast.NotEq: "!=",
-}
-_MISSING = object()
+_UNKNOWN = object()
+_PATH = re.compile(r"-?(&?[A-Za-z_]\w*(->|\.\w|\[\d+\]|\w)*|[\d.]+(e[-+]?\d+)?)")
+"""A variable, a member of one or a number: it may stand in several places."""
 
 
 class Expressions:
     """The expressions of one function, for the types that it is called with."""
 
-    def __init__(self, program: Program, source: Source) -> None:
-        self.program, self.source = program, source
-        self.locals: set[str] = set()
+    def __init__(self, program: Program, source: Source, names: dict[str, Any]) -> None:
+        self.program, self.source, self.names = program, source, names
         self.bound: dict[str, Value] = {}
-        """Parameters, and variables that have a value here."""
+        """The parameters and variables that have a value here."""
+        self.locals: set[str] = set()
         self.lines: list[str] = []
         self.indent = 1
         self._used: set[str] = set()
 
-    def called(self, function: FunctionType, arguments: Sequence[Value], node: ast.AST) -> Function:
+    def refuse(self, node: Any, reason: str) -> NoReturn:
+        """End with a reason, and the line of a node."""
+        raise self.source.error(node, reason)
+
+    def translate(self, function: Any, arguments: Sequence[Value], node: ast.AST) -> Function:
         """The function in C for these arguments."""
         raise NotImplementedError
 
-    def error(self, node: ast.AST, reason: str) -> UntranslatableError:
-        """An error with a reason, and the line of a node."""
-        return self.source.error(getattr(node, "lineno", 1), reason)
-
-    # Lines and names
+    # Lines and names of variables
 
     def say(self, line: str) -> None:
         """Add a line."""
         self.lines.append(f"{'    ' * self.indent}{line}")
 
-    def fresh(self, name: str) -> str:
-        """A name for a variable of C that is not one of Python's."""
-        count, plain = 1, identifier(name)
-        while name in self._used or name in self.locals or name == plain + "_":
+    def fresh(self, name: str, own: bool = False) -> str:
+        """A name for a variable of C: the block's own, or one for what C cannot say at once."""
+        found, count = identifier(name), 1
+        while found in self._used or (found in self.locals and not own):
             count += 1
-            name = f"{plain}_{count}"
-        self._used.add(name)
-        return name
+            found = f"{name}_{count}"
+        self._used.add(found)
+        return found
 
     def simple(self, value: Value, name: str = "value") -> Value:
-        """A value that may stand in several places: a variable, a member, a number."""
-        if value.items is not None and not isinstance(value.type, Record):
-            return value._replace(items=tuple(self.simple(item, name) for item in value.items))
-        if isinstance(value.type, Group) or re.fullmatch(r"-?[\w.]+(->|[\w.\[\]])*", value.text):
+        """The value where it may stand several times: what is more than a name gets a variable."""
+        if value.items is not None and isinstance(value.type, Tuple):
+            return value._replace(items=tuple(self.simple(i, name) for i in value.items))
+        if isinstance(value.type, Group) or _PATH.fullmatch(value.text):
             return value
-        call = re.match(r"\w+_(\w+)\(", value.text)
-        new = self.fresh(call[1] if call else name)
-        self.say(f"{self.c(value.type)} {new} = {self.initial(value)};")
-        return Value(new, value.type)
+        return self.copied(value, name)
 
-    def c(self, t: Type) -> str:
-        """The name of a type in C."""
-        return self.program.c(t, self.source)
+    def copied(self, value: Value, name: str) -> Value:
+        """The value in a variable of its own."""
+        variable = self.fresh(name)
+        self.say(f"{self.program.c(value.type, self.names)} {variable} = {value.text};")
+        return Value(variable, value.type)
 
-    def text(self, value: Value, level: int = CHOICE) -> str:
-        """An expression of C, in parentheses where its operator binds less than `level`."""
-        if value.items is not None:
-            return f"({self.c(value.type)}){self.initial(value)}"
+    def at(self, value: Value, level: int) -> str:
+        """The text of a value where an operator of this level takes it."""
         return value.text if value.level >= level else f"({value.text})"
 
-    def initial(self, value: Value) -> str:
-        """What initialises a variable, or a member."""
-        if value.items is None:
-            return value.text
-        self.c(value.type)
-        return self.program.braces(value.type, [self.initial(item) for item in value.items])
-
-    # What a node is
+    # What is known before a block runs
 
     def known(self, node: ast.expr) -> Any:
-        """The object of Python that a name stands for, or _MISSING: functions, classes, constants."""
-        if isinstance(node, ast.Name) and node.id not in self.locals | self.bound.keys():
-            there = self.source.names
-            return there[node.id] if node.id in there else getattr(builtins, node.id, _MISSING)
+        """The object of Python that an expression names, whatever the inputs are."""
+        if isinstance(node, ast.Name) and node.id not in self.locals:
+            found = self.names.get(node.id, getattr(builtins, node.id, _UNKNOWN))
+            if found is _UNKNOWN:
+                self.refuse(node, f"{node.id}: there is no such name")
+            return found
         if isinstance(node, ast.Attribute):
-            base = self.known(node.value)
-            if isinstance(base, ModuleType | type):
-                return getattr(base, node.attr, _MISSING)
-        return _MISSING
+            of = self.known(node.value)
+            if isinstance(of, ModuleType | type):
+                return getattr(of, node.attr, _UNKNOWN)
+        return _UNKNOWN
 
-    def value(self, node: ast.expr) -> Value:
-        """The value of an expression."""
-        found = self.known(node)
-        if found is not _MISSING:
-            return self._static(node, found)
-        kind = type(node).__name__
-        make: Callable[[Any], Value] | None = getattr(self, f"_{kind.lower()}", None)
-        if make is None:
-            raise self.error(node, ADVICE.get(kind, f"{kind} is not in the subset"))
-        return make(node)
-
-    def _static(self, node: ast.expr, found: Any) -> Value:
-        if isinstance(found, IntEnum):
-            return Value(self.program.member(found), Member(type(found)), is_int=True)
-        if not is_constant(found):
-            what = ast.unparse(node)
-            raise self.error(
-                node, ADVICE.get(type(found), f"{what} is no number: must be called, or be one")
-            )
-        source, name = self.source, ast.unparse(node).rpartition(".")[2]
+    def constant(self, node: ast.expr, found: Any) -> Value:
+        """A constant of a module; a number that has a name in capitals keeps it."""
+        kind = types.of_value(found)
+        if kind is None or isinstance(kind, Group):
+            self.refuse(node, f"{ast.unparse(node)}: {type(found).__name__} is not in the subset")
+        names, name = self.names, getattr(node, "attr", getattr(node, "id", ""))
         if isinstance(node, ast.Attribute):
-            base = self.known(node.value)
-            if base is math:
-                return self._of_math(name, found)
-            home = self.program.source(vars(base)) if isinstance(base, ModuleType) else None
-            if home is None:
-                return self.literal(found)
-            source = home
-        origin = self.source.imported.get(name)
-        if isinstance(node, ast.Name) and origin and origin[0].module == "math":
-            return self._of_math(origin[1], found)
-        text, kind, is_int = self.program.constant(source, name, found)
-        return Value(text, kind, is_int=is_int, span=(found, found + 1) if is_int else None)
+            names = vars(self.known(node.value))
+        if isinstance(kind, Scalar) and (isinstance(found, IntEnum) or not name.isupper()):
+            return self.number_of(found)
+        return Value(self.program.constant(dict(names), name, found), kind)
 
-    def _of_math(self, name: str, value: float) -> Value:
-        names = {"pi": "PI", "tau": "TAU", "e": "E", "inf": "HUGE_VAL"}
-        return Value(names.get(name) or number(value), REAL)
-
-    def literal(self, value: Any) -> Value:
-        """A number, or a tuple of them, as it is in Python."""
-        if isinstance(value, tuple):
-            items = tuple(self.literal(item) for item in value)
-            kind: Type | None = of_items([item.type for item in items])
-            kind = Record(type(value)) if is_record(type(value)) else kind
-            assert kind
-            return Value("", kind, items=items)
-        if isinstance(value, IntEnum):
-            return Value(self.program.member(value), Member(type(value)), is_int=True)
+    def number_of(self, value: Any) -> Value:
+        """A number of Python."""
         if isinstance(value, bool):
             return Value(str(int(value)), BOOLEAN)
-        level = SIGN if value < 0 else WORD
-        if isinstance(value, int):
-            return Value(number(value), WHOLE, level, span=(value, value + 1))
-        return Value(number(value), REAL, level)
-
-    def _constant(self, node: ast.Constant) -> Value:
-        if isinstance(node.value, float):
-            return Value(self.source.literal(node), REAL)
-        if isinstance(node.value, int) and abs(node.value) <= 2**53:
-            return self.literal(node.value)
-        if isinstance(node.value, str):
-            raise self.error(node, ADVICE["JoinedStr"])
-        kind = type(node.value).__name__
-        what = (
-            f"{node.value}: must be up to 2^53"
-            if kind == "int"
-            else f"a {kind} is not in the subset"
+        text = number(value)
+        return Value(
+            text, REAL if isinstance(value, float) else WHOLE, SIGN if text[0] == "-" else WORD
         )
-        raise self.error(node, what)
 
-    def _name(self, node: ast.Name) -> Value:
-        if node.id in self.bound:
-            return self.bound[node.id]
-        if node.id in self.locals:
-            raise self.error(node, f"{node.id}: may have no value here; give it one before")
-        raise self.error(node, f"{node.id}: is not defined")
+    # Expressions
 
-    # Operators
+    def value(self, node: ast.expr) -> Value:
+        """An expression."""
+        found = self.known(node)
+        if found is not _UNKNOWN:
+            return self.constant(node, found)
+        kind = type(node).__name__
+        translate = getattr(self, f"_{kind.lower()}", None)
+        if translate is None:
+            self.refuse(node, ADVICE.get(kind, f"{ast.unparse(node)}: is not in the subset"))
+        made: Value = translate(node)
+        return made
 
     def number(self, node: ast.expr) -> Value:
-        """An expression that must be a number; True and False are 1 and 0."""
-        return self.as_number(self.value(node), node)
+        """An expression that must be a number."""
+        return self._as_number(self.value(node), node)
 
-    def as_number(self, value: Value, node: ast.AST) -> Value:
-        """A value that must be a number."""
-        if value.type == BOOLEAN:
-            return Value(f"(double){self.text(value, SIGN)}", WHOLE, SIGN)
-        if isinstance(value.type, Member):
-            return value._replace(type=WHOLE)
-        if value.type not in NUMBERS:
-            raise self.error(node, f"{ast.unparse(node)} is a {said(value.type)}, must be a number")
+    def _as_number(self, value: Value, node: ast.AST) -> Value:
+        if not isinstance(value.type, Scalar):
+            self.refuse(node, f"{ast.unparse(node)} is {said(value.type)}: must be a number")
+        return value._replace(type=WHOLE) if value.type == BOOLEAN else value
+
+    def condition(self, node: ast.expr) -> Value:
+        """An expression as a condition."""
+        value = self.value(node)
+        if value.type in NUMBERS:
+            return Value(f"{self.at(value, SUM)} != 0.0", BOOLEAN, EQUAL)
+        if value.type != BOOLEAN:
+            self.refuse(node, f"{ast.unparse(node)} is {said(value.type)}: must be a condition")
         return value
 
+    def _constant(self, node: ast.Constant) -> Value:
+        if not isinstance(node.value, int | float):
+            self.refuse(node, f"{ast.unparse(node)}: must be a number")
+        if isinstance(node.value, int) and abs(node.value) > 2**53:
+            self.refuse(node, f"{node.value}: an int must be at most 2**53; write {node.value}.0")
+        return self.number_of(node.value)
+
+    def _name(self, node: ast.Name) -> Value:
+        if node.id not in self.bound:
+            self.refuse(node, f"{node.id} may have no value here; give it one before")
+        return self.bound[node.id]
+
     def _binop(self, node: ast.BinOp) -> Value:
-        left = self.value(node.left)
-        if isinstance(left.type, Tuple):
-            return self._tuple_operation(node, left)
-        a, b = self.as_number(left, node.left), self.number(node.right)
+        left, right = self.value(node.left), self.value(node.right)
+        if isinstance(left.type, Tuple) and isinstance(node.op, ast.Mult):
+            items = [self.simple(item) for item in self.items(left, node.left)]
+            return self.display(items * self._index(node.right))
+        a, b = self._as_number(left, node.left), self._as_number(right, node.right)
         if isinstance(node.op, ast.Pow):
-            if WHOLE == a.type == b.type:
-                raise self.error(
-                    node, "a power of ints is not in the subset; write float(n) ** ..."
-                )
-            return Value(f"pow({self.text(a)}, {self.text(b)})", REAL)
-        if type(node.op) not in _OPERATORS:
-            raise self.error(
-                node, f"{ast.unparse(node)}: this operator is not in the subset; use + - * / **"
-            )
-        symbol, level = _OPERATORS[type(node.op)]
-        if a.span and b.span and level == SUM:
-            return self._sum_of_ints(a, symbol, b)
-        plain = isinstance(node.op, ast.Div) or REAL in (a.type, b.type)
-        if a.is_int and b.is_int:
-            a = Value(f"(double){self.text(a, SIGN)}", WHOLE, SIGN)
-        text = f"{self.text(a, level)} {symbol} {self.text(b, level + 1)}"
-        if plain or not isinstance(node.op, ast.Mult):
-            kind = REAL if plain else WHOLE if a.type == b.type == WHOLE else NUMBER
-            return Value(text, kind, level)
-        if NUMBER in (a.type, b.type):
-            raise self.error(node, "a product of what may be an int or a float; write 0.0 for 0")
-        return Value(f"{text} + 0.0", WHOLE, SUM)  # an int has no -0.0
-
-    def _sum_of_ints(self, a: Value, symbol: str, b: Value) -> Value:
-        """Of the numbers of loops, and constants: it is an int of C."""
-        assert a.span and b.span
-        low, high = b.span if symbol == "+" else (1 - b.span[1], 1 - b.span[0])
-        span = a.span[0] + low, a.span[1] + high - 1
-        return Value(f"{as_int(a)} {symbol} {as_int(b)}", WHOLE, SUM, is_int=True, span=span)
-
-    def _tuple_operation(self, node: ast.BinOp, left: Value) -> Value:
-        items = self.items(left, node)
-        if isinstance(node.op, ast.Add):
-            return self.display(items + self.items(self.value(node.right), node), node)
-        if isinstance(node.op, ast.Mult):
-            return self.display(items * self._place(node.right), node)
-        raise self.error(node, "a tuple: must be added to another, or multiplied by a constant")
+            if a.type == b.type == WHOLE:
+                self.refuse(node, f"{ast.unparse(node)}: of two ints; write float(...)")
+            return Value(f"pow({a.text}, {b.text})", REAL)
+        if type(node.op) not in OPERATORS:
+            kind = type(node.op).__name__
+            self.refuse(node, ADVICE.get(kind, f"{ast.unparse(node)}: is not in the subset"))
+        symbol, level = OPERATORS[type(node.op)]
+        text = f"{self.at(a, level)} {symbol} {self.at(b, level + 1)}"
+        if a.type == b.type == WHOLE and symbol != "/":  # the zero of an int has no sign
+            return Value(f"({text} + 0.0)" if symbol == "*" else text, WHOLE, level)
+        return Value(text, REAL, level)
 
     def _unaryop(self, node: ast.UnaryOp) -> Value:
         if isinstance(node.op, ast.Not):
-            return Value(f"!{self.text(self.condition(node.operand), SIGN)}", BOOLEAN, SIGN)
+            return Value(f"!{self.at(self.condition(node.operand), SIGN)}", BOOLEAN, SIGN)
         value = self.number(node.operand)
         if isinstance(node.op, ast.UAdd):
             return value
         if not isinstance(node.op, ast.USub):
-            raise self.error(node, "bits are not in the subset; use arithmetic")
-        if value.type == NUMBER:
-            raise self.error(node, "- of what may be an int or a float; write 0.0 for 0")
-        if isinstance(node.operand, ast.Constant) and isinstance(node.operand.value, int):
-            return self.literal(-node.operand.value)
-        if value.type == WHOLE and not value.is_int:
-            return Value(f"0.0 - {self.text(value, PRODUCT)}", WHOLE, SUM)
-        span = (1 - value.span[1], 1 - value.span[0]) if value.span else None
-        return value._replace(text=f"-{self.text(value, WORD)}", level=SIGN, span=span)
-
-    def condition(self, node: ast.expr) -> Value:
-        """An expression as a condition: of numbers, if they are not zero."""
-        if isinstance(node, ast.BoolOp):
-            return self._joined(node, [self.condition(v) for v in node.values])
-        value = self.value(node)
-        if value.type == BOOLEAN:
-            return value
-        value = self.as_number(value, node)
-        return Value(f"{self.text(value, SUM)} != 0.0", BOOLEAN, EQUAL)
+            self.refuse(node, f"{ast.unparse(node)}: bits are not in the subset")
+        if value.type == WHOLE and not value.text[0].isdigit():
+            return Value(f"0.0 - {self.at(value, PRODUCT)}", WHOLE, SUM)
+        inner = self.at(value, SIGN)
+        return Value(f"-({inner})" if inner[0] == "-" else f"-{inner}", value.type, SIGN)
 
     def _boolop(self, node: ast.BoolOp) -> Value:
-        values = [self.value(v) for v in node.values]
-        if any(v.type != BOOLEAN for v in values):
-            raise self.error(node, "and, or of numbers is not in the subset; write a if ... else b")
-        return self._joined(node, values)
-
-    def _joined(self, node: ast.BoolOp, values: list[Value]) -> Value:
         symbol, level = ("&&", AND) if isinstance(node.op, ast.And) else ("||", OR)
-        return self._all(values, symbol, level)
+        return self._all([self.condition(item) for item in node.values], symbol, level)
 
     def _all(self, values: Sequence[Value], symbol: str, level: int) -> Value:
-        text = f" {symbol} ".join(self.text(v, EQUAL) for v in values)
-        return Value(text, BOOLEAN, level if len(values) > 1 else values[0].level)
+        if len(values) == 1:
+            return values[0]
+        return Value(f" {symbol} ".join(self.at(v, EQUAL) for v in values), BOOLEAN, level)
 
     def _compare(self, node: ast.Compare) -> Value:
-        parts = [self.value(node.left)] if not self._is_look_up(node) else []
-        if not parts:
-            return self._look_up_in(node)
-        nodes = [node.left, *node.comparators]
-        parts += [self.value(n) for n in node.comparators]
-        for i, part in enumerate(parts):
-            if part.type != BOOLEAN or len(parts) > 2:
-                parts[i] = self.as_number(part, nodes[i])
-            if 0 < i < len(parts) - 1 and "(" in part.text:
-                parts[i] = self.simple(parts[i])
+        values = [self.number(item) for item in (node.left, *node.comparators)]
+        values[1:-1] = [self.simple(v) for v in values[1:-1]]
         found = []
-        for op, a, b in zip(node.ops, parts, parts[1:], strict=False):
-            if type(op) not in _COMPARISONS:
-                raise self.error(node, "is and in are not in the subset here; use ==")
-            if (a.type == BOOLEAN) != (b.type == BOOLEAN):
-                raise self.error(node, f"compares a {said(a.type)} with a {said(b.type)}")
-            text = f"{self.text(a, SUM)} {_COMPARISONS[type(op)]} {self.text(b, SUM)}"
-            found.append(Value(text, BOOLEAN, EQUAL))
+        for a, op, b in zip(values, node.ops, values[1:], strict=False):
+            if type(op) not in COMPARISONS:
+                self.refuse(node, f"{ast.unparse(node)}: is not in the subset; compare numbers")
+            symbol = COMPARISONS[type(op)]
+            level = EQUAL if symbol in ("==", "!=") else LESS
+            found.append(Value(f"{self.at(a, SUM)} {symbol} {self.at(b, SUM)}", BOOLEAN, level))
         return self._all(found, "&&", AND)
 
-    def _is_look_up(self, node: ast.Compare) -> bool:
-        return isinstance(self.known(node.comparators[-1]), Mapping)
-
-    def _look_up_in(self, node: ast.Compare) -> Value:
-        """`key in TABLE`."""
-        if not isinstance(node.ops[0], ast.In | ast.NotIn) or len(node.ops) > 1:
-            raise self.error(
-                node, "a dict: must be used as in key in TABLE, TABLE.get(key, default)"
-            )
-        key = self.simple(self.number(node.left))
-        equal, symbol, level = (
-            ("==", "||", OR) if isinstance(node.ops[0], ast.In) else ("!=", "&&", AND)
-        )
-        keys = [self.program.key(k) for k in self.known(node.comparators[0])]
-        return self._all(
-            [Value(f"{key.text} {equal} {k}", BOOLEAN, EQUAL) for k in keys], symbol, level
-        )
-
     def _ifexp(self, node: ast.IfExp) -> Value:
-        test, a, b = self.condition(node.test), self.value(node.body), self.value(node.orelse)
-        kind = joined(a.type, b.type)
-        if kind is None:
-            raise self.error(node, f"is a {said(a.type)} or a {said(b.type)}; must be of one type")
-        text = f"{self.text(test, OR)} ? {self.text(a, OR)} : {self.text(b)}"
-        return Value(text, kind, CHOICE, is_int=a.is_int and b.is_int)
+        test = self.at(self.condition(node.test), OR)
+        a, b = self.value(node.body), self.value(node.orelse)
+        kind = self.common(a.type, b.type, node)
+        return Value(f"{test} ? {self.at(a, OR)} : {self.at(b, CHOICE)}", kind, CHOICE)
 
-    # Tuples, fields, items
-
-    def display(self, items: Sequence[Value], node: ast.AST) -> Value:
-        """A tuple that stands item by item."""
-        kind = of_items([item.type for item in items])
+    def common(self, a: Type, b: Type, node: ast.AST) -> Type:
+        """The type of what may be of either; refused where there is none."""
+        kind = types.joined(a, b)
         if kind is None:
-            raise self.error(node, "an empty tuple is not in the subset")
-        return Value("", kind, items=tuple(items))
+            self.refuse(node, f"{ast.unparse(node)} is {said(a)} or {said(b)}: must be one of them")
+        return kind
+
+    # Tuples
+
+    def display(self, items: Sequence[Value], kind: Type | None = None) -> Value:
+        """A tuple, or a NamedTuple, of these items."""
+        t = kind or Tuple(tuple(item.type for item in items))
+        if any(isinstance(item.type, Group) for item in items):
+            return Value("", t, WORD, tuple(items))
+        braces = self.program.braces(t, [item.text for item in items])
+        return Value(f"({self.program.c(t, self.names)}){braces}", t, WORD, tuple(items))
 
     def _tuple(self, node: ast.Tuple) -> Value:
-        return self.display(self.starred(node.elts), node)
+        return self.display(self.starred(node.elts))
 
     def starred(self, nodes: Sequence[ast.expr]) -> list[Value]:
-        """The values of expressions, some of which may be `*items`."""
+        """Expressions, with all items of those that have a star."""
         found: list[Value] = []
         for node in nodes:
             star = isinstance(node, ast.Starred)
-            found += self.items(self.value(node.value), node) if star else [self.value(node)]
+            found += self.items(self.value(node.value), node) if star else [self.value(node)]  # type: ignore[attr-defined]
         return found
 
     def items(self, value: Value, node: ast.AST) -> list[Value]:
         """The items of a tuple."""
+        if not isinstance(value.type, Tuple | Record):
+            self.refuse(node, f"{ast.unparse(node)} is {said(value.type)}: must be a tuple")
         if value.items is not None:
-            return [*value.items]
-        if isinstance(value.type, Record):
-            base = self.simple(value)
-            return [self.field(base, name, node) for name in fields(value.type)]
-        if not isinstance(value.type, Tuple):
-            raise self.error(node, f"a {said(value.type)} has no items")
-        base = self.simple(value)
-        place = "at[{}]" if value.type.is_array else "at_{}"
-        return [
-            Value(f"{self.text(base, WORD)}.{place.format(i)}", kind)
-            for i, kind in enumerate(value.type.items)
-        ]
+            return list(value.items)
+        of = self.simple(value, self._called(node)).text
+        kinds = types.parts(value.type)
+        return [Value(of + self.program.member(value.type, i), k) for i, k in enumerate(kinds)]
 
-    def field(self, value: Value, name: str, node: ast.AST) -> Value:
-        """A field of a NamedTuple or of parameters."""
-        assert isinstance(value.type, Record | Group)
-        kind = fields(value.type)[name]
-        if kind is None:
-            raise self.error(
-                node, f"{value.type.cls.__name__}.{name}: is not of a type in the subset"
-            )
-        if value.items is not None:
-            return value.items[list(fields(value.type)).index(name)]
-        text = self._member(value, name)
-        return Value(f"&{text}" if isinstance(kind, Group) else text, kind)
-
-    def _member(self, value: Value, name: str) -> str:
-        if isinstance(value.type, Group):
-            plain = value.text.startswith("&")
-            return (
-                f"{value.text[1:]}.{identifier(name)}"
-                if plain
-                else f"{value.text}->{identifier(name)}"
-            )
-        return f"{self.text(value, WORD)}.{identifier(name)}"
-
-    def _attribute(self, node: ast.Attribute) -> Value:
-        value = self.value(node.value)
-        if isinstance(value.type, Member) and node.attr == "name":
-            return Value(f"{self.program.member_names(value.type.cls)}({value.text})", TEXT)
-        if not isinstance(value.type, Record | Group):
-            raise self.error(node, f"{node.attr}: a {said(value.type)} has no such field")
-        if node.attr in fields(value.type):
-            return self.field(value, node.attr, node)
-        there = inspect.getattr_static(value.type.cls, node.attr, None)
-        if isinstance(there, cached_property) and isinstance(value.type, Group):
-            kept = self.program.kept.setdefault(value.type.cls, {})
-            if node.attr not in kept:
-                plain = Value("p", value.type)
-                kept[node.attr] = self.called(there.func, [plain], node)
-            return Value(self._member(value, node.attr), kept[node.attr].returns)
-        if isinstance(there, property) and there.fget:
-            return self.call(there.fget, [value], node)
-        if there is not None and not callable(there):
-            return self.literal(there)
-        raise self.error(node, f"{said(value.type)} has no such field: {node.attr}")
+    def _called(self, node: Any) -> str:
+        """What to call the value of an expression: by the function that gives it."""
+        of = getattr(node, "func", None)
+        return str(getattr(of, "attr", getattr(of, "id", "value"))).strip("_").lower()
 
     def _subscript(self, node: ast.Subscript) -> Value:
-        value = self.value(node.value)
-        items = self.items(value, node)
+        items = self.items(self.value(node.value), node.value)
         if isinstance(node.slice, ast.Slice):
-            bounds = (node.slice.lower, node.slice.upper, node.slice.step)
-            return self.display(items[slice(*(b and self._place(b) for b in bounds))], node)
-        index = self.value(node.slice)
-        low, high = index.span or (-1, 0)
-        if high - low > 1 and low >= 0 and high <= len(items) and isinstance(value.type, Tuple):
-            if value.type.is_array and value.items is None:
-                return Value(f"{self.simple(value).text}.at[{as_int(index)}]", value.type.items[0])
-        place = self._place(node.slice)
+            ends = [
+                None if e is None else self._index(e) for e in (node.slice.lower, node.slice.upper)
+            ]
+            return self.display(items[slice(*ends)])
+        place = self._index(node.slice)
         if not -len(items) <= place < len(items):
-            raise self.error(node, f"{ast.unparse(node)}: there are {len(items)} items")
+            self.refuse(node, f"{ast.unparse(node)}: there are {len(items)} items")
         return items[place]
 
-    def _place(self, node: ast.expr) -> int:
-        found = fixed(self.value(node))
-        if found is None:
-            raise self.error(
-                node, "an index must be a constant int, or the number of a loop over the items"
+    def _index(self, node: ast.expr) -> int:
+        try:
+            place = ast.literal_eval(node)
+        except ValueError:
+            place = self.known(node)
+        if not isinstance(place, int):
+            self.refuse(node, f"[{ast.unparse(node)}]: an index must be a constant")
+        return place
+
+    def _attribute(self, node: ast.Attribute) -> Value:
+        return self.field(self.value(node.value), node.attr, node)
+
+    def field(self, value: Value, name: str, node: ast.AST) -> Value:
+        """An attribute of a NamedTuple or of parameters: a field, or a property."""
+        t = value.type
+        if isinstance(t, Scalar | Tuple):
+            self.refuse(node, f"{ast.unparse(node)}: {said(t)} has no {name}")
+        if name in types.fields(t):
+            if isinstance(t, Record):
+                return self.items(value, node)[t.cls._fields.index(name)]
+            kind = types.fields(t)[name]
+            return Value(
+                f"{'&' if isinstance(kind, Group) else ''}{self._arrow(value)}{identifier(name)}",
+                kind,
             )
-        return found
+        found = inspect.getattr_static(t.cls, name, None)
+        if isinstance(found, cached_property) and t == self.program.params:
+            if name not in self.program.kept:
+                self.program.kept[name] = self.translate(found.func, [Value("p", t)], node)
+            return Value(self._arrow(value) + identifier(name), self.program.kept[name].returns)
+        if isinstance(found, property | cached_property):
+            getter = found.fget if isinstance(found, property) else found.func
+            return self.call(getter, [value], {}, node)
+        return self.refuse(node, f"{ast.unparse(node)}: {t.cls.__name__} has no {name}")
+
+    def _arrow(self, value: Value) -> str:
+        return f"{value.text[1:]}." if value.text[0] == "&" else f"{value.text}->"
 
     # Calls
 
     def _call(self, node: ast.Call) -> Value:
         function = self.known(node.func)
-        if function is _MISSING:
-            if not isinstance(node.func, ast.Attribute):
-                raise self.error(node, f"{ast.unparse(node.func)}: is no function")
+        function = getattr(function, "__wrapped__", function)  # an lru_cache only saves time
+        if isinstance(node.func, ast.Attribute) and function is _UNKNOWN:
             return self._method(node, node.func)
-        function = inspect.unwrap(function) if callable(function) else function
-        if is_record(function):
-            return self._record(node, function)
-        if isinstance(function, FunctionType) and self.program.source(function.__globals__):
-            return self.call(function, self.starred(node.args), node, node.keywords)
-        if isinstance(function, type) and issubclass(function, IntEnum):
-            value = self.value(node.args[0])
-            if value.type == Member(function):
-                return value
-        return self._builtin(node, function)
-
-    def _builtin(self, node: ast.Call, function: Any) -> Value:
-        if not callable(function) or not function.__hash__:
-            raise self.error(node, f"{ast.unparse(node.func)}: is no function")
-        advice = ADVICE.get(function)
-        if advice or node.keywords:
-            raise self.error(node, advice or f"{ast.unparse(node.func)}: must have no keywords")
-        if function in (any, all):
-            symbol, level = ("||", OR) if function is any else ("&&", AND)
-            return self._all([self._truth(v, node) for v in self._each(node)], symbol, level)
-        if function is tuple:
-            return self.display(self._each(node), node)
-        if function in (min, max):
-            return self._extreme(node, "smaller" if function is min else "larger")
+        if function in (any, all, tuple):
+            return self._over_items(node, function)
+        if function in (min, max, abs, float, len) or function in TO_WHOLE:
+            return self._builtin(node, function)
+        if function in FUNCTIONS or function is math.ldexp:
+            name = FUNCTIONS.get(function, "scaled")  # with as many arguments as math has
+            return Value(f"{name}({', '.join(self.number(a).text for a in node.args)})", REAL)
+        if function in ADVICE:
+            self.refuse(node, ADVICE[function])
         arguments = self.starred(node.args)
-        if function is len and len(arguments) == 1:
-            return self.literal(len(self.items(arguments[0], node)))
-        values = [self.as_number(v, node) for v in arguments]
-        texts = [self.text(v) for v in values]
-        kind = values[0].type if values else REAL
-        if function is math.log and len(values) == 2:
-            return Value(f"log({texts[0]}) / log({texts[1]})", REAL, PRODUCT)
-        name, count = MATH.get(function, ("", 1))
-        if function is pow:
-            name, count = "pow", 2
-        if len(values) != count:
-            raise self.error(node, f"{ast.unparse(node.func)}: must have {count} argument(s)")
-        if name:
-            return Value(f"{name}({', '.join(texts)})", REAL)
-        if function is abs:
-            return Value(f"fabs({texts[0]})", kind)
-        if function is float:
-            return values[0]._replace(type=REAL)
-        if function is bool:
-            return Value(f"{self.text(values[0], SUM)} != 0.0", BOOLEAN, EQUAL)
-        if function in TESTS:
-            return Value(f"({TESTS[function]}({texts[0]}) != 0)", BOOLEAN)
-        if function in WHOLES:
-            return values[0] if kind == WHOLE else Value(f"{WHOLES[function]}({texts[0]})", WHOLE)
-        raise self.error(node, f"{ast.unparse(node.func)}: is not in the subset")
-
-    def _truth(self, value: Value, node: ast.AST) -> Value:
-        if value.type != BOOLEAN:
-            raise self.error(node, f"of a {said(value.type)}; must be of conditions")
-        return value
-
-    def _extreme(self, node: ast.Call, name: str) -> Value:
-        values = self.starred(node.args)
-        values = self.items(values[0], node) if len(values) == 1 else values
-        found = self.as_number(values[0], node)
-        for value in values[1:]:
-            kind = joined(found.type, self.as_number(value, node).type)
-            assert kind
-            found = Value(f"{name}({self.text(found)}, {self.text(value)})", kind)
-        return found
-
-    def _each(self, node: ast.Call) -> list[Value]:
-        """The items of the only argument: a tuple, or a generator over tuples of fixed lengths."""
-        if len(node.args) != 1:
-            raise self.error(node, f"{ast.unparse(node.func)}: must have 1 argument")
-        made = node.args[0]
-        if not isinstance(made, ast.GeneratorExp):
-            return self.items(self.value(made), made)
-        if any(g.ifs for g in made.generators):
-            raise self.error(
-                made, "if in a generator is not in the subset; write a if ... else b in it"
-            )
-        before, found = dict(self.bound), []
-        for row in product(*(self.rows(g.iter) for g in made.generators)):
-            for generator, item in zip(made.generators, row, strict=True):
-                self.bind(generator.target, item)
-            found.append(self.value(made.elt))
-        self.bound = before
-        return found
-
-    def rows(self, node: ast.expr) -> list[Value]:
-        """What a loop goes over: a tuple, zip() or enumerate() of tuples."""
-        function = self.known(node.func) if isinstance(node, ast.Call) else None
-        if isinstance(node, ast.Call) and function in (zip, enumerate):
-            columns = [self.rows(argument) for argument in node.args]
-            if function is enumerate:
-                columns = [[self.literal(i) for i in range(len(columns[0]))], *columns]
-            return [self.display(row, node) for row in zip(*columns, strict=False)]
-        return self.items(self.simple(self.value(node)), node)
-
-    def bind(self, target: ast.expr, value: Value) -> None:
-        """Let the names of a target stand for a value, or its items, without a variable."""
-        if isinstance(target, ast.Name):
-            self.bound[target.id] = self.simple(value, target.id)
-        elif isinstance(target, ast.Tuple):
-            for name, item in zip(target.elts, self.unpacked(target, value), strict=True):
-                self.bind(name, item)
-
-    def unpacked(self, target: ast.Tuple, value: Value) -> list[Value]:
-        """The items of a value, as many as the target has."""
-        items = self.items(value, target)
-        if len(items) != len(target.elts) or any(isinstance(t, ast.Starred) for t in target.elts):
-            raise self.error(target, f"{ast.unparse(target)}: there are {len(items)} items")
-        return items
+        named = {k.arg: self.value(k.value) for k in node.keywords if k.arg}
+        if types.is_record(function):
+            return self._record(node, function, arguments, named)
+        if isinstance(function, type) and issubclass(function, IntEnum):
+            return arguments[0]
+        if not isinstance(function, FunctionType):
+            self.refuse(node, f"{ast.unparse(node.func)}: is not in the subset")
+        return self.call(function, arguments, named, node)
 
     def call(
-        self,
-        function: FunctionType | Callable[..., Any],
-        arguments: list[Value],
-        node: ast.AST,
-        keywords: Sequence[ast.keyword] = (),
+        self, function: Any, given: Sequence[Value], named: Mapping[str, Value], node: ast.AST
     ) -> Value:
-        """A call of a function of the block."""
-        assert isinstance(function, FunctionType)
-        given = self._matched(inspect.signature(function), arguments, keywords, node)
-        made = self.called(function, given, node)
-        return Value(f"{made.name}({', '.join(self.text(v) for v in given)})", made.returns)
+        """A call of a function, with its defaults."""
+        arguments = self._matched(inspect.signature(function), given, named, node)
+        made = self.translate(function, arguments, node)
+        return Value(f"{made.name}({', '.join(a.text for a in arguments)})", made.returns)
 
     def _matched(
-        self, signature: inspect.Signature, values: list[Value], keywords: Sequence[ast.keyword],
-        node: ast.AST,
-    ) -> list[Value]:  # fmt: skip
-        """The arguments in the order of the parameters."""
-        if any(k.arg is None for k in keywords):
-            raise self.error(node, "** in a call is not in the subset")
-        named = {str(k.arg): self.value(k.value) for k in keywords}
+        self, signature: inspect.Signature, given: Any, named: Any, node: ast.AST
+    ) -> list[Value]:
         try:
-            found = signature.bind(*values, **named)
+            bound = signature.bind(*given, **named)
         except TypeError as error:
-            raise self.error(node, f"{ast.unparse(node)}: {error}") from None
-        given = found.arguments
-        if any(p.kind in (p.VAR_POSITIONAL, p.VAR_KEYWORD) for p in signature.parameters.values()):
-            raise self.error(node, "*args and **kwargs are not in the subset")
-        return [
-            given[name] if name in given else self.literal(p.default)
-            for name, p in signature.parameters.items()
-        ]
+            self.refuse(node, f"{ast.unparse(node)}: {error}")
+        bound.apply_defaults()
+        return [v if isinstance(v, Value) else self._default(v) for v in bound.arguments.values()]
 
-    def _record(self, node: ast.Call, cls: type[Any]) -> Value:
-        """A NamedTuple that is made."""
-        values = self._matched(inspect.signature(cls), self.starred(node.args), node.keywords, node)
-        kinds = fields(Record(cls))
-        for value, (name, kind) in zip(values, kinds.items(), strict=True):
-            self.must_be(value, kind, f"{cls.__name__}.{name}", node)
-        return Value("", Record(cls), items=tuple(values))
+    def _default(self, value: Any) -> Value:
+        if isinstance(value, tuple):
+            kind = types.of_value(value)
+            return self.display([self._default(item) for item in value], kind)
+        return self.number_of(value)
 
-    def must_be(self, value: Value, kind: Type | None, name: str, node: ast.AST) -> None:
-        """End where a field gets a value of another type than it is declared with."""
-        if kind is None or value.type != kind:
-            expected = f"{said(kind)}, as declared" if kind else "of a type in the subset"
-            raise self.error(node, f"{name} is {said(value.type)}: must be {expected}")
+    def _record(self, node: ast.AST, cls: Any, given: Sequence[Value], named: Any) -> Value:
+        found = self._matched(inspect.signature(cls), given, named, node)
+        t = Record(cls)
+        for value, (name, kind) in zip(found, types.fields(t).items(), strict=True):
+            if self.common(value.type, kind, node) != kind:
+                self.refuse(node, f"{name} is {said(value.type)}: must be {said(kind)}")
+        return self.display(found, t)
 
     def _method(self, node: ast.Call, of: ast.Attribute) -> Value:
         table = self.known(of.value)
-        if isinstance(table, Mapping):
-            return self._got(node, of, table)
+        if isinstance(table, Mapping) and of.attr == "get":
+            key, default = (self.number(a) for a in node.args)
+            return self._looked_up(table, key, default)
         value = self.value(of.value)
-        if value.type == TEXT and of.attr == "lower":
-            return value
-        if isinstance(value.type, Record) and of.attr == "_replace":
-            return self._replaced(node, value, value.type)
-        if isinstance(value.type, Record | Group):
-            method = inspect.getattr_static(value.type.cls, of.attr, None)
-            if isinstance(method, FunctionType):
-                return self.call(method, [value, *self.starred(node.args)], node, node.keywords)
-        raise self.error(node, f"{of.attr}: a {said(value.type)} has no such method")
+        if of.attr == "_replace" and isinstance(value.type, Record):
+            return self._replaced(node, value)
+        return self.refuse(
+            node, f"{ast.unparse(of)}: is not in the subset; use a function of the module"
+        )
 
-    def _got(self, node: ast.Call, of: ast.Attribute, table: Mapping[Any, Any]) -> Value:
-        if of.attr != "get" or len(node.args) != 2:
-            raise self.error(
-                node, "a dict: must be used as in key in TABLE, TABLE.get(key, default)"
-            )
-        if not all(isinstance(k, int) and isinstance(v, float) for k, v in table.items()):
-            raise self.error(node, f"{ast.unparse(of.value)}: must be of floats by ints or members")
-        key, otherwise = (self.number(argument) for argument in node.args)
-        if otherwise.type != REAL:
-            raise self.error(node, f"the default is {said(otherwise.type)}; must be float")
-        source = self.source
-        if isinstance(of.value, ast.Attribute):
-            home = self.program.source(vars(self.known(of.value.value)))
-            source = home or source
-        name = self.program.look_up(source, ast.unparse(of.value).rpartition(".")[2], table)
-        return Value(f"{name}({self.text(key)}, {self.text(otherwise)})", REAL)
+    def _replaced(self, node: ast.Call, value: Value) -> Value:
+        new = [(identifier(str(k.arg)), self.value(k.value).text) for k in node.keywords]
+        copy = self.copied(value, "changed")
+        for name, text in new:
+            self.say(f"{copy.text}.{name} = {text};")
+        return copy
 
-    def _replaced(self, node: ast.Call, value: Value, t: Record) -> Value:
-        """A copy with other fields."""
-        kinds = fields(t)
-        new = {str(k.arg): self.value(k.value) for k in node.keywords}
-        for name, item in new.items():
-            if name not in kinds:
-                raise self.error(node, f"{t.cls.__name__} has no field {name}")
-            self.must_be(item, kinds[name], f"{t.cls.__name__}.{name}", node)
-        copy = self.fresh(identifier(t.cls.__name__.lower()))
-        self.say(f"{self.c(t)} {copy} = {self.initial(value)};")
-        for name, item in new.items():
-            self.say(f"{copy}.{identifier(name)} = {self.text(item)};")
-        return Value(copy, t)
+    def _looked_up(self, table: Mapping[Any, Any], key: Value, default: Value) -> Value:
+        at = self.simple(key).text
+        text = "".join(f"{at} == {number(k)} ? {number(v)} : " for k, v in table.items())
+        return Value(text + self.at(default, CHOICE), default.type, CHOICE)
 
+    def _builtin(self, node: ast.Call, function: Any) -> Value:
+        if function is len:
+            return self.number_of(len(self.items(self.value(node.args[0]), node.args[0])))
+        arguments = self.starred(node.args)
+        if function in (min, max):
+            if len(arguments) == 1:
+                arguments = self.items(arguments[0], node.args[0])
+            return self._extreme(node, "smaller" if function is min else "larger", arguments)
+        value = self._as_number(arguments[0], node)
+        if function is float:
+            return value._replace(type=REAL)
+        if function is abs:
+            return Value(f"fabs({value.text})", value.type)
+        return value if value.type == WHOLE else Value(f"{TO_WHOLE[function]}({value.text})", WHOLE)
 
-def fixed(value: Value) -> int | None:
-    """A whole number that is known."""
-    return value.span[0] if value.span and value.span[1] - value.span[0] == 1 else None
+    def _extreme(self, node: ast.Call, name: str, arguments: Sequence[Value]) -> Value:
+        first, *others = [self._as_number(a, node) for a in arguments]
+        for other in others:
+            kind = self.common(first.type, other.type, node)
+            first = Value(f"{name}({first.text}, {other.text})", kind)
+        return first
 
+    # Generators
 
-def as_int(value: Value) -> str:
-    """A whole number within known bounds, as an int of C."""
-    return value.text if value.is_int else str(fixed(value))
+    def _over_items(self, node: ast.Call, function: Any) -> Value:
+        over = node.args[0] if node.args else node
+        if not isinstance(over, ast.GeneratorExp):
+            return self.display(self.items(self.value(over), over))
+        found = self._each(over, conditions=function is not tuple)
+        if function is tuple:
+            return self.display(found)
+        return self._all(found, *(("||", OR) if function is any else ("&&", AND)))
+
+    def _each(self, node: ast.GeneratorExp, conditions: bool) -> list[Value]:
+        loop = node.generators[0]
+        if len(node.generators) > 1 or loop.ifs:
+            self.refuse(node, "a generator must have one for, and no if")
+        before, hidden, found = dict(self.bound), self.locals, []
+        self.locals = hidden | {n.id for n in ast.walk(loop.target) if isinstance(n, ast.Name)}
+        for row in self._rows(loop.iter):
+            self._bind(loop.target, row)
+            made = self.condition(node.elt) if conditions else self.value(node.elt)
+            found.append(made if conditions else self.simple(made, "item"))
+        self.bound, self.locals = before, hidden
+        return found
+
+    def _rows(self, node: ast.expr) -> list[Value]:
+        if isinstance(node, ast.Call) and self.known(node.func) is zip:
+            columns = [self.items(self.value(a), a) for a in node.args]
+            return [
+                Value("", Tuple(tuple(v.type for v in row)), WORD, row)
+                for row in zip(*columns, strict=True)
+            ]
+        return self.items(self.value(node), node)
+
+    def _bind(self, target: ast.expr, value: Value) -> None:
+        if isinstance(target, ast.Tuple):
+            for name, item in zip(target.elts, self.items(value, target), strict=True):
+                self._bind(name, item)
+        elif isinstance(target, ast.Name):
+            self.bound[target.id] = self.simple(value, target.id)
