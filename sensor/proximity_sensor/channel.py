@@ -28,9 +28,6 @@ from .optics import outputs as seen
 Inputs = optics.Inputs
 Outputs = optics.Outputs
 
-GIVEN_WITH_CUSTOM_ONLY = optics.Params().reflectance
-"""The reflectance beside a surface that is chosen by name, which has its own."""
-
 LONGEST_STEP = 10.0
 """s; a longer communication step is discarded."""
 
@@ -51,7 +48,7 @@ class Params(optics.Params):
     sampling: clock.Params = clock.Params()
     surface: Annotated[
         surfaces.Surface,
-        Parameter("a surface by name; custom has the reflectance given", tunable=True),
+        Parameter("a surface by name wins over reflectance; custom leaves it", tunable=True),
     ] = surfaces.Surface.CUSTOM
 
     def __post_init__(self) -> None:
@@ -61,12 +58,6 @@ class Params(optics.Params):
             raise ValueError(
                 f"filter.cutoff = {self.filter.cutoff!r} Hz: must be below half of sampling.rate, "
                 f"{highest:g}"
-            )
-        if self.surface in surfaces.REFLECTANCE and self.reflectance != GIVEN_WITH_CUSTOM_ONLY:
-            named = surfaces.Surface(self.surface).name.lower()
-            raise ValueError(
-                f"reflectance = {self.reflectance!r} with surface = {named}: "
-                f"must be {GIVEN_WITH_CUSTOM_ONLY:g}, its default; surface = custom takes others"
             )
 
     @cached_property

@@ -106,7 +106,7 @@ def _function(head: str, lines: list[str]) -> str:
 
 
 def _table(block: Any, described: list[Field], states: int) -> str:
-    """The variables, in the order inputs, outputs, parameters: value references are places in it."""
+    """The variables: inputs, outputs, parameters; value references are places in this table."""
     found = variables(described)
     kinds = ("input", "output", "parameter")
     counts = {f"{kind}s": sum(v.causality == kind for v in found) for kind in kinds}

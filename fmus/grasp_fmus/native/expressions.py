@@ -333,7 +333,7 @@ class Expressions:
             self.refuse(node, f"{ast.unparse(node)}: {said(t)} has no {name}")
         if name in types.fields(t):
             if isinstance(t, Record):
-                return self.items(value, node)[t.cls._fields.index(name)]
+                return self.items(value, node)[[*types.fields(t)].index(name)]
             kind = types.fields(t)[name]
             return Value(
                 f"{'&' if isinstance(kind, Group) else ''}{self._arrow(value)}{identifier(name)}",

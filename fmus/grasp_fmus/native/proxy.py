@@ -14,7 +14,6 @@ from ..model_description import version
 from ..proxy import DEFAULTS, Settings, bounded, shared_signature
 from ..proxy_build import Original, proxy_model
 from ..variable import Variable
-from .blocks import KINDS
 from .build import Plan, with_binaries
 from .description import build_description, native_description
 from .members import ICONS
@@ -24,7 +23,7 @@ from .text import number, string
 
 TEMPLATE = Path(__file__).with_name("native_proxy.html.in")
 
-_KINDS = {**KINDS, str: "KIND_STRING"}
+_KINDS = {float: "KIND_REAL", bool: "KIND_BOOLEAN", int: "KIND_INTEGER", str: "KIND_STRING"}
 _WHOLE = (-(2.0**31), 2.0**31 - 1.0)
 """What an Integer of the link holds."""
 
