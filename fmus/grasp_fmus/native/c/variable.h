@@ -22,7 +22,9 @@ typedef struct {
     double start;         /* of a String, its place among the texts */
 } Variable;
 
+#ifndef TEXT_CAPACITY
 #define TEXT_CAPACITY 2048  /* bytes of a message with its NUL; what does not fit is cut off */
+#endif
 #define TEXT_DIGITS 800     /* no double has more */
 
 typedef struct {
