@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from grasp_fmus.packing import packages, with_imports
+from grasp_fmus.package import packages, with_imports
 from grasp_fmus.shipped import SCRIPTS, blocks
 from support.imports import (
     Import,

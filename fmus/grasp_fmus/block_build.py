@@ -15,12 +15,11 @@ from math import isfinite, isnan
 from pathlib import Path
 from typing import Any
 
-from .cards import BEGIN, variable_tables
+from .cards import variable_tables
 from .contract import declared, longest_step, unpacker, variables
-from .fmu import HASH, Model, write_fmu
-from .folder import Built
 from .model_description import Description
-from .packing import IMPORT, packages
+from .package import HASH, IMPORT, Built, Model, packages, script, write_python
+from .page import BEGIN
 from .shipped import SCRIPTS
 from .variable import Variable
 
@@ -28,13 +27,13 @@ PARTS = ("Params", "Inputs", "State", "Outputs", "initial_state", "step", "outpu
 """What a block has."""
 
 
-def build_block(file: Path, out: Path, bind_python: str | None = None) -> Built:
+def build_block(file: Path, out: Path) -> Built:
     """Build the FMU of the block in a file into the folder out: spring_plant.py, SpringPlant.fmu.
 
-    bind_python is as in build(). ValueError, one line, where the file is no block, see own_model().
+    ValueError, one line, where the file is no block, see own_model().
     """
     with own_model(file) as model:
-        return write_fmu(out / f"{model.description.name}.fmu", model, bind_python)
+        return write_python(out / f"{model.description.name}.fmu", model)
 
 
 @contextmanager
@@ -48,7 +47,7 @@ def own_model(file: Path) -> Iterator[Model]:
     if file.suffix != ".py" or not is_identifier or file.stem.startswith("_"):
         raise ValueError(f"{file}: must be NAME.py, NAME of letters, digits and _, a letter first")
     name = "".join(word[:1].upper() + word[1:] for word in file.stem.split("_"))
-    for ours in (script.stem for script in SCRIPTS.glob("*.py")):
+    for ours in (shipped.stem for shipped in SCRIPTS.glob("*.py")):
         if ours.lower() == name.lower():  # the same file on Windows
             raise ValueError(f"{file}: {ours}.fmu is one of the FMUs that come with this package")
     text, tree = _parsed(file)
@@ -61,21 +60,12 @@ def own_model(file: Path) -> Iterator[Model]:
             Description(name, summary.rstrip("."), _variables(file, block)),
             f"{rest.strip()}\n\n{BEGIN}{variable_tables({name: block})}",
             {
-                f"{name}.py": _script(name, file.stem).encode(),
+                f"{name}.py": script(f"import {file.stem}_block_{HASH} as block"),
                 f"{file.stem}_block.py": text.encode(),
             },
             block,
             file,
         )
-
-
-def _script(name: str, stem: str) -> str:
-    return (
-        f"import {stem}_block_{HASH} as block_module\n"
-        f"from {__package__} import slave\n\n\n"
-        f"class {name}(slave.Fmi2Slave):\n"
-        f"    block = block_module\n"
-    )
 
 
 def _parsed(file: Path) -> tuple[str, ast.Module]:

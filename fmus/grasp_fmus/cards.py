@@ -7,10 +7,11 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from .contract import Block, Field, declared
-from .packing import card_file
+from .package import card_file
+from .page import BEGIN
 from .shipped import blocks
 
-BEGIN, END = "<!-- variables -->\n", "<!-- end of variables -->\n"
+END = "<!-- end of variables -->\n"
 
 
 def updated(card: str, blocks: Mapping[str, Block]) -> str:

@@ -4,53 +4,16 @@ That takes a few milliseconds, without importing what builds. What the stamp hol
 """
 
 import json
-import os
 import sys
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
-from typing import Literal
 
-from .packing import card_file, package_folder, packages
+from .package import Built as Built
+from .package import card_file, package_folder, packages
+from .package import write_file as write_file
 
 STAMP = ".stamp.json"
-
-
-@dataclass(frozen=True, slots=True)
-class Built:
-    """An FMU in its folder, and how building it changed what was there."""
-
-    path: Path
-    status: Literal["new", "changed", "unchanged"]
-    changes: tuple[str, ...] = ()
-    """Files in the FMU, and attributes of its variables, that are not as they were."""
-
-
-def write_file(target: Path, data: bytes) -> None:
-    """Write a file in one piece, with its folder, unless it has that content already.
-
-    OSError names the target.
-    """
-    if target.is_file() and target.read_bytes() == data:
-        return
-    target.parent.mkdir(parents=True, exist_ok=True)
-    for left in target.parent.glob(f"{target.name}.*.part"):
-        if not _runs(left.suffixes[-2][1:]):  # a kill has left it
-            left.unlink(missing_ok=True)
-    part = target.with_name(f"{target.name}.{os.getpid()}.part")
-    try:
-        part.write_bytes(data)
-        part.replace(target)
-    except OSError as error:
-        raise OSError(error.errno, error.strerror, str(target)) from error
-    finally:
-        part.unlink(missing_ok=True)
-
-
-def _runs(process: str) -> bool:
-    """Return True if there may be a process of this number."""
-    return not Path("/proc/self").exists() or Path("/proc", process).exists()
 
 
 def sources_hash() -> str:

@@ -4,11 +4,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from .documentation import PROXY, icon
-from .fmu import Model, write_fmu
-from .folder import Built
 from .host_log import ERROR, WARNING
 from .model_description import UNITS, Description, Experiment, Unit
+from .package import Built, Model, write_python
+from .page import icon
 from .proxy import DEFAULTS, Settings, bounded, own_variables
 from .variable import Variable
 
@@ -31,15 +30,14 @@ def build_proxy(
     target: Path,
     original: Original,
     settings: Settings = DEFAULTS,
-    bind_python: str | None = None,
 ) -> Built:
     """Build the proxy of an FMU; its own parameters start at `settings`.
 
-    `bind_python` is as in build(). A proxy that is there with the same content is left alone.
+    A proxy that is there with the same content is left alone.
     ValueError where the stem of `target` is no identifier of C, a setting is out of its range, a
     text is too long to be sent, or a name is taken.
     """
-    return write_fmu(target, proxy_model(target, original, settings), bind_python)
+    return write_python(target, proxy_model(target, original, settings))
 
 
 def proxy_model(target: Path, original: Original, settings: Settings) -> Model:
@@ -71,7 +69,6 @@ def proxy_model(target: Path, original: Original, settings: Settings) -> Model:
         _card(own),
         {f"{name}.py": _script(name, original, settings).encode()},
         picture=icon("Proxy"),
-        making=PROXY,
     )
 
 

@@ -7,6 +7,14 @@ from typing import Any
 SCRIPTS = Path(__file__).parent / "scripts"
 
 
+class Script:
+    """What a script in SCRIPTS says of an FMU."""
+
+    block: Any
+    requires: tuple[str, ...] = ()
+    """Packages that the block imports when its first state is made; not packed."""
+
+
 def slave_class(script: Path) -> Any:
     """Return the class in a script, which has the script's name."""
     spec = spec_from_file_location(script.stem, script)

@@ -1,72 +1,209 @@
-"""The slave that runs a block; its outputs are worked out when they are asked for."""
+"""Runs a block behind the FMI 2.0 interface of pythonfmu 0.7.0, whose binary is as it comes.
 
-from collections.abc import Callable
-from functools import cache
-from math import inf, isfinite
-from typing import Any, ClassVar
+A call that is refused raises and has no effect; pythonfmu answers fmi2Fatal, and logs the reason.
+A ValueError, ArithmeticError or ImportError is a reason; of any other exception the whole traceback
+is logged. Value references are positions in one list of values. Outputs are worked out when they
+are asked for.
+"""
 
-from .base import INSTANTIATED, PHASES, STEPPING, TIME_TOLERANCE, RefusalError, Slave, reported
-from .contract import (
-    Block,
-    Field,
-    build_params,
-    declared,
-    longest_step,
-    packer,
-    unpacker,
-    variables,
-)
-from .host_log import DISCARD
-from .snapshot import Snapshot, from_bytes, to_bytes
-from .variable import Variable
+import ctypes
+import struct
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from functools import cache, wraps
+from math import inf, isclose, isfinite
+from typing import Any, NamedTuple, NoReturn, TypeVar, cast
+from weakref import ref
+
+from .contract import Block, Field, build_params, declared, longest_step, packer, unpacker
+from .contract import variables as variables_of
+from .variable import TYPES, Scalar, Variable
+
+INSTANTIATED, INITIALISING, STEPPING, TERMINATED = range(4)
+PHASES = "before initialisation", "in initialisation mode", "in step mode", "after fmi2Terminate"
+
+TIME_TOLERANCE = 1e-9
+"""How far, in s, the host's clock may be from the slave's; relative to the time it is 1e-12."""
+
+MAGIC = b"graspFMU"
+HEAD = 24
+"""Bytes of a state before its numbers: the magic, and the content hash of the FMU."""
+
+REASONS = (ValueError, ArithmeticError, ImportError)
+
+
+class Access(NamedTuple):
+    """How a list of value references is read or set; worked out where it is not the last one."""
+
+    vrs: list[int]
+    where: slice | None
+    """None: not in a row."""
+    outputs: bool
+    parameters: bool
+    limited: bool
+
+
+_NOTHING = Access([], None, False, False, False)
+"""How to read or set nothing, which is always allowed."""
+
+
+class Snapshot(NamedTuple):
+    """The state of a slave at a moment: everything else follows from it."""
+
+    phase: int
+    time: float
+    settable: tuple[Any, ...]
+    """The values of inputs and parameters."""
+    state: Any
+    """The state of the block."""
+
+
+class Shape(NamedTuple):
+    """What all instances of a block share: to make it takes longer than all the rest of one."""
+
+    fields: list[Field]
+    variables: list[Variable]
+    outputs: slice
+    functions: tuple[Callable[..., Any], ...]
+    """step, outputs, pack the inputs, unpack the outputs."""
 
 
 @cache
-def _shape(
-    block: Block,
-) -> tuple[list[Field], list[Variable], float, tuple[Callable[..., Any], ...]]:
-    """Made once for all instances: that takes longer than all the rest of one."""
+def shape_of(block: Block) -> Shape:
+    """Made once."""
     fields = declared(block)
-    functions = (block.step, block.outputs, packer(block.Inputs, fields), unpacker(fields))
-    return fields, variables(fields), longest_step(block), functions
+    variables = variables_of(fields)
+    causalities = [v.causality for v in variables]
+    first = causalities.count("input")
+    outputs = slice(first, first + causalities.count("output"))
+    functions = block.step, block.outputs, packer(block.Inputs, fields), unpacker(fields)
+    return Shape(fields, variables, outputs, functions)
 
 
-class Fmi2Slave(Slave):
-    """A block as an FMI 2.0 co-simulation slave; a subclass names the block."""
+_F = TypeVar("_F", bound=Callable[..., Any])
 
-    block: Block
-    requires: ClassVar[tuple[str, ...]] = ()
-    """Packages that the block imports when its first state is made; not packed."""
 
-    def _prepare(self) -> None:
-        self._fields, self._variables, self._longest, self._functions = _shape(
-            self.block  # type: ignore[arg-type]  # a module can be hashed
-        )
+def reported(call: _F) -> _F:
+    """The call, with what it raises reported. In the calls of every step this is written out."""
+
+    @wraps(call)
+    def reporting(self: "Slave", *arguments: Any) -> Any:
+        try:
+            return call(self, *arguments)
+        except BaseException as error:
+            self._report(error)
+
+    return cast(_F, reporting)
+
+
+def _getter(kind: type[Scalar]) -> Callable[["Slave", list[int]], list[Any]]:
+    def get(self: "Slave", vrs: list[int]) -> list[Any]:
+        """Values of the given references."""
+        try:
+            access = self._last_read[kind]
+            if vrs != access.vrs:
+                access = self._last_read[kind] = self._access(vrs, kind)
+            if self._inputs is None and access.outputs:
+                self._refresh()
+        except BaseException as error:
+            self._report(error)
+        where = access.where
+        return self._values[where] if where else [self._values[vr] for vr in vrs]
+
+    return get
+
+
+def _setter(kind: type[Scalar]) -> Callable[["Slave", list[int], list[Any]], None]:
+    real = kind is float
+
+    def set_(self: "Slave", vrs: list[int], values: list[Any]) -> None:
+        """Set inputs or parameters, all or none; outputs follow when they are next asked for."""
+        try:
+            access = self._last_set[kind]
+            if vrs != access.vrs:
+                access = self._access(vrs, kind)
+                self._check_settable(vrs)
+                self._last_set[kind] = access
+            if access.limited or (real and not isfinite(sum(values))):
+                for vr, value in zip(vrs, values, strict=True):
+                    self._variables[vr].check(value)
+        except BaseException as error:
+            self._report(error)
+        if access.where:
+            self._values[access.where] = values
+        else:
+            for vr, value in zip(vrs, values, strict=True):
+                self._values[vr] = value
+        if access.parameters:
+            self._params = None
+        self._inputs = None
+
+    return set_
+
+
+class Slave:
+    """An instance of a block, as pythonfmu calls it."""
+
+    @reported
+    def __init__(self, maker: "Maker", name: str) -> None:
+        self.maker, self.name, self._block = maker, name, maker.block
+        self._time = 0.0
+        self._params: Any = None  # None: one was set and they are to be read again
+        self._inputs: Any = None  # None: something was set and the outputs are out of date
+        self._fields, self._variables, self._outputs, self._functions = shape_of(self._block)
+        self._longest_step = longest_step(self._block)
         self._values = [v.start for v in self._variables]
-        causalities = [v.causality for v in self._variables]
-        self._first_output = causalities.count("input")
-        self._first_parameter = self._first_output + causalities.count("output")
-        self._outputs = slice(self._first_output, self._first_parameter)
-        self._state = self._initial_state(self.block.Params(), self.block.Inputs())
+        self._state = self._block.initial_state(self._block.Params(), self._block.Inputs())
         self._enter(INSTANTIATED)
+
+    def _enter(self, phase: int) -> None:
+        self._phase = phase
+        # The host nearly always asks for the same again
+        self._last_read, self._last_set = (dict.fromkeys(TYPES, _NOTHING) for _ in range(2))
+
+    # The life cycle
+
+    @reported
+    def setup_experiment(self, start_time: float, *_: object) -> None:
+        """Time starts at start_time, in s."""
+        self._require("fmi2SetupExperiment", INSTANTIATED)
+        if not isfinite(start_time):
+            raise ValueError(f"start time = {start_time} s: must be a finite number")
+        self._time = start_time
+
+    @reported
+    def enter_initialization_mode(self) -> None:
+        """Refuse parameters set so far that do not go together."""
+        self._require("fmi2EnterInitializationMode", INSTANTIATED)
+        self._refresh()
+        self._enter(INITIALISING)
+
+    @reported
+    def exit_initialization_mode(self) -> None:
+        """Outputs are those of the parameters and inputs set so far."""
+        self._require("fmi2ExitInitializationMode", INITIALISING)
+        self._refresh()
+        self._enter(STEPPING)
+
+    def terminate(self) -> None:
+        """The end; values can still be read."""
+        self._enter(TERMINATED)
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Advance the block by step_size seconds with the inputs as they are.
 
-        Returns False, and stays where it is, if the step is longer than the block takes, if the
-        outputs would not be finite, or if the block gives a reason of its own: a plain
-        ArithmeticError.
+        It raises where it cannot, and stays where it is. To discard the step is no way out: of that
+        pythonfmu says that the slave wishes to end the simulation.
         """
         try:
             if not (
                 self._phase == STEPPING
-                and 0.0 < step_size < inf
+                and 0.0 < step_size <= self._longest_step
                 and -TIME_TOLERANCE <= current_time - self._time <= TIME_TOLERANCE
             ):
                 self._check_step(current_time, step_size)
-            if step_size > self._longest:
-                return self._discard(step_size, f"must be at most {self._longest:g} s")
-            step, evaluate, pack, unpack = self._functions
+            step, outputs, pack, unpack = self._functions
             params, inputs = self._params, self._inputs
             if inputs is None:
                 if params is None:
@@ -74,103 +211,238 @@ class Fmi2Slave(Slave):
                 self._inputs = inputs = pack(self._values)
             try:
                 state = step(params, self._state, inputs, step_size)
-                values = unpack(evaluate(params, state, inputs))
-            except ArithmeticError as error:
-                own = type(error) is ArithmeticError
-                fault = f"{type(error).__name__}: {error}: must be finite"
-                return self._discard(step_size, str(error) if own else fault)
-            if not isfinite(sum(values)) and (text := self._not_finite(values)):
-                return self._discard(step_size, f"{text}: must be finite")
+                values = unpack(outputs(params, state, inputs))
+                if not isfinite(sum(values)):
+                    self._check_finite(values)
+            except REASONS as error:
+                raise ArithmeticError(f"step of {step_size} s: {error}") from error
         except BaseException as error:
-            raise self._reported(error) from None
+            self._report(error)
         self._state = state
         self._values[self._outputs] = values
         self._time = current_time + step_size
         return True
 
-    # State
+    # Values
 
-    def _get_fmu_state(self) -> Snapshot:
-        before, after = self._values[: self._first_output], self._values[self._first_parameter :]
-        return Snapshot(self._phase, self._time, (*before, *after), self._state)
+    get_real, set_real = _getter(float), _setter(float)
+    get_boolean, set_boolean = _getter(bool), _setter(bool)
+    get_integer, set_integer = _getter(int), _setter(int)
+    get_string, set_string = _getter(str), _setter(str)
 
-    @reported
-    def _set_fmu_state(self, snapshot: Any) -> None:
-        self._check_state(snapshot)
-        self._values[: self._first_output] = snapshot.settable[: self._first_output]
-        self._values[self._first_parameter :] = snapshot.settable[self._first_output :]
-        self._time, self._state = snapshot.time, snapshot.state
-        self._params = self._inputs = None
-        self._enter(snapshot.phase)
-
-    @reported
-    def state_to_bytes(self, snapshot: Any) -> bytes:
-        """A state of this FMU, serialised."""
-        self._check_state(snapshot)
-        return to_bytes(snapshot, self._content)
-
-    @reported
-    def state_from_bytes(self, data: bytes) -> Snapshot:
-        """A state of this FMU from its bytes."""
-        variables = (
-            *self._variables[: self._first_output],
-            *self._variables[self._first_parameter :],
+    def _access(self, vrs: list[int], kind: type[Scalar]) -> Access:
+        """How to read or set these variables, which must be of this kind."""
+        for vr in vrs:
+            if not 0 <= vr < len(self._variables):
+                last = len(self._variables) - 1
+                raise ValueError(f"value reference {vr}: must be from 0 to {last}")
+            v = self._variables[vr]
+            if v.kind is not kind:
+                wrong, right = TYPES[kind], TYPES[v.kind]
+                raise ValueError(f"{v.name}: accessed as {wrong}: must be as {right}")
+        row = slice(vrs[0], vrs[0] + len(vrs)) if vrs else slice(0)
+        found = [self._variables[vr] for vr in vrs]
+        return Access(
+            list(vrs),
+            row if vrs == [*range(row.start or 0, row.stop)] else None,
+            any(v.causality == "output" for v in found),
+            any(v.causality == "parameter" for v in found),
+            any(v.limits for v in found),
         )
-        try:
-            snapshot = from_bytes(data, self._content, like=self._get_fmu_state())
-            for v, value in zip(variables, snapshot.settable, strict=True):
-                v.check(value)
-        except (ValueError, OverflowError) as error:
-            raise RefusalError(str(error)) from error
-        if snapshot.phase not in range(len(PHASES)) or not isfinite(snapshot.time):
-            raise RefusalError(f"state in phase {snapshot.phase} at {snapshot.time} s: is none")
-        return snapshot
-
-    @property
-    def _content(self) -> str:
-        return type(self).__module__.rpartition("_")[2]
 
     # Checks
 
-    def _check_state(self, snapshot: Any) -> None:
-        if not isinstance(snapshot, Snapshot):
-            raise RefusalError(f"state of another FMU: must be of this one, {self._content}")
+    def _require(self, call: str, phase: int) -> None:
+        if self._phase != phase:
+            raise ValueError(f"{call} {PHASES[self._phase]}: must be {PHASES[phase]}")
 
-    def _not_finite(self, values: list[float]) -> str:
-        return ", ".join(
-            f"{v.name} = {value!r}{v.in_unit}"
-            for v, value in zip(self._variables[self._outputs], values, strict=True)
-            if not isfinite(value)
-        )
+    def _check_step(self, current_time: float, step_size: float) -> None:
+        self._require("fmi2DoStep", STEPPING)
+        if not 0.0 < step_size < inf:
+            raise ValueError(f"step size = {step_size} s: must be a finite number above 0")
+        if not isclose(current_time, self._time, rel_tol=1e-12, abs_tol=TIME_TOLERANCE):
+            raise ValueError(f"step from {current_time} s: must be from {self._time} s")
+        if step_size > self._longest_step:
+            raise ValueError(f"step of {step_size} s: must be at most {self._longest_step:g} s")
 
-    def _discard(self, step_size: float, text: str) -> bool:
-        self._inputs = None
-        self._log(DISCARD, f"step of {step_size} s: {text}")
-        return False
+    def _check_settable(self, vrs: list[int]) -> None:
+        for v in (self._variables[vr] for vr in vrs):
+            if v.causality == "output":
+                raise ValueError(f"{v.name}: output set: must be an input or a parameter")
+            if self._phase == TERMINATED:
+                raise ValueError(f"{v.name}: set after fmi2Terminate: must be before")
+            if self._phase == STEPPING and v.variability == "fixed":
+                raise ValueError(
+                    f"{v.name}: fixed parameter set in step mode: must be before "
+                    "fmi2ExitInitializationMode"
+                )
+
+    def _check_finite(self, values: list[float]) -> None:
+        pairs = zip(self._variables[self._outputs], values, strict=True)
+        wrong = [f"{v.name} = {x!r}{v.in_unit}" for v, x in pairs if not isfinite(x)]
+        if wrong:
+            raise ValueError(f"{', '.join(wrong)}: must be finite")
 
     # The block
 
     def _refresh(self) -> None:
         """Work out the outputs; before the end of initialisation the initial state as well."""
-        _, evaluate, pack, unpack = self._functions
+        _, outputs, pack, unpack = self._functions
         params = self._read_params() if self._params is None else self._params
         self._inputs = inputs = pack(self._values)
         if self._phase < STEPPING:
-            self._state = self._initial_state(params, inputs)
-        values = unpack(evaluate(params, self._state, inputs))
-        if not isfinite(sum(values)) and (text := self._not_finite(values)):
-            raise RefusalError(f"{text}: must be finite")
+            self._state = self._block.initial_state(params, inputs)
+        values = unpack(outputs(params, self._state, inputs))
+        self._check_finite(values)
         self._values[self._outputs] = values
 
-    def _initial_state(self, params: Any, inputs: Any) -> Any:
-        try:
-            return self.block.initial_state(params, inputs)
-        except ImportError as error:
-            raise RefusalError(str(error)) from error
-
     def _read_params(self) -> Any:
-        try:
-            self._params = build_params(self.block, self._fields, self._values)
-        except ValueError as error:
-            raise RefusalError(str(error)) from error
+        self._params = build_params(self._block, self._fields, self._values)
         return self._params
+
+    # States
+
+    def _get_fmu_state(self) -> Snapshot:
+        before, after = self._values[: self._outputs.start], self._values[self._outputs.stop :]
+        return Snapshot(self._phase, self._time, (*before, *after), self._state)
+
+    @reported
+    def _set_fmu_state(self, snapshot: object) -> None:
+        phase, self._time, settable, self._state = self._ours(snapshot)
+        self._values[: self._outputs.start] = settable[: self._outputs.start]
+        self._values[self._outputs.stop :] = settable[self._outputs.start :]
+        self._params = self._inputs = None
+        self._enter(phase)
+
+    @reported
+    def state_to_bytes(self, snapshot: object) -> bytes:
+        """A state of this FMU, serialised: States in fmus/README.md."""
+        phase, time, settable, state = self._ours(snapshot)
+        numbers = [phase, time, *_scalars((settable, state))]
+        head = MAGIC + self.maker.content.encode()
+        return head + struct.pack(f"<{len(numbers)}d", *numbers)
+
+    @reported
+    def state_from_bytes(self, data: bytes) -> Snapshot:
+        """A state of this FMU from its bytes."""
+        like, content = self._get_fmu_state(), self.maker.content
+        size = HEAD + 8 * len(list(_scalars(like)))
+        if data[:8] != MAGIC:
+            raise ValueError(f"state of {len(data)} bytes: must begin with {MAGIC!r}")
+        if data[8:HEAD] != content.encode():
+            origin = data[8:HEAD].decode("ascii", "replace")
+            raise ValueError(f"state of the FMU with content {origin}: must be of {content}")
+        if len(data) != size:
+            raise ValueError(f"state of {len(data)} bytes: must have {size}")
+        found: Snapshot = _shaped(like, iter(struct.unpack(f"<{size // 8 - 3}d", data[HEAD:])))
+        if found.phase not in range(len(PHASES)) or not isfinite(found.time):
+            raise ValueError(f"state in phase {found.phase} at {found.time} s: must be of a run")
+        variables = self._variables[: self._outputs.start] + self._variables[self._outputs.stop :]
+        for v, value in zip(variables, found.settable, strict=True):
+            v.check(value)
+        return found
+
+    def _ours(self, snapshot: object) -> Snapshot:
+        if not isinstance(snapshot, Snapshot):
+            raise ValueError(f"state of another FMU: must be of this one, {self.maker.content}")
+        return snapshot
+
+    # pythonfmu's side
+
+    def _get_log_queue(self) -> list[Any]:
+        return _NO_MESSAGES
+
+    def _report(self, error: BaseException) -> NoReturn:
+        """Raise what pythonfmu is to log of an exception that would leave the slave.
+
+        For that it gives up its references to class, instance and messages, but goes on using them.
+        """
+        for used in (self.maker, self, _NO_MESSAGES):
+            keep(used)
+        self._inputs = None  # the outputs may not have been worked out
+        if isinstance(error, REASONS):
+            text = str(error)
+        else:
+            from traceback import format_exception  # only a bug needs it
+
+            text = "".join(format_exception(error)).strip()
+        raise ReportedError(f"{self.name}, t = {self._time:.9g} s: {text}") from None
+
+
+class ReportedError(Exception):
+    """What leaves the slave: pythonfmu logs its repr, as a format of printf."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text.replace("%", "%%").encode(errors="replace").decode())
+
+    __repr__ = Exception.__str__
+
+
+_NO_MESSAGES: list[Any] = []
+"""What a slave has for pythonfmu's log. It would be passed on while the exception is set that a
+call raised: a logger in Python cannot run then.
+"""
+
+
+class Maker:
+    """Stands for the class that pythonfmu looks for: it makes instances, one alive at a time.
+
+    pythonfmu asks the class, not the instance, to serialise a state.
+    """
+
+    def __init__(self, block: Any, content: str) -> None:
+        self.block, self.content = block, content
+
+    def __call__(self, instance_name: str, resources: str, **_: object) -> Slave:
+        """Make an instance, at instantiation and at every reset.
+
+        pythonfmu puts the FMU's folder on the import path, and leaves it there; all modules have
+        been imported by now.
+        """
+        with suppress(ValueError):
+            sys.path.remove(resources)
+        sys.path_importer_cache.pop(resources, None)
+        slave = Slave(self, instance_name)
+        self._made = ref(slave)
+        return slave
+
+    def _fmu_state_to_bytes(self, snapshot: object) -> bytes:
+        return cast(Slave, self._made()).state_to_bytes(snapshot)
+
+    def _fmu_state_from_bytes(self, data: bytes) -> Snapshot:
+        return cast(Slave, self._made()).state_from_bytes(data)
+
+
+def offer(block: Any, module: dict[str, Any]) -> None:
+    """Called by the script of an FMU: have pythonfmu find a Maker in the names of its module.
+
+    pythonfmu imports the script, and runs it again at every instantiation. Of the classes that this
+    makes it keeps all that it learns, for good; there is none, so it takes what the module has
+    under the empty name. It also gives up a reference to the names, which it only borrowed.
+    """
+    keep(module)
+    module[""] = Maker(block, module["__name__"].rpartition("_")[2])
+
+
+def keep(used: object) -> None:
+    """Add the reference to an object that pythonfmu gives up without owning it."""
+    ctypes.pythonapi.Py_IncRef(ctypes.py_object(used))
+
+
+def _scalars(value: Any) -> Iterator[float]:
+    if isinstance(value, tuple):
+        for item in value:
+            yield from _scalars(item)
+    else:
+        yield value
+
+
+def _shaped(like: Any, numbers: Iterator[float]) -> Any:
+    """The numbers in the shape of `like`, each of the type that it has there."""
+    if isinstance(like, tuple):
+        items = [_shaped(item, numbers) for item in like]
+        return tuple(items) if type(like) is tuple else type(like)(*items)
+    number = next(numbers)
+    if type(like) is not float and type(like)(number) != number:
+        raise ValueError(f"state with {number!r}: must be a {type(like).__name__} there")
+    return type(like)(number)

@@ -74,7 +74,6 @@ def test_what_is_built_is_said_before_the_compiler_runs(
         (["--target", "linux64"], "--target linux64: must be with --native"),
         (["--fmi", "2"], "--fmi 2: must be with --native"),
         (["--c-only", "c"], "--c-only c: must be with --native"),
-        (["--native", "--bind-python"], "--bind-python: a native FMU needs no Python; must be"),
         (["--native", "--c-only", "c", "--fmi", "3"], "build: --c-only: C without FMI; must be"),
         (["--native", "--out", "/dev/null/x"], "--out /dev/null/x: cannot write to /dev/null"),
         (["--native", "--c-only", "c", "Gripper"], "build: Gripper: no such block; must be of"),

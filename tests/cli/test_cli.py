@@ -6,13 +6,14 @@ import math
 import re
 import sys
 import zipfile
+from importlib import metadata
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from conftest import Altered, Run
 from grasp_cosim import System, cli, simulate
-from grasp_fmus import documentation
 from grasp_fmus.shipped import blocks
 from support.cases import CASES
 
@@ -277,25 +278,14 @@ def test_doctor_without_an_fmu_looks_at_the_machine(command: Run) -> None:
     assert re.search(r"^ok +python +3\.1\d", out)
 
 
-def test_an_empty_name_of_a_python_is_no_way_to_leave_the_option_out(command: Run) -> None:
-    code, out, err = command("build", "--bind-python", "")
-    assert (code, out) == (2, "")
-    assert err == "grasp-cosim: --bind-python '': must be a Python program, or left out\n"
-
-
-def test_a_python_that_is_none(command: Run) -> None:
-    code, _, err = command("build", "--bind-python", "no-such-python")
-    assert code == 2
-    assert err.startswith("grasp-cosim: build: Python to bind to: no-such-python: no such program")
-
-
 def test_a_missing_file_without_a_name_is_told(
     command: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(documentation, "_LICENCES", {"license.txt": "no-such-package"})
+    none = SimpleNamespace(read_text=lambda _: None)
+    monkeypatch.setattr(metadata, "distribution", lambda _: none)
     code, _, err = command("build")
     assert code == 2
-    assert "no-such-package: no licenses/LICENSE among its metadata; install it with pip" in err
+    assert "grasp-cosim: no licenses/LICENSE among its metadata; install it with pip" in err
 
 
 @pytest.mark.parametrize("verb", ["inspect", "doctor"])

@@ -10,7 +10,7 @@ from conftest import Run
 from grasp_cosim import InputError, System, simulate
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.interface.obstacles import this_platform
-from grasp_fmus import fmu
+from grasp_fmus import package
 from support.both_engines import needs_compiler
 
 HERE = this_platform("2.0")
@@ -118,9 +118,17 @@ def test_what_has_no_twin_does_not_load(foreign: Path) -> None:
 
 @needs_compiler
 @pytest.mark.slow
-def test_build_makes_native_ones_too(command: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    theirs = for_another(fmu._linux_binary(None))
-    monkeypatch.setattr(fmu, "_linux_binary", lambda _: theirs)
+def test_build_makes_native_ones_too(
+    command: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "pythonfmu"
+    shutil.copytree(package.package_folder("pythonfmu"), folder)
+    binary = folder / "resources/binaries/linux64/libpythonfmu-export.so"
+    binary.write_bytes(for_another(binary.read_bytes()))
+    find = package.package_folder
+    monkeypatch.setattr(
+        package, "package_folder", lambda name: folder if name == "pythonfmu" else find(name)
+    )
     shutil.copy(SPRING, ".")
     code, out, err = command("build", SPRING.name)
     assert (code, out) == (0, "fmus/build/SpringPlant.fmu: new\nfmus/native/SpringPlant.fmu: new\n")

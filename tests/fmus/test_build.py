@@ -10,10 +10,9 @@ from pathlib import Path
 import pytest
 from grasp_fmus import fmu
 from grasp_fmus.build import build
-from grasp_fmus.documentation import icon
-from grasp_fmus.fmu import HASH, build_fmu
 from grasp_fmus.folder import STAMP, Built, is_current, sources_hash
-from grasp_fmus.packing import package_folder, packages
+from grasp_fmus.package import HASH, build_fmu, package_folder, packages
+from grasp_fmus.page import icon
 from grasp_fmus.shipped import SCRIPTS, blocks
 from support.slow import slow
 
@@ -116,7 +115,7 @@ def test_an_up_to_date_folder_costs_no_import_of_what_builds(fmus: Path, tmp_pat
         cwd=tmp_path, check=True, capture_output=True, text=True,
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
     )  # fmt: skip
-    needed = [f"grasp_fmus.{name}" for name in ("packing", "folder", "shipped", "build")]
+    needed = [f"grasp_fmus.{name}" for name in ("package", "folder", "shipped", "build")]
     assert done.stdout == f"{{'unchanged'}}\n{needed}\n"
 
 

@@ -12,7 +12,7 @@ from zipfile import ZipFile
 
 import pytest
 from conftest import Altered, Load
-from grasp_fmus.packing import package_folder
+from grasp_fmus.package import package_folder
 from support.fmi2 import OK, Fmu, Instance
 from support.kinds import all_kinds
 from support.packages import runnable
@@ -227,7 +227,7 @@ OURS = """
 import gripper_plant.rigid, gripper_plant.contact
 import proximity_sensor.optics
 import grasp_controller.series, grasp_controller.adaptive
-import grasp_fmus.slave, grasp_fmus.contract, grasp_fmus.snapshot, grasp_fmus.host_log
+import grasp_fmus.slave, grasp_fmus.contract
 sys.path.insert(0, str(Path(grasp_fmus.__file__).parent / "scripts"))
 import GraspController, GraspControllerAdaptive, GripperPlant, GripperPlantCompliant
 import GripperPlantMovable, GripperPlantMuJoCo, ProximitySensor

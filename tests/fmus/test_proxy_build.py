@@ -19,7 +19,7 @@ from grasp_cosim import cli
 from grasp_cosim.hil.protocol import link_signature
 from grasp_cosim.interface.read import read_interface
 from grasp_fmus.c_header import c_header
-from grasp_fmus.documentation import icon
+from grasp_fmus.page import icon
 from support import native_fmus
 from support.kinds import Kind, native_slowly, proxy_options
 from support.slow import slow

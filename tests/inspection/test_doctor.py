@@ -119,7 +119,7 @@ def test_our_fmu_loads_here(fmus: Path) -> None:
     fix = {f.check: f.fix for f in findings}["host"]
     assert fix
     assert "LD_PRELOAD=" in fix
-    assert "grasp-cosim build --bind-python" in fix
+    assert "grasp-cosim build --native" in fix
 
 
 def test_a_stock_fmu_loads_here(stock: Path) -> None:
@@ -127,7 +127,7 @@ def test_a_stock_fmu_loads_here(stock: Path) -> None:
     assert {f.status for f in found.values() if f.check in FMU_CHECKS} == {"ok", "warning"}
     assert found["trial"].status == "ok"
     assert "PythonFMU 0.7.0" in found["fmu"].text
-    assert "--bind-python" not in (found["host"].fix or "")
+    assert "grasp-cosim" not in (found["host"].fix or "")
 
 
 def test_text_is_one_line_each_with_the_fix_below() -> None:

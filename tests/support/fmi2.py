@@ -2,6 +2,7 @@
 
 import ctypes
 import platform
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from ctypes import byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 from pathlib import Path
@@ -10,6 +11,9 @@ from xml.etree import ElementTree
 from zipfile import ZipFile
 
 from . import fmi3
+
+PYTHONFMU = re.compile(r"\AFatal py exception encountered: \[\w+\] \w+\n")
+"""What pythonfmu puts before the reason of a slave, and the status that it gives it."""
 
 OK, WARNING, DISCARD, ERROR, FATAL = range(5)
 
@@ -51,6 +55,9 @@ class Fmu:
         with ZipFile(path) as archive:
             archive.extractall(folder)
         self.folder = folder
+        self.python = (folder / "resources/slavemodule.txt").exists()
+        self.refused = FATAL if self.python else ERROR
+        self.discarded = FATAL if self.python else DISCARD
         root = ElementTree.parse(folder / "modelDescription.xml").getroot()
         self.fmi = int(root.get("fmiVersion", "")[0])
         self.guid = root.get("guid", root.get("instantiationToken", ""))
@@ -105,12 +112,16 @@ class _Calls:
 
 
 class Instance:
-    """An instance; use as a context manager. Calls return the FMI status."""
+    """An instance; use as a context manager. Calls return the FMI status.
+
+    Debug logging is on where a reason needs it: in an FMU that Python runs.
+    """
 
     def __init__(
-        self, fmu: Fmu, name: str = "instance", logging: bool = False, logger: bool = True
+        self, fmu: Fmu, name: str = "instance", logging: bool | None = None, logger: bool = True
     ) -> None:
         self.fmu = fmu
+        logging = fmu.python if logging is None else logging
         self.log: list[Logged] = []
         resources, called = fmu.folder / "resources", name.encode()
         self._calls: _Calls | fmi3.Calls
@@ -130,7 +141,12 @@ class Instance:
 
     def _logged(self, instance: bytes, status: int, category: bytes, text: bytes) -> None:
         self.log.append(
-            Logged(instance.decode(), status, (category or b"").decode(), text.decode())
+            Logged(
+                instance.decode(),
+                status,
+                (category or b"").decode(),
+                PYTHONFMU.sub("", text.decode()),
+            )
         )
 
     def __enter__(self) -> "Instance":

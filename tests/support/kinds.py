@@ -8,10 +8,10 @@ from typing import Literal
 
 import pytest
 from grasp_fmus.block_build import build_block
-from grasp_fmus.fmu import build_fmu, shipped_model
 from grasp_fmus.native.build import Plan, build_native_block, build_native_model, planned
 from grasp_fmus.native.proxy import build_native_proxy
 from grasp_fmus.native.targets import Version
+from grasp_fmus.package import build_fmu, shipped_model
 from grasp_fmus.proxy import Settings
 from grasp_fmus.proxy_build import Original
 from grasp_fmus.proxy_build import build_proxy as build_python_proxy

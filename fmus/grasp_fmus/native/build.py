@@ -15,7 +15,7 @@ from ..shipped import SCRIPTS, slave_class
 from .targets import Target, Version, folders, here, universal
 
 if TYPE_CHECKING:
-    from ..fmu import Model
+    from ..package import Model
 
 Members = Mapping[str, bytes]
 """The files in an FMU, by name."""
@@ -85,7 +85,7 @@ def build_native(out: Path, plan: Plan | None = None, names: Sequence[str] = ())
     if not names and is_current(out, sources):
         return [Built(out / f"{name}.fmu", "unchanged") for name in chosen]
     from ..cross_check import cross_check_files  # only now: they take longer to load
-    from ..fmu import shipped_model, write_members
+    from ..package import shipped_model, write_members
     from .members import native_members
 
     models = {name: shipped_model(SCRIPTS / f"{name}.py") for name in chosen}
@@ -116,7 +116,7 @@ def build_native_block(file: Path, out: Path, plan: Plan | None = None) -> Built
 
 def build_native_model(model: Model, out: Path, plan: Plan) -> Built:
     """Build the native FMU of a model into the folder `out`, without cross-check files."""
-    from ..fmu import write_members
+    from ..package import write_members
     from .members import native_members
 
     name = model.description.name

@@ -13,10 +13,10 @@ from string import Template
 from c_compilers import BITS, LIBM
 
 from ..c_header import Group, Member, comment, members, structs
-from ..fmu import Model
 from ..folder import write_file
 from ..link.message import Value
 from ..link.signature import ORDER, Causality, Kind, LinkVariable, Signature
+from ..package import Model
 from ..variable import Scalar, Variable
 from .blocks import translated
 

@@ -1,17 +1,12 @@
 """What a native FMU holds besides its binaries: description, sources, documentation, icon."""
 
-from pathlib import Path
-from string import Template
-
-from ..documentation import OURS, framed, licences
-from ..fmu import HASH, Model, hashed, python_members
-from ..model_description import version
+from ..package import HASH, Model, hashed, python_members
+from ..page import NATIVE, licences, page
 from .blocks import translated
 from .description import build_description, native_description
 from .sources import native_sources
 from .targets import Version
 
-TEMPLATE = Path(__file__).with_name("native.html.in")
 ICONS = {2: "model.png", 3: "terminalsAndIcons/icon.png"}
 
 
@@ -33,15 +28,10 @@ def native_members(model: Model, fmi: Version) -> dict[str, bytes]:
             **{f"sources/{file}": data for file, data in sources.items()},
         }
     )
-    sections = Template(TEMPLATE.read_text("utf-8")).substitute(
-        name=name, fmi=fmi, override=f"FMI{fmi}_OVERRIDE_FUNCTION_PREFIX"
-    )
-    page = framed(
-        name, model.description.summary, model.card, version(), f"{fmi}.0", sections
-    ).encode()
+    html = page(name, model.description.summary, model.card, NATIVE, fmi)
     return {
         **files,
         **({ICONS[fmi]: model.picture} if model.picture else {}),
-        "documentation/index.html": page,
-        **{f"documentation/licenses/{file}": text for file, text in licences(OURS).items()},
+        "documentation/index.html": html.encode(),
+        **licences("grasp-cosim"),
     }

@@ -1,8 +1,8 @@
 from grasp_controller import series
-from grasp_fmus import slave
+from grasp_fmus import shipped
 
 
-class GraspController(slave.Fmi2Slave):
+class GraspController(shipped.Script):
     """Multiple impedance control: simultaneous contact, impact reduction, contact force."""
 
     block = series

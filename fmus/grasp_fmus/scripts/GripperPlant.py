@@ -1,9 +1,9 @@
 from gripper_plant import rigid
 
-from grasp_fmus import slave
+from grasp_fmus import shipped
 
 
-class GripperPlant(slave.Fmi2Slave):
+class GripperPlant(shipped.Script):
     """Two-finger gripper and a rigid, fixed object."""
 
     block = rigid

@@ -1,9 +1,9 @@
 from gripper_plant import compliant
 
-from grasp_fmus import slave
+from grasp_fmus import shipped
 
 
-class GripperPlantCompliant(slave.Fmi2Slave):
+class GripperPlantCompliant(shipped.Script):
     """Two-finger gripper and a fixed object that gives."""
 
     block = compliant

@@ -1,9 +1,9 @@
 from gripper_plant import movable
 
-from grasp_fmus import slave
+from grasp_fmus import shipped
 
 
-class GripperPlantMovable(slave.Fmi2Slave):
+class GripperPlantMovable(shipped.Script):
     """Two-finger gripper and a box on a floor, which slides and topples."""
 
     block = movable

@@ -1,9 +1,9 @@
 from gripper_plant import mujoco_box
 
-from grasp_fmus import slave
+from grasp_fmus import shipped
 
 
-class GripperPlantMuJoCo(slave.Fmi2Slave):
+class GripperPlantMuJoCo(shipped.Script):
     """Two-finger gripper and a box, fixed or on a floor, in MuJoCo."""
 
     block = mujoco_box

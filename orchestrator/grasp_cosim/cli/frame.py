@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import logging
 import os
-import sys
 import traceback
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
@@ -72,24 +71,6 @@ metrics_option = click.option(
     type=PATH,
     help="A Python file with metrics of your own.",
 )
-
-
-def bind_python_option(more: str = "") -> Command:
-    """The option of commands that build FMUs; `more` is added to its help."""
-
-    def given(_: click.Context, __: click.Parameter, python: str | None) -> str | None:
-        if python == "":
-            raise InputError("--bind-python '': must be a Python program, or left out")
-        return python
-
-    return click.option(
-        "--bind-python",
-        is_flag=False,
-        flag_value=sys.executable,
-        metavar="[PYTHON]",
-        callback=given,
-        help=f"For hosts that are not Python: bind to libpython.{more}",
-    )
 
 
 def load_system(

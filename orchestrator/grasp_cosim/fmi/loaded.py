@@ -94,6 +94,8 @@ class LoadedInstance(ABC):
         self._said_before = 0  # of these, on longer parts of a step that is divided
         self._read_log()  # forgets what an earlier instance of this name said
         self._folder: ScratchFolder | None = None
+        self._python = False
+        self._slave: Any = None
         if obstacle := of_binary(interface):
             raise InputError(f"{name}: {interface.called} {obstacle}")
         try:
@@ -178,13 +180,18 @@ class LoadedInstance(ABC):
                 self._worst = error.status
                 said = as_reason(self._messages())
                 warnings.warn(f"{self.name}: {error}{said}", stacklevel=2)
-        if self._worst < FATAL:
+        if self._slave is not None and (self._worst < FATAL or self._outlives_fatal):
             self._free()
         if self._folder:
             resources = str(Path(self._folder.name, "resources"))
             if resources in sys.path:  # pythonfmu puts it there and leaves it
                 sys.path.remove(resources)
             self._folder.cleanup()
+
+    @property
+    def _outlives_fatal(self) -> bool:
+        """True for our Python FMUs: fmi2Fatal is what pythonfmu makes of any call refused."""
+        return self._python and (self.interface.tool or "").startswith("grasp-cosim")
 
     def _free(self) -> None:
         """Free the instance, and the library with it."""
@@ -372,10 +379,11 @@ class LoadedInstance(ABC):
 
     def _messages(self) -> list[str]:
         """Return the logged messages that have not been read yet."""
-        own = re.compile(rf"\A{re.escape(self.name)}, t = \S+ s: ")  # so our FMUs begin
-        said = [own.sub("", text, count=1) for text in (*self._unread, *self._read_log())]
+        said = [*self._unread, *self._read_log()]
         self._unread.clear()
-        return [text for text in said if not _PYTHONFMU_PREFIX.match(text)] or said
+        said = [text for text in said if not _PYTHONFMU_PREFIX.match(text)] or said
+        own = re.compile(rf"\A{re.escape(self.name)}, t = \S+ s: ")  # so our FMUs begin
+        return [own.sub("", _PYTHONFMU_PREFIX.sub("", text), count=1) for text in said]
 
 
 @cache
@@ -407,4 +415,4 @@ def as_reason(said: list[str]) -> str:
     """Messages, each once, as the end of a one-line error; of a traceback what it comes to."""
     last = [text.strip().rpartition("\n")[2] if _TRACEBACK in text else text for text in said]
     text = " ".join(" ".join(dict.fromkeys(last)).split())
-    return f": {_PYTHONFMU_PREFIX.sub('', text)}" if text else ""
+    return f": {text}" if text else ""

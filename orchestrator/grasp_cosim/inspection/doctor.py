@@ -59,10 +59,6 @@ print("freed")
 """
 
 
-_REPEATED = re.compile(r"^\[FATAL\] .*\nfailed, for the reason logged before\n", re.MULTILINE)
-"""What pythonfmu adds to the reason that an FMU of ours gives."""
-
-
 @dataclass(frozen=True, slots=True)
 class Finding:
     """A finding of one check; fix is a command or an instruction to copy."""
@@ -329,8 +325,7 @@ def host(fmu: Unpacked) -> Verdict | None:
         return None
     fix = f"LD_PRELOAD={quote(path or LIBPYTHON)} HOST"
     if "grasp-cosim" in fmu.tool:
-        fix += ", or grasp-cosim build --native, or, where that cannot be, "
-        fix += "grasp-cosim build --bind-python"
+        fix += ", or grasp-cosim build --native"
     text = "bound to no libpython: hosts that are not Python miss the symbol _Py_NoneStruct"
     return "warning", text, fix
 
@@ -404,7 +399,6 @@ def trial(fmu: Unpacked, timeout: float = 60.0) -> Verdict:
     arguments = ["-P", "-u", "-c", _TRIAL, str(fmu.path.absolute())]
     code, said = _run(sys.executable, *arguments, timeout=timeout, cwd=fmu.folder)
     said = said.replace(f"{fmu.folder}/", "").replace(f"trial: {fmu.path.absolute()} ", "")
-    said = _REPEATED.sub("", said)
     last = ["", *filter(None, map(str.strip, said.splitlines()))][-1]
     if code is None:
         return "problem", f"does not load and instantiate within {timeout:g} s", None

@@ -16,8 +16,8 @@ from c_compilers import BITS
 from grasp_fmus.block_build import own_model
 from grasp_fmus.contract import build_params, declared, packer, unpacker
 from grasp_fmus.cross_check import STEP_SIZE, STEPS
-from grasp_fmus.fmu import Model, shipped_model
 from grasp_fmus.native.c_only import called_of_libm, write_c
+from grasp_fmus.package import Model, shipped_model
 from grasp_fmus.shipped import SCRIPTS, blocks
 from support.compiled import compile_c
 from support.kinds import TRANSLATED

@@ -5,8 +5,6 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from grasp_fmus.changes import read_members
-from grasp_fmus.fmu import HASH
 from grasp_fmus.folder import STAMP
 from grasp_fmus.native.build import (
     build_native,
@@ -16,6 +14,7 @@ from grasp_fmus.native.build import (
     python_only,
 )
 from grasp_fmus.native.targets import here
+from grasp_fmus.package import HASH, read_members
 from support.kinds import TRANSLATED
 from support.native_fmus import needs_gcc
 from support.slow import slow

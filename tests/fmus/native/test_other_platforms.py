@@ -10,9 +10,9 @@ from pathlib import Path
 import fmpy
 import pytest
 from c_compilers import environment as of_compiler
-from grasp_fmus.changes import read_members
 from grasp_fmus.native.build import build_native, compiler_for, planned
 from grasp_fmus.native.targets import LINUX_ARM, LINUX_X86, WINDOWS, Target
+from grasp_fmus.package import read_members
 from support.compilers import needs_zig
 
 HOST = Path(__file__).with_name("platform_host.c")

@@ -10,22 +10,18 @@ from ...errors import InputError, SimulationError
 from ...files import FMU_FOLDER, NATIVE_FOLDER, check_folder
 from ...interface.obstacles import of_binary
 from ...interface.read import describe
-from ..frame import PATH, bind_python_option, json_option, say, show, waiting
+from ..frame import PATH, json_option, say, show, waiting
 
 if TYPE_CHECKING:
-    from grasp_fmus.folder import Built
+    from grasp_fmus.package import Built
 
 FIRST = "; zig makes its libraries first, once, which takes a minute or two"
 """Of a first build for other platforms."""
-
-BOUND_FOLDER = Path("fmus/bound")
-"""Where FMUs bound to a Python are built, below the current folder."""
 
 
 @click.command()
 @click.argument("block", required=False, type=PATH)
 @click.option("--out", type=PATH, help=f"Default: {FMU_FOLDER}")
-@bind_python_option(f" Default of --out: {BOUND_FOLDER}")
 @click.option(
     "--native", is_flag=True, help=f"As C, without Python. Default of --out: {NATIVE_FOLDER}"
 )
@@ -42,7 +38,6 @@ BOUND_FOLDER = Path("fmus/bound")
 def build(
     block: Path | None,
     out: Path | None,
-    bind_python: str | None,
     native: bool,
     target: str | None,
     fmi: str | None,
@@ -56,8 +51,7 @@ def build(
     docs/your_plant.md shows one. With --native, BLOCK may be the name of one of ours as well.
 
     Says what is not as it was built last. Where pythonfmu has no binary for this machine, native
-    FMUs are built beside them, too. --bind-python adds the libpython of PYTHON, by default
-    of this one, to what the FMUs load. --native translates the blocks to C and compiles them.
+    FMUs are built beside them, too. --native translates the blocks to C and compiles them.
 
     \b
     Example: grasp-cosim build --out my_fmus
@@ -68,9 +62,7 @@ def build(
     for option, value in only_native.items():
         if value is not None and not native:
             raise InputError(f"{option} {value}: must be with --native")
-    if native and bind_python:
-        raise InputError("--bind-python: a native FMU needs no Python; must be without --native")
-    folder = out or (NATIVE_FOLDER if native else BOUND_FOLDER if bind_python else FMU_FOLDER)
+    folder = out or (NATIVE_FOLDER if native else FMU_FOLDER)
     check_folder(c_only or folder)
     notes: list[str] = []
     try:
@@ -81,8 +73,8 @@ def build(
         if native:
             built, notes = _native(block, folder, target, 3 if fmi == "3" else 2)
         else:
-            built = _in_python(block, folder, bind_python)
-            if not bind_python and (obstacle := of_binary(describe(built[0].path))):
+            built = _in_python(block, folder)
+            if obstacle := of_binary(describe(built[0].path)):
                 twins = folder.parent / NATIVE_FOLDER.name
                 built = [*built, *_native(block, twins, None, 2)[0]]
                 notes = [f"built native FMUs, too: {built[0].path} {obstacle.what}"]
@@ -97,14 +89,14 @@ def build(
     return 0
 
 
-def _in_python(block: Path | None, folder: Path, bind_python: str | None) -> "Sequence[Built]":
+def _in_python(block: Path | None, folder: Path) -> "Sequence[Built]":
     from grasp_fmus.block_build import build_block
     from grasp_fmus.build import build as build_fmus
 
     with waiting(f"building {block or 'the FMUs'}"):
         if block:
-            return [build_block(block, folder, bind_python)]
-        return build_fmus(folder, bind_python)
+            return [build_block(block, folder)]
+        return build_fmus(folder)
 
 
 def _native(
@@ -132,9 +124,9 @@ def _native(
 def _write_c(block: Path | None, folder: Path, as_json: bool) -> int:
     """Write the C of one block into the folder, of all into folders in it."""
     from grasp_fmus.block_build import own_model
-    from grasp_fmus.fmu import shipped_model
     from grasp_fmus.native.build import chosen_names, python_only
     from grasp_fmus.native.c_only import write_c
+    from grasp_fmus.package import shipped_model
     from grasp_fmus.shipped import SCRIPTS
 
     if block and not _is_name(block):

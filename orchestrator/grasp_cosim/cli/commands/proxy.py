@@ -17,11 +17,11 @@ from ...hil.protocol import link_signature
 from ...interface.interface import Interface, Value, Variable
 from ...interface.read import read_interface
 from ...interface.units import BASE
-from ..frame import PATH, bind_python_option, json_option, say, show, waiting
+from ..frame import PATH, json_option, say, show, waiting
 from .build import FIRST
 
 if TYPE_CHECKING:
-    from grasp_fmus.folder import Built
+    from grasp_fmus.package import Built
     from grasp_fmus.proxy_build import Original
 
 KINDS: Mapping[str, type[Value]] = {"Real": float, "Integer": int, "Boolean": bool, "String": str}
@@ -45,7 +45,6 @@ KINDS: Mapping[str, type[Value]] = {"Real": float, "Integer": int, "Boolean": bo
     show_default=True,
     help="Longest wait per step in s.",
 )
-@bind_python_option()
 @click.option("--native", is_flag=True, help="As C, without Python.")
 @click.option(
     "--target",
@@ -61,7 +60,6 @@ def proxy(
     host: str,
     port: int,
     timeout: float,
-    bind_python: str | None,
     native: bool,
     target: str | None,
     fmi: str | None,
@@ -84,7 +82,7 @@ def proxy(
     from grasp_fmus.proxy_build import build_proxy
 
     _check_paths(fmu, out, c_header)
-    _check_native(native, out, bind_python, {"--target": target, "--fmi": fmi})
+    _check_native(native, out, {"--target": target, "--fmi": fmi})
     interface = read_interface(fmu)
     signature, notes = link_signature(interface)
     report: dict[str, object] = {"notes": notes}
@@ -98,7 +96,7 @@ def proxy(
                 built, said_of = _built_native(out, original, settings, target, fmi)
                 notes += said_of
             else:
-                built = build_proxy(out, original, settings, bind_python)
+                built = build_proxy(out, original, settings)
             lines += [f"{out}: {built.status}", *(f"    {change}" for change in built.changes)]
             report |= {"fmu": str(out), "status": built.status, "changes": list(built.changes)}
         if c_header is not None:
@@ -126,9 +124,7 @@ def _header(interface: Interface) -> str:
     return c_header(interface.identifier, signature, known, said)
 
 
-def _check_native(
-    native: bool, out: Path | None, bind_python: str | None, only: Mapping[str, str | None]
-) -> None:
+def _check_native(native: bool, out: Path | None, only: Mapping[str, str | None]) -> None:
     """InputError where options do not go together."""
     for option, value in {**only, "--native": True if native else None}.items():
         if value is None:
@@ -137,8 +133,6 @@ def _check_native(
             raise InputError(f"{option} {value}: must be with --native")
         if out is None:
             raise InputError(f"{option}: there is no FMU to make; must be with -o FILE.fmu")
-    if native and bind_python:
-        raise InputError("--bind-python: a native FMU needs no Python; must be without --native")
 
 
 def _built_native(

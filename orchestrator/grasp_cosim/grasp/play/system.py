@@ -9,7 +9,7 @@ from ..controllers import CONTROLLERS
 from ..presets import CASES, SYSTEM
 
 if TYPE_CHECKING:
-    from grasp_fmus.fmu import Model
+    from grasp_fmus.package import Model
 
 PLANTS = {
     "fixed": "GripperPlant",
@@ -33,7 +33,7 @@ _TYPES = {"Real": 0, "Boolean": 1, "Integer": 2}
 @cache
 def model(name: str) -> "Model":
     """Return the model of an FMU that comes with the package."""
-    from grasp_fmus.fmu import shipped_model
+    from grasp_fmus.package import shipped_model
     from grasp_fmus.shipped import SCRIPTS
 
     return shipped_model(SCRIPTS / f"{name}.py")

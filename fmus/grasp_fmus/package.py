@@ -1,0 +1,269 @@
+"""Makes an FMU that Python runs: a script, the modules that it imports, pythonfmu's binaries.
+
+The same sources give the same bytes. Why modules have a hash in their names: fmus/README.md. To be
+packed, a package must be imported at the top level of a module, with `from PACKAGE import ...`:
+only such an import can be given the name that the package has in the FMU.
+"""
+
+from __future__ import annotations
+
+import ast
+import io
+import os
+import re
+import sys
+import zipfile
+import zlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from hashlib import sha256
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+if TYPE_CHECKING:
+    from .model_description import Description
+
+HASH = "CONTENT_HASH"
+"""Stands for the content hash until it is known."""
+
+IMPORT = re.compile(r"^from (\w+)(?=[\w.]* import\b)", re.MULTILINE)
+"""An import whose package is packed, unless it is of the standard library."""
+
+BINARIES = {"linux64": ("libpythonfmu-export", "so"), "win64": ("pythonfmu-export", "dll")}
+"""Those of pythonfmu, by their folder in it and in an FMU."""
+
+
+@dataclass(frozen=True, slots=True)
+class Built:
+    """An FMU in its folder, and how building it changed what was there."""
+
+    path: Path
+    status: Literal["new", "changed", "unchanged"]
+    changes: tuple[str, ...] = ()
+    """Empty; the command still asks."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """What an FMU is made of, whether it will run in Python or by itself."""
+
+    description: Description
+    card: str
+    """In Markdown."""
+    sources: Mapping[str, bytes]
+    """Its script NAME.py, and modules beside it; what they import is packed with them."""
+    block: Any = None
+    """The module of the block; None for a proxy."""
+    file: Path | None = None
+    """The source of a block that is a file of one's own."""
+    picture: bytes | None = None
+    requires: tuple[str, ...] = ()
+    """Packages that must be installed where it runs."""
+
+
+def build_fmu(script: Path, out: Path) -> Built:
+    """Build the FMU of a script that comes with this package into the folder `out`."""
+    return write_python(out / f"{script.stem}.fmu", shipped_model(script))
+
+
+def shipped_model(file: Path) -> Model:
+    """Return the model of a script."""
+    from .contract import declared, variables
+    from .model_description import Description
+    from .page import icon
+    from .shipped import slave_class
+
+    slave = slave_class(file)
+    block, name = slave.block, file.stem
+    package, _, module = block.__name__.rpartition(".")
+    return Model(
+        Description(name, (slave.__doc__ or "").rstrip("."), variables(declared(block))),
+        card_file(package).read_text("utf-8"),
+        {f"{name}.py": script(f"from {package} import {module} as block")},
+        block,
+        picture=icon(name),
+        requires=slave.requires,
+    )
+
+
+def script(imports: str) -> bytes:
+    """Return the script of an FMU, whose block is imported as `block`."""
+    return f"{imports}\nfrom {__package__} import slave\n\nslave.offer(block, globals())\n".encode()
+
+
+def write_python(target: Path, model: Model) -> Built:
+    """Write the FMU that Python runs, unless it is there already with the same content."""
+    return write_members(target, python_members(model)[1])
+
+
+def python_members(model: Model) -> tuple[str, dict[str, bytes]]:
+    """Return the content hash of the FMU that Python runs, and the files in it."""
+    from .model_description import model_description
+    from .page import PYTHON, licences, needed, page
+
+    d = model.description
+    html = page(d.name, d.summary, model.card, PYTHON, packages=needed(model.requires))
+    folder = package_folder("pythonfmu") / "resources" / "binaries"
+    return hashed(
+        {
+            "modelDescription.xml": model_description(d, HASH),
+            **({"model.png": model.picture} if model.picture else {}),
+            "documentation/index.html": html.encode(),
+            **licences("grasp-cosim", "pythonfmu"),
+            **{
+                f"binaries/{place}/{d.name}.{kind}": (
+                    folder / place / f"{file}.{kind}"
+                ).read_bytes()
+                for place, (file, kind) in BINARIES.items()
+            },
+            "resources/slavemodule.txt": f"{d.name}_{HASH}".encode(),
+            **_renamed(with_imports(model.sources)),
+        }
+    )
+
+
+def hashed(template: Mapping[str, bytes]) -> tuple[str, dict[str, bytes]]:
+    """Return the hash of files, and the files with it in the place of HASH."""
+    digest = sha256()
+    for member, data in sorted(template.items()):
+        digest.update(f"{member}\0{len(data)}\0".encode() + data)
+    content = digest.hexdigest()[:16]
+    return content, {
+        name.replace(HASH, content): data.replace(HASH.encode(), content.encode())
+        for name, data in template.items()
+    }
+
+
+def write_members(target: Path, files: Mapping[str, bytes]) -> Built:
+    """Write an FMU that holds these files, unless it is there already and holds the same."""
+    there = target.is_file()
+    if there and read_members(target.read_bytes()) == files:
+        return Built(target, "unchanged")
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        for name, data in sorted(files.items()):
+            entry = zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0))  # the same whenever it is built
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.external_attr = 0o644 << 16
+            archive.writestr(entry, data)
+    write_file(target, buffer.getvalue())
+    return Built(target, "changed" if there else "new")
+
+
+def read_members(fmu: bytes) -> dict[str, bytes]:
+    """Return the files in an FMU by name; none where it is damaged or no FMU."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(fmu)) as archive:
+            return {name: archive.read(name) for name in archive.namelist()}
+    except (OSError, EOFError, ValueError, RuntimeError, zipfile.BadZipFile, zlib.error):
+        return {}
+
+
+def write_file(target: Path, data: bytes) -> None:
+    """Write a file in one piece, with its folder, unless it has that content already.
+
+    OSError names the target.
+    """
+    if target.is_file() and target.read_bytes() == data:
+        return
+    target.parent.mkdir(parents=True, exist_ok=True)
+    part = target.with_name(f"{target.name}.{os.getpid()}.part")
+    try:
+        part.write_bytes(data)
+        part.replace(target)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(target)) from error
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _renamed(sources: Mapping[str, bytes]) -> dict[str, bytes]:
+    """Return the sources as they stand in the FMU, all modules under names with HASH."""
+    packages = sorted({name.partition("/")[0] for name in sources if "/" in name})
+    imports = re.compile(rf"^from ({'|'.join(packages)})\b".encode(), re.MULTILINE)
+    packed = {}
+    for name, data in sources.items():
+        package, _, rest = name.partition("/")
+        place = f"{package}_{HASH}/{rest}" if rest else f"{Path(name).stem}_{HASH}.py"
+        packed[f"resources/{place}"] = imports.sub(rf"from \1_{HASH}".encode(), data)
+    return packed
+
+
+def with_imports(sources: Mapping[str, bytes]) -> dict[str, bytes]:
+    """Return `sources` and all modules they import, by path in the FMU without the content hash."""
+    found = dict(sources)
+    waiting = list(sources)
+    while waiting:
+        path = waiting.pop()
+        for module in _imported(path, found[path]):
+            for name, file in _files(module):
+                if name not in found:
+                    found[name] = file.read_bytes()
+                    waiting.append(name)
+    return found
+
+
+def packages(*roots: str) -> dict[str, Path]:
+    """Return the folders of these packages, and of those to pack that their modules import."""
+    found: dict[str, Path] = {}
+    waiting = [*roots]
+    while waiting:
+        package = waiting.pop()
+        found[package] = package_folder(package)
+        for file in found[package].rglob("*.py"):
+            imported = {*IMPORT.findall(file.read_text("utf-8"))} - sys.stdlib_module_names
+            waiting += imported - {*found, *waiting}
+    return dict(sorted(found.items()))
+
+
+def package_folder(package: str) -> Path:
+    """Return the folder of a package, which is not imported for that; ImportError without one."""
+    spec = find_spec(package)
+    if spec is None or spec.origin is None:
+        raise ImportError(f"{package}: no such package; must be installed")
+    return Path(spec.origin).parent
+
+
+def card_file(package: str) -> Path:
+    """Return the equation card of a package: in it once it is installed, in the sources beside."""
+    inside = package_folder(package) / "README.md"
+    return inside if inside.exists() else inside.parents[1] / "README.md"
+
+
+@cache
+def _imported(path: str, source: bytes) -> list[str]:
+    """Return the modules to pack that a source imports, and names in them that may be modules."""
+    found: list[str] = []
+    *package, _ = path.split("/")
+    for node in _run(ast.parse(source, path)):
+        if not isinstance(node, ast.ImportFrom):
+            continue
+        above = package[: len(package) + 1 - node.level] if node.level else []
+        module = ".".join([*above, *filter(None, [node.module])])
+        outside = node.col_offset or module.partition(".")[0] in sys.stdlib_module_names
+        if node.level or not outside:
+            found += [module, *(f"{module}.{alias.name}" for alias in node.names)]
+    return found
+
+
+def _run(tree: ast.AST) -> Iterator[ast.AST]:
+    """Yield all statements and what holds some, but those that only a type checker looks at."""
+    for node in ast.iter_child_nodes(tree):
+        checked = isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+        if not (checked or isinstance(node, ast.expr)):
+            yield node
+            yield from _run(node)
+
+
+def _files(module: str) -> Iterator[tuple[str, Path]]:
+    """Yield the files that importing a module runs, with their paths in the FMU."""
+    package, *rest = module.split(".")
+    folder = package_folder(package)
+    place = folder.joinpath(*rest)
+    own = place / "__init__.py" if place.is_dir() else place.with_suffix(".py")
+    if own.is_file():
+        above = (folder.joinpath(*rest[:i]) / "__init__.py" for i in range(len(rest)))
+        for file in (*above, own):
+            yield f"{package}/{file.relative_to(folder).as_posix()}", file

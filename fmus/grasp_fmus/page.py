@@ -1,0 +1,211 @@
+"""Makes what an FMU holds for its reader: documentation/index.html, the licences, the icon.
+
+A page is Markdown, the card and then the sections that follow here; its frame is page.html.in.
+"""
+
+from collections.abc import Sequence
+from html import escape
+from itertools import cycle
+from pathlib import Path
+from re import MULTILINE, search, sub
+from string import Template
+from typing import Any
+
+from .model_description import version
+
+ICONS = Path(__file__).parent / "icons"
+FRAME = Path(__file__).with_name("page.html.in")
+
+BEGIN = "<!-- variables -->\n"
+"""In a card, before the tables of the variables."""
+
+PYTHON = """\
+## What the host needs
+
+To be a Python process, 3.11 or newer, 64 bit, on Linux or Windows: this FMU runs Python code inside
+the binary of pythonfmu. $packages For a host that is not Python, or another processor, take the
+native FMU: `grasp-cosim build --native`.
+
+The path of the folder that the host extracts the FMU to must be made of ASCII letters, digits,
+`_ . - ~` and spaces: any other character crashes pythonfmu's loader, and the host with it. The
+GUID is not checked. `grasp-cosim inspect $name.fmu` says whether this machine can load it.
+
+## Errors
+
+A call that is refused has no effect and returns `fmi2Fatal`: a value out of range, a step that is
+too long, or one whose results would not be finite. The reason is in the log of the host where
+debug logging is on: instance, time, variable, value and what would be valid.
+"""
+NATIVE = """\
+## What the host needs
+
+Nothing but a binary for its platform: this FMU needs no Python, no other library than those of the
+system, no files, and no time or environment. It allocates memory when it is instantiated and never
+after that, and keeps nothing outside of its instances. It reads nothing from the folder that the
+host extracts it to, whose path may be any.
+
+## Compiling the sources
+
+`sources/` holds all of it as C99. One file is compiled, `$name.c`; it includes the others, and
+`buildDescription.xml` says so:
+
+    cc -std=c99 -O2 -ffp-contract=off -D$override -shared -fPIC -o $name.so $name.c -lm
+
+$linking The compiler must not contract a·b+c into one operation (`-march=native` and some
+processors make it do so unless it is told `-ffp-contract=off`) nor trade exactness for speed
+(`-Ofast`, `-ffast-math`): the FMU tests that when it is instantiated, and refuses to be, with the
+reason in the log.
+
+## What is promised of the numbers
+
+On Linux with glibc, on x86-64 and aarch64, outputs and states equal those of the same block in
+Python, bit for bit, on the same processor. Elsewhere the mathematical functions are others, which
+round the last digit otherwise now and then: after minutes of a closed loop the values agreed to
+1e-12.
+
+## Errors
+
+$errors A step that is too long, or whose results would not be finite, returns `fmi${fmi}Discard`.
+"""
+PROXY = """\
+## What the host needs
+
+A binary for its platform, and a peer in reach: this FMU needs no Python and no other library than
+those of the system. It has one UDP socket to its peer, reads the monotonic clock, and random bytes
+for each session; a file only where `proxy.key_file` names one. It allocates memory when it is
+instantiated, and keeps nothing outside of its instances.
+
+## Compiling the sources
+
+`sources/` holds all of it as C99. One file is compiled, `$name.c`; it includes the others, and
+`buildDescription.xml` says so:
+
+    cc -std=c99 -O2 -D$override -shared -fPIC -o $name.so $name.c -lm
+
+On Windows it is linked with `ws2_32` as well. $linking
+
+## Errors
+
+$errors A step without an answer in time returns `fmi${fmi}OK`: `proxy.state` says what became of
+it, and the log that the peer is lost. With `proxy.on_loss = stop` the step in which it is lost
+returns `fmi${fmi}Error`, and so does every later one.
+"""
+_LINKING = """It compiles without warnings with `-Wall -Wextra -Wpedantic`. All functions but those
+of FMI are `static`, and without `-D$override` these begin with `${name}_`: any number of such FMUs
+can be linked into one program."""
+_ERRORS = """A call that is refused returns `fmi${fmi}Error` and has no effect. The reason is in the
+log even when debug logging is off: instance, time, variable, value and the allowed range."""
+_STATES = """\
+## States
+
+Getting, setting, freeing and serialising the state of the FMU are supported. A state can be
+exchanged between instances of the same FMU, its bytes also between the one in Python and the native
+one.
+"""
+_NO_STATES = "## States\n\nNot supported: the state is that of the peer.\n"
+
+
+def page(name: str, summary: str, card: str, about: str, fmi: int = 2, packages: str = "") -> str:
+    """Return documentation/index.html of an FMU, from its card and what is to be said of its kind.
+
+    Both are in Markdown; `about` is one of PYTHON, NATIVE, PROXY. The page stands alone: links and
+    pictures of the card point to nothing in an FMU and come out as their text, HTML in it as it is
+    written. The result is XML as well.
+    """
+    theirs = ", the binary of pythonfmu as well: documentation/licenses/pythonfmu.txt"
+    licence = f"MIT: documentation/licenses/license.txt{theirs if about is PYTHON else ''}."
+    states = _NO_STATES if about is PROXY else _STATES
+    override = f"FMI{fmi}_OVERRIDE_FUNCTION_PREFIX"
+    known = {"name": name, "fmi": fmi, "override": override, "packages": packages}
+    linking, errors = (Template(text).substitute(known) for text in (_LINKING, _ERRORS))
+    sections = Template(about).substitute(known, linking=linking, errors=errors)
+    return Template(FRAME.read_text("utf-8")).substitute(
+        name=escape(name),
+        summary=escape(summary.rstrip(".")),
+        version=escape(version()),
+        fmi=f"{fmi}.0",
+        card=_rendered(card, 1),
+        sections=_rendered(f"{sections}\n{states}\n## Licence\n\n{licence}\n", 0),
+    )
+
+
+def needed(packages: Sequence[str]) -> str:
+    """Say which packages must be installed in the Python of the host."""
+    named = ", ".join(f"`{name}`" for name in packages)
+    return f"That Python must have {named}." if named else "No packages need to be installed."
+
+
+def licences(*distributions: str) -> dict[str, bytes]:
+    """Return the licences of installed distributions, ours and others', as files of an FMU.
+
+    FileNotFoundError if one is not installed, or has no licence.
+    """
+    from importlib import metadata  # takes time to load
+
+    found = {}
+    for name in distributions:
+        try:
+            text = metadata.distribution(name).read_text("licenses/LICENSE")
+        except metadata.PackageNotFoundError:
+            text = None
+        if not text:
+            raise FileNotFoundError(
+                f"{name}: no licenses/LICENSE among its metadata; install it with pip"
+            )
+        file = "license" if name == "grasp-cosim" else name
+        found[f"documentation/licenses/{file}.txt"] = text.encode()
+    return found
+
+
+def icon(name: str) -> bytes | None:
+    """Return model.png of the FMU `name`; None where there is none for it."""
+    file = ICONS / f"{name}.png"
+    return file.read_bytes() if file.exists() else None
+
+
+def _rendered(text: str, down: int) -> str:
+    """Return Markdown as HTML, headings some levels down: the page has its own title.
+
+    Equations in LaTeX, in ```math, come out as MathML. Each cell of a table knows its head, for
+    phones, where a row is shown as a list.
+    """
+    from markdown_it import MarkdownIt  # takes time to load
+
+    text = sub(r"^<!--.*-->$", "", text.replace(BEGIN, "## Variables\n\n"), flags=MULTILINE)
+    markdown = MarkdownIt("commonmark", {"html": False, "xhtmlOut": True}).enable("table")
+    for rule in ("link_open", "link_close"):
+        markdown.add_render_rule(rule, lambda *_: "")
+    markdown.add_render_rule("image", lambda _, tokens, index, *__: escape(tokens[index].content))
+    renderer: Any = markdown.renderer
+    code = renderer.rules["fence"]
+    markdown.add_render_rule("fence", lambda _, *given: _equation(*given) or code(*given))
+    tokens = markdown.parse(text)
+    heads: list[str] = []
+    cells = cycle([""])
+    for i, token in enumerate(tokens):
+        if token.type == "thead_open":
+            heads = []
+        if token.type == "th_open":
+            heads.append(tokens[i + 1].content)
+        if token.type == "tbody_open":
+            cells = cycle(heads)
+        if token.type == "td_open":
+            token.attrSet("data-head", next(cells))
+        if token.type in ("heading_open", "heading_close"):
+            token.tag = f"h{min(int(token.tag[1]) + down, 6)}"
+    html: str = markdown.renderer.render(tokens, markdown.options, {})
+    return html
+
+
+def _equation(tokens: Sequence[Any], index: int, *_: object) -> str:
+    """Return the HTML of a fence with an equation and its number, if it has a tag; else nothing."""
+    if tokens[index].info.strip() != "math":
+        return ""
+    from latex2mathml.converter import convert  # takes time to load
+
+    tag = r"\\tag\{(.*?)\}"
+    said = search(tag, tokens[index].content)
+    # An element of HTML: it needs no namespace.
+    math = sub(' xmlns="[^"]*"', "", convert(sub(tag, "", tokens[index].content), display="block"))
+    number = f"<span>({escape(said[1])})</span>" if said else ""
+    return f'<div class="equation"><div>{math}</div>{number}</div>\n'
