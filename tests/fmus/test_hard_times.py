@@ -1,10 +1,9 @@
-"""Python hosts in trouble: at the end of the stack, interrupted, with no import path, in threads.
+"""Python hosts in trouble: with no import path, in threads.
 
 Each is a process of its own:  python tests/fmus/test_hard_times.py HOST FOLDER FMU...
 """
 
 import os
-import signal
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -13,58 +12,11 @@ from threading import Thread
 from typing import Any
 
 import pytest
-from support.fmi2 import ERROR, OK, Fmu, Instance
+from support.fmi2 import OK, Fmu, Instance
 from support.packages import runnable
 from support.slow import slow
 
 ROUNDS = 10
-MANY = 200
-
-
-def at_the_end_of_the_stack(fmus: list[Fmu]) -> None:
-    """Python may raise between pythonfmu's call and the slave's first line, and at any repr."""
-
-    def deep(levels: int) -> None:
-        if levels:
-            deep(levels - 1)
-        else:
-            statuses.append(instance.step(0.0, -1.0))
-
-    statuses: list[int] = []
-    with Instance(fmus[0], logger=False) as instance:
-        instance.initialise()
-        for levels in range(sys.getrecursionlimit()):
-            try:
-                deep(levels)
-            except RecursionError:
-                break
-        assert set(statuses) == {ERROR}
-        assert instance.step(0.0, 1e-3) == OK
-
-
-def interrupted(fmus: list[Fmu]) -> None:
-    """A signal handler that raises does so anywhere, also on the way into the slave."""
-    refused, inside = 0, False
-
-    def interrupt(*_: object) -> None:
-        nonlocal inside
-        if inside:
-            inside = False
-            raise KeyboardInterrupt
-
-    signal.signal(signal.SIGALRM, interrupt)
-    with Instance(fmus[0], logger=False) as instance:
-        instance.initialise()
-        signal.setitimer(signal.ITIMER_REAL, 1e-3, 1.7e-4)
-        while refused < MANY:
-            try:  # not with suppress(), which is Python, and so can be interrupted itself
-                inside = True
-                refused += instance.get_real([0])[0] != OK
-                inside = False
-            except KeyboardInterrupt:
-                pass
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        assert instance.step(0.0, 1e-3) == OK
 
 
 def without_an_import_path(fmus: list[Fmu]) -> None:
@@ -100,10 +52,7 @@ def in_threads(fmus: list[Fmu]) -> None:
     assert sys.path == before
 
 
-HOSTS: dict[str, Any] = {
-    host.__name__: host
-    for host in (at_the_end_of_the_stack, interrupted, without_an_import_path, in_threads)
-}
+HOSTS: dict[str, Any] = {host.__name__: host for host in (without_an_import_path, in_threads)}
 
 
 @pytest.mark.parametrize("host", [slow(h) if h == "in_threads" else h for h in HOSTS])

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from conftest import Load
-from support.fmi2 import DISCARD, OK, Instance
+from support.fmi2 import OK, Instance
 
 NAME = "GripperPlantMuJoCo"
 MISSING = (
@@ -31,7 +31,7 @@ def test_a_step_that_mujoco_cannot_take_is_discarded(
     """With the block's own reason, and the instance goes on."""
     with Instance(load(NAME)).initialise() as instance:
         assert instance.set({"force[1]": force}) == OK
-        assert instance.step(0.0, size) == DISCARD
+        assert instance.step(0.0, size) == instance.fmu.discarded
         assert [message.text for message in instance.log] == [
             f"instance, t = 0 s: step of {size} s: {reason}"
         ]

@@ -125,7 +125,7 @@ def test_a_value_that_is_not_finite_ends_the_run_where_it_arises(
     fmu = altered("ProximitySensor", "proximity_sensor/optics.py", GAP, nan)
     with pytest.raises(
         SimulationError,
-        match=r"^sensor_1: ProximitySensor.fmu returned discard .*: intensity = nan V: must be",
+        match=r"^sensor_1: ProximitySensor.fmu returned fatal .*: intensity = nan V: must be",
     ) as caught:
         simulate(grasp.swap("sensor_1", fmu))
     result = caught.value.result

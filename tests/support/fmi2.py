@@ -121,7 +121,7 @@ class Instance:
         self, fmu: Fmu, name: str = "instance", logging: bool | None = None, logger: bool = True
     ) -> None:
         self.fmu = fmu
-        logging = fmu.python if logging is None else logging
+        logging = fmu.python and logger if logging is None else logging
         self.log: list[Logged] = []
         resources, called = fmu.folder / "resources", name.encode()
         self._calls: _Calls | fmi3.Calls
