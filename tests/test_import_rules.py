@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from grasp_fmus.package import packages, with_imports
+from grasp_fmus.package import packages, shipped_model, with_imports
 from grasp_fmus.shipped import SCRIPTS, blocks
 from support.imports import (
     Import,
@@ -152,9 +152,9 @@ def test_the_fmu_adapter_knows_no_physics_but_for_the_scripts() -> None:
 
 
 def test_what_is_packed_into_fmus_imports_the_standard_library_only() -> None:
-    scripts = {script.name: script.read_bytes() for script in SCRIPTS.glob("*.py")}
-    packed = with_imports({**scripts, "Proxy.py": b"from grasp_fmus import proxy\n"})
-    assert {"grasp_fmus/slave.py", "grasp_fmus/link/client.py"} < packed.keys()
+    models = [shipped_model(script) for script in SCRIPTS.glob("*.py")]
+    packed = with_imports({name: data for m in models for name, data in m.sources.items()})
+    assert {"grasp_fmus/slave.py", "gripper_plant/movable.py"} < packed.keys()
     ours = packages("grasp_fmus").keys()
     foreign = {
         (file, name)

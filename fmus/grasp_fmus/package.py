@@ -12,8 +12,6 @@ import io
 import os
 import re
 import sys
-import zipfile
-import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -141,6 +139,8 @@ def write_members(target: Path, files: Mapping[str, bytes]) -> Built:
     there = target.is_file()
     if there and read_members(target.read_bytes()) == files:
         return Built(target, "unchanged")
+    import zipfile  # takes time to load, and mostly there is nothing to write
+
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
         for name, data in sorted(files.items()):
@@ -154,6 +154,9 @@ def write_members(target: Path, files: Mapping[str, bytes]) -> Built:
 
 def read_members(fmu: bytes) -> dict[str, bytes]:
     """Return the files in an FMU by name; none where it is damaged or no FMU."""
+    import zipfile
+    import zlib
+
     try:
         with zipfile.ZipFile(io.BytesIO(fmu)) as archive:
             return {name: archive.read(name) for name in archive.namelist()}

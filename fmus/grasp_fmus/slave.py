@@ -6,7 +6,9 @@ is logged. Value references are positions in one list of values. Outputs are wor
 are asked for.
 """
 
+import atexit
 import ctypes
+import os
 import struct
 import sys
 from collections.abc import Callable, Iterator
@@ -330,8 +332,7 @@ class Slave:
         if data[:8] != MAGIC:
             raise ValueError(f"state of {len(data)} bytes: must begin with {MAGIC!r}")
         if data[8:HEAD] != content.encode():
-            origin = data[8:HEAD].decode("ascii", "replace")
-            raise ValueError(f"state of the FMU with content {origin}: must be of {content}")
+            raise ValueError(f"state of another FMU: must be of this one, {content}")
         if len(data) != size:
             raise ValueError(f"state of {len(data)} bytes: must have {size}")
         found: Snapshot = _shaped(like, iter(struct.unpack(f"<{size // 8 - 3}d", data[HEAD:])))
@@ -390,8 +391,9 @@ class Maker:
     pythonfmu asks the class, not the instance, to serialise a state.
     """
 
-    def __init__(self, block: Any, content: str) -> None:
-        self.block, self.content = block, content
+    def __init__(self, block: Any, script: str) -> None:
+        self.block = block
+        self.name, _, self.content = script.rpartition("_")
 
     def __call__(self, instance_name: str, resources: str, **_: object) -> Slave:
         """Make an instance, at instantiation and at every reset.
@@ -402,6 +404,7 @@ class Maker:
         with suppress(ValueError):
             sys.path.remove(resources)
         sys.path_importer_cache.pop(resources, None)
+        _binaries.add(f"{resources}/../binaries/linux64/{self.name}.so")
         slave = Slave(self, instance_name)
         self._made = ref(slave)
         return slave
@@ -421,7 +424,22 @@ def offer(block: Any, module: dict[str, Any]) -> None:
     under the empty name. It also gives up a reference to the names, which it only borrowed.
     """
     keep(module)
-    module[""] = Maker(block, module["__name__"].rpartition("_")[2])
+    module[""] = Maker(block, module["__name__"])
+
+
+_binaries: set[str] = set()
+"""The paths of those that have made an instance."""
+
+
+@atexit.register
+def let_go() -> None:
+    """Have pythonfmu's binaries let go of Python while they can.
+
+    As the process ends they do it twice, the second time in memory that was freed.
+    """
+    for binary in _binaries:
+        with suppress(OSError, AttributeError):  # it was unloaded; on Windows there is no need
+            ctypes.PyDLL(binary, mode=os.RTLD_NOLOAD | os.RTLD_NOW).finalizePythonInterpreter()
 
 
 def keep(used: object) -> None:

@@ -6,9 +6,7 @@ import math
 import re
 import sys
 import zipfile
-from importlib import metadata
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -281,11 +279,12 @@ def test_doctor_without_an_fmu_looks_at_the_machine(command: Run) -> None:
 def test_a_missing_file_without_a_name_is_told(
     command: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    none = SimpleNamespace(read_text=lambda _: None)
-    monkeypatch.setattr(metadata, "distribution", lambda _: none)
+    said = "grasp-cosim: no licenses/LICENSE among its metadata; install it with pip"
+    missing = FileNotFoundError(said)
+    monkeypatch.setattr("grasp_fmus.page.licences", lambda *_: (_ for _ in ()).throw(missing))
     code, _, err = command("build")
     assert code == 2
-    assert "grasp-cosim: no licenses/LICENSE among its metadata; install it with pip" in err
+    assert said in err
 
 
 @pytest.mark.parametrize("verb", ["inspect", "doctor"])

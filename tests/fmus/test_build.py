@@ -8,7 +8,6 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from grasp_fmus import fmu
 from grasp_fmus.build import build
 from grasp_fmus.folder import STAMP, Built, is_current, sources_hash
 from grasp_fmus.package import HASH, build_fmu, package_folder, packages
@@ -241,7 +240,8 @@ def test_a_build_that_fails_leaves_what_was_there(
     fmus: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     shutil.copy(fmus / "GripperPlant.fmu", tmp_path)
-    monkeypatch.setattr(fmu, "icon", lambda name: (_ for _ in ()).throw(OSError("no icon")))
+    failure = (_ for _ in ()).throw
+    monkeypatch.setattr("grasp_fmus.page.icon", lambda _: failure(OSError("no icon")))
     with pytest.raises(OSError, match="no icon"):
         build(tmp_path)
     assert contents(tmp_path) == {"GripperPlant.fmu": (fmus / "GripperPlant.fmu").read_bytes()}

@@ -12,6 +12,7 @@ from threading import Thread
 from typing import Any
 
 import pytest
+from support.compiled import compile_c
 from support.fmi2 import OK, Fmu, Instance
 from support.packages import runnable
 from support.slow import slow
@@ -59,6 +60,22 @@ HOSTS: dict[str, Any] = {host.__name__: host for host in (without_an_import_path
 def test_the_host_lives(fmus: Path, tmp_path: Path, host: str) -> None:
     """With every other FMU, one of each room; the threads with all."""
     hosted(host, tmp_path, runnable(fmus)[:: 1 if host == "in_threads" else 2])
+
+
+def test_binaries_let_go_of_python_before_the_process_ends(tmp_path: Path) -> None:
+    """pythonfmu 0.7.0 alone does that twice then, the second time in memory that was freed."""
+    source, library = tmp_path / "let_go.c", tmp_path / "let_go.so"
+    source.write_text(
+        "#include <stdio.h>\n"
+        'void finalizePythonInterpreter(void) { puts("let go"); fflush(stdout); }\n'
+    )
+    compile_c(["gcc", "-shared", "-fPIC", source], library)
+    program = (
+        "import ctypes, sys; from grasp_fmus import slave; ctypes.CDLL(sys.argv[1]);"
+        "slave._binaries |= {sys.argv[1], '/no/such.so'}"
+    )
+    done = subprocess.run([sys.executable, "-c", program, library], capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "let go\n", "")
 
 
 def test_threads_live_with_native_fmus_too(natives: Path, tmp_path: Path) -> None:

@@ -114,9 +114,9 @@ def test_a_state_of_another_fmu_is_refused(load: Load) -> None:
     with ready(load("GripperPlant")) as plant, ready(load("ProximitySensor")) as sensor:
         state = plant.state()
         assert sensor.restore(state) == sensor.fmu.refused
-        assert "state of another FMU: must be of this one" in sensor.log[0].text
         assert sensor.from_bytes(state.to_bytes())[0] == sensor.fmu.refused
-        assert "state of the FMU with content" in sensor.log[1].text
+        for said in sensor.log:
+            assert "state of another FMU: must be of this one" in said.text
         assert sensor.step(0.0, H) == OK
         state.free()
 

@@ -123,7 +123,9 @@ def values(f: Field) -> st.SearchStrategy[float]:
     near = st.sampled_from([-2.0, -0.5, 0.0, 0.1, 0.7, 1.0, 1.5, 4.0]).map(
         lambda x: min(max(x * sizes[0], low), high)
     )
-    return near | st.floats(max(low, -10.0 * sizes[0]), min(high, 10.0 * sizes[0]))
+    drawn = st.floats(max(low, -10.0 * sizes[0]), min(high, 10.0 * sizes[0]))
+    # Of a size for which Python raises nothing: there C has a value
+    return near | drawn.map(lambda x: min(max(float(f"{x:.6f}"), low), high))
 
 
 def changes(block: Any) -> st.SearchStrategy[list[tuple[dict[str, float], int]]]:
@@ -139,7 +141,7 @@ def agree(instance: Instance, twin: Twin, status: int, call: Callable[[], object
     asked, _, reason = expected(instance.fmu, call)
     assert status == asked, instance.log
     if status != OK:
-        assert instance.log[0].text.endswith(reason)
+        assert reason in instance.log[0].text
         assert "\n" not in instance.log[0].text
     instance.log.clear()
     status, y = outputs(instance)
@@ -148,7 +150,7 @@ def agree(instance: Instance, twin: Twin, status: int, call: Callable[[], object
         assert (status, [*map(repr, y)]) == (OK, [*map(repr, found)])
     else:
         assert status == instance.fmu.refused
-        assert instance.log[0].text.endswith(reason)
+        assert reason in instance.log[0].text
     instance.log.clear()
 
 

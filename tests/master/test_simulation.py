@@ -105,7 +105,7 @@ def test_an_fmu_that_fails_on_the_way_leaves_what_was_recorded(
     trap = f"if u.gap < 0.044:\n        raise RuntimeError('the lamp is broken')\n    {GAP}"
     fmu = altered("ProximitySensor", "proximity_sensor/optics.py", GAP, trap)
     with pytest.raises(
-        SimulationError, match=r"^sensor_1: .*error at t = .*lamp is broken"
+        SimulationError, match=r"^sensor_1: .*fatal at t = .*lamp is broken"
     ) as caught:
         simulate(grasp.swap("sensor_1", fmu))
     result = caught.value.result

@@ -12,7 +12,7 @@ from c_compilers import LIBM
 from grasp_fmus.contract import build_params, declared, packer, unpacker, variables
 from grasp_fmus.native import blocks as translation
 from grasp_fmus.shipped import blocks
-from grasp_fmus.snapshot import _scalars
+from grasp_fmus.slave import _scalars
 from support.compiled import compile_c
 from support.native_fmus import needs_gcc
 
