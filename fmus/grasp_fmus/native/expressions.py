@@ -25,14 +25,8 @@ CHOICE, OR, AND, EQUAL, LESS, SUM, PRODUCT, SIGN, WORD = range(1, 10)
 
 OPERATORS = {ast.Add: ("+", SUM), ast.Sub: ("-", SUM), ast.Mult: ("*", PRODUCT)}
 OPERATORS[ast.Div] = "/", PRODUCT
-COMPARISONS = {
-    ast.Lt: "<",
-    ast.LtE: "<=",
-    ast.Gt: ">",
-    ast.GtE: ">=",
-    ast.Eq: "==",
-    ast.NotEq: "!=",
-}
+COMPARISONS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">="}
+EQUALITIES = {ast.Eq: "==", ast.NotEq: "!="}
 FUNCTIONS = {
     getattr(math, name): name
     for name in re.findall(
@@ -41,6 +35,8 @@ FUNCTIONS = {
         "log1p log2 pow sin sinh sqrt tan tanh",
     )
 }
+FUNCTIONS |= {math.ldexp: "scaled"}
+OF_TWO = (math.atan2, math.copysign, math.fmod, math.pow, math.ldexp)
 TO_WHOLE = {math.floor: "floored", math.ceil: "ceiled", math.trunc: "truncated", int: "truncated"}
 
 ADVICE: dict[Any, str] = {
@@ -152,9 +148,8 @@ class Expressions:
         if isinstance(value, bool):
             return Value(str(int(value)), BOOLEAN)
         text = number(value)
-        return Value(
-            text, REAL if isinstance(value, float) else WHOLE, SIGN if text[0] == "-" else WORD
-        )
+        kind = REAL if isinstance(value, float) else WHOLE
+        return Value(text, kind, SIGN if text[0] == "-" else WORD)
 
     # Expressions
 
@@ -246,10 +241,10 @@ class Expressions:
         values[1:-1] = [self.simple(v) for v in values[1:-1]]
         found = []
         for a, op, b in zip(values, node.ops, values[1:], strict=False):
-            if type(op) not in COMPARISONS:
+            symbol = COMPARISONS.get(type(op)) or EQUALITIES.get(type(op))
+            if symbol is None:
                 self.refuse(node, f"{ast.unparse(node)}: is not in the subset; compare numbers")
-            symbol = COMPARISONS[type(op)]
-            level = EQUAL if symbol in ("==", "!=") else LESS
+            level = EQUAL if type(op) in EQUALITIES else LESS
             found.append(Value(f"{self.at(a, SUM)} {symbol} {self.at(b, SUM)}", BOOLEAN, level))
         return self._all(found, "&&", AND)
 
@@ -293,22 +288,16 @@ class Expressions:
             self.refuse(node, f"{ast.unparse(node)} is {said(value.type)}: must be a tuple")
         if value.items is not None:
             return list(value.items)
-        of = self.simple(value, self._called(node)).text
+        of = self.simple(value).text
         kinds = types.parts(value.type)
         return [Value(of + self.program.member(value.type, i), k) for i, k in enumerate(kinds)]
-
-    def _called(self, node: Any) -> str:
-        """What to call the value of an expression: by the function that gives it."""
-        of = getattr(node, "func", None)
-        return str(getattr(of, "attr", getattr(of, "id", "value"))).strip("_").lower()
 
     def _subscript(self, node: ast.Subscript) -> Value:
         items = self.items(self.value(node.value), node.value)
         if isinstance(node.slice, ast.Slice):
-            ends = [
-                None if e is None else self._index(e) for e in (node.slice.lower, node.slice.upper)
-            ]
-            return self.display(items[slice(*ends)])
+            first = self._index(node.slice.lower) if node.slice.lower else 0
+            last = self._index(node.slice.upper) if node.slice.upper else len(items)
+            return self.display(items[first:last])
         place = self._index(node.slice)
         if not -len(items) <= place < len(items):
             self.refuse(node, f"{ast.unparse(node)}: there are {len(items)} items")
@@ -335,10 +324,8 @@ class Expressions:
             if isinstance(t, Record):
                 return self.items(value, node)[[*types.fields(t)].index(name)]
             kind = types.fields(t)[name]
-            return Value(
-                f"{'&' if isinstance(kind, Group) else ''}{self._arrow(value)}{identifier(name)}",
-                kind,
-            )
+            address = "&" if isinstance(kind, Group) else ""
+            return Value(f"{address}{self._arrow(value)}{identifier(name)}", kind)
         found = inspect.getattr_static(t.cls, name, None)
         if isinstance(found, cached_property) and t == self.program.params:
             if name not in self.program.kept:
@@ -359,21 +346,23 @@ class Expressions:
         function = getattr(function, "__wrapped__", function)  # an lru_cache only saves time
         if isinstance(node.func, ast.Attribute) and function is _UNKNOWN:
             return self._method(node, node.func)
+        if node.keywords and function in (min, max, *FUNCTIONS, *TO_WHOLE):
+            self.refuse(node, f"{ast.unparse(node)}: keywords are not in the subset")
         if function in (any, all, tuple):
             return self._over_items(node, function)
         if function in (min, max, abs, float, len) or function in TO_WHOLE:
             return self._builtin(node, function)
-        if function in FUNCTIONS or function is math.ldexp:
-            name = FUNCTIONS.get(function, "scaled")  # with as many arguments as math has
-            return Value(f"{name}({', '.join(self.number(a).text for a in node.args)})", REAL)
+        if function in FUNCTIONS:
+            given = [self.number(a).text for a in node.args]
+            if len(given) != (2 if function in OF_TWO else 1):
+                self.refuse(node, f"{ast.unparse(node)}: has another number of arguments in C")
+            return Value(f"{FUNCTIONS[function]}({', '.join(given)})", REAL)
         if function in ADVICE:
             self.refuse(node, ADVICE[function])
         arguments = self.starred(node.args)
         named = {k.arg: self.value(k.value) for k in node.keywords if k.arg}
         if types.is_record(function):
             return self._record(node, function, arguments, named)
-        if isinstance(function, type) and issubclass(function, IntEnum):
-            return arguments[0]
         if not isinstance(function, FunctionType):
             self.refuse(node, f"{ast.unparse(node.func)}: is not in the subset")
         return self.call(function, arguments, named, node)
@@ -394,13 +383,7 @@ class Expressions:
         except TypeError as error:
             self.refuse(node, f"{ast.unparse(node)}: {error}")
         bound.apply_defaults()
-        return [v if isinstance(v, Value) else self._default(v) for v in bound.arguments.values()]
-
-    def _default(self, value: Any) -> Value:
-        if isinstance(value, tuple):
-            kind = types.of_value(value)
-            return self.display([self._default(item) for item in value], kind)
-        return self.number_of(value)
+        return [v if isinstance(v, Value) else self.number_of(v) for v in bound.arguments.values()]
 
     def _record(self, node: ast.AST, cls: Any, given: Sequence[Value], named: Any) -> Value:
         found = self._matched(inspect.signature(cls), given, named, node)
@@ -435,26 +418,23 @@ class Expressions:
         return Value(text + self.at(default, CHOICE), default.type, CHOICE)
 
     def _builtin(self, node: ast.Call, function: Any) -> Value:
-        if function is len:
-            return self.number_of(len(self.items(self.value(node.args[0]), node.args[0])))
-        arguments = self.starred(node.args)
+        given = self.starred(node.args)
+        if len(given) == 1 and isinstance(given[0].type, Tuple):
+            given = self.items(given[0], node)
+            if function is len:
+                return self.number_of(len(given))
+        value, *others = [self._as_number(a, node) for a in given]
         if function in (min, max):
-            if len(arguments) == 1:
-                arguments = self.items(arguments[0], node.args[0])
-            return self._extreme(node, "smaller" if function is min else "larger", arguments)
-        value = self._as_number(arguments[0], node)
+            for other in others:
+                kind = self.common(value.type, other.type, node)
+                name = "smaller" if function is min else "larger"
+                value = Value(f"{name}({value.text}, {other.text})", kind)
+            return value
         if function is float:
             return value._replace(type=REAL)
         if function is abs:
             return Value(f"fabs({value.text})", value.type)
         return value if value.type == WHOLE else Value(f"{TO_WHOLE[function]}({value.text})", WHOLE)
-
-    def _extreme(self, node: ast.Call, name: str, arguments: Sequence[Value]) -> Value:
-        first, *others = [self._as_number(a, node) for a in arguments]
-        for other in others:
-            kind = self.common(first.type, other.type, node)
-            first = Value(f"{name}({first.text}, {other.text})", kind)
-        return first
 
     # Generators
 
@@ -483,10 +463,8 @@ class Expressions:
     def _rows(self, node: ast.expr) -> list[Value]:
         if isinstance(node, ast.Call) and self.known(node.func) is zip:
             columns = [self.items(self.value(a), a) for a in node.args]
-            return [
-                Value("", Tuple(tuple(v.type for v in row)), WORD, row)
-                for row in zip(*columns, strict=True)
-            ]
+            rows = zip(*columns, strict=True)
+            return [Value("", Tuple(tuple(v.type for v in row)), WORD, row) for row in rows]
         return self.items(self.value(node), node)
 
     def _bind(self, target: ast.expr, value: Value) -> None:

@@ -50,15 +50,17 @@ class Body(Expressions):
 
     def definition(self, name: str, types: Sequence[Type]) -> str:
         """The text of the function in C."""
-        heads = []
-        for argument, kind in zip(self.node.args.args, types, strict=True):
+        heads, given = [], self.node.args
+        if given.vararg or given.kwarg or given.kwonlyargs:
+            self.refuse(self.node, "*args, **kwargs and keywords alone are not in the subset")
+        for argument, kind in zip(given.args, types, strict=True):
             c_name = self.fresh(argument.arg, own=True)
             self.bound[argument.arg] = Value(c_name, kind)
             star = "const {} *{}" if isinstance(kind, Group) else "{} {}"
             heads.append(star.format(self.program.c(kind, self.names), c_name))
         self.block(self.node.body)
-        if self.returns is None:
-            self.refuse(self.node, f"{self.node.name}: must return a value")
+        if self.returns is None or not _ends(self.node.body):
+            self.refuse(self.node, f"{self.node.name}: must return a value on every way")
         return self._text(name, heads, self.program.c(self.returns, self.names))
 
     def _text(self, name: str, heads: Sequence[str], returns: str) -> str:
@@ -129,9 +131,7 @@ class Body(Expressions):
         if node.value is None:
             self.refuse(node, f"{self.node.name}: must return a value")
         value = self.value(node.value)
-        self.returns = (
-            value.type if self.returns is None else self.common(self.returns, value.type, node)
-        )
+        self.returns = self.common(self.returns or value.type, value.type, node)
         self.say(f"return {value.text};")
 
     def _on_annassign(self, node: ast.AnnAssign) -> None:
@@ -162,9 +162,7 @@ class Body(Expressions):
             old = self.bound.get(name)
             for j in range(i + 1, len(pairs)):
                 later, v = pairs[j]
-                if old and re.search(
-                    rf"(?<![\w.>])(?<!-){re.escape(old.text)}\b", v.text.replace("->", ".")
-                ):
+                if old and re.search(rf"(?<![\w.]){old.text}\b", v.text.replace("->", ".")):
                     pairs[j] = later, self.copied(v, f"new_{later}")
         for name, v in pairs:
             self._store(name, v, node)
@@ -189,9 +187,8 @@ class Body(Expressions):
             return
         kind = joined(old.type, value.type)
         if kind is None:
-            self.refuse(
-                node, f"{name} is {said(old.type)}, then {said(value.type)}; use another name"
-            )
+            kinds = f"{said(old.type)}, then {said(value.type)}"
+            self.refuse(node, f"{name} is {kinds}; use another name")
         self.bound[name] = Value(old.text, kind)
         self.say(f"{old.text} = {value.text};")
 
@@ -313,6 +310,14 @@ def translated_function(
     program.functions[key] = made = Function(name, body.returns)
     program.bodies.append(text)
     return made
+
+
+def _ends(body: Sequence[ast.stmt]) -> bool:
+    """Return True if a block always ends in a return."""
+    last = body[-1] if body else None
+    if isinstance(last, ast.If):
+        return _ends(last.body) and _ends(last.orelse)
+    return isinstance(last, ast.Return)
 
 
 def _names(node: ast.AST, context: type[ast.expr_context] = ast.expr_context) -> list[str]:
