@@ -20,9 +20,7 @@ import fmpy
 import pytest
 from grasp_cosim import System, cli
 from grasp_cosim.grasp.presets import SYSTEM
-from grasp_fmus.build import build
-from grasp_fmus.native import twins
-from grasp_fmus.native.build import build_native
+from grasp_fmus.build import build, build_native, shipped_twins
 from hypothesis import find, settings
 from hypothesis import strategies as st
 from support import campaign, kinds
@@ -297,9 +295,9 @@ def no_compiler(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Non
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setattr(c_compilers, "find_zig", lambda: None)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    twins.shipped_twins.cache_clear()
+    shipped_twins.cache_clear()
     yield
-    twins.shipped_twins.cache_clear()
+    shipped_twins.cache_clear()
 
 
 @pytest.fixture

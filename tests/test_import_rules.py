@@ -7,8 +7,9 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from grasp_fmus.build import SOURCES
 from grasp_fmus.package import packages, shipped_model, with_imports
-from grasp_fmus.shipped import SCRIPTS, blocks
+from grasp_fmus.shipped import PACKAGES, SHIPPED
 from support.imports import (
     Import,
     calls,
@@ -140,22 +141,28 @@ def test_the_protocol_of_the_link_is_known_to_both_its_ends_alone_and_knows_nobo
     assert not foreign
 
 
-def test_the_fmu_adapter_knows_no_physics_but_for_the_scripts() -> None:
-    found = {
-        (f, n)
-        for f, n in imports(ROOT / "fmus/grasp_fmus")
-        if n in OURS - {"grasp_fmus", "block_variables", "c_compilers"}
-    }
-    assert found == {
-        (f"{name}.py", block.__name__.partition(".")[0]) for name, block in blocks().items()
-    }
+def test_the_fmu_adapter_knows_no_physics_but_for_a_table_of_names() -> None:
+    found = {n for _, n in imports(ROOT / "fmus/grasp_fmus") if n in {*BLOCKS.values()}}
+    assert not found
+    naming = {f.name for f in (ROOT / "fmus/grasp_fmus").rglob("*.py") if BY_NAME & called(f)}
+    assert naming == {"shipped.py", "package.py"}
+    assert {s.module.partition(".")[0] for s in SHIPPED.values()} == {*BLOCKS.values()}
+
+
+def called(file: Path) -> set[str]:
+    """The names in a file."""
+    return {n.id for n in ast.walk(ast.parse(file.read_text("utf-8"))) if isinstance(n, ast.Name)}
+
+
+def test_all_that_fmus_are_made_of_decides_whether_they_are_up_to_date() -> None:
+    assert set(packages("grasp_fmus")) <= {*SOURCES}
 
 
 def test_what_is_packed_into_fmus_imports_the_standard_library_only() -> None:
-    models = [shipped_model(script) for script in SCRIPTS.glob("*.py")]
+    models = [shipped_model(name) for name in SHIPPED]
     packed = with_imports({name: data for m in models for name, data in m.sources.items()})
     assert {"grasp_fmus/slave.py", "gripper_plant/movable.py"} < packed.keys()
-    ours = packages("grasp_fmus").keys()
+    ours = {*PACKAGES, "grasp_fmus"}
     foreign = {
         (file, name)
         for file, source in packed.items()

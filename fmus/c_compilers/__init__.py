@@ -13,8 +13,7 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from tempfile import mkdtemp
@@ -128,39 +127,28 @@ def environment(scratch: Path) -> dict[str, str]:
     return {**os.environ, **own, "LC_ALL": "C"}
 
 
-def compile_all(jobs: Sequence[Job], scratch: Path) -> list[Path]:
+def compile_all(jobs: Iterable[Job], scratch: Path) -> list[Path]:
     """Return the library of each job, which is compiled in scratch where it is not kept.
 
-    It stays there where nothing can be kept. CompilerError where a compiler fails.
+    That is done while the next job is waited for, as many at once as there are processors. What
+    cannot be kept stays in scratch. CompilerError where a compiler fails; however this ends, none
+    runs on.
     """
-    made = {name: cache.kept(name) for name in (job.kept_as for job in jobs)}
-    missing = {job.kept_as: job for job in jobs if not made[job.kept_as]}
-    compiled = zip(missing, _compiled([*missing.values()], scratch), strict=True)
-    made |= {name: cache.keep(library, name) for name, library in compiled}
-    return [place for job in jobs if (place := made[job.kept_as])]
+    from concurrent.futures import ThreadPoolExecutor  # only now: it takes time to load
 
-
-def _compiled(jobs: Sequence[Job], scratch: Path) -> list[Path]:
-    """Return the libraries of jobs, as many at once as there are processors.
-
-    However this ends, no compiler runs on.
-    """
     most = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     started: list[subprocess.Popen[str]] = []
     ended = threading.Event()
 
     def run(job: Job) -> Path:
+        if library := cache.kept(job.kept_as):
+            return library
         folder = Path(mkdtemp(dir=scratch))
         process = _started(job, folder)
         started.append(process)
         if ended.is_set():
             _end(process)
-        said, _ = process.communicate()
-        library = folder / f"{job.name}{job.suffix}"
-        if process.returncode or not library.is_file():
-            command = f"{shlex.join(job.compiler.command)}: exit code {process.returncode}"
-            raise CompilerError(f"{job.name}.c: {command}: {_first_error(said)}")
-        return library
+        return cache.keep(_made(job, process, folder), job.kept_as)
 
     with ThreadPoolExecutor(most) as pool:
         try:
@@ -185,9 +173,15 @@ def _started(job: Job, folder: Path) -> subprocess.Popen[str]:
         raise CompilerError(f"{job.name}.c: {said}") from error
 
 
-def _first_error(text: str) -> str:
-    lines = [line.strip() for line in text.splitlines() if line.strip()] or ["no message"]
-    return next((line for line in lines if re.search(r"\berror\b", line, re.I)), lines[-1])
+def _made(job: Job, process: subprocess.Popen[str], folder: Path) -> Path:
+    said, _ = process.communicate()
+    library = folder / f"{job.name}{job.suffix}"
+    if process.returncode == 0 and library.is_file():
+        return library
+    lines = [line.strip() for line in said.splitlines() if line.strip()] or ["no message"]
+    first = next((line for line in lines if re.search(r"\berror\b", line, re.I)), lines[-1])
+    command = shlex.join(job.compiler.command)
+    raise CompilerError(f"{job.name}.c: {command}: exit code {process.returncode}: {first}")
 
 
 def _end(process: subprocess.Popen[str]) -> None:

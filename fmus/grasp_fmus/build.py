@@ -1,34 +1,354 @@
-"""Brings a folder of FMUs up to date with the sources."""
+"""Builds FMUs, those that Python runs and native ones, and brings folders of them up to date.
 
+What was built of the blocks that come with the package is kept in the user's cache, under a key
+made of all that decides it: the sources, and of native FMUs the platforms, compilers and flags. A
+folder is brought up to date by copying what differs, and that takes no import of what builds.
+"""
+
+from __future__ import annotations
+
+import atexit
+import functools
+import os
+import shutil
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack, nullcontext, suppress
+from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from .folder import is_current, sources_hash, write_stamp
-from .package import Built, write_file
-from .shipped import SCRIPTS, slave_class
+from c_compilers import Compiler, CompilerError, Job, cache, compile_all, find_compiler
+
+from .native.targets import Target, Version, folders, here, universal
+from .package import Built, card_file, package_folder, write_file
+from .shipped import PACKAGES, SHIPPED
+
+if TYPE_CHECKING:
+    import zipfile
+
+    from .package import Model
+
+Members = Mapping[str, bytes]
+"""The files in an FMU, by name."""
+
+SOURCES = (*PACKAGES, "c_compilers", "grasp_fmus")
+"""The packages that decide what FMUs hold."""
+
+VERSIONS = ("grasp_cosim-", "latex2mathml-", "markdown_it_py-", "pythonfmu-")
+"""Of distributions whose versions are in FMUs, or decide what is: so their metadata is called."""
+
+MOST_KEPT = 16
+"""Builds in the cache: every change of a source makes one."""
+
+UNPREFIXED = tuple(f"FMI{fmi}_OVERRIDE_FUNCTION_PREFIX" for fmi in (2, 3))
+"""What is defined for a shared library, in which functions are called as the standard does."""
+
+NETWORKED = {".so": ("-lpthread", "-ldl"), ".dll": ("-lws2_32",)}
+"""The libraries of sockets and threads, by the suffix of a shared library; cl is told in the C."""
+
+
+class NoTwinsError(Exception):
+    """There are no native FMUs here, and none can be built: why, and what helps, in one line."""
+
+
+class Plan(NamedTuple):
+    """Which binaries an FMU gets: by target its folder and its compiler."""
+
+    fmi: Version
+    places: Mapping[Target, str]
+    compilers: Mapping[Target, Compiler]
+    note: str
+    """What is to be said of the folders, or ""."""
+
+    @property
+    def key(self) -> str:
+        """A hash of all that decides the binaries, but for the sources."""
+        return cache.key(
+            repr((self.fmi, *place, self.compilers[place[0]].identity))
+            for place in self.places.items()
+        )
+
+
+def planned(asked: Sequence[Target] = (), fmi: Version = 2) -> Plan:
+    """Return the plan for this machine and the targets asked for.
+
+    ValueError, one line, where there is no compiler for one of them.
+    """
+    places, note = folders(asked, fmi)
+    return Plan(fmi, places, {t: compiler_for(t, t in asked) for t in places}, note)
+
+
+def compiler_for(target: Target, asked: bool) -> Compiler:
+    """Return the compiler for a target; ValueError where there is none, with what to install.
+
+    Where the target was asked for by name, to go to machines with an older libc, it is zig.
+    """
+    return find_compiler("" if target == here() and not asked else target.zig)
 
 
 def build(out: Path) -> list[Built]:
-    """Build the FMUs into the folder `out`, in alphabetical order, with their cross-check files.
+    """Build the FMUs that Python runs into the folder `out`, with their cross-check files.
 
-    An FMU that is there already with the same content is left alone, and nothing is
-    made at all where the stamp in the folder says that all is as it was built from these sources.
-    An FMU that needs other packages has no cross-check files: it would be these that they check,
-    and only where they are installed.
+    A file that is there with the same content is left alone. An FMU that needs other packages has
+    no cross-check files: it would be these that they check, and only where they are installed.
     """
-    scripts = sorted(SCRIPTS.glob("*.py"))
-    sources = sources_hash()
-    if is_current(out, sources):
-        return [Built(out / f"{script.stem}.fmu", "unchanged") for script in scripts]
-    from .cross_check import cross_check_files  # only now: they take longer to load than that took
-    from .package import build_fmu
+    return _brought(out, _kept(_build_python, "python"))
 
-    built = [build_fmu(script, out) for script in scripts]
-    names = [fmu.path.name for fmu in built]
-    for script in scripts:
-        slave = slave_class(script)
-        files = {} if slave.requires else cross_check_files(script.stem, slave.block)
-        for name, data in files.items():
-            write_file(out / name, data)
-        names += files
-    write_stamp(out, sources, names)
+
+def build_native(out: Path, plan: Plan | None = None, names: Sequence[str] = ()) -> list[Built]:
+    """Build native FMUs into the folder `out`, with their cross-check files; by default all.
+
+    ValueError, one line, for a name that is none or stays Python only, or where a compiler is
+    missing; CompilerError where one fails.
+    """
+    return _brought(out, _kept_native(plan or planned(), chosen_names(names)))
+
+
+def build_block(file: Path, out: Path, plan: Plan | None = None) -> Built:
+    """Build the FMU of the block in a file into the folder out: spring_plant.py, SpringPlant.fmu.
+
+    With a plan it is native. ValueError, one line, where the file is no block, see own_model().
+    """
+    from .own_block import own_model
+
+    with own_model(file) as model:
+        return build_model(model, out, plan)
+
+
+def build_model(model: Model, out: Path, plan: Plan | None = None) -> Built:
+    """Build the FMU of a model into the folder `out`, without cross-check files."""
+    from .native.members import native_members
+    from .package import write_members, write_python
+
+    name = model.description.name
+    if not plan:
+        return write_python(out / f"{name}.fmu", model)
+    fmus = with_binaries([(name, native_members(model, plan.fmi))], plan)
+    return write_members(out / f"{name}.fmu", fmus[name])
+
+
+def chosen_names(names: Sequence[str] = ()) -> list[str]:
+    """Return these names of blocks that come with the package, by default all that can be native.
+
+    ValueError, one line, for one that is none, or that stays Python only.
+    """
+    only = python_only()
+    known = [name for name in SHIPPED if name not in only]
+    for name in names:
+        if name not in known:
+            valid = f"no such block; must be of {', '.join(known)}, or a file NAME.py"
+            raise ValueError(only.get(name, f"{name}: {valid}"))
+    return [*names] or known
+
+
+def python_only() -> dict[str, str]:
+    """Why a block that comes with the package cannot be native, by its name."""
+    return {
+        name: f"{name}: stays Python only, as it needs {', '.join(shipped.requires)}"
+        for name, shipped in SHIPPED.items()
+        if shipped.requires
+    }
+
+
+def with_binaries(
+    fmus: Iterable[tuple[str, Members]], plan: Plan, networked: bool = False
+) -> dict[str, Members]:
+    """Return the FMUs by name with their binaries; those of one place become one for all.
+
+    Each is compiled while the next is waited for. `networked` ones are linked with what sockets
+    need.
+    """
+    complete: dict[str, Members] = {}
+
+    def jobs() -> Iterator[Job]:
+        for name, files in fmus:
+            complete[name] = files
+            for target, compiler in plan.compilers.items():
+                yield job(name, _sources(files), target, compiler, networked)
+
+    with TemporaryDirectory(prefix="grasp_fmus_") as scratch:
+        made = iter([library.read_bytes() for library in compile_all(jobs(), Path(scratch))])
+    for name, files in complete.items():
+        thin: dict[str, list[bytes]] = {}
+        for target in plan.compilers:
+            place = f"binaries/{plan.places[target]}/{name}{target.suffix}"
+            thin.setdefault(place, []).append(next(made))
+        binaries = {place: several[0] if len(several) == 1 else universal(several)
+                    for place, several in thin.items()}  # fmt: skip
+        complete[name] = {**files, **binaries}
+    return complete
+
+
+def job(
+    name: str, sources: Members, target: Target, compiler: Compiler, networked: bool = False
+) -> Job:
+    """Return what makes the library of an FMU, in which functions are called as in the standard."""
+    libraries = NETWORKED.get(target.suffix, ()) if networked else ()
+    return Job(name, sources, compiler, target.suffix, UNPREFIXED, libraries)
+
+
+def _sources(files: Members) -> dict[str, bytes]:
+    """Return the files of sources/ by their names there."""
+    place = "sources/"
+    return {n.removeprefix(place): data for n, data in files.items() if n.startswith(place)}
+
+
+# ------------------------------------------------------------------ what is kept
+
+
+def sources_key() -> str:
+    """Return a key of all that decides what the FMUs and the files beside them hold.
+
+    That is our packages and cards, pythonfmu's binaries, versions, and that of Python.
+    """
+    site = package_folder("pythonfmu")
+    files = [*_below(site / "resources" / "binaries"), *map(card_file, PACKAGES)]
+    files += [file for package in SOURCES for file in _below(package_folder(package))]
+    versions = sorted(name for name in os.listdir(site.parent) if name.startswith(VERSIONS))  # noqa: PTH208
+    contents = (part for f in files if f.is_file() for part in (f.name, f.read_bytes()))
+    return cache.key((sys.version, *versions, *contents))
+
+
+def _below(folder: Path) -> list[Path]:
+    """Return the files below a folder, but for what Python makes there."""
+    found = []
+    for place, below, names in os.walk(folder):
+        below[:] = sorted(name for name in below if name != "__pycache__")
+        found += [Path(place, name) for name in sorted(names)]
+    return found
+
+
+def _kept(make: Callable[[Path], None], *parts: str) -> Path:
+    """Return the folder that `make` fills, from the cache where it was made of the same parts.
+
+    Where nothing can be kept it ends with this process.
+    """
+    name = f"fmus/{cache.key((sources_key(), *parts))}"
+    if kept := cache.kept(name):
+        return kept
+    with ExitStack() as stack:
+        made = Path(stack.enter_context(TemporaryDirectory(prefix="grasp_fmus_")))
+        make(made)
+        kept = cache.keep(made, name)
+        if kept == made:
+            atexit.register(stack.pop_all().close)
+        else:
+            _forget_old(kept.parent)
+    return kept
+
+
+def _forget_old(folder: Path) -> None:
+    with suppress(OSError):  # another process does so, too
+        for old in sorted(folder.iterdir(), key=lambda f: f.stat().st_mtime)[:-MOST_KEPT]:
+            shutil.rmtree(old)
+
+
+def _brought(out: Path, made: Path) -> list[Built]:
+    """Bring the folder `out` up to date with one that was made; return its FMUs."""
+    built = []
+    for file in sorted(made.iterdir()):
+        target, data = out / file.name, file.read_bytes()
+        there = target.is_file()
+        same = there and target.read_bytes() == data
+        if not same:
+            write_file(target, data)
+        if file.suffix == ".fmu":
+            built.append(Built(target, "unchanged" if same else "changed" if there else "new"))
     return built
+
+
+def _build_python(folder: Path) -> None:
+    from .package import shipped_model, write_python
+
+    for name, shipped in SHIPPED.items():
+        model = shipped_model(name)
+        write_python(folder / f"{name}.fmu", model)
+        if not shipped.requires:
+            _write_checks(folder, name, model.block)
+
+
+def _kept_native(
+    plan: Plan,
+    names: Sequence[str],
+    during: Callable[[str], AbstractContextManager[object]] = nullcontext,
+) -> Path:
+    return _kept(partial(_build_native, plan, names, during), "native", plan.key, *names)
+
+
+def _build_native(
+    plan: Plan,
+    names: Sequence[str],
+    during: Callable[[str], AbstractContextManager[object]],
+    folder: Path,
+) -> None:
+    from .native.members import native_members
+    from .package import shipped_model, write_members
+
+    def fmus() -> Iterator[tuple[str, Members]]:
+        for name in names:
+            model = shipped_model(name)
+            yield name, native_members(model, plan.fmi)
+            _write_checks(folder, name, model.block)
+
+    with during("compiling the native FMUs, once for these sources"):
+        for name, complete in with_binaries(fmus(), plan).items():
+            write_members(folder / f"{name}.fmu", complete)
+
+
+def _write_checks(folder: Path, name: str, block: Any) -> None:
+    from .cross_check import cross_check_files
+
+    for file, data in cross_check_files(name, block).items():
+        (folder / file).write_bytes(data)
+
+
+# ------------------------------------------------------------------ twins
+
+
+@functools.cache
+def shipped_twins(
+    during: Callable[[str], AbstractContextManager[object]] = nullcontext,
+) -> Path:
+    """The folder of the native FMUs of the blocks that come with the package, built if need be.
+
+    That is done in the context that `during` makes of a line that says so. NoTwinsError where it
+    cannot be.
+    """
+    try:
+        return _kept_native(planned(), chosen_names(), during)
+    except (ValueError, CompilerError) as error:
+        raise NoTwinsError(str(error)) from error
+    except OSError as error:
+        raise NoTwinsError(f"{error.filename}: {error.strerror}") from error
+
+
+def is_twin(fmu: Path, content: str) -> bool:
+    """Return True for a native FMU that runs here, and whose Python twin has this content hash.
+
+    It says so in its sources.
+    """
+    import zipfile
+    import zlib
+
+    damaged = (OSError, EOFError, ValueError, RuntimeError, zipfile.BadZipFile, zlib.error)
+    with suppress(*damaged), zipfile.ZipFile(fmu) as archive:
+        said = f'#define CONTENT "{content}"'.encode()
+        sources = [n for n in archive.namelist() if n.startswith("sources/") and n.endswith(".c")]
+        return any(said in archive.read(name) for name in sources) and _runs_here(archive)
+    return False
+
+
+def _runs_here(archive: zipfile.ZipFile) -> bool:
+    """Return True if a binary is for this machine: linux64 may hold one for another processor."""
+    places = tuple(f"binaries/{name}/" for name in (here().folder, here().tuple))
+    binaries = [name for name in archive.namelist() if name.startswith(places)]
+    with Path(sys.executable).open("rb") as python:
+        ours = _processor(python.read(20))
+    return any(_processor(archive.read(name)) == ours for name in binaries)
+
+
+def _processor(binary: bytes) -> bytes:
+    """Return the processor that an ELF file is for; of other files nothing."""
+    return binary[18:20] if binary.startswith(b"\x7fELF") else b""

@@ -5,7 +5,6 @@ from pathlib import Path
 from .package import HASH as HASH
 from .package import Built, write_python
 from .package import Model as Model
-from .package import build_fmu as build_fmu
 from .package import hashed as hashed
 from .package import python_members as python_members
 from .package import shipped_model as shipped_model

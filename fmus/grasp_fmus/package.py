@@ -16,9 +16,12 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
+
+from .shipped import SHIPPED
 
 if TYPE_CHECKING:
     from .model_description import Description
@@ -35,12 +38,10 @@ BINARIES = {"linux64": ("libpythonfmu-export", "so"), "win64": ("pythonfmu-expor
 
 @dataclass(frozen=True, slots=True)
 class Built:
-    """An FMU in its folder, and how building it changed what was there."""
+    """An FMU in its folder, and how it is beside what was there."""
 
     path: Path
     status: Literal["new", "changed", "unchanged"]
-    changes: tuple[str, ...] = ()
-    """Empty; the command still asks."""
 
 
 @dataclass(frozen=True)
@@ -61,28 +62,22 @@ class Model:
     """Packages that must be installed where it runs."""
 
 
-def build_fmu(script: Path, out: Path) -> Built:
-    """Build the FMU of a script that comes with this package into the folder `out`."""
-    return write_python(out / f"{script.stem}.fmu", shipped_model(script))
-
-
-def shipped_model(file: Path) -> Model:
-    """Return the model of a script."""
+def shipped_model(name: str) -> Model:
+    """Return the model of an FMU that comes with this package."""
     from .contract import declared, variables
     from .model_description import Description
     from .page import icon
-    from .shipped import slave_class
 
-    slave = slave_class(file)
-    block, name = slave.block, file.stem
-    package, _, module = block.__name__.rpartition(".")
+    shipped = SHIPPED[name]
+    block = import_module(shipped.module)
+    package, _, module = shipped.module.rpartition(".")
     return Model(
-        Description(name, (slave.__doc__ or "").rstrip("."), variables(declared(block))),
+        Description(name, shipped.summary, variables(declared(block))),
         card_file(package).read_text("utf-8"),
         {f"{name}.py": script(f"from {package} import {module} as block")},
         block,
         picture=icon(name),
-        requires=slave.requires,
+        requires=shipped.requires,
     )
 
 

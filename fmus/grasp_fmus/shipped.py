@@ -1,30 +1,51 @@
-"""The FMUs that come with this package: one for each script."""
+"""The FMUs that come with this package: a line for each, the only place that knows their blocks."""
 
-from importlib.util import module_from_spec, spec_from_file_location
-from pathlib import Path
-from typing import Any
-
-SCRIPTS = Path(__file__).parent / "scripts"
+from collections.abc import Mapping
+from importlib import import_module
+from typing import Any, NamedTuple
 
 
-class Script:
-    """What a script in SCRIPTS says of an FMU."""
+class Shipped(NamedTuple):
+    """What an FMU is, and the module of its block."""
 
-    block: Any
+    summary: str
+    module: str
     requires: tuple[str, ...] = ()
-    """Packages that the block imports when its first state is made; not packed."""
+    """Packages that must be installed where it runs."""
 
 
-def slave_class(script: Path) -> Any:
-    """Return the class in a script, which has the script's name."""
-    spec = spec_from_file_location(script.stem, script)
-    if spec is None or spec.loader is None:
-        raise ImportError(f"{script}: must be a Python file")
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return getattr(module, script.stem)
+SHIPPED: Mapping[str, Shipped] = {
+    "GraspController": Shipped(
+        "Multiple impedance control: simultaneous contact, impact reduction, contact force",
+        "grasp_controller.series",
+    ),
+    "GraspControllerAdaptive": Shipped(
+        "Multiple impedance control of a grasp whose two faces may differ in colour",
+        "grasp_controller.adaptive",
+    ),
+    "GripperPlant": Shipped("Two-finger gripper and a rigid, fixed object", "gripper_plant.rigid"),
+    "GripperPlantCompliant": Shipped(
+        "Two-finger gripper and a fixed object that gives", "gripper_plant.compliant"
+    ),
+    "GripperPlantMovable": Shipped(
+        "Two-finger gripper and a box on a floor, which slides and topples", "gripper_plant.movable"
+    ),
+    "GripperPlantMuJoCo": Shipped(
+        "Two-finger gripper and a box, fixed or on a floor, in MuJoCo",
+        "gripper_plant.mujoco_box",
+        ("mujoco",),
+    ),
+    "ProximitySensor": Shipped(
+        "Optical proximity sensor of the reflected-light-intensity type, one channel",
+        "proximity_sensor.channel",
+    ),
+}
+"""By the names of the FMUs, in alphabetical order."""
+
+PACKAGES = ("block_variables", *sorted({s.module.partition(".")[0] for s in SHIPPED.values()}))
+"""What a block of one's own may import besides the standard library."""
 
 
 def blocks() -> dict[str, Any]:
-    """Return the blocks, which are modules, by the names of their FMUs, in alphabetical order."""
-    return {script.stem: slave_class(script).block for script in sorted(SCRIPTS.glob("*.py"))}
+    """Return the blocks, which are modules, by the names of their FMUs."""
+    return {name: import_module(shipped.module) for name, shipped in SHIPPED.items()}

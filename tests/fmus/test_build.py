@@ -1,101 +1,171 @@
-"""Packing: reproducible, complete, left alone when nothing changed."""
+"""Building: complete, the same bytes everywhere, made once, and what is there left alone."""
 
 import os
 import shutil
 import subprocess
 import sys
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from grasp_fmus.build import build
-from grasp_fmus.folder import STAMP, Built, is_current, sources_hash
-from grasp_fmus.package import HASH, build_fmu, package_folder, packages
+from c_compilers import cache
+from grasp_fmus import build as builds
+from grasp_fmus.build import (
+    Plan,
+    build,
+    build_block,
+    build_native,
+    chosen_names,
+    planned,
+    python_only,
+    sources_key,
+)
+from grasp_fmus.native.targets import here
+from grasp_fmus.package import HASH, Built, package_folder, read_members
 from grasp_fmus.page import icon
-from grasp_fmus.shipped import SCRIPTS, blocks
+from grasp_fmus.shipped import SHIPPED
+from support.kinds import OWN, TRANSLATED
+from support.native_fmus import needs_gcc
 from support.slow import slow
 
-NAMES = list(blocks())
-FMUS = [f"{name}.fmu" for name in NAMES]
-CHECKED = [name for name in NAMES if name != "GripperPlantMuJoCo"]
-"""Those with cross-check files; of the other they would check the package that it needs."""
-
-FILES = sorted(
-    [
-        STAMP,
-        *FMUS,
-        *(f"{name}{end}" for name in CHECKED for end in ("_in.csv", "_ref.csv", "_ref.opt")),
-    ]
-)
+ENDS = ("_in.csv", "_ref.csv", "_ref.opt")
+FILES = sorted([f"{n}.fmu" for n in SHIPPED] + [n + end for n in TRANSLATED for end in ENDS])
+BINARY = f"binaries/{here().folder}/{{}}{here().suffix}"
+ONE = ["ProximitySensor"]
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in folder.iterdir()}
+    return {path.name: path.read_bytes() for path in folder.glob("[!.]*")}
 
 
 def times(folder: Path) -> dict[str, int]:
-    return {path.name: path.stat().st_mtime_ns for path in folder.iterdir()}
+    return {path.name: path.stat().st_mtime_ns for path in folder.glob("[!.]*")}
 
 
-def test_there_is_a_plant_a_sensor_and_a_controller() -> None:
-    assert {"GraspController", "GripperPlant", "ProximitySensor"} <= set(NAMES)
+def members(fmu: Path) -> dict[str, bytes]:
+    return read_members(fmu.read_bytes())
 
 
-def test_builds_the_fmus_with_their_cross_check_files(fmus: Path) -> None:
-    assert sorted(path.name for path in fmus.iterdir()) == FILES
+@pytest.fixture
+def out(fmus: Path, tmp_path: Path) -> Path:
+    """A folder with what was built."""
+    return Path(shutil.copytree(fmus, tmp_path / "out"))
+
+
+@pytest.fixture
+def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty one."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return tmp_path / "cache/grasp-cosim"
+
+
+# ------------------------------------------------------------------ what is built
+
+
+def test_the_fmus_with_their_cross_check_files(fmus: Path, natives: Path) -> None:
+    assert sorted(contents(fmus)) == FILES
+    assert sorted(contents(natives)) == sorted(
+        [f"{n}.fmu" for n in TRANSLATED] + [n + end for n in TRANSLATED for end in ENDS]
+    )
+    for name in (n + end for n in TRANSLATED for end in ENDS):
+        assert (natives / name).read_bytes() == (fmus / name).read_bytes()
+
+
+def test_archives_are_the_same_whenever_they_are_made(fmus: Path) -> None:
+    for path in fmus.glob("*.fmu"):
+        with zipfile.ZipFile(path) as archive:
+            entries = archive.infolist()
+        assert [e.filename for e in entries] == sorted(e.filename for e in entries)
+        assert {(e.date_time, e.external_attr >> 16, e.compress_type) for e in entries} == {
+            ((1980, 1, 1, 0, 0, 0), 0o644, zipfile.ZIP_DEFLATED)
+        }
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_what_is_in_an_fmu(fmus: Path, natives: Path, name: str) -> None:
+    common = {"modelDescription.xml", "documentation/index.html"}
+    common |= {"model.png"} if icon(name) else set()
+    folders = ("resources/", "sources/", "documentation/licenses/")
+    python = members(fmus / f"{name}.fmu")
+    found = {n for n in python if not n.startswith(folders)}
+    assert found == {*common, f"binaries/linux64/{name}.so", f"binaries/win64/{name}.dll"}
+    assert "documentation/licenses/license.txt" in python
+    assert not [n for n, data in python.items() if HASH in n or HASH.encode() in data]
+    if name in TRANSLATED:
+        native = members(natives / f"{name}.fmu")
+        assert {n for n in native if not n.startswith(folders)} == {*common, BINARY.format(name)}
+        assert native.get("model.png") == python.get("model.png")
+        content = python["resources/slavemodule.txt"].rpartition(b"_")[2]
+        assert b'"%s"' % content in native[f"sources/{name}.c"]
+        assert not [n for n, data in native.items() if HASH in n or HASH.encode() in data]
 
 
 @pytest.mark.slow
-def test_says_what_it_built(tmp_path: Path) -> None:
-    folder = tmp_path / "not" / "there yet"
-    assert build(folder) == [Built(folder / name, "new", ()) for name in FMUS]
-    assert build(folder) == [Built(folder / name, "unchanged", ()) for name in FMUS]
-
-
-@pytest.mark.slow
-def test_another_process_gives_the_same_bytes(fmus: Path, tmp_path: Path) -> None:
-    """From another folder, and with sets in another order."""
+def test_another_process_gives_the_same_bytes(fmus: Path, own_cache: Path, tmp_path: Path) -> None:
+    """From another folder, with sets in another order, and several at once."""
     script = "from pathlib import Path; from grasp_fmus import build; build.build(Path('out'))"
-    for seed in ("1", "2"):
-        subprocess.run(
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    started = [
+        subprocess.Popen(
             [sys.executable, "-c", script],
-            cwd=tmp_path, check=True,
-            env={**os.environ, "PYTHONHASHSEED": seed, "PYTHONPATH": os.pathsep.join(sys.path)},
-        )  # fmt: skip
-        assert contents(tmp_path / "out") == contents(fmus)
-        shutil.rmtree(tmp_path / "out")
+            cwd=tmp_path, env={**environment, "PYTHONHASHSEED": seed},
+        )
+        for seed in ("1", "2", "3")
+    ]  # fmt: skip
+    assert [process.wait() for process in started] == [0, 0, 0]
+    assert contents(tmp_path / "out") == contents(fmus)
+    assert len(list((own_cache / "fmus").iterdir())) == 1
 
 
-@pytest.mark.parametrize("name", FMUS)
-def test_entries_are_sorted_and_dated_alike(fmus: Path, name: str) -> None:
-    with zipfile.ZipFile(fmus / name) as archive:
-        entries = archive.infolist()
-    assert [e.filename for e in entries] == sorted(e.filename for e in entries)
-    assert {e.date_time for e in entries} == {(1980, 1, 1, 0, 0, 0)}
-    assert {e.external_attr >> 16 for e in entries} == {0o644}
-    assert {e.compress_type for e in entries} == {zipfile.ZIP_DEFLATED}
+@needs_gcc
+def test_another_compiler_makes_another_binary_and_nothing_else(
+    natives: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The GUID is that of description and sources, whatever they are compiled with."""
+    monkeypatch.setenv("CC", "gcc -fno-inline")
+    (built,) = build_native(tmp_path, names=ONE)
+    ours, theirs = members(built.path), members(natives / "ProximitySensor.fmu")
+    assert {n for n in ours if ours[n] != theirs[n]} == {BINARY.format("ProximitySensor")}
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_everything_an_fmu_should_have(fmus: Path, name: str) -> None:
-    with zipfile.ZipFile(fmus / f"{name}.fmu") as archive:
-        found = {n for n in archive.namelist() if not n.startswith("resources/")}
-    assert found - {n for n in found if n.startswith("documentation/licenses/")} == {
-        "modelDescription.xml",
-        *(["model.png"] if icon(name) else []),
-        "documentation/index.html",
-        f"binaries/linux64/{name}.so",
-        f"binaries/win64/{name}.dll",
-    }
-    assert "documentation/licenses/license.txt" in found
+@needs_gcc
+def test_versions_of_fmi_differ_in_what_they_must(natives: Path, tmp_path: Path) -> None:
+    (built,) = build_native(tmp_path, planned(fmi=3), ONE)
+    two, three = members(natives / "ProximitySensor.fmu"), members(built.path)
+    assert three["terminalsAndIcons/icon.png"] == two["model.png"]
+    assert f"binaries/{here().tuple}/ProximitySensor{here().suffix}" in three
+    assert two["sources/block.h"] == three["sources/block.h"]
+    assert "fmi2" not in three["documentation/index.html"].decode()
 
 
-def test_no_place_is_left_where_the_hash_belongs(fmus: Path) -> None:
-    for name in FMUS:
-        with zipfile.ZipFile(fmus / name) as archive:
-            for member in archive.namelist():
-                assert HASH not in member
-                assert HASH.encode() not in archive.read(member)
+# ------------------------------------------------------------------ up to date
+
+
+def test_what_is_there_is_left_alone(out: Path) -> None:
+    before = times(out)
+    assert build(out) == [Built(out / f"{name}.fmu", "unchanged") for name in SHIPPED]
+    assert times(out) == before
+
+
+@pytest.mark.parametrize("name", ["ProximitySensor.fmu", "GripperPlant_in.csv"])
+@pytest.mark.parametrize("damage", ["cut", "a bit", "gone"])
+def test_whatever_is_altered_is_mended_and_said(
+    fmus: Path, out: Path, name: str, damage: str
+) -> None:
+    """Also with its size and its time kept; the others are not written, nothing is left beside."""
+    file, data = out / name, bytearray((out / name).read_bytes())
+    data[len(data) // 2] ^= 1
+    before = times(out)
+    file.write_bytes(data if damage == "a bit" else data[:1000])
+    os.utime(file, ns=(before[name], before[name]))
+    if damage == "gone":
+        file.unlink()
+    found = {b.path.name: b.status for b in build(out) if b.status != "unchanged"}
+    status = "new" if damage == "gone" else "changed"
+    assert found == ({name: status} if name.endswith(".fmu") else {})
+    assert contents(out) == contents(fmus)
+    assert {n for n, t in times(out).items() if before[n] != t} == {name}
 
 
 def test_an_up_to_date_folder_costs_no_import_of_what_builds(fmus: Path, tmp_path: Path) -> None:
@@ -105,7 +175,7 @@ def test_an_up_to_date_folder_costs_no_import_of_what_builds(fmus: Path, tmp_pat
         from grasp_fmus.build import build
         print({built.status for built in build(Path(sys.argv[1]))})
         print([n for n in sys.modules if n.startswith((
-            "grasp_fmus.", "pythonfmu", "markdown_it", "latex2mathml", "numpy", "zipfile",
+            "grasp_fmus.", "pythonfmu", "markdown_it", "latex2mathml", "numpy",
             "importlib.metadata", "gripper_plant", "block_variables",
         ))])
     """
@@ -114,148 +184,103 @@ def test_an_up_to_date_folder_costs_no_import_of_what_builds(fmus: Path, tmp_pat
         cwd=tmp_path, check=True, capture_output=True, text=True,
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
     )  # fmt: skip
-    needed = [f"grasp_fmus.{name}" for name in ("package", "folder", "shipped", "build")]
-    assert done.stdout == f"{{'unchanged'}}\n{needed}\n"
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("data", [None, *map(slow, [b"{", b"", b"[]", b'{"sources": 1}', b"{}"])])
-def test_without_a_stamp_that_can_be_read_all_is_looked_at(
-    fmus: Path, tmp_path: Path, data: bytes | None
-) -> None:
-    for path in fmus.iterdir():
-        shutil.copy(path, tmp_path)
-    (tmp_path / "GripperPlant_ref.opt").write_bytes(b"altered")
-    (tmp_path / STAMP).unlink()
-    if data is not None:
-        (tmp_path / STAMP).write_bytes(data)
-    assert {built.status for built in build(tmp_path)} == {"unchanged"}
-    assert contents(tmp_path) == contents(fmus)
-
-
-@pytest.mark.parametrize("name", FILES)
-def test_whatever_is_altered_is_found(fmus: Path, tmp_path: Path, name: str) -> None:
-    """A bit of a file, with its size and its time kept."""
-    for path in fmus.iterdir():
-        shutil.copy2(path, tmp_path)
-    sources = sources_hash()
-    assert is_current(tmp_path, sources)
-    file = tmp_path / name
-    time, data = file.stat().st_mtime_ns, bytearray(file.read_bytes())
-    data[len(data) // 2] ^= 1
-    file.write_bytes(data)
-    os.utime(file, ns=(time, time))
-    assert not is_current(tmp_path, sources)
-    file.unlink()
-    assert not is_current(tmp_path, sources)
+    needed = ["native", "native.targets", "shipped", "package", "build"]
+    assert done.stdout == f"{{'unchanged'}}\n{[f'grasp_fmus.{name}' for name in needed]}\n"
 
 
 SOURCES = (
-    "grasp_fmus/cross_check.py", "grasp_fmus/scripts/GripperPlant.py",
-    "grasp_fmus/icons/GripperPlant.png", "grasp_fmus/page.html.in", "gripper_plant/rigid.py",
-    "proximity_sensor/optics.py", "grasp_controller/series.py", "README.md",
-    "grasp_fmus/scripts/New.py", "pythonfmu-0.7.0.dist-info/METADATA",
-    "pythonfmu/resources/binaries/linux64/libpythonfmu-export.so",
+    "grasp_fmus/cross_check.py", "grasp_fmus/icons/GripperPlant.png", "grasp_fmus/page.html.in",
+    "grasp_fmus/native/c/slave.h", "c_compilers/__init__.py", "gripper_plant/rigid.py",
+    "grasp_fmus/new.py", "README.md", "pythonfmu/resources/binaries/linux64/libpythonfmu-export.so",
+    "pythonfmu-9.dist-info",
 )  # fmt: skip
 
 
-@pytest.mark.slow
-def test_every_source_is_in_the_hash(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of copies of the packages, and of the metadata and binaries of what is installed."""
-    for package in packages("grasp_fmus"):
+def test_every_source_is_in_the_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of copies of the packages, and of the binaries and the version of what is installed."""
+    for package in (*builds.SOURCES, "pythonfmu"):
         original = package_folder(package)
         shutil.copytree(original, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(package_folder("gripper_plant").parent / "README.md", tmp_path)
-    for found in ("pythonfmu", "pythonfmu-0.7.0.dist-info"):
-        shutil.copytree(package_folder("pythonfmu").parent / found, tmp_path / found)
-    monkeypatch.syspath_prepend(str(tmp_path))
-    with monkeypatch.context() as m:
-        for module in [n for n in sys.modules if n.partition(".")[0] in packages("grasp_fmus")]:
-            if not module.startswith("grasp_fmus."):
-                m.delitem(sys.modules, module)
-        before = sources_hash()
-        assert sources_hash() == before
-        for name in SOURCES:
-            with (tmp_path / name).open("ab") as file:
-                file.write(b"\n")
-            after = sources_hash()
-            assert after != before, name
-            before = after
+    monkeypatch.setattr(builds, "package_folder", lambda package: tmp_path / package)
+    monkeypatch.setattr(builds, "card_file", lambda package: tmp_path / "README.md")
+    keys = [sources_key()]
+    for name in SOURCES:
+        with (tmp_path / name).open("ab") as file:
+            file.write(b"\n")
+        keys.append(sources_key())
+    assert len({*keys}) == len(SOURCES) + 1
+    assert sources_key() == keys[-1]
 
 
-@pytest.mark.slow
-def test_several_processes_at_once_leave_one_whole_folder(fmus: Path, tmp_path: Path) -> None:
-    script = "import sys, pathlib; from grasp_fmus.build import build; build(pathlib.Path('out'))"
-    env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    command = [sys.executable, "-c", script]
-    builders = [subprocess.Popen(command, cwd=tmp_path, env=env) for _ in range(3)]
-    assert [process.wait() for process in builders] == [0, 0, 0]
-    assert contents(tmp_path / "out") == contents(fmus)
+def made_once(folder: Path) -> None:
+    (folder / "made.fmu").write_bytes(b"made")
 
 
-def test_an_fmu_with_the_same_content_is_left_alone(fmus: Path, tmp_path: Path) -> None:
-    for path in fmus.iterdir():
-        shutil.copy(path, tmp_path)
-    before = times(tmp_path)
-    build(tmp_path)
-    assert times(tmp_path) == before
+def test_of_what_is_kept_the_newest_stay(own_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(builds, "MOST_KEPT", 2)
+    for k, part in enumerate("abca"):
+        folder = builds._kept(made_once, part)
+        os.utime(folder, (k, k))
+    assert len(list((own_cache / "fmus").iterdir())) == 2
+    monkeypatch.setattr("test_build.made_once", None)
+    assert builds._kept(made_once, "a") == folder
 
 
-@pytest.mark.slow
-def test_a_damaged_fmu_is_built_again(fmus: Path, tmp_path: Path) -> None:
-    """The others are not, and nothing is left beside them."""
-    for path in fmus.iterdir():
-        shutil.copy(path, tmp_path)
-    (tmp_path / "ProximitySensor.fmu").write_bytes(b"half of an archi")
-    before = times(tmp_path)
-    statuses = [built.status for built in build(tmp_path)]
-    assert statuses == [*(["unchanged"] * (len(FMUS) - 1)), "changed"]
-    assert contents(tmp_path) == contents(fmus)
-    after = times(tmp_path)
-    assert [name for name in FILES if before[name] != after[name]] == ["ProximitySensor.fmu"]
-
-
-@pytest.mark.slow
-def test_cross_check_files_are_written_again_where_they_differ(fmus: Path, tmp_path: Path) -> None:
-    for path in fmus.iterdir():
-        shutil.copy(path, tmp_path)
-    (tmp_path / "GripperPlant_in.csv").unlink()
-    (tmp_path / "GraspController_ref.csv").write_text("0\n")
-    before = times(tmp_path)
-    assert {built.status for built in build(tmp_path)} == {"unchanged"}
-    assert contents(tmp_path) == contents(fmus)
-    after = times(tmp_path)
-    assert {n for n in FILES if before.get(n) != after[n]} == {
-        "GripperPlant_in.csv",
-        "GraspController_ref.csv",
-    }
-
-
-def test_one_fmu_alone_is_built_without_cross_check_files(fmus: Path, tmp_path: Path) -> None:
-    build_fmu(SCRIPTS / "GripperPlant.py", tmp_path)
-    assert contents(tmp_path) == {"GripperPlant.fmu": (fmus / "GripperPlant.fmu").read_bytes()}
-
-
-def test_a_build_that_fails_leaves_what_was_there(
-    fmus: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.usefixtures("own_cache")
+def test_where_nothing_can_be_kept_it_lives_as_long_as_the_process(
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    shutil.copy(fmus / "GripperPlant.fmu", tmp_path)
-    failure = (_ for _ in ()).throw
-    monkeypatch.setattr("grasp_fmus.page.icon", lambda _: failure(OSError("no icon")))
-    with pytest.raises(OSError, match="no icon"):
-        build(tmp_path)
-    assert contents(tmp_path) == {"GripperPlant.fmu": (fmus / "GripperPlant.fmu").read_bytes()}
+    ends: list[Callable[[], object]] = []
+    monkeypatch.setattr(cache, "writable", lambda _: None)
+    monkeypatch.setattr("atexit.register", ends.append)
+    folder = builds._kept(made_once, "a")
+    assert [path.name for path in folder.iterdir()] == ["made.fmu"]
+    for end in ends:
+        end()
+    assert not folder.exists()
 
 
-@pytest.mark.parametrize(
-    "name", ["modelDescription.xml", "documentation/index.html", "binaries/linux64/GripperPlant.so"]
-)
-def test_an_fmu_with_one_damaged_file_is_built_again(fmus: Path, tmp_path: Path, name: str) -> None:
-    data = bytearray((fmus / "GripperPlant.fmu").read_bytes())
-    with zipfile.ZipFile(fmus / "GripperPlant.fmu") as archive:
-        entry = archive.getinfo(name)
-    data[entry.header_offset + 30 + len(name) + entry.compress_size // 2] ^= 0xFF
-    (tmp_path / "GripperPlant.fmu").write_bytes(data)
-    built = build_fmu(SCRIPTS / "GripperPlant.py", tmp_path)
-    assert built.status == "changed"
-    assert contents(tmp_path) == {"GripperPlant.fmu": (fmus / "GripperPlant.fmu").read_bytes()}
+@pytest.mark.usefixtures("own_cache")
+def test_a_build_that_fails_leaves_what_was_there(
+    fmus: Path, out: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("grasp_fmus.page.icon", lambda name: (_ for _ in ()).throw(OSError("none")))
+    with pytest.raises(OSError, match="none"):
+        build(out)
+    assert contents(out) == contents(fmus)
+
+
+# ------------------------------------------------------------------ which blocks
+
+
+def test_all_but_one_can_be_native() -> None:
+    assert chosen_names() == TRANSLATED
+    said = "GripperPlantMuJoCo: stays Python only, as it needs mujoco"
+    assert python_only() == {"GripperPlantMuJoCo": said}
+
+
+@pytest.mark.parametrize("name", ["GripperPlantMuJoCo", "gripperplant", ""])
+def test_a_name_that_cannot_be_native(name: str, tmp_path: Path) -> None:
+    said = rf"^{name}: (stays Python only|no such block; must be of GraspController, )"
+    with pytest.raises(ValueError, match=said):
+        build_native(tmp_path / "out", Plan(2, {}, {}, ""), ["ProximitySensor", name])
+    assert not (tmp_path / "out").exists()
+
+
+@needs_gcc
+def test_one_by_its_name_is_that_of_all(natives: Path, tmp_path: Path) -> None:
+    (built,) = build_native(tmp_path, names=ONE)
+    assert built.status == "new"
+    assert {*contents(tmp_path)} == {"ProximitySensor.fmu", *(ONE[0] + end for end in ENDS)}
+    assert built.path.read_bytes() == (natives / "ProximitySensor.fmu").read_bytes()
+
+
+@needs_gcc
+@pytest.mark.parametrize("fmi", [2, slow(3)])
+def test_a_block_of_ones_own(fmi: int, tmp_path: Path) -> None:
+    plan = planned(fmi=3 if fmi == 3 else 2)
+    built = build_block(OWN["SpringPlant"], tmp_path, plan)
+    assert built == Built(tmp_path / "SpringPlant.fmu", "new")
+    assert f'fmiVersion="{fmi}.0"' in members(built.path)["modelDescription.xml"].decode()
+    assert build_block(OWN["SpringPlant"], tmp_path, plan).status == "unchanged"

@@ -4,7 +4,7 @@ import importlib
 import re
 import shutil
 from dataclasses import dataclass
-from itertools import accumulate, pairwise
+from itertools import accumulate
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Annotated, Any, NamedTuple
@@ -12,9 +12,8 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 import pytest
 from block_variables import Input, Output
-from conftest import Altered, Folder
+from conftest import Folder
 from fmpy import read_model_description, simulate_fmu
-from fmpy.cross_check.validate_vendor_repo import read_csv as read_csv_of_the_rules
 from fmpy.cross_check.validate_vendor_repo import validate_test_fmu
 from fmpy.util import read_csv, read_ref_opt_file, validate_result
 from grasp_fmus.contract import declared, variables
@@ -77,13 +76,6 @@ def simulated(fmu: Path, folder: Path, name: str, **arguments: Any) -> Any:
     )
 
 
-def largest_difference(result: Any, reference: Any) -> float:
-    return max(
-        float(np.abs(result[column].astype(float) - reference[column]).max())
-        for column in reference.dtype.names
-    )
-
-
 def test_the_files_are_named_as_the_rules_want(name: str, fmus: Path) -> None:
     files = cross_check_files(name, block(name))
     assert list(files) == [f"{name}_in.csv", f"{name}_ref.csv", f"{name}_ref.opt"]
@@ -97,44 +89,27 @@ def test_fmpy_finds_no_problem_in_the_submission(folder: Path) -> None:
 @pytest.mark.parametrize(("suffix", "causality"), [("in", "input"), ("ref", "output")])
 def test_a_csv_file_follows_the_rules(folder: Path, name: str, suffix: str, causality: str) -> None:
     description = read_model_description(folder / f"{name}.fmu")
-    variables = [v.name for v in description.modelVariables if v.causality == causality]
-    booleans = {v.name for v in description.modelVariables if v.type == "Boolean"}
+    found = [v for v in description.modelVariables if v.causality == causality]
     path = folder / f"{name}_{suffix}.csv"
     head, *lines = path.read_text("ascii").splitlines()
-    columns = ["time", *variables]
-    assert head == ",".join(f'"{column}"' for column in columns)
+    assert head == ",".join(f'"{column}"' for column in ["time", *(v.name for v in found)])
     assert path.stat().st_size < 1e6
     assert len(lines) <= 1000
-    for line in lines:
-        cells = line.split(",")
-        assert len(cells) == len(columns)
+    for cells in (line.split(",") for line in lines):
         assert all(map(LITERAL.fullmatch, cells))
-        assert {c for c, column in zip(cells, columns, strict=True) if column in booleans} <= {
-            "0", "1",
-        }  # fmt: skip
-    table = read_csv(path, variable_names=variables)
-    assert np.array_equal(table, read_csv_of_the_rules(path, variables))
-    assert len(table) == len(lines)
+        for v, cell in zip(found, cells[1:], strict=True):
+            assert v.type != "Boolean" or cell in ("0", "1")
 
 
 def test_the_rows_lie_on_the_communication_points(folder: Path, name: str) -> None:
+    """Whether a host multiplies, adds up or counts nanoseconds."""
     options = read_ref_opt_file(folder / f"{name}_ref.opt")
     times = read_csv(folder / f"{name}_in.csv")["time"]
     assert np.array_equal(times, read_csv(folder / f"{name}_ref.csv")["time"])
-    assert times[0] == options["StartTime"]
-    assert times[-1] == options["StopTime"]
-    assert {b - a for a, b in pairwise(times)} == {options["StepSize"]}
+    assert (times[0], times[-1]) == (options["StartTime"], options["StopTime"])
     assert options["OutputIntervalLength"] == options["StepSize"] == STEP_SIZE
-    # Whether a host multiplies, adds up or counts nanoseconds:
-    added_up = accumulate([options["StepSize"]] * (len(times) - 1), initial=0.0)
-    assert list(times) == list(added_up)
+    assert list(times) == list(accumulate([STEP_SIZE] * (len(times) - 1), initial=0.0))
     assert all((1e9 * t).is_integer() for t in map(float, times))
-
-
-def test_every_line_of_the_options_is_read(folder: Path, name: str) -> None:
-    lines = (folder / f"{name}_ref.opt").read_text("ascii").splitlines()
-    assert len(read_ref_opt_file(folder / f"{name}_ref.opt")) == len(lines)
-    assert all(re.fullmatch(r"\w+, [0-9.e-]+", line) for line in lines)
 
 
 @all_kinds
@@ -158,29 +133,6 @@ def test_an_importer_with_a_step_of_its_own_passes(folder: Path, name: str) -> N
     # The rules allow 0.1. An impact may lie between two samples, and so may a jump in the ratio of
     # two intensities, of which the adaptive controller learns.
     assert outside < (0.08 if name == "GraspControllerAdaptive" else 0.002)
-
-
-@pytest.mark.parametrize(
-    ("name", "source", "before", "after"),
-    [
-        ("ProximitySensor", "proximity_sensor/optics.py", "p.gain *", "1.0001 * p.gain *"),
-        ("GripperPlant", "gripper_plant/fingers.py", "Side(half +", "Side(1e-6 + half +"),
-        ("GraspController", "grasp_controller/series.py", "u.position), 0.0", "u.position), 1e-4"),
-    ],
-)
-def test_a_changed_block_is_noticed(
-    altered: Altered, tmp_path: Path, name: str, source: str, before: str, after: str
-) -> None:
-    for file, data in cross_check_files(name, block(name)).items():
-        (tmp_path / file).write_bytes(data)
-    result = simulated(altered(name, source, before, after), tmp_path, name)
-    assert largest_difference(result, read_csv(tmp_path / f"{name}_ref.csv")) > 1e-7
-
-
-def test_the_inputs_put_every_output_to_use(folder: Path, name: str) -> None:
-    reference = read_csv(folder / f"{name}_ref.csv")
-    still = [column for column in reference.dtype.names if len(set(reference[column])) == 1]
-    assert still == STILL.get(name, [])
 
 
 @pytest.mark.parametrize("name", sorted(BLOCKS))

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from conftest import Load
+from grasp_fmus.shipped import SHIPPED
 from hypothesis import HealthCheck, given
 from support.drawn_calls import SEQUENCES, Drawn
 from support.examples import examples
@@ -18,15 +19,7 @@ from support.slow import slow
 
 pytestmark = all_kinds
 
-NAMES = (
-    "GripperPlant",
-    "GripperPlantCompliant",
-    "GripperPlantMovable",
-    "GripperPlantMuJoCo",
-    "ProximitySensor",
-    "GraspControllerAdaptive",
-    "GraspController",
-)
+FIRST, *OTHERS = SHIPPED
 
 
 def in_order(fmu: Fmu) -> list[float]:
@@ -36,7 +29,7 @@ def in_order(fmu: Fmu) -> list[float]:
 
 
 @pytest.mark.hypothesis  # it finds those that are decorated, not what is inside of them
-@pytest.mark.parametrize("name", [NAMES[0], *map(slow, NAMES[1:-1]), NAMES[-1]])
+@pytest.mark.parametrize("name", [FIRST, *map(slow, OTHERS)])
 def test_any_sequence_of_calls(load: Load, name: str) -> None:
     expected = in_order(load(name))
 

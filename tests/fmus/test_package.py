@@ -6,13 +6,12 @@ from pathlib import Path
 from zipfile import ZipFile
 
 import pytest
-from grasp_fmus.block_build import build_block
+from grasp_fmus.build import build_block
 from grasp_fmus.model_description import Experiment
 from grasp_fmus.package import IMPORT, packages, with_imports
 from grasp_fmus.proxy_build import Original, build_proxy
-from grasp_fmus.shipped import SCRIPTS
+from grasp_fmus.shipped import SHIPPED
 
-NAMES = sorted(script.stem for script in SCRIPTS.glob("*.py"))
 SPRING = Path(__file__).parents[2] / "docs" / "spring_plant.py"
 
 LOAD = """
@@ -37,7 +36,7 @@ def check_packed(fmu: Path, folder: Path) -> None:
     assert sorted(done.stdout.split("\n")[:-1]) == sorted(map(str, resources.rglob("*.py")))
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", SHIPPED)
 def test_the_modules_of_an_fmu_are_those_that_its_script_imports(
     fmus: Path, tmp_path: Path, name: str
 ) -> None:

@@ -11,11 +11,12 @@ from xml.etree import ElementTree
 
 import pytest
 from grasp_fmus import page as made
+from grasp_fmus.build import build_model
 from grasp_fmus.contract import Field, declared
 from grasp_fmus.model_description import version
-from grasp_fmus.package import build_fmu
+from grasp_fmus.package import shipped_model
 from grasp_fmus.page import NATIVE, PROXY, PYTHON, icon, licences, needed, page
-from grasp_fmus.shipped import SCRIPTS, blocks
+from grasp_fmus.shipped import blocks
 from report.javascript import in_browser
 
 ROOT = Path(__file__).parents[2]
@@ -181,5 +182,5 @@ def test_the_fmu_holds_page_licences_and_icon(
             assert archive.read(file) == data
         assert archive.read("model.png") == icon("GripperPlant")
     monkeypatch.setattr(made, "ICONS", tmp_path)  # it need not have one
-    built = build_fmu(SCRIPTS / "GripperPlant.py", tmp_path)
+    built = build_model(shipped_model("GripperPlant"), tmp_path)
     assert "model.png" not in zipfile.ZipFile(built.path).namelist()

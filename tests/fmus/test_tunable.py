@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from conftest import Load
-from grasp_fmus.block_build import build_block
+from grasp_fmus.build import build_block
 from grasp_fmus.contract import Field, build_params, declared, longest_step, unpacker
 from grasp_fmus.shipped import blocks
 from hypothesis import HealthCheck, given

@@ -12,7 +12,7 @@ from types import ModuleType
 from typing import Literal
 
 import fmpy
-from grasp_fmus.block_build import build_block
+from grasp_fmus.build import build_block
 from grasp_fmus.contract import declared, variables
 from grasp_fmus.model_description import Description
 from grasp_fmus.native.description import build_description, native_description

@@ -7,15 +7,14 @@ from pathlib import Path
 from typing import Literal
 
 import pytest
-from grasp_fmus.block_build import build_block
-from grasp_fmus.native.build import Plan, build_native_block, build_native_model, planned
+from grasp_fmus.build import Plan, build_block, build_model, planned
 from grasp_fmus.native.proxy import build_native_proxy
 from grasp_fmus.native.targets import Version
-from grasp_fmus.package import build_fmu, shipped_model
+from grasp_fmus.package import shipped_model
 from grasp_fmus.proxy import Settings
 from grasp_fmus.proxy_build import Original
 from grasp_fmus.proxy_build import build_proxy as build_python_proxy
-from grasp_fmus.shipped import SCRIPTS, blocks
+from grasp_fmus.shipped import SHIPPED
 
 from .packages import PACKAGES
 from .slow import platforms, slow
@@ -36,9 +35,9 @@ OWN = {"SpringPlant": Path(__file__).parents[2] / "docs/spring_plant.py"}
 """Blocks that are a file of one's own, by the names of their FMUs."""
 
 
-NAMES = (*blocks(), *OWN)
+NAMES = (*SHIPPED, *OWN)
 
-TRANSLATED = [name for name in blocks() if name not in PACKAGES]
+TRANSLATED = [name for name in SHIPPED if name not in PACKAGES]
 """The blocks that come with the package, of which there are native FMUs."""
 
 QUICK = "ProximitySensor"
@@ -69,17 +68,13 @@ def plan(kind: Kind) -> Plan:
 
 
 def build_shipped(name: str, kind: Kind, out: Path) -> Path:
-    """Build the FMU of a script."""
-    if kind == "python":
-        return build_fmu(SCRIPTS / f"{name}.py", out).path
-    return build_native_model(shipped_model(SCRIPTS / f"{name}.py"), out, plan(kind)).path
+    """Build one of those that come with the package."""
+    return build_model(shipped_model(name), out, None if kind == "python" else plan(kind)).path
 
 
 def build_own(name: str, kind: Kind, out: Path) -> Path:
     """Build the FMU of one of OWN."""
-    if kind == "python":
-        return build_block(OWN[name], out).path
-    return build_native_block(OWN[name], out, plan(kind)).path
+    return build_block(OWN[name], out, None if kind == "python" else plan(kind)).path
 
 
 def proxy_options(kind: Kind) -> list[str]:

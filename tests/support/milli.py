@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Literal
 
-from grasp_fmus.block_build import build_block
+from grasp_fmus.build import build_block
 
 Units = Literal["defined", "named", "none"]
 """Units with their definitions, as names that are not defined, or none at all."""

@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 from c_compilers import Compiler, compile_all
 from grasp_fmus.base import LoggedError, Message
-from grasp_fmus.folder import write_file
+from grasp_fmus.build import compiler_for, job
 from grasp_fmus.model_description import Experiment
-from grasp_fmus.native.build import compiler_for, job
 from grasp_fmus.native.proxy import proxy_members
 from grasp_fmus.native.targets import Version, here
+from grasp_fmus.package import write_file
 from grasp_fmus.proxy import DEFAULTS, bounded, own_variables
 from grasp_fmus.proxy_build import Original
 from grasp_fmus.variable import TYPES, Variable

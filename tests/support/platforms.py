@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 from c_compilers import Compiler, compile_all
-from grasp_fmus.native.build import compiler_for, job
+from grasp_fmus.build import compiler_for, job
 from grasp_fmus.native.targets import LINUX_ARM, LINUX_X86, WINDOWS, Target, here
 
 from .c_host import HEADERS, SOURCE, Host, Unpacked

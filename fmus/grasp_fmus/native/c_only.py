@@ -13,10 +13,9 @@ from string import Template
 from c_compilers import BITS, LIBM
 
 from ..c_header import Group, Member, comment, members, structs
-from ..folder import write_file
 from ..link.message import Value
 from ..link.signature import ORDER, Causality, Kind, LinkVariable, Signature
-from ..package import Model
+from ..package import Model, write_file
 from ..variable import Scalar, Variable
 from .blocks import translated
 

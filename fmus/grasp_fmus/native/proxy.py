@@ -4,17 +4,17 @@ from collections.abc import Sequence
 from pathlib import Path
 from string import Template
 
+from ..build import Plan, with_binaries
 from ..c_header import wire
 from ..documentation import OURS, framed, licences
 from ..fmu import HASH, hashed, write_members
-from ..folder import Built
 from ..link.message import Codec
 from ..link.signature import Signature
 from ..model_description import version
+from ..package import Built
 from ..proxy import DEFAULTS, Settings, bounded, shared_signature
 from ..proxy_build import Original, proxy_model
 from ..variable import Variable
-from .build import Plan, with_binaries
 from .description import build_description, native_description
 from .members import ICONS
 from .sources import proxy_sources
@@ -36,8 +36,8 @@ def build_native_proxy(
     ValueError as build_proxy; CompilerError where a compiler fails.
     """
     members = proxy_members(target, original, plan.fmi, settings)
-    ((_, complete),) = with_binaries({target.stem: members}, plan, networked=True)
-    return write_members(target, complete)
+    fmus = with_binaries([(target.stem, members)], plan, networked=True)
+    return write_members(target, fmus[target.stem])
 
 
 def proxy_members(

@@ -35,11 +35,12 @@ def twins(
     An FMU without a twin has none here, and so has one that needs no Python. InputError where one
     that has no binary for this machine lacks its twin because none can be built.
     """
-    from grasp_fmus.native.twins import NoTwinsError, is_shipped, shipped_twins
+    from grasp_fmus.build import NoTwinsError, shipped_twins
+    from grasp_fmus.shipped import SHIPPED
 
     folder, failure = None, ""
     ours = [c for c in system.components if _is_ours(c)]
-    shipped = [c for c in ours if is_shipped(c.interface.identifier)]
+    shipped = [c for c in ours if c.interface.identifier in SHIPPED]
     if shipped:
         try:
             folder = shipped_twins(during)
@@ -85,7 +86,7 @@ def _is_ours(component: Component) -> bool:
 
 def _twin(component: Component, shipped: Path | None) -> Path | None:
     """The native FMU of the same content as the component's, of those built and of the user's."""
-    from grasp_fmus.native.twins import is_twin
+    from grasp_fmus.build import is_twin
 
     places = [*([shipped / _file(component)] if shipped else []), *users_twins(component)]
     return next((p for p in places if is_twin(p, component.interface.guid)), None)

@@ -13,12 +13,12 @@ from typing import Any
 
 import pytest
 from c_compilers import BITS
-from grasp_fmus.block_build import own_model
 from grasp_fmus.contract import build_params, declared, packer, unpacker
 from grasp_fmus.cross_check import STEP_SIZE, STEPS
 from grasp_fmus.native.c_only import called_of_libm, write_c
+from grasp_fmus.own_block import own_model
 from grasp_fmus.package import Model, shipped_model
-from grasp_fmus.shipped import SCRIPTS, blocks
+from grasp_fmus.shipped import blocks
 from support.compiled import compile_c
 from support.kinds import TRANSLATED
 from support.native_fmus import needs_gcc
@@ -45,7 +45,7 @@ def model_of(name: str) -> Iterator[Model]:
         with own_model(SPRING) as own:
             yield own
     else:
-        yield shipped_model(SCRIPTS / f"{name}.py")
+        yield shipped_model(name)
 
 
 @pytest.fixture(scope="module")
@@ -150,7 +150,7 @@ def controller(tmp_path_factory: pytest.TempPathFactory) -> Controller:
     @cache
     def made(name: str) -> tuple[InC, Any]:
         folder = tmp_path_factory.mktemp(name)
-        c = InC(shipped_model(SCRIPTS / f"{name}.py"), folder)
+        c = InC(shipped_model(name), folder)
         (folder / "p.c").write_text(
             f'#include "{name}.h"\n'
             f"const {name}_Parameters defaults = {name.upper()}_PARAMETERS_DEFAULTS;\n"
@@ -217,7 +217,7 @@ def test_what_is_refused_leaves_the_state(
 @pytest.mark.slow
 def test_a_parameter_out_of_its_range_is_named(tmp_path: Path) -> None:
     """As the FMU names it."""
-    made = shipped_model(SCRIPTS / "GripperPlant.py")
+    made = shipped_model("GripperPlant")
     c = InC(made, tmp_path)
     variables = [v for v in made.description.variables if v.causality == "parameter"]
     assert {v.kind for v in variables} == {float}

@@ -10,7 +10,7 @@ from pathlib import Path
 import fmpy
 import pytest
 from c_compilers import LIBM
-from grasp_fmus.native.build import build_native, planned
+from grasp_fmus.build import build_native, planned
 from grasp_fmus.native.targets import KNOWN, LINUX_ARM, LINUX_X86, MAC_ARM, MAC_X86, WINDOWS, Target
 from grasp_fmus.package import read_members
 from support.compilers import needs_zig

@@ -7,10 +7,8 @@ from xml.etree.ElementTree import Element, fromstring
 
 import fmpy
 import pytest
-from grasp_fmus.contract import declared, variables
 from grasp_fmus.model_description import Description, model_description
 from grasp_fmus.native.description import build_description, native_description
-from grasp_fmus.shipped import SCRIPTS, slave_class
 from grasp_fmus.variable import Variable
 from lxml import etree  # type: ignore[import-untyped]
 from support.kinds import TRANSLATED
@@ -20,8 +18,9 @@ VERSIONS: tuple[Literal[2, 3], ...] = (2, 3)
 
 
 def described(name: str) -> Description:
-    slave = slave_class(SCRIPTS / f"{name}.py")
-    return Description(name, slave.__doc__ or "", variables(declared(slave.block)))
+    from grasp_fmus.package import shipped_model
+
+    return shipped_model(name).description
 
 
 def plain(element: Element) -> Any:

@@ -10,7 +10,7 @@ from pathlib import Path
 import fmpy
 import pytest
 from c_compilers import environment as of_compiler
-from grasp_fmus.native.build import build_native, compiler_for, planned
+from grasp_fmus.build import build_native, compiler_for, planned
 from grasp_fmus.native.targets import LINUX_ARM, LINUX_X86, WINDOWS, Target
 from grasp_fmus.package import read_members
 from support.compilers import needs_zig

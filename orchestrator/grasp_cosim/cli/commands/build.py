@@ -82,16 +82,16 @@ def build(
         raise InputError(f"build: {error}") from error
     for note in notes:
         say(note)
-    report = {str(b.path): {"status": b.status, "changes": list(b.changes)} for b in built}
-    lines = ("\n    ".join((f"{b.path}: {b.status}", *b.changes)) for b in built)
+    report = {str(b.path): {"status": b.status} for b in built}
+    lines = (f"{b.path}: {b.status}" for b in built)
     made = {"fmus": list(report), "built": report, **({"notes": notes} if native else {})}
     show(as_json, made, "\n".join(lines))
     return 0
 
 
 def _in_python(block: Path | None, folder: Path) -> "Sequence[Built]":
-    from grasp_fmus.block_build import build_block
     from grasp_fmus.build import build as build_fmus
+    from grasp_fmus.build import build_block
 
     with waiting(f"building {block or 'the FMUs'}"):
         if block:
@@ -104,7 +104,7 @@ def _native(
 ) -> "tuple[Sequence[Built], list[str]]":
     """What was built, and what is to be said of it."""
     from c_compilers import CompilerError
-    from grasp_fmus.native.build import build_native, build_native_block, planned, python_only
+    from grasp_fmus.build import build_block, build_native, planned, python_only
     from grasp_fmus.native.targets import targets
 
     plan = planned(targets(target.split(",")) if target is not None else (), fmi)
@@ -116,25 +116,24 @@ def _native(
                 return build_native(folder, plan), [*notes, *python_only().values()]
             if _is_name(block):
                 return build_native(folder, plan, [str(block)]), notes
-            return [build_native_block(block, folder, plan)], notes
+            return [build_block(block, folder, plan)], notes
     except CompilerError as error:
         raise SimulationError(str(error)) from error
 
 
 def _write_c(block: Path | None, folder: Path, as_json: bool) -> int:
     """Write the C of one block into the folder, of all into folders in it."""
-    from grasp_fmus.block_build import own_model
-    from grasp_fmus.native.build import chosen_names, python_only
+    from grasp_fmus.build import chosen_names, python_only
     from grasp_fmus.native.c_only import write_c
+    from grasp_fmus.own_block import own_model
     from grasp_fmus.package import shipped_model
-    from grasp_fmus.shipped import SCRIPTS
 
     if block and not _is_name(block):
         with own_model(block) as model:
             written = write_c(folder, model)
     else:
         names = chosen_names([str(block)] if block else [])
-        models = {name: shipped_model(SCRIPTS / f"{name}.py") for name in names}
+        models = {name: shipped_model(name) for name in names}
         places = {name: folder if block else folder / name for name in names}
         written = [path for name in names for path in write_c(places[name], models[name])]
     notes = [] if block else [*python_only().values()]

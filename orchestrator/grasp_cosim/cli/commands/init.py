@@ -185,7 +185,7 @@ def _grasp(
 def _natives(folder: Path) -> Path:
     """Where native FMUs are below a folder, built first."""
     from c_compilers import CompilerError
-    from grasp_fmus.native.build import build_native
+    from grasp_fmus.build import build_native
 
     try:
         build_native(folder / NATIVE_FOLDER)

@@ -97,8 +97,8 @@ def proxy(
                 notes += said_of
             else:
                 built = build_proxy(out, original, settings)
-            lines += [f"{out}: {built.status}", *(f"    {change}" for change in built.changes)]
-            report |= {"fmu": str(out), "status": built.status, "changes": list(built.changes)}
+            lines.append(f"{out}: {built.status}")
+            report |= {"fmu": str(out), "status": built.status}
         if c_header is not None:
             write_text(c_header, text)
             lines.append(f"{c_header}: written")
@@ -139,7 +139,7 @@ def _built_native(
     out: Path, original: "Original", settings: Settings, target: str | None, fmi: str | None
 ) -> "tuple[Built, list[str]]":
     """The native proxy, and what is to be said of it."""
-    from grasp_fmus.native.build import planned
+    from grasp_fmus.build import planned
     from grasp_fmus.native.proxy import build_native_proxy
     from grasp_fmus.native.targets import targets
 

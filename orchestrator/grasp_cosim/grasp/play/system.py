@@ -34,9 +34,8 @@ _TYPES = {"Real": 0, "Boolean": 1, "Integer": 2}
 def model(name: str) -> "Model":
     """Return the model of an FMU that comes with the package."""
     from grasp_fmus.package import shipped_model
-    from grasp_fmus.shipped import SCRIPTS
 
-    return shipped_model(SCRIPTS / f"{name}.py")
+    return shipped_model(name)
 
 
 def shipped() -> bytes:

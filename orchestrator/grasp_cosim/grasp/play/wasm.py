@@ -18,9 +18,9 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from c_compilers import BITS, LIBM, environment, find_zig
-from grasp_fmus.folder import write_file
 from grasp_fmus.native.blocks import translated
 from grasp_fmus.native.sources import native_sources
+from grasp_fmus.package import write_file
 
 from ...checks import install_command
 from ...errors import InputError

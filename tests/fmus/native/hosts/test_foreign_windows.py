@@ -12,7 +12,7 @@ import pytest
 from grasp_cosim import System, simulate
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.ssp.write import write_ssp
-from grasp_fmus.native.build import build_native, planned
+from grasp_fmus.build import build_native, planned
 from grasp_fmus.native.targets import WINDOWS
 from support.compilers import needs_zig
 from support.platforms import needs_programs, windows

@@ -1,0 +1,217 @@
+"""Reads a block that is a Python file of one's own, wherever that is, and checks that it is one.
+
+Its documentation is its docstring and the table of its variables.
+"""
+
+import ast
+import inspect
+import sys
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stdout
+from importlib.machinery import ModuleSpec, SourceFileLoader
+from importlib.util import module_from_spec
+from math import isfinite, isnan
+from pathlib import Path
+from typing import Any
+
+from .cards import variable_tables
+from .contract import declared, longest_step, unpacker, variables
+from .model_description import Description
+from .package import HASH, IMPORT, Model, script
+from .page import BEGIN
+from .shipped import PACKAGES, SHIPPED
+from .variable import Variable
+
+PARTS = ("Params", "Inputs", "State", "Outputs", "initial_state", "step", "outputs")
+"""What a block has."""
+
+
+@contextmanager
+def own_model(file: Path) -> Iterator[Model]:
+    """The model of the block in a file, which is among the imported modules meanwhile.
+
+    The block may import the standard library, and from PACKAGES.
+    ValueError, one line, where the file is no such block.
+    """
+    is_identifier = file.stem.isascii() and file.stem.isidentifier()
+    if file.suffix != ".py" or not is_identifier or file.stem.startswith("_"):
+        raise ValueError(f"{file}: must be NAME.py, NAME of letters, digits and _, a letter first")
+    name = "".join(word[:1].upper() + word[1:] for word in file.stem.split("_"))
+    for ours in SHIPPED:
+        if ours.lower() == name.lower():  # the same file on Windows
+            raise ValueError(f"{file}: {ours}.fmu is one of the FMUs that come with this package")
+    text, tree = _parsed(file)
+    _check_imports(file, text, tree)
+    with _run(file, tree) as block:
+        summary, _, rest = inspect.cleandoc(block.__doc__ or "").partition("\n")
+        if not summary:
+            raise ValueError(f"{file}: must begin with a docstring; its first line says what it is")
+        yield Model(
+            Description(name, summary.rstrip("."), _variables(file, block)),
+            f"{rest.strip()}\n\n{BEGIN}{variable_tables({name: block})}",
+            {
+                f"{name}.py": script(f"import {file.stem}_block_{HASH} as block"),
+                f"{file.stem}_block.py": text.encode(),
+            },
+            block,
+            file,
+        )
+
+
+def _parsed(file: Path) -> tuple[str, ast.Module]:
+    try:
+        text = file.read_text("utf-8")
+        return text, ast.parse(text.encode(), str(file))
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{file}: byte {error.start}: must be UTF-8") from error
+    except (SyntaxError, ValueError) as error:
+        number = getattr(error, "lineno", None)  # there is none for a NUL byte
+        line = f" line {number}:" if number else ""
+        raise ValueError(f"{file}:{line} is no Python: {error.args[0]}") from error
+
+
+def _check_imports(file: Path, text: str, tree: ast.Module) -> None:
+    """ValueError where a module that the block imports could not be packed."""
+    renamed = {text.count("\n", 0, match.start()) + 1 for match in IMPORT.finditer(text)}
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Import | ast.ImportFrom):
+            continue
+        top_level_from = isinstance(node, ast.ImportFrom) and node.col_offset == 0
+        for module in _imported(node):
+            package = module.partition(".")[0]
+            if package in sys.stdlib_module_names:
+                continue
+            if package not in PACKAGES:
+                raise ValueError(
+                    f"{file}: line {node.lineno}: imports {module}, which would not be in the FMU; "
+                    f"must be of the standard library, or of {', '.join(PACKAGES)}"
+                )
+            if not (top_level_from and node.lineno in renamed):
+                raise ValueError(
+                    f"{file}: line {node.lineno}: {package} must be imported at the top level, "
+                    f"with single spaces, as: from {package} import ..."
+                )
+
+
+def _imported(node: ast.Import | ast.ImportFrom) -> list[str]:
+    if isinstance(node, ast.Import):
+        return [alias.name for alias in node.names]
+    return ["." * node.level + (node.module or "")]
+
+
+@contextmanager
+def _run(file: Path, tree: ast.Module) -> Iterator[Any]:
+    """The module of a file, which is among the imported ones meanwhile: annotations need that.
+
+    What it prints goes to standard error.
+    """
+    name = f"{file.stem}_block"
+    module = module_from_spec(ModuleSpec(name, SourceFileLoader(name, str(file))))
+    before = sys.modules.get(name)
+    sys.modules[name] = module
+    try:
+        with redirect_stdout(sys.stderr):
+            with _tried(file, "import"):
+                exec(compile(tree, str(file), "exec"), vars(module))  # noqa: S102 - the user's own
+            missing = ", ".join(part for part in PARTS if not hasattr(module, part))
+            if missing:
+                raise ValueError(f"{file}: has no {missing}; a block has {', '.join(PARTS)}")
+            yield module
+    finally:
+        del sys.modules[name]
+        if before:
+            sys.modules[name] = before
+
+
+def _variables(file: Path, block: Any) -> list[Variable]:
+    """Return the variables of a block that works at its start values."""
+    with _tried(file, "Params()"):
+        p = block.Params()
+    with _tried(file, "Inputs()"):
+        u = block.Inputs()
+    with _tried(file, "declaration"):
+        fields = declared(block)
+        found = variables(fields)
+        _check_declaration(found)
+        longest_step(block)
+    with _tried(file, "initial_state()"):
+        first = block.initial_state(p, u)
+        kinds = _kinds(first)
+    with _tried(file, "step()"):
+        second = block.step(p, first, u, 1e-3)
+        _check_kinds(_kinds(second), kinds)
+    outputs = [v for v in found if v.causality == "output"]
+    listed = unpacker(fields)
+    with _tried(file, "outputs()"):
+        for x in (first, second):
+            _check_outputs(outputs, listed(block.outputs(p, x, u)))
+    return found
+
+
+def _check_declaration(found: list[Variable]) -> None:
+    names = set()
+    for v in found:
+        if v.name in names:
+            raise ValueError(f"{v.name}: is there twice; inputs, outputs, parameters share names")
+        names.add(v.name)
+        if not v.name.isascii():
+            raise ValueError(f"{v.name}: must be of ASCII letters, digits and _")
+        if v.causality != "output":
+            _check_type(v, v.start, (v.kind,))
+            v.check(v.start)
+
+
+def _check_type(v: Variable, value: Any, kinds: tuple[type[Any], ...]) -> None:
+    if type(value) not in kinds:
+        raise ValueError(f"{v.name} = {value!r}: must be of type {v.kind.__name__}")
+
+
+def _check_outputs(outputs: list[Variable], values: list[Any]) -> None:
+    for v, value in zip(outputs, values, strict=True):
+        _check_type(v, value, (float, int) if v.kind is float else (v.kind,))
+        if not isfinite(value):
+            raise ValueError(f"{v.name} = {value!r}{v.in_unit}: must be finite")
+
+
+def _kinds(state: Any) -> dict[str, type[Any]]:
+    """The types of the scalars in a state, by name; ValueError where it could not be saved."""
+    kinds = {}
+    for name, value in _scalars("State", state):
+        if not isinstance(value, (float, int)):
+            raise ValueError(f"{name} = {value!r}: must be float, bool, int, or a tuple of those")
+        if isnan(value):
+            raise ValueError(f"{name} = {value!r}: must be a number")
+        kinds[name] = type(value)
+    return kinds
+
+
+def _scalars(name: str, value: Any) -> Iterator[tuple[str, Any]]:
+    if isinstance(value, tuple):
+        fields = [f".{field}" for field in getattr(value, "_fields", ())]
+        labels = fields or [f"[{i + 1}]" for i in range(len(value))]
+        for label, item in zip(labels, value, strict=True):
+            yield from _scalars(f"{name}{label}", item)
+    else:
+        yield name, value
+
+
+def _check_kinds(kinds: dict[str, type[Any]], before: dict[str, type[Any]]) -> None:
+    """ValueError where a saved state would not come back as it was: 0.5 as 0, by an int."""
+    for name in {**before, **kinds}:
+        kind, like = (k[name].__name__ if name in k else "not there" for k in (kinds, before))
+        if kind != like:
+            raise ValueError(f"{name} is {kind}: must be as initial_state() makes it, {like}")
+
+
+@contextmanager
+def _tried(file: Path, what: str) -> Iterator[None]:
+    """Raise what goes wrong in the user's code as a ValueError that says what and where."""
+    try:
+        yield
+    except (Exception, SystemExit) as error:
+        frames = traceback.extract_tb(error.__traceback__)
+        lines = [frame.lineno for frame in frames if frame.filename == str(file)]
+        place = f" line {lines[-1]}:" if lines else ""
+        said = " ".join(str(error).splitlines())
+        raise ValueError(f"{file}:{place} {what}: {type(error).__name__}: {said}") from error

@@ -1,0 +1,205 @@
+"""The FMU of a block that is one file of the user's own."""
+
+import json
+import sys
+import zipfile
+from math import exp
+from pathlib import Path
+
+import pytest
+from conftest import Run
+from grasp_fmus.build import build_block
+from grasp_fmus.package import Built
+from support.fmi2 import OK, Fmu, Instance
+
+READ = "declaration" if sys.version_info >= (3, 14) else "import"
+"""When Python evaluates an annotation."""
+
+LAG = '''"""A first-order lag.
+
+    T·y' = u - y
+"""
+
+from dataclasses import dataclass
+from math import exp
+from typing import Annotated, NamedTuple
+
+from block_variables import Input, Output, Parameter
+
+
+@dataclass(frozen=True)
+class Params:
+    time_constant: Annotated[
+        float, Parameter("T, time constant", unit="s", low=1e-3, high=1e3)
+    ] = 0.5
+
+
+class Inputs(NamedTuple):
+    u: Annotated[float, Input("what it follows", unit="N", nominal=1.0)] = 1.0
+
+
+class State(NamedTuple):
+    y: float
+
+
+class Outputs(NamedTuple):
+    y: Annotated[float, Output("what follows", unit="N", nominal=1.0, depends_on=set())]
+
+
+def initial_state(p, u):
+    return State(0.0)
+
+
+def step(p, x, u, h):
+    return State(u.u + (x.y - u.u) * exp(-h / p.time_constant))
+
+
+def outputs(p, x, u):
+    return Outputs(x.y)
+'''
+
+
+def write(folder: Path, text: str, name: str = "first_order_lag.py") -> Path:
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def answer(path: Path, folder: Path) -> float:
+    """Its output after 0.3 s of one step."""
+    with Instance(Fmu(path, folder)) as instance:
+        instance.initialise()
+        assert instance.step(0.0, 0.3) == OK
+        return instance.get("y")[0]
+
+
+def test_a_file_becomes_an_fmu(tmp_path: Path) -> None:
+    built = build_block(write(tmp_path, LAG), tmp_path / "out")
+    assert built == Built(tmp_path / "out/FirstOrderLag.fmu", "new")
+    assert answer(built.path, tmp_path / "a") == pytest.approx(1.0 - exp(-0.6), abs=1e-15)
+    assert [p.name for p in (tmp_path / "out").iterdir()] == ["FirstOrderLag.fmu"]
+
+
+def test_it_brings_its_documentation(tmp_path: Path) -> None:
+    with zipfile.ZipFile(build_block(write(tmp_path, LAG), tmp_path).path) as archive:
+        page = archive.read("documentation/index.html").decode()
+    assert "<h1>FirstOrderLag</h1>\n<p>A first-order lag.</p>" in page
+    assert "T·y' = u - y" in page
+    assert "<code>time_constant</code>" in page
+
+
+def test_a_change_is_built_and_both_run_in_one_process(tmp_path: Path) -> None:
+    file = write(tmp_path, LAG)
+    before = build_block(file, tmp_path / "1")
+    assert build_block(file, tmp_path / "1").status == "unchanged"
+    write(tmp_path, LAG.replace("= 0.5", "= 0.6"))
+    after = build_block(file, tmp_path / "2")
+    assert answer(before.path, tmp_path / "a") == pytest.approx(1.0 - exp(-0.6), abs=1e-15)
+    assert answer(after.path, tmp_path / "b") == pytest.approx(1.0 - exp(-0.5), abs=1e-15)
+
+
+def test_packages_of_our_blocks_come_along(tmp_path: Path) -> None:
+    text = LAG.replace("from math", "from gripper_plant import substeps\nfrom math")
+    text = text.replace("State(0.0)", "State(float(substeps.count(30.0, 1.0)))")
+    built = build_block(write(tmp_path, text), tmp_path)
+    with zipfile.ZipFile(built.path) as archive:
+        assert any(name.startswith("resources/gripper_plant_") for name in archive.namelist())
+    expected = 1.0 + 299.0 * exp(-0.6)  # 30 1/s over 1 s, sub-steps of 0.1
+    assert answer(built.path, tmp_path / "a") == pytest.approx(expected, rel=1e-14)
+
+
+# fmt: off
+WRONG = [
+    ("from math", "import numpy\nfrom math", "line 7: imports numpy, which would not be in "),
+    ("from math", "from .x import y\nfrom math", "line 7: imports .x, which would not be in "),
+    *(("from math", f"{line}\nfrom math", "line 7: gripper_plant must be imported at the top level,"
+       " with single spaces, as: from gripper_plant import ...\n")
+      for line in ("import gripper_plant", "from  gripper_plant import substeps")),
+    ("def step(", "def step((", "line 36: is no Python: "),
+    ("from math", "1 / 0\nfrom math", "line 7: import: ZeroDivisionError: division by zero"),
+    ("from math", "raise SystemExit('a\\nb')\nfrom math", "line 7: import: SystemExit: a b"),
+    ("from math", "\0\nfrom math", "is no Python: source code string cannot contain null "),
+    ("def step", "def advance", "has no step; a block has Params, Inputs, State, Outputs, "),
+    ("= 1.0\n", "\n", "Inputs(): TypeError: "),
+    (", nominal=1.0, depends", ", depends", "declaration: TypeError: y: must have a nominal "),
+    (", depends_on=set()", "", "declaration: TypeError: y: must have the inputs that reach"),
+    ("high=1e3", "hihg=1e3", f"line 16: {READ}: TypeError: Parameter.__init__() got an"),
+    ('Input("what', 'Output("what', 'declaration: TypeError: u: must be Annotated[type, Inpu'),
+    ("u: Annotated[float,", "u: Annotated[int,", "declaration: TypeError: u is int: must be "),
+    ("State(0.0)", "Stat(0.0)", "line 33: initial_state(): NameError: name 'Stat' is not "),
+    ("Outputs(x.y)", "(x.y, x.y)", "outputs(): ValueError: too many values to unpack"),
+    ("exp(-h / p.time_constant)", "float('nan')", "step(): ValueError: State.y = nan: must "),
+    ("Outputs(x.y)", "Outputs(x.y - 1e999)", "outputs(): ValueError: y = -inf N: must be fini"),
+    ("Outputs(x.y)", "Outputs(x.y * 1e999 if x.y else 0.0)", "outputs(): ValueError: y = inf N"),
+    ("Outputs(x.y)", "Outputs(x.y > 0)", "outputs(): ValueError: y = False: must be of type "),
+    ("Outputs(NamedTuple):\n    y:", "Outputs(NamedTuple):\n    u:",
+     "declaration: ValueError: u: is there twice; inputs, outputs, parameters share names"),
+    ("Outputs(NamedTuple):\n    y:", "Outputs(NamedTuple):\n    \u00ff:",
+     "declaration: ValueError: \u00ff: must be of ASCII letters, digits and _"),
+    ("= 0.5", "= 5e3", "declaration: ValueError: time_constant = 5000.0 s: must be from 0.001 to "),
+    ("] = 1.0", "] = 1e999", "declaration: ValueError: u = inf N: must be a finite number"),
+    ("] = 1.0", "] = 1", "declaration: ValueError: u = 1: must be of type float"),
+    ("State(0.0)", "State((0.0, None))", "initial_state(): ValueError: State.y[2] = None: must b"),
+    ("return State(0.0)", "return State(0)",
+     "step(): ValueError: State.y is float: must be as initial_state() makes it, int"),
+    ("State(u.u + (x.y - u.u) * exp(-h / p.time_constant))", "State((1.0, 2.0))",
+     "step(): ValueError: State.y is not there: must be as initial_state() makes it, float"),
+]
+# fmt: on
+
+
+@pytest.mark.parametrize(("before", "after", "said"), WRONG)
+def test_what_is_wrong_is_one_line(
+    command: Run, tmp_path: Path, before: str, after: str, said: str
+) -> None:
+    assert LAG.count(before) == 1
+    file = write(tmp_path, LAG.replace(before, after))
+    code, out, err = command("build", file, "--out", "out")
+    assert (code, out) == (2, "")
+    assert err.startswith(f"grasp-cosim: build: {file}: {said}")
+    assert err.count("\n") == 1
+    assert not list(tmp_path.glob("out/*"))
+
+
+def test_a_block_must_say_what_it_is(command: Run, tmp_path: Path) -> None:
+    file = write(tmp_path, LAG.partition('"""\n\n')[2])
+    assert command("build", file)[2].startswith(f"grasp-cosim: build: {file}: must begin with a ")
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("1st.py", "must be NAME.py"),
+        ("lag.txt", "must be NAME.py"),
+        ("gripper_plant.py", "GripperPlant.fmu is one of the FMUs that come with this package"),
+        ("GRIPPERplant.py", "GripperPlant.fmu is one of the FMUs that come with this package"),
+    ],
+)
+def test_a_name_that_does_not_do(command: Run, tmp_path: Path, name: str, said: str) -> None:
+    file = write(tmp_path, LAG, name)
+    code, _, err = command("build", file)
+    assert code == 2
+    assert err.startswith(f"grasp-cosim: build: {file}: {said}")
+
+
+def test_what_the_file_prints_is_not_among_the_results(command: Run, tmp_path: Path) -> None:
+    text = LAG.replace("from math", "print('imported')\nfrom math")
+    text = text.replace("    return State(0.0)", "    print('started')\n    return State(0.0)")
+    code, out, err = command("build", write(tmp_path, text), "--json")
+    assert (code, json.loads(out)["fmus"]) == (0, ["fmus/build/FirstOrderLag.fmu"])
+    assert err == "imported\nstarted\n"
+
+
+def test_a_file_must_be_utf_8(command: Run, tmp_path: Path) -> None:
+    file = tmp_path / "lag.py"
+    file.write_bytes(LAG.encode("latin-1"))
+    said = f"grasp-cosim: build: {file}: byte {LAG.index('·')}: must be UTF-8\n"
+    assert command("build", file) == (2, "", said)
+
+
+def test_a_folder_in_the_place_of_the_fmu(command: Run, tmp_path: Path) -> None:
+    (tmp_path / "out/FirstOrderLag.fmu").mkdir(parents=True)
+    code, out, err = command("build", write(tmp_path, LAG), "--out", "out")
+    assert (code, out) == (2, "")
+    assert err == "grasp-cosim: out/FirstOrderLag.fmu: Is a directory\n"
+    assert [p.name for p in (tmp_path / "out").iterdir()] == ["FirstOrderLag.fmu"]
