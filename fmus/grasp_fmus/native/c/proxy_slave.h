@@ -532,7 +532,8 @@ static void proxy_take_failsafe(Slave *s)
             continue;
         }
         if (variables[output].kind == KIND_STRING) {
-            strcpy(s->texts[(int)s->values[output]], slave_string(s, (uint32_t)safe));
+            memmove(slave_string(s, (uint32_t)output), slave_string(s, (uint32_t)safe),
+                    SLAVE_STRING_SIZE);
         } else {
             s->values[output] = s->values[safe];
         }
