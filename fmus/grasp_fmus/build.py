@@ -119,7 +119,7 @@ def build_block(file: Path, out: Path, plan: Plan | None = None) -> Built:
 
 def build_model(model: Model, out: Path, plan: Plan | None = None) -> Built:
     """Build the FMU of a model into the folder `out`, without cross-check files."""
-    from .native.members import native_members
+    from .native.sources import native_members
     from .package import write_members, write_python
 
     name = model.description.name
@@ -283,7 +283,7 @@ def _build_native(
     during: Callable[[str], AbstractContextManager[object]],
     folder: Path,
 ) -> None:
-    from .native.members import native_members
+    from .native.sources import native_members
     from .package import shipped_model, write_members
 
     def fmus() -> Iterator[tuple[str, Members]]:

@@ -17,7 +17,7 @@ from typing import Any
 
 from .cards import variable_tables
 from .contract import declared, longest_step, unpacker, variables
-from .model_description import Description
+from .description import Description
 from .package import HASH, IMPORT, Model, script
 from .page import BEGIN
 from .shipped import PACKAGES, SHIPPED

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from .shipped import SHIPPED
 
 if TYPE_CHECKING:
-    from .model_description import Description
+    from .description import Description
 
 HASH = "CONTENT_HASH"
 """Stands for the content hash until it is known."""
@@ -65,7 +65,7 @@ class Model:
 def shipped_model(name: str) -> Model:
     """Return the model of an FMU that comes with this package."""
     from .contract import declared, variables
-    from .model_description import Description
+    from .description import Description
     from .page import icon
 
     shipped = SHIPPED[name]
@@ -93,7 +93,7 @@ def write_python(target: Path, model: Model) -> Built:
 
 def python_members(model: Model) -> tuple[str, dict[str, bytes]]:
     """Return the content hash of the FMU that Python runs, and the files in it."""
-    from .model_description import model_description
+    from .description import model_description
     from .page import PYTHON, licences, needed, page
 
     d = model.description

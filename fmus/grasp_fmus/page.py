@@ -11,7 +11,7 @@ from re import MULTILINE, search, sub
 from string import Template
 from typing import Any
 
-from .model_description import version
+from .description import version
 
 ICONS = Path(__file__).parent / "icons"
 FRAME = Path(__file__).with_name("page.html.in")

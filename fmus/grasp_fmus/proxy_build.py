@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from .description import UNITS, Description, Experiment, Unit
 from .host_log import ERROR, WARNING
-from .model_description import UNITS, Description, Experiment, Unit
 from .package import Built, Model, write_python
 from .page import icon
 from .proxy import DEFAULTS, Settings, bounded, own_variables

@@ -7,7 +7,7 @@ from zipfile import ZipFile
 
 import pytest
 from grasp_fmus.build import build_block
-from grasp_fmus.model_description import Experiment
+from grasp_fmus.description import Experiment
 from grasp_fmus.package import IMPORT, packages, with_imports
 from grasp_fmus.proxy_build import Original, build_proxy
 from grasp_fmus.shipped import SHIPPED

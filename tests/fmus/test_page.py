@@ -13,7 +13,7 @@ import pytest
 from grasp_fmus import page as made
 from grasp_fmus.build import build_model
 from grasp_fmus.contract import Field, declared
-from grasp_fmus.model_description import version
+from grasp_fmus.description import version
 from grasp_fmus.package import shipped_model
 from grasp_fmus.page import NATIVE, PROXY, PYTHON, icon, licences, needed, page
 from grasp_fmus.shipped import blocks

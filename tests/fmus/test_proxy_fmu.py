@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 import pytest
 from fmpy import simulate_fmu
+from grasp_fmus.description import Experiment
 from grasp_fmus.link.message import END, HELLO, INITIALISE, STEP
-from grasp_fmus.model_description import Experiment
 from grasp_fmus.proxy import Settings
 from grasp_fmus.proxy_build import Original
 from support import kinds

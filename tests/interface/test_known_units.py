@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from grasp_cosim.interface.read import read_interface
 from grasp_cosim.interface.units import BASE, Unit, known_unit
-from grasp_fmus.model_description import UNITS
+from grasp_fmus.description import UNITS
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -12,7 +12,7 @@ import pytest
 from c_compilers import Compiler, compile_all
 from grasp_fmus.base import LoggedError, Message
 from grasp_fmus.build import compiler_for, job
-from grasp_fmus.model_description import Experiment
+from grasp_fmus.description import Experiment
 from grasp_fmus.native.proxy import proxy_members
 from grasp_fmus.native.targets import Version, here
 from grasp_fmus.package import write_file

@@ -2,26 +2,18 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from string import Template
 
 from ..build import Plan, with_binaries
 from ..c_header import wire
-from ..documentation import OURS, framed, licences
-from ..fmu import HASH, hashed, write_members
 from ..link.message import Codec
 from ..link.signature import Signature
-from ..model_description import version
-from ..package import Built
+from ..package import HASH, Built, write_members
 from ..proxy import DEFAULTS, Settings, bounded, shared_signature
 from ..proxy_build import Original, proxy_model
 from ..variable import Variable
-from .description import build_description, native_description
-from .members import ICONS
-from .sources import proxy_sources
+from .sources import proxy_sources, with_description
 from .targets import Version
 from .text import number, string
-
-TEMPLATE = Path(__file__).with_name("native_proxy.html.in")
 
 _KINDS = {float: "KIND_REAL", bool: "KIND_BOOLEAN", int: "KIND_INTEGER", str: "KIND_STRING"}
 _WHOLE = (-(2.0**31), 2.0**31 - 1.0)
@@ -52,26 +44,7 @@ def proxy_members(
         f"{wire('wire', signature)}\n#endif\n",
         "variables.h": _table(signature, description.variables),
     }
-    _, files = hashed(
-        {
-            "modelDescription.xml": native_description(description, HASH, fmi),
-            "sources/buildDescription.xml": build_description(name, fmi, networked=True),
-            **{
-                f"sources/{file}": data
-                for file, data in proxy_sources(name, original.file, own, HASH, fmi).items()
-            },
-        }
-    )
-    sections = Template(TEMPLATE.read_text("utf-8")).substitute(
-        name=name, fmi=fmi, override=f"FMI{fmi}_OVERRIDE_FUNCTION_PREFIX"
-    )
-    page = framed(name, description.summary, model.card, version(), f"{fmi}.0", sections)
-    return {
-        **files,
-        **({ICONS[fmi]: model.picture} if model.picture else {}),
-        "documentation/index.html": page.encode(),
-        **{f"documentation/licenses/{file}": text for file, text in licences(OURS).items()},
-    }
+    return with_description(model, proxy_sources(name, original.file, own, HASH, fmi), fmi)
 
 
 _LICENCE = "/* What a proxy and its peer say to each other, in bytes: README.md of the link. */\n"

@@ -1,43 +1,26 @@
-"""Puts together the C sources of a native FMU: one file to compile, which includes the others."""
+"""Puts together a native FMU but for its binaries: the C of NAME.c, and all that describes it."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Literal
+from string import Template
 
+from ..description import Version, build_description, model_description
+from ..package import HASH, Model, hashed, python_members
+from ..page import NATIVE, PROXY, licences, page
+from .blocks import translated
 from .text import string
 
-C = Path(__file__).with_name("c")
-COMMON = ("variable.h", "slave.h")
-"""Of every slave."""
-PROXY = ("sockets.h", "client.h", "connection.h", "proxy_slave.h")
+HERE = Path(__file__).parent
+C = HERE / "c"
+OF_BLOCK = ("arithmetic.h", "block_slave.h")
+OF_PROXY = ("sockets.h", "client.h", "connection.h", "proxy_slave.h")
 HEADERS = {
     2: ("fmi2TypesPlatform.h", "fmi2FunctionTypes.h", "fmi2Functions.h"),
     3: ("fmi3PlatformTypes.h", "fmi3FunctionTypes.h", "fmi3Functions.h"),
 }
 """Of the FMI standard, by its version."""
 
-_MAIN = """\
-/* {name} for FMI {fmi}.0: the file to compile. It includes all others, and all in it but the
-   functions of FMI is static: any number of such FMUs link into one program.
-
-   The functions are called {name}_fmi{fmi}DoStep and so on. FMI{fmi}_FUNCTION_PREFIX may be defined
-   otherwise. For a shared library, where they are called fmi{fmi}DoStep, define
-   FMI{fmi}_OVERRIDE_FUNCTION_PREFIX, as the standard says; CMake's {name}_EXPORTS does as well.
-
-{how} */
-
-#if !defined(FMI{fmi}_FUNCTION_PREFIX) && !defined({name}_EXPORTS)
-#define FMI{fmi}_FUNCTION_PREFIX {name}_
-#endif
-
-#if defined(_MSC_VER) && !defined(_CRT_SECURE_NO_WARNINGS)
-#define _CRT_SECURE_NO_WARNINGS /* strcpy and strcat are given room for what they write */
-#endif
-{defined}
-#define TOKEN "{guid}"
-{included}
-#include "fmi{fmi}.h"
-"""
+ICONS = {2: "model.png", 3: "terminalsAndIcons/icon.png"}
 
 _BLOCK = """\
    Compile as C99, without contraction (-ffp-contract=off) and never with -ffast-math: an FMU that
@@ -45,7 +28,6 @@ _BLOCK = """\
 _PROXY = """\
    Compile as C99 and link with the sockets of the system: ws2_32 on Windows; where the C library is
    older than glibc 2.34, pthread and dl."""
-
 _SYSTEM = """
 #if !defined(_GNU_SOURCE) && !defined(_WIN32)
 #define _GNU_SOURCE /* before the first header of the system: its sockets, threads and libraries */
@@ -56,48 +38,77 @@ _SYSTEM = """
 """
 
 
-def native_sources(
-    name: str, block: str, content: str, guid: str, fmi: Literal[2, 3]
-) -> dict[str, bytes]:
-    """Return the files of sources/ by name, for FMI `fmi`; NAME.c is the one to compile.
+def native_members(model: Model, fmi: Version) -> dict[str, bytes]:
+    """Return the files of the native FMU of a block but for its binaries, by name.
 
-    `block` is the block in C, block.h. `content` is the content hash of the FMU of the
-    same block in Python, 16 hexadecimal digits, which is in states; `guid` is that of this FMU.
+    In its states is the content of the FMU of the same block in Python, which exchanges them.
+    UntranslatableError, one line, where the block holds what cannot be translated.
     """
-    included = (
-        f'#define CONTENT "{content}" /* of the FMU in Python with which states are exchanged */'
-        '\n\n#include "block.h"'
-    )
-    main = _MAIN.format(name=name, fmi=fmi, guid=guid, how=_BLOCK, defined="", included=included)
-    return {
-        f"{name}.c": main.encode(),
-        "block.h": block.encode(),
-        **_files("arithmetic.h", "block_slave.h", fmi=fmi),
-    }
+    name = model.description.name
+    content, _ = python_members(model)
+    block = translated(name, model.block, model.file)
+    return with_description(model, native_sources(name, block, content, HASH, fmi), fmi)
+
+
+def native_sources(
+    name: str, block: str, content: str, guid: str, fmi: Version
+) -> dict[str, bytes]:
+    """Return the files of sources/ by name; NAME.c is compiled, and includes all others with "".
+
+    `block` is the block in C. `content` is the content hash of the FMU of the same block in Python,
+    16 hexadecimal digits; `guid` is that of this FMU.
+    """
+    defined = f'CONTENT "{content}" /* of the FMU in Python, with which states are exchanged */'
+    main = _main(name, guid, fmi, _BLOCK, "", defined, ["block.h"])
+    return {f"{name}.c": main, "block.h": block.encode(), **_files(fmi, *OF_BLOCK)}
 
 
 def proxy_sources(
-    name: str, original: str, own: Mapping[str, str], guid: str, fmi: Literal[2, 3]
+    name: str, original: str, own: Mapping[str, str], guid: str, fmi: Version
 ) -> dict[str, bytes]:
     """Return the same of a proxy of the FMU with the file name `original`.
 
-    `own` are the files that only this proxy has: its variables, the wire with its signature.
+    `own` are the files that only this proxy has: the wire with its signature, its variables.
     """
-    included = (
-        f'#define PROXY_ORIGINAL {string(original)}\n\n#include "wire.h"\n#include "variables.h"'
-    )
-    main = _MAIN.format(
-        name=name, fmi=fmi, guid=guid, how=_PROXY, defined=_SYSTEM, included=included
-    )
-    return {
-        f"{name}.c": main.encode(),
-        **{file: text.encode() for file, text in own.items()},
-        **_files(*PROXY, fmi=fmi),
-    }
+    defined = f"PROXY_ORIGINAL {string(original)}"
+    main = _main(name, guid, fmi, _PROXY, _SYSTEM, defined, own)
+    files = {file: text.encode() for file, text in own.items()}
+    return {f"{name}.c": main, **files, **_files(fmi, *OF_PROXY)}
 
 
-def _files(*names: str, fmi: Literal[2, 3]) -> dict[str, bytes]:
-    """Return files that are the same in every FMU, and those of every slave."""
-    files = [C / file for file in (*COMMON, *names, f"fmi{fmi}.h")]
+def _main(
+    name: str, guid: str, fmi: Version, how: str, system: str, defined: str, own: Iterable[str]
+) -> bytes:
+    texts = {"name": name, "fmi": str(fmi), "guid": guid, "how": how, "system": system}
+    texts["defined"] = f"#define {defined}"
+    texts["included"] = "\n".join(f'#include "{file}"' for file in own)
+    return Template((HERE / "main.c.in").read_text("ascii")).substitute(texts).encode()
+
+
+def _files(fmi: Version, *names: str) -> dict[str, bytes]:
+    """Return files that are the same in every FMU of a kind, and those of every slave."""
+    files = [C / file for file in ("variable.h", "slave.h", *names, f"fmi{fmi}.h")]
     files += [C / "headers" / file for file in HEADERS[fmi]]
     return {file.name: file.read_bytes() for file in files}
+
+
+def with_description(model: Model, sources: Mapping[str, bytes], fmi: Version) -> dict[str, bytes]:
+    """Return sources, which hold HASH for the GUID, as they are in an FMU, and all else in it.
+
+    The GUID is a hash of description and sources, whatever it is compiled for and on.
+    """
+    d, networked = model.description, model.block is None
+    _, files = hashed(
+        {
+            "modelDescription.xml": model_description(d, HASH, fmi, native=True),
+            "sources/buildDescription.xml": build_description(d.name, networked),
+            **{f"sources/{file}": data for file, data in sources.items()},
+        }
+    )
+    html = page(d.name, d.summary, model.card, PROXY if networked else NATIVE, fmi)
+    return {
+        **files,
+        **({ICONS[fmi]: model.picture} if model.picture else {}),
+        "documentation/index.html": html.encode(),
+        **licences("grasp-cosim"),
+    }

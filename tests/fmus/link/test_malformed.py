@@ -17,6 +17,7 @@ from typing import Literal
 
 import pytest
 from grasp_fmus.c_header import c_header
+from grasp_fmus.description import Experiment
 from grasp_fmus.link.client import Client, Verdict
 from grasp_fmus.link.message import (
     HEAD,
@@ -32,7 +33,6 @@ from grasp_fmus.link.message import (
 )
 from grasp_fmus.link.peer import Peer, Request
 from grasp_fmus.link.signature import Signature
-from grasp_fmus.model_description import Experiment
 from grasp_fmus.native.proxy import proxy_members
 from grasp_fmus.proxy import DEFAULTS
 from grasp_fmus.proxy_build import Original

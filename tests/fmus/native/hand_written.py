@@ -1,7 +1,6 @@
-"""A mass that is pushed, with a fault on demand; hand_written.h is the same in C."""
+"""The variables of a mass that is pushed, with a fault on demand; hand_written.h has the rest."""
 
 from dataclasses import dataclass
-from math import inf, nan
 from typing import Annotated, NamedTuple
 
 from block_variables import Input, Output, Parameter, check
@@ -33,35 +32,9 @@ class Inputs(NamedTuple):
     held: Annotated[bool, Input("does not move")] = False
 
 
-class State(NamedTuple):
-    """Of the mass."""
-
-    position: float
-    velocity: float
-    steps: int
-    moves: bool
-
-
 class Outputs(NamedTuple):
     """Of the mass."""
 
     position: Annotated[float, Output("x", unit="m", nominal=1.0, depends_on=set())]
     velocity: Annotated[float, Output("v", unit="m/s", nominal=1.0, depends_on=set())]
     moves: Annotated[bool, Output("moves", depends_on=set(), depends_initially_on={"held"})]
-
-
-def initial_state(p: Params, u: Inputs) -> State:
-    """At rest."""
-    return State(nan if p.fault == 2 else p.start, 0.0, 0, not u.held)
-
-
-def step(p: Params, x: State, u: Inputs, h: float) -> State:
-    """Pushed for h seconds."""
-    acceleration = 0.0 if u.held else p.gain * u.force / p.mass
-    velocity = inf if p.fault == 1 else x.velocity + h * acceleration
-    return State(x.position + h * velocity, velocity, x.steps + 1, velocity != 0.0)
-
-
-def outputs(p: Params, x: State, u: Inputs) -> Outputs:
-    """What is seen."""
-    return Outputs(x.position, nan if p.fault == 3 else x.velocity, x.moves)

@@ -16,7 +16,7 @@ from fmpy.build import build_platform_binary
 from fmpy.util import read_csv, read_ref_opt_file
 from fmpy.validation import validate_fmu
 from grasp_fmus.build import UNPREFIXED
-from grasp_fmus.model_description import Experiment
+from grasp_fmus.description import Experiment
 from grasp_fmus.proxy import Settings
 from grasp_fmus.proxy_build import Original
 from support.kinds import TRANSLATED, Kind, build_proxy

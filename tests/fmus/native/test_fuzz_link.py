@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 from grasp_fmus.c_header import c_header
+from grasp_fmus.description import Experiment
 from grasp_fmus.link.message import HELLO, INITIALISE, STEP
 from grasp_fmus.link.signature import Causality, Kind, LinkVariable, Signature
-from grasp_fmus.model_description import Experiment
 from grasp_fmus.native.proxy import proxy_members
 from grasp_fmus.proxy import DEFAULTS
 from grasp_fmus.proxy_build import Original

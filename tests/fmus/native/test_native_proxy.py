@@ -9,8 +9,8 @@ from random import Random
 
 import pytest
 from grasp_fmus import connection
+from grasp_fmus.description import Experiment
 from grasp_fmus.link.message import END, HELLO, INITIALISE, STEP
-from grasp_fmus.model_description import Experiment
 from grasp_fmus.native.proxy import proxy_members
 from grasp_fmus.native.targets import Version
 from grasp_fmus.proxy import DEFAULTS

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
-from grasp_fmus.model_description import Experiment, Unit
+from grasp_fmus.description import Experiment, Unit
 from grasp_fmus.proxy import DEFAULTS, Settings
 from grasp_fmus.variable import Enumeration
 from grasp_fmus.variable import Variable as ProxyVariable

@@ -1,0 +1,340 @@
+"""Writes modelDescription.xml of FMI 2.0 and 3.0 from variables, and how an FMU in C is built."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import isfinite
+from typing import Literal, NamedTuple
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+from c_compilers import BITS, LIBM
+
+from .host_log import CATEGORIES, DISCARD, ERROR
+from .variable import Enumeration, Scalar, Variable
+
+Version = Literal[2, 3]
+"""Of FMI."""
+
+TYPES: dict[type[Scalar], str] = {float: "Float64", bool: "Boolean", int: "Int32", str: "String"}
+"""What FMI 3.0 calls a kind of variable."""
+
+OPTIONS = " ".join((*BITS, *(f"-fno-builtin-{function}" for function in LIBM)))
+"""Of any compiler that calls them so; contracted, an FMU makes no instance."""
+
+_WORD = r"(?:[A-Za-z_]\w*|'(?:[^'\\]|\\.)+')(?:\[\d+(?:,\d+)*\])?"
+_STRUCTURED = re.compile(rf"{_WORD}(?:\.{_WORD})*", re.ASCII)
+"""Names of FMI's structured naming convention, but for der(), which proxy.hold. cannot precede."""
+
+
+class Unit(NamedTuple):
+    """Exponents of the SI base units, and the name and factor of a unit to display.
+
+    value in base units = factor * value + offset.
+    """
+
+    base: Mapping[str, int]
+    display: tuple[str, float] | None = None
+    factor: float = 1.0
+    offset: float = 0.0
+
+
+UNITS: dict[str, Unit] = {
+    "m": Unit({"m": 1}, ("mm", 1e3)),
+    "m/s": Unit({"m": 1, "s": -1}, ("mm/s", 1e3)),
+    "kg": Unit({"kg": 1}),
+    "N": Unit({"kg": 1, "m": 1, "s": -2}),
+    "N.s": Unit({"kg": 1, "m": 1, "s": -1}),
+    "N.s/m": Unit({"kg": 1, "s": -1}),
+    "N/m": Unit({"kg": 1, "s": -2}),
+    "V": Unit({"kg": 1, "m": 2, "s": -3, "A": -1}, ("mV", 1e3)),
+    "V/s": Unit({"kg": 1, "m": 2, "s": -4, "A": -1}),
+    "s": Unit({"s": 1}),
+    "1/s": Unit({"s": -1}),
+    "Hz": Unit({"s": -1}),
+    "s/m": Unit({"s": 1, "m": -1}),
+    "rad": Unit({"rad": 1}),
+    "1": Unit({}),
+}
+"""V.m^n and N/m^n are not among them: their exponent is a parameter."""
+
+
+class Experiment(NamedTuple):
+    """A default experiment, times in s; None for what is not given."""
+
+    start: float | None = 0.0
+    stop: float | None = 3.0
+    tolerance: float | None = None
+    step: float | None = 1e-4
+
+
+@dataclass(frozen=True)
+class Description:
+    """The content of a model description; the value reference of a variable is its position."""
+
+    name: str
+    summary: str
+    variables: Sequence[Variable]
+    units: Mapping[str, Unit] = field(default_factory=lambda: UNITS)
+    """The definitions of units; a variable's unit that is not here is a name alone."""
+    can_vary_step: bool = True
+    has_states: bool = True
+    experiment: Experiment = Experiment()
+    statuses: Sequence[int] = (DISCARD, ERROR)
+    """The statuses that are logged with messages."""
+
+    @property
+    def enumerations(self) -> list[Enumeration]:
+        """The types of the variables that are whole numbers with names."""
+        return list(dict.fromkeys(v.enumeration for v in self.variables if v.enumeration))
+
+
+def model_description(
+    d: Description, guid: str, fmi: Version = 2, *, native: bool = False
+) -> bytes:
+    """Return modelDescription.xml in UTF-8, of an FMU in C, with sources, if it is native.
+
+    In FMI 3.0, which only native ones have, `guid` is the token, and the last variable is the time.
+    """
+    structured = all(_STRUCTURED.fullmatch(v.name) for v in d.variables)
+    root = Element(
+        "fmiModelDescription",
+        {
+            "fmiVersion": f"{fmi}.0",
+            "modelName": d.name,
+            "guid" if fmi == 2 else "instantiationToken": guid,
+            "description": d.summary,
+            "version": version(),
+            "license": "MIT",
+            "generationTool": _tool(native),
+            "variableNamingConvention": "structured" if structured else "flat",
+        },
+    )
+    if fmi == 2:
+        root.set("numberOfEventIndicators", "0")
+        _add_interface_2(root, d, native)
+    else:
+        _add_interface_3(root, d)
+    _add_units(root, d, *(("s",) if fmi == 3 else ()))
+    _add_enumerations(root, d, fmi)
+    _add_categories_and_experiment(root, d)
+    variables = SubElement(root, "ModelVariables")
+    for reference, v in enumerate(d.variables):
+        _add_variable(variables, v, reference, d.units, fmi)
+    if fmi == 3:
+        SubElement(variables, "Float64", _time(d))
+    _add_structure(root, d.variables, fmi)
+    return _document(root)
+
+
+def build_description(name: str, networked: bool = False) -> bytes:
+    """Return sources/buildDescription.xml, which FMI 2.0 takes as FMI 3.0 defines it.
+
+    One that is networked has a configuration of its own for Windows, with the library of sockets;
+    hosts that read a single one take the first, which links everywhere else.
+    """
+    root = Element("fmiBuildDescription", fmiVersion="3.0")
+    _add_configuration(root, name, modelIdentifier=name)
+    if networked:
+        windows = _add_configuration(root, name, modelIdentifier=name, platform="x86_64-windows")
+        SubElement(windows, "Library", name="ws2_32", description="the sockets of Windows")
+    return _document(root)
+
+
+def _add_configuration(root: Element, name: str, **attributes: str) -> Element:
+    configuration = SubElement(root, "BuildConfiguration", attributes)
+    files = SubElement(configuration, "SourceFileSet", language="C99", compilerOptions=OPTIONS)
+    SubElement(files, "SourceFile", name=f"{name}.c")
+    return configuration
+
+
+def version(distribution: str = "grasp-cosim") -> str:
+    """Return the version of an installed distribution."""
+    from importlib import metadata  # takes longer to load than all the rest
+
+    return metadata.version(distribution)
+
+
+def _tool(native: bool) -> str:
+    return "grasp-cosim" if native else f"grasp-cosim with pythonfmu {version('pythonfmu')}"
+
+
+def _document(root: Element) -> bytes:
+    indent(root)
+    text: bytes = tostring(root, "UTF-8", xml_declaration=True)
+    return text + b"\n"
+
+
+def _literal(value: Scalar) -> str:
+    """Return a value as it stands in an attribute."""
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+# What an FMU can do
+
+
+def _add_interface_2(root: Element, d: Description, native: bool) -> None:
+    interface = SubElement(
+        root,
+        "CoSimulation",
+        modelIdentifier=d.name,
+        needsExecutionTool=_literal(not native),
+        canHandleVariableCommunicationStepSize=_literal(d.can_vary_step),
+        canNotUseMemoryManagementFunctions=_literal(not native),
+        canGetAndSetFMUstate=_literal(d.has_states),
+        canSerializeFMUstate=_literal(d.has_states),
+    )
+    if native:
+        SubElement(SubElement(interface, "SourceFiles"), "File", name=f"{d.name}.c")
+
+
+def _add_interface_3(root: Element, d: Description) -> None:
+    SubElement(
+        root,
+        "CoSimulation",
+        modelIdentifier=d.name,
+        canGetAndSetFMUState=_literal(d.has_states),
+        canSerializeFMUState=_literal(d.has_states),
+        canHandleVariableCommunicationStepSize=_literal(d.can_vary_step),
+    )
+
+
+def _add_categories_and_experiment(root: Element, d: Description) -> None:
+    categories = SubElement(root, "LogCategories")
+    for status in d.statuses:
+        SubElement(categories, "Category", name=CATEGORIES[status])
+    times = zip(("startTime", "stopTime", "tolerance", "stepSize"), d.experiment, strict=True)
+    experiment = {key: repr(time) for key, time in times if time is not None}
+    if experiment:
+        SubElement(root, "DefaultExperiment", experiment)
+
+
+# Units and types
+
+
+def _add_units(root: Element, d: Description, *more: str) -> None:
+    """Add the units of the variables, and more, with what is known of them."""
+    names = dict.fromkeys([*(v.unit for v in d.variables if v.unit), *more])
+    if not names:
+        return
+    definitions = SubElement(root, "UnitDefinitions")
+    for name in names:
+        element = SubElement(definitions, "Unit", name=name)
+        if name not in d.units:
+            continue
+        unit = d.units[name]
+        base = {key: str(power) for key, power in unit.base.items()}
+        base |= {"factor": repr(unit.factor)} if unit.factor != 1.0 else {}
+        base |= {"offset": repr(unit.offset)} if unit.offset != 0.0 else {}
+        SubElement(element, "BaseUnit", base)
+        if unit.display:
+            display, factor = unit.display
+            SubElement(element, "DisplayUnit", name=display, factor=repr(factor))
+
+
+def _add_enumerations(root: Element, d: Description, fmi: Version) -> None:
+    if not d.enumerations:
+        return
+    definitions = SubElement(root, "TypeDefinitions")
+    for enumeration in d.enumerations:
+        if fmi == 2:
+            simple = SubElement(definitions, "SimpleType", name=enumeration.name)
+            items = SubElement(simple, "Enumeration")
+        else:
+            items = SubElement(definitions, "EnumerationType", name=enumeration.name)
+        for name, number in enumeration.items:
+            SubElement(items, "Item", name=name, value=str(number))
+
+
+# Variables
+
+
+def _add_variable(
+    parent: Element, v: Variable, reference: int, units: Mapping[str, Unit], fmi: Version
+) -> None:
+    role, values = _role(v, reference), _values(v, units)
+    if fmi == 2:
+        SubElement(SubElement(parent, "ScalarVariable", role), v.type, values)
+        return
+    start = values.pop("start", None) if v.kind is str else None
+    kind = "Enumeration" if v.enumeration else TYPES[v.kind]
+    element = SubElement(parent, kind, {**role, **values})
+    if start is not None:
+        SubElement(element, "Start", value=start)
+
+
+def _role(v: Variable, reference: int) -> dict[str, str]:
+    """Return the attributes of a variable that say what it is for."""
+    found = {
+        "name": v.name,
+        "valueReference": str(reference),
+        "causality": v.causality,
+        "variability": v.variability,
+    }
+    if v.description:
+        found["description"] = v.description
+    if v.causality != "input":
+        found["initial"] = _initial(v)
+    return found
+
+
+def _initial(v: Variable) -> str:
+    if v.causality == "parameter" or v.variability == "constant":
+        return "exact"
+    return "calculated" if v.start is None else "approx"
+
+
+def _values(v: Variable, units: Mapping[str, Unit]) -> dict[str, str]:
+    """Return the attributes of a variable that say what values it has."""
+    found: dict[str, str] = {}
+    if v.enumeration:
+        found["declaredType"] = v.enumeration.name
+    if v.kind is float and v.unit:
+        found["unit"] = v.unit
+        if v.unit in units and (display := units[v.unit].display):
+            found["displayUnit"] = display[0]
+    if v.relative:
+        found["relativeQuantity"] = "true"
+    if v.kind in (float, int) and v.limits:
+        limits = zip(("min", "max"), v.limits, strict=True)
+        found |= {key: repr(v.kind(limit)) for key, limit in limits if isfinite(limit)}
+    if v.nominal is not None:
+        found["nominal"] = repr(v.nominal)
+    if v.start is not None:
+        found["start"] = _literal(float(v.start) if v.kind is float else v.start)
+    return found
+
+
+def _time(d: Description) -> dict[str, str]:
+    name = "time"
+    while name in {v.name for v in d.variables}:
+        name += "_"
+    return {
+        "name": name,
+        "valueReference": str(len(d.variables)),
+        "causality": "independent",
+        "variability": "continuous",
+        "description": "t",
+        "unit": "s",
+    }
+
+
+# What depends on what
+
+
+def _add_structure(root: Element, variables: Sequence[Variable], fmi: Version) -> None:
+    """Add outputs and initial unknowns: FMI 2.0 counts variables from 1, FMI 3.0 refers to them."""
+    structure = SubElement(root, "ModelStructure")
+    number = {v.name: str(i) for i, v in enumerate(variables, 1 if fmi == 2 else 0)}
+    outputs = [v for v in variables if v.causality == "output"]
+    initial = [v for v in outputs if _initial(v) != "exact"]
+    sections = {
+        "Output": [(v, v.dependencies) for v in outputs],
+        "InitialUnknown": [(v, v.initial_dependencies) for v in initial],
+    }
+    for section, unknowns in sections.items():
+        parent, tag, key = structure, section, "valueReference"
+        if fmi == 2 and unknowns:
+            parent, tag, key = SubElement(structure, f"{section}s"), "Unknown", "index"
+        for v, names in unknowns:
+            known = " ".join(number[name] for name in names)
+            SubElement(parent, tag, {key: number[v.name], "dependencies": known})
