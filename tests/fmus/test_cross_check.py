@@ -1,12 +1,11 @@
 """The cross-check files follow the rules, and an importer reproduces them from the FMU."""
 
-import importlib
 import re
 import shutil
-from dataclasses import dataclass
+from dataclasses import make_dataclass
 from itertools import accumulate
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -18,35 +17,17 @@ from fmpy.cross_check.validate_vendor_repo import validate_test_fmu
 from fmpy.util import read_csv, read_ref_opt_file, validate_result
 from grasp_fmus.contract import declared, variables
 from grasp_fmus.cross_check import STEP_SIZE, cross_check_files
-from support.kinds import Kind, all_kinds
+from grasp_fmus.shipped import blocks
+from support.kinds import TRANSLATED, Kind, all_kinds
 from support.slow import slow
 
-BLOCKS = {
-    "GripperPlant": "gripper_plant.rigid",
-    "GripperPlantCompliant": "gripper_plant.compliant",
-    "GripperPlantMovable": "gripper_plant.movable",
-    "ProximitySensor": "proximity_sensor.channel",
-    "GraspController": "grasp_controller.series",
-    "GraspControllerAdaptive": "grasp_controller.adaptive",
-}
-STILL = {
-    "GripperPlant": ["object_position"],
-    "GripperPlantCompliant": ["object_position", "damaged"],
-    "GripperPlantMovable": ["tilt", "toppled"],
-}
-"""What the inputs do not change: they shake the gripper, but break and topple nothing."""
-
+BLOCKS = {name: block for name, block in blocks().items() if name in TRANSLATED}
 LITERAL = re.compile(r"-?\d+(\.\d+)?(e-?\d+)?")
 """A floating point literal of C."""
 
 
-def block(name: str) -> ModuleType:
-    return importlib.import_module(BLOCKS[name])
-
-
 @pytest.fixture(
-    scope="module",
-    params=[slow(n) if n[12:] in ("Compliant", "Movable") else n for n in sorted(BLOCKS)],
+    scope="module", params=[slow(n) if n[12:] in ("Compliant", "Movable") else n for n in BLOCKS]
 )
 def name(request: pytest.FixtureRequest) -> str:
     """The FMUs, one after the other."""
@@ -66,18 +47,12 @@ def folder(name: str, fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> P
 def simulated(fmu: Path, folder: Path, name: str, **arguments: Any) -> Any:
     """The FMU, run by FMPy with the options and inputs in the folder."""
     options = read_ref_opt_file(folder / f"{name}_ref.opt")
-    arguments = {"output_interval": options["StepSize"], **arguments}
-    return simulate_fmu(
-        fmu,
-        start_time=options["StartTime"],
-        stop_time=options["StopTime"],
-        input=read_csv(folder / f"{name}_in.csv"),
-        **arguments,
-    )
+    inputs, stop = read_csv(folder / f"{name}_in.csv"), options["StopTime"]
+    return simulate_fmu(fmu, start_time=0.0, stop_time=stop, input=inputs, **arguments)
 
 
 def test_the_files_are_named_as_the_rules_want(name: str, fmus: Path) -> None:
-    files = cross_check_files(name, block(name))
+    files = cross_check_files(name, BLOCKS[name])
     assert list(files) == [f"{name}_in.csv", f"{name}_ref.csv", f"{name}_ref.opt"]
     assert files == {file: (fmus / file).read_bytes() for file in files}
 
@@ -116,7 +91,8 @@ def test_the_rows_lie_on_the_communication_points(folder: Path, name: str) -> No
 def test_the_fmu_gives_the_reference_to_the_last_bit(
     folder: Path, folder_of: Folder, kind: Kind, name: str
 ) -> None:
-    result = simulated(folder_of(kind) / f"{name}.fmu", folder, name)
+    fmu = folder_of(kind) / f"{name}.fmu"
+    result = simulated(fmu, folder, name, output_interval=STEP_SIZE)
     reference = read_csv(folder / f"{name}_ref.csv")
     assert set(result.dtype.names) == set(reference.dtype.names)
     for column in reference.dtype.names:
@@ -124,21 +100,18 @@ def test_the_fmu_gives_the_reference_to_the_last_bit(
 
 
 def test_an_importer_with_a_step_of_its_own_passes(folder: Path, name: str) -> None:
-    options = read_ref_opt_file(folder / f"{name}_ref.opt")
-    result = simulated(
-        folder / f"{name}.fmu", folder, name, step_size=options["StepSize"], output_interval=None
-    )
-    assert result["time"][1] != options["StepSize"]
-    outside = validate_result(result, read_csv(folder / f"{name}_ref.csv"), options["StopTime"])
-    # The rules allow 0.1. An impact may lie between two samples, and so may a jump in the ratio of
-    # two intensities, of which the adaptive controller learns.
+    """The rules allow 0.1. An impact may lie between two samples, and so may a jump in the ratio of
+    two intensities, of which the adaptive controller learns.
+    """
+    result = simulated(folder / f"{name}.fmu", folder, name, step_size=STEP_SIZE)
+    assert result["time"][1] != STEP_SIZE
+    outside = validate_result(result, read_csv(folder / f"{name}_ref.csv"), result["time"][-1])
     assert outside < (0.08 if name == "GraspControllerAdaptive" else 0.002)
 
 
-@pytest.mark.parametrize("name", sorted(BLOCKS))
-def test_inputs_differ_jump_and_stay_within_the_nominal_value(name: str, fmus: Path) -> None:
-    inputs = [v for v in variables(declared(block(name))) if v.causality == "input"]
-    table = read_csv(fmus / f"{name}_in.csv")
+def test_inputs_differ_jump_and_stay_within_the_nominal_value(folder: Path, name: str) -> None:
+    inputs = [v for v in variables(declared(BLOCKS[name])) if v.causality == "input"]
+    table = read_csv(folder / f"{name}_in.csv")
     for v in inputs:
         values = table[v.name]
         off = np.abs(values - (v.start or 0.0)) / (v.nominal or 1.0)
@@ -149,11 +122,6 @@ def test_inputs_differ_jump_and_stay_within_the_nominal_value(name: str, fmus: P
     assert len({table[v.name].tobytes() for v in inputs}) == len(inputs)
 
 
-@dataclass(frozen=True)
-class Params:
-    """No parameters."""
-
-
 class Inputs(NamedTuple):
     """A switch and a signal."""
 
@@ -162,28 +130,24 @@ class Inputs(NamedTuple):
 
 
 class Outputs(NamedTuple):
-    """The inverse of something that reaches zero, if it is wanted."""
+    """A power of something that reaches zero, if it is wanted."""
 
     value: Annotated[float, Output("the value", unit="1", nominal=1.0, depends_on={"signal"})]
 
 
 def other(power: float) -> Any:
-    """A block that none of the signals is for."""
+    """A block with this power."""
     return SimpleNamespace(
-        Params=Params,
-        Inputs=Inputs,
-        Outputs=Outputs,
-        initial_state=lambda p, u: None,
-        step=lambda p, x, u, h: None,
+        Params=make_dataclass("Params", ()), Inputs=Inputs, Outputs=Outputs,
+        initial_state=lambda p, u: None, step=lambda p, x, u, h: None,
         outputs=lambda p, x, u: Outputs(np.float64(1.0 - u.signal) ** power if u.on else 0.0),
-    )
+    )  # fmt: skip
 
 
 def test_a_switch_is_thrown_once() -> None:
-    files = cross_check_files("Other", other(1.0))
-    rows = [line.split(",") for line in files["Other_in.csv"].decode().splitlines()]
-    assert rows[0] == ['"time"', '"on"', '"signal"']
-    assert [row[1] for row in rows[1:]] == ["1"] * 384 + ["0"] * 385
+    rows = cross_check_files("Other", other(1.0))["Other_in.csv"].decode().splitlines()
+    assert rows[0] == '"time","on","signal"'
+    assert [row.split(",")[1] for row in rows[1:]] == ["1"] * 384 + ["0"] * 385
 
 
 @pytest.mark.filterwarnings("ignore:divide by zero")
