@@ -8,7 +8,7 @@ H = 1e-3
 """A step in s."""
 
 
-def drive(instance: Instance, first: int, last: int) -> list[float]:
+def drive(instance: Instance, first: int, last: int, h: float = H) -> list[float]:
     """Steps from first to last with inputs that change; returns all outputs."""
     seen = []
     for k in range(first, last):
@@ -16,6 +16,6 @@ def drive(instance: Instance, first: int, last: int) -> list[float]:
         scale = -2.0 if "force[1]" in inputs else 0.05
         values = {n: scale * sin(0.1 * k + i) + 0.06 for i, n in enumerate(inputs)}
         assert instance.set(values) == OK
-        assert instance.step(k * H, H) == OK
+        assert instance.step(k * h, h) == OK
         seen += instance.outputs()
     return seen
