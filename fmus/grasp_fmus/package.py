@@ -32,8 +32,8 @@ HASH = "CONTENT_HASH"
 IMPORT = re.compile(r"^from (\w+)(?=[\w.]* import\b)", re.MULTILINE)
 """An import whose package is packed, unless it is of the standard library."""
 
-BINARIES = {"linux64": ("libpythonfmu-export", "so"), "win64": ("pythonfmu-export", "dll")}
-"""Those of pythonfmu, by their folder in it and in an FMU."""
+BINARIES = {"so": "linux64/libpythonfmu-export.so", "dll": "win64/pythonfmu-export.dll"}
+"""Those of pythonfmu by their endings, in folders that are those of an FMU."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,10 +106,8 @@ def python_members(model: Model) -> tuple[str, dict[str, bytes]]:
             "documentation/index.html": html.encode(),
             **licences("grasp-cosim", "pythonfmu"),
             **{
-                f"binaries/{place}/{d.name}.{kind}": (
-                    folder / place / f"{file}.{kind}"
-                ).read_bytes()
-                for place, (file, kind) in BINARIES.items()
+                f"binaries/{Path(file).parent}/{d.name}.{kind}": (folder / file).read_bytes()
+                for kind, file in BINARIES.items()
             },
             "resources/slavemodule.txt": f"{d.name}_{HASH}".encode(),
             **_renamed(with_imports(model.sources)),
@@ -131,9 +129,6 @@ def hashed(template: Mapping[str, bytes]) -> tuple[str, dict[str, bytes]]:
 
 def write_members(target: Path, files: Mapping[str, bytes]) -> Built:
     """Write an FMU that holds these files, unless it is there already and holds the same."""
-    there = target.is_file()
-    if there and read_members(target.read_bytes()) == files:
-        return Built(target, "unchanged")
     import zipfile  # takes time to load, and mostly there is nothing to write
 
     buffer = io.BytesIO()
@@ -143,20 +138,11 @@ def write_members(target: Path, files: Mapping[str, bytes]) -> Built:
             entry.compress_type = zipfile.ZIP_DEFLATED
             entry.external_attr = 0o644 << 16
             archive.writestr(entry, data)
+    before = target.read_bytes() if target.is_file() else None
     write_file(target, buffer.getvalue())
-    return Built(target, "changed" if there else "new")
-
-
-def read_members(fmu: bytes) -> dict[str, bytes]:
-    """Return the files in an FMU by name; none where it is damaged or no FMU."""
-    import zipfile
-    import zlib
-
-    try:
-        with zipfile.ZipFile(io.BytesIO(fmu)) as archive:
-            return {name: archive.read(name) for name in archive.namelist()}
-    except (OSError, EOFError, ValueError, RuntimeError, zipfile.BadZipFile, zlib.error):
-        return {}
+    if before == buffer.getvalue():
+        return Built(target, "unchanged")
+    return Built(target, "changed" if before else "new")
 
 
 def write_file(target: Path, data: bytes) -> None:
@@ -203,19 +189,6 @@ def with_imports(sources: Mapping[str, bytes]) -> dict[str, bytes]:
     return found
 
 
-def packages(*roots: str) -> dict[str, Path]:
-    """Return the folders of these packages, and of those to pack that their modules import."""
-    found: dict[str, Path] = {}
-    waiting = [*roots]
-    while waiting:
-        package = waiting.pop()
-        found[package] = package_folder(package)
-        for file in found[package].rglob("*.py"):
-            imported = {*IMPORT.findall(file.read_text("utf-8"))} - sys.stdlib_module_names
-            waiting += imported - {*found, *waiting}
-    return dict(sorted(found.items()))
-
-
 def package_folder(package: str) -> Path:
     """Return the folder of a package, which is not imported for that; ImportError without one."""
     spec = find_spec(package)
@@ -235,7 +208,7 @@ def _imported(path: str, source: bytes) -> list[str]:
     """Return the modules to pack that a source imports, and names in them that may be modules."""
     found: list[str] = []
     *package, _ = path.split("/")
-    for node in _run(ast.parse(source, path)):
+    for node in ast.walk(ast.parse(source, path)):
         if not isinstance(node, ast.ImportFrom):
             continue
         above = package[: len(package) + 1 - node.level] if node.level else []
@@ -244,15 +217,6 @@ def _imported(path: str, source: bytes) -> list[str]:
         if node.level or not outside:
             found += [module, *(f"{module}.{alias.name}" for alias in node.names)]
     return found
-
-
-def _run(tree: ast.AST) -> Iterator[ast.AST]:
-    """Yield all statements and what holds some, but those that only a type checker looks at."""
-    for node in ast.iter_child_nodes(tree):
-        checked = isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
-        if not (checked or isinstance(node, ast.expr)):
-            yield node
-            yield from _run(node)
 
 
 def _files(module: str) -> Iterator[tuple[str, Path]]:

@@ -22,9 +22,10 @@ from grasp_fmus.build import (
     sources_key,
 )
 from grasp_fmus.native.targets import here
-from grasp_fmus.package import HASH, Built, package_folder, read_members
+from grasp_fmus.package import HASH, Built, package_folder
 from grasp_fmus.page import icon
 from grasp_fmus.shipped import SHIPPED
+from support.fmi2 import read_members
 from support.kinds import OWN, TRANSLATED
 from support.native_fmus import needs_gcc
 from support.slow import slow
@@ -41,10 +42,6 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 def times(folder: Path) -> dict[str, int]:
     return {path.name: path.stat().st_mtime_ns for path in folder.glob("[!.]*")}
-
-
-def members(fmu: Path) -> dict[str, bytes]:
-    return read_members(fmu.read_bytes())
 
 
 @pytest.fixture
@@ -87,13 +84,13 @@ def test_what_is_in_an_fmu(fmus: Path, natives: Path, name: str) -> None:
     common = {"modelDescription.xml", "documentation/index.html"}
     common |= {"model.png"} if icon(name) else set()
     folders = ("resources/", "sources/", "documentation/licenses/")
-    python = members(fmus / f"{name}.fmu")
+    python = read_members(fmus / f"{name}.fmu")
     found = {n for n in python if not n.startswith(folders)}
     assert found == {*common, f"binaries/linux64/{name}.so", f"binaries/win64/{name}.dll"}
     assert "documentation/licenses/license.txt" in python
     assert not [n for n, data in python.items() if HASH in n or HASH.encode() in data]
     if name in TRANSLATED:
-        native = members(natives / f"{name}.fmu")
+        native = read_members(natives / f"{name}.fmu")
         assert {n for n in native if not n.startswith(folders)} == {*common, BINARY.format(name)}
         assert native.get("model.png") == python.get("model.png")
         content = python["resources/slavemodule.txt"].rpartition(b"_")[2]
@@ -125,14 +122,14 @@ def test_another_compiler_makes_another_binary_and_nothing_else(
     """The GUID is that of description and sources, whatever they are compiled with."""
     monkeypatch.setenv("CC", "gcc -fno-inline")
     (built,) = build_native(tmp_path, names=ONE)
-    ours, theirs = members(built.path), members(natives / "ProximitySensor.fmu")
+    ours, theirs = read_members(built.path), read_members(natives / "ProximitySensor.fmu")
     assert {n for n in ours if ours[n] != theirs[n]} == {BINARY.format("ProximitySensor")}
 
 
 @needs_gcc
 def test_versions_of_fmi_differ_in_what_they_must(natives: Path, tmp_path: Path) -> None:
     (built,) = build_native(tmp_path, planned(fmi=3), ONE)
-    two, three = members(natives / "ProximitySensor.fmu"), members(built.path)
+    two, three = read_members(natives / "ProximitySensor.fmu"), read_members(built.path)
     assert three["terminalsAndIcons/icon.png"] == two["model.png"]
     assert f"binaries/{here().tuple}/ProximitySensor{here().suffix}" in three
     assert two["sources/block.h"] == three["sources/block.h"]
@@ -282,5 +279,5 @@ def test_a_block_of_ones_own(fmi: int, tmp_path: Path) -> None:
     plan = planned(fmi=3 if fmi == 3 else 2)
     built = build_block(OWN["SpringPlant"], tmp_path, plan)
     assert built == Built(tmp_path / "SpringPlant.fmu", "new")
-    assert f'fmiVersion="{fmi}.0"' in members(built.path)["modelDescription.xml"].decode()
+    assert f'fmiVersion="{fmi}.0"' in read_members(built.path)["modelDescription.xml"].decode()
     assert build_block(OWN["SpringPlant"], tmp_path, plan).status == "unchanged"

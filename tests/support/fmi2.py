@@ -48,6 +48,12 @@ class Logged(NamedTuple):
     text: str
 
 
+def read_members(fmu: Path) -> dict[str, bytes]:
+    """The files in an FMU by name."""
+    with ZipFile(fmu) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
 class Fmu:
     """An FMU, extracted into a folder and loaded."""
 

@@ -12,8 +12,8 @@ import pytest
 from c_compilers import LIBM
 from grasp_fmus.build import build_native, planned
 from grasp_fmus.native.targets import KNOWN, LINUX_ARM, LINUX_X86, MAC_ARM, MAC_X86, WINDOWS, Target
-from grasp_fmus.package import read_members
 from support.compilers import needs_zig
+from support.fmi2 import read_members
 
 NAME = "ProximitySensor"
 """Of all blocks the one that calls most."""
@@ -47,7 +47,7 @@ def binaries(tmp_path_factory: pytest.TempPathFactory) -> dict[Target, Path]:
     """One FMU for all platforms, its binaries by target."""
     folder = tmp_path_factory.mktemp("all")
     (built,) = build_native(folder, planned(KNOWN, fmi=3), [NAME])
-    members = read_members(built.path.read_bytes())
+    members = read_members(built.path)
     files = {}
     for target in KNOWN:
         files[target] = folder / f"{target.tuple}{target.suffix}"
@@ -112,7 +112,7 @@ def standard_functions(fmi: int) -> set[str]:
 
 def test_one_dylib_serves_both_processors_in_fmi_2(tmp_path: Path) -> None:
     (built,) = build_native(tmp_path, planned([MAC_X86, MAC_ARM]), [NAME])
-    data = read_members(built.path.read_bytes())[f"binaries/darwin64/{NAME}.dylib"]
+    data = read_members(built.path)[f"binaries/darwin64/{NAME}.dylib"]
     magic, count = struct.unpack_from(">II", data)
     assert (magic, count) == (0xCAFEBABE, 2)
     for i in range(2):

@@ -12,8 +12,8 @@ import pytest
 from c_compilers import environment as of_compiler
 from grasp_fmus.build import build_native, compiler_for, planned
 from grasp_fmus.native.targets import LINUX_ARM, LINUX_X86, WINDOWS, Target
-from grasp_fmus.package import read_members
 from support.compilers import needs_zig
+from support.fmi2 import read_members
 
 HOST = Path(__file__).with_name("platform_host.c")
 ARM = Path("/usr/aarch64-linux-gnu")
@@ -36,7 +36,7 @@ def fmu(name: str, tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]
     """The files in an FMU with a binary for each."""
     plan = planned([LINUX_X86, LINUX_ARM, WINDOWS])
     (built,) = build_native(tmp_path_factory.mktemp("fmu"), plan, [name])
-    return read_members(built.path.read_bytes())
+    return read_members(built.path)
 
 
 def ends(fmu: dict[str, bytes], target: Target, folder: Path, *emulator: str) -> Ends:
