@@ -24,11 +24,9 @@ PYTHON = """\
 
 To be a Python process, 3.11 or newer, 64 bit, on Linux or Windows: this FMU runs Python code inside
 the binary of pythonfmu. $packages For a host that is not Python, or another processor, take the
-native FMU: `grasp-cosim build --native`.
-
-The path of the folder that the host extracts the FMU to must be made of ASCII letters, digits,
-`_ . - ~` and spaces: any other character crashes pythonfmu's loader, and the host with it. The
-GUID is not checked. `grasp-cosim inspect $name.fmu` says whether this machine can load it.
+native FMU: `grasp-cosim build --native`. The path of the folder that the host extracts the FMU to
+must be made of ASCII letters, digits, `_ . - ~` and spaces: any other character crashes pythonfmu's
+loader, and the host with it. `grasp-cosim inspect $name.fmu` says whether this machine can load it.
 
 ## Errors
 
@@ -36,73 +34,53 @@ A call that is refused has no effect and returns `fmi2Fatal`: a value out of ran
 too long, or one whose results would not be finite. The reason is in the log of the host where
 debug logging is on: instance, time, variable, value and what would be valid.
 """
-NATIVE = """\
+_COMPILED = """
+## Compiling the sources
+
+`sources/` holds all of it as C99. One file is compiled, `$name.c`, which includes the others:
+
+    cc -std=c99 -O2 -ffp-contract=off -D$override -shared -fPIC -o $name.so $name.c -lm
+
+It compiles without warnings with `-Wall -Wextra -Wpedantic`. All functions but those of FMI are
+`static`, and without `-D$override` these begin with `${name}_`: any number of such FMUs can be
+linked into one program.
+
+## Errors
+
+A call that is refused returns `fmi${fmi}Error` and has no effect. The reason is in the log even
+when debug logging is off: instance, time, variable, value and what would be valid."""
+NATIVE = f"""\
 ## What the host needs
 
 Nothing but a binary for its platform: this FMU needs no Python, no other library than those of the
 system, no files, and no time or environment. It allocates memory when it is instantiated and never
-after that, and keeps nothing outside of its instances. It reads nothing from the folder that the
-host extracts it to, whose path may be any.
-
-## Compiling the sources
-
-`sources/` holds all of it as C99. One file is compiled, `$name.c`; it includes the others, and
-`buildDescription.xml` says so:
-
-    cc -std=c99 -O2 -ffp-contract=off -D$override -shared -fPIC -o $name.so $name.c -lm
-
-$linking The compiler must not contract a·b+c into one operation (`-march=native` and some
-processors make it do so unless it is told `-ffp-contract=off`) nor trade exactness for speed
-(`-Ofast`, `-ffast-math`): the FMU tests that when it is instantiated, and refuses to be, with the
-reason in the log.
+after that, and reads nothing from the folder that the host extracts it to.
+{_COMPILED} A step
+that is too long, or whose results would not be finite, returns `fmi${{fmi}}Discard`.
 
 ## What is promised of the numbers
 
-On Linux with glibc, on x86-64 and aarch64, outputs and states equal those of the same block in
-Python, bit for bit, on the same processor. Elsewhere the mathematical functions are others, which
-round the last digit otherwise now and then: after minutes of a closed loop the values agreed to
-1e-12.
-
-## Errors
-
-$errors A step that is too long, or whose results would not be finite, returns `fmi${fmi}Discard`.
+On Linux with glibc, on x86-64 and aarch64, they are those of the same block in Python, bit for bit;
+elsewhere libm rounds otherwise now and then. Compiled with contraction of a·b+c (`-march=native`
+without `-ffp-contract=off`) or with `-ffast-math`, the FMU refuses to be instantiated.
 """
-PROXY = """\
+PROXY = f"""\
 ## What the host needs
 
-A binary for its platform, and a peer in reach: this FMU needs no Python and no other library than
-those of the system. It has one UDP socket to its peer, reads the monotonic clock, and random bytes
-for each session; a file only where `proxy.key_file` names one. It allocates memory when it is
-instantiated, and keeps nothing outside of its instances.
+A binary for its platform, and a peer in reach: this FMU needs no Python. It has one UDP socket to
+its peer, reads the monotonic clock, and random bytes for each session; a file only where
+`proxy.key_file` names one. On Windows its sources are linked with `ws2_32`.
+{_COMPILED}
 
-## Compiling the sources
-
-`sources/` holds all of it as C99. One file is compiled, `$name.c`; it includes the others, and
-`buildDescription.xml` says so:
-
-    cc -std=c99 -O2 -D$override -shared -fPIC -o $name.so $name.c -lm
-
-On Windows it is linked with `ws2_32` as well. $linking
-
-## Errors
-
-$errors A step without an answer in time returns `fmi${fmi}OK`: `proxy.state` says what became of
-it, and the log that the peer is lost. With `proxy.on_loss = stop` the step in which it is lost
-returns `fmi${fmi}Error`, and so does every later one.
+A step without an answer in time returns `fmi${{fmi}}OK`: `proxy.state` says what became of it, and
+the log that the peer is lost. With `proxy.on_loss = stop` the step in which it is lost returns
+`fmi${{fmi}}Error`, and so does every later one.
 """
-_LINKING = """It compiles without warnings with `-Wall -Wextra -Wpedantic`. All functions but those
-of FMI are `static`, and without `-D$override` these begin with `${name}_`: any number of such FMUs
-can be linked into one program."""
-_ERRORS = """A call that is refused returns `fmi${fmi}Error` and has no effect. The reason is in the
-log even when debug logging is off: instance, time, variable, value and the allowed range."""
-_STATES = """\
-## States
+"""What is to be said of each kind of FMU, in Markdown."""
 
-Getting, setting, freeing and serialising the state of the FMU are supported. A state can be
+_STATES = """Getting, setting, freeing and serialising the state are supported. A state can be
 exchanged between instances of the same FMU, its bytes also between the one in Python and the native
-one.
-"""
-_NO_STATES = "## States\n\nNot supported: the state is that of the peer.\n"
+one."""
 
 
 def page(name: str, summary: str, card: str, about: str, fmi: int = 2, packages: str = "") -> str:
@@ -114,18 +92,18 @@ def page(name: str, summary: str, card: str, about: str, fmi: int = 2, packages:
     """
     theirs = ", the binary of pythonfmu as well: documentation/licenses/pythonfmu.txt"
     licence = f"MIT: documentation/licenses/license.txt{theirs if about is PYTHON else ''}."
-    states = _NO_STATES if about is PROXY else _STATES
+    states = "Not supported: the state is that of the peer." if about is PROXY else _STATES
     override = f"FMI{fmi}_OVERRIDE_FUNCTION_PREFIX"
-    known = {"name": name, "fmi": fmi, "override": override, "packages": packages}
-    linking, errors = (Template(text).substitute(known) for text in (_LINKING, _ERRORS))
-    sections = Template(about).substitute(known, linking=linking, errors=errors)
+    sections = Template(f"{about}\n## States\n\n{states}\n\n## Licence\n\n{licence}\n").substitute(
+        name=name, fmi=fmi, override=override, packages=packages
+    )
     return Template(FRAME.read_text("utf-8")).substitute(
         name=escape(name),
         summary=escape(summary.rstrip(".")),
         version=escape(version()),
         fmi=f"{fmi}.0",
         card=_rendered(card, 1),
-        sections=_rendered(f"{sections}\n{states}\n## Licence\n\n{licence}\n", 0),
+        sections=_rendered(sections, 0),
     )
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from conftest import Run
 from grasp_fmus.build import build_block
-from grasp_fmus.package import Built, read_members
-from support.fmi2 import OK, Fmu, Instance
+from grasp_fmus.package import Built
+from support.fmi2 import OK, Fmu, Instance, read_members
 
 READ = "declaration" if sys.version_info >= (3, 14) else "import"
 """When Python evaluates an annotation."""
@@ -86,7 +86,7 @@ def test_a_change_is_built_and_both_run_in_one_process(tmp_path: Path) -> None:
     after = build_block(write(tmp_path, LAG.replace("= 0.5", "= 0.6")), tmp_path / "2")
     assert answer(before.path, tmp_path / "a") == pytest.approx(1.0 - exp(-0.6), abs=1e-15)
     assert answer(after.path, tmp_path / "b") == pytest.approx(1.0 - exp(-0.5), abs=1e-15)
-    page = read_members(after.path.read_bytes())["documentation/index.html"].decode()
+    page = read_members(after.path)["documentation/index.html"].decode()
     assert "<h1>FirstOrderLag</h1>\n<p>A first-order lag.</p>" in page
     assert "T·y' = u - y" in page
     assert "<code>time_constant</code>" in page
