@@ -4,6 +4,7 @@ A page is Markdown, the card and then the sections that follow here; its frame i
 """
 
 from collections.abc import Sequence
+from functools import cache
 from html import escape
 from itertools import cycle
 from pathlib import Path
@@ -141,6 +142,7 @@ def icon(name: str) -> bytes | None:
     return file.read_bytes() if file.exists() else None
 
 
+@cache
 def _rendered(text: str, down: int) -> str:
     """Return Markdown as HTML, headings some levels down: the page has its own title.
 

@@ -105,7 +105,7 @@ class Source:
 
     def member(self, cls: str, name: str) -> str:
         """What the docstring below a member of a class says of it, or ""."""
-        for node in ast.walk(self.tree):
+        for node in self.tree.body:
             if isinstance(node, ast.ClassDef) and node.name == cls:
                 for at, said in zip(node.body, node.body[1:], strict=False):
                     is_it = isinstance(at, ast.AnnAssign) and getattr(at.target, "id", "") == name

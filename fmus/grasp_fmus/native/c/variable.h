@@ -32,14 +32,14 @@ typedef struct {
     char at[TEXT_CAPACITY];
 } Text;
 
-static inline void text_clear(Text *text)
+static void text_clear(Text *text)
 {
     text->length = 0;
     text->at[0] = '\0';
 }
 
 /* The bytes of a text in UTF-8 that `room` has place for, in whole characters */
-static inline size_t text_fitting(const char *text, size_t room)
+static size_t text_fitting(const char *text, size_t room)
 {
     size_t n = strlen(text);
     if (n > room) {
@@ -49,7 +49,7 @@ static inline size_t text_fitting(const char *text, size_t room)
     return n;
 }
 
-static inline void text_put_part(Text *text, const char *more, size_t n)
+static void text_put_part(Text *text, const char *more, size_t n)
 {
     size_t room = sizeof text->at - 1 - text->length;
     n = n <= room ? n : text_fitting(more, room);
@@ -58,13 +58,13 @@ static inline void text_put_part(Text *text, const char *more, size_t n)
     text->at[text->length] = '\0';
 }
 
-static inline void text_put(Text *text, const char *more)
+static void text_put(Text *text, const char *more)
 {
     text_put_part(text, more, strlen(more));
 }
 
 /* The digits d of m * 2^exponent, which is 0.d * 10^point, all of them; returns the point */
-static inline int text_digits(char *digits, uint64_t m, int exponent)
+static int text_digits(char *digits, uint64_t m, int exponent)
 {
     const uint32_t base = 1000000000;
     uint32_t words[TEXT_DIGITS / 9 + 4], place;  /* a number to that base, the lowest first */
@@ -100,7 +100,7 @@ static inline int text_digits(char *digits, uint64_t m, int exponent)
 }
 
 /* Round digits to so many, a half to the even one; returns the point, which may move */
-static inline int text_rounded(char *digits, int point, int most)
+static int text_rounded(char *digits, int point, int most)
 {
     int n = (int)strlen(digits), up;
     if (n <= most) {
@@ -121,7 +121,7 @@ static inline int text_rounded(char *digits, int point, int most)
 }
 
 /* -1, 0, 1 as the number with these digits is below, at or above m * 2^exponent */
-static inline int text_compare(const char *digits, int point, uint64_t m, int exponent)
+static int text_compare(const char *digits, int point, uint64_t m, int exponent)
 {
     char other[TEXT_DIGITS];
     int at = text_digits(other, m, exponent), order = strcmp(digits, other);
@@ -129,7 +129,7 @@ static inline int text_compare(const char *digits, int point, uint64_t m, int ex
 }
 
 /* Whether digits are read as m * 2^exponent: nearer to it than to any other double, or even */
-static inline int text_reads_back(const char *digits, int point, uint64_t m, int exponent)
+static int text_reads_back(const char *digits, int point, uint64_t m, int exponent)
 {
     int narrow = m == (uint64_t)1 << 52 && exponent > -1074;  /* those below are twice as close */
     int odd = m % 2 == 1;
@@ -138,7 +138,7 @@ static inline int text_reads_back(const char *digits, int point, uint64_t m, int
 }
 
 /* Write digits, with an exponent where the point is not among the first `most` of them */
-static inline void text_put_digits(Text *text, const char *digits, int point, int most)
+static void text_put_digits(Text *text, const char *digits, int point, int most)
 {
     static const char zeros[] = "00000000000000000";
     int n = (int)strlen(digits), far = point <= -4 || point > most, whole = far ? 1 : point;
@@ -165,7 +165,7 @@ static inline void text_put_digits(Text *text, const char *digits, int point, in
 }
 
 /* Write a number; `digits` 0: the fewest of 15 to 17 that are read as the same number */
-static inline void text_put_double(Text *text, double v, int digits)
+static void text_put_double(Text *text, double v, int digits)
 {
     char all[TEXT_DIGITS], found[TEXT_DIGITS];
     uint64_t bits, m;
@@ -188,13 +188,13 @@ static inline void text_put_double(Text *text, double v, int digits)
 }
 
 /* As format(v, ".{digits}g") of Python; digits from 1 to 17 */
-static inline void text_general(Text *text, double v, int digits)
+static void text_general(Text *text, double v, int digits)
 {
     text_put_double(text, v, digits);
 }
 
 /* A number that is read back as the same one, with a point or an exponent: -1.0 */
-static inline void text_number(Text *text, double v)
+static void text_number(Text *text, double v)
 {
     size_t from = text->length;
     text_put_double(text, v, 0);
@@ -204,7 +204,7 @@ static inline void text_number(Text *text, double v)
 }
 
 /* As printf has it: %s, %d, %g, %%, and %.17g for text_number(); no others */
-static inline void text_put_list(Text *text, const char *format, va_list list)
+static void text_put_list(Text *text, const char *format, va_list list)
 {
     const char *at;
     for (; (at = strchr(format, '%')) != NULL; format = at + (at[1] == '.' ? 5 : 2)) {
