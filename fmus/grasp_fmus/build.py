@@ -45,8 +45,8 @@ MOST_KEPT = 16
 UNPREFIXED = tuple(f"FMI{fmi}_OVERRIDE_FUNCTION_PREFIX" for fmi in (2, 3))
 """What is defined for a shared library, in which functions are called as the standard does."""
 
-NETWORKED = {".so": ("-lpthread", "-ldl"), ".dll": ("-lws2_32",)}
-"""The libraries of sockets and threads, by the suffix of a shared library; cl is told in the C."""
+NETWORKED = {".dll": ("-lws2_32",)}
+"""The libraries of sockets, by the suffix of a shared library; cl is told in the C."""
 
 
 class NoTwinsError(Exception):

@@ -1,37 +1,33 @@
-"""The slave of a proxy: at every step it exchanges its variables with a peer over UDP."""
+"""Builds the proxy of an FMU: the same variables, in C, which a peer gives values to over UDP."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
-from itertools import accumulate, pairwise
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from time import monotonic_ns
-from typing import Annotated, Any, NamedTuple, get_args, get_type_hints
-from weakref import finalize
+from typing import Annotated, NamedTuple, get_args, get_type_hints
 
-from .base import INITIALISING, INSTANTIATED, STEPPING, RefusalError, Slave, reported
-from .connection import Connection
-from .host_log import DISCARD, WARNING
-from .link.client import Client
-from .link.message import FAILED, LONGEST_STEP, PORT, STRING_SIZE, exposed, read_key
+from .bench_header import wire
+from .build import Plan, with_binaries
+from .description import UNITS, Description, Experiment, Unit, Version
+from .host_log import ERROR, WARNING
+from .link.message import PORT
 from .link.signature import LinkVariable, Signature
+from .native.sources import proxy_sources, with_description
+from .native.text import number, string
+from .package import HASH, Built, Model, write_members
+from .page import icon
 from .variable import TYPES, Scalar, Variable
 
-HOLD, FAILSAFE, STOP = ON_LOSS = ("hold", "failsafe", "stop")
-"""The choices of proxy.on_loss, for when the peer is lost."""
+PROTOCOL = Path(__file__).parent / "link/README.md"
 
-NOT_CONNECTED, CONNECTED, MISSING, LOST = range(4)
-"""The values of proxy.state."""
-
-MOST = 2**31 - 1
 LONGEST_TEXT = 1023
 """Bytes that a text of the settings has at most."""
-_NANOSECONDS = 1e9
+_MOST = 2**31 - 1
 
 
 class Settings(NamedTuple):
     """The parameters proxy.*, but for those of the outputs: type, unit, limits, description."""
 
-    host: Annotated[str, "", None, "name or IPv4 address of the peer"] = "127.0.0.1"
+    host: Annotated[str, "", (0, LONGEST_TEXT), "name or IPv4 address of the peer"] = "127.0.0.1"
     port: Annotated[int, "", (1, 65535), "its UDP port"] = PORT
     timeout: Annotated[
         float, "s", (1e-6, 3600.0), "longest wait for the outputs of a step, by the clock"
@@ -43,16 +39,22 @@ class Settings(NamedTuple):
         "longest wait for an answer in initialisation mode, by the clock",
     ] = 5.0
     misses_tolerated: Annotated[
-        int, "", (0, MOST), "misses in a row before the peer is lost with one more"
+        int, "", (0, _MOST), "misses in a row before the peer is lost with one more"
     ] = 3
     on_loss: Annotated[
-        str, "", None, "hold: outputs stay; failsafe: proxy.failsafe.*; stop: fmi2Error"
-    ] = STOP
+        str,
+        "",
+        (0, LONGEST_TEXT),
+        "hold: outputs stay; failsafe: proxy.failsafe.*; stop: fmi2Error",
+    ] = "stop"
     resume: Annotated[bool, "", None, "go on asking a lost peer, and come back when it answers"] = (
         False
     )
     key_file: Annotated[
-        str, "", None, "file with a key shared with the peer, 16 bytes or more; empty: none"
+        str,
+        "",
+        (0, LONGEST_TEXT),
+        "file with a key shared with the peer, 16 bytes or more; empty: none",
     ] = ""
 
 
@@ -76,6 +78,51 @@ _DIAGNOSTICS: Mapping[str, tuple[type[Scalar], str, str]] = {
     ),
 }  # fmt: skip
 """Type, unit and description of the outputs proxy.* by their names."""
+
+
+@dataclass(frozen=True)
+class Original:
+    """The FMU whose place a proxy takes; `file` is its name.
+
+    `variables` are its inputs, parameters and outputs that are exchanged, in this order.
+    """
+
+    file: str
+    variables: Sequence[Variable]
+    units: Mapping[str, Unit]
+    experiment: Experiment
+    can_vary_step: bool
+
+
+def build_proxy(
+    target: Path, original: Original, plan: Plan, settings: Settings = DEFAULTS
+) -> Built:
+    """Build the proxy of an FMU for the platforms of a plan; its parameters start at `settings`.
+
+    A proxy that is there with the same content is left alone. ValueError where the stem of `target`
+    is no identifier of C, a setting is out of its range, or a name is taken; CompilerError where a
+    compiler fails.
+    """
+    members = proxy_members(target, original, plan.fmi, settings)
+    fmus = with_binaries([(target.stem, members)], plan, networked=True)
+    return write_members(target, fmus[target.stem])
+
+
+def proxy_members(
+    target: Path, original: Original, fmi: Version = 2, settings: Settings = DEFAULTS
+) -> dict[str, bytes]:
+    """Return the files of a proxy but for the binaries, by name; ValueError as build_proxy()."""
+    description = _description(target, original, settings)
+    signature = shared_signature(original.variables)
+    own = {
+        "wire.h": f"{_LICENCE}#ifndef WIRE_H\n#define WIRE_H\n\n{_INCLUDED}\n"
+        f"{wire('wire', signature)}\n#endif\n",
+        "variables.h": _table(signature, description.variables),
+    }
+    card = _card(description.variables[len(original.variables) :])
+    model = Model(description, card, {}, picture=icon("Proxy"))
+    sources = proxy_sources(description.name, original.file, own, HASH, fmi)
+    return with_description(model, sources, fmi)
 
 
 def own_variables(outputs: Sequence[Variable], settings: Settings = DEFAULTS) -> list[Variable]:
@@ -107,255 +154,97 @@ def own_variables(outputs: Sequence[Variable], settings: Settings = DEFAULTS) ->
 def shared_signature(variables: Sequence[Variable]) -> Signature:
     """Return the signature of the variables of an original."""
     shared = ((v.name, TYPES[v.kind], v.causality, v.unit or None) for v in variables)
-    return Signature(tuple(LinkVariable(*v) for v in shared))
+    return Signature(tuple(LinkVariable(*v) for v in shared))  # type: ignore[arg-type]  # no String
 
 
-def bounded(variables: Sequence[Variable], shared: int) -> list[Variable]:
-    """Return all variables of a proxy with the limits that its slave checks.
+def _description(target: Path, original: Original, settings: Settings) -> Description:
+    name = target.stem
+    if not (name.isascii() and name.isidentifier()) or target.suffix != ".fmu":
+        raise ValueError(
+            f"{target.name}: must be NAME.fmu, NAME of letters, digits and _, no digit first"
+        )
+    taken = [v.name for v in original.variables if v.name.startswith("proxy.")]
+    if taken:
+        raise ValueError(f"{original.file}: {taken[0]}: proxy. begins the names of a proxy's own")
+    own = own_variables([v for v in original.variables if v.causality == "output"], settings)
+    for v in own:
+        if v.start is not None:
+            v.check(v.start)
+    return Description(
+        name,
+        f"Proxy of {original.file}: a peer has its outputs, over UDP",
+        [*original.variables, *own],
+        {"s": UNITS["s"], **original.units},
+        original.can_vary_step,
+        has_states=False,
+        experiment=original.experiment,
+        statuses=(WARNING, ERROR),
+    )
 
-    The first ones, `shared` in number, are the original's: of those texts alone have limits, which
-    are what can be sent; the peer checks the rest.
+
+def _card(own: Sequence[Variable]) -> str:
+    """Return the proxy's own variables and the protocol, in Markdown."""
+    rows = []
+    for v in own:
+        start = "" if v.start is None else str(v.start).lower()
+        limits = f"{v.limits[0]:g} to {v.limits[1]:g}" if v.limits and v.kind is not str else ""
+        cells = (f"`{v.name}`", v.causality, v.type, v.unit, start, limits, v.description)
+        rows.append(f"| {' | '.join(cell.replace('|', '&#124;') for cell in cells)} |\n")
+    return (
+        "## Variables of the proxy\n\n"
+        "All others are those of the original.\n\n"
+        "| variable | causality | type | unit | start | range | meaning |\n"
+        f"|---|---|---|---|---|---|---|\n{''.join(rows)}\n"
+        f"{PROTOCOL.read_text('utf-8')}"
+    )
+
+
+_LICENCE = "/* What a proxy and its peer say to each other, in bytes: README.md of the link. */\n"
+_INCLUDED = "".join(
+    f"#include <{header}.h>\n" for header in ("stdbool", "stddef", "stdint", "string")
+)
+_KINDS = {float: "KIND_REAL", bool: "KIND_BOOLEAN", int: "KIND_INTEGER", str: "KIND_STRING"}
+_WHOLE = (-(2.0**31), 2.0**31 - 1.0)
+"""What an Integer of the link holds."""
+
+
+def _table(signature: Signature, variables: Sequence[Variable]) -> str:
+    """Return variables.h: all variables, and the texts that Strings begin with.
+
+    Of the original's no limits are checked here: the peer does so.
     """
-    found = []
+    texts: list[str] = []
+    rows = []
     for i, v in enumerate(variables):
-        sent = i < shared or v.name.startswith("proxy.failsafe.")
-        limits = v.limits if i >= shared else None
+        limits = v.limits if i >= len(signature.variables) else None
+        start: float = 0.0
+        low, high = limits or (_WHOLE if v.kind is int else (0.0, 0.0))
         if v.kind is str:
-            limits = (0, STRING_SIZE - 1 if sent else LONGEST_TEXT)
-        found.append(replace(v, limits=limits))
-    return found
-
-
-def _refused(call: str) -> Callable[..., Any]:
-    """Return a function for a call about states, all of which are refused."""
-
-    @reported
-    def refuse(self: Slave, *_: Any) -> None:
-        raise RefusalError(f"{call}: a proxy has no state, it is the peer's")
-
-    return refuse
-
-
-class Fmi2Proxy(Slave):
-    """A proxy as an FMI 2.0 co-simulation slave; a subclass names the original.
-
-    Values are in the order: inputs, parameters, outputs of the original, then own_variables().
-    """
-
-    original: str
-    """The file name of the original."""
-    variables: tuple[Variable, ...]
-    """Those of the original: inputs, parameters, outputs."""
-    settings = DEFAULTS
-    """The start values of its own parameters."""
-    clock: Callable[[], int] = staticmethod(monotonic_ns)
-
-    def _prepare(self) -> None:
-        self._signature = exchanged = shared_signature(self.variables)
-        outputs = self.variables[len(exchanged.request) :]
-        self._variables = bounded(
-            [*self.variables, *own_variables(outputs, self.settings)], len(self.variables)
+            start = len(texts)
+            texts.append(string(str(v.start or "")))
+        elif v.start is not None:
+            start = float(v.start)
+        fixed = int(v.variability == "fixed")
+        numbers = ", ".join(number(float(x)) for x in (low, high, start))
+        rows.append(
+            f"    {{{string(v.name)}, {string(v.in_unit)}, {_KINDS[v.kind]}, "
+            f"{v.causality.upper()}, {fixed},\n"
+            f"     {int(limits is not None or v.kind is int)}, {numbers}}},\n"
         )
-        self._values = [v.kind() if v.start is None else v.start for v in self._variables]
-        sizes = (len(exchanged.request), n := len(outputs), len(Settings._fields), n, n)
-        self._request, self._outputs, self._settings, self._holds, self._failsafes = _slices(sizes)
-        self._diagnostics = slice(self._failsafes.stop, len(self._values))
-        self._connection: Connection | None = None
-        self._address = ("", 0, "")
-        self._state = NOT_CONNECTED
-        self._missed = 0
-        self._sessions = 1
-        self._loss = ""
-        self._enter(INSTANTIATED)
-
-    # The life cycle
-
-    @reported
-    def enter_initialization_mode(self) -> None:
-        """Greet the peer."""
-        self._require("fmi2EnterInitializationMode", INSTANTIATED)
-        self._connected()
-        self._enter(INITIALISING)
-
-    @reported
-    def do_step(self, current_time: float, step_size: float) -> bool:
-        """Send inputs and parameters, wait for the outputs; without them, hold or lose.
-
-        Returns False, and does nothing, if the step is longer than a peer takes.
-        """
-        self._check_step(current_time, step_size)
-        if step_size > LONGEST_STEP:
-            self._log(DISCARD, f"step of {step_size} s: must be at most {LONGEST_STEP:g} s")
-            return False
-        if self._inputs is None:
-            self._refresh()
-        settings, connection = self._read_settings(), self._connection
-        assert connection is not None  # noqa: S101 - there is one from initialisation on
-        if self._state != LOST or settings.resume:
-            deadline, anew = self._deadline(settings.timeout), self._state == LOST
-            if connection.step(current_time, step_size, self._inputs, deadline, anew):
-                self._note_answer(connection)
-            else:
-                self._note_miss(connection, settings)
-        if self._state == LOST and settings.on_loss == STOP:
-            self._report(connection)
-            raise RefusalError(self._loss)
-        self._time = current_time + step_size
-        if self._state != LOST:
-            self._take(connection)
-        self._report(connection)
-        return True
-
-    @reported
-    def terminate(self) -> None:
-        """The end, for the peer as well; values can still be read."""
-        self._disconnect()
-        super().terminate()
-
-    # State
-
-    _get_fmu_state = _refused("fmi2GetFMUstate")
-    _set_fmu_state = _refused("fmi2SetFMUstate")
-    state_to_bytes = _refused("fmi2SerializeFMUstate")
-    state_from_bytes = _refused("fmi2DeSerializeFMUstate")
-
-    # The peer
-
-    def _refresh(self) -> None:
-        """In initialisation mode, exchange values; after that outputs do not follow a set."""
-        if self._phase not in (INITIALISING, STEPPING) or self._inputs is not None:
-            return
-        inputs = self._values[self._request]
-        if self._phase == INITIALISING:
-            connection, settings = self._connected(), self._read_settings()
-            deadline = self._deadline(settings.connect_timeout)
-            if not connection.initialise(self._time, inputs, deadline):
-                self._give_up(connection, settings)
-            self._take(connection)
-        self._inputs = inputs
-
-    def _connected(self) -> Connection:
-        """Return the connection with a session to the peer of the settings, or RefusalError."""
-        settings = self._read_settings()
-        address = (settings.host, settings.port, settings.key_file)
-        if self._connection is not None and self._address == address:
-            return self._connection
-        self._disconnect()
-        client = Client(self._signature, self._key(settings.key_file))
-        deadline = self._deadline(settings.connect_timeout)
-        try:
-            connection = Connection(settings.host, settings.port, client, deadline, self.clock)
-        except OSError as error:
-            reason = error.strerror or error
-            raise RefusalError(f"{_peer(settings)}: no connection: {reason}") from error
-        self._connection, self._address = connection, address
-        self._close = finalize(self, connection.close)
-        if not connection.greet(deadline):
-            self._give_up(connection, settings)
-        self._values[self._diagnostics.start] = self._state = CONNECTED
-        return connection
-
-    def _key(self, file: str) -> bytes | None:
-        """Return the shared key in a file, None without a file; RefusalError where it is invalid.
-
-        It is logged where others can read it.
-        """
-        try:
-            key = read_key(Path(file)) if file else None
-            if key and (said := exposed(Path(file))):
-                self._log(WARNING, said)
-        except (OSError, ValueError) as error:
-            reason = getattr(error, "strerror", error)
-            raise RefusalError(f"proxy.key_file = {file!r}: {reason}") from error
-        return key
-
-    def _deadline(self, timeout: float) -> int:
-        return self.clock() + round(timeout * _NANOSECONDS)
-
-    def _disconnect(self) -> None:
-        if self._connection is not None:
-            self._close()
-            self._connection = None
-            self._values[self._diagnostics.start] = self._state = NOT_CONNECTED
-
-    def _give_up(self, connection: Connection, settings: Settings) -> None:
-        """Raise RefusalError with the reason why initialisation failed; the host may try again."""
-        self._disconnect()
-        if connection.refusal:
-            raise RefusalError(f"{_peer(settings)}: {connection.refusal.text}")
-        raise RefusalError(
-            f"no answer from {_peer(settings)} within {settings.connect_timeout:g} s"
-            f"{connection.trouble}: is the peer running there, and has it "
-            f"{'the same' if settings.key_file else 'no'} key? "
-            f"e.g. grasp-cosim serve {self.original} --port {settings.port}"
-        )
-
-    def _note_answer(self, connection: Connection) -> None:
-        if self._state == LOST:
-            text = f"{_peer(self._read_settings())}: the peer answers again"
-            if connection.sessions > self._sessions:
-                text += " in a new session, its model set up anew"
-            self._log(WARNING, text)
-        self._sessions = connection.sessions
-        self._state, self._missed = CONNECTED, 0
-
-    def _note_miss(self, connection: Connection, settings: Settings) -> None:
-        self._missed += 1
-        failed = connection.refusal is not None and connection.refusal.code == FAILED
-        if self._state != LOST:
-            self._state = MISSING
-            if failed or self._missed > settings.misses_tolerated:
-                self._lose(connection, settings)
-
-    def _lose(self, connection: Connection, settings: Settings) -> None:
-        self._state = LOST
-        reason = f"no answer within {settings.timeout:g} s{connection.trouble}"
-        if connection.refusal:
-            reason = connection.refusal.text
-        self._loss = f"{_peer(settings)} is lost, {self._missed} missed in a row: {reason}"
-        if settings.on_loss == STOP:
-            return
-        self._log(WARNING, f"{self._loss}; proxy.on_loss = {settings.on_loss}")
-        self._take(connection)
-        if settings.on_loss == FAILSAFE:
-            places = (self._outputs, self._holds, self._failsafes)
-            each = zip(*(self._values[place] for place in places), strict=True)
-            self._values[self._outputs] = [now if hold else safe for now, hold, safe in each]
-
-    # Values
-
-    def _read_settings(self) -> Settings:
-        """Return the settings now; RefusalError where one is invalid."""
-        if self._params is None:
-            settings = Settings(*self._values[self._settings])
-            if settings.on_loss not in ON_LOSS:
-                raise RefusalError(
-                    f"proxy.on_loss = {settings.on_loss!r}: must be {', '.join(ON_LOSS)}"
-                )
-            self._params = settings
-        return self._params  # type: ignore[no-any-return]  # a block's are of any type
-
-    def _take(self, connection: Connection) -> None:
-        outputs = connection.client.outputs
-        assert outputs is not None  # noqa: S101 - there are some from initialisation on
-        self._values[self._outputs] = outputs
-
-    def _report(self, connection: Connection) -> None:
-        """Bring the diagnostics up to date; before the first step they would not settle."""
-        client = connection.client
-        c = client.counters
-        counts = (
-            self._state, c.missed, self._missed, c.late, c.out_of_order, c.duplicated, c.rejected,
-            connection.sessions,
-        )  # fmt: skip
-        times = (client.round_trip / _NANOSECONDS, self._time - client.outputs_time)
-        self._values[self._diagnostics] = [*(min(count, MOST) for count in counts), *times]
-
-
-def _slices(sizes: Sequence[int]) -> list[slice]:
-    """Return consecutive slices of a list, of these sizes."""
-    return [slice(*pair) for pair in pairwise(accumulate(sizes, initial=0))]
-
-
-def _peer(settings: Settings) -> str:
-    return f"{settings.host}:{settings.port}"
+    defined = {
+        "N_REQUEST": len(signature.request),
+        "N_ANSWER": len(signature.answer),
+        "REQUEST_SIZE": 8 * len(signature.request),
+        "ANSWER_SIZE": 8 * len(signature.answer),
+        "N_VARIABLES": len(rows),
+        "N_TEXTS": len(texts),
+    }
+    return (
+        "/* The variables of a proxy, in the order of their value references. */\n"
+        + "".join(f"#define {name} {value}\n" for name, value in defined.items())
+        + '#include "variable.h"\n\n'
+        + f"static const Variable variables[N_VARIABLES] = {{\n{''.join(rows)}}};\n\n"
+        + "static const char *const texts[N_TEXTS + 1] = {\n"
+        + "".join(f"    {text},\n" for text in texts)
+        + '    ""};\n'
+    )

@@ -16,9 +16,10 @@ import pytest
 from conftest import Folder
 from grasp_cosim.hil.served import Service
 from support import campaign
-from support.kinds import Kind, all_kinds, native_slowly, proxy_options
+from support.kinds import Kind, all_kinds
 from support.packages import runnable
 from support.proxies import build_proxy, serving
+from support.slow import platforms
 
 CALLER = Path(__file__).with_name("random_calls.py")
 
@@ -68,13 +69,14 @@ def test_the_fmus_live(
         assert report["calls"][f"{name} 3"] > 0
 
 
-@native_slowly
+@pytest.mark.slow
+@pytest.mark.parametrize("fmi", ["2", platforms("3")])
 @pytest.mark.parametrize(
     ("seeds", "calls"),
     [(range(1), 60), pytest.param(campaign.seeds(100), 250, marks=a_campaign)],
     ids=["few", "many"],
 )
-def test_proxies_live(fmus: Path, kind: Kind, tmp_path: Path, seeds: range, calls: int) -> None:
+def test_proxies_live(fmus: Path, fmi: str, tmp_path: Path, seeds: range, calls: int) -> None:
     """With a peer, and one without."""
     with ExitStack() as stack:
         proxies = []
@@ -82,7 +84,7 @@ def test_proxies_live(fmus: Path, kind: Kind, tmp_path: Path, seeds: range, call
             fmu = fmus / f"{name}.fmu"
             port = stack.enter_context(serving(fmu, Service(lockstep=True))).port_socket
             proxy = tmp_path / f"{name}Proxy.fmu"
-            proxies.append(build_proxy(fmu, proxy, port.getsockname()[1], *proxy_options(kind)))
+            proxies.append(build_proxy(fmu, proxy, port.getsockname()[1], "--fmi", fmi))
         alone = tmp_path / "Alone.fmu"
-        proxies.append(build_proxy(fmus / "GraspController.fmu", alone, 9, *proxy_options(kind)))
+        proxies.append(build_proxy(fmus / "GraspController.fmu", alone, 9, "--fmi", fmi))
         called(tmp_path / "host", seeds, calls, proxies)

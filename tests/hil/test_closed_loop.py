@@ -10,11 +10,8 @@ import pytest
 from grasp_cosim import System, simulate
 from grasp_cosim.hil.served import Service
 from grasp_cosim.master.engine import Engine
-from support.kinds import Kind, native_slowly, proxy_options
 from support.proxies import build_proxy, serving
 from support.slow import slow
-
-pytestmark = native_slowly
 
 ENGINE: Engine = "python"
 """The peers are threads of this process. The compiled loop keeps Python's lock to itself, where
@@ -31,15 +28,14 @@ def stepped(grasp: System) -> System:
 
 @contextmanager
 def on_the_bench(
-    system: System, folder: Path, kind: Kind, names: tuple[str, ...], how: Service
+    system: System, folder: Path, names: tuple[str, ...], how: Service
 ) -> Iterator[System]:
     """The system with these components as proxies, each with a peer in lockstep of its own."""
     with ExitStack() as stack:
         for name in names:
             fmu = system.component(name, "test").fmu
             server = stack.enter_context(serving(fmu, how))
-            options = proxy_options(kind)
-            proxy = build_proxy(fmu, folder / f"{name}_bench.fmu", server.address[1], *options)
+            proxy = build_proxy(fmu, folder / f"{name}_bench.fmu", server.address[1])
             system = system.swap(name, proxy)
         yield system
 
@@ -51,12 +47,12 @@ def on_the_bench(
     ids=["all", "controller"],
 )
 def test_a_part_on_the_bench_changes_no_bit(
-    stepped: System, kind: Kind, tmp_path: Path, names: tuple[str, ...], scheme: str
+    stepped: System, tmp_path: Path, names: tuple[str, ...], scheme: str
 ) -> None:
     values = {"plant.initial_object_position": 0.02, "sensor_1.reflectance": 0.93}
     system = stepped.with_experiment(scheme=scheme).with_values(values)
     direct = simulate(system)
-    with on_the_bench(system, tmp_path, kind, names, Service(lockstep=True)) as benched:
+    with on_the_bench(system, tmp_path, names, Service(lockstep=True)) as benched:
         proxied = simulate(benched, engine=ENGINE)
     for signal, column in direct.items():
         np.testing.assert_array_equal(column, proxied[signal], signal)
@@ -69,27 +65,25 @@ def test_a_part_on_the_bench_changes_no_bit(
 
 
 @pytest.mark.slow
-def test_native_and_python_mixed(
-    stepped: System, natives: Path, kind: Kind, tmp_path: Path
-) -> None:
-    """Proxies of either kind, of native and of Python FMUs, with peers that serve the other."""
+def test_native_and_python_mixed(stepped: System, natives: Path, tmp_path: Path) -> None:
+    """Proxies of native and of Python FMUs, with peers that serve the other."""
     system, direct = stepped, simulate(stepped)
     for name in ("plant", "sensor_2"):
         fmu = natives / system.component(name, "test").fmu.name
         system = system.swap(name, fmu)
     with ExitStack() as stack:
-        for name, of in (("plant", kind), ("sensor_1", "python"), ("controller", kind)):
-            one = on_the_bench(system, tmp_path, of, (name,), Service(lockstep=True))
+        for name in ("plant", "sensor_1", "controller"):
+            one = on_the_bench(system, tmp_path, (name,), Service(lockstep=True))
             system = stack.enter_context(one)
         again = simulate(system, engine=ENGINE)
     for signal, values in direct.items():
         np.testing.assert_array_equal(values, again[signal], signal)
 
 
-def test_events_reach_the_bench(grasp: System, kind: Kind, tmp_path: Path) -> None:
+def test_events_reach_the_bench(grasp: System, tmp_path: Path) -> None:
     """A tunable parameter of a sensor on the bench, set on the way."""
     system = grasp.with_experiment(step=1e-3, stop=0.02)
-    with on_the_bench(system, tmp_path, kind, ("sensor_1",), Service(lockstep=True)) as benched:
+    with on_the_bench(system, tmp_path, ("sensor_1",), Service(lockstep=True)) as benched:
         there, here = darkened(benched), darkened(system)
     np.testing.assert_array_equal(there, here)
     assert here[11] < 0.6 * here[10]
@@ -105,10 +99,8 @@ def darkened(system: System) -> npt.NDArray[np.float64]:
 
 
 @pytest.mark.slow
-def test_two_runs_one_after_the_other_use_the_same_bench(
-    grasp: System, kind: Kind, tmp_path: Path
-) -> None:
+def test_two_runs_one_after_the_other_use_the_same_bench(grasp: System, tmp_path: Path) -> None:
     system = grasp.with_experiment(step=1e-3, stop=0.05)
-    with on_the_bench(system, tmp_path, kind, ("plant",), Service(lockstep=True)) as benched:
+    with on_the_bench(system, tmp_path, ("plant",), Service(lockstep=True)) as benched:
         first, second = (simulate(benched, engine=ENGINE)["plant.position[1]"] for _ in range(2))
     np.testing.assert_array_equal(first, second)

@@ -19,10 +19,7 @@ from grasp_cosim.errors import InputError
 from grasp_cosim.interface.interface import Value
 from grasp_cosim.recording.result import Result
 from support.campaign import seeds
-from support.kinds import Kind, native_slowly, proxy_options
 from support.proxies import build_proxy
-
-pytestmark = native_slowly
 
 MOMENTS, PORTION = seeds(200), 20
 TOLERATED = 3
@@ -82,12 +79,11 @@ def peers(fmus: Path) -> Iterator[Peers]:
 
 
 @pytest.fixture(scope="module")
-def proxied(grasp: System, kind: Kind, tmp_path_factory: pytest.TempPathFactory) -> System:
+def proxied(grasp: System, tmp_path_factory: pytest.TempPathFactory) -> System:
     """The controller on the bench, alone: it moves its fingers although nothing follows them."""
     controller = grasp.component("controller", "test")
     proxy = build_proxy(
         controller.fmu, tmp_path_factory.mktemp("bench") / "controller_bench.fmu", 5501,
-        *proxy_options(kind),
     )  # fmt: skip
     values: dict[str, Value] = {
         "position[1]": 0.11,

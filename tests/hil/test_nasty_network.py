@@ -16,12 +16,9 @@ from grasp_cosim.hil.traffic import Entry
 from grasp_cosim.interface.interface import Value
 from grasp_cosim.master.engine import Engine
 from grasp_cosim.recording.result import Result
-from support.kinds import Kind, native_slowly, proxy_options
 from support.ports import kept_port
 from support.proxies import build_proxy, relaying, serving, wait_until
 from support.slow import slow
-
-pytestmark = native_slowly
 
 ENGINE: Engine = "python"
 """The peers are threads of this process: test_closed_loop.py."""
@@ -50,7 +47,7 @@ def network(conditions: Conditions, *outages: Outage) -> Network:
 
 @contextmanager
 def behind_a_relay(
-    system: System, name: str, folder: Path, bad: Network, log: list[Entry], kind: Kind
+    system: System, name: str, folder: Path, bad: Network, log: list[Entry]
 ) -> Iterator[tuple[System, Server, Relay]]:
     """The system with a component on the bench, which steps on request, behind a relay."""
     fmu = system.component(name, "test").fmu
@@ -58,8 +55,7 @@ def behind_a_relay(
         serving(fmu, Service(lockstep=True)) as server,
         relaying(server.address, bad, log=log.append) as relay,
     ):
-        options = proxy_options(kind)
-        proxy = build_proxy(fmu, folder / f"{name}_bench.fmu", relay.address[1], *options)
+        proxy = build_proxy(fmu, folder / f"{name}_bench.fmu", relay.address[1])
         yield system.swap(name, proxy), server, relay
 
 
@@ -84,7 +80,7 @@ def dropped(log: list[Entry], direction: Direction) -> int:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["plant", "controller"])
 def test_with_losses_and_jitter_the_grasp_completes_and_every_datagram_is_accounted_for(
-    slow_grasp: System, kind: Kind, tmp_path: Path, name: str
+    slow_grasp: System, tmp_path: Path, name: str
 ) -> None:
     log: list[Entry] = []
     values: dict[str, Value] = {
@@ -92,7 +88,7 @@ def test_with_losses_and_jitter_the_grasp_completes_and_every_datagram_is_accoun
         f"{name}.proxy.misses_tolerated": 1000,
     }
     bad = network(BAD)
-    with behind_a_relay(slow_grasp, name, tmp_path, bad, log, kind) as (system, server, relay):
+    with behind_a_relay(slow_grasp, name, tmp_path, bad, log) as (system, server, relay):
         result = simulated(system.with_values(values), name)
         wait_until(lambda: server.fmu.counters()["sessions"] == 1)
         peer, counters = server.fmu.counters(), relay.counters
@@ -123,9 +119,7 @@ def last(result: Result, name: str) -> int:
 
 
 @pytest.mark.slow
-def test_the_peer_out_of_reach_for_a_while_and_back(
-    slow_grasp: System, kind: Kind, tmp_path: Path
-) -> None:
+def test_the_peer_out_of_reach_for_a_while_and_back(slow_grasp: System, tmp_path: Path) -> None:
     """Twenty requests get nowhere; the peer makes up for them with what comes after."""
     log: list[Entry] = []
     gone = Network(outages=(Outage(100, 120),))
@@ -134,7 +128,7 @@ def test_the_peer_out_of_reach_for_a_while_and_back(
         "plant.proxy.on_loss": "hold",
         "plant.proxy.resume": True,
     }
-    with behind_a_relay(slow_grasp, "plant", tmp_path, gone, log, kind) as (system, _, _):
+    with behind_a_relay(slow_grasp, "plant", tmp_path, gone, log) as (system, _, _):
         result = simulated(system.with_values(values), "plant")
     state, row = result["plant.proxy.state"], result["plant.proxy.consecutive_missed"]
     lost = np.flatnonzero(state == 3)
@@ -153,9 +147,7 @@ def test_the_peer_out_of_reach_for_a_while_and_back(
 
 
 @pytest.mark.parametrize("resume", [slow(True), False])
-def test_the_peer_started_anew(
-    slow_grasp: System, kind: Kind, tmp_path: Path, resume: bool
-) -> None:
+def test_the_peer_started_anew(slow_grasp: System, tmp_path: Path, resume: bool) -> None:
     """It knows no session; a proxy that may resume begins another one, from the start values."""
     fmu = slow_grasp.component("plant", "test").fmu
     values: dict[str, Value] = {
@@ -167,7 +159,7 @@ def test_the_peer_started_anew(
         "plant.proxy.resume": resume,
     }
     with kept_port() as port:
-        proxy = build_proxy(fmu, tmp_path / "plant_bench.fmu", port, *proxy_options(kind))
+        proxy = build_proxy(fmu, tmp_path / "plant_bench.fmu", port)
         system = slow_grasp.swap("plant", proxy).with_values(values)
         with serving(fmu, Service(lockstep=True), ("127.0.0.1", port)):
             session = simulate.session(system, engine=ENGINE)

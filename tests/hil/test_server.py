@@ -20,7 +20,7 @@ from grasp_cosim.hil.protocol import link_signature
 from grasp_cosim.hil.served import ServedFmu, Service
 from grasp_cosim.hil.server import Server
 from grasp_cosim.interface.read import read_interface
-from grasp_fmus.link.message import LARGEST
+from grasp_fmus.link.message import LARGEST, STEP
 from support import campaign
 from support.proxies import HandProxy, UdpAsk, serving, wait_until
 
@@ -67,7 +67,7 @@ def test_by_its_own_clock_it_goes_on_without_requests(fmus: Path) -> None:
         proxy.step(0.0, 1e-3, values)
         wait_until(lambda: server.fmu.counters()["own_steps"] >= 20)
         proxy.step(0.02, 1e-3, values)
-        assert proxy.client.outputs_time >= 0.02
+        assert proxy.outputs_time >= 0.02
 
 
 def test_the_port_is_one_that_is_free(fmus: Path) -> None:
@@ -104,7 +104,7 @@ def test_many_malformed_datagrams(fmus: Path, key: bytes | None) -> None:
         socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vandal,
     ):
         proxy.begin(1, values)
-        legal = bytearray(proxy.client.step(0.0, 1e-3, values, 0))
+        legal = bytearray(proxy.request(STEP, 0.0, values, 1e-3))
         if key is None:
             legal[24:40] = bytes(16)  # an outsider knows neither session nor cookie
         noise = list(itertools.islice(garbage(campaign.first_seed, bytes(legal)), 10_000))

@@ -88,7 +88,7 @@ def jacobi(
     fmu = system.component("plant", "test").fmu
     with serving(fmu, Service(lockstep=True)) as server:
         target = tmp_path_factory.mktemp("proxy") / "PlantBench.fmu"
-        yield system.swap("plant", build_proxy(fmu, target, server.address[1], "--native"))
+        yield system.swap("plant", build_proxy(fmu, target, server.address[1]))
 
 
 def gaps(program: str, path: Path, system: System) -> npt.NDArray[np.float64]:

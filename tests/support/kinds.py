@@ -8,12 +8,8 @@ from typing import Literal
 
 import pytest
 from grasp_fmus.build import Plan, build_block, build_model, planned
-from grasp_fmus.native.proxy import build_native_proxy
 from grasp_fmus.native.targets import Version
 from grasp_fmus.package import shipped_model
-from grasp_fmus.proxy import Settings
-from grasp_fmus.proxy_build import Original
-from grasp_fmus.proxy_build import build_proxy as build_python_proxy
 from grasp_fmus.shipped import SHIPPED
 
 from .packages import PACKAGES
@@ -75,16 +71,3 @@ def build_shipped(name: str, kind: Kind, out: Path) -> Path:
 def build_own(name: str, kind: Kind, out: Path) -> Path:
     """Build the FMU of one of OWN."""
     return build_block(OWN[name], out, None if kind == "python" else plan(kind)).path
-
-
-def proxy_options(kind: Kind) -> list[str]:
-    """What the command proxy is given for one of a kind; the test is skipped without a compiler."""
-    return [] if kind == "python" else ["--native", "--fmi", str(plan(kind).fmi)]
-
-
-def build_proxy(original: Original, kind: Kind, folder: Path, settings: Settings) -> Path:
-    """Build the proxy of an FMU."""
-    target = folder / "TheProxy.fmu"
-    if kind == "python":
-        return build_python_proxy(target, original, settings).path
-    return build_native_proxy(target, original, plan(kind), settings).path

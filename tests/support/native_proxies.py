@@ -1,51 +1,71 @@
-"""Native proxies with the clock and the network of a test, called as pythonfmu calls a slave."""
+"""Proxies with the clock and the network of a test, called by the names of their variables."""
 
 import ctypes
+import errno
+import shutil
 import tempfile
 import zipfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
 from c_compilers import Compiler, compile_all
-from grasp_fmus.base import LoggedError, Message
 from grasp_fmus.build import compiler_for, job
-from grasp_fmus.description import Experiment
-from grasp_fmus.native.proxy import proxy_members
-from grasp_fmus.native.targets import Version, here
+from grasp_fmus.description import Experiment, Version
+from grasp_fmus.native.targets import here
 from grasp_fmus.package import write_file
-from grasp_fmus.proxy import DEFAULTS, bounded, own_variables
-from grasp_fmus.proxy_build import Original
-from grasp_fmus.variable import TYPES, Variable
+from grasp_fmus.proxy import Original, proxy_members
+from grasp_fmus.variable import Variable
 
-from .fmi2 import DISCARD, OK, Fmu, Instance
+from .fmi2 import ERROR, OK, Fmu, Instance
+from .scripted_peer import VARIABLES, Clock, ScriptedPeer
+from .slow import platforms
 
 SHIM = Path(__file__).parents[1] / "fmus/native/proxy_shim.h"
 STRICT = ("-Wall", "-Wextra", "-Wpedantic", "-Werror")
 NAME = "AnyProxy"
+FMI: Version = 2
+"""Of the proxies that are made; a test module chooses it with on_each_version."""
+
+COUNTS = ("missed", "consecutive_missed", "late", "out_of_order", "duplicated", "rejected")
 
 _CLOCK = ctypes.CFUNCTYPE(ctypes.c_int64)
-_LOOK_UP = ctypes.CFUNCTYPE(ctypes.c_int)
 _SEND = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_size_t)
-_HOOKS = ("clock", "send", "look_up")
 _C: dict[str, Any] = {
     "Real": ctypes.c_double, "Integer": ctypes.c_int, "Boolean": ctypes.c_int,
     "String": ctypes.c_char_p,
 }  # fmt: skip
+_PYTHON: dict[str, Callable[[Any], Any]] = {"Boolean": bool, "String": bytes.decode}
+
+
+@pytest.fixture(autouse=True, params=[2, platforms(3)])
+def on_each_version(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """To import into a test module: its proxies are of this version of FMI."""
+    monkeypatch.setattr("support.native_proxies.FMI", request.param)
+
+
+def original(variables: Sequence[Variable] = VARIABLES) -> Original:
+    return Original("Original.fmu", variables, {}, Experiment(), True)
+
+
+def write_sources(folder: Path, fmi: Version = 2) -> None:
+    """The sources of a proxy, into a folder that is there."""
+    for file, data in proxy_members(Path(f"{NAME}.fmu"), original(), fmi).items():
+        if file.startswith("sources/"):
+            (folder / file.removeprefix("sources/")).write_bytes(data)
 
 
 @cache
 def _fmu(variables: tuple[Variable, ...], fmi: Version) -> Fmu:
     """Built once per process, compiled once for all."""
-    original = Original("Original.fmu", variables, {}, Experiment(), True)
-    files = proxy_members(Path(f"{NAME}.fmu"), original, fmi, DEFAULTS)
+    files = proxy_members(Path(f"{NAME}.fmu"), original(variables), fmi)
     sources = {n.removeprefix("sources/"): d for n, d in files.items() if n.startswith("sources/")}
-    try:
-        compiler = compiler_for(here(), asked=False)
-    except ValueError as error:
-        pytest.skip(f"NO compiler: {error}")
+    if not shutil.which("gcc"):
+        pytest.skip("NO gcc")
+    compiler = compiler_for(here(), asked=False)
     shimmed = Compiler((*compiler.command, *STRICT, "-include", SHIM.name))
     sources = {**sources, SHIM.name: SHIM.read_bytes()}
     folder = Path(tempfile.mkdtemp(prefix="native_proxy_"))
@@ -57,108 +77,126 @@ def _fmu(variables: tuple[Variable, ...], fmi: Version) -> Fmu:
     return Fmu(folder / f"{NAME}.fmu", folder / "u")
 
 
-class NativeSlave:
-    """A native proxy, called as a Python one."""
+class Host:
+    """A host with one instance of a proxy; what is refused raises RefusedError."""
 
     def __init__(
-        self, variables: Sequence[Variable], clock: Callable[[], int], fmi: Version
-    ) -> None:
-        outputs = [v for v in variables if v.causality == "output"]
-        self._variables = bounded([*variables, *own_variables(outputs)], len(variables))
-        fmu = _fmu(tuple(variables), fmi)
-        self._hooks = _CLOCK(clock), _SEND(self._sent), _LOOK_UP(self._looked_up)
+        self, port: int, clock: Callable[[], int], variables: Sequence[Variable] = VARIABLES,
+        **settings: Any,
+    ) -> None:  # fmt: skip
+        self._fmu = _fmu(tuple(variables), FMI)
+        self._outputs = [v.name for v in variables if v.causality == "output"]
+        self._hooks = {"clock": _CLOCK(clock), "send": _SEND(self._sent)}
         self.intercept: Callable[[bytes], None] = lambda datagram: None
         """Called with what is sent; it may raise an OSError instead."""
-        self.look_up: Callable[[], None] = lambda: None
-        """Called before a name is looked up, in the thread that does so."""
-        self._instance = Instance(fmu, "proxy")
-
-    def __del__(self) -> None:
-        if hasattr(self, "_instance"):
-            self._call("FreeInstance")
+        self._instance = Instance(self._fmu, "proxy")
+        self.time = 0.0
+        self.set(**{"proxy.port": port, "proxy.timeout": 100.0, "proxy.connect_timeout": 100.0})
+        settings = {"on_loss": "failsafe", **settings}
+        self.set(**{f"proxy.{name}": value for name, value in settings.items()})
 
     def _sent(self, at: int, size: int) -> int:
         try:
             self.intercept(ctypes.string_at(at, size))
         except OSError as error:
-            return error.errno or -1
+            return error.errno or errno.EIO
         return 0
 
-    def _looked_up(self) -> int:
-        self.look_up()
-        return 0
-
-    def _call(self, function: str, *arguments: Any) -> int:
-        library = self._instance.fmu.library
-        places = [ctypes.c_void_p.in_dll(library, f"shim_{name}") for name in _HOOKS]
-        before = [place.value for place in places]  # one that goes may do so in another's call
-        for place, hook in zip(places, self._hooks, strict=True):
+    def call(self, function: str, *arguments: Any) -> int:
+        """Any function of FMI 2.0, by its name without fmi2; its status."""
+        for name, hook in self._hooks.items():
+            place = ctypes.c_void_p.in_dll(self._fmu.library, f"shim_{name}")
             place.value = ctypes.cast(hook, ctypes.c_void_p).value
-        status = self._instance.call(function, *arguments)
-        for place, value in zip(places, before, strict=True):
-            place.value = value
-        if function != "FreeInstance" and status not in (OK, DISCARD):
-            raise LoggedError
-        return status
+        return self._instance.call(function, *arguments)
 
-    def _get_log_queue(self) -> list[Message]:
-        return [Message(m.status, m.category, m.text) for m in self._instance.log]
+    def must(self, function: str, *arguments: Any) -> None:
+        status = self.call(function, *arguments)
+        if status != OK:
+            raise RefusedError(status)
 
-    def setup_experiment(self, start: float) -> None:
+    def free(self) -> None:
+        self.call("FreeInstance")
+
+    def _access(self, action: str, name: str, *given: Any) -> Any:
+        kind = self._fmu.kinds[name]
+        values = (_C[kind] * 1)(*given)
+        reference = (ctypes.c_uint * 1)(self._fmu.references[name])
+        self.must(f"{action}{kind}", reference, ctypes.c_size_t(1), values)
+        return _PYTHON.get(kind, lambda value: value)(values[0])
+
+    def set(self, **values: Any) -> None:
+        for name, value in values.items():
+            self._access("Set", name, value.encode() if isinstance(value, str) else value)
+
+    def get(self, name: str) -> Any:
+        return self._access("Get", name)
+
+    def outputs(self) -> list[Any]:
+        return [self.get(name) for name in self._outputs]
+
+    def own(self) -> list[Any]:
+        return [self.get(name) for name in self._fmu.references if name.startswith("proxy.")]
+
+    def state(self) -> int:
+        return int(self.get("proxy.state"))
+
+    def counts(self) -> dict[str, int]:
+        """The counters that are not 0."""
+        return {name: n for name in COUNTS if (n := self.get(f"proxy.{name}"))}
+
+    def setup(self, start: float) -> None:
         real = ctypes.c_double
-        self._call("SetupExperiment", 0, real(0.0), real(start), 0, real(0.0))
+        self.must("SetupExperiment", 0, real(0.0), real(start), 0, real(0.0))
 
-    def enter_initialization_mode(self) -> None:
-        self._call("EnterInitializationMode")
+    def enter(self) -> None:
+        self.must("EnterInitializationMode")
 
-    def exit_initialization_mode(self) -> None:
-        self._call("ExitInitializationMode")
+    def initialise(self) -> "Host":
+        self.setup(0.0)
+        self.enter()
+        self.must("ExitInitializationMode")
+        return self
 
-    def do_step(self, time: float, size: float) -> bool:
-        return self._call("DoStep", ctypes.c_double(time), ctypes.c_double(size), 1) == OK
+    def do_step(self, time: float, size: float) -> None:
+        self.must("DoStep", ctypes.c_double(time), ctypes.c_double(size), 1)
+
+    def step(self, size: float = 0.25) -> None:
+        self.do_step(self.time, size)
+        self.time += size
 
     def terminate(self) -> None:
-        self._call("Terminate")
+        self.must("Terminate")
 
-    def _get_fmu_state(self) -> None:
-        self._call("GetFMUstate", ctypes.byref(ctypes.c_void_p()))
+    def log(self) -> list[str]:
+        return [m.text for m in self._instance.log]
 
-    def _set_fmu_state(self, _: bytes) -> None:
-        self._call("SetFMUstate", None)
-
-    def state_to_bytes(self, _: bytes) -> None:
-        self._call("SerializeFMUstate", None, None, ctypes.c_size_t(0))
-
-    def state_from_bytes(self, _: bytes) -> None:
-        self._call("DeSerializeFMUstate", None, ctypes.c_size_t(0), None)
-
-    def _get(self, kind: str, vrs: Sequence[int]) -> list[Any]:
-        n = len(vrs)
-        values = (_C[kind] * n)()
-        self._call(f"Get{kind}", (ctypes.c_uint * n)(*vrs), ctypes.c_size_t(n), values)
-        return [_TO_PYTHON[kind](v) for v in values]
-
-    def _set(self, kind: str, vrs: Sequence[int], values: Sequence[Any]) -> None:
-        n = len(vrs)
-        given = (_C[kind] * n)(*(v.encode() if isinstance(v, str) else v for v in values))
-        self._call(f"Set{kind}", (ctypes.c_uint * n)(*vrs), ctypes.c_size_t(n), given)
+    def refused(self, call: Callable[..., Any], *arguments: Any) -> str:
+        """The one line in the log about a call that is refused."""
+        before = len(self.log())
+        with pytest.raises(RefusedError) as error:
+            call(*arguments)
+        assert error.value.args == (ERROR,)
+        (line,) = self.log()[before:]
+        assert "\n" not in line
+        return line
 
 
-_TO_PYTHON: dict[str, Callable[[Any], Any]] = {
-    "Real": float, "Integer": int, "Boolean": bool, "String": bytes.decode,
-}  # fmt: skip
+class RefusedError(Exception):
+    """A call whose status is not fmi2OK."""
 
 
-def _access(kind: str) -> None:
-    def get(self: NativeSlave, vrs: Sequence[int]) -> list[Any]:
-        return self._get(kind, vrs)
+@contextmanager
+def hosted(port: int, clock: Clock | None = None, **how: Any) -> Iterator[Host]:
+    """A host, whose instance is freed in the end."""
+    host = Host(port, clock or Clock(), **how)
+    try:
+        yield host
+    finally:
+        host.free()
 
-    def set_(self: NativeSlave, vrs: Sequence[int], values: Sequence[Any]) -> None:
-        self._set(kind, vrs, values)
 
-    setattr(NativeSlave, f"get_{kind.lower()}", get)
-    setattr(NativeSlave, f"set_{kind.lower()}", set_)
-
-
-for _kind in TYPES.values():
-    _access(_kind)
+@contextmanager
+def connected(clock: Clock | None = None, **how: Any) -> Iterator[tuple[Host, ScriptedPeer]]:
+    """A proxy in step mode, and its peer."""
+    with ScriptedPeer(clock) as peer, hosted(peer.port, peer.clock, **how) as host:
+        yield host.initialise(), peer

@@ -7,54 +7,109 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 from grasp_cosim import cli
 from grasp_cosim.hil.address import Address
 from grasp_cosim.hil.network import Network
+from grasp_cosim.hil.protocol import exchanged
 from grasp_cosim.hil.relay import Relay
 from grasp_cosim.hil.served import ServedFmu, Service
 from grasp_cosim.hil.server import Server
 from grasp_cosim.hil.traffic import Log
-from grasp_cosim.interface.read import read_interface
-from grasp_fmus.link.client import Client, Verdict
-from grasp_fmus.link.message import LARGEST, Value
+from grasp_fmus.link.message import (
+    END,
+    HELLO,
+    INITIALISE,
+    LARGEST,
+    OUTPUTS,
+    REFUSE,
+    SHORTEST_HELLO,
+    STEP,
+    WELCOME,
+    Codec,
+    Message,
+    Sealer,
+    Value,
+)
 from grasp_fmus.link.signature import Signature
 
 Ask = Callable[[bytes], bytes | None]
 """Hands a datagram over; the answer, if there is one."""
 
 
+class RefusedError(Exception):
+    """What a peer says in a REFUSE: its code, and its reason."""
+
+    def __str__(self) -> str:
+        return str(self.args[1])
+
+
 class HandProxy:
     """Does what a proxy FMU does, without an FMU and without patience."""
 
     def __init__(self, signature: Signature, ask: Ask, key: bytes | None = None) -> None:
-        self.client = Client(signature, key)
+        self.signature = signature
+        self.round = 0
+        """What the header has as the time of sending."""
+        self.outputs_time = 0.0
         self._ask = ask
+        self._sealer = Sealer(key)
+        self._codecs = Codec(signature.request), Codec(signature.answer)
+        self._session = self._cookie = self._sequence = 0
+
+    def hello(self, session: int, **changed: Any) -> bytes:
+        """The HELLO that begins a session."""
+        self._session, self._cookie, self._sequence = session, 0, 0
+        text = self.signature.text.encode()
+        return self.pack(HELLO, body=text.ljust(SHORTEST_HELLO, b"\0"), **changed)
+
+    def request(
+        self, kind: int, time: float, values: Sequence[Value], step: float = 0.0, /, **changed: Any
+    ) -> bytes:
+        """The next INITIALISE or STEP."""
+        self._sequence += 1
+        body = self._codecs[0].pack(*values)
+        plain = {"kind": kind, "time": time, "step": step, "body": body}
+        return self.pack(**{**plain, **changed})
+
+    def pack(self, kind: int, **changed: Any) -> bytes:
+        """A datagram of the session."""
+        state = (self.signature.hash, self._session, self._cookie, self._sequence)
+        plain = Message(kind, 0, *state, 0.0, 0.0, self.round, b"")
+        return self._sealer.pack(plain._replace(**changed))
 
     def begin(self, session: int, values: Sequence[Value], time: float = 0.0) -> list[Value]:
         """HELLO and INITIALISE; the outputs."""
-        self._must(self.client.greet(session, 0))
+        self.take(self._ask(self.hello(session)))
         return self.initialise(time, values)
 
     def initialise(self, time: float, values: Sequence[Value]) -> list[Value]:
-        return self._must(self.client.initialise(time, values, 0))
+        return self.take(self._ask(self.request(INITIALISE, time, values)))
 
     def step(self, time: float, step: float, values: Sequence[Value]) -> list[Value]:
-        return self._must(self.client.step(time, step, values, 0))
+        return self.take(self._ask(self.request(STEP, time, values, step)))
 
     def end(self) -> None:
-        assert self._ask(self.client.end(0)) is None
+        assert self._ask(self.pack(END)) is None
 
-    def _must(self, request: bytes) -> list[Value]:
-        answer = self._ask(request)
+    def take(self, answer: bytes | None) -> list[Value]:
+        """The outputs in an answer, if any; RefusedError where it refuses."""
         assert answer is not None
-        verdict = self.client.receive(answer, 0)
-        if verdict is Verdict.REFUSED:
-            assert self.client.refusal is not None
-            raise RuntimeError(self.client.refusal.text)
-        assert verdict is Verdict.ANSWERED
-        return self.client.outputs or []
+        m = self._sealer.open(answer)
+        assert isinstance(m, Message), m
+        assert (m.session, m.sequence, m.sent) == (self._session, self._sequence, self.round)
+        if m.kind == REFUSE:
+            raise RefusedError(m.code, m.body.decode())
+        assert m.interface == self.signature.hash
+        if m.kind == WELCOME:
+            self._cookie = m.cookie
+            return []
+        assert (m.kind, m.cookie) == (OUTPUTS, self._cookie)
+        self.outputs_time = m.time
+        values = self._codecs[1].unpack(m.body)
+        assert values is not None
+        return values
 
 
 class UdpAsk:
@@ -89,7 +144,7 @@ def serving(
     fmu: Path, how: Service, address: tuple[str, int] = ("127.0.0.1", 0)
 ) -> Iterator[Server]:
     """A server in a thread, stopped in the end."""
-    with Server(ServedFmu(read_interface(fmu), how), address) as server:
+    with Server(ServedFmu(exchanged(fmu), how), address) as server:
         thread = threading.Thread(target=server.serve)
         thread.start()
         try:

@@ -1,19 +1,16 @@
-"""A peer that answers as it is told, in a thread; and a proxy's slave without its FMU around it.
+"""A peer that answers as it is told, in a thread.
 
 The clock is the test's: a step is missed because the peer puts the clock past the deadline, and
 then wakes the proxy with a datagram that means nothing. So nothing depends on how fast things go.
 """
 
-import ctypes
 import socket
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Sequence
 from itertools import count
 from threading import Thread
 from typing import Any
 
-import pytest
 from grasp_fmus.link.message import (
     BUSY,
     END,
@@ -21,7 +18,6 @@ from grasp_fmus.link.message import (
     HELLO,
     INITIALISE,
     LARGEST,
-    OTHER_INTERFACE,
     OUTPUTS,
     REFUSE,
     STEP,
@@ -31,12 +27,9 @@ from grasp_fmus.link.message import (
     Message,
     Sealer,
 )
-from grasp_fmus.link.signature import LinkVariable, Signature
-from grasp_fmus.proxy import Fmi2Proxy
-from grasp_fmus.variable import TYPES, Variable
-
-from .kinds import NATIVE, Kind
-from .native_proxies import NativeSlave
+from grasp_fmus.link.signature import Signature
+from grasp_fmus.proxy import shared_signature
+from grasp_fmus.variable import Variable
 
 Act = Callable[["ScriptedPeer", Message], None]
 
@@ -44,25 +37,21 @@ VARIABLES = (
     Variable("force", float, "input", "N", 1.5),
     Variable("mode", int, "input", "", 3, "discrete"),
     Variable("armed", bool, "input", "", True, "discrete"),
-    Variable("label", str, "input", "", "start", "discrete"),
     Variable("gain", float, "parameter", "1", 2.0, "tunable"),
     Variable("mass", float, "parameter", "kg", 0.5, "fixed"),
     Variable("doubled", float, "output", "N"),
     Variable("passed", int, "output", "", None, "discrete"),
     Variable("denied", bool, "output", "", None, "discrete"),
-    Variable("echo", str, "output", "", None, "discrete"),
 )
 """One of each kind and causality; what the peer answers is in answers()."""
 
-SIGNATURE = Signature(
-    tuple(LinkVariable(v.name, TYPES[v.kind], v.causality, v.unit or None) for v in VARIABLES)
-)
+SIGNATURE = shared_signature(VARIABLES)
 
 
 def answers(values: Sequence[Any]) -> list[Any]:
     """The outputs to a request."""
-    force, mode, armed, label, gain, _ = values
-    return [gain * force, mode, not armed, label]
+    force, mode, armed, gain, _ = values
+    return [gain * force, mode, not armed]
 
 
 class Clock:
@@ -143,7 +132,7 @@ class ScriptedPeer:
 
     def outputs(self, m: Message) -> bytes:
         """The OUTPUTS to m."""
-        body = Codec(self.signature.answer).pack(self._outputs(self.values(m)))
+        body = Codec(self.signature.answer).pack(*self._outputs(self.values(m)))
         return self.pack(m, OUTPUTS, body, time=m.time + m.step - self.offset)
 
     def _run(self) -> None:
@@ -223,12 +212,8 @@ def busy(peer: ScriptedPeer, m: Message) -> None:
     peer.send(peer.pack(m, REFUSE, b"", BUSY))
 
 
-def other(signature: Signature) -> Act:
-    def act(peer: ScriptedPeer, m: Message) -> None:
-        text, own = signature.text.encode(), signature.hash
-        peer.send(peer.pack(m, REFUSE, text, OTHER_INTERFACE, interface=own))
-
-    return act
+def refuse(code: int, reason: bytes = b"", **changed: Any) -> Act:
+    return lambda peer, m: peer.send(peer.pack(m, REFUSE, reason, code, **changed))
 
 
 def datagrams(first: Iterable[bytes], then: Act = answer) -> Act:
@@ -240,151 +225,3 @@ def datagrams(first: Iterable[bytes], then: Act = answer) -> Act:
         then(peer, m)
 
     return act
-
-
-# The slave
-
-
-KIND: Kind = "python"
-"""The kind of proxy that a Host is; a test module chooses it with on_each_kind."""
-
-
-@pytest.fixture(autouse=True)
-def on_each_kind(kind: Kind, monkeypatch: pytest.MonkeyPatch) -> None:
-    """To import into a test module: its hosts are of the kind that it runs on."""
-    monkeypatch.setattr("support.scripted_peer.KIND", kind)
-
-
-class PythonSlave:
-    """The slave of a proxy that Python runs, without its FMU around it."""
-
-    def __new__(cls, variables: Sequence[Variable], clock: Callable[[], int]) -> Any:
-        slave_type: Any = type(Fmi2Proxy)
-        slave = slave_type(
-            "AnyProxy",
-            (Fmi2Proxy,),
-            {
-                "__module__": "made_by_a_test",
-                "original": "Original.fmu",
-                "variables": tuple(variables),
-                "clock": staticmethod(clock),
-            },
-        )
-        logger = ctypes.create_string_buffer(256)  # where no instance name stands
-        made = slave(None, "proxy", "", ctypes.addressof(logger), 0)
-        made.logger = logger
-        return made
-
-
-class Intercepted:
-    """A socket of which a test sees what is sent, and may raise an OSError instead."""
-
-    def __init__(self, real: socket.socket, act: Callable[[bytes], None]) -> None:
-        self._real, self._act = real, act
-
-    def send(self, datagram: bytes) -> int:
-        self._act(datagram)
-        return self._real.send(datagram)
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._real, name)
-
-
-class Host:
-    """A proxy's slave as pythonfmu calls it, by variable name."""
-
-    def __init__(
-        self, port: int, clock: Callable[[], int], variables: Sequence[Variable] = VARIABLES,
-        **settings: Any,
-    ) -> None:  # fmt: skip
-        self.slave: Any
-        if KIND == "python":
-            self.slave = PythonSlave(variables, clock)
-        else:
-            self.slave = NativeSlave(variables, clock, NATIVE[KIND])
-        self.references = {v.name: i for i, v in enumerate(self.slave._variables)}
-        self.time = 0.0
-        self.set(**{"proxy.port": port, "proxy.timeout": 100.0, "proxy.connect_timeout": 100.0})
-        settings = {"on_loss": "failsafe", **settings}
-        self.set(**{f"proxy.{name}": value for name, value in settings.items()})
-
-    @contextmanager
-    def intercepted(self, act: Callable[[bytes], None]) -> Iterator[None]:
-        """What it sends meanwhile is seen by `act`, which may raise an OSError instead."""
-        if KIND != "python":
-            before, self.slave.intercept = self.slave.intercept, act
-            yield
-            self.slave.intercept = before
-            return
-        with pytest.MonkeyPatch.context() as m:
-            real = socket.socket
-            m.setattr(socket, "socket", lambda *which: Intercepted(real(*which), act))
-            if (ours := self.slave._connection) is not None:
-                m.setattr(ours, "_socket", Intercepted(ours._socket, act))
-            yield
-
-    @contextmanager
-    def looking_up(self, act: Callable[[], None]) -> Iterator[None]:
-        """Before it looks up a name it calls `act`, in the thread that does so."""
-        if KIND != "python":
-            self.slave.look_up = act
-            yield
-            return
-        real = socket.getaddrinfo
-
-        def looked_up(*arguments: Any) -> Any:
-            if not arguments[-1] & socket.AI_NUMERICHOST:
-                act()
-            return real(*arguments)
-
-        with pytest.MonkeyPatch.context() as m:
-            m.setattr(socket, "getaddrinfo", looked_up)
-            yield
-
-    def _kind(self, name: str) -> str:
-        return TYPES[self.slave._variables[self.references[name]].kind].lower()
-
-    def set(self, **values: Any) -> None:
-        for name, value in values.items():
-            put = getattr(self.slave, f"set_{self._kind(name)}")
-            put([self.references[name]], [value])
-
-    def get(self, name: str) -> Any:
-        return getattr(self.slave, f"get_{self._kind(name)}")([self.references[name]])[0]
-
-    def outputs(self) -> list[Any]:
-        return [self.get(v.name) for v in VARIABLES if v.causality == "output"]
-
-    def state(self) -> int:
-        return int(self.get("proxy.state"))
-
-    def counts(self) -> dict[str, int]:
-        """The counters that are not 0."""
-        names = ("missed", "consecutive_missed", "late", "out_of_order", "duplicated", "rejected")
-        return {name: n for name in names if (n := self.get(f"proxy.{name}"))}
-
-    def initialise(self) -> "Host":
-        self.slave.setup_experiment(0.0)
-        self.slave.enter_initialization_mode()
-        self.slave.exit_initialization_mode()
-        return self
-
-    def step(self, size: float = 0.25) -> None:
-        assert self.slave.do_step(self.time, size)
-        self.time += size
-
-    def log(self) -> list[str]:
-        return [m.msg for m in self.slave._get_log_queue()]
-
-
-@contextmanager
-def connected(
-    variables: Sequence[Variable] = VARIABLES, clock: Clock | None = None, **settings: Any
-) -> Iterator[tuple[Host, ScriptedPeer]]:
-    """A proxy in step mode, and its peer."""
-    with ScriptedPeer(clock) as peer:
-        host = Host(peer.port, peer.clock, variables, **settings)
-        try:
-            yield host.initialise(), peer
-        finally:
-            host.slave.terminate()

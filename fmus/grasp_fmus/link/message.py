@@ -7,17 +7,18 @@ import struct
 from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from .signature import HASH_SIZE, LinkVariable, Signature
 
 Value = float | int | bool | str
+"""The value of a variable of FMI; texts are not exchanged."""
 
-MAGIC, VERSION = b"GRSP", 1
+MAGIC, VERSION = b"GRSP", 2
 HELLO, WELCOME, REFUSE, INITIALISE, STEP, OUTPUTS, END = range(1, 8)
 """Kinds of datagrams."""
 
-OTHER_INTERFACE, BUSY, UNKNOWN, FAILED = range(1, 5)
+OTHER_INTERFACE, BUSY, UNKNOWN, FAILED, OTHER_VERSION = range(1, 6)
 """The reasons why a peer refuses: codes of REFUSE."""
 
 HEAD = struct.Struct(f"<4sHBB{HASH_SIZE}sQQQddqII")
@@ -27,10 +28,11 @@ LARGEST = 65_507
 PORT = 5501
 """The default UDP port of a peer."""
 
+SHORTEST_HELLO = 1024
+"""Bytes of the body of a HELLO, at least, so that there is room for the reason in its answer."""
 LONGEST_STEP = 3600.0
 """s that a STEP may ask for, so that no datagram keeps a bench busy for good."""
 
-STRING_SIZE = 128
 SMALLEST_KEY = 16
 """Bytes of a shared key, at least."""
 LARGEST_KEY = 4096
@@ -41,7 +43,7 @@ MALFORMED, FORGED = "malformed", "forged"
 
 _TEXT = frozenset((*b"\t\r\n", *range(0x20, 0x7F)))
 
-_CODES = {"Real": "d", "Integer": "q", "Boolean": "Q", "String": f"{STRING_SIZE}s"}
+_CODES = {"Real": "d", "Integer": "q", "Boolean": "Q"}
 
 
 class Message(NamedTuple):
@@ -57,6 +59,7 @@ class Message(NamedTuple):
     step: float
     sent: int
     body: bytes
+    version: int = VERSION
 
 
 class Sealer:
@@ -71,67 +74,49 @@ class Sealer:
 
     def pack(self, m: Message) -> bytes:
         """Return the datagram of a message; ValueError where it would be too large."""
-        *fields, body = m
-        datagram = HEAD.pack(MAGIC, VERSION, *fields, len(body), 0) + body
+        *fields, body, version = m
+        datagram = HEAD.pack(MAGIC, version, *fields, len(body), 0) + body
         size = len(datagram) + self._tag_size
         if size > LARGEST:
             raise ValueError(f"datagram of {size} bytes: must be {LARGEST} at most")
         return datagram + hmac.digest(self._key, datagram, "sha256") if self._key else datagram
 
     def open(self, datagram: bytes) -> Message | str:
-        """Return the message in a datagram, or the fault of it: MALFORMED or FORGED."""
+        """Return the message in a datagram of any version, or its fault: MALFORMED or FORGED."""
         end = len(datagram) - self._tag_size
-        if end < HEAD.size or len(datagram) > LARGEST:
-            return MALFORMED
-        magic, version, *fields, size, zero = HEAD.unpack_from(datagram)
-        if magic != MAGIC or version != VERSION:
+        if end < HEAD.size or len(datagram) > LARGEST or not datagram.startswith(MAGIC):
             return MALFORMED
         if self._key is not None:
             tag = hmac.digest(self._key, datagram[:end], "sha256")
             if not hmac.compare_digest(tag, datagram[end:]):
                 return FORGED
-        m = Message._make((*fields, datagram[HEAD.size : end]))
+        _, version, *fields, size, zero = HEAD.unpack_from(datagram)
+        m = Message._make((*fields, datagram[HEAD.size : end], version))
         known = HELLO <= m.kind <= END and isfinite(m.time + m.step)
         return m if known and size == len(m.body) and not zero else MALFORMED
 
 
 class Codec:
-    """Values of variables as a body: Real f64, Integer i64, Boolean u64, String 128 bytes."""
+    """Values of variables as a body: Real f64, Integer i64, Boolean u64."""
 
     def __init__(self, variables: Sequence[LinkVariable]) -> None:
         self._struct = struct.Struct("<" + "".join(_CODES[v.kind] for v in variables))
+        self.pack = self._struct.pack
+        self.size = self._struct.size
         self._reals = [i for i, v in enumerate(variables) if v.kind == "Real"]
         self._integers = [i for i, v in enumerate(variables) if v.kind == "Integer"]
         self._booleans = [i for i, v in enumerate(variables) if v.kind == "Boolean"]
-        self._strings = [(i, v.name) for i, v in enumerate(variables) if v.kind == "String"]
-        self.size = self._struct.size
-
-    def pack(self, values: Sequence[Value]) -> bytes:
-        """Return the body that holds these values; ValueError where a string is too long."""
-        if not self._strings:
-            return self._struct.pack(*values)
-        packed: list[Any] = list(values)
-        for i, name in self._strings:
-            packed[i] = data = str(values[i]).encode()
-            if len(data) >= STRING_SIZE or b"\0" in data:
-                raise ValueError(
-                    f"{name} = {values[i]!r}: must have fewer than {STRING_SIZE} bytes in UTF-8, "
-                    "and no NUL"
-                )
-        return self._struct.pack(*packed)
 
     def unpack(self, body: bytes) -> list[Value] | None:
         """Return the values of a body; None where its size is wrong or a value is invalid.
 
-        Invalid is a Real that is not finite, an Integer beyond 32 bits, a Boolean other than 0 and
-        1, a string that is not UTF-8 or not filled up with NUL, at least one.
+        Invalid is a Real that is not finite, an Integer beyond 32 bits, a Boolean but 0 and 1.
         """
         if len(body) != self.size:
             return None
         values = list(self._struct.unpack(body))
-        if not isfinite(sum([values[i] for i in self._reals])) and not all(
-            isfinite(values[i]) for i in self._reals
-        ):
+        reals = [values[i] for i in self._reals]
+        if not isfinite(sum(reals)) and not all(map(isfinite, reals)):
             return None
         for i in self._integers:
             if not -(2**31) <= values[i] < 2**31:
@@ -140,14 +125,6 @@ class Codec:
             if values[i] > 1:
                 return None
             values[i] = values[i] == 1
-        try:
-            for i, _ in self._strings:
-                text, end, rest = values[i].partition(b"\0")
-                if not end or rest.strip(b"\0"):
-                    return None
-                values[i] = text.decode()
-        except UnicodeDecodeError:
-            return None
         return values
 
 

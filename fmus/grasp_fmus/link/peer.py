@@ -5,10 +5,9 @@ and none that is longer than that while there is no session: who sends in anothe
 to gain by it.
 """
 
-from collections import OrderedDict
-from collections.abc import Callable
+import hmac
 from dataclasses import dataclass
-from secrets import randbits
+from secrets import token_bytes
 from typing import NamedTuple
 
 from . import message
@@ -31,8 +30,9 @@ class PeerCounters:
 
     `steps` and `initialisations`: done. `repeated`: answered again. `duplicated`: steps that had
     come already; `stale`: steps older than the last. `foreign`: of another interface, or of a
-    session that is not known. `malformed`: no datagram of this protocol, or with invalid values.
-    `forged`: without the tag of the key. `busy`: HELLOs while another session was under way.
+    session that is not known; `other_version`: of another version of the protocol. `malformed`: no
+    datagram of this protocol, or with invalid values. `forged`: without the tag of the key. `busy`:
+    HELLOs while another session was under way.
     """
 
     steps: int = 0
@@ -41,6 +41,7 @@ class PeerCounters:
     duplicated: int = 0
     stale: int = 0
     foreign: int = 0
+    other_version: int = 0
     malformed: int = 0
     forged: int = 0
     busy: int = 0
@@ -67,12 +68,9 @@ class Peer:
     """One bench. It serves one session at a time."""
 
     def __init__(
-        self,
-        signature: Signature,
-        key: bytes | None = None,
-        cookie: Callable[[], int] = lambda: randbits(64) or 1,
+        self, signature: Signature, key: bytes | None = None, random: bytes | None = None
     ) -> None:
-        """`cookie` makes numbers from 1 to 2**64 - 1 that nobody can guess.
+        """`random` are bytes that nobody can guess, which cookies are made of; by default drawn.
 
         ValueError where the key is too short.
         """
@@ -81,8 +79,8 @@ class Peer:
         self._sealer = Sealer(key)
         self._request = Codec(signature.request)
         self._answer = Codec(signature.answer)
-        self._make_cookie = cookie
-        self._greeted: OrderedDict[int, int] = OrderedDict()  # cookies by session
+        self._random = random or token_bytes(16)
+        self._begun = 0  # sessions
         self._live: tuple[int, int] | None = None  # session and cookie
         self._heard = 0
         self._last: Message | None = None
@@ -100,19 +98,22 @@ class Peer:
         """Return what to do about a datagram; `now` in ns of a monotonic clock."""
         m = self._sealer.open(datagram)
         if isinstance(m, str):
-            return self._drop("forged" if m == message.FORGED else "malformed")
+            return self._count(m)
+        if m.kind not in (message.HELLO, message.INITIALISE, message.STEP, message.END):
+            return self._count(message.MALFORMED)
+        if m.version != message.VERSION:
+            self._count("other_version")
+            return self._refuse(m, message.OTHER_VERSION) if m.kind == message.HELLO else None
         if m.kind == message.HELLO:
             return self._hello(m, now)
-        if m.kind not in (message.INITIALISE, message.STEP, message.END):
-            return self._drop("malformed")
         if m.interface != self.signature.hash:
-            return self._drop("foreign")
+            return self._count("foreign")
         return self._in_session(m, now)
 
     def outputs(self, values: list[Value], time: float) -> bytes:
         """Return the answer to the last request: outputs, and the time in s they belong to."""
         assert self._last is not None  # noqa: S101 - there is a request to answer
-        body = self._answer.pack(values)
+        body = self._answer.pack(*values)
         self._last_answer = self._pack(self._last, message.OUTPUTS, 0, body, time)
         return self._last_answer
 
@@ -120,12 +121,12 @@ class Peer:
         """Return the answer to the last request where it cannot be done; end the session."""
         m = self._last
         assert m is not None  # noqa: S101 - there is a request to answer
-        self._reason = reason.encode()[:LARGEST_REASON]
+        self._reason = _words(reason)
         self._over()
         self._refused = m.session, m.cookie, m.sequence
-        return self._pack(m, message.REFUSE, message.FAILED, self._reason)
+        return self._refuse(m, message.FAILED, self._reason)
 
-    def _drop(self, counter: str) -> Action:
+    def _count(self, counter: str) -> Action:
         setattr(self.counters, counter, getattr(self.counters, counter) + 1)
         return None
 
@@ -135,24 +136,23 @@ class Peer:
 
     def _hello(self, m: Message, now: int) -> Action:
         if m.sequence or m.cookie:
-            return self._drop("malformed")
+            return self._count("malformed")
         if m.interface != self.signature.hash:
-            self.counters.foreign += 1
-            fits = self.signature.text.encode()[: len(m.body)]
-            return self._pack(m, message.REFUSE, message.OTHER_INTERFACE, fits)
-        if m.body.rstrip(b"\0") != self.signature.text.encode():
-            return self._drop("malformed")
+            self._count("foreign")
+            reason = _words(self.signature.difference(m.body))[: len(m.body)]
+            return self._refuse(m, message.OTHER_INTERFACE, reason)
         if self._busy(m.session, now):
-            self.counters.busy += 1
-            return self._pack(m, message.REFUSE, message.BUSY)
-        if self._live is not None and self._live[0] == m.session:
-            cookie = self._live[1]
-        else:
-            cookie = self._greeted.get(m.session) or self._make_cookie()
-            self._greeted[m.session] = cookie
-            if len(self._greeted) > 64:  # that have not yet begun
-                self._greeted.popitem(last=False)
+            self._count("busy")
+            return self._refuse(m, message.BUSY)
+        session, cookie = self._live or (None, 0)
+        cookie = cookie if session == m.session else self._cookie(m.session)
         return self._pack(m._replace(cookie=cookie), message.WELCOME)
+
+    def _cookie(self, session: int) -> int:
+        """That of a session that may begin now: another one once any session has begun."""
+        numbers = session.to_bytes(8, "little") + self._begun.to_bytes(8, "little")
+        made = hmac.digest(self._random, numbers, "sha256")
+        return int.from_bytes(made[:8], "little") | 1
 
     def _in_session(self, m: Message, now: int) -> Action:
         if self._live != (m.session, m.cookie):
@@ -162,37 +162,38 @@ class Peer:
             return Request(message.END, m.time, 0.0, [], fresh=False)
         last = self._last.sequence if self._last else 0
         if m.sequence < last:
-            return self._drop("stale")
+            return self._count("stale")
         if m.sequence == last:
             if m.kind == message.STEP or self._last_answer is None:
-                return self._drop("duplicated")
-            self.counters.repeated += 1
+                return self._count("duplicated")
+            self._count("repeated")
             return self._last_answer
         return self._do(m, now, fresh=False)
 
     def _begin(self, m: Message, now: int) -> Action:
         """Make the session of the first INITIALISE the one under way."""
         if m.kind == message.INITIALISE and self._refused == (m.session, m.cookie, m.sequence):
-            self.counters.repeated += 1
-            return self._pack(m, message.REFUSE, message.FAILED, self._reason[: len(m.body)])
-        if self._greeted.get(m.session) != m.cookie or m.kind != message.INITIALISE:
-            self.counters.foreign += 1
-            end = m.kind == message.END
-            return None if end else self._pack(m, message.REFUSE, message.UNKNOWN)
-        if self._busy(m.session, now):
-            self.counters.busy += 1
-            return self._pack(m, message.REFUSE, message.BUSY)
+            self._count("repeated")
+            return self._refuse(m, message.FAILED, self._reason[: len(m.body)])
+        if m.kind == message.END:
+            return self._count("foreign")
+        if m.kind == message.INITIALISE and self._busy(m.session, now):
+            self._count("busy")
+            return self._refuse(m, message.BUSY)
+        if m.kind != message.INITIALISE or m.cookie != self._cookie(m.session):
+            self._count("foreign")
+            return self._refuse(m, message.UNKNOWN)
         request = self._do(m, now, fresh=True)
         if isinstance(request, Request):
-            del self._greeted[m.session]
             self._live, self._stepping = (m.session, m.cookie), False
+            self._begun += 1
         return request
 
     def _do(self, m: Message, now: int, fresh: bool) -> Action:
         values = self._request.unpack(m.body)
         too_late = m.kind == message.INITIALISE and self._stepping and not fresh
         if values is None or too_late or (m.kind == message.STEP) != (m.step > 0.0):
-            return self._drop("malformed")
+            return self._count("malformed")
         # Only what is new counts as heard: who repeats a recorded datagram keeps nobody away
         self._heard = now
         self._last, self._last_answer, self._refused = m, None, None
@@ -208,9 +209,16 @@ class Peer:
     def _over(self) -> None:
         self._live, self._last, self._stepping = None, None, False
 
+    def _refuse(self, m: Message, code: int, reason: bytes = b"") -> bytes:
+        return self._pack(m, message.REFUSE, code, reason)
+
     def _pack(
         self, m: Message, kind: int, code: int = 0, body: bytes = b"", time: float = 0.0
     ) -> bytes:
         """Return an answer to the request `m`."""
         fields = (kind, code, self.signature.hash, m.session, m.cookie, m.sequence)
         return self._sealer.pack(Message(*fields, time, 0.0, m.sent, body))
+
+
+def _words(reason: str) -> bytes:
+    return reason.encode("ascii", "replace")[:LARGEST_REASON]

@@ -3,18 +3,17 @@
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
+from io import StringIO
+from itertools import zip_longest
 from typing import Literal, NamedTuple
 
-Kind = Literal["Real", "Integer", "Boolean", "String"]
+Kind = Literal["Real", "Integer", "Boolean"]
 Causality = Literal["input", "parameter", "output"]
 
 ORDER: tuple[Causality, ...] = ("input", "parameter", "output")
 """Requests carry inputs, then parameters; answers carry outputs."""
 
 HASH_SIZE = 16
-
-NAMED = 4
-"""The most differences that are named in one line."""
 
 
 class LinkVariable(NamedTuple):
@@ -40,7 +39,7 @@ class Signature:
         object.__setattr__(self, "variables", ordered)
         seen = set()
         for v in self.variables:
-            if set("\t\n\r") & set(f"{v.name}{v.unit or ''}"):
+            if set("\t\n\r\0") & set(f"{v.name}{v.unit or ''}"):
                 raise ValueError(
                     f"variable {v.name!r} [{v.unit}]: must be without tabs and line ends"
                 )
@@ -58,7 +57,7 @@ class Signature:
     @cached_property
     def hash(self) -> bytes:
         """The first 16 bytes of the SHA-256 of the text."""
-        return hashed(self.text.encode())
+        return sha256(self.text.encode()).digest()[:HASH_SIZE]
 
     @cached_property
     def request(self) -> tuple[LinkVariable, ...]:
@@ -74,35 +73,13 @@ class Signature:
         """Return the variables of a causality, in order."""
         return tuple(v for v in self.variables if v.causality == causality)
 
-    def difference(self, other: str) -> str:
-        """Return the differences of another signature's text from this one, as half a line.
+    def difference(self, proxy: bytes) -> str:
+        """Return the first variable that is another one in a proxy's text, which may be any bytes.
 
-        It is empty where there are none. The other's text may be anything.
+        This signature is the peer's.
         """
-        ours, theirs = _lines(self.text), _lines(other)
-        found = [f"there is no {_words(ours[name])}" for name in ours if name not in theirs]
-        found += [f"there is also {_words(theirs[name])}" for name in theirs if name not in ours]
-        found += [
-            f"{_words(theirs[name])}, must be {_words(ours[name])}"
-            for name in ours
-            if name in theirs and theirs[name] != ours[name]
-        ]
-        if not found and self.text != other:
-            found = ["the variables are in another order"]
-        more = [f"and {len(found) - NAMED} more"] if len(found) > NAMED else []
-        return "; ".join([*found[:NAMED], *more])
-
-
-def hashed(text: bytes) -> bytes:
-    """Return the hash of a signature's text."""
-    return sha256(text).digest()[:HASH_SIZE]
-
-
-def _lines(text: str) -> dict[str, str]:
-    return {line.rpartition("\t")[2]: line for line in text.splitlines()}
-
-
-def _words(line: str) -> str:
-    """Return a line in words: output gap[1], Real in m."""
-    causality, kind, unit, name = [*line.split("\t", 3), "", "", ""][:4]
-    return f"{causality} {name}, {kind}{'' if unit == '-' else f' in {unit}'}"
+        theirs = proxy.partition(b"\0")[0].decode(errors="replace")
+        pairs = zip_longest(StringIO(theirs), StringIO(self.text), fillvalue="no more")
+        first, own = next((pair for pair in pairs if pair[0] != pair[1]), ("no more", "no more"))
+        said = f"the proxy has {first}, the peer {own}"
+        return said.replace("\t", " ").replace("\n", "")

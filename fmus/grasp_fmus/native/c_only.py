@@ -1,7 +1,7 @@
 """Writes the C of a block alone, for real-time targets: no FMI, no allocation, no stdio.
 
 c_only.h.in and c_only.c.in are its header and its code, for a block called Model; here they get the
-name and the variables. Members are called as in the C header of a proxy (c_header.py), so that the
+name and the variables. Members are called as in the C header of a proxy (bench_header.py), so that the
 structs of both are the same.
 """
 
@@ -12,7 +12,7 @@ from string import Template
 
 from c_compilers import BITS, LIBM
 
-from ..c_header import Group, Member, comment, members, structs
+from ..bench_header import Group, Member, comment, members, structs
 from ..link.message import Value
 from ..link.signature import ORDER, Causality, Kind, LinkVariable, Signature
 from ..package import Model, write_file

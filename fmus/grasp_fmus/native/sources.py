@@ -13,7 +13,7 @@ from .text import string
 HERE = Path(__file__).parent
 C = HERE / "c"
 OF_BLOCK = ("arithmetic.h", "block_slave.h")
-OF_PROXY = ("sockets.h", "client.h", "connection.h", "proxy_slave.h")
+OF_PROXY = ("sockets.h", "client.h", "channel.h", "proxy_slave.h")
 HEADERS = {
     2: ("fmi2TypesPlatform.h", "fmi2FunctionTypes.h", "fmi2Functions.h"),
     3: ("fmi3PlatformTypes.h", "fmi3FunctionTypes.h", "fmi3Functions.h"),
@@ -26,11 +26,10 @@ _BLOCK = """\
    Compile as C99, without contraction (-ffp-contract=off) and never with -ffast-math: an FMU that
    would not calculate as its Python source does makes no instance and says why in the log."""
 _PROXY = """\
-   Compile as C99 and link with the sockets of the system: ws2_32 on Windows; where the C library is
-   older than glibc 2.34, pthread and dl."""
+   Compile as C99 and link with the sockets of the system: ws2_32 on Windows."""
 _SYSTEM = """
 #if !defined(_GNU_SOURCE) && !defined(_WIN32)
-#define _GNU_SOURCE /* before the first header of the system: its sockets, threads and libraries */
+#define _GNU_SOURCE /* before the first header of the system: its sockets */
 #endif
 #if defined(_WIN32) && !defined(_CRT_RAND_S)
 #define _CRT_RAND_S

@@ -75,12 +75,10 @@ class DrivenFmu:
 
     def set(self, values: Sequence[Value]) -> None:
         """Set inputs, and the parameters that are not what they were."""
-        instance, (calls, texts) = self._required(), self._inputs
-        for places, _, data, call in calls:
+        instance = self._required()
+        for places, _, data, call in self._inputs:
             data[:] = [values[i] for i in places]
             _check(instance, call())
-        if texts:
-            instance.set(list(texts.values()), [values[i] for i in texts])
         self._set_changed(values, parameters_only=True)
 
     def advance(self, time: float, step: float, over: Callable[[], bool] = lambda: False) -> None:
@@ -136,15 +134,11 @@ class DrivenFmu:
         self._step, self._bound = 0.0, None
 
     def _get(self, instance: Instance) -> list[Value]:
-        calls, texts = self._answer
         values: list[Value] = [0.0] * len(self._outputs)
-        for places, kind, data, call in calls:
+        for places, kind, data, call in self._answer:
             _check(instance, call())
             for i, value in zip(places, data.tolist(), strict=True):
                 values[i] = kind(value)
-        if texts:
-            for i, value in zip(texts, instance.get(list(texts.values())), strict=True):
-                values[i] = value
         return values
 
     def _set_changed(self, values: Sequence[Value], parameters_only: bool = False) -> None:
@@ -198,22 +192,19 @@ class _Bound(NamedTuple):
 _KINDS: dict[str, Callable[[float], Value]] = {"Real": float, "Integer": int, "Boolean": bool}
 
 
-def _bound(
-    instance: Instance, action: str, variables: Sequence[LinkVariable]
-) -> tuple[list[_Bound], dict[int, Variable]]:
-    """The calls that pass these variables, and the strings, which have none, by their place."""
+def _bound(instance: Instance, action: str, variables: Sequence[LinkVariable]) -> list[_Bound]:
+    """The calls that pass these variables."""
     by_type: dict[str, dict[int, Variable]] = {}
     for place, v in enumerate(variables):
         variable = instance.interface.by_name[v.name]
         by_type.setdefault(variable.type, {})[place] = variable
-    texts = by_type.pop("String", {})
     calls = []
     for fmi_type, found in by_type.items():
         data = np.zeros(len(found), dtype(instance.interface.version, fmi_type))
         call = instance.transfer(action, list(found.values()), data).python
         kind = _KINDS[next(iter(found.values())).kind]
         calls.append(_Bound(list(found), kind, data, call))
-    return calls, texts
+    return calls
 
 
 def _check(instance: Instance, status: int) -> None:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 
-from grasp_fmus.link.message import END, INITIALISE
+from grasp_fmus.link.message import END, INITIALISE, VERSION
 from grasp_fmus.link.peer import TOO_LONG, Peer, Request
 
 from ..errors import InputError, SimulationError, nearest
@@ -53,6 +53,7 @@ class Counts:
 DROPPED = {
     "forged": "without the right key is dropped",
     "malformed": "that is none of this protocol, or with another kind of key, is dropped",
+    "other_version": f"of another protocol is refused: must be {VERSION}",
     "foreign": "of another interface, or of a session that is not known, is refused",
     "busy": "of another proxy is refused while a session is under way",
 }
@@ -197,7 +198,7 @@ def _failsafe(interface: Interface, peer: Peer, values: Mapping[str, Value]) -> 
         if name not in places:
             said = f"failsafe {name}: no such input of {interface.path.name}"
             raise InputError(f"{said}; {nearest(name, places, interface.listing)}")
-    zero: dict[str, Value] = {"Real": 0.0, "Integer": 0, "Boolean": False, "String": ""}
+    zero: dict[str, Value] = {"Real": 0.0, "Integer": 0, "Boolean": False}
     found: dict[int, Value] = {}
     for name, place in places.items():
         start = interface.by_name[name].start

@@ -21,7 +21,6 @@ ALL = (
     LinkVariable("a", "Real", "input"),
     LinkVariable("b", "Integer", "input"),
     LinkVariable("c", "Boolean", "input"),
-    LinkVariable("d", "String", "input"),
 )
 
 messages = st.builds(
@@ -36,12 +35,13 @@ messages = st.builds(
     st.floats(-1e300, 1e300),
     st.integers(-(2**63), 2**63 - 1),
     st.binary(max_size=300),
+    st.integers(0, 2**16 - 1),
 )
 
 
 def test_the_bytes_are_those_of_the_card() -> None:
     datagram = Sealer().pack(EXAMPLE)
-    assert datagram[:8] == b"GRSP\x01\x00\x05\x00"
+    assert datagram[:8] == b"GRSP\x02\x00\x05\x00"
     assert datagram[8:24] == HASH
     assert struct.unpack_from("<QQQ", datagram, 24) == (2**63 + 1, 7, 3)
     assert struct.unpack_from("<dd", datagram, 48) == (0.25, 1e-3)
@@ -69,7 +69,7 @@ def test_one_changed_byte_is_noticed_with_a_key(m: Message, place: int, change: 
 
 @pytest.mark.parametrize(
     ("place", "data"),
-    [(0, b"grsp"), (4, b"\x02"), (6, b"\x00"), (6, b"\x08"), (72, b"\x07"), (76, b"\x01")],
+    [(0, b"grsp"), (6, b"\x00"), (6, b"\x08"), (72, b"\x07"), (76, b"\x01")],
 )
 def test_malformed(place: int, data: bytes) -> None:
     datagram = bytearray(Sealer().pack(EXAMPLE))
@@ -103,15 +103,14 @@ def test_the_largest_datagram() -> None:
     st.floats(allow_nan=False, allow_infinity=False),
     st.integers(-(2**31), 2**31 - 1),
     st.booleans(),
-    st.text(st.characters(exclude_characters="\0", codec="utf-8"), max_size=30),
 )
-def test_values_there_and_back(a: float, b: int, c: bool, d: str) -> None:
+def test_values_there_and_back(a: float, b: int, c: bool) -> None:
     codec = Codec(ALL)
-    body = codec.pack([a, b, c, d])
-    assert len(body) == codec.size == 8 + 8 + 8 + 128
+    body = codec.pack(a, b, c)
+    assert len(body) == codec.size == 24
     back = codec.unpack(body)
-    assert back == [a, b, c, d]
-    assert [type(v) for v in back] == [float, int, bool, str]
+    assert back == [a, b, c]
+    assert [type(v) for v in back] == [float, int, bool]
     assert math.copysign(1.0, a) == math.copysign(1.0, float(back[0]))
 
 
@@ -123,31 +122,22 @@ def test_values_there_and_back(a: float, b: int, c: bool, d: str) -> None:
         (8, struct.pack("<q", 2**31)),
         (8, struct.pack("<q", -(2**31) - 1)),
         (16, struct.pack("<Q", 2)),
-        (24, b"\xff\xfe"),
-        (24, b"a\0b"),
-        (24, b"a" * 128),
     ],
 )
 def test_what_is_no_value(place: int, bad: bytes) -> None:
-    body = bytearray(Codec(ALL).pack([1.0, 1, True, "x"]))
+    body = bytearray(Codec(ALL).pack(1.0, 1, True))
     body[place : place + len(bad)] = bad
     assert Codec(ALL).unpack(bytes(body)) is None
 
 
 def test_the_largest_reals_are_values_though_their_sum_is_not() -> None:
     codec = Codec(ALL[:1] * 2)
-    assert codec.unpack(codec.pack([1.7e308, 1.7e308])) == [1.7e308, 1.7e308]
+    assert codec.unpack(codec.pack(1.7e308, 1.7e308)) == [1.7e308, 1.7e308]
 
 
-@pytest.mark.parametrize("size", [0, 7, 9, 151, 153])
+@pytest.mark.parametrize("size", [0, 7, 9, 23, 25])
 def test_a_body_of_another_size_holds_no_values(size: int) -> None:
     assert Codec(ALL).unpack(bytes(size)) is None
-
-
-@pytest.mark.parametrize("text", ["x" * 128, "é" * 64, "a\0b"])
-def test_a_string_that_does_not_fit_is_refused(text: str) -> None:
-    with pytest.raises(ValueError, match=r"d = .*: must have fewer than 128 bytes"):
-        Codec(ALL).pack([1.0, 1, True, text])
 
 
 @pytest.mark.parametrize("around", [b"\n", b"\r\n", b" ", b"\t", b"\0", b"\xff"])
@@ -182,8 +172,8 @@ def test_a_key_is_read_without_the_line_end(tmp_path: Path) -> None:
 
 
 def test_too_many_variables_for_a_datagram() -> None:
-    many = tuple(LinkVariable(f"x{i}", "String", "output") for i in range(512))
-    with pytest.raises(ValueError, match="an answer with 512 variables has 65648 bytes"):
+    many = tuple(LinkVariable(f"x{i}", "Real", "output") for i in range(8200))
+    with pytest.raises(ValueError, match="an answer with 8200 variables has 65712 bytes"):
         message.check_size(Signature(many))
     names = tuple(LinkVariable("x" * 1000 + str(i), "Real", "output") for i in range(70))
     with pytest.raises(ValueError, match="their names must fit"):

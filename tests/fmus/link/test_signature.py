@@ -1,4 +1,4 @@
-"""The signature: order, text, hash, and what differs, in words."""
+"""The signature of the variables exchanged: its text, its hash, and what differs."""
 
 from hashlib import sha256
 
@@ -6,65 +6,44 @@ import pytest
 from grasp_fmus.link.signature import LinkVariable, Signature
 
 GAP = LinkVariable("gap", "Real", "input", "m")
-REFLECTANCE = LinkVariable("reflectance", "Real", "parameter", "1")
-INTENSITY = LinkVariable("intensity", "Real", "output", "V")
-CONTACT = LinkVariable("contact", "Boolean", "output")
-
-ONE = Signature((INTENSITY, GAP, CONTACT, REFLECTANCE))
+GAIN = LinkVariable("gain", "Real", "parameter", "1")
+OUT = LinkVariable("intensity", "Real", "output", "V")
+SENSOR = Signature((OUT, GAP, GAIN))
 
 
-def test_the_order_is_inputs_parameters_outputs_and_within_them_the_given_one() -> None:
-    assert ONE.variables == (GAP, REFLECTANCE, INTENSITY, CONTACT)
-    assert ONE.request == (GAP, REFLECTANCE)
-    assert ONE.answer == (INTENSITY, CONTACT)
-
-
-def test_text_and_hash() -> None:
-    text = (
-        "input\tReal\tm\tgap\nparameter\tReal\t1\treflectance\n"
-        "output\tReal\tV\tintensity\noutput\tBoolean\t-\tcontact\n"
+def test_text_and_hash_are_those_of_the_card() -> None:
+    assert SENSOR.text == (
+        "input\tReal\tm\tgap\nparameter\tReal\t1\tgain\noutput\tReal\tV\tintensity\n"
     )
-    assert ONE.text == text
-    assert ONE.hash == sha256(text.encode()).digest()[:16]
-
-
-@pytest.mark.parametrize("name", ["a\tb", "a\nb", "a\rb"])
-def test_a_name_that_the_text_cannot_hold_is_refused(name: str) -> None:
-    with pytest.raises(ValueError, match="must be without tabs and line ends"):
-        Signature((LinkVariable(name, "Real", "input"),))
-
-
-def test_a_name_twice_is_refused() -> None:
-    with pytest.raises(ValueError, match="'gap': is there twice"):
-        Signature((GAP, GAP._replace(causality="output")))
+    assert SENSOR.hash == sha256(SENSOR.text.encode()).digest()[:16]
+    assert Signature((LinkVariable("b", "Boolean", "input"),)).text == "input\tBoolean\t-\tb\n"
+    assert (SENSOR.request, SENSOR.answer) == ((GAP, GAIN), (OUT,))
 
 
 @pytest.mark.parametrize(
-    ("other", "words"),
+    ("proxy", "difference"),
     [
-        ((GAP, REFLECTANCE, INTENSITY, CONTACT), ""),
-        ((GAP, REFLECTANCE, INTENSITY), "there is no output contact, Boolean"),
-        (
-            (GAP, REFLECTANCE, INTENSITY, CONTACT, LinkVariable("x", "Integer", "output", "m")),
-            "there is also output x, Integer in m",
-        ),
-        (
-            (GAP._replace(unit="mm"), REFLECTANCE, INTENSITY, CONTACT),
-            "input gap, Real in mm, must be input gap, Real in m",
-        ),
-        ((GAP, REFLECTANCE, CONTACT, INTENSITY), "the variables are in another order"),
+        ((GAP, OUT),
+         "the proxy has output Real V intensity, the peer parameter Real 1 gain"),
+        ((GAP, GAIN), "the proxy has no more, the peer output Real V intensity"),
+        ((GAP._replace(unit="mm"), GAIN, OUT),
+         "the proxy has input Real mm gap, the peer input Real m gap"),
+        ((GAP, GAIN, OUT, OUT._replace(name="y", kind="Boolean", unit=None)),
+         "the proxy has output Boolean - y, the peer no more"),
+    ],
+)  # fmt: skip
+def test_the_first_difference_is_named(proxy: tuple[LinkVariable, ...], difference: str) -> None:
+    assert SENSOR.difference(Signature(proxy).text.encode() + bytes(9)) == difference
+
+
+@pytest.mark.parametrize(
+    ("variables", "reason"),
+    [
+        ((GAP, GAP._replace(causality="output")), "variable 'gap': is there twice"),
+        ((GAP._replace(name="a\tb"),), r"variable 'a\\tb' \[m\]: must be without tabs"),
+        ((GAP._replace(unit="m\n"),), r"\[m\n\]: must be without tabs and line ends"),
     ],
 )
-def test_difference(other: tuple[LinkVariable, ...], words: str) -> None:
-    assert ONE.difference(Signature(other).text) == words
-
-
-def test_of_many_differences_four_are_named() -> None:
-    assert Signature(()).difference(ONE.text).endswith("; there is also output contact, Boolean")
-    many = tuple(LinkVariable(f"x{i}", "Real", "input") for i in range(6))
-    assert Signature(many).difference("").endswith("input x3, Real; and 2 more")
-
-
-@pytest.mark.parametrize("other", ["", "\n\n", "\t\t\t", "nonsense", "input\tReal", "\x00\ud7ff"])
-def test_the_text_of_another_may_be_anything(other: str) -> None:
-    assert ONE.difference(other)
+def test_what_the_text_cannot_hold(variables: tuple[LinkVariable, ...], reason: str) -> None:
+    with pytest.raises(ValueError, match=reason):
+        Signature(variables)

@@ -68,7 +68,7 @@ static every_kind_link_event ask(Side *side, uint8_t kind, uint64_t cookie, uint
 {
     size_t n;
     memset(request, 0, EVERY_KIND_HEAD_SIZE);
-    memcpy(request, "GRSP\1", 5);
+    memcpy(request, "GRSP\2", 5);
     request[EVERY_KIND_AT_KIND] = kind;
     memcpy(request + EVERY_KIND_AT_INTERFACE, every_kind_hash(), 16);
     every_kind_put(request + EVERY_KIND_AT_SESSION, 8, 99);
@@ -83,8 +83,7 @@ static every_kind_link_event ask(Side *side, uint8_t kind, uint64_t cookie, uint
 static void begin(Side *side)
 {
     size_t body = EVERY_KIND_INPUTS_SIZE + EVERY_KIND_PARAMETERS_SIZE;
-    every_kind_signature(request + EVERY_KIND_HEAD_SIZE);
-    ask(side, EVERY_KIND_HELLO, 0, 0, 0.0, EVERY_KIND_SIGNATURE_SIZE);
+    ask(side, EVERY_KIND_HELLO, 0, 0, 0.0, 0);
     memset(request + EVERY_KIND_HEAD_SIZE, 0, body);
     ask(side, EVERY_KIND_INITIALISE, every_kind_get(answer + EVERY_KIND_AT_COOKIE, 8), 1, 0.0, body);
     every_kind_link_answer(side, 0.0, answer);

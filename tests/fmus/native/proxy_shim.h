@@ -1,8 +1,7 @@
-/* In front of the sources of a proxy: its clock is that of a test, which also sees what it sends and
-   when it looks up a name, and may have either fail. */
+/* In front of the sources of a proxy: its clock is that of a test, which also sees what it sends, and
+   may have that fail. */
 #define _GNU_SOURCE
 #include <errno.h>
-#include <netdb.h>
 #include <stdint.h>
 #include <sys/socket.h>
 #include <time.h>
@@ -11,14 +10,6 @@
 
 SHIM_EXPORT int64_t (*shim_clock)(void); /* ns */
 SHIM_EXPORT int (*shim_send)(const void *datagram, size_t size); /* 0, or why it is not sent */
-SHIM_EXPORT int (*shim_look_up)(void); /* 0, or what getaddrinfo() returns for a name */
-
-static int shim_getaddrinfo(const char *host, const char *service, const struct addrinfo *how,
-                            struct addrinfo **found)
-{
-    int error = how->ai_flags & AI_NUMERICHOST ? 0 : shim_look_up();
-    return error ? error : getaddrinfo(host, service, how, found);
-}
 
 static int shim_clock_gettime(clockid_t clock, struct timespec *now)
 {
@@ -37,4 +28,3 @@ static ssize_t shim_sent(int at, const void *datagram, size_t size, int flags)
 
 #define clock_gettime shim_clock_gettime
 #define send shim_sent
-#define getaddrinfo shim_getaddrinfo

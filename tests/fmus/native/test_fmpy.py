@@ -16,10 +16,10 @@ from fmpy.build import build_platform_binary
 from fmpy.util import read_csv, read_ref_opt_file
 from fmpy.validation import validate_fmu
 from grasp_fmus.build import UNPREFIXED
-from grasp_fmus.description import Experiment
-from grasp_fmus.proxy import Settings
-from grasp_fmus.proxy_build import Original
-from support.kinds import TRANSLATED, Kind, build_proxy
+from grasp_fmus.build import planned
+from grasp_fmus.description import Experiment, Version
+from grasp_fmus.proxy import Original, Settings, build_proxy
+from support.kinds import TRANSLATED
 from support.native_fmus import needs_gcc
 from support.scripted_peer import VARIABLES, ScriptedPeer
 from support.slow import platforms, slow
@@ -88,16 +88,17 @@ def test_fmpy_compiles_its_sources(
 
 @pytest.mark.slow
 @pytest.mark.skipif(not shutil.which("cmake", path=PROGRAMS), reason="NO cmake")
-@pytest.mark.parametrize("kind", ["native", platforms("native FMI 3")])
+@pytest.mark.parametrize("fmi", [2, platforms(3)])
 def test_fmpy_compiles_the_sources_of_a_proxy(
-    kind: Kind, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    fmi: Version, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PATH", PROGRAMS)
     folder, made = tmp_path / "fmu", tmp_path / "made"
     made.mkdir()
     with ScriptedPeer() as peer:
         original = Original("Original.fmu", VARIABLES, {}, Experiment(), True)
-        fmu = build_proxy(original, kind, tmp_path, Settings(port=peer.port, timeout=60.0))
+        settings = Settings(port=peer.port, timeout=60.0)
+        fmu = build_proxy(tmp_path / "P.fmu", original, planned(fmi=fmi), settings).path
         shutil.unpack_archive(fmu, folder, "zip")
         shutil.rmtree(folder / "binaries")
         build_platform_binary(folder, made)

@@ -1,94 +1,24 @@
-"""A native proxy beside one that Python runs: the same datagrams; its sources; its description."""
+"""The sources of a proxy, and a proxy in a host by the real clock."""
 
-import os
+import ctypes
 import shutil
 import subprocess
-import sys
 from pathlib import Path
-from random import Random
+from typing import Any
 
+import numpy as np
 import pytest
-from grasp_fmus import connection
-from grasp_fmus.description import Experiment
+from fmpy import simulate_fmu
 from grasp_fmus.link.message import END, HELLO, INITIALISE, STEP
-from grasp_fmus.native.proxy import proxy_members
-from grasp_fmus.native.targets import Version
-from grasp_fmus.proxy import DEFAULTS
-from grasp_fmus.proxy_build import Original
-from support import kinds, scripted_peer
-from support.campaign import seeds
-from support.fmi2 import Fmu
-from support.kinds import Kind
-from support.native_proxies import STRICT
-from support.scripted_peer import (
-    VARIABLES,
-    Host,
-    ScriptedPeer,
-    answer,
-    fail,
-    forget,
-    keep,
-    miss,
-    send_kept_and_miss,
-)
+from grasp_fmus.build import planned
+from grasp_fmus.description import Version
+from grasp_fmus.proxy import Settings, build_proxy
+from support.fmi2 import OK, WARNING, Fmu, Instance
+from support.native_proxies import STRICT, original, write_sources
+from support.scripted_peer import ScriptedPeer, fail
 from support.slow import platforms
 
-ACTS = (answer, answer, answer, miss, keep, send_kept_and_miss, forget, fail)
-KEY = b"sixteen bytes of key, and some more"
-
-
-def exchanged(kind: Kind, seed: int, key: Path | None, patch: pytest.MonkeyPatch) -> list[bytes]:
-    """All that a proxy sends in a life of many kinds of answers."""
-    patch.setattr(scripted_peer, "KIND", kind)
-    random = Random(seed)
-    with ScriptedPeer(key=key.read_bytes() if key else None) as peer:
-        peer.told(HELLO, miss)
-        host = Host(
-            peer.port, peer.clock, resume=True, misses_tolerated=2, connect_timeout=3600.0,
-            key_file=str(key or ""),
-        )  # fmt: skip
-        host.initialise()
-        for _ in range(60):
-            host.set(
-                force=random.gauss(0.0, 1e3), mode=random.randrange(-(2**31), 2**31),
-                armed=random.random() < 0.5, label=random.choice(["", "Größe", "x" * 127]),
-                gain=random.uniform(0.5, 2.0),
-            )  # fmt: skip
-            peer.told(STEP, random.choice(ACTS))
-            host.step(random.uniform(1e-6, 1.0))
-            peer.clock.now += random.randrange(10**9)
-        host.slave.terminate()
-    return peer.datagrams
-
-
-@pytest.mark.parametrize("with_key", [False, True])
-@pytest.mark.parametrize(
-    "drawn",
-    [range(1), pytest.param(seeds(60), marks=[pytest.mark.slow, pytest.mark.campaign])],
-    ids=["one", "many"],
-)
-def test_the_same_datagrams_to_the_byte(
-    drawn: range, with_key: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    key = tmp_path / "key" if with_key else None
-    if key:
-        key.write_bytes(KEY)
-        key.chmod(0o600)
-    for seed in drawn:
-        with monkeypatch.context() as patch:
-            theirs = exchanged("native", seed, key, patch)
-            found = dict.fromkeys(int.from_bytes(d[24:32], "little") for d in theirs)
-            assert {d[6] for d in theirs} == {HELLO, INITIALISE, STEP, END}, seed
-            sessions = iter(found)
-            patch.setattr(connection, "randbits", lambda bits, known=sessions: next(known))
-            assert exchanged("python", seed, key, patch) == theirs, seed
-
-
-def write_sources(folder: Path, fmi: Version) -> None:
-    original = Original('An "original".fmu', VARIABLES, {}, Experiment(), True)
-    for file, data in proxy_members(Path("AnyProxy.fmu"), original, fmi, DEFAULTS).items():
-        if file.startswith("sources/"):
-            (folder / file.removeprefix("sources/")).write_bytes(data)
+pytestmark = pytest.mark.skipif(not shutil.which("gcc"), reason="NO gcc")
 
 
 @pytest.mark.slow
@@ -113,69 +43,105 @@ def test_the_sources_compile_without_a_warning(
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not shutil.which("gcc"), reason="NO gcc")
 def test_two_of_them_link_into_one_program(tmp_path: Path) -> None:
     """All but the functions of FMI is static, and those have the name of the FMU before them."""
-    write_sources(tmp_path, 2)
+    write_sources(tmp_path)
     text = (tmp_path / "AnyProxy.c").read_text()
     (tmp_path / "Other.c").write_text(text.replace("AnyProxy", "Other"))
     main = "extern int AnyProxy_fmi2Reset(void*), Other_fmi2Reset(void*);\n"
     main += "int main(void) { return AnyProxy_fmi2Reset(0) + Other_fmi2Reset(0); }\n"
     (tmp_path / "main.c").write_text(main)
-    files = ["AnyProxy.c", "Other.c", "main.c"]
-    command = ["gcc", "-std=c99", *files, "-o", "both", "-lm", "-lpthread", "-ldl"]
+    command = ["gcc", "-std=c99", "AnyProxy.c", "Other.c", "main.c", "-o", "both", "-lm"]
     subprocess.run(command, cwd=tmp_path, check=True)
-    done = subprocess.run([tmp_path / "both"])
-    assert done.returncode == 6
+    assert subprocess.run([tmp_path / "both"]).returncode == 6
 
 
-SLOW_RESOLVER = """
-#define _GNU_SOURCE
-#include <dlfcn.h>
-#include <netdb.h>
-#include <unistd.h>
-int getaddrinfo(const char *host, const char *service, const struct addrinfo *how,
-                struct addrinfo **found)
-{
-    int (*real)(const char *, const char *, const struct addrinfo *, struct addrinfo **);
-    *(void **)&real = dlsym(RTLD_NEXT, "getaddrinfo");
-    if (!(how->ai_flags & AI_NUMERICHOST))
-        sleep(1);
-    return real(host, service, how, found);
-}
-"""
-UNLOADED = """
-import ctypes, sys, time
-import _ctypes
-library, guid = ctypes.CDLL(sys.argv[1]), sys.argv[2].encode()
-library.fmi2Instantiate.restype = ctypes.c_void_p
-callbacks = (ctypes.c_void_p * 5)()
-c = ctypes.c_void_p(library.fmi2Instantiate(b"x", 1, guid, b"", callbacks, 0, 0))
-assert c
-vr, n = (ctypes.c_uint * 1)(int(sys.argv[3])), ctypes.c_size_t(1)
-assert library.fmi2SetString(c, vr, n, (ctypes.c_char_p * 1)(b"localhost")) == 0
-vr[0] = int(sys.argv[4])
-assert library.fmi2SetReal(c, vr, n, (ctypes.c_double * 1)(0.05)) == 0
-assert library.fmi2EnterInitializationMode(c) == 3
-library.fmi2FreeInstance(c)
-_ctypes.dlclose(library._handle)
-time.sleep(1.5)
-print("lives")
-"""
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One that was built for users."""
+    target = tmp_path_factory.mktemp("proxy") / "TheProxy.fmu"
+    return build_proxy(
+        target, original(), planned(), Settings(timeout=60.0, connect_timeout=60.0)
+    ).path
 
 
-@pytest.mark.slow
-@pytest.mark.skipif(not shutil.which("gcc"), reason="NO gcc")
-def test_the_resolver_may_come_back_when_the_fmu_is_gone(tmp_path: Path) -> None:
-    """The thread that was left alone with a name is still in the library, which a host unloads."""
-    original = Original("Original.fmu", VARIABLES, {}, Experiment(), True)
-    fmu = Fmu(kinds.build_proxy(original, "native", tmp_path, DEFAULTS), tmp_path / "unpacked")
-    (tmp_path / "slow.c").write_text(SLOW_RESOLVER)
-    shared = ["gcc", "-shared", "-fPIC", "slow.c", "-o", "slow.so", "-ldl"]
-    subprocess.run(shared, cwd=tmp_path, check=True)
-    places = [str(fmu.references[f"proxy.{name}"]) for name in ("host", "connect_timeout")]
-    done = subprocess.run(
-        [sys.executable, "-c", UNLOADED, str(fmu.binary), fmu.guid, *places],
-        env={**os.environ, "LD_PRELOAD": str(tmp_path / "slow.so")}, capture_output=True, text=True,
-    )  # fmt: skip
-    assert (done.returncode, done.stdout, done.stderr) == (0, "lives\n", "")
+@pytest.fixture(scope="module")
+def fmu(path: Path, tmp_path_factory: pytest.TempPathFactory) -> Fmu:
+    return Fmu(path, tmp_path_factory.mktemp("unpacked"))
+
+
+def initialised(instance: Instance, port: int, timeout: float = 60.0) -> Instance:
+    reference = (ctypes.c_uint * 1)(instance.fmu.references["proxy.on_loss"])
+    text = (ctypes.c_char_p * 1)(b"failsafe")
+    assert instance.call("SetString", reference, ctypes.c_size_t(1), text) == OK
+    return instance.initialise(**{"proxy.port": port, "proxy.timeout": timeout})
+
+
+def test_reset_ends_the_session_and_another_begins(fmu: Fmu) -> None:
+    with ScriptedPeer() as peer, Instance(fmu, "bench") as instance:
+        for _ in range(5):
+            initialised(instance, peer.port)
+            assert instance.set({"force": 9.0}) == OK
+            assert instance.step(0.0, 0.5) == OK
+            assert instance.get("doubled") == [18.0]
+            assert instance.get("proxy.round_trip_time") > [0.0]
+            assert instance.call("Reset") == OK
+            assert instance.get("force") == [1.5]
+    assert peer.kinds() == [HELLO, INITIALISE, STEP, END] * 5
+    assert len({m.session for m in peer.got}) == 5
+
+
+def test_a_loss_is_a_warning_in_the_log(fmu: Fmu) -> None:
+    with ScriptedPeer() as peer, Instance(fmu, "bench") as instance:
+        initialised(instance, peer.port)
+        peer.told(STEP, fail)
+        assert instance.step(0.0, 0.5) == OK
+        (said,) = instance.log
+        assert (said.status, said.category) == (WARNING, "logStatusWarning")
+        assert said.text == (
+            f"bench, t = 0 s: 127.0.0.1:{peer.port} is lost, 1 missed in a row: "
+            "the peer failed: the motor is hot; proxy.on_loss = failsafe"
+        )
+
+
+def test_a_silent_peer_by_the_real_clock(fmu: Fmu) -> None:
+    with ScriptedPeer() as peer, Instance(fmu, "bench") as instance:
+        initialised(instance, peer.port, 1e-3)
+        peer.told(STEP, *[lambda p, m: None] * 10)
+        for k in range(6):
+            assert instance.step(0.5 * k, 0.5) == OK
+        assert instance.get("proxy.age") == [3.0]
+        assert "4 missed in a row: no answer within 0.001 s;" in instance.log[0].text
+    assert peer.kinds().count(STEP) == 4
+
+
+def test_many_instances_side_by_side(fmu: Fmu) -> None:
+    peers = [ScriptedPeer() for _ in range(8)]
+    instances = [Instance(fmu, f"bench {k}") for k in range(len(peers))]
+    try:
+        for k, (instance, peer) in enumerate(zip(instances, peers, strict=True)):
+            initialised(instance, peer.port)
+            assert instance.set({"force": float(k)}) == OK
+        for step in range(3):
+            for k, instance in enumerate(instances):
+                assert instance.step(0.5 * step, 0.5) == OK
+                assert instance.get("doubled") == [2.0 * k]
+    finally:
+        for instance in instances:
+            instance.call("FreeInstance")
+        for peer in peers:
+            peer.__exit__()
+
+
+def test_plain_fmpy_simulates_it(path: Path) -> None:
+    with ScriptedPeer() as peer:
+        force = np.array([(0.0, 1.0), (1.0, 2.0)], [("time", "f8"), ("force", "f8")])
+        result: Any = simulate_fmu(
+            str(path), validate=True, stop_time=1.0, step_size=0.125, output_interval=0.125,
+            start_values={"proxy.port": peer.port, "gain": 4.0}, input=force,
+            output=["doubled", "passed", "proxy.state", "proxy.missed"],
+        )  # fmt: skip
+    inputs = [peer.values(m)[0] for m in peer.got if m.kind == STEP]
+    assert len(inputs) == 8
+    np.testing.assert_array_equal(result["doubled"][1:], [4.0 * force for force in inputs])
+    assert [set(result[n]) for n in ("passed", "proxy.state", "proxy.missed")] == [{3}, {1}, {0}]

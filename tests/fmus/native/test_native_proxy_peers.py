@@ -23,7 +23,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.skipif(not shutil.which("gcc"), reas
 def target(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The controller on a target, as docs/handoff.md makes it."""
     folder = tmp_path_factory.mktemp("target")
-    assert cli.main(["build", "--native", "--c-only", str(folder), "GraspController"]) == 0
+    assert cli.main(["build", "--c-only", str(folder), "GraspController"]) == 0
     header = ["--c-header", str(folder / "grasp_controller.h")]
     assert cli.main(["proxy", str(fmus / "GraspController.fmu"), *header]) == 0
     source = Path(__file__).parents[3] / "docs/controller_target.c"
@@ -59,7 +59,7 @@ def test_with_the_peer_in_c(
     system = grasp.with_experiment(step=STEP, stop=STOP, scheme=scheme)
     fmu = system.component("controller", "test").fmu
     with running(target, key) as port:
-        proxy = build_proxy(fmu, tmp_path / "Bench.fmu", port, "--native")
+        proxy = build_proxy(fmu, tmp_path / "Bench.fmu", port)
         there = simulate(system.swap("controller", proxy).with_values(values))
     direct = simulate(system)
     for signal, column in direct.items():
@@ -84,7 +84,7 @@ def test_keys_of_both_sides(
         "plant.proxy.connect_timeout": 60.0 if ours == theirs else 0.3,
     }
     with serving(fmu, Service(lockstep=True, key=theirs)) as server:
-        proxy = build_proxy(fmu, tmp_path / "Bench.fmu", server.address[1], "--native")
+        proxy = build_proxy(fmu, tmp_path / "Bench.fmu", server.address[1])
         there = system.swap("plant", proxy).with_values(values)
         if ours == theirs:
             assert simulate(there, engine="python").complete  # the server is a thread of ours

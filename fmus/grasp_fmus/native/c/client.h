@@ -1,9 +1,8 @@
-/* The proxy's side of a session: makes requests, judges what comes back, counts. No sockets. It does
-   what link/client.py does.
+/* The proxy's side of a session: makes requests, judges what comes back, counts. No sockets.
 
    Before it is included: wire.h, and of the variables exchanged
        N_REQUEST, N_ANSWER          their numbers: inputs and parameters, outputs
-       REQUEST_SIZE, ANSWER_SIZE    the bytes of their values
+       REQUEST_SIZE, ANSWER_SIZE    the bytes of their values, eight each
        CLIENT_KIND(i)               the kind of the i-th of them all: KIND_REAL, ... */
 #ifndef CLIENT_H
 #define CLIENT_H
@@ -11,6 +10,7 @@
 #include <string.h>
 
 #define CLIENT_WINDOW 4096  /* requests back of which is known whether they were answered */
+#define CLIENT_REASON 1024  /* bytes of a reason, at most */
 
 enum { CLIENT_NOTHING, CLIENT_ANSWERED, CLIENT_REFUSED };  /* verdicts on a datagram */
 
@@ -20,17 +20,17 @@ typedef struct {
 
 typedef struct {
     ClientCounters counters;
-    int refused, cut; /* a code of REFUSE; whether what is below is a part of it only */
-    uint8_t reason[WIRE_LARGEST + 1]; /* the body of the last REFUSE, and a NUL */
-    size_t reason_size;
-    uint8_t outputs[ANSWER_SIZE + 1]; /* of the newest answer */
-    double outputs_time;              /* s: what they belong to */
-    int64_t round_trip;               /* ns: from its request to the newest answer */
+    int refused;  /* the code of the last REFUSE, from a peer of this version of the protocol */
+    unsigned version;
+    char reason[CLIENT_REASON + 1];
+    uint8_t outputs[ANSWER_SIZE + 1];  /* of the newest answer */
+    double outputs_time;               /* s: what they belong to */
+    int64_t round_trip;                /* ns: from its request to the newest answer */
 
     wire_sealer sealer;
     uint64_t session, cookie, sequence, first_step, newest, awaited;
     int greeting;
-    uint8_t seen[CLIENT_WINDOW]; /* 1: the request with this sequence, modulo, was answered */
+    uint8_t seen[CLIENT_WINDOW];  /* 1: the request with this sequence, modulo, was answered */
 } Client;
 
 /* Returns 0 where the key is too short; NULL: no key. */
@@ -40,42 +40,14 @@ static int client_begin(Client *client, const uint8_t *key, size_t size)
     return wire_sealer_init(&client->sealer, key, size);
 }
 
-/* Values as bytes: the request's, from numbers and texts; returns how many */
-
-static size_t client_value_size(int kind)
-{
-    return kind == KIND_STRING ? WIRE_STRING_SIZE : 8;
-}
-
-static int client_is_value(int kind, const uint8_t *value)
-{
-    return kind == KIND_REAL      ? wire_is_real(value)
-           : kind == KIND_BOOLEAN ? wire_is_boolean(value)
-           : kind == KIND_INTEGER ? wire_is_integer(value) : wire_is_string(value);
-}
-
-static int client_are_outputs(const uint8_t *body, size_t size)
-{
-    int i;
-    if (size != ANSWER_SIZE) {
-        return 0;
-    }
-    for (i = N_REQUEST; i < N_REQUEST + N_ANSWER; i++) {
-        if (!client_is_value(CLIENT_KIND(i), body)) {
-            return 0;
-        }
-        body += client_value_size(CLIENT_KIND(i));
-    }
-    return 1;
-}
-
 /* Requests. The body is at datagram + WIRE_HEAD_SIZE already; the size of the whole is returned. */
 
 static size_t client_pack(const Client *client, uint8_t kind, double time, double step, int64_t now,
                           size_t body, uint8_t *datagram)
 {
     memset(datagram, 0, WIRE_HEAD_SIZE);
-    memcpy(datagram, "GRSP\1", 5);
+    memcpy(datagram, "GRSP", 4);
+    wire_put(datagram + WIRE_AT_VERSION, 2, WIRE_VERSION);
     datagram[WIRE_AT_KIND] = kind;
     memcpy(datagram + WIRE_AT_INTERFACE, wire_hash(), 16);
     wire_put(datagram + WIRE_AT_SESSION, 8, client->session);
@@ -88,19 +60,22 @@ static size_t client_pack(const Client *client, uint8_t kind, double time, doubl
     return wire_seal(&client->sealer, datagram, WIRE_HEAD_SIZE + body);
 }
 
-/* HELLO, to begin a session of that number, longer by so many NULs */
-static size_t client_greet(Client *client, uint64_t session, int64_t now, size_t fill,
-                           uint8_t *datagram)
+/* HELLO, to begin a session of that number */
+static size_t client_greet(Client *client, uint64_t session, int64_t now, uint8_t *datagram)
 {
-    size_t room = WIRE_LARGEST - WIRE_HEAD_SIZE - WIRE_TAG_SIZE - WIRE_SIGNATURE_SIZE;
+    const char *const *line;
+    size_t size = 0;
     client->session = session;
     client->cookie = client->sequence = client->first_step = client->newest = client->awaited = 0;
     client->greeting = 1;
     client->refused = 0;
-    fill = fill < room ? fill : room;
-    wire_signature(datagram + WIRE_HEAD_SIZE);
-    memset(datagram + WIRE_HEAD_SIZE + WIRE_SIGNATURE_SIZE, 0, fill);
-    return client_pack(client, WIRE_HELLO, 0.0, 0.0, now, WIRE_SIGNATURE_SIZE + fill, datagram);
+    memset(datagram + WIRE_HEAD_SIZE, 0, WIRE_SHORTEST_HELLO);
+    for (line = wire_lines(); *line; line++) {
+        memcpy(datagram + WIRE_HEAD_SIZE + size, *line, strlen(*line));
+        size += strlen(*line);
+    }
+    size = size > WIRE_SHORTEST_HELLO ? size : WIRE_SHORTEST_HELLO;
+    return client_pack(client, WIRE_HELLO, 0.0, 0.0, now, size, datagram);
 }
 
 /* INITIALISE, or a STEP over `step`, both from `time` in s */
@@ -153,26 +128,33 @@ static int client_receive_welcome(Client *client, const uint8_t *datagram, size_
 static int client_receive_refusal(Client *client, const uint8_t *datagram, size_t body)
 {
     uint64_t sequence = wire_get(datagram + WIRE_AT_SEQUENCE, 8);
-    uint8_t code = datagram[WIRE_AT_CODE], digest[32];
-    wire_sha256 sha;
+    uint8_t code = datagram[WIRE_AT_CODE];
     if (sequence != (client->greeting ? 0 : client->awaited)
         || wire_get(datagram + WIRE_AT_COOKIE, 8) != client->cookie
         || !(client->greeting || client->awaited) || code < WIRE_OTHER_INTERFACE
-        || code > WIRE_FAILED) {
+        || code > WIRE_OTHER_VERSION) {
         return client_reject(client);
     }
     client->refused = code;
-    client->cut = 0;
-    memcpy(client->reason, datagram + WIRE_HEAD_SIZE, body);
+    client->version = (unsigned)wire_get(datagram + WIRE_AT_VERSION, 2);
+    body = body < CLIENT_REASON ? body : CLIENT_REASON;
     client->reason[body] = '\0';
-    client->reason_size = body;
-    if (code == WIRE_OTHER_INTERFACE) {
-        wire_sha256_begin(&sha);
-        wire_sha256_add(&sha, client->reason, body);
-        wire_sha256_end(&sha, digest);
-        client->cut = memcmp(digest, datagram + WIRE_AT_INTERFACE, 16) != 0;
+    while (body-- > 0) {  /* one line of ASCII, whatever it is */
+        uint8_t c = datagram[WIRE_HEAD_SIZE + body];
+        client->reason[body] = (char)(c < 0x20 ? ' ' : c < 0x7f ? c : '?');
     }
     return CLIENT_REFUSED;
+}
+
+static int client_are_outputs(const uint8_t *body, size_t size)
+{
+    int i, right = size == ANSWER_SIZE;
+    for (i = N_REQUEST; right && i < N_REQUEST + N_ANSWER; i++, body += 8) {
+        int kind = CLIENT_KIND(i);
+        right = kind == KIND_REAL      ? wire_is_real(body)
+                : kind == KIND_BOOLEAN ? wire_is_boolean(body) : wire_is_integer(body);
+    }
+    return right;
 }
 
 static int client_receive_outputs(Client *client, const uint8_t *datagram, size_t body, int64_t now)
@@ -205,7 +187,7 @@ static int client_receive_outputs(Client *client, const uint8_t *datagram, size_
     return awaited ? CLIENT_ANSWERED : CLIENT_NOTHING;
 }
 
-/* The verdict on a datagram, whatever it holds */
+/* The verdict on a datagram, whatever it holds; of another version only its name is understood */
 static int client_receive(Client *client, const uint8_t *datagram, size_t size, int64_t now)
 {
     size_t body;
@@ -215,6 +197,10 @@ static int client_receive(Client *client, const uint8_t *datagram, size_t size, 
         return client_reject(client);
     }
     kind = datagram[WIRE_AT_KIND];
+    if ((wire_get(datagram + WIRE_AT_VERSION, 2) != WIRE_VERSION)
+        != (kind == WIRE_REFUSE && datagram[WIRE_AT_CODE] == WIRE_OTHER_VERSION)) {
+        return client_reject(client);
+    }
     if (kind == WIRE_OUTPUTS && !client->greeting
         && wire_get(datagram + WIRE_AT_COOKIE, 8) == client->cookie) {
         return client_receive_outputs(client, datagram, body, now);

@@ -13,18 +13,17 @@ from grasp_fmus.variable import Variable as ProxyVariable
 
 from ...errors import InputError, SimulationError
 from ...files import check_folder, write_text
-from ...hil.protocol import link_signature
+from ...hil.protocol import exchanged, link_signature
 from ...interface.interface import Interface, Value, Variable
-from ...interface.read import read_interface
 from ...interface.units import BASE
 from ..frame import PATH, json_option, say, show, waiting
 from .build import FIRST
 
 if TYPE_CHECKING:
     from grasp_fmus.package import Built
-    from grasp_fmus.proxy_build import Original
+    from grasp_fmus.proxy import Original
 
-KINDS: Mapping[str, type[Value]] = {"Real": float, "Integer": int, "Boolean": bool, "String": str}
+KINDS: Mapping[str, type[Value]] = {"Real": float, "Integer": int, "Boolean": bool}
 
 
 @click.command()
@@ -45,13 +44,12 @@ KINDS: Mapping[str, type[Value]] = {"Real": float, "Integer": int, "Boolean": bo
     show_default=True,
     help="Longest wait per step in s.",
 )
-@click.option("--native", is_flag=True, help="As C, without Python.")
 @click.option(
     "--target",
     metavar="NAMES",
     help="Binaries for others too: linux64,win64,darwin64,aarch64-linux. They need ziglang.",
 )
-@click.option("--fmi", type=click.Choice(["2", "3"]), help="Of a native proxy. Default: 2")
+@click.option("--fmi", type=click.Choice(["2", "3"]), help="Version of the proxy. Default: 2")
 @click.option("--c-header", type=PATH, help="Write the peer's side as a C99 header.")
 @json_option
 def proxy(
@@ -60,7 +58,6 @@ def proxy(
     host: str,
     port: int,
     timeout: float,
-    native: bool,
     target: str | None,
     fmi: str | None,
     c_header: Path | None,
@@ -71,19 +68,18 @@ def proxy(
     It is an FMU with the same variables. It sends inputs and parameters in one UDP datagram per
     step and waits --timeout for the outputs. What happens without an answer is up to its parameters
     proxy.*, where --host, --port and --timeout are start values. The peer: grasp-cosim serve, or a
-    bench with the header of --c-header. With --native it is C, for hosts and machines without
-    Python.
+    bench with the header of --c-header. It is C, and needs a compiler: gcc, or ziglang of
+    grasp-cosim[native].
 
     \b
     Example: grasp-cosim proxy fmus/build/GripperPlant.fmu -o GripperPlantProxy.fmu --timeout 0.001
-    Native: grasp-cosim proxy vendor.fmu -o Bench.fmu --native --target linux64,win64
+    For others: grasp-cosim proxy vendor.fmu -o Bench.fmu --target linux64,win64
     """
     from c_compilers import CompilerError  # only here: they take time to load
-    from grasp_fmus.proxy_build import build_proxy
 
     _check_paths(fmu, out, c_header)
-    _check_native(native, out, {"--target": target, "--fmi": fmi})
-    interface = read_interface(fmu)
+    _check_options(out, {"--target": target, "--fmi": fmi})
+    interface = exchanged(fmu)
     signature, notes = link_signature(interface)
     report: dict[str, object] = {"notes": notes}
     lines = []
@@ -91,12 +87,8 @@ def proxy(
         text = _header(interface) if c_header is not None else ""
         if out is not None:
             original = _original(interface, [v.name for v in signature.variables])
-            settings = Settings(host, port, timeout)
-            if native:
-                built, said_of = _built_native(out, original, settings, target, fmi)
-                notes += said_of
-            else:
-                built = build_proxy(out, original, settings)
+            built, said_of = _built(out, original, Settings(host, port, timeout), target, fmi)
+            notes += said_of
             lines.append(f"{out}: {built.status}")
             report |= {"fmu": str(out), "status": built.status}
         if c_header is not None:
@@ -115,38 +107,34 @@ def proxy(
 
 def _header(interface: Interface) -> str:
     """The C header of the peer."""
-    from grasp_fmus.c_header import c_header
+    from grasp_fmus.bench_header import bench_header
 
     signature, _ = link_signature(interface)
     starts = {v.name: _start(interface.by_name[v.name]) for v in signature.request}
     known = {name: start for name, start in starts.items() if start is not None}
     said = {v.name: v.description or "" for v in interface.variables}
-    return c_header(interface.identifier, signature, known, said)
+    return bench_header(interface.identifier, signature, known, said)
 
 
-def _check_native(native: bool, out: Path | None, only: Mapping[str, str | None]) -> None:
-    """InputError where options do not go together."""
-    for option, value in {**only, "--native": True if native else None}.items():
-        if value is None:
-            continue
-        if not native:
-            raise InputError(f"{option} {value}: must be with --native")
-        if out is None:
+def _check_options(out: Path | None, only: Mapping[str, str | None]) -> None:
+    """InputError where options are of an FMU, and there is none to make."""
+    for option, value in only.items():
+        if value is not None and out is None:
             raise InputError(f"{option}: there is no FMU to make; must be with -o FILE.fmu")
 
 
-def _built_native(
+def _built(
     out: Path, original: "Original", settings: Settings, target: str | None, fmi: str | None
 ) -> "tuple[Built, list[str]]":
-    """The native proxy, and what is to be said of it."""
+    """The proxy, and what is to be said of it."""
     from grasp_fmus.build import planned
-    from grasp_fmus.native.proxy import build_native_proxy
     from grasp_fmus.native.targets import targets
+    from grasp_fmus.proxy import build_proxy
 
     plan = planned(targets(target.split(",")) if target is not None else (), 3 if fmi == "3" else 2)
     places = ", ".join(t.tuple for t in plan.places)
     with waiting(f"building for {places}{FIRST if target else ''}"):
-        built = build_native_proxy(out, original, plan, settings)
+        built = build_proxy(out, original, plan, settings)
     return built, [plan.note] if plan.note else []
 
 
@@ -166,7 +154,7 @@ def _check_paths(fmu: Path, out: Path | None, c_header: Path | None) -> None:
 
 def _original(interface: Interface, names: list[str]) -> "Original":
     """What a proxy has from the FMU; names are the variables to exchange, in order."""
-    from grasp_fmus.proxy_build import Original
+    from grasp_fmus.proxy import Original
 
     known = {name for name in names if interface.by_name[name].causality != "output"}
     return Original(

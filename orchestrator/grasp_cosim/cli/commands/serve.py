@@ -10,10 +10,9 @@ import click
 
 from ...errors import InputError
 from ...hil.address import is_loopback, text
-from ...hil.protocol import LONGEST_SILENCE, shared_key
+from ...hil.protocol import LONGEST_SILENCE, exchanged, shared_key
 from ...hil.served import ServedFmu, Service
 from ...hil.server import DEFAULT_ADDRESS, Server
-from ...interface.read import read_interface
 from ...system.description import in_nanoseconds
 from ..frame import FAILED, INTERRUPTED, NEGATIVE, PATH, fail, json_option, pair, say, show
 from ..signals import ended_by_signals
@@ -79,7 +78,7 @@ def serve(
         None if key_file is None else shared_key(key_file, say),
     )
     end = None if duration is None else in_nanoseconds("--duration", duration)
-    served = ServedFmu(read_interface(fmu), service, say)
+    served = ServedFmu(exchanged(fmu), service, say)
     with Server(served, (host, port), say) as server:
         for note in served.notes:
             say(note)

@@ -19,7 +19,7 @@ static void make_plausible(const every_kind_link *link, unsigned what, uint8_t *
     size_t tag = link->sealer.keyed ? (size_t)EVERY_KIND_TAG_SIZE : 0;
     if (size < EVERY_KIND_HEAD_SIZE + tag)
         return;
-    memcpy(datagram, "GRSP\1\0", 6);
+    memcpy(datagram, what & 64 ? "GRSP\1\0" : "GRSP\2\0", 6);
     memcpy(datagram + EVERY_KIND_AT_INTERFACE, every_kind_hash(), 16);
     every_kind_put(datagram + EVERY_KIND_AT_SIZE, 4, size - tag - EVERY_KIND_HEAD_SIZE);
     every_kind_put(datagram + EVERY_KIND_AT_ZERO, 4, 0);
@@ -29,17 +29,15 @@ static void make_plausible(const every_kind_link *link, unsigned what, uint8_t *
         every_kind_put(datagram + EVERY_KIND_AT_SESSION, 8, link->session);
         every_kind_put(datagram + EVERY_KIND_AT_COOKIE, 8, link->cookie);
         every_kind_put(datagram + EVERY_KIND_AT_SEQUENCE, 8, last + (what >> 4 & 3) - 1);
-    } else if (link->greeted_count) {
-        const uint64_t *greeted = link->greeted[what % link->greeted_count];
-        every_kind_put(datagram + EVERY_KIND_AT_SESSION, 8, greeted[0]);
-        every_kind_put(datagram + EVERY_KIND_AT_COOKIE, 8, greeted[1]);
+    } else {
+        uint64_t session = every_kind_get(datagram + EVERY_KIND_AT_SESSION, 8);
+        every_kind_put(datagram + EVERY_KIND_AT_COOKIE, 8, every_kind_link_cookie(link, session));
     }
 }
 
 static size_t compute(every_kind_link *link, uint8_t *answer)
 {
     memcpy(&link->outputs.y_real, &link->inputs.u_real, sizeof link->outputs.y_real);
-    memcpy(link->outputs.y_string, link->inputs.u_string, sizeof link->outputs.y_string);
     return link->parameters.p_integer == 13 ? every_kind_link_fail(link, "thirteen", answer)
                                             : every_kind_link_answer(link, link->time, answer);
 }
@@ -56,9 +54,8 @@ static void judge(every_kind_link *link, unsigned what, int64_t now)
     datagram = (uint8_t *)realloc(datagram, size ? size : 1);
     if (what & 1)
         make_plausible(link, what, datagram, size);
-    if (size > 200 && what & 8 && datagram[EVERY_KIND_AT_KIND] == EVERY_KIND_HELLO &&
-            size >= EVERY_KIND_HEAD_SIZE + EVERY_KIND_SIGNATURE_SIZE)
-        every_kind_signature(datagram + EVERY_KIND_HEAD_SIZE);
+    if (what & 8 && size >= EVERY_KIND_HEAD_SIZE && datagram[EVERY_KIND_AT_KIND] == EVERY_KIND_HELLO)
+        datagram[EVERY_KIND_AT_INTERFACE] ^= 1; /* of another interface */
     if (what & 2 && size >= EVERY_KIND_TAG_SIZE)
         every_kind_seal(&link->sealer, datagram, size - EVERY_KIND_TAG_SIZE);
     event = every_kind_link_receive(link, datagram, size, now, answer, &n);

@@ -36,7 +36,7 @@ def test_steps(
     original = fmus / "ProximitySensor.fmu"
     script = Script()
     with serving(original, Service(lockstep=True)) as server:
-        options = ["--native", "--target", target.tuple, "--fmi", str(fmi)]
+        options = ["--target", target.tuple, "--fmi", str(fmi)]
         path = build_proxy(original, tmp_path / "Bench.fmu", server.address[1], *options)
         fmu = unpacked(path, tmp_path / "unpacked")
         gap, intensity = fmu.reference("gap"), fmu.reference("intensity")
@@ -68,7 +68,7 @@ def test_a_peer_that_is_gone_on_windows(
     original = fmus / "ProximitySensor.fmu"
     with serving(original, Service(lockstep=True)) as server:
         port = server.address[1]
-    options = ["--native", "--target", "win64"]
+    options = ["--target", "win64"]
     fmu = unpacked(build_proxy(original, tmp_path / "B.fmu", port, *options), tmp_path / "u")
     script = Script().add("load", 0, 2, f"Z:{fmu.binary('win64')}")
     script.add("new", 0, 0, "full", "bench", fmu.token, None)

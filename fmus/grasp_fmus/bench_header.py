@@ -17,8 +17,9 @@ from .link.message import (
     HEAD,
     LARGEST_KEY,
     LONGEST_STEP,
-    STRING_SIZE,
+    SHORTEST_HELLO,
     TAG_SIZE,
+    VERSION,
     Codec,
     Value,
     check_size,
@@ -32,8 +33,8 @@ WIRE = Path(__file__).with_name("wire.h.in")
 LARGEST_REASON = 256
 """Bytes of a REFUSE's reason in C, as in the template."""
 
-_TYPES = {"Real": "double", "Integer": "int32_t", "Boolean": "bool", "String": "char"}
-_ZEROS: dict[str, Value] = {"Real": 0.0, "Integer": 0, "Boolean": False, "String": ""}
+_TYPES = {"Real": "double", "Integer": "int32_t", "Boolean": "bool"}
+_ZEROS: dict[str, Value] = {"Real": 0.0, "Integer": 0, "Boolean": False}
 _MEANINGS: dict[Causality, str] = {
     "input": "What the proxy sends with every request",
     "parameter": "What the proxy sends with every request as well; only tunable ones change",
@@ -77,7 +78,7 @@ class Group(NamedTuple):
     size: int
 
 
-def c_header(
+def bench_header(
     name: str,
     signature: Signature,
     starts: Mapping[str, Value] | None = None,
@@ -98,7 +99,6 @@ def c_header(
         Group(prefix, c, f"{prefix}_{c}s", *members(signature, c)) for c in ORDER
     ]
     packing = [*map(_check, groups), _unpack(inputs), _unpack(parameters), _pack(outputs)]
-    text_size = len(signature.text.encode())
     return Template(_named(TEMPLATE.read_text("utf-8"), prefix)).substitute(
         title=comment(name),
         structs=structs(groups, _MEANINGS, starts or {}, descriptions or {}),
@@ -108,7 +108,7 @@ def c_header(
         inputs_size=inputs.size,
         parameters_size=parameters.size,
         outputs_size=outputs.size,
-        answer_size=HEAD.size + TAG_SIZE + max(outputs.size, text_size, LARGEST_REASON),
+        answer_size=HEAD.size + TAG_SIZE + max(outputs.size, LARGEST_REASON),
     )
 
 
@@ -120,7 +120,8 @@ def wire(prefix: str, signature: Signature) -> str:
         first_half_of_the_hash=", ".join(octets[:8]),
         second_half_of_the_hash=", ".join(octets[8:]),
         signature_lines="".join(f"        {line},\n" for line in lines),
-        signature_size=len(signature.text.encode()),
+        version=VERSION,
+        shortest_hello=SHORTEST_HELLO,
         longest_step=LONGEST_STEP,
         largest_key=LARGEST_KEY,
     )
@@ -170,17 +171,16 @@ def members(signature: Signature, causality: Causality) -> tuple[list[Member], i
         identifier = next(n for n in (f"{wanted}{ending}" for ending in endings) if n not in taken)
         taken.add(identifier)
         found.append(Member(variable, identifier, offset))
-        offset += Codec([variable]).size
+        offset += 8
     return found, offset
 
 
 def _struct(group: Group, meaning: str, descriptions: Mapping[str, str]) -> str:
     lines = []
     for v, identifier, _ in group.members:
-        size = f"[{STRING_SIZE}]" if v.kind == "String" else ""
         said = descriptions.get(v.name, "").replace("·", ".")
         text = comment((f"{v.name}, {v.unit}" if v.unit else v.name) + (said and f": {said}"))
-        lines.append(f"    {f'{_TYPES[v.kind]} {identifier}{size};':<40} /* {text} */")
+        lines.append(f"    {f'{_TYPES[v.kind]} {identifier};':<40} /* {text} */")
     head = f"/* {meaning} */\ntypedef struct {{"
     none = f"    uint8_t none; /* the model has no {group.causality}s */"
     return _lines(head, lines, none, f"}} {group.struct};")
@@ -196,7 +196,7 @@ def _defaults(group: Group, starts: Mapping[str, Value]) -> str:
 
 def _literal(v: LinkVariable, value: Value) -> str:
     try:
-        packed = Codec([v]).unpack(Codec([v]).pack([value]))
+        packed = Codec([v]).unpack(Codec([v]).pack(value))
     except (struct.error, OverflowError):
         packed = None
     if packed is None:
@@ -204,8 +204,6 @@ def _literal(v: LinkVariable, value: Value) -> str:
             f"{v.name} = {value!r}, its start: must be a finite value of kind {v.kind}"
         )
     [start] = packed
-    if isinstance(start, str):
-        return quoted(start)
     if isinstance(start, bool):
         return str(start).lower()
     return "(-2147483647 - 1)" if start == -(2**31) and v.kind == "Integer" else repr(start)
@@ -222,13 +220,10 @@ def _check(group: Group) -> str:
 
 
 def _unpack(group: Group) -> str:
-    lines = []
-    for v, identifier, offset in group.members:
-        get = f"{group.prefix}_get_{v.kind.lower()}(body + {offset}"
-        lines.append(
-            f"    {get}, values->{identifier});" if v.kind == "String"
-            else f"    values->{identifier} = {get});"
-        )  # fmt: skip
+    lines = [
+        f"    values->{identifier} = {group.prefix}_get_{v.kind.lower()}(body + {offset});"
+        for v, identifier, offset in group.members
+    ]
     arguments = f"(const uint8_t *body, {group.struct} *values)"
     head = f"void {group.prefix}_unpack_{group.causality}s{arguments}"
     return _function(head, lines, "(void)body, (void)values;")

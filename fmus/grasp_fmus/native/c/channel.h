@@ -1,0 +1,159 @@
+/* A proxy's channel to its peer: the socket, and how long an answer is awaited. Times are ns of
+   net_now(), or s of simulation. */
+#ifndef CHANNEL_H
+#define CHANNEL_H
+
+#include "client.h"
+#include "sockets.h"
+
+#define CHANNEL_REPEAT 50000000  /* ns after which HELLO and INITIALISE are sent again */
+
+enum { CHANNEL_NEW, GREETING, WELCOME, CHANNEL_INITIALISING, READY };  /* stages */
+
+typedef struct {
+    Client client;
+    Socket socket;
+    int refused;                  /* the code by which the peer refused the last request, or 0 */
+    char trouble[NET_TEXT_SIZE];  /* what the network reported; empty: nothing */
+    uint64_t sessions;            /* begun */
+    int stage;
+    uint8_t pending[WIRE_LARGEST], request[WIRE_LARGEST], datagram[WIRE_LARGEST + 1];
+    size_t pending_size;
+} Channel;
+
+static void channel_note(Channel *c, int error)
+{
+    if (!net_is_refused(error)) {  /* that nobody listens is what no answer means */
+        net_error_text(error, c->trouble);
+    }
+}
+
+static void channel_send(Channel *c, const uint8_t *request, size_t size)
+{
+    int i, error = 1;
+    for (i = 0; i < 2 && error; i++) {  /* a call that reports an earlier one sends nothing */
+        error = net_send(c->socket, request, size);
+        if (error) {
+            channel_note(c, error);
+        }
+    }
+}
+
+/* End the session, if there is one, and close the socket */
+static void channel_close(Channel *c)
+{
+    if (c->stage > GREETING) {
+        size_t size = client_pack(&c->client, WIRE_END, 0.0, 0.0, net_now(), 0, c->request);
+        (void)net_send(c->socket, c->request, size);
+    }
+    net_shut(c->socket);
+}
+
+/* Take one datagram, if there is one, and judge it */
+static int channel_receive(Channel *c)
+{
+    int error, verdict = CLIENT_NOTHING;
+    long size = net_receive(c->socket, c->datagram, sizeof c->datagram, &error);
+    if (size == NET_FAILED) {
+        channel_note(c, error);
+    }
+    if (size >= 0) {
+        verdict = client_receive(&c->client, c->datagram, (size_t)size, net_now());
+    }
+    if (verdict == CLIENT_REFUSED) {
+        c->refused = c->client.refused;
+        verdict = c->refused == WIRE_BUSY ? CLIENT_NOTHING : verdict;  /* it may become free */
+    }
+    return verdict;
+}
+
+/* Send a request and wait for its answer until the deadline, whatever comes; 1 if it came */
+static int channel_ask(Channel *c, const uint8_t *request, size_t size, int64_t deadline, int repeat)
+{
+    int64_t now = net_now(), again = now;
+    int verdict = CLIENT_NOTHING;
+    c->refused = 0;
+    c->trouble[0] = '\0';
+    for (; verdict == CLIENT_NOTHING && now < deadline; now = net_now()) {
+        if (now >= again) {
+            channel_send(c, request, size);
+            again = repeat ? now + CHANNEL_REPEAT : deadline;
+        }
+        if (net_wait(c->socket, (again < deadline ? again : deadline) - now)) {
+            verdict = channel_receive(c);
+        }
+    }
+    return verdict == CLIENT_ANSWERED;
+}
+
+/* Begin a session, or go on with what was begun; 1 if the peer welcomes it */
+static int channel_greet(Channel *c, int64_t deadline)
+{
+    uint64_t session;
+    if (c->stage == CHANNEL_NEW) {
+        if (!net_random(&session, sizeof session)) {
+            net_copy_text(c->trouble, "there are no random numbers");
+            return 0;
+        }
+        c->pending_size = client_greet(&c->client, session, net_now(), c->pending);
+        c->stage = GREETING;
+    }
+    if (c->stage == GREETING && channel_ask(c, c->pending, c->pending_size, deadline, 1)) {
+        c->stage = WELCOME;
+        c->sessions++;
+    }
+    return c->stage > GREETING;
+}
+
+/* Set values, or go on with what is under way; 1 if the outputs are there */
+static int channel_initialise(Channel *c, double time, const uint8_t *values, int64_t deadline)
+{
+    do {
+        if (!channel_greet(c, deadline)) {
+            return 0;
+        }
+        if (c->stage != CHANNEL_INITIALISING) {
+            memcpy(c->pending + WIRE_HEAD_SIZE, values, REQUEST_SIZE);
+            c->pending_size =
+                client_ask(&c->client, WIRE_INITIALISE, time, 0.0, net_now(), c->pending);
+            c->stage = CHANNEL_INITIALISING;
+        }
+        if (channel_ask(c, c->pending, c->pending_size, deadline, 1)) {
+            c->stage = READY;
+        } else if (c->refused == WIRE_UNKNOWN || c->refused == WIRE_FAILED) {
+            c->stage = CHANNEL_NEW;
+        }
+    } while (c->refused == WIRE_UNKNOWN);  /* another session was before this one */
+    return c->stage == READY;
+}
+
+/* Step from `time` over `step`, both in s; 1 if the outputs came in time. With `anew`, begin another
+   session where the peer does not know this one, or there is none. */
+static int channel_step(Channel *c, double time, double step, const uint8_t *values,
+                        int64_t deadline, int anew)
+{
+    size_t size;
+    int i;
+    for (i = 0; i < 2; i++) {
+        if (c->stage != READY && !channel_initialise(c, time, values, deadline)) {
+            break;
+        }
+        memcpy(c->request + WIRE_HEAD_SIZE, values, REQUEST_SIZE);
+        size = client_ask(&c->client, WIRE_STEP, time, step, net_now(), c->request);
+        if (channel_ask(c, c->request, size, deadline, 0)) {
+            return 1;
+        }
+        if (!anew || c->refused != WIRE_UNKNOWN) {
+            break;
+        }
+        c->stage = CHANNEL_NEW;
+    }
+    if (c->stage == READY) {
+        client_miss(&c->client);
+    } else {  /* what is under way is awaited in the next step as well */
+        c->client.counters.missed++;
+    }
+    return 0;
+}
+
+#endif
