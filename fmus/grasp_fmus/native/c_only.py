@@ -1,8 +1,8 @@
 """Writes the C of a block alone, for real-time targets: no FMI, no allocation, no stdio.
 
 c_only.h.in and c_only.c.in are its header and its code, for a block called Model; here they get the
-name and the variables. Members are called as in the C header of a proxy (bench_header.py), so that the
-structs of both are the same.
+name and the variables. Members are called as in the C header of a proxy (bench_header.py), so that
+the structs of both are the same.
 """
 
 import re

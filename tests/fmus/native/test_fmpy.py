@@ -15,8 +15,7 @@ from fmpy import simulate_fmu
 from fmpy.build import build_platform_binary
 from fmpy.util import read_csv, read_ref_opt_file
 from fmpy.validation import validate_fmu
-from grasp_fmus.build import UNPREFIXED
-from grasp_fmus.build import planned
+from grasp_fmus.build import UNPREFIXED, planned
 from grasp_fmus.description import Experiment, Version
 from grasp_fmus.proxy import Original, Settings, build_proxy
 from support.kinds import TRANSLATED

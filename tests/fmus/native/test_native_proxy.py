@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 from fmpy import simulate_fmu
-from grasp_fmus.link.message import END, HELLO, INITIALISE, STEP
 from grasp_fmus.build import planned
 from grasp_fmus.description import Version
+from grasp_fmus.link.message import END, HELLO, INITIALISE, STEP
 from grasp_fmus.proxy import Settings, build_proxy
 from support.fmi2 import OK, WARNING, Fmu, Instance
 from support.native_proxies import STRICT, original, write_sources
