@@ -9,7 +9,6 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from c_compilers import BITS, LIBM
 
-from .host_log import CATEGORIES, DISCARD, ERROR
 from .variable import Enumeration, Scalar, Variable
 
 Version = Literal[2, 3]
@@ -20,6 +19,12 @@ TYPES: dict[type[Scalar], str] = {float: "Float64", bool: "Boolean", int: "Int32
 
 OPTIONS = " ".join((*BITS, *(f"-fno-builtin-{function}" for function in LIBM)))
 """Of any compiler that calls them so; contracted, an FMU makes no instance."""
+
+WARNING, DISCARD, ERROR = 1, 2, 3
+"""FMI statuses."""
+
+CATEGORIES = {WARNING: "logStatusWarning", DISCARD: "logStatusDiscard", ERROR: "logStatusError"}
+"""The categories of messages in use, by status; their names are those of the FMI standard."""
 
 _WORD = r"(?:[A-Za-z_]\w*|'(?:[^'\\]|\\.)+')(?:\[\d+(?:,\d+)*\])?"
 _STRUCTURED = re.compile(rf"{_WORD}(?:\.{_WORD})*", re.ASCII)
@@ -116,7 +121,7 @@ def model_description(
         _add_interface_3(root, d)
     _add_units(root, d, *(("s",) if fmi == 3 else ()))
     _add_enumerations(root, d, fmi)
-    _add_categories_and_experiment(root, d)
+    _add_log_and_experiment(root, d, native)
     variables = SubElement(root, "ModelVariables")
     for reference, v in enumerate(d.variables):
         _add_variable(variables, v, reference, d.units, fmi)
@@ -198,10 +203,12 @@ def _add_interface_3(root: Element, d: Description) -> None:
     )
 
 
-def _add_categories_and_experiment(root: Element, d: Description) -> None:
-    categories = SubElement(root, "LogCategories")
-    for status in d.statuses:
-        SubElement(categories, "Category", name=CATEGORIES[status])
+def _add_log_and_experiment(root: Element, d: Description, native: bool) -> None:
+    """Add the categories of messages; pythonfmu logs without, which a host must not leave out."""
+    if native:
+        categories = SubElement(root, "LogCategories")
+        for status in d.statuses:
+            SubElement(categories, "Category", name=CATEGORIES[status])
     times = zip(("startTime", "stopTime", "tolerance", "stepSize"), d.experiment, strict=True)
     experiment = {key: repr(time) for key, time in times if time is not None}
     if experiment:
