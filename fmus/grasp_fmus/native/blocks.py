@@ -3,7 +3,6 @@
 import re
 from collections.abc import Iterator
 from dataclasses import fields as dataclass_fields
-from math import isinf
 from pathlib import Path
 from types import FunctionType
 from typing import Any
@@ -102,7 +101,7 @@ def _function(head: str, lines: list[str]) -> str:
     text = " ".join(lines)
     unused = [f"(void){name};" for name in names if not re.search(rf"\b{name}\b", text)]
     body = "".join(f"{wrapped(f'    {line}')}\n" for line in [*unused, *lines])
-    return f"{wrapped(f'static {head}')}\n{{\n{body}}}\n"
+    return f"{wrapped(f'static inline {head}')}\n{{\n{body}}}\n"
 
 
 def _table(block: Any, described: list[Field], states: int) -> str:
@@ -115,7 +114,7 @@ def _table(block: Any, described: list[Field], states: int) -> str:
     for v in found:
         kind = "INTEGER" if v.enumeration else v.type.upper()
         limits = v.limits or (0.0, 0.0)
-        numbers = [0.0 if isinf(n) else n for n in (*limits, float(v.start or 0.0))]
+        numbers = [*limits, float(v.start or 0.0)]
         cells = [string(v.name), string(v.in_unit), f"KIND_{kind}", v.causality.upper()]
         cells += [str(int(v.variability == "fixed")), str(int(v.limits is not None))]
         rows.append(f"    {{{', '.join([*cells, *map(number, numbers)])}}},\n")

@@ -464,7 +464,7 @@ class Expressions:
         if isinstance(node, ast.Call) and self.known(node.func) is zip:
             columns = [self.items(self.value(a), a) for a in node.args]
             rows = zip(*columns, strict=True)
-            return [Value("", Tuple(tuple(v.type for v in row)), WORD, row) for row in rows]
+            return [self.display(row) for row in rows]
         return self.items(self.value(node), node)
 
     def _bind(self, target: ast.expr, value: Value) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 from .expressions import Expressions
 from .structs import Function, Program
 from .text import comment, string, wrapped
-from .types import WHOLE, Group, Type, Value, joined, said
+from .types import REAL, WHOLE, Group, Type, Value, said
 
 ADVICE = {
     "While": "while is not in the subset, as a step must end; use for ... in range(n) with break",
@@ -42,6 +42,10 @@ class Body(Expressions):
         """How often names are in the statements of the blocks that are open."""
         self._late: dict[str, list[str]] = {}
         """Variables that are declared at the top, as more than one block uses them, by type."""
+        self._variables: dict[str, Value] = {}
+        """Those of C, whether they have a value here or not."""
+        self._exits: list[list[set[str]]] = []
+        """What has a value where each open loop is left, or goes on."""
 
     def translate(self, function: Any, arguments: Sequence[Value], node: ast.AST) -> Function:
         """The function in C for these arguments."""
@@ -121,11 +125,11 @@ class Body(Expressions):
     def _on_pass(self, node: ast.Pass) -> None:
         pass
 
-    def _on_break(self, node: ast.Break) -> None:
-        self.say("break;")
+    def _on_break(self, node: ast.Break | ast.Continue) -> None:
+        self._exits[-1].append({*self.bound})
+        self.say(f"{type(node).__name__.lower()};")
 
-    def _on_continue(self, node: ast.Continue) -> None:
-        self.say("continue;")
+    _on_continue = _on_break
 
     def _on_return(self, node: ast.Return) -> None:
         if node.value is None:
@@ -181,21 +185,20 @@ class Body(Expressions):
         if value.text == "" or isinstance(value.type, Group):  # parameters stay where they are
             self.bound[name] = value
             return
-        old = self.bound.get(name)
+        old = self._variables.get(name) or self.bound.get(name)
         if old is None:
             self._declare(name, value)
             return
-        kind = joined(old.type, value.type)
-        if kind is None:
+        if value.type not in (old.type, WHOLE if old.type == REAL else old.type):
             kinds = f"{said(old.type)}, then {said(value.type)}"
-            self.refuse(node, f"{name} is {kinds}; use another name")
-        self.bound[name] = Value(old.text, kind)
+            self.refuse(node, f"{name} is {kinds}; use another name, or write 0.0 for 0")
+        self.bound[name] = self._variables[name] = old
         self.say(f"{old.text} = {value.text};")
 
     def _declare(self, name: str, value: Value) -> None:
         """Declare a variable where it is first used, or at the top, where other blocks use it."""
         c_name, kind = self.fresh(name, own=True), self.program.c(value.type, self.names)
-        self.bound[name] = Value(c_name, value.type)
+        self.bound[name] = self._variables[name] = Value(c_name, value.type)
         if self._inside and self._inside[-1][name] < self._uses[name]:
             self._late.setdefault(kind, []).append(c_name)
             self.say(f"{c_name} = {value.text};")
@@ -209,36 +212,66 @@ class Body(Expressions):
         while len(rest) == 1 and isinstance(rest[0], ast.If):
             branches.append((self.condition(rest[0].test).text, rest[0].body))
             rest = rest[0].orelse
-        for i, (test, body) in enumerate(branches):
-            self.say(f"{'} else ' if i else ''}if ({test}) {{")
+        before, after = dict(self.bound), [] if rest else [{*self.bound}]
+        for i, (test, body) in enumerate([*branches, *([("", rest)] if rest else [])]):
+            head = f"if ({test}) {{" if test else "{"
+            self.say(f"}} else {head}" if i else head)
+            self.bound = dict(before)
             self.block(body, inner=True)
-        if rest:
-            self.say("} else {")
-            self.block(rest, inner=True)
+            after += [] if _leaves(body) else [{*self.bound}]
         self.say("}")
+        self._go_on(before, after)
+
+    def _go_on(self, before: dict[str, Value], ways: list[set[str]]) -> None:
+        """Go on with what has a value on all ways."""
+        everywhere = set[str].intersection(*ways) if ways else set()
+        self.bound = {n: self._variables[n] for n in everywhere if n in self._variables} | before
 
     def _on_for(self, node: ast.For) -> None:
-        call = node.iter
-        if node.orelse or not (isinstance(call, ast.Call) and self.known(call.func) is range):
-            self.refuse(node, f"for ... in {ast.unparse(call)}: must be range(n), without else")
+        call, name = node.iter, ast.unparse(node.target)
+        changed = {n for s in node.body for n in _names(s, ast.Store)}
+        is_range = isinstance(call, ast.Call) and self.known(call.func) is range
+        if node.orelse or {*_names(node.target)} & changed - {"_"}:
+            self.refuse(node, f"{name}: must not be changed in its loop, which has no else")
+        if not isinstance(call, ast.Call) or not is_range:
+            self._on_each(node, changed)
+            return
         if not isinstance(node.target, ast.Name) or not 1 <= len(call.args) <= 2:
             self.refuse(node, f"{ast.unparse(call)}: must be range(n) or range(first, n)")
+        if name in self.bound and name != "_":
+            self.refuse(node, f"{name}: is a variable already; use another name")
         first, last = (["0"] + [self.number(a).text for a in call.args])[-2:]
-        changed = {n for s in node.body for n in _names(s, ast.Store)}
         if changed & {*_names(call)} or not re.fullmatch(r"[\w.>-]+", last):
             last = self.copied(Value(last, WHOLE), "count").text
-        name = node.target.id
-        if name != "_" and name in changed:
-            self.refuse(node, f"{name} is changed in its loop; use another name")
         counter = self.fresh("i" if name == "_" else name)
         constant = isinstance(call.args[-1], ast.Constant) and name == "_"
         self._late.setdefault("int" if constant else "double", []).append(counter)
+        before = dict(self.bound)
         if name != "_":
             self.bound[name] = Value(counter, WHOLE)
         last = last.removesuffix(".0") if constant else last
         self.say(f"for ({counter} = {first}; {counter} < {last}; {counter}++) {{")
+        self._exits.append([])
         self.block(node.body, inner=True)
         self.say("}")
+        ways = self._exits.pop() + ([] if _leaves(node.body) else [{*self.bound} - {name}])
+        runs = len(call.args) == 1 and self._fixed(call.args[0]) > 0
+        self._go_on(before, ways if runs and ways else [{*before}])
+
+    def _fixed(self, node: ast.expr) -> int:
+        found = node.value if isinstance(node, ast.Constant) else self.known(node)
+        return found if isinstance(found, int) else 0
+
+    def _on_each(self, node: ast.For, changed: set[str]) -> None:
+        """A loop over a tuple, or zip() of tuples, item by item."""
+        inner = [n for s in node.body for n in ast.walk(s)]
+        if any(isinstance(n, ast.Break | ast.Continue) for n in inner):
+            self.refuse(node, "break and continue are only for a loop over range(n)")
+        if changed & {*_names(node.iter)}:
+            self.refuse(node, f"{ast.unparse(node.iter)}: must not be changed in its loop")
+        for row in self._rows(node.iter):
+            self._bind(node.target, row)
+            self.block(node.body)
 
 
 class Check(Body):
@@ -318,6 +351,14 @@ def _ends(body: Sequence[ast.stmt]) -> bool:
     if isinstance(last, ast.If):
         return _ends(last.body) and _ends(last.orelse)
     return isinstance(last, ast.Return)
+
+
+def _leaves(body: Sequence[ast.stmt]) -> bool:
+    """Return True if nothing comes after a block."""
+    last = body[-1]
+    if isinstance(last, ast.If):
+        return bool(last.orelse) and _leaves(last.body) and _leaves(last.orelse)
+    return isinstance(last, ast.Return | ast.Break | ast.Continue | ast.Raise)
 
 
 def _names(node: ast.AST, context: type[ast.expr_context] = ast.expr_context) -> list[str]:

@@ -20,7 +20,7 @@ RESERVED = frozenset(
     auto break case char const continue default do double else enum extern float for goto if inline
     int long register restrict return short signed sizeof static struct switch typedef union
     unsigned void volatile while asm bool class delete false near far new near nullptr operator
-    private public this true typeof virtual
+    private public this true typeof virtual alignas alignof constexpr static_assert thread_local
     abs acos acosh asin asinh atan atan2 atanh cbrt ceil copysign cos cosh div erf erfc exp exp2
     expm1 fabs fdim floor fma fmax fmin fmod free frexp gamma hypot index j0 j1 jn ldexp lgamma log
     log10 log1p log2 logb malloc modf nan pow remainder rint round scalb signal signgam sin sinh
@@ -34,8 +34,9 @@ RESERVED = frozenset(
 
 
 def identifier(name: str) -> str:
-    """A name that C does not use for something else."""
-    return f"{name}_" if name in RESERVED else name
+    """A name that C does not use for something else, of ASCII."""
+    plain = "".join(c if c.isascii() else f"u{ord(c):x}" for c in name)
+    return f"{plain}_" if plain in RESERVED else plain
 
 
 def number(value: float) -> str:

@@ -107,8 +107,6 @@ def joined(a: Type, b: Type) -> Type | None:
     """The type of what may be either; None where they do not go together."""
     if a == b:
         return a
-    if a in NUMBERS and b in NUMBERS:
-        return REAL
     if isinstance(a, Tuple) and isinstance(b, Tuple) and len(a.items) == len(b.items):
         items = tuple(joined(x, y) for x, y in zip(a.items, b.items, strict=True))
         return Tuple(tuple(i for i in items if i)) if all(items) else None

@@ -1,96 +1,113 @@
-"""A block in C gives the bits of the block in Python: parameters, inputs and steps by chance."""
+"""The shipped blocks, those of docs/, a hand of N fingers, blocks by chance: the bits of Python."""
 
-import ctypes
-import math
-import struct
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from random import Random
 from typing import Any
 
 import pytest
-from c_compilers import LIBM
-from grasp_fmus.contract import build_params, declared, packer, unpacker, variables
-from grasp_fmus.native import blocks as translation
+from fmus.native.c_block import Both, loaded
+from fmus.native.random_block import random_block
 from grasp_fmus.shipped import blocks
-from grasp_fmus.slave import _scalars
-from support.compiled import compile_c
+from support.campaign import part, seeds
+from support.kinds import TRANSLATED
 from support.native_fmus import needs_gcc
+from support.slow import platforms, slow
 
 pytestmark = needs_gcc
 
-C = Path(translation.__file__).with_name("c")
-DRIVER = Path(__file__).with_name("block_driver.c")
-FLAGS = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror"]
-FLAGS += ["-ffp-contract=off", *(f"-fno-builtin-{name}" for name in LIBM)]
-NAMES = [name for name in blocks() if "MuJoCo" not in name]
+DOCS = Path(__file__).parents[3] / "docs"
+HAND = Path(__file__).with_name("hand.py")
+OWN = {path.stem: path for path in (*DOCS.glob("*_plant.py"), *DOCS.glob("*_controller.py"))}
+OWN |= {"moving_object": DOCS / "moving_object.py", "hand": HAND}
+NAMES = [*TRANSLATED, *OWN]
 
 
-def library(name: str, block: Any, folder: Path, cc: str = "gcc") -> ctypes.CDLL:
-    """The block in C."""
-    (folder / "block.h").write_text(translation.translated(name, block), "ascii")
-    command = [cc, *FLAGS, "-shared", "-fPIC", f"-I{folder}", f"-I{C}", str(DRIVER), "-lm"]
-    return ctypes.CDLL(str(compile_c(command, folder / f"{name}.so")))
+@contextmanager
+def block_of(name: str, folder: Path) -> Iterator[Any]:
+    """A block by its name."""
+    if name in OWN:
+        with loaded(folder / f"{name}.py", OWN[name].read_text("utf-8")) as own:
+            yield own
+    else:
+        yield blocks()[name]
 
 
-def value(v: Any, random: Random) -> Any:
-    """Of a variable: as declared, or by chance within its range."""
-    start = float(v.start or 0.0)
-    if random.random() < 0.4:
-        return v.kind(start)
-    low, high = v.limits or (-math.inf, math.inf)
-    if v.kind is bool:
-        return random.random() < 0.5
-    if v.kind is int:
-        return random.randint(int(low), int(high))
-    size = (
-        math.exp(random.uniform(-10.0, 4.0)) if random.random() < 0.3 else 0.3 * abs(start) + 0.01
-    )
-    return min(max(random.gauss(start, size), low), high)
-
-
-def bits(numbers: Any) -> list[bytes]:
-    """One NaN is as good as another."""
-    return [struct.pack("<d", math.nan if x != x else x) for x in map(float, numbers)]
-
-
-def run(found: ctypes.CDLL, block: Any, random: Random, steps: int) -> int:
-    """One run in both, with a state saved and restored in each step; the number of values."""
-    fields = declared(block)
-    listed, pack, unpack = variables(fields), packer(block.Inputs, fields), unpacker(fields)
-    values = [value(v, random) for v in listed]
-    reason = ctypes.create_string_buffer(2000)
-    sizes = (ctypes.c_int * 3)()
-    found.sizes(sizes)
-    state, seen = (ctypes.c_double * max(1, sizes[2]))(), (ctypes.c_double * sizes[1])()
-
-    def in_c() -> Any:
-        return (ctypes.c_double * len(values))(*map(float, values))
-
-    try:
-        p = build_params(block, fields, values)
-    except ValueError:
-        assert not found.check(in_c(), reason)
-        assert reason.value
-        return 0
-    assert found.check(in_c(), reason)
-    x, h, count = block.initial_state(p, pack(values)), random.choice([1e-4, 1e-3, 1e-2]), 0
-    found.initial_state(in_c(), state)
-    for _ in range(steps):
-        for i, v in enumerate(listed):
-            if v.causality == "input" and random.random() < 0.5:
-                values[i] = value(v, random)
-        u, given = pack(values), in_c()
-        found.outputs(given, state, seen)
-        assert bits(seen) == bits(unpack(block.outputs(p, x, u)))
-        x = block.step(p, x, u, h)
-        found.step(given, ctypes.c_double(h), state)
-        assert bits(state) == bits(_scalars(x))
-        count += len(seen) + len(state)
-    return count
-
-
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [*TRANSLATED, *map(slow, OWN)])
 def test_c_gives_the_bits_of_python(name: str, tmp_path: Path) -> None:
-    block = blocks()[name]
-    found = library(name, block, tmp_path)
-    assert sum(run(found, block, Random(seed), 12) for seed in range(20)) > 1_000
+    with block_of(name, tmp_path) as block:
+        both = Both(name, block, tmp_path / "c", options=["-O0"])
+        assert sum(both.random_run(Random(seed), 10) for seed in range(15)) > 100
+
+
+@pytest.mark.parametrize("fingers", [2, *map(slow, (3, 4, 5))])
+def test_a_hand_of_n_fingers(fingers: int, tmp_path: Path) -> None:
+    source = HAND.read_text("utf-8").replace("N = 3", f"N = {fingers}")
+    with loaded(tmp_path / "hand.py", source) as block:
+        both = Both(f"hand{fingers}", block, tmp_path / "c")
+        assert both.n_state == 7 * fingers
+        assert sum(both.random_run(Random(seed), 20) for seed in range(20)) > 1_000
+
+
+def test_a_block_by_chance(tmp_path: Path) -> None:
+    with loaded(tmp_path / "chance.py", random_block(Random(1))) as block:
+        both = Both("chance", block, tmp_path / "c", options=["-O0", "-w"])
+        assert sum(both.random_run(Random(seed), 10) for seed in range(20)) > 100
+
+
+@pytest.mark.slow
+@pytest.mark.campaign
+def test_ten_million_values(tmp_path: Path) -> None:
+    """Half of them of shipped blocks and those of the docs, half of blocks by chance."""
+    whole = part(10_000_000)
+    for name in NAMES:
+        with block_of(name, tmp_path) as block:
+            both, count, random = (
+                Both(name, block, tmp_path / "c"),
+                0,
+                Random(f"{name} {seeds(1)[0]}"),
+            )
+            while count < whole / 2 / len(NAMES):
+                count += both.random_run(random, 200)
+    count, tries = 0, 0
+    while count < whole / 2:
+        random, tries = Random(seeds(1)[0] + tries), tries + 1
+        with loaded(tmp_path / f"chance_{tries}.py", random_block(random)) as block:
+            both = Both(f"chance_{tries}", block, tmp_path / "chance", options=["-O1", "-w"])
+            count += sum(both.random_run(random, 100) for _ in range(100))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("cc", "option"),
+    [("clang", "-O2"), ("gcc", "-O3"), platforms("gcc", "-O0"), platforms("clang", "-O0")],
+)
+@pytest.mark.parametrize("name", NAMES)
+def test_any_compiler_gives_the_bits_of_python(
+    name: str, cc: str, option: str, tmp_path: Path
+) -> None:
+    with block_of(name, tmp_path) as block:
+        both = Both(name, block, tmp_path / "c", cc, [option])
+        assert sum(both.random_run(Random(seed), 30) for seed in range(20)) > 1_000
+
+
+@pytest.mark.slow
+def test_the_same_sources_give_the_same_bytes() -> None:
+    code = (
+        "from grasp_fmus.native.blocks import translated\n"
+        "from grasp_fmus.shipped import blocks\n"
+        "for name in ('GripperPlantMovable', 'ProximitySensor', 'GraspController'):\n"
+        "    print(translated(name, blocks()[name]))\n"
+    )
+    texts = {
+        subprocess.check_output(
+            [sys.executable, "-c", code], env={**os.environ, "PYTHONHASHSEED": str(seed)}
+        )
+        for seed in (1, 2)
+    }
+    assert len(texts) == 1
+    assert str(Path.cwd().parent) not in texts.pop().decode()

@@ -13,10 +13,6 @@
 #pragma STDC FP_CONTRACT OFF
 #endif
 
-#define PI 3.141592653589793
-#define TAU 6.283185307179586
-#define E 2.718281828459045
-
 /* max(a, b): the first of equals, and of what cannot be compared */
 static inline double larger(double a, double b)
 {
