@@ -12,7 +12,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import threading
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -138,23 +137,19 @@ def compile_all(jobs: Iterable[Job], scratch: Path) -> list[Path]:
 
     most = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     started: list[subprocess.Popen[str]] = []
-    ended = threading.Event()
 
     def run(job: Job) -> Path:
         if library := cache.kept(job.kept_as):
             return library
         folder = Path(mkdtemp(dir=scratch))
-        process = _started(job, folder)
-        started.append(process)
-        if ended.is_set():
-            _end(process)
+        started.append(process := _started(job, folder))
         return cache.keep(_made(job, process, folder), job.kept_as)
 
     with ThreadPoolExecutor(most) as pool:
         try:
             return [*pool.map(run, jobs)]
         finally:  # on Ctrl-C, too, which comes to the main thread alone
-            ended.set()
+            pool.shutdown(wait=False, cancel_futures=True)
             for process in started:
                 _end(process)
 

@@ -6,7 +6,6 @@ import signal
 import struct
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -165,56 +164,28 @@ def test_a_compiler_that_fails_is_heard_in_one_line(
     assert not (tmp_path / "cache/grasp-cosim/compiled").exists()
 
 
-def test_a_compiler_that_has_just_started_ends_with_us(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Ctrl-C that comes while a compiler is being started does not lose it."""
-    begin, begun, heard = c_compilers._started, [], threading.Event()
-
-    def interrupt(*_: object) -> None:
-        heard.set()
-        raise KeyboardInterrupt
-
-    def slowly(job: Job, folder: Path) -> subprocess.Popen[str]:
-        begun.append(begin(job, folder))
-        os.kill(os.getpid(), signal.SIGINT)
-        assert heard.wait(60.0)
-        return begun[-1]
-
-    monkeypatch.setattr(c_compilers, "_started", slowly)
-    before = signal.signal(signal.SIGINT, interrupt)
-    try:
-        with pytest.raises(KeyboardInterrupt):
-            made(tmp_path, compiler=program(tmp_path / "cc", "exec sleep 3600"))
-    finally:
-        signal.signal(signal.SIGINT, before)
-    assert [process.returncode for process in begun] == [-signal.SIGKILL]
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_no_compiler_outlives_us(number: signal.Signals, tmp_path: Path) -> None:
-    """Nor what it has started, nor its files."""
-    pid = tmp_path / "pid"
-    program(tmp_path / "cc", f"sleep 3600 & echo $! > {pid}; wait")
-    command = [sys.executable, "-m", "grasp_cosim", "build", "--native", "--out", "out"]
-    environment = {
-        **os.environ, "CC": f"{tmp_path}/cc", "PYTHONPATH": os.pathsep.join(sys.path),
-        "TMPDIR": str(tmp_path),
-    }  # fmt: skip
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_no_compiler_outlives_us(number: signal.Signals, code: int, tmp_path: Path) -> None:
+    """Nor what it has started, nor its files; those that wait do not start."""
+    log = tmp_path / "log"
+    program(tmp_path / "cc", f"sleep 3600 & echo $! >> {log}; wait")
+    environment = {"CC": f"{tmp_path}/cc", "TMPDIR": str(tmp_path)}
     us = subprocess.Popen(
-        command, cwd=tmp_path, env=environment, stderr=subprocess.PIPE, text=True,
+        [sys.executable, "-m", "grasp_cosim", "build", "--native", "--out", "out"],
+        cwd=tmp_path, env={**os.environ, **environment, "PYTHONPATH": os.pathsep.join(sys.path)},
+        stderr=subprocess.PIPE, text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )  # fmt: skip
     end = time.monotonic() + 60.0
-    while not (pid.exists() and pid.read_text()) and time.monotonic() < end:
+    while not (log.exists() and log.read_text()) and time.monotonic() < end:
         time.sleep(0.05)
-    child = int(pid.read_text())
     us.send_signal(number)
     _, said = us.communicate(timeout=60.0)
-    code = 130 if number == signal.SIGINT else 143
     assert (us.returncode, said.strip()) == (code, "grasp-cosim: interrupted")
-    assert ends(child)
+    started = log.read_text().split()
+    assert len(started) <= (os.cpu_count() or 1)
+    assert all(ends(int(pid)) for pid in started)
     assert not (tmp_path / "out").exists()
     assert not list(tmp_path.glob("grasp_*"))
 
