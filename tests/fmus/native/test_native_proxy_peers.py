@@ -23,7 +23,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.skipif(not shutil.which("gcc"), reas
 def target(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The controller on a target, as docs/handoff.md makes it."""
     folder = tmp_path_factory.mktemp("target")
-    assert cli.main(["build", "--c-only", str(folder), "GraspController"]) == 0
+    assert cli.main(["build", "--native", "--c-only", str(folder), "GraspController"]) == 0
     header = ["--c-header", str(folder / "grasp_controller.h")]
     assert cli.main(["proxy", str(fmus / "GraspController.fmu"), *header]) == 0
     source = Path(__file__).parents[3] / "docs/controller_target.c"

@@ -3,7 +3,7 @@
    Before it is included: wire.h, and of the variables exchanged
        N_REQUEST, N_ANSWER          their numbers: inputs and parameters, outputs
        REQUEST_SIZE, ANSWER_SIZE    the bytes of their values, eight each
-       CLIENT_KIND(i)               the kind of the i-th of them all: KIND_REAL, ... */
+       variables                    their table, in this order */
 #ifndef CLIENT_H
 #define CLIENT_H
 
@@ -150,7 +150,7 @@ static int client_are_outputs(const uint8_t *body, size_t size)
 {
     int i, right = size == ANSWER_SIZE;
     for (i = N_REQUEST; right && i < N_REQUEST + N_ANSWER; i++, body += 8) {
-        int kind = CLIENT_KIND(i);
+        int kind = variables[i].kind;
         right = kind == KIND_REAL      ? wire_is_real(body)
                 : kind == KIND_BOOLEAN ? wire_is_boolean(body) : wire_is_integer(body);
     }

@@ -11,7 +11,6 @@
 
 #define SLAVE_HAS_STATES 0
 #define SLAVE_LONGEST_STEP WIRE_LONGEST_STEP
-#define CLIENT_KIND(i) variables[i].kind
 
 #include "channel.h"
 #include "variable.h"
