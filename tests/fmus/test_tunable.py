@@ -1,16 +1,12 @@
 """Parameters that change between two steps: from there, the FMU is the block with the new ones."""
 
-import sys
 from collections.abc import Callable
-from importlib.util import module_from_spec, spec_from_file_location
 from math import isfinite
-from pathlib import Path
 from typing import Any
 
 import pytest
 from conftest import Load
-from grasp_fmus.build import build_block
-from grasp_fmus.contract import Field, build_params, declared, longest_step, unpacker
+from grasp_fmus.contract import Field, build_params, declared, longest_step, packer, unpacker
 from grasp_fmus.shipped import blocks
 from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
@@ -20,7 +16,6 @@ from support.kinds import all_kinds
 
 pytestmark = all_kinds
 
-SPRING = Path(__file__).parents[2] / "docs/spring_plant.py"
 BLOCKS = blocks()
 CLOSED = {
     "initial_position[1]": 0.0655,
@@ -62,10 +57,7 @@ class Twin:
 
     @property
     def inputs(self) -> Any:
-        fields = [f for f in self.fields if f.causality == "input"]
-        values = {f.path[0]: [self.values[n] for n in f.names] for f in fields}
-        own = {f.path[0]: values[f.path[0]][0] for f in fields if f.size is None}
-        return self.block.Inputs(**{n: tuple(v) for n, v in values.items()} | own)
+        return packer(self.block.Inputs, self.fields)(list(self.values.values()))
 
     def outputs(self) -> list[Any]:
         """Those of now; ValueError where the parameters do not go together."""
@@ -154,8 +146,11 @@ def agree(instance: Instance, twin: Twin, status: int, call: Callable[[], object
     instance.log.clear()
 
 
-def same_as_the_block(fmu: Fmu, block: Any, start: dict[str, float]) -> None:
+@pytest.mark.hypothesis
+@pytest.mark.parametrize("name", BLOCKS)
+def test_a_change_is_that_of_the_block(load: Load, name: str) -> None:
     """Whatever changes, between whichever steps."""
+    fmu, block, start = load(name), BLOCKS[name], STARTS[name]
 
     @given(drawn=changes(block))
     @examples(25, suppress_health_check=list(HealthCheck))
@@ -174,34 +169,13 @@ def same_as_the_block(fmu: Fmu, block: Any, start: dict[str, float]) -> None:
     run()
 
 
-@pytest.mark.hypothesis
-@pytest.mark.parametrize("name", BLOCKS)
-def test_a_change_is_that_of_the_block(load: Load, name: str) -> None:
-    same_as_the_block(load(name), BLOCKS[name], STARTS[name])
-
-
-@pytest.mark.hypothesis
-def test_a_change_is_that_of_a_block_of_the_users(tmp_path: Path) -> None:
-    fmu = Fmu(build_block(SPRING, tmp_path).path, tmp_path / "unpacked")
-    spec = spec_from_file_location("spring_plant", SPRING)
-    assert spec is not None
-    assert spec.loader is not None
-    block: Any = module_from_spec(spec)
-    sys.modules["spring_plant"] = block  # where its declarations are looked up
-    spec.loader.exec_module(block)
-    same_as_the_block(fmu, block, CLOSED)
-
-
 def test_what_does_not_go_together_is_refused_when_it_is_needed(load: Load) -> None:
     """So that a host may set them in two calls; nothing has happened, and a set mends it."""
     with Instance(load("ProximitySensor"), "eye").initialise() as instance:
         assert instance.step(0.0, H) == OK
         before = instance.outputs()
-        assert instance.assign({"reflectance": 0.5, "surface": 4}) == OK
-        refusal = (
-            "eye, t = 0.002 s: reflectance = 0.5 with surface = brown: must be 1, its default; "
-            "surface = custom takes others"
-        )
+        assert instance.assign({"adc.range[1]": 10.0, "reflectance": 0.5}) == OK
+        refusal = "eye, t = 0.002 s: adc.range = 10.0, 10.0 V: the second must be above the first"
         state = instance.state()
         for step in (True, False):
             status = instance.step(H, H) if step else instance.get_real([1])[0]
@@ -212,9 +186,9 @@ def test_what_does_not_go_together_is_refused_when_it_is_needed(load: Load) -> N
         saved = state.to_bytes()
         assert instance.restore(state) == OK
         state.free()
-        assert instance.assign({"reflectance": 1.0}) == OK
+        assert instance.assign({"adc.range[1]": -10.0}) == OK
         assert instance.step(H, H) == OK
-        assert instance.outputs() == [0.86 * value for value in before]
+        assert instance.outputs() == [0.5 * value for value in before]
         status, again = instance.from_bytes(saved)  # of the moment with both
         assert (status, instance.restore(again)) == (OK, OK)
         assert instance.step(H, H) == instance.fmu.refused
