@@ -7,8 +7,7 @@ from typing import Annotated, NamedTuple, get_args, get_type_hints
 
 from .bench_header import wire
 from .build import Plan, with_binaries
-from .description import UNITS, Description, Experiment, Unit, Version
-from .host_log import ERROR, WARNING
+from .description import ERROR, UNITS, WARNING, Description, Experiment, Unit, Version
 from .link.message import PORT
 from .link.signature import LinkVariable, Signature
 from .native.sources import proxy_sources, with_description

@@ -13,13 +13,13 @@ import struct
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import cache, wraps
 from math import inf, isclose, isfinite
 from typing import Any, NamedTuple, NoReturn, TypeVar, cast
 from weakref import ref
 
-from .contract import Block, Field, build_params, declared, longest_step, packer, unpacker
-from .contract import variables as variables_of
+from . import contract
 from .variable import TYPES, Scalar, Variable
 
 INSTANTIATED, INITIALISING, STEPPING, TERMINATED = range(4)
@@ -34,8 +34,11 @@ HEAD = 24
 
 REASONS = (ValueError, ArithmeticError, ImportError)
 
+Functions = tuple[Callable[..., Any], ...]
 
-class Access(NamedTuple):
+
+@dataclass(frozen=True, slots=True)
+class Access:
     """How a list of value references is read or set; worked out where it is not the last one."""
 
     vrs: list[int]
@@ -43,10 +46,9 @@ class Access(NamedTuple):
     """None: not in a row."""
     outputs: bool
     parameters: bool
-    limited: bool
 
 
-_NOTHING = Access([], None, False, False, False)
+_NOTHING = Access([], None, False, False)
 """How to read or set nothing, which is always allowed."""
 
 
@@ -61,26 +63,14 @@ class Snapshot(NamedTuple):
     """The state of the block."""
 
 
-class Shape(NamedTuple):
-    """What all instances of a block share: to make it takes longer than all the rest of one."""
-
-    fields: list[Field]
-    variables: list[Variable]
-    outputs: slice
-    functions: tuple[Callable[..., Any], ...]
-    """step, outputs, pack the inputs, unpack the outputs."""
-
-
 @cache
-def shape_of(block: Block) -> Shape:
-    """Made once."""
-    fields = declared(block)
-    variables = variables_of(fields)
-    causalities = [v.causality for v in variables]
-    first = causalities.count("input")
-    outputs = slice(first, first + causalities.count("output"))
-    functions = block.step, block.outputs, packer(block.Inputs, fields), unpacker(fields)
-    return Shape(fields, variables, outputs, functions)
+def _shape(block: contract.Block) -> tuple[list[contract.Field], list[Variable], Functions]:
+    """What all instances share, as it takes longer to make than all the rest of one: fields,
+    variables, and the functions to step, give outputs, pack inputs and unpack outputs.
+    """
+    fields = contract.declared(block)
+    pack, unpack = contract.packer(block.Inputs, fields), contract.unpacker(fields)
+    return fields, contract.variables(fields), (block.step, block.outputs, pack, unpack)
 
 
 _F = TypeVar("_F", bound=Callable[..., Any])
@@ -100,39 +90,41 @@ def reported(call: _F) -> _F:
 
 
 def _getter(kind: type[Scalar]) -> Callable[["Slave", list[int]], list[Any]]:
+    place = [*TYPES].index(kind)
+
     def get(self: "Slave", vrs: list[int]) -> list[Any]:
         """Values of the given references."""
         try:
-            access = self._last_read[kind]
+            access = self._last_read[place]
             if vrs != access.vrs:
-                access = self._last_read[kind] = self._access(vrs, kind)
+                access = self._last_read[place] = self._access(vrs, kind)
             if self._inputs is None and access.outputs:
                 self._refresh()
         except BaseException as error:
             self._report(error)
         where = access.where
-        return self._values[where] if where else [self._values[vr] for vr in vrs]
+        return self._values[where] if where is not None else [self._values[vr] for vr in vrs]
 
     return get
 
 
 def _setter(kind: type[Scalar]) -> Callable[["Slave", list[int], list[Any]], None]:
-    real = kind is float
+    real, place = kind is float, [*TYPES].index(kind)
 
     def set_(self: "Slave", vrs: list[int], values: list[Any]) -> None:
         """Set inputs or parameters, all or none; outputs follow when they are next asked for."""
         try:
-            access = self._last_set[kind]
+            access = self._last_set[place]
             if vrs != access.vrs:
                 access = self._access(vrs, kind)
                 self._check_settable(vrs)
-                self._last_set[kind] = access
-            if access.limited or (real and not isfinite(sum(values))):
+                self._last_set[place] = access
+            if access.parameters or (real and not isfinite(sum(values))):
                 for vr, value in zip(vrs, values, strict=True):
                     self._variables[vr].check(value)
         except BaseException as error:
             self._report(error)
-        if access.where:
+        if access.where is not None:
             self._values[access.where] = values
         else:
             for vr, value in zip(vrs, values, strict=True):
@@ -153,8 +145,11 @@ class Slave:
         self._time = 0.0
         self._params: Any = None  # None: one was set and they are to be read again
         self._inputs: Any = None  # None: something was set and the outputs are out of date
-        self._fields, self._variables, self._outputs, self._functions = shape_of(self._block)
-        self._longest_step = longest_step(self._block)
+        self._fields, self._variables, self._functions = _shape(self._block)
+        causalities = [v.causality for v in self._variables]
+        first = causalities.count("input")
+        self._outputs = slice(first, first + causalities.count("output"))
+        self._longest_step = contract.longest_step(self._block)
         self._values = [v.start for v in self._variables]
         self._state = self._block.initial_state(self._block.Params(), self._block.Inputs())
         self._enter(INSTANTIATED)
@@ -162,7 +157,7 @@ class Slave:
     def _enter(self, phase: int) -> None:
         self._phase = phase
         # The host nearly always asks for the same again
-        self._last_read, self._last_set = (dict.fromkeys(TYPES, _NOTHING) for _ in range(2))
+        self._last_read, self._last_set = ([_NOTHING] * len(TYPES) for _ in range(2))
 
     # The life cycle
 
@@ -195,14 +190,13 @@ class Slave:
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Advance the block by step_size seconds with the inputs as they are.
 
-        It raises where it cannot, and stays where it is. To discard the step is no way out: of that
-        pythonfmu says that the slave wishes to end the simulation.
+        Where it cannot, it raises: to discard a step is for pythonfmu to end the simulation.
         """
         try:
             if not (
                 self._phase == STEPPING
                 and 0.0 < step_size <= self._longest_step
-                and -TIME_TOLERANCE <= current_time - self._time <= TIME_TOLERANCE
+                and abs(current_time - self._time) <= TIME_TOLERANCE
             ):
                 self._check_step(current_time, step_size)
             step, outputs, pack, unpack = self._functions
@@ -242,14 +236,14 @@ class Slave:
             if v.kind is not kind:
                 wrong, right = TYPES[kind], TYPES[v.kind]
                 raise ValueError(f"{v.name}: accessed as {wrong}: must be as {right}")
-        row = slice(vrs[0], vrs[0] + len(vrs)) if vrs else slice(0)
-        found = [self._variables[vr] for vr in vrs]
+        first = vrs[0] if vrs else 0
+        in_a_row = vrs == [*range(first, first + len(vrs))]
+        causalities = {self._variables[vr].causality for vr in vrs}
         return Access(
             list(vrs),
-            row if vrs == [*range(row.start or 0, row.stop)] else None,
-            any(v.causality == "output" for v in found),
-            any(v.causality == "parameter" for v in found),
-            any(v.limits for v in found),
+            slice(first, first + len(vrs)) if in_a_row else None,
+            "output" in causalities,
+            "parameter" in causalities,
         )
 
     # Checks
@@ -299,7 +293,7 @@ class Slave:
         self._values[self._outputs] = values
 
     def _read_params(self) -> Any:
-        self._params = build_params(self._block, self._fields, self._values)
+        self._params = contract.build_params(self._block, self._fields, self._values)
         return self._params
 
     # States
@@ -329,17 +323,15 @@ class Slave:
         """A state of this FMU from its bytes."""
         like, content = self._get_fmu_state(), self.maker.content
         size = HEAD + 8 * len(list(_scalars(like)))
-        if data[:8] != MAGIC:
-            raise ValueError(f"state of {len(data)} bytes: must begin with {MAGIC!r}")
-        if data[8:HEAD] != content.encode():
+        if data[:HEAD] != MAGIC + content.encode():
             raise ValueError(f"state of another FMU: must be of this one, {content}")
         if len(data) != size:
             raise ValueError(f"state of {len(data)} bytes: must have {size}")
         found: Snapshot = _shaped(like, iter(struct.unpack(f"<{size // 8 - 3}d", data[HEAD:])))
         if found.phase not in range(len(PHASES)) or not isfinite(found.time):
             raise ValueError(f"state in phase {found.phase} at {found.time} s: must be of a run")
-        variables = self._variables[: self._outputs.start] + self._variables[self._outputs.stop :]
-        for v, value in zip(variables, found.settable, strict=True):
+        settable = [v for v in self._variables if v.causality != "output"]
+        for v, value in zip(settable, found.settable, strict=True):
             v.check(value)
         return found
 
