@@ -65,10 +65,8 @@ class Plan(NamedTuple):
     @property
     def key(self) -> str:
         """A hash of all that decides the binaries, but for the sources."""
-        return cache.key(
-            repr((self.fmi, *place, self.compilers[place[0]].identity))
-            for place in self.places.items()
-        )
+        identities = [compiler.identity for compiler in self.compilers.values()]
+        return cache.key([repr((self.fmi, *self.places.items(), *identities))])
 
 
 def planned(asked: Sequence[Target] = (), fmi: Version = 2) -> Plan:
@@ -250,11 +248,11 @@ def _brought(out: Path, made: Path) -> list[Built]:
     built = []
     for file in sorted(made.iterdir()):
         target, data = out / file.name, file.read_bytes()
-        there = target.is_file()
-        same = there and target.read_bytes() == data
-        if not same:
+        before = target.read_bytes() if target.is_file() else None
+        if data != before:
             write_file(target, data)
         if file.suffix == ".fmu":
+            same, there = data == before, before is not None
             built.append(Built(target, "unchanged" if same else "changed" if there else "new"))
     return built
 
