@@ -17,8 +17,8 @@ import os
 import sys
 import time
 from collections import Counter, deque
+from collections.abc import Callable
 from ctypes import byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
-from hashlib import blake2b
 from pathlib import Path
 from random import Random
 from typing import Any, NamedTuple
@@ -32,36 +32,29 @@ INSTANCES = 2
 KEPT = 6
 """States, and bytes of states, that are kept to be used again."""
 
-PAGE = os.sysconf("SC_PAGESIZE")
-
-SPECIAL = (
-    0.0, -0.0, 1e-300, 5e-324, 1e-9, 1e-4, 1e-3, 0.1, 1.0, 10.0, 1e3, 1e6, 1e9, 1e300,
-    sys.float_info.max, math.inf, math.nan,
-)  # fmt: skip
+SPECIAL = (0.0, -0.0, 1e-300, 5e-324, 1e-9, 1e-4, 1e-3, 0.1, 1.0, 10.0, 1e6, 1e300,
+           sys.float_info.max, math.inf, math.nan)  # fmt: skip
 
 WAITS = ("proxy.timeout", "proxy.connect_timeout")
 """Longest waits of a proxy, in s; they are as long as they are told to be."""
 
-LEFT_ALONE = (*WAITS, "proxy.host", "proxy.port", "proxy.key_file", "proxy.on_loss")
+LEFT_ALONE = {*WAITS, "proxy.host", "proxy.port", "proxy.key_file", "proxy.on_loss"}
 """What may have a proxy ask the network for names, or read any file, or never begin."""
 
+Limited = tuple[int, float, float]
+"""A reference with the limits of its variable, nan where there are none."""
 
-class Variables:
-    """The variables of an FMU by their FMI type, with the limits that they are declared with."""
 
-    def __init__(self, fmu: Fmu) -> None:
-        root = ElementTree.parse(fmu.folder / "modelDescription.xml").getroot()
-        self.by_type: dict[str, list[tuple[int, float, float]]] = {}
-        self.left_alone: set[int] = set()
-        for v in root.findall("ModelVariables/*"):
-            name, declared = v.get("name", ""), v[0] if fmu.fmi == 2 else v
-            if name not in fmu.references:  # the time of FMI 3.0
-                continue
-            low, high = (float(declared.get(k, math.nan)) for k in ("min", "max"))
-            known = self.by_type.setdefault(fmu.kinds[name], [])
-            known.append((fmu.references[name], low, high))
-            if name in LEFT_ALONE:
-                self.left_alone.add(fmu.references[name])
+def variables(fmu: Fmu) -> dict[str, list[Limited]]:
+    """Those of an FMU by the names of the functions that get and set them."""
+    root = ElementTree.parse(fmu.folder / "modelDescription.xml").getroot()
+    found: dict[str, list[Limited]] = {}
+    for v in root.findall("ModelVariables/*"):
+        name, says = v.get("name", ""), v[0] if fmu.fmi == 2 else v
+        if name in fmu.references and name not in LEFT_ALONE:  # and not the time of FMI 3.0
+            low, high = (float(says.get(key, math.nan)) for key in ("min", "max"))
+            found.setdefault(fmu.kinds[name], []).append((fmu.references[name], low, high))
+    return found
 
 
 class State(NamedTuple):
@@ -77,264 +70,193 @@ class Caller:
     """Calls the functions of one FMU at random."""
 
     def __init__(self, fmu: Fmu, random: Random, folder: Path, shared: list[State]) -> None:
-        self.fmu, self.random = fmu, random
-        self.variables = Variables(fmu)
+        self.fmu, self.random, self.shared = fmu, random, shared
+        self.variables = variables(fmu)
         self.calls: Counter[str] = Counter()
         self.longest = (0.0, "")
-        self._last = (folder / "last").open("w")
-        self._shared = shared  # those of all FMUs
-        self._bytes: deque[bytes] = deque(maxlen=KEPT)
-        self._is_proxy = WAITS[0] in fmu.references
-        self._instances = [self._made() for _ in range(1 if self._is_proxy else INSTANCES)]
-        self._times = [0.0] * len(self._instances)
+        self.last = folder / "last"
+        self.bytes: deque[bytes] = deque(maxlen=KEPT)
+        self.is_proxy = WAITS[0] in fmu.references
+        self.instances = [self.made() for _ in range(1 if self.is_proxy else INSTANCES)]
+        self.times = [0.0] * len(self.instances)
 
     def run(self, calls: int) -> None:
         """Make so many calls."""
         for _ in range(calls):
-            self._at = self.random.randrange(len(self._instances))
-            self._instance = self._instances[self._at]
-            self._instance.log.clear()
-            getattr(self, self.random.choice(ACTIONS))()
+            self.at = self.random.randrange(len(self.instances))
+            self.instance = self.instances[self.at]
+            self.instance.log.clear()
+            self.random.choice(ACTIONS)(self)
 
     def end(self) -> None:
         """Free all that there is."""
-        for state in [s for s in self._shared if s.maker is self]:
-            self._free(state)
-        for instance in self._instances:
-            self._call("FreeInstance", on=instance)
-        self._last.close()
+        for state in [s for s in self.shared if s.maker is self]:
+            self.free(state)
+        for instance in self.instances:
+            self.call("FreeInstance", on=instance)
 
-    def _made(self) -> Instance:
-        instance = Instance(self.fmu, "any", self.random.random() < 0.3)
-        self._be_quick(instance)
+    def made(self) -> Instance:
+        instance = Instance(self.fmu, "any")
+        if self.is_proxy:
+            assert instance.set(dict.fromkeys(WAITS, 0.1)) == OK
         return instance
 
-    def _be_quick(self, instance: Instance) -> None:
-        """Have a proxy wait for 0.1 s at most, and outlive its peer at times."""
-        if not self._is_proxy:
-            return
-        assert instance.set(dict.fromkeys(WAITS, 0.1)) == OK
-        choice = (c_char_p * 1)(self.random.choice((b"stop", b"hold", b"failsafe")))
-        reference = (c_uint * 1)(self.fmu.references["proxy.on_loss"])
-        assert instance.call("SetString", reference, c_size_t(1), choice) == OK
-
-    def _call(self, name: str, *arguments: Any, on: Instance | None = None) -> int:
-        self._last.seek(0)
-        self._last.write(f"{self.fmu.name} {name} {arguments}\n")
-        self._last.truncate()
-        self._last.flush()
+    def call(self, name: str, *arguments: Any, on: Instance | None = None) -> int:
+        self.last.write_text(f"{self.fmu.name} {name} {arguments}\n")
         began = time.thread_time()
-        status = (on or self._instance).call(name, *arguments)
+        status = (on or self.instance).call(name, *arguments)
         took = time.thread_time() - began
-        if took > self.longest[0]:
-            self.longest = (took, f"{self.fmu.name} {name} {[str(a) for a in arguments]}")
+        self.longest = max(self.longest, (took, f"{self.fmu.name} {name} {arguments}"))
         self.calls[f"{name} {status if name != 'FreeInstance' else ''}"] += 1
         return status
 
     # What the arguments are
 
-    def _number(self) -> float:
+    def number(self) -> float:
         r = self.random
-        kind = r.random()
-        if kind < 0.4:
-            return r.choice((1.0, -1.0)) * r.choice(SPECIAL)
-        if kind < 0.7:
-            return float(r.choice((1.0, -1.0)) * 10.0 ** r.uniform(-300.0, 300.0))
-        return r.uniform(-1.0, 1.0)
+        sign = r.choice((1.0, -1.0))
+        powers = 10.0 ** r.uniform(-300.0, 300.0)
+        return sign * float(r.choice((r.choice(SPECIAL), r.uniform(0.0, 1.0), powers)))
 
-    def _in_range(self, low: float, high: float) -> float:
-        """A value that a variable with these limits may have, often at its limits."""
+    def value(self, low: float, high: float) -> float:
+        """One that a variable with these limits may have, often at its limits."""
         r = self.random
         if not low < high or r.random() < 0.1:
-            return self._number()
-        if r.random() < 0.3:
-            return r.choice((low, high))
-        span: float = 10.0 ** r.uniform(-9.0, 0.0) * (high - low)
-        return low + span if r.random() < 0.5 else high - span
+            return self.number()
+        far = r.choice((0.0, 10.0 ** r.uniform(-9.0, 0.0))) * (high - low)
+        return float(r.choice((low + far, high - far)))
 
-    def _references(self, kind: str) -> list[tuple[int, float, float]]:
-        """Variables of a type, mostly; some of another, and some that there are none of."""
-        r = self.random
-        own = self.variables.by_type.get(kind, [])
-        found = []
+    def drawn(self, kind: str) -> tuple[Any, c_size_t, list[Limited]]:
+        """References of a type, mostly; some of another, and some that there are none of."""
+        r, found = self.random, []
         for _ in range(r.choice((0, 1, 1, 1, 2, 5))):
-            if own and r.random() < 0.9:
-                found.append(r.choice(own))
-            else:
-                wrong = r.choice((r.randrange(200), r.randrange(2**32), 2**32 - 1, 2**31))
-                found.append((wrong, math.nan, math.nan))
-        return found
-
-    def _vector(self, references: list[tuple[int, float, float]]) -> tuple[Any, Any]:
-        n = len(references)
-        return (c_uint * n)(*(reference for reference, *_ in references)), c_size_t(n)
+            wrong = r.choice((r.randrange(200), r.randrange(2**32), 2**32 - 1, 2**31))
+            own = self.variables.get(kind, [])
+            found.append(r.choice(own) if own and r.random() < 0.9 else (wrong, math.nan, math.nan))
+        if self.is_proxy:  # a wrong one may be that of what is left alone
+            found = [v for v in found if v[0] >= 2**31 or v in self.variables.get(kind, [])]
+        n = len(found)
+        return (c_uint * n)(*(v[0] for v in found)), c_size_t(n), found
 
     # What is called
 
-    def _setup(self) -> None:
-        start = self._number() if self.random.random() < 0.3 else 0.0
-        on, number = self.random.randrange(2), self._number()
-        status = self._call(
-            "SetupExperiment", on, c_double(number), c_double(start), on, c_double(number)
-        )
-        if status == OK:
-            self._times[self._at] = start
+    def set_up(self) -> None:
+        start = self.number() if self.random.random() < 0.3 else 0.0
+        any_ = c_double(self.number())
+        if self.call("SetupExperiment", 1, any_, c_double(start), 1, any_) == OK:
+            self.times[self.at] = start
 
-    def _enter(self) -> None:
-        self._call("EnterInitializationMode")
-
-    def _exit(self) -> None:
-        self._call("ExitInitializationMode")
-
-    def _start(self) -> None:
+    def start(self) -> None:
         """In order, so that there are instances that step."""
-        if self._call("Reset") == OK:
-            self._times[self._at] = 0.0
-        self._be_quick(self._instance)
+        if self.call("Reset") == OK:
+            self.times[self.at] = 0.0
+        if self.is_proxy:
+            assert self.instance.set(dict.fromkeys(WAITS, 0.1)) == OK
         for _ in range(self.random.choice((0, 0, 1, 3))):
-            self._set("Real")
-            self._set("Boolean")
-        self._call("SetupExperiment", 0, c_double(0.0), c_double(0.0), 0, c_double(0.0))
-        self._enter()
-        self._exit()
+            self.set("Real")
+            self.set("Boolean")
+        self.call("SetupExperiment", 0, c_double(0.0), c_double(0.0), 0, c_double(0.0))
+        self.call("EnterInitializationMode")
+        self.call("ExitInitializationMode")
 
-    def _seldom_end(self) -> None:
-        if self.random.random() < 0.2:
-            self._call("Terminate")
-
-    def _seldom_anew(self) -> None:
+    def anew(self) -> None:
         if self.random.random() < 0.1:
-            for state in [s for s in self._shared if s.owner is self._instance]:
-                self._free(state)
-            self._call("FreeInstance")
-            self._instances[self._at] = self._made()
-            self._times[self._at] = 0.0
+            for state in [s for s in self.shared if s.owner is self.instance]:
+                self.free(state)
+            self.call("FreeInstance")
+            self.instances[self.at], self.times[self.at] = self.made(), 0.0
 
-    def _step(self) -> None:
-        size = self.random.choice((1e-4, 1e-3, 1e-2, 0.1, abs(self._number()), self._number()))
-        begin = self._times[self._at] if self.random.random() < 0.9 else self._number()
-        if self._call("DoStep", c_double(begin), c_double(size), self.random.randrange(2)) == OK:
-            self._times[self._at] = begin + size
+    def step(self) -> None:
+        size = self.random.choice((1e-4, 1e-3, 1e-2, 0.1, abs(self.number()), self.number()))
+        begin = self.times[self.at] if self.random.random() < 0.9 else self.number()
+        if self.call("DoStep", c_double(begin), c_double(size), 1) == OK:
+            self.times[self.at] = begin + size
 
-    def _set(self, kind: str) -> None:
-        r = self.random
-        chosen = [v for v in self._references(kind) if v[0] not in self.variables.left_alone]
-        vector, n = self._vector(chosen)
+    def set(self, kind: str) -> None:
+        vector, n, chosen = self.drawn(kind)
         values: Any
         if kind == "Real":
-            values = (c_double * n.value)(*(self._in_range(low, high) for _, low, high in chosen))
+            values = (c_double * n.value)(*(self.value(low, high) for _, low, high in chosen))
         elif kind == "String":
-            texts = (
-                bytes(r.randrange(1, 256) for _ in range(r.choice((0, 3, 300)))) for _ in chosen
-            )
-            values = (c_char_p * n.value)(*texts)
+            values = (c_char_p * n.value)(*(self.random.randbytes(9) * 40 for _ in chosen))
         else:
-            values = (c_int * n.value)(
-                *(r.choice((0, 1, 2, -1, 2**31 - 1, -(2**31))) for _ in chosen)
-            )
-        self._call(f"Set{kind}", vector, n, values)
+            whole = (0, 1, 2, -1, 2**31 - 1, -(2**31))
+            values = (c_int * n.value)(*(self.random.choice(whole) for _ in chosen))
+        self.call(f"Set{kind}", vector, n, values)
 
-    def _set_real(self) -> None:
-        self._set("Real")
-
-    def _set_other(self) -> None:
-        self._set(self.random.choice(("Integer", "Boolean", "String")))
-
-    def _get(self) -> None:
+    def get(self) -> None:
         kind = self.random.choice(("Real", "Real", "Integer", "Boolean", "String"))
         element = {"Real": c_double, "String": c_char_p}.get(kind, c_int)
-        vector, n = self._vector(self._references(kind))
-        self._call(f"Get{kind}", vector, n, (element * n.value)())
+        vector, n, _ = self.drawn(kind)
+        self.call(f"Get{kind}", vector, n, (element * n.value)())
 
-    def _save(self) -> None:
+    def keep(self, function: str, *arguments: Any) -> None:
+        """Keep the state that it makes; the oldest goes, freed by the instance that made it."""
         pointer = c_void_p()
-        if self._call("GetFMUstate", byref(pointer)) == OK:
-            self._keep(pointer)
+        if self.call(function, *arguments, byref(pointer)) == OK:
+            self.shared.append(State(self, self.instance, pointer, self.times[self.at]))
+            own = [s for s in self.shared if s.maker is self]
+            if len(own) > KEPT:
+                self.free(own[0])
 
-    def _keep(self, pointer: c_void_p) -> None:
-        """Keep a state; the oldest goes, freed by the instance that made it."""
-        self._shared.append(State(self, self._instance, pointer, self._times[self._at]))
-        own = [s for s in self._shared if s.maker is self]
-        if len(own) > KEPT:
-            self._free(own[0])
+    def free(self, state: State) -> None:
+        self.shared.remove(state)
+        self.call("FreeFMUstate", byref(state.pointer), on=state.owner)
 
-    def _free(self, state: State) -> None:
-        self._shared.remove(state)
-        self._call("FreeFMUstate", byref(state.pointer), on=state.owner)
+    def restore(self) -> None:
+        if self.shared:
+            state = self.random.choice(self.shared)
+            if self.call("SetFMUstate", state.pointer) == OK:
+                self.times[self.at] = state.time
 
-    def _restore(self) -> None:
-        if self._shared:
-            state = self.random.choice(self._shared)
-            if self._call("SetFMUstate", state.pointer) == OK:
-                self._times[self._at] = state.time
+    def serialise(self) -> None:
+        if self.shared:
+            pointer, size = self.random.choice(self.shared).pointer, c_size_t()
+            if self.call("SerializedFMUstateSize", pointer, byref(size)) == OK:
+                buffer = (ctypes.c_char * size.value)()
+                if self.call("SerializeFMUstate", pointer, buffer, size) == OK:
+                    self.bytes.append(buffer.raw)
 
-    def _serialise(self) -> None:
-        if not self._shared:
-            return
-        pointer, size = self.random.choice(self._shared).pointer, c_size_t()
-        if self._call("SerializedFMUstateSize", pointer, byref(size)) == OK:
-            buffer = (ctypes.c_char * size.value)()
-            if self._call("SerializeFMUstate", pointer, buffer, size) == OK:
-                self._bytes.append(buffer.raw)
-
-    def _deserialise(self) -> None:
+    def deserialise(self) -> None:
+        """From bytes that are as they were, cut, longer, or with another number in them."""
         r = self.random
-        data = bytearray(
-            r.choice(self._bytes) if self._bytes else r.randbytes(r.choice((0, 7, 300)))
-        )
+        data = bytearray(r.choice(self.bytes) if self.bytes else r.randbytes(r.choice((0, 7, 300))))
         for _ in range(r.choice((0, 1, 1, 5))):
-            place = r.randrange(len(data) + 1)
-            change = r.randrange(4)
+            place, change = r.randrange(len(data) + 1), r.randrange(3)
             if change == 0:
-                data[place:] = b""
+                data[place:] = r.randbytes(r.choice((0, 8)))
             elif change == 1:
-                data[place:place] = r.randbytes(8)
-            elif change == 2:
                 data[place : place + 1] = r.randbytes(1)
-            elif len(data) >= 48:  # a number of the state, with the check sum that it needs
-                at = 40 + 8 * r.randrange((len(data) - 40) // 8)
-                data[at : at + 8] = bytes(c_double(self._number()))
-                data[24:40] = blake2b(bytes(data[8:24] + data[40:]), digest_size=16).digest()
+            elif len(data) >= 32:
+                place = 24 + 8 * r.randrange((len(data) - 24) // 8)
+                data[place : place + 8] = bytes(c_double(self.number()))
         buffer = (ctypes.c_char * max(1, len(data))).from_buffer_copy(bytes(data) or b"\0")
-        pointer = c_void_p()
-        if self._call("DeSerializeFMUstate", buffer, c_size_t(len(data)), byref(pointer)) == OK:
-            self._keep(pointer)
+        self.keep("DeSerializeFMUstate", buffer, c_size_t(len(data)))
 
-    def _other(self) -> None:
+    def other(self) -> None:
         """What a slave of ours does not have, and switches."""
-        r = self.random
-        vector, n = self._vector(self._references("Real"))
+        vector, n, _ = self.drawn("Real")
         numbers = (c_double * n.value)()
-        orders = (c_int * n.value)()
-        which = r.randrange(6 if self.fmu.fmi == 2 else 2)  # FMI 3.0 has none of the others
-        if which == 0:
-            self._call("SetDebugLogging", r.randrange(2), c_size_t(0), None)
-        elif which == 1:
-            self._call("GetDirectionalDerivative", vector, n, vector, n, numbers, numbers)
-        elif which == 2:
-            self._call("SetRealInputDerivatives", vector, n, orders, numbers)
-        elif which == 3:
-            self._call("GetRealOutputDerivatives", vector, n, orders, numbers)
-        elif which == 4:
-            self._call("CancelStep")
+        if self.random.random() < 0.5:
+            self.call("SetDebugLogging", self.random.randrange(2), c_size_t(0), None)
         else:
-            kind, value = r.choice((("Real", c_double), ("Integer", c_int), ("Boolean", c_int)))
-            self._call(f"Get{kind}Status", r.randrange(-1, 9), byref(value()))
+            self.call("GetDirectionalDerivative", vector, n, vector, n, numbers, numbers)
 
 
-ACTIONS = (
-    *("_setup", "_enter", "_exit", "_start", "_seldom_end", "_seldom_anew"),
-    *("_step",) * 6,
-    *("_set_real",) * 4,
-    *("_set_other", "_get", "_get", "_other"),
-    *("_save", "_restore", "_restore", "_serialise", "_deserialise", "_deserialise"),
-)
+def seldom(call: Callable[[Caller], object]) -> Callable[[Caller], object]:
+    return lambda caller: caller.random.random() < 0.2 and call(caller)
 
 
-def resident() -> int:
-    """Bytes of memory that this process has."""
-    gc.collect()
-    return int(Path("/proc/self/statm").read_text().split()[1]) * PAGE
+ACTIONS: tuple[Callable[[Caller], object], ...] = (
+    Caller.set_up, Caller.start, Caller.anew, Caller.get, Caller.get, Caller.other,
+    *(Caller.step,) * 6,
+    *(lambda c: c.set("Real"),) * 4,
+    lambda c: c.set(c.random.choice(("Integer", "Boolean", "String"))),
+    lambda c: c.call("EnterInitializationMode"), lambda c: c.call("ExitInitializationMode"),
+    seldom(lambda c: c.call("Terminate")),
+    lambda c: c.keep("GetFMUstate"), Caller.restore, Caller.restore, Caller.serialise,
+    Caller.deserialise, Caller.deserialise,
+)  # fmt: skip
 
 
 def main(folder: str, first: str, seeds: str, calls: str, *fmus: str) -> None:
@@ -352,7 +274,9 @@ def main(folder: str, first: str, seeds: str, calls: str, *fmus: str) -> None:
             caller.end()
             done += caller.calls
             longest = max(longest, caller.longest)
-        memory.append(resident())
+        gc.collect()
+        pages = int(Path("/proc/self/statm").read_text().split()[1])
+        memory.append(pages * os.sysconf("SC_PAGESIZE"))
     print(json.dumps({"longest": longest, "calls": done, "memory": memory}))  # noqa: T201
 
 

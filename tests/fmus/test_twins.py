@@ -1,10 +1,8 @@
 """An FMU that Python runs and the native one, call by call: the same in all that a host can see.
 
-Statuses, values, what is logged and the bytes of states; whatever is called, with whatever.
+Values, what is refused and why, and the bytes of states; whatever is called, with whatever.
 """
 
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
@@ -65,22 +63,3 @@ def test_a_run_that_is_saved_in_one_goes_on_in_the_other(
             saved = state.to_bytes()
             state.free()
     assert seen == expected
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_instances_in_threads(load_as: LoadAs, kind: Kind, name: str) -> None:
-    """Native ones run at the same time, beside one in Python; each as alone."""
-
-    def life(fmu_kind: Kind) -> Callable[[], list[float]]:
-        def live() -> list[float]:
-            with Instance(load_as(name, fmu_kind)).initialise() as instance:
-                return drive(instance, 0, 300)
-
-        return live
-
-    lives = [life(k) for k in ("python", kind, kind, kind)]
-    expected = lives[0]()
-    assert lives[1]() == expected
-    with ThreadPoolExecutor(len(lives)) as pool:
-        together = [pool.submit(live) for live in lives]
-        assert all(one.result() == expected for one in together)
