@@ -79,6 +79,7 @@ def _main(
     name: str, guid: str, fmi: Version, how: str, system: str, defined: str, own: Iterable[str]
 ) -> bytes:
     texts = {"name": name, "fmi": str(fmi), "guid": guid, "how": how, "system": system}
+    texts["slave"] = OF_PROXY[-1] if system else OF_BLOCK[-1]
     texts["defined"] = f"#define {defined}"
     texts["included"] = "\n".join(f'#include "{file}"' for file in own)
     return Template((HERE / "main.c.in").read_text("ascii")).substitute(texts).encode()

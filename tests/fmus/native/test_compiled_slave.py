@@ -28,8 +28,10 @@ def compiler(name: str) -> str:
 @pytest.mark.parametrize("level", ["-O0", platforms("-O2"), slow("-O3")])
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_no_warning(cc: str, level: str, fmi: Version, tmp_path: Path) -> None:
+    """Also where the formats of messages are checked."""
     write_sources(tmp_path / "c", fmi)
-    compile_in(tmp_path / "c", fmi, [level], compiler(cc))
+    checked = "-DTEXT_LIKE_PRINTF=__attribute__((format(printf, 2, 3)))"
+    compile_in(tmp_path / "c", fmi, [level, checked], compiler(cc))
 
 
 @pytest.mark.skipif(not shutil.which("nm"), reason="NO nm")

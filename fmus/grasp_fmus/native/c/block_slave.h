@@ -6,7 +6,7 @@
 #define BLOCK_SLAVE_H
 
 #define SLAVE_HAS_STATES 1
-#define SLAVE_LONGEST_STEP BLOCK_LONGEST_STEP
+#define SLAVE_LONGEST_STEP ((double)BLOCK_LONGEST_STEP)
 #define N_TEXTS 0
 static const char *const texts[N_TEXTS + 1] = {""};
 
@@ -246,12 +246,13 @@ static Status slave_get_state(Slave *s, void **place)
 static Status slave_set_state(Slave *s, const void *memory)
 {
     const unsigned char *state = (const unsigned char *)memory;
-    double numbers[N_STATE + 1];
+    double numbers[N_STATE + 1], phase;
     int i;
     if (slave_check_state(s, state) != SLAVE_OK) {
         return SLAVE_ERROR;
     }
-    s->phase = (int)state_number(state, STATE_PHASE);
+    phase = state_number(state, STATE_PHASE);
+    s->phase = (int)phase;
     s->values[SLAVE_TIME] = state_number(state, STATE_TIME);
     for (i = 0; i < N_INPUTS + N_PARAMETERS; i++) {
         s->values[state_variable(i)] = state_number(state, STATE_VALUES + i);

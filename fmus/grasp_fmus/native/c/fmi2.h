@@ -28,11 +28,7 @@ typedef fmi2Status Status;
 #define SLAVE_GET_STATE "GetFMUstate"
 #define N_REFERENCES N_VARIABLES
 
-#ifdef PROXY_ORIGINAL
-#include "proxy_slave.h"
-#else
-#include "block_slave.h"
-#endif
+#include SLAVE  /* of a block or a proxy, which NAME.c defines */
 
 /* The host */
 

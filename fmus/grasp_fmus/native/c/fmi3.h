@@ -26,11 +26,7 @@ typedef fmi3Status Status;
 #define SLAVE_GET_STATE "GetFMUState"
 #define N_REFERENCES (N_VARIABLES + 1)  /* with the time */
 
-#ifdef PROXY_ORIGINAL
-#include "proxy_slave.h"
-#else
-#include "block_slave.h"
-#endif
+#include SLAVE  /* of a block or a proxy, which NAME.c defines */
 
 /* The host */
 

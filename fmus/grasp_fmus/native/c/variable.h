@@ -229,10 +229,8 @@ static void text_put_list(Text *text, const char *format, va_list list)
     text_put(text, format);
 }
 
-#ifdef __GNUC__
-#define TEXT_LIKE_PRINTF __attribute__((format(printf, 2, 3)))
-#else
-#define TEXT_LIKE_PRINTF
+#ifndef TEXT_LIKE_PRINTF
+#define TEXT_LIKE_PRINTF  /* an attribute for compilers that check formats */
 #endif
 
 TEXT_LIKE_PRINTF static inline void text_say(Text *text, const char *format, ...)
