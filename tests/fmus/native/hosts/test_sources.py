@@ -131,7 +131,8 @@ def test_one_file_to_compile_and_no_file_too_many(fmu: Unpacked) -> None:
             of_c |= {*re.findall(r"^\s*#\s*include\s+<([^>]+)>", text, re.MULTILINE)}
     assert reached == files
     assert of_c <= {
-        "float.h", "math.h", "stdarg.h", "stddef.h", "stdint.h", "stdlib.h", "string.h", "stdbool.h",
+        "float.h", "math.h", "stdarg.h", "stdbool.h", "stddef.h", "stdint.h", "stdlib.h",
+        "string.h",
     }  # fmt: skip
 
 
