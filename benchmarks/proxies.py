@@ -1,11 +1,11 @@
 """What a proxy costs, how evenly it answers, and how soon it notices that its peer is gone.
 
 Prints the cost of a step of the grasp with its plant here and behind a proxy (lockstep, loopback, a
-peer in a process of its own); the same with native FMUs, the controller behind a native proxy, and
-its peer in C, then paced at 1 kHz with priority, where the system permits; and for 200 peers killed
-at seeded moments, for either kind of proxy, the time until the outputs were at their failsafe
-values, beside what is declared: proxy.timeout for each miss that is tolerated, and one step, which
-waits as long.
+peer that serves the Python FMU in a process of its own); the same with native FMUs, the controller
+behind a proxy, and its peer in C, then paced at 1 kHz with priority, where the system permits; and
+for 200 peers killed at seeded moments the time until the outputs were at their failsafe values,
+beside what is declared: proxy.timeout for each miss that is tolerated, and one step, which waits as
+long.
 """
 
 import os
@@ -50,10 +50,10 @@ def peers(system: System, name: str) -> Program:
     return Program(sys.executable, str(PEERS), str(system.component(name, name).fmu))
 
 
-def proxied(system: System, name: str, folder: Path, *options: str) -> System:
+def proxied(system: System, name: str, folder: Path) -> System:
     """The system with a component behind a proxy."""
     fmu, proxy = system.component(name, name).fmu, folder / f"{name}_proxy.fmu"
-    if _made(["proxy", str(fmu), "-o", str(proxy), *options]):
+    if _made(["proxy", str(fmu), "-o", str(proxy)]):
         raise RuntimeError(f"{fmu}: no proxy")
     return system.swap(name, proxy).with_values(
         {f"{name}.proxy.timeout": 10.0, f"{name}.proxy.misses_tolerated": TOLERATED}
@@ -94,7 +94,7 @@ def native_cost(folder: Path) -> None:
     command = ["cc", *flags, *sources, "-o", str(target), "-lm"]
     subprocess.run(command, check=not any(made))
     system = System.load(SYSTEM, fmus)
-    there = proxied(system, "controller", folder, "--native")
+    there = proxied(system, "controller", folder)
     with subprocess.Popen([target, "0"], stdout=subprocess.PIPE, text=True) as process:
         port = int((process.stdout or sys.stdin).readline().split()[-1])
         there = there.with_values({"controller.proxy.port": port})
@@ -111,9 +111,9 @@ def native_cost(folder: Path) -> None:
     print(f"round trip at 1 kHz: {said}, worst {1e6 * trips[-1]:.0f} us")
 
 
-def kills(system: System, folder: Path, *options: str) -> None:
+def kills(system: System, folder: Path) -> None:
     """Print how long it takes from the death of the peer to the failsafe values."""
-    whole = proxied(system, "controller", folder, *options).with_experiment(step=1e-3, stop=0.5)
+    whole = proxied(system, "controller", folder).with_experiment(step=1e-3, stop=0.5)
     part = whole.component("controller", "controller")
     values: dict[str, Value] = {
         v.name: 0.1 * (-1) ** i for i, v in enumerate(part.interface.of("input"))
@@ -138,7 +138,7 @@ def kills(system: System, folder: Path, *options: str) -> None:
     declared = TIMEOUT * TOLERATED + TIMEOUT
     _, median, worst = spread(took)
     print(
-        f"{KILLS} peers killed {' '.join(options)}: failsafe after {median:.1f} ms (median), "
+        f"{KILLS} peers killed: failsafe after {median:.1f} ms (median), "
         f"{worst:.1f} ms (worst), declared {1e3 * declared:.0f} ms: "
         f"{TOLERATED} misses of {1e3 * TIMEOUT:.0f} ms and a step that waits as long, beside what "
         "the steps compute"
@@ -152,7 +152,6 @@ def main() -> None:
         cost(system, Path(folder))
         native_cost(Path(folder))
         kills(system, Path(folder))
-        kills(system, Path(folder), "--native")
 
 
 if __name__ == "__main__":

@@ -148,9 +148,9 @@ def test_lost_requests_are_not_made_up_for_when_the_end_has_come(
 
 
 def test_a_step_in_parts_is_given_up_when_the_end_has_come(
-    fmus: Path, clocked: MakeClocked
+    natives: Path, clocked: MakeClocked
 ) -> None:
-    fmu = fmus / "GripperPlantMovable.fmu"
+    fmu = natives / "GripperPlantMovable.fmu"
     it = clocked(fmu, Service(lockstep=True))
     push = starts(fmu, **{"force[1]": -3.0, "force[2]": 3.0})
     it.proxy.begin(1, push)

@@ -32,6 +32,8 @@ class DrivenFmu:
         self.time = 0.0
         self._signature = signature
         self._outputs = [interface.by_name[v.name] for v in signature.answer]
+        self._booleans = [i for i, v in enumerate(signature.answer) if v.kind == "Boolean"]
+        self._first_parameter = len(signature.of("input"))
         self._instance: Instance | None = None
         self._stepping = False
         self._values: list[Value] = []
@@ -76,10 +78,12 @@ class DrivenFmu:
     def set(self, values: Sequence[Value]) -> None:
         """Set inputs, and the parameters that are not what they were."""
         instance = self._required()
-        for places, _, data, call in self._inputs:
+        for places, data, call in self._inputs:
             data[:] = [values[i] for i in places]
-            _check(instance, call())
-        self._set_changed(values, parameters_only=True)
+            if (status := call()) > WARNING:
+                raise instance.failure(status, 0.0)
+        if values[self._first_parameter :] != self._values[self._first_parameter :]:
+            self._set_changed(values, parameters_only=True)
 
     def advance(self, time: float, step: float, over: Callable[[], bool] = lambda: False) -> None:
         """Advance by `step` from `time`, both in s, with the values as they are.
@@ -104,6 +108,8 @@ class DrivenFmu:
         """Return the outputs now, in the order of the signature."""
         instance = self._required()
         values = self._get(instance) if self._stepping else instance.get(self._outputs)
+        if isfinite(sum(values)):  # type: ignore[arg-type]  # none is a text
+            return values
         for v, value in zip(self._outputs, values, strict=True):
             if isinstance(value, float) and not isfinite(value):
                 raise SimulationError(
@@ -135,10 +141,13 @@ class DrivenFmu:
 
     def _get(self, instance: Instance) -> list[Value]:
         values: list[Value] = [0.0] * len(self._outputs)
-        for places, kind, data, call in self._answer:
-            _check(instance, call())
+        for places, data, call in self._answer:
+            if (status := call()) > WARNING:
+                raise instance.failure(status, 0.0)
             for i, value in zip(places, data.tolist(), strict=True):
-                values[i] = kind(value)
+                values[i] = value
+        for i in self._booleans:
+            values[i] = bool(values[i])
         return values
 
     def _set_changed(self, values: Sequence[Value], parameters_only: bool = False) -> None:
@@ -184,12 +193,8 @@ class _Bound(NamedTuple):
     """A call that passes the variables of one FMI type, which have these places in a list."""
 
     places: list[int]
-    kind: Callable[[float], Value]
     data: npt.NDArray[np.generic]
     call: Callable[[], int]
-
-
-_KINDS: dict[str, Callable[[float], Value]] = {"Real": float, "Integer": int, "Boolean": bool}
 
 
 def _bound(instance: Instance, action: str, variables: Sequence[LinkVariable]) -> list[_Bound]:
@@ -202,11 +207,5 @@ def _bound(instance: Instance, action: str, variables: Sequence[LinkVariable]) -
     for fmi_type, found in by_type.items():
         data = np.zeros(len(found), dtype(instance.interface.version, fmi_type))
         call = instance.transfer(action, list(found.values()), data).python
-        kind = _KINDS[next(iter(found.values())).kind]
-        calls.append(_Bound(list(found), kind, data, call))
+        calls.append(_Bound(list(found), data, call))
     return calls
-
-
-def _check(instance: Instance, status: int) -> None:
-    if status > WARNING:
-        raise instance.failure(status, 0.0)

@@ -1,11 +1,11 @@
 """A loop at a UDP port that waits for datagrams and for time, until it is stopped."""
 
-import selectors
 import socket
 import threading
 import time
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
+from select import select
 from typing import Any, Self
 
 from ..system.parts import NANOSECONDS
@@ -35,8 +35,7 @@ class Loop:
         self._stopping = False
         self._end: int | None = None
         with ExitStack() as stack:
-            # select() waits to the microsecond, epoll() and poll() to the millisecond
-            self._selector = stack.enter_context(selectors.SelectSelector())
+            self._handlers: dict[socket.socket, Callable[[], Any]] = {}
             self._wake, woken = (stack.enter_context(end) for end in socket.socketpair())
             self._wake.setblocking(False)
             self.register(woken, lambda: woken.recv(LARGEST))
@@ -46,7 +45,7 @@ class Loop:
 
     def register(self, readable: socket.socket, handler: Callable[[], Any]) -> None:
         """Have `handler` called whenever there is something to receive at a socket."""
-        self._selector.register(readable, selectors.EVENT_READ, handler)
+        self._handlers[readable] = handler
 
     def run(self, duration_ns: int | None = None, done: Callable[[], bool] = lambda: False) -> None:
         """Go on until `stop`, until `done`, or for a duration in ns.
@@ -66,11 +65,13 @@ class Loop:
         waits = [] if wait_ns is None else [wait_ns]
         if (due := self._due()) is not None:
             waits.append(max(due - self._clock(), 0))
-        ready = self._selector.select(min(waits) / NANOSECONDS if waits else None)
+        most = max(min(waits), 0) / NANOSECONDS if waits else None
+        # to the microsecond, where epoll() and poll() wait to the millisecond
+        ready, _, _ = select([*self._handlers], [], [], most)
         with self._lock:
             # the port last: its handler may close another socket that is ready, too
-            for key, _ in sorted(ready, key=lambda r: r[0].fileobj is self.port_socket):
-                key.data()
+            for readable in sorted(ready, key=lambda r: r is self.port_socket):
+                self._handlers[readable]()
             self._look(self._clock())
 
     def stop(self) -> None:

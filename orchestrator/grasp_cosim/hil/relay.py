@@ -92,7 +92,7 @@ class Relay(Loop):
 
     def _forget(self, address: Address) -> None:
         client = self._clients.pop(address)
-        self._selector.unregister(client.towards_peer)
+        del self._handlers[client.towards_peer]
         client.towards_peer.close()
 
     def _forget_clients(self) -> None:

@@ -12,9 +12,6 @@ from .served import Say, ServedFmu
 DEFAULT_ADDRESS: Address = ("127.0.0.1", PORT)
 """The address that a proxy looks at if nobody says otherwise."""
 
-BURST = 64
-"""The most datagrams that are taken before the clock is looked at again."""
-
 
 class Server(Loop):
     """Serves an FMU, which it closes in the end."""
@@ -40,15 +37,14 @@ class Server(Loop):
         self.run(duration_ns, lambda: sessions is not None and served.sessions >= sessions)
 
     def _receive(self) -> None:
-        """Take what has come, at most a burst of it."""
-        for _ in range(BURST):
-            found = received(self.port_socket)
-            if found is None:  # nothing there; or an answer found nobody
-                return
-            datagram, source = found
-            answer = self.fmu.answer(datagram, text(source), time.monotonic_ns())
-            try:
-                if answer is not None:
-                    self.port_socket.sendto(answer, source)
-            except OSError as error:  # to the proxy it is a lost datagram
-                self._say(f"{text(source)}: not sent: {error.strerror or error}")
+        """Take one datagram: after it the clock is looked at again."""
+        found = received(self.port_socket)
+        if found is None:  # an answer found nobody
+            return
+        datagram, source = found
+        answer = self.fmu.answer(datagram, text(source), time.monotonic_ns())
+        try:
+            if answer is not None:
+                self.port_socket.sendto(answer, source)
+        except OSError as error:  # to the proxy it is a lost datagram
+            self._say(f"{text(source)}: not sent: {error.strerror or error}")
