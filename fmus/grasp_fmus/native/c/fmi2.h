@@ -1,4 +1,6 @@
-/* FMI 2.0 for co-simulation: each function of the standard, in terms of the slave. */
+/* FMI 2.0 for co-simulation: each function of the standard, in terms of the slave.
+
+   Before it is included: SLAVE, the header of that slave, and what this needs before it. */
 #ifndef FMI2_H
 #define FMI2_H
 
@@ -28,7 +30,7 @@ typedef fmi2Status Status;
 #define SLAVE_GET_STATE "GetFMUstate"
 #define N_REFERENCES N_VARIABLES
 
-#include SLAVE  /* of a block or a proxy, which NAME.c defines */
+#include SLAVE
 
 /* The host */
 

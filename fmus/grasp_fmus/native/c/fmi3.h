@@ -1,4 +1,6 @@
-/* FMI 3.0 for co-simulation: each function of the standard, in terms of the slave. */
+/* FMI 3.0 for co-simulation: each function of the standard, in terms of the slave.
+
+   Before it is included: SLAVE, the header of that slave, and what this needs before it. */
 #ifndef FMI3_H
 #define FMI3_H
 
@@ -26,7 +28,7 @@ typedef fmi3Status Status;
 #define SLAVE_GET_STATE "GetFMUState"
 #define N_REFERENCES (N_VARIABLES + 1)  /* with the time */
 
-#include SLAVE  /* of a block or a proxy, which NAME.c defines */
+#include SLAVE
 
 /* The host */
 
