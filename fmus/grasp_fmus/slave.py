@@ -14,7 +14,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cache, wraps
+from functools import cache
 from math import inf, isclose, isfinite
 from typing import Any, NamedTuple, NoReturn, TypeVar, cast
 from weakref import ref
@@ -33,8 +33,6 @@ HEAD = 24
 """Bytes of a state before its numbers: the magic, and the content hash of the FMU."""
 
 REASONS = (ValueError, ArithmeticError, ImportError)
-
-Functions = tuple[Callable[..., Any], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +62,7 @@ class Snapshot(NamedTuple):
 
 
 @cache
-def _shape(block: contract.Block) -> tuple[list[contract.Field], list[Variable], Functions]:
+def _shape(block: contract.Block) -> tuple[list[contract.Field], list[Variable], tuple[Any, ...]]:
     """What all instances share, as it takes longer to make than all the rest of one: fields,
     variables, and the functions to step, give outputs, pack inputs and unpack outputs.
     """
@@ -79,7 +77,6 @@ _F = TypeVar("_F", bound=Callable[..., Any])
 def reported(call: _F) -> _F:
     """The call, with what it raises reported. In the calls of every step this is written out."""
 
-    @wraps(call)
     def reporting(self: "Slave", *arguments: Any) -> Any:
         try:
             return call(self, *arguments)
@@ -193,12 +190,14 @@ class Slave:
         Where it cannot, it raises: to discard a step is for pythonfmu to end the simulation.
         """
         try:
-            if not (
-                self._phase == STEPPING
-                and 0.0 < step_size <= self._longest_step
-                and abs(current_time - self._time) <= TIME_TOLERANCE
-            ):
-                self._check_step(current_time, step_size)
+            if self._phase != STEPPING:
+                self._require("fmi2DoStep", STEPPING)
+            if not 0.0 < step_size < inf:
+                raise ValueError(f"step size = {step_size} s: must be a finite number above 0")
+            if not abs(current_time - self._time) <= TIME_TOLERANCE:
+                self._check_time(current_time)
+            if step_size > self._longest_step:
+                raise ValueError(f"step of {step_size} s: must be at most {self._longest_step:g} s")
             step, outputs, pack, unpack = self._functions
             params, inputs = self._params, self._inputs
             if inputs is None:
@@ -252,14 +251,9 @@ class Slave:
         if self._phase != phase:
             raise ValueError(f"{call} {PHASES[self._phase]}: must be {PHASES[phase]}")
 
-    def _check_step(self, current_time: float, step_size: float) -> None:
-        self._require("fmi2DoStep", STEPPING)
-        if not 0.0 < step_size < inf:
-            raise ValueError(f"step size = {step_size} s: must be a finite number above 0")
-        if not isclose(current_time, self._time, rel_tol=1e-12, abs_tol=TIME_TOLERANCE):
+    def _check_time(self, current_time: float) -> None:
+        if not isclose(current_time, self._time, rel_tol=1e-12):
             raise ValueError(f"step from {current_time} s: must be from {self._time} s")
-        if step_size > self._longest_step:
-            raise ValueError(f"step of {step_size} s: must be at most {self._longest_step:g} s")
 
     def _check_settable(self, vrs: list[int]) -> None:
         for v in (self._variables[vr] for vr in vrs):
