@@ -8,9 +8,6 @@ from typing import Annotated
 
 from block_variables import Group, Parameter
 
-MOST = 1e9
-"""Squeezes in N and speeds in m/s count as this at most, that squares of them stay numbers."""
-
 
 @dataclass(frozen=True, slots=True)
 class Params(Group, name="hold"):
@@ -40,14 +37,13 @@ class Params(Group, name="hold"):
 
 def filtered(p: Params, before: float, closing: float, h: float) -> float:
     """The low-passed speed of closing in m/s, h seconds later."""
-    rest = min(max(closing, -MOST), MOST)
-    return before + h / (p.time_constant + h) * (rest - before)
+    return before + h / (p.time_constant + h) * (closing - before)
 
 
 def hold(p: Params, u: tuple[float, float], closing: float) -> float:
     """Return h from the forces u in N and the low-passed speed of closing in m/s: 1 is a grasp."""
     u_1, u_2 = u
-    squeeze = min(max(0.0, 0.5 * u_2 - 0.5 * u_1), MOST)
+    squeeze = max(0.0, 0.5 * u_2 - 0.5 * u_1)
     pressed, slow = squeeze * squeeze, p.speed * p.speed
     of = (pressed + p.squeeze * p.squeeze) * (slow + closing * closing)
     return pressed * slow / of

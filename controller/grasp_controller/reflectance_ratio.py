@@ -16,18 +16,6 @@ from typing import Annotated, NamedTuple
 
 from block_variables import Group, Parameter
 
-MOST_VOLTS = 1e3
-"""Intensities count as this at most, that powers of them stay numbers."""
-
-MOST_METRES = 1e3
-"""And positions and gaps as this at most, on both sides."""
-
-MOST_NOISE = 1e200
-"""The noise of a point counts as this at most, that sums of it stay numbers."""
-
-STEEPEST = 1e150
-"""And slopes as this at most, or as one over it at least."""
-
 
 @dataclass(frozen=True, slots=True)
 class Params(Group, name="reflectance"):
@@ -142,10 +130,8 @@ class Estimate(NamedTuple):
 
 def first_point(p: Params, floor: float, s: float, xi: float) -> Line:
     """The line of a finger at s in m that sees xi in V: a point, without a slope."""
-    seen = _clamped(xi, floor, MOST_VOLTS)
-    y = exp(-log(seen) / p.diffusion_exponent)
-    at = _clamped(s, -MOST_METRES, MOST_METRES)
-    return _point(seen, at, y, 0.0)
+    seen = max(xi, floor)
+    return _point(seen, s, exp(-log(seen) / p.diffusion_exponent), 0.0)
 
 
 def low_pass(p: Params, h: float) -> LowPass:
@@ -162,16 +148,14 @@ def moved(
     of it that counts, from 0 to 1.
     """
     share = low_pass.share
-    seen = line.intensity + share * (_clamped(xi, floor, MOST_VOLTS) - line.intensity)
-    seen = _clamped(seen, floor, MOST_VOLTS)
-    here = _clamped(s, -MOST_METRES, MOST_METRES)
-    at = line.s + share * (here - line.s)
+    seen = max(line.intensity + share * (max(xi, floor) - line.intensity), floor)
+    at = line.s + share * (s - line.s)
     brightness = log(seen)
     y = exp(-brightness / p.diffusion_exponent)
     weight = believed * exp(p.weight_exponent * brightness) * _travel(line, at, y)
     total = line.weight + weight
     if total <= 0.0:
-        return _point(seen, at, y, here - at)
+        return _point(seen, at, y, s - at)
     new = weight / total
     shift = new * (at - line.mean_s)
     mean_s = line.mean_s + shift
@@ -180,17 +164,17 @@ def moved(
     c_sy = line.c_sy + weight * (y - line.mean_y) * rest
     mean_y = line.mean_y + new * (y - line.mean_y)
     noise = weight * y / seen
-    noise = min(noise * noise * low_pass.alike, MOST_NOISE)
+    noise = noise * noise * low_pass.alike
     q_0 = line.q_0 + noise
     q_1 = line.q_1 - shift * line.q_0 + noise * rest
     q_2 = line.q_2 + shift * (shift * line.q_0 - 2.0 * line.q_1) + noise * rest * rest
     per_y, variance = 1.0, inf
-    if c_ss > 0.0 and c_sy > 0.0 and q_2 > 0.0:
-        per_y = _clamped(c_ss / c_sy, 1.0 / STEEPEST, STEEPEST)
+    if 0.0 < c_ss < inf and 0.0 < c_sy < inf and 0.0 < q_2 < inf:
+        per_y = c_ss / c_sy
         relative = p.intensity_noise / c_sy
         variance = relative * relative * q_2
     sums = (total, mean_s, mean_y, c_ss, c_sy, q_0, q_1, q_2)
-    return Line(seen, at, y, here - at, *sums, per_y, variance)
+    return Line(seen, at, y, s - at, *sums, per_y, variance)
 
 
 def _point(seen: float, at: float, y: float, ahead: float) -> Line:
@@ -230,7 +214,7 @@ def _gap(p: Params, line: Line, white: float) -> float:
     prior = p.prior_deviation * p.prior_deviation
     gain = prior / (prior + line.variance) if prior > 0.0 else 0.0
     way = (1.0 - gain) * white + gain * line.per_y
-    return _clamped(line.y * way - p.offset_distance + line.ahead, -MOST_METRES, MOST_METRES)
+    return line.y * way - p.offset_distance + line.ahead
 
 
 def _clamped(x: float, low: float, high: float) -> float:

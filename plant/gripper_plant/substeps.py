@@ -2,13 +2,13 @@
 
 from math import ceil
 
-LONGEST_STEP = 10.0
+LONGEST_STEP = 2.0
 """s, of every plant; a longer communication step is discarded."""
 
 RATIO = 0.1
 """Longest sub-step as a fraction of the fastest time constant."""
 
-MOST = 100_000
+MOST = 20_000
 """In a communication step, so that none is endless; one that needs more has no result."""
 
 

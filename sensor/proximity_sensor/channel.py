@@ -28,7 +28,7 @@ from .optics import outputs as seen
 Inputs = optics.Inputs
 Outputs = optics.Outputs
 
-LONGEST_STEP = 10.0
+LONGEST_STEP = 2.0
 """s; a longer communication step is discarded."""
 
 WARM_UP = 100

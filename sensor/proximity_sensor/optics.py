@@ -16,7 +16,7 @@ class Params:
     reflectance: Annotated[
         float,
         Parameter(
-            "alpha, reflectance of the surface relative to white",
+            "alpha, reflectance relative to white; a surface by name wins",
             unit="1",
             low=0.0,
             high=10.0,

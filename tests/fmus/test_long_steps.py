@@ -13,11 +13,11 @@ from support.kinds import all_kinds
 pytestmark = all_kinds
 
 LONGEST = {
-    "GripperPlant": 10.0,
-    "GripperPlantCompliant": 10.0,
-    "GripperPlantMovable": 10.0,
+    "GripperPlant": 2.0,
+    "GripperPlantCompliant": 2.0,
+    "GripperPlantMovable": 2.0,
     "GripperPlantMuJoCo": 0.2,
-    "ProximitySensor": 10.0,
+    "ProximitySensor": 2.0,
 }
 
 TERMINATED = 3
@@ -56,7 +56,7 @@ STIFF: dict[str, dict[str, float]] = {
 
 @pytest.mark.parametrize("name", STIFF)
 def test_a_step_with_too_many_sub_steps_is_discarded(load: Load, name: str) -> None:
-    """They would be over 100,000; the instance takes a shorter one."""
+    """They would be over 20,000; the instance takes a shorter one."""
     closed = {"initial_position[1]": 0.0651, "initial_position[2]": -0.0051}
     with Instance(load(name)).initialise(**closed, **STIFF[name]) as instance:
         assert instance.set({"force[1]": -3.0, "force[2]": 3.0}) == OK

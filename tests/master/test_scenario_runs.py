@@ -78,12 +78,11 @@ def test_an_event_at_the_start_is_a_start_value(grasp: System) -> None:
 
 
 def test_values_that_do_not_go_together_end_the_run_with_the_reason(grasp: System) -> None:
-    event = Event({REFLECTANCE: 0.6, Port("sensor_1", "surface"): "black"}, at_ns=10_000_000)
-    with pytest.raises(
-        SimulationError, match=r"reflectance = 0\.6 with surface = black: must be 1"
-    ):
+    low, high = (Port("sensor_1", f"adc.range[{i}]") for i in (1, 2))
+    event = Event({low: 20.0, Port("sensor_1", "surface"): "black"}, at_ns=10_000_000)
+    with pytest.raises(SimulationError, match=r"adc\.range = 20\.0, 10\.0 V: the second must be"):
         run(grasp, events=(event,))
-    back = Event({REFLECTANCE: 1.0}, at_ns=10_000_000)
+    back = Event({high: 30.0}, at_ns=10_000_000)
     result = run(grasp, events=(event, back))
     assert result["sensor_1.intensity"][11] == pytest.approx(
         intensity(result["plant.gap[1]"], 0.57)[11]

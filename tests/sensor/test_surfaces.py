@@ -21,22 +21,10 @@ def test_the_sensor_was_fitted_to_white() -> None:
 
 
 @pytest.mark.parametrize(("surface", "alpha"), REFLECTANCE.items())
-def test_a_surface_by_name_is_one_of_its_reflectance(surface: Surface, alpha: float) -> None:
-    named = channel.Params(surface=surface)
+def test_a_surface_by_name_wins_over_the_reflectance(surface: Surface, alpha: float) -> None:
+    named = channel.Params(surface=surface, reflectance=0.1)
     assert seen(named) == seen(channel.Params(reflectance=alpha))
 
 
 def test_a_custom_surface_has_the_reflectance_given() -> None:
     assert seen(channel.Params(reflectance=0.5)) == pytest.approx(0.5 * seen(channel.Params()))
-
-
-@pytest.mark.parametrize("surface", REFLECTANCE)
-def test_a_reflectance_beside_a_surface_by_name_is_refused(surface: Surface) -> None:
-    """It would be without effect."""
-    said = (
-        f"reflectance = 0.9 with surface = {surface.name.lower()}: must be 1, its default; "
-        "surface = custom takes others"
-    )
-    with pytest.raises(ValueError, match=f"^{said}$"):
-        channel.Params(surface=surface, reflectance=0.9)
-    assert channel.Params(surface=surface, reflectance=1.0).alpha == REFLECTANCE[surface]
