@@ -27,8 +27,11 @@ LIBM = (
 )  # fmt: skip
 """Functions whose calls no compiler may work out by itself: it rounds otherwise than libm."""
 
-BITS = ("-std=c99", "-O2", "-ffp-contract=off")
-"""What decides the bits, besides -fno-builtin-NAME for the functions in LIBM."""
+BITS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
+"""What decides the bits, besides -fno-builtin-NAME for the functions in LIBM.
+
+The last two leave them as they are: nobody reads errno, nor the flags of exceptions.
+"""
 
 OWN = ("cc", "gcc", "clang", "cl")
 """Compilers of this machine, the first that is there, unless CC names one."""

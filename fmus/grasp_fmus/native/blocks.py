@@ -68,14 +68,14 @@ def _parts_of(program: Program, name: str, block: Any) -> Iterator[str]:
     yield _function("int block_check(const BlockParams *p, Text *why)", [*checks, "return 1;"])
     yield _function(
         "void block_initial_state(const BlockParams *p, const BlockInputs *u, BlockState *x)",
-        [f"*x = {first.name}(p, *u);"],
+        [f"*x = {_call(first, 'pu')};"],
     )
     yield _function(
         f"void block_step({PXU}, double h, BlockState *after)",
-        [f"*after = {step.name}(p, *x, *u, h);"],
+        [f"*after = {_call(step, 'pxuh')};"],
     )
     yield _function(
-        f"void block_outputs({PXU}, BlockOutputs *y)", [f"*y = {evaluate.name}(p, *x, *u);"]
+        f"void block_outputs({PXU}, BlockOutputs *y)", [f"*y = {_call(evaluate, 'pxu')};"]
     )
     yield from _states(scalars)
     yield "#endif\n"
@@ -94,6 +94,11 @@ def _part(
         reason = f"{name}: returns {said(made.returns)}; must be {said(must)}"
         raise where.error(code.co_firstlineno, reason)
     return made
+
+
+def _call(made: Function, names: str) -> str:
+    given = zip(names, made.by_address, strict=True)
+    return f"{made.name}({', '.join(n if b or n in 'ph' else f'*{n}' for n, b in given)})"
 
 
 def _function(head: str, lines: list[str]) -> str:

@@ -59,7 +59,7 @@ ADVICE: dict[Any, str] = {
 }
 
 _UNKNOWN = object()
-_PATH = re.compile(r"-?(&?[A-Za-z_]\w*(->|\.\w|\[\d+\]|\w)*|[\d.]+(e[-+]?\d+)?)")
+_PATH = re.compile(r"-?([*&]?[A-Za-z_]\w*(->|\.\w|\[\d+\]|\w)*|[\d.]+(e[-+]?\d+)?)")
 """A variable, a member of one or a number: it may stand in several places."""
 
 
@@ -290,7 +290,10 @@ class Expressions:
             return list(value.items)
         of = self.simple(value).text
         kinds = types.parts(value.type)
-        return [Value(of + self.program.member(value.type, i), k) for i, k in enumerate(kinds)]
+        members = [of + self.program.member(value.type, i) for i in range(len(kinds))]
+        if of[0] == "*":
+            members = [member[1:].replace(".", "->", 1) for member in members]
+        return [*map(Value, members, kinds)]
 
     def _subscript(self, node: ast.Subscript) -> Value:
         items = self.items(self.value(node.value), node.value)
@@ -373,7 +376,16 @@ class Expressions:
         """A call of a function, with its defaults."""
         arguments = self._matched(inspect.signature(function), given, named, node)
         made = self.translate(function, arguments, node)
-        return Value(f"{made.name}({', '.join(a.text for a in arguments)})", made.returns)
+        texts = [
+            self._address(a) if by_address else a.text
+            for a, by_address in zip(arguments, made.by_address, strict=True)
+        ]
+        return Value(f"{made.name}({', '.join(texts)})", made.returns)
+
+    def _address(self, value: Value) -> str:
+        """Where a NamedTuple is."""
+        text = self.simple(value).text
+        return text[1:] if text[0] == "*" else f"&{text}"
 
     def _matched(
         self, signature: inspect.Signature, given: Any, named: Any, node: ast.AST

@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
-from .expressions import Expressions
+from .expressions import SIGN, WORD, Expressions
 from .structs import Function, Program
 from .text import comment, string, wrapped
-from .types import REAL, WHOLE, Group, Type, Value, said
+from .types import REAL, WHOLE, Group, Record, Type, Value, said, size
 
 ADVICE = {
     "While": "while is not in the subset, as a step must end; use for ... in range(n) with break",
@@ -26,6 +26,9 @@ ADVICE = {
     "Delete": "del is not in the subset; leave it out",
 }
 
+LARGE = 4
+"""A NamedTuple of more numbers goes by its address, unless the function changes or returns it."""
+
 
 class Body(Expressions):
     """The body of one function, for the types that it is called with."""
@@ -36,6 +39,7 @@ class Body(Expressions):
         self.function = function
         self.node = source.functions[function.__code__.co_firstlineno]
         self.returns: Type | None = None
+        self.by_address: tuple[bool, ...] = ()
         self.locals = {*_names(self.node, ast.Store), *(a.arg for a in self.node.args.args)}
         self._uses = Counter(_names(self.node))
         self._inside: list[Counter[str]] = []
@@ -55,12 +59,22 @@ class Body(Expressions):
     def definition(self, name: str, types: Sequence[Type]) -> str:
         """The text of the function in C."""
         heads, given = [], self.node.args
+        handed_on = {
+            r.value.id
+            for r in ast.walk(self.node)
+            if isinstance(r, ast.Return) and isinstance(r.value, ast.Name)
+        }
+        copied = {*_names(self.node, ast.Store), *handed_on}
         if given.vararg or given.kwarg or given.kwonlyargs:
             self.refuse(self.node, "*args, **kwargs and keywords alone are not in the subset")
         for argument, kind in zip(given.args, types, strict=True):
-            c_name = self.fresh(argument.arg, own=True)
-            self.bound[argument.arg] = Value(c_name, kind)
-            star = "const {} *{}" if isinstance(kind, Group) else "{} {}"
+            c_name, is_copy = self.fresh(argument.arg, own=True), argument.arg in copied
+            large = isinstance(kind, Record) and size(kind) > LARGE and not is_copy
+            self.by_address += (large,)
+            self.bound[argument.arg] = Value(
+                f"{'*' * large}{c_name}", kind, SIGN if large else WORD
+            )
+            star = "const {} *{}" if isinstance(kind, Group) or large else "{} {}"
             heads.append(star.format(self.program.c(kind, self.names), c_name))
         self.block(self.node.body)
         if self.returns is None or not _ends(self.node.body):
@@ -340,7 +354,7 @@ def translated_function(
     name = program.unique(function.__module__, function.__qualname__, key)
     text = body.definition(name, types)
     assert body.returns is not None  # noqa: S101 - definition() has refused what returns nothing
-    program.functions[key] = made = Function(name, body.returns)
+    program.functions[key] = made = Function(name, body.returns, body.by_address)
     program.bodies.append(text)
     return made
 

@@ -15,6 +15,8 @@ class Function(NamedTuple):
 
     name: str
     returns: Type
+    by_address: tuple[bool, ...] = ()
+    """Which arguments are large NamedTuples, by their address."""
 
 
 class Program:

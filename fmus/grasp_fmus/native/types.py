@@ -103,6 +103,11 @@ def parts(t: Type) -> tuple[Type, ...]:
     return tuple(fields(t).values()) if isinstance(t, Record) else ()
 
 
+def size(t: Type) -> int:
+    """How many numbers there are in it."""
+    return sum(map(size, parts(t))) or 1
+
+
 def joined(a: Type, b: Type) -> Type | None:
     """The type of what may be either; None where they do not go together."""
     if a == b:

@@ -11,6 +11,7 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
+from c_compilers import BITS as DECIDING
 from c_compilers import LIBM
 from grasp_fmus.contract import build_params, declared, packer, unpacker, variables
 from grasp_fmus.native import blocks as translation
@@ -18,8 +19,8 @@ from support.compiled import compile_c
 
 C = Path(translation.__file__).with_name("c")
 DRIVER = Path(__file__).with_name("block_driver.c")
-STRICT = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror"]
-BITS = ["-ffp-contract=off", *(f"-fno-builtin-{name}" for name in LIBM)]
+STRICT = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror"]
+BITS = [*DECIDING, *(f"-fno-builtin-{name}" for name in LIBM)]
 RAISED = (ArithmeticError, ValueError, TypeError)
 """What Python raises where C has a value: TypeError of a complex number that is compared."""
 

@@ -123,7 +123,7 @@ class Writer:
         r = self.random
         kind = r.random()
         if depth == 0 or kind < 0.15:
-            return r.choice([*self.reals, f"{r.uniform(-3.0, 3.0):.3g}", repr(r.gauss(0.0, 1.0))])
+            return r.choice([*self.reals, f"{r.uniform(-3.0, 3.0):.3f}", repr(r.gauss(0.0, 1.0))])
         if kind < 0.4:
             return r.choice(OF_ONE).format(self.real(depth - 1))
         if kind < 0.85:

@@ -13,6 +13,18 @@
 #pragma STDC FP_CONTRACT OFF
 #endif
 
+#ifdef __GNUC__ /* a call with the same arguments need not be made again */
+double atan2(double, double) __attribute__((const));
+double cos(double) __attribute__((const));
+double exp(double) __attribute__((const));
+double expm1(double) __attribute__((const));
+double log(double) __attribute__((const));
+double pow(double, double) __attribute__((const));
+double sin(double) __attribute__((const));
+double tan(double) __attribute__((const));
+double tanh(double) __attribute__((const));
+#endif
+
 /* max(a, b): the first of equals, and of what cannot be compared */
 static inline double larger(double a, double b)
 {
