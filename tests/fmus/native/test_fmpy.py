@@ -2,20 +2,17 @@
 
 import os
 import shutil
-import subprocess
-import sys
 import sysconfig
 from pathlib import Path
 from typing import Any, Literal
 
 import pytest
-from c_compilers import BITS
 from conftest import Folder
 from fmpy import simulate_fmu
 from fmpy.build import build_platform_binary
 from fmpy.util import read_csv, read_ref_opt_file
 from fmpy.validation import validate_fmu
-from grasp_fmus.build import UNPREFIXED, planned
+from grasp_fmus.build import planned
 from grasp_fmus.description import Experiment, Version
 from grasp_fmus.proxy import Original, Settings, build_proxy
 from support.kinds import TRANSLATED
@@ -107,29 +104,3 @@ def test_fmpy_compiles_the_sources_of_a_proxy(
         )  # fmt: skip
     assert set(result["doubled"]) == {6.0}
     assert len(result) == 9
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "fmi"),
-    [("GraspController", 2), platforms("GraspController", 3)]
-    + [platforms("GraspControllerAdaptive", fmi) for fmi in (2, 3)],
-)
-@pytest.mark.skipif("fma" not in Path("/proc/cpuinfo").read_text(), reason="NO fma")
-def test_contraction_is_caught(fmu: Path, tmp_path: Path) -> None:
-    """Compiled for this processor without a word on contraction, it refuses to be instantiated."""
-    for place, flags in (("contracted", ()), ("exact", BITS)):
-        folder = tmp_path / place
-        shutil.unpack_archive(fmu, folder, "zip")
-        (binary,) = folder.glob("binaries/*/*")
-        command = ["gcc", "-std=gnu99", "-O2", "-march=native", *flags, "-shared", "-fPIC"]
-        defined = [f"-D{macro}" for macro in UNPREFIXED]
-        source = str(folder / f"sources/{fmu.stem}.c")
-        subprocess.run([*command, *defined, "-o", str(binary), source, "-lm"], check=True)
-    script = "import fmpy, sys; fmpy.simulate_fmu(sys.argv[1], stop_time=0.01)"
-    done = subprocess.run(  # apart: FMPy has one logger for a process, and it may be another's here
-        [sys.executable, "-c", script, tmp_path / "contracted"], capture_output=True, text=True
-    )
-    assert "Failed to instantiate" in done.stderr
-    assert "a * b + c is not rounded twice: must be compiled with -ffp-contract=off" in done.stdout
-    simulate_fmu(tmp_path / "exact", stop_time=0.01)

@@ -137,15 +137,6 @@ def test_one_file_to_compile_and_no_file_too_many(fmu: Unpacked) -> None:
 
 
 @every
-def test_names_of_files_differ_in_more_than_their_case(fmu: Unpacked) -> None:
-    """For file systems of Windows and macOS; and none is a device there."""
-    names = [path.name.lower() for path in sources(fmu).iterdir()]
-    assert len(set(names)) == len(names)
-    assert not {name.partition(".")[0] for name in names} & {"con", "prn", "aux", "nul", "com1"}
-    assert all(re.fullmatch(r"[a-z0-9_]+\.(h|c|xml)", name) for name in names)
-
-
-@every
 def test_c_that_old_and_strict_compilers_take(fmu: Unpacked) -> None:
     """No `for (int`, no //, no extension of GNU, no complex, no array of variable length."""
     for path in sources(fmu).glob("*.[ch]"):
