@@ -61,8 +61,8 @@ class HandProxy:
     def hello(self, session: int, **changed: Any) -> bytes:
         """The HELLO that begins a session."""
         self._session, self._cookie, self._sequence = session, 0, 0
-        text = self.signature.text.encode()
-        return self.pack(HELLO, body=text.ljust(SHORTEST_HELLO, b"\0"), **changed)
+        body = self.signature.text.encode().ljust(SHORTEST_HELLO, b"\0")
+        return self.pack(HELLO, **{"body": body, **changed})
 
     def request(
         self, kind: int, time: float, values: Sequence[Value], step: float = 0.0, /, **changed: Any
