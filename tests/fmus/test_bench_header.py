@@ -767,7 +767,7 @@ def test_a_target_that_was_away_for_long_does_not_race_after_its_clock(target: P
         (["port"], 2, "usage"), ([""], 2, "usage"), (["0", "-", "1ms"], 2, "usage"),
         (["0", "-", "1e-12"], 2, "usage"), (["0", "-", "nan"], 2, "usage"),
         (["0", "nowhere"], 2, "nowhere: cannot be read"),
-        (["0", "/dev/null"], 2, "/dev/null: cannot be read, or is no key"),
+        (["0", "/dev/null"], 2, "/dev/null: cannot be read, or is no key of 16"),
     ],
 )  # fmt: skip
 def test_a_target_called_wrongly(target: Path, words: list[str], code: int, said: str) -> None:

@@ -7,6 +7,7 @@
 #include "sockets.h"
 
 #define CHANNEL_REPEAT 50000000  /* ns after which HELLO and INITIALISE are sent again */
+#define CHANNEL_LOOKS 64         /* for an answer before it sleeps, as to be woken takes as long */
 
 enum { CHANNEL_NEW, GREETING, WELCOME, CHANNEL_INITIALISING, READY };  /* stages */
 
@@ -23,7 +24,7 @@ typedef struct {
 
 static void channel_note(Channel *c, int error)
 {
-    if (!net_is_refused(error)) {  /* that nobody listens is what no answer means */
+    if (error && !net_is_refused(error)) {  /* that nobody listens is what no answer means */
         net_error_text(error, c->trouble);
     }
 }
@@ -33,9 +34,7 @@ static void channel_send(Channel *c, const uint8_t *request, size_t size)
     int i, error = 1;
     for (i = 0; i < 2 && error; i++) {  /* a call that reports an earlier one sends nothing */
         error = net_send(c->socket, request, size);
-        if (error) {
-            channel_note(c, error);
-        }
+        channel_note(c, error);
     }
 }
 
@@ -49,11 +48,18 @@ static void channel_close(Channel *c)
     net_shut(c->socket);
 }
 
-/* Take one datagram, if there is one, and judge it */
-static int channel_receive(Channel *c)
+/* Take one datagram, which is awaited for ns at most, and judge it */
+static int channel_receive(Channel *c, int64_t ns)
 {
-    int error, verdict = CLIENT_NOTHING;
-    long size = net_receive(c->socket, c->datagram, sizeof c->datagram, &error);
+    int error, i, verdict = CLIENT_NOTHING;
+    long size = NET_NOTHING;
+    for (i = 0; size == NET_NOTHING && i < CHANNEL_LOOKS; i++) {
+        net_yield();
+        size = net_receive(c->socket, c->datagram, sizeof c->datagram, &error);
+    }
+    if (size == NET_NOTHING && net_wait(c->socket, ns)) {
+        size = net_receive(c->socket, c->datagram, sizeof c->datagram, &error);
+    }
     if (size == NET_FAILED) {
         channel_note(c, error);
     }
@@ -79,9 +85,7 @@ static int channel_ask(Channel *c, const uint8_t *request, size_t size, int64_t 
             channel_send(c, request, size);
             again = repeat ? now + CHANNEL_REPEAT : deadline;
         }
-        if (net_wait(c->socket, (again < deadline ? again : deadline) - now)) {
-            verdict = channel_receive(c);
-        }
+        verdict = channel_receive(c, (again < deadline ? again : deadline) - now);
     }
     return verdict == CLIENT_ANSWERED;
 }

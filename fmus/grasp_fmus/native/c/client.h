@@ -105,11 +105,6 @@ static int client_reject(Client *client)
     return CLIENT_NOTHING;
 }
 
-static int64_t client_since(const uint8_t *datagram, int64_t now)
-{
-    return (int64_t)((uint64_t)now - wire_get(datagram + WIRE_AT_SENT, 8));
-}
-
 static int client_receive_welcome(Client *client, const uint8_t *datagram, size_t body, int64_t now)
 {
     uint64_t cookie = wire_get(datagram + WIRE_AT_COOKIE, 8);
@@ -121,7 +116,7 @@ static int client_receive_welcome(Client *client, const uint8_t *datagram, size_
     }
     client->greeting = 0;
     client->cookie = cookie;
-    client->round_trip = client_since(datagram, now);
+    client->round_trip = (int64_t)((uint64_t)now - wire_get(datagram + WIRE_AT_SENT, 8));
     return CLIENT_ANSWERED;
 }
 
@@ -179,7 +174,7 @@ static int client_receive_outputs(Client *client, const uint8_t *datagram, size_
         client->newest = sequence;
         memcpy(client->outputs, datagram + WIRE_HEAD_SIZE, body);
         client->outputs_time = wire_get_real(datagram + WIRE_AT_TIME);
-        client->round_trip = client_since(datagram, now);
+        client->round_trip = (int64_t)((uint64_t)now - wire_get(datagram + WIRE_AT_SENT, 8));
     }
     if (awaited) {
         client->awaited = 0;

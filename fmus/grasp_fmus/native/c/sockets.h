@@ -37,6 +37,7 @@ typedef SOCKET Socket;
 #include <fcntl.h>
 #include <netdb.h>
 #include <netinet/in.h>
+#include <sched.h>
 #include <sys/select.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
@@ -93,21 +94,11 @@ static int net_error(void)
 /* Windows would say it in the language of the user */
 static void net_error_text(int error, char *text)
 {
-    const char *known = error == WSAENETUNREACH    ? "Network is unreachable"
-                        : error == WSAEHOSTUNREACH ? "No route to host"
-                        : error == WSAENETDOWN     ? "Network is down"
-                        : error == WSAEACCES       ? "Permission denied" : NULL;
-    if (known) {
-        net_copy_text(text, known);
+    if (error == WSAENETUNREACH || error == WSAEHOSTUNREACH || error == WSAENETDOWN) {
+        net_copy_text(text, "Network is unreachable");
     } else {
         sprintf(text, "Windows error %d", error);
     }
-}
-
-static void net_lookup_text(int error, char *text)
-{
-    (void)error;
-    net_copy_text(text, "Name or service not known");
 }
 
 static int net_is_nothing(int error)
@@ -151,11 +142,15 @@ static FILE *net_file(const char *path)
                                                                           : NULL;
 }
 
-/* The rights of others to a file, 0 where there are none or nobody can tell; else all of its mode */
 static unsigned net_exposed(const char *path)
 {
-    (void)path;
+    (void)path;  /* nobody can tell */
     return 0;
+}
+
+static void net_yield(void)
+{
+    SwitchToThread();
 }
 
 /* Wait for a datagram, ns at most; what Windows rounds up to its ticks is waited for awake */
@@ -164,12 +159,7 @@ static int net_wait(Socket at, int64_t ns)
     const int64_t tick = 16000000;
     struct timeval most;
     fd_set sockets;
-    if (ns <= tick) {
-        SwitchToThread();
-        ns = 0;
-    } else {
-        ns -= tick;
-    }
+    ns = ns > tick ? ns - tick : 0;
     most.tv_sec = (long)(ns / NET_SECOND);
     most.tv_usec = (long)(ns % NET_SECOND / 1000);
     FD_ZERO(&sockets);
@@ -206,11 +196,6 @@ static int net_error(void)
 static void net_error_text(int error, char *text)
 {
     net_copy_text(text, strerror(error));
-}
-
-static void net_lookup_text(int error, char *text)
-{
-    net_copy_text(text, gai_strerror(error));
 }
 
 static int net_is_nothing(int error)
@@ -251,11 +236,16 @@ static FILE *net_file(const char *path)
     return fopen(path, "rb");
 }
 
-/* The rights of others to a file, 0 where there are none or nobody can tell; else all of its mode */
+/* The mode of a file that others have rights to; 0 where they have none */
 static unsigned net_exposed(const char *path)
 {
     struct stat file;
     return stat(path, &file) == 0 && (file.st_mode & 077) ? (unsigned)file.st_mode & 07777 : 0;
+}
+
+static void net_yield(void)
+{
+    sched_yield();
 }
 
 /* Wait for a datagram, ns at most */
@@ -277,13 +267,11 @@ static int net_wait(Socket at, int64_t ns)
 static int net_address(const char *host, int port, struct sockaddr_in *address, char *text)
 {
     struct addrinfo how, *found = NULL;
-    int error;
     memset(&how, 0, sizeof how);
     how.ai_family = AF_INET;
     how.ai_socktype = SOCK_DGRAM;
-    error = getaddrinfo(host, NULL, &how, &found);
-    if (error) {
-        net_lookup_text(error, text);
+    if (getaddrinfo(host, NULL, &how, &found)) {
+        net_copy_text(text, "no such host, or none with an IPv4 address");
         return 0;
     }
     memcpy(address, found->ai_addr, sizeof *address);
@@ -333,20 +321,19 @@ static long net_receive(Socket at, uint8_t *datagram, size_t size, int *error)
 static long net_read(const char *path, uint8_t *data, size_t size, char *text)
 {
     FILE *file = net_file(path);
-    size_t n = 0;
-    int error = errno;
+    long n = -1;
     if (file) {
         setvbuf(file, NULL, _IONBF, 0);
-        errno = 0;
-        n = fread(data, 1, size, file);
-        error = ferror(file) ? errno : 0;
+        n = (long)fread(data, 1, size, file);
+        n = ferror(file) ? -1 : n;
+    }
+    if (n < 0) {
+        net_copy_text(text, strerror(errno));
+    }
+    if (file) {
         fclose(file);
     }
-    if (!file || error) {
-        net_copy_text(text, strerror(error));
-        return -1;
-    }
-    return (long)n;
+    return n;
 }
 
 #endif
