@@ -116,11 +116,14 @@ def said_of(rows: list[list[str]]) -> str:
     return run(f"{command.replace(controller, 'controller.o')} && {emulator} || echo failed")
 
 
-def test_an_image_finds_a_difference(rows: list[list[str]]) -> None:
+def test_an_image_finds_a_difference_and_steps_that_take_too_long(rows: list[list[str]]) -> None:
     rows[-1][-1] = repr(float(rows[-1][-1]) + 1e-9)
     found = said(said_of(rows))
     assert found["steps"] == len(rows) == 51
     assert found["largest difference, 1e-18"] == pytest.approx(1e9, rel=1e-3)
+    assert found["steps begun late"] == 0
+    slower = said(run(replaced(COMMANDS[-1], {**M7, "shift=3": "shift=10"})))
+    assert slower["steps begun late"] > 40
 
 
 def test_an_image_ends_where_an_input_is_none(rows: list[list[str]]) -> None:
