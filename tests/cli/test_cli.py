@@ -282,6 +282,7 @@ def test_a_missing_file_without_a_name_is_told(
     said = "grasp-cosim: no licenses/LICENSE among its metadata; install it with pip"
     missing = FileNotFoundError(said)
     monkeypatch.setattr("grasp_fmus.page.licences", lambda *_: (_ for _ in ()).throw(missing))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(Path("empty").absolute()))
     code, _, err = command("build")
     assert code == 2
     assert said in err
