@@ -28,7 +28,7 @@ BLOCKS = {
     "sensor": "proximity_sensor",
     "controller": "grasp_controller",
 }
-OURS = {*BLOCKS.values(), "block_variables", "c_compilers", "grasp_fmus", "grasp_cosim"}
+OURS = {*BLOCKS.values(), "block_variables", "c_compilers", "si_units", "grasp_fmus", "grasp_cosim"}
 
 
 LINK = "grasp_fmus.link"
@@ -173,7 +173,7 @@ def test_what_is_packed_into_fmus_imports_the_standard_library_only() -> None:
     assert foreign == {("gripper_plant/mujoco_box.py", "mujoco")}
 
 
-@pytest.mark.parametrize("package", ["block_variables", "c_compilers"])
+@pytest.mark.parametrize("package", ["block_variables", "c_compilers", "si_units"])
 def test_what_fmus_and_orchestrator_share_imports_the_standard_library_only(package: str) -> None:
     found = {name for _, name in imports(ROOT / "fmus" / package)}
     assert found

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 Members = Mapping[str, bytes]
 """The files in an FMU, by name."""
 
-SOURCES = (*PACKAGES, "c_compilers", "grasp_fmus")
+SOURCES = (*PACKAGES, "c_compilers", "si_units", "grasp_fmus")
 """The packages that decide what FMUs hold."""
 
 VERSIONS = ("grasp_cosim-", "latex2mathml-", "markdown_it_py-", "pythonfmu-")

@@ -2,12 +2,13 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import isfinite
 from typing import Literal, NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from c_compilers import BITS, LIBM
+from si_units import BASE, Unit, known_unit
 
 from .variable import Enumeration, Scalar, Variable
 
@@ -31,36 +32,8 @@ _STRUCTURED = re.compile(rf"{_WORD}(?:\.{_WORD})*", re.ASCII)
 """Names of FMI's structured naming convention, but for der(), which proxy.hold. cannot precede."""
 
 
-class Unit(NamedTuple):
-    """Exponents of the SI base units, and the name and factor of a unit to display.
-
-    value in base units = factor * value + offset.
-    """
-
-    base: Mapping[str, int]
-    display: tuple[str, float] | None = None
-    factor: float = 1.0
-    offset: float = 0.0
-
-
-UNITS: dict[str, Unit] = {
-    "m": Unit({"m": 1}, ("mm", 1e3)),
-    "m/s": Unit({"m": 1, "s": -1}, ("mm/s", 1e3)),
-    "kg": Unit({"kg": 1}),
-    "N": Unit({"kg": 1, "m": 1, "s": -2}),
-    "N.s": Unit({"kg": 1, "m": 1, "s": -1}),
-    "N.s/m": Unit({"kg": 1, "s": -1}),
-    "N/m": Unit({"kg": 1, "s": -2}),
-    "V": Unit({"kg": 1, "m": 2, "s": -3, "A": -1}, ("mV", 1e3)),
-    "V/s": Unit({"kg": 1, "m": 2, "s": -4, "A": -1}),
-    "s": Unit({"s": 1}),
-    "1/s": Unit({"s": -1}),
-    "Hz": Unit({"s": -1}),
-    "s/m": Unit({"s": 1, "m": -1}),
-    "rad": Unit({"rad": 1}),
-    "1": Unit({}),
-}
-"""V.m^n and N/m^n are not among them: their exponent is a parameter."""
+DISPLAY = {"m": "mm", "m/s": "mm/s", "V": "mV"}
+"""Units to show values in, a thousand times as many."""
 
 
 class Experiment(NamedTuple):
@@ -79,8 +52,8 @@ class Description:
     name: str
     summary: str
     variables: Sequence[Variable]
-    units: Mapping[str, Unit] = field(default_factory=lambda: UNITS)
-    """The definitions of units; a variable's unit that is not here is a name alone."""
+    units: Mapping[str, Unit] | None = None
+    """The definitions of units, by default those known by their names; others are names alone."""
     can_vary_step: bool = True
     has_states: bool = True
     experiment: Experiment = Experiment()
@@ -124,7 +97,7 @@ def model_description(
     _add_log_and_experiment(root, d, native)
     variables = SubElement(root, "ModelVariables")
     for reference, v in enumerate(d.variables):
-        _add_variable(variables, v, reference, d.units, fmi)
+        _add_variable(variables, v, reference, DISPLAY if d.units is None else {}, fmi)
     if fmi == 3:
         SubElement(variables, "Float64", _time(d))
     _add_structure(root, d.variables, fmi)
@@ -226,16 +199,16 @@ def _add_units(root: Element, d: Description, *more: str) -> None:
     definitions = SubElement(root, "UnitDefinitions")
     for name in names:
         element = SubElement(definitions, "Unit", name=name)
-        if name not in d.units:
+        unit = known_unit(name) if d.units is None else d.units.get(name)
+        if not unit:
             continue
-        unit = d.units[name]
-        base = {key: str(power) for key, power in unit.base.items()}
+        powers = zip(BASE, unit.exponents, strict=True)
+        base = {key: str(power) for key, power in powers if power}
         base |= {"factor": repr(unit.factor)} if unit.factor != 1.0 else {}
         base |= {"offset": repr(unit.offset)} if unit.offset != 0.0 else {}
         SubElement(element, "BaseUnit", base)
-        if unit.display:
-            display, factor = unit.display
-            SubElement(element, "DisplayUnit", name=display, factor=repr(factor))
+        if d.units is None and name in DISPLAY:
+            SubElement(element, "DisplayUnit", name=DISPLAY[name], factor=repr(1e3))
 
 
 def _add_enumerations(root: Element, d: Description, fmi: Version) -> None:
@@ -256,9 +229,9 @@ def _add_enumerations(root: Element, d: Description, fmi: Version) -> None:
 
 
 def _add_variable(
-    parent: Element, v: Variable, reference: int, units: Mapping[str, Unit], fmi: Version
+    parent: Element, v: Variable, reference: int, display: Mapping[str, str], fmi: Version
 ) -> None:
-    role, values = _role(v, reference), _values(v, units)
+    role, values = _role(v, reference), _values(v, display)
     if fmi == 2:
         SubElement(SubElement(parent, "ScalarVariable", role), v.type, values)
         return
@@ -290,15 +263,15 @@ def _initial(v: Variable) -> str:
     return "calculated" if v.start is None else "approx"
 
 
-def _values(v: Variable, units: Mapping[str, Unit]) -> dict[str, str]:
+def _values(v: Variable, display: Mapping[str, str]) -> dict[str, str]:
     """Return the attributes of a variable that say what values it has."""
     found: dict[str, str] = {}
     if v.enumeration:
         found["declaredType"] = v.enumeration.name
     if v.kind is float and v.unit:
         found["unit"] = v.unit
-        if v.unit in units and (display := units[v.unit].display):
-            found["displayUnit"] = display[0]
+        if v.unit in display:
+            found["displayUnit"] = display[v.unit]
     if v.relative:
         found["relativeQuantity"] = "true"
     if v.kind in (float, int) and v.limits:

@@ -15,6 +15,8 @@ from math import isfinite, isnan
 from pathlib import Path
 from typing import Any
 
+from si_units import refusal
+
 from .cards import variable_tables
 from .contract import declared, longest_step, unpacker, variables
 from .description import Description
@@ -155,6 +157,8 @@ def _check_declaration(found: list[Variable]) -> None:
         if v.name in names:
             raise ValueError(f"{v.name}: is there twice; inputs, outputs, parameters share names")
         names.add(v.name)
+        if v.unit and (text := refusal(v.unit)):
+            raise ValueError(f"{v.name}: {text}")
         if not v.name.isascii():
             raise ValueError(f"{v.name}: must be of ASCII letters, digits and _")
         if v.causality != "output":

@@ -5,9 +5,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, NamedTuple, get_args, get_type_hints
 
+from si_units import BASE, Unit
+
 from .bench_header import wire
 from .build import Plan, with_binaries
-from .description import ERROR, UNITS, WARNING, Description, Experiment, Unit, Version
+from .description import ERROR, WARNING, Description, Experiment, Version
 from .link.message import PORT
 from .link.signature import LinkVariable, Signature
 from .native.sources import proxy_sources, with_description
@@ -17,6 +19,8 @@ from .page import icon
 from .variable import TYPES, Scalar, Variable
 
 PROTOCOL = Path(__file__).parent / "link/README.md"
+
+SECOND = Unit("s", tuple(int(name == "s") for name in BASE))
 
 LONGEST_TEXT = 1023
 """Bytes that a text of the settings has at most."""
@@ -173,7 +177,7 @@ def _description(target: Path, original: Original, settings: Settings) -> Descri
         name,
         f"Proxy of {original.file}: a peer has its outputs, over UDP",
         [*original.variables, *own],
-        {"s": UNITS["s"], **original.units},
+        {"s": SECOND, **original.units},
         original.can_vary_step,
         has_states=False,
         experiment=original.experiment,

@@ -132,6 +132,8 @@ WRONG = [
     ("= 0.5", "= 5e3", "declaration: ValueError: time_constant = 5000.0 s: must be from 0.001 to "),
     ("] = 1.0", "] = 1e999", "declaration: ValueError: u = inf N: must be a finite number"),
     ("] = 1.0", "] = 1", "declaration: ValueError: u = 1: must be of type float"),
+    ('Input("what it follows", unit="N"', 'Input("what it follows", unit="newtons"',
+     "declaration: ValueError: u: unit 'newtons' is not known; did you mean N?"),
     ("State(0.0)", "State((0.0, None))", "initial_state(): ValueError: State.y[2] = None: must b"),
     ("return State(0.0)", "return State(0)",
      "step(): ValueError: State.y is float: must be as initial_state() makes it, int"),

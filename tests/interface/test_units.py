@@ -6,11 +6,12 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim import InputError, System
-from grasp_cosim.interface.units import BASE, Unit, conversion
+from grasp_cosim.interface.units import conversion
 from grasp_cosim.system.checks import connection_transform
 from grasp_cosim.system.parts import Component, Connection, Port
 from hypothesis import given
 from hypothesis import strategies as st
+from si_units import BASE, Unit
 
 exponents = st.tuples(*[st.integers(-4, 4)] * len(BASE))
 factors = st.floats(1e-9, 1e9) | st.floats(-1e9, -1e-9)

@@ -10,12 +10,12 @@ from typing import Any
 import pytest
 from grasp_cosim.errors import InputError
 from grasp_cosim.interface.interface import Interface, Variable, kind_of
-from grasp_cosim.interface.units import Unit
 from grasp_cosim.qualification.interface_difference import capability_differences
 from grasp_cosim.qualification.swap import Swap, component_of, prepare_swap
 from grasp_cosim.system.description import System
 from grasp_cosim.system.parts import Condition, Connection, Event, Fault, Initialisation, Port
 from qualification.made import DEPENDENCIES, PLANT, changed, without, write_fmu, write_system
+from si_units import Unit
 
 GAP = Port("plant", "gap")
 POSITION = Port("spring", "position")

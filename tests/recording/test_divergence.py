@@ -8,12 +8,12 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from grasp_cosim.interface.interface import Interface, Variable
-from grasp_cosim.interface.units import Unit
 from grasp_cosim.recording.divergence import DECADES, FAR, Divergence, Runaway, largest
 from grasp_cosim.recording.listener import Signal
 from grasp_cosim.system.parts import Connection, Port
 from hypothesis import given
 from hypothesis import strategies as st
+from si_units import Unit
 
 Floats = npt.NDArray[Any]
 

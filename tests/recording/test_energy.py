@@ -11,7 +11,6 @@ from grasp_cosim import System
 from grasp_cosim.interface.arrays import MOST_ELEMENTS
 from grasp_cosim.interface.interface import Interface
 from grasp_cosim.interface.read import read_interface
-from grasp_cosim.interface.units import Unit
 from grasp_cosim.recording.energy import Bond, ExchangeEnergy, bonds
 from grasp_cosim.system import parts
 from grasp_cosim.system.parts import Component, Connection, Port
@@ -20,6 +19,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from proximity_sensor import optics
+from si_units import Unit
 from support.direct import closed_loop
 from support.examples import examples
 

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from si_units import known_unit
 
 from ..errors import InputError
 from ..files import check_nature
-from ..interface.units import IDENTITY, Conversion, conversion, known_unit
+from ..interface.units import IDENTITY, Conversion, conversion
 from ..metrics.metric import Metric, Signals
 from ..qualification.tube import ROUNDING, Curve, curve
 from ..recording.load import SETTINGS, SIGNALS, load_run, read_mdf

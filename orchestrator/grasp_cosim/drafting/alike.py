@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
+from si_units import Unit
+
 from ..interface.interface import Interface, Variable
-from ..interface.units import Unit
 
 CERTAIN = 0.9
 """From this likeness on, where no other is as great, it needs no check."""

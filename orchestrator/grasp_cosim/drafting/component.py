@@ -8,9 +8,10 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from si_units import known_unit
+
 from ..errors import choices
 from ..interface.interface import SETTABLE, Interface, Variable
-from ..interface.units import known_unit
 from ..system.parts import Component
 from ..system.structure import Structure
 from ..system.swap import converted, stated

@@ -10,8 +10,8 @@ from string import Template
 from typing import TypeVar
 
 import numpy as np
+from si_units import known_unit
 
-from ..interface.units import known_unit
 from ..metrics.metric import resolved
 from ..recording.result import Result
 from ..report.page import Scene, Zoom

@@ -9,11 +9,13 @@ from pathlib import Path
 from shlex import quote
 from typing import Any, Literal, Protocol, get_args
 
+from si_units import Unit, known_unit, spelt_like
+
 from ..checks import EXACT, integer, known, real
 from ..errors import InputError, choices
 from ..scratch import without_scratch
 from .arrays import MOST_ELEMENTS, Array, Element, element_names, size_of
-from .units import IDENTITY, Conversion, Unit, conversion, known_unit, spelt_like
+from .units import IDENTITY, Conversion, conversion
 
 Value = float | int | bool | str
 

@@ -13,6 +13,8 @@ from functools import lru_cache
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
+from si_units import BASE, Unit, known_unit
+
 from ..checks import real
 from ..errors import InputError
 from ..files import check_fmu_file
@@ -31,7 +33,6 @@ from .interface import (
     typed,
 )
 from .obstacles import of_binary, of_kind, platform_of
-from .units import BASE, Unit, known_unit
 
 NUMERIC = ("Real", "Integer")
 WHOLE = re.compile(r"\s*[+-]?[0-9]+\s*")

@@ -1,46 +1,15 @@
-"""Units as FMI and SSP define them, those that are known by their names, and conversions."""
+"""Conversions between units."""
 
 import math
-import re
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
+
+from si_units import OTHER, Unit
 
 if TYPE_CHECKING:  # reading a description needs no numpy, which takes time to load
     import numpy as np
     import numpy.typing as npt
 
-BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 Number = TypeVar("Number", float, "npt.NDArray[np.float64]")
-
-
-@dataclass(frozen=True, slots=True)
-class Unit:
-    """value in base units = factor * value + offset; exponents in the order of BASE."""
-
-    name: str
-    exponents: tuple[int, ...]
-    factor: float = 1.0
-    offset: float = 0.0
-
-    @property
-    def si(self) -> bool:
-        """True if its values are those in base units."""
-        return (self.factor, self.offset) == (1.0, 0.0)
-
-    @property
-    def without_offset(self) -> "Unit":
-        """The unit of differences."""
-        return replace(self, offset=0.0) if self.offset else self
-
-    def reversed(self, name: str) -> "Unit":
-        """The unit, by another name, of values with the other sign."""
-        return replace(self, name=name, factor=-self.factor)
-
-    def measures(self, other: "Unit") -> bool:
-        """True if both are of one quantity; an angle is a number, as many tools define it."""
-        return self.exponents[:-1] == other.exponents[:-1]
 
 
 class Conversion(NamedTuple):
@@ -69,116 +38,10 @@ def conversion(source: Unit, target: Unit) -> Conversion | None:
     return Conversion(factor, offset) if possible else None
 
 
-PREFIXES = {
-    "f": -15, "p": -12, "n": -9, "u": -6, "µ": -6, "m": -3, "c": -2, "d": -1, "": 0, "h": 2, "k": 3,
-    "M": 6, "G": 9, "T": 12,
-}  # fmt: skip
-"""Powers of ten; not those that make PS or at of what other units are called."""
-
-_SI = {
-    "m": (0, {"m": 1}), "g": (-3, {"kg": 1}), "s": (0, {"s": 1}), "A": (0, {"A": 1}),
-    "K": (0, {"K": 1}), "mol": (0, {"mol": 1}), "cd": (0, {"cd": 1}), "rad": (0, {"rad": 1}),
-    "sr": (0, {"rad": 2}), "Hz": (0, {"s": -1}), "N": (0, {"kg": 1, "m": 1, "s": -2}),
-    "Pa": (0, {"kg": 1, "m": -1, "s": -2}), "bar": (5, {"kg": 1, "m": -1, "s": -2}),
-    "J": (0, {"kg": 1, "m": 2, "s": -2}), "W": (0, {"kg": 1, "m": 2, "s": -3}),
-    "C": (0, {"A": 1, "s": 1}), "V": (0, {"kg": 1, "m": 2, "s": -3, "A": -1}),
-    "F": (0, {"kg": -1, "m": -2, "s": 4, "A": 2}),
-    "Ohm": (0, {"kg": 1, "m": 2, "s": -3, "A": -2}),
-    "S": (0, {"kg": -1, "m": -2, "s": 3, "A": 2}),
-    "Wb": (0, {"kg": 1, "m": 2, "s": -2, "A": -1}), "T": (0, {"kg": 1, "s": -2, "A": -1}),
-    "H": (0, {"kg": 1, "m": 2, "s": -2, "A": -2}), "lm": (0, {"cd": 1}),
-    "lx": (0, {"cd": 1, "m": -2}), "Bq": (0, {"s": -1}), "Gy": (0, {"m": 2, "s": -2}),
-    "Sv": (0, {"m": 2, "s": -2}), "kat": (0, {"mol": 1, "s": -1}), "l": (-3, {"m": 3}),
-    "L": (-3, {"m": 3}),
-}  # fmt: skip
-"""Symbols that take a prefix: a power of ten, and powers of base units."""
-
-_OTHER = {
-    "1": (1.0, 0.0, {}), "-": (1.0, 0.0, {}), "%": (0.01, 0.0, {}),
-    "deg": (math.pi / 180.0, 0.0, {"rad": 1}), "rev": (2.0 * math.pi, 0.0, {"rad": 1}),
-    "rpm": (math.pi / 30.0, 0.0, {"rad": 1, "s": -1}), "degC": (1.0, 273.15, {"K": 1}),
-    "degF": (5.0 / 9.0, 273.15 - 32.0 * 5.0 / 9.0, {"K": 1}), "min": (60.0, 0.0, {"s": 1}),
-    "h": (3600.0, 0.0, {"s": 1}), "d": (86400.0, 0.0, {"s": 1}), "t": (1e3, 0.0, {"kg": 1}),
-    "in": (0.0254, 0.0, {"m": 1}), "ft": (0.3048, 0.0, {"m": 1}),
-    "lb": (0.45359237, 0.0, {"kg": 1}),
-    "lbf": (4.4482216152605, 0.0, {"kg": 1, "m": 1, "s": -2}),
-}  # fmt: skip
-"""Symbols without a prefix: factor, offset, powers of base units."""
-
-_SIGNS = {
-    "°C": "degC", "°F": "degF", "°": "deg", "Ω": "Ohm", "\u2126": "Ohm", "\u03bc": "µ", "⁻": "-",
-    "¹": "1", "²": "2", "³": "3",
-}  # fmt: skip
-"""Signs and how the names above have them; two are of the ohm, one is a Greek mu."""
-
-_FACTOR = re.compile(r"(1|-|[^\d\s.*·/^()+-]+)(?:(?<![1-])\^?([+-]?\d))?")
-_PRODUCT = re.compile("[.*·]")
-_UNIT = re.compile(r"([^/()]+)(?:/(?:([^/()]+)|\(([^/()]+)\)))?")
-
-
-@lru_cache(maxsize=256)
-def known_unit(name: str) -> Unit | None:
-    """The unit of a name, without a definition: SI with prefixes, deg, degC, min, h, %, rpm, ...
-
-    Products, powers and a quotient are as FMI writes them: N.s/m, m/s2, J/(kg.K); or with signs
-    like °C and m/s². None where it is no such name.
-    """
-    written = name
-    for mark, meant in _SIGNS.items():
-        written = written.replace(mark, meant)
-    parts = _UNIT.fullmatch(written)
-    if parts is None:
-        return None
-    above, single, several = parts.groups()
-    below = single or several
-    if single and _PRODUCT.search(single):
-        return None  # N/m.s: as (m.s) or as .s, which is not said
-    factors = [(text, 1) for text in _PRODUCT.split(above)]
-    factors += [(text, -1) for text in _PRODUCT.split(below)] if below else []
-    scale, ten, exponents = 1.0, 0, [0] * len(BASE)
-    offset = 0.0
-    for text, sign in factors:
-        found = _symbol(text)
-        if found is None:
-            return None
-        (factor, shift, power_of_ten, base), power = found
-        scale *= factor ** (sign * power)
-        ten += sign * power * power_of_ten
-        offset = shift if len(factors) == 1 and power == 1 else 0.0
-        for i, key in enumerate(BASE):
-            exponents[i] += sign * power * base.get(key, 0)
-    scale *= float(f"1e{ten}")
-    return Unit(name, tuple(exponents), scale, offset) if 0.0 < scale < math.inf else None
-
-
-def spelt_like(name: str, defined: Iterable[str]) -> list[str]:
-    """The units, of those defined or known, that differ from a name in capitals only: kN of KN."""
-    known = (f"{prefix}{symbol}" for symbol in _SI for prefix in PREFIXES)
-    found = (unit for unit in (*defined, *known, *_OTHER) if unit.lower() == name.lower())
-    return [*dict.fromkeys(found)]
-
-
 def between_units(ratio: float) -> bool:
     """True if a number > 0 looks like one between two units and not like a gain: 1000, 25.4, 60."""
     digits = math.log10(ratio)
     if abs(digits - round(digits)) < 1e-9:
         return round(digits) != 0
-    shifts = (sign * math.log10(factor) for factor, *_ in _OTHER.values() for sign in (-1, 1))
+    shifts = (sign * math.log10(factor) for factor, *_ in OTHER.values() for sign in (-1, 1))
     return any(abs(digits - s - round(digits - s)) < 1e-4 for s in shifts if s % 1.0)
-
-
-def _symbol(text: str) -> tuple[tuple[float, float, int, dict[str, int]], int] | None:
-    """Factor, offset, power of ten and base units of a symbol like mm, and its power."""
-    match = _FACTOR.fullmatch(text)
-    if match is None:
-        return None
-    symbol, power = match[1], int(match[2] or 1)
-    if symbol in _OTHER:
-        factor, offset, base = _OTHER[symbol]
-        return (factor, offset, 0, base), power
-    for end in _SI:
-        prefix = symbol.removesuffix(end)
-        if symbol.endswith(end) and prefix in PREFIXES:
-            ten, base = _SI[end]
-            return (1.0, 0.0, ten + PREFIXES[prefix], base), power
-    return None

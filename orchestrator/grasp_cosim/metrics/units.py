@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
+from si_units import Unit, known_unit
+
 from ..errors import InputError, choices
-from ..interface.units import Conversion, Unit, known_unit
+from ..interface.units import Conversion
 from ..system.parts import Port
 from ..system.readings import Reading, in_other_units, naming, readings
 from ..system.structure import Structure

@@ -15,9 +15,9 @@ from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
+from si_units import known_unit
 
 from ..interface.interface import Interface, Variable
-from ..interface.units import known_unit
 from ..system.description import System
 from ..system.parts import Component, Port
 from .listener import Signal

@@ -13,11 +13,12 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from si_units import known_unit
 
 from ..checks import choice, is_number, real
 from ..errors import InputError, choices
 from ..files import check_nature
-from ..interface.units import Conversion, known_unit
+from ..interface.units import Conversion
 from ..metrics.metric import Metric, Signals, registered
 from ..numerals import counted
 from ..plain import from_cell

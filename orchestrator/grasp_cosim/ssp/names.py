@@ -4,9 +4,10 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import fields, replace
 
+from si_units import known_unit
+
 from ..errors import InputError, choices
 from ..interface.interface import Value
-from ..interface.units import known_unit
 from ..system.parts import Component, Solver
 from .annotation import Beside
 from .network import Part

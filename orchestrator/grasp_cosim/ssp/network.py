@@ -14,9 +14,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
+from si_units import Unit
+
 from ..errors import InputError, nearest
 from ..interface.interface import Interface, Variable
-from ..interface.units import Unit
 from .tree import Element, Hop, Node, Path
 from .units import change, same
 

@@ -5,9 +5,10 @@ from dataclasses import dataclass, field, replace
 from posixpath import dirname
 from typing import Any
 
+from si_units import Unit, known_unit
+
 from ..checks import known
 from ..errors import InputError
-from ..interface.units import Unit, known_unit
 from .archive import STRUCTURE, Archive
 from .document import ROOTS, checked, child, parse
 from .notes import Notes

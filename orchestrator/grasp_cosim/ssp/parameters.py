@@ -18,9 +18,10 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from si_units import Unit
+
 from ..errors import InputError, choices
 from ..interface.interface import SETTABLE, Value
-from ..interface.units import Unit
 from .document import at, child, children, is_true, short
 from .network import Carried, Network
 from .origin import Origin

@@ -9,11 +9,12 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
+from si_units import Unit
+
 from ..checks import known
 from ..errors import InputError, choices
 from ..interface.interface import Interface, Variable
 from ..interface.read import read_interface
-from ..interface.units import Unit
 from .archive import STRUCTURE, Archive
 from .document import at, child, children, is_true, qualified, short
 from .origin import Origin, open_structure

@@ -4,8 +4,10 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from si_units import BASE, Unit
+
 from ..errors import InputError
-from ..interface.units import BASE, Unit, conversion
+from ..interface.units import conversion
 from .document import add, at, child, children
 
 

@@ -10,11 +10,12 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from si_units import Unit
+
 from ..errors import InputError
 from ..interface.interface import Value, Variable
 from ..interface.obstacles import of_binary
 from ..interface.read import read_interface
-from ..interface.units import Unit
 from ..numerals import counted
 from ..system.description import System
 from ..system.parts import NANOSECONDS, Component, Connection, Port

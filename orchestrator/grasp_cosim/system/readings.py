@@ -10,9 +10,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from math import isclose
 from typing import NamedTuple
 
+from si_units import Unit
+
 from ..errors import InputError, choices
 from ..interface.interface import SETTABLE, Interface, Variable
-from ..interface.units import IDENTITY, Conversion, Unit, between_units, conversion
+from ..interface.units import IDENTITY, Conversion, between_units, conversion
 from .parts import Connection, Port
 from .structure import Structure
 

@@ -20,9 +20,11 @@ from operator import le
 from pathlib import Path
 from typing import Literal, get_args
 
+from si_units import known_unit
+
 from ..checks import EXACT, choice, integer, real
 from ..errors import InputError
-from ..interface.units import conversion, known_unit
+from ..interface.units import conversion
 from ..numerals import counted
 from ..plain import from_cell
 from .parts import LONGEST, NANOSECONDS, Port

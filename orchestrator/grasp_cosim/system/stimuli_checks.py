@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from array import array
 
+from si_units import known_unit
+
 from ..checks import exact, known
 from ..errors import InputError, choices
 from ..interface.interface import Interface, Value, Variable
-from ..interface.units import IDENTITY, Conversion, conversion, known_unit
+from ..interface.units import IDENTITY, Conversion, conversion
 from .parts import Port
 from .readings import unit_of
 from .stimuli import Column, Stimuli

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
-from grasp_fmus.description import Experiment, Unit
+from grasp_fmus.description import Experiment
 from grasp_fmus.proxy import DEFAULTS, Settings
 from grasp_fmus.variable import Enumeration
 from grasp_fmus.variable import Variable as ProxyVariable
@@ -15,7 +15,6 @@ from ...errors import InputError, SimulationError
 from ...files import check_folder, write_text
 from ...hil.protocol import exchanged, link_signature
 from ...interface.interface import Interface, Value, Variable
-from ...interface.units import BASE
 from ..frame import PATH, json_option, say, show, waiting
 from .build import FIRST
 
@@ -160,14 +159,7 @@ def _original(interface: Interface, names: list[str]) -> "Original":
     return Original(
         interface.path.name,
         [_variable(interface, interface.by_name[name], known) for name in names],
-        {
-            unit.name: Unit(
-                {key: power for key, power in zip(BASE, unit.exponents, strict=True) if power},
-                factor=unit.factor,
-                offset=unit.offset,
-            )
-            for unit in interface.units.values()
-        },
+        interface.units,
         Experiment(*(None if v is None else float(v) for v in interface.experiment.values())),
         interface.can_vary_step,
     )

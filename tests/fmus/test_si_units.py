@@ -1,0 +1,143 @@
+"""Units that are known by their names, and what is meant by one that is not."""
+
+import math
+from xml.etree.ElementTree import fromstring
+
+import pytest
+from grasp_fmus.description import Description, Version, model_description
+from grasp_fmus.variable import Variable
+from hypothesis import given
+from hypothesis import strategies as st
+from si_units import BASE, known_unit, refusal
+
+TEN = {"": 0, "m": -3, "u": -6, "n": -9, "k": 3, "M": 6, "G": 9, "c": -2, "h": 2}
+SYMBOLS = {"m": {"m": 1}, "s": {"s": 1}, "N": {"kg": 1, "m": 1, "s": -2}, "K": {"K": 1}}
+
+
+def exponents(**powers: int) -> tuple[int, ...]:
+    return tuple(powers.get(name, 0) for name in BASE)
+
+
+@pytest.mark.parametrize(
+    ("name", "factor", "offset", "powers"),
+    [
+        ("mm", 1e-3, 0.0, {"m": 1}),
+        ("mm/s", 1e-3, 0.0, {"m": 1, "s": -1}),
+        ("m/s2", 1.0, 0.0, {"m": 1, "s": -2}),
+        ("m.s-2", 1.0, 0.0, {"m": 1, "s": -2}),
+        ("m*s^-2", 1.0, 0.0, {"m": 1, "s": -2}),
+        ("mN", 1e-3, 0.0, {"kg": 1, "m": 1, "s": -2}),
+        ("g", 1e-3, 0.0, {"kg": 1}),
+        ("J/(kg.K)", 1.0, 0.0, {"m": 2, "s": -2, "K": -1}),
+        ("km/h", 1e3 / 3600.0, 0.0, {"m": 1, "s": -1}),
+        ("l/min", 1e-3 / 60.0, 0.0, {"m": 3, "s": -1}),
+        ("cm3", 1e-6, 0.0, {"m": 3}),
+        ("deg", math.pi / 180.0, 0.0, {"rad": 1}),
+        ("rpm", 2.0 * math.pi / 60.0, 0.0, {"rad": 1, "s": -1}),
+        ("degC", 1.0, 273.15, {"K": 1}),
+        ("degC/s", 1.0, 0.0, {"K": 1, "s": -1}),
+        ("degF", 5.0 / 9.0, 459.67 * 5.0 / 9.0, {"K": 1}),
+        ("mbar", 100.0, 0.0, {"kg": 1, "m": -1, "s": -2}),
+        ("min", 60.0, 0.0, {"s": 1}),
+        ("mcd", 1e-3, 0.0, {"cd": 1}),
+        ("mmol", 1e-3, 0.0, {"mol": 1}),
+        ("%", 1e-2, 0.0, {}),
+        ("-", 1.0, 0.0, {}),
+        ("kOhm", 1e3, 0.0, {"kg": 1, "m": 2, "s": -3, "A": -2}),
+        ("in", 0.0254, 0.0, {"m": 1}),
+        ("m/s²", 1.0, 0.0, {"m": 1, "s": -2}),
+        ("s⁻¹", 1.0, 0.0, {"s": -1}),
+        ("mm³", 1e-9, 0.0, {"m": 3}),
+        ("°C", 1.0, 273.15, {"K": 1}),
+        ("°/s", math.pi / 180.0, 0.0, {"rad": 1, "s": -1}),
+        ("\u03bcm", 1e-6, 0.0, {"m": 1}),
+        ("k\u03a9", 1e3, 0.0, {"kg": 1, "m": 2, "s": -3, "A": -2}),
+        ("\u2126", 1.0, 0.0, {"kg": 1, "m": 2, "s": -3, "A": -2}),
+    ],
+)
+def test_known_names(name: str, factor: float, offset: float, powers: dict[str, int]) -> None:
+    found = known_unit(name)
+    assert found is not None
+    assert (found.name, found.exponents) == (name, exponents(**powers))
+    assert found.factor == pytest.approx(factor, rel=1e-15)
+    assert found.offset == pytest.approx(offset, rel=1e-15)
+
+
+OTHERS = "Nm kgm N/m.s m/s/s m. .m /s () 10m 12 1e3 PS at zork mkg kdeg m- -- d99 m¹² µ k ² °m"
+
+
+@pytest.mark.parametrize("name", [*OTHERS.split(), "", " m", "m s"])
+def test_other_names_are_not(name: str) -> None:
+    assert known_unit(name) is None
+
+
+@given(
+    st.sampled_from(list(TEN)),
+    st.sampled_from(list(SYMBOLS)),
+    st.sampled_from(list(TEN)),
+    st.sampled_from(list(SYMBOLS)),
+    st.integers(1, 3),
+)
+def test_prefixes_are_powers_of_ten_to_the_bit(
+    above: str, one: str, below: str, other: str, power: int
+) -> None:
+    found = known_unit(f"{above}{one}/{below}{other}{power}")
+    expected = [SYMBOLS[one].get(b, 0) - power * SYMBOLS[other].get(b, 0) for b in BASE]
+    assert found is not None
+    assert found.exponents == tuple(expected)
+    assert found.factor == float(f"1e{TEN[above] - power * TEN[below]}")
+
+
+@given(st.text(alphabet="mskNKPagh1-2%./()*^°µ²⁻ ", max_size=8))
+def test_no_text_is_more_than_no_unit(name: str) -> None:
+    found = known_unit(name)
+    assert found is None or (math.isfinite(found.factor) and found.factor > 0.0)
+
+
+@pytest.mark.parametrize("name", ["Pa", "rad/s", "N.m", "W", "kN", "V.m^n", "N/m^n", "1", "%"])
+def test_a_unit_is_not_refused(name: str) -> None:
+    assert refusal(name) == ""
+
+
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [
+        ("newtons", "N"),
+        ("Newton", "N"),
+        ("kilograms", "kg"),
+        ("millimetre", "mm"),
+        ("metres/second", "m/s"),
+        ("newton metres", "N.m"),
+        ("Nm", "N.m"),
+        ("Volts", "V"),
+        ("KG", "kg"),
+        ("hertz", "Hz"),
+        ("kiloohm", "kOhm"),
+    ],
+)
+def test_what_is_meant_is_asked(name: str, meant: str) -> None:
+    assert refusal(name) == f"unit {name!r} is not known; did you mean {meant}?"
+
+
+@pytest.mark.parametrize("name", ["zork", "m/s/s", "V.n^m", "m s^n"])
+def test_where_nothing_is_near_the_form_is_said(name: str) -> None:
+    assert refusal(name) == f"unit {name!r} is not known; must be one like N, kg, m/s2, N.s/m"
+
+
+@pytest.mark.parametrize(
+    ("name", "base"),
+    [
+        ("Pa", {"kg": "1", "m": "-1", "s": "-2"}),
+        ("kN", {"kg": "1", "m": "1", "s": "-2", "factor": "1000.0"}),
+        ("degC", {"K": "1", "offset": "273.15"}),
+        ("1", {}),
+        ("V.m^n", None),
+    ],
+)
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_description_defines_them(fmi: Version, name: str, base: dict[str, str] | None) -> None:
+    variable = Variable("x", float, "input", name, 0.0)
+    root = fromstring(model_description(Description("X", "", [variable]), "g", fmi))
+    (unit,) = (unit for unit in root.iter("Unit") if unit.get("name") == name)
+    found = unit.find("BaseUnit")
+    assert (None if found is None else found.attrib) == base
