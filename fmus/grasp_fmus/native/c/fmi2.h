@@ -80,9 +80,9 @@ static void slave_release(const Host *host, void *memory)
 
 #define FMI2_NOT_THERE(Name, arguments)                                                            \
     FMI2_FUNCTION(Name, arguments,                                                                 \
-                  slave_refuse((Slave *)c, "fmi2" #Name ": is not supported by this FMU"))
+                  slave_refuse(c, "fmi2" #Name ": is not supported by this FMU"))
 
-#define FMI2_REFERENCES const fmi2ValueReference vr[], size_t n
+#define FMI2_REFERENCES fmi2Component c, const fmi2ValueReference vr[], size_t n
 
 /* Inquiry */
 
@@ -124,38 +124,28 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
 void fmi2FreeInstance(fmi2Component c)
 {
     if (c) {
-        slave_free((Slave *)c);
+        slave_free(c);
     }
 }
 
-fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fmi2Real tolerance,
-                               fmi2Real start, fmi2Boolean has_stop, fmi2Real stop)
-{
-    if (!c || slave_require((Slave *)c, "SetupExperiment", INSTANTIATED) != SLAVE_OK) {
-        return fmi2Error;
-    }
-    return slave_begin_at((Slave *)c, start);
-}
-
-fmi2Status fmi2EnterInitializationMode(fmi2Component c)
-{
-    if (!c || slave_require((Slave *)c, "EnterInitializationMode", INSTANTIATED) != SLAVE_OK) {
-        return fmi2Error;
-    }
-    return slave_enter_initialisation((Slave *)c);
-}
-
-FMI2_FUNCTION(ExitInitializationMode, (fmi2Component c), slave_exit_initialisation((Slave *)c))
-FMI2_FUNCTION(Terminate, (fmi2Component c), slave_terminate((Slave *)c))
-FMI2_FUNCTION(Reset, (fmi2Component c), slave_reset((Slave *)c))
+FMI2_FUNCTION(SetupExperiment,
+              (fmi2Component c, fmi2Boolean has_tolerance, fmi2Real tolerance, fmi2Real start,
+               fmi2Boolean has_stop, fmi2Real stop),
+              slave_require(c, "SetupExperiment", INSTANTIATED) ? fmi2Error
+                                                                : slave_begin_at(c, start))
+FMI2_FUNCTION(EnterInitializationMode, (fmi2Component c),
+              slave_enter(c, ((const Slave *)c)->values[SLAVE_TIME]))
+FMI2_FUNCTION(ExitInitializationMode, (fmi2Component c), slave_exit(c))
+FMI2_FUNCTION(Terminate, (fmi2Component c), slave_terminate(c))
+FMI2_FUNCTION(Reset, (fmi2Component c), slave_reset(c))
 
 /* Values */
 
 #define FMI2_VALUES(Type)                                                                          \
-    FMI2_FUNCTION(Get##Type, (fmi2Component c, FMI2_REFERENCES, fmi2##Type values[]),              \
-                  slave_get_##Type((Slave *)c, vr, n, values))                                     \
-    FMI2_FUNCTION(Set##Type, (fmi2Component c, FMI2_REFERENCES, const fmi2##Type values[]),        \
-                  slave_set_##Type((Slave *)c, vr, n, values))
+    FMI2_FUNCTION(Get##Type, (FMI2_REFERENCES, fmi2##Type values[]),                               \
+                  slave_get_##Type(c, vr, n, values))                                              \
+    FMI2_FUNCTION(Set##Type, (FMI2_REFERENCES, const fmi2##Type values[]),                         \
+                  slave_set_##Type(c, vr, n, values))
 
 SLAVE_VALUES(Real, KIND_REAL, fmi2Real)
 SLAVE_VALUES(Integer, KIND_INTEGER, fmi2Integer)
@@ -174,46 +164,35 @@ FMI2_VALUES(String)
 #define FMI2_OF_STATES(Name, arguments, result) FMI2_NOT_THERE(Name, arguments)
 #endif
 
-FMI2_OF_STATES(GetFMUstate, (fmi2Component c, fmi2FMUstate *state),
-               slave_get_state((Slave *)c, state))
-FMI2_OF_STATES(SetFMUstate, (fmi2Component c, fmi2FMUstate state),
-               slave_set_state((Slave *)c, state))
-FMI2_OF_STATES(FreeFMUstate, (fmi2Component c, fmi2FMUstate *state),
-               slave_free_state((Slave *)c, state))
+FMI2_OF_STATES(GetFMUstate, (fmi2Component c, fmi2FMUstate *state), slave_get_state(c, state))
+FMI2_OF_STATES(SetFMUstate, (fmi2Component c, fmi2FMUstate state), slave_set_state(c, state))
+FMI2_OF_STATES(FreeFMUstate, (fmi2Component c, fmi2FMUstate *state), slave_free_state(c, state))
 FMI2_OF_STATES(SerializedFMUstateSize, (fmi2Component c, fmi2FMUstate state, size_t *size),
-               slave_state_size((Slave *)c, state, size))
+               slave_state_size(c, state, size))
 FMI2_OF_STATES(SerializeFMUstate,
                (fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size),
-               slave_serialise((Slave *)c, state, bytes, size))
+               slave_serialise(c, state, bytes, size))
 FMI2_OF_STATES(DeSerializeFMUstate,
                (fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state),
-               slave_deserialise((Slave *)c, bytes, size, state))
+               slave_deserialise(c, bytes, size, state))
 
 /* Steps */
 
 FMI2_FUNCTION(DoStep, (fmi2Component c, fmi2Real time, fmi2Real h, fmi2Boolean no_state_prior),
-              slave_do_step((Slave *)c, time, h))
+              slave_do_step(c, time, h))
 
 /* After a step that was discarded: that it is not the end, and how far the slave came */
 
-fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value)
+static Status slave_get_time(const Slave *s, double *time)
 {
-    if (!c || kind != fmi2LastSuccessfulTime) {
-        return c ? fmi2Discard : fmi2Error;
-    }
-    *value = ((Slave *)c)->values[SLAVE_TIME];
-    return fmi2OK;
+    *time = s->values[SLAVE_TIME];
+    return SLAVE_OK;
 }
 
-fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value)
-{
-    if (!c || kind != fmi2Terminated) {
-        return c ? fmi2Discard : fmi2Error;
-    }
-    *value = fmi2False;
-    return fmi2OK;
-}
-
+FMI2_FUNCTION(GetRealStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2Real *value),
+              kind == fmi2LastSuccessfulTime ? slave_get_time(c, value) : fmi2Discard)
+FMI2_FUNCTION(GetBooleanStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value),
+              kind == fmi2Terminated ? (*value = fmi2False, fmi2OK) : fmi2Discard)
 FMI2_FUNCTION(GetIntegerStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value),
               fmi2Discard)
 FMI2_FUNCTION(GetStringStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2String *value),
@@ -224,11 +203,10 @@ FMI2_FUNCTION(GetStringStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2
 FMI2_NOT_THERE(CancelStep, (fmi2Component c))
 FMI2_NOT_THERE(GetStatus, (fmi2Component c, const fmi2StatusKind kind, fmi2Status *value))
 FMI2_NOT_THERE(SetRealInputDerivatives,
-               (fmi2Component c, FMI2_REFERENCES, const fmi2Integer order[], const fmi2Real v[]))
-FMI2_NOT_THERE(GetRealOutputDerivatives,
-               (fmi2Component c, FMI2_REFERENCES, const fmi2Integer order[], fmi2Real v[]))
+               (FMI2_REFERENCES, const fmi2Integer order[], const fmi2Real v[]))
+FMI2_NOT_THERE(GetRealOutputDerivatives, (FMI2_REFERENCES, const fmi2Integer order[], fmi2Real v[]))
 FMI2_NOT_THERE(GetDirectionalDerivative,
-               (fmi2Component c, FMI2_REFERENCES, const fmi2ValueReference known[], size_t n_known,
+               (FMI2_REFERENCES, const fmi2ValueReference known[], size_t n_known,
                 const fmi2Real dv_known[], fmi2Real dv[]))
 FMI2_NOT_THERE(EnterEventMode, (fmi2Component c))
 FMI2_NOT_THERE(NewDiscreteStates, (fmi2Component c, fmi2EventInfo *info))

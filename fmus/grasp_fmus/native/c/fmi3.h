@@ -65,9 +65,9 @@ static void slave_release(const Host *host, void *memory)
 
 #define FMI3_NOT_THERE(Name, arguments)                                                            \
     FMI3_FUNCTION(Name, arguments,                                                                 \
-                  slave_refuse((Slave *)c, "fmi3" #Name ": is not supported by this FMU"))
+                  slave_refuse(c, "fmi3" #Name ": is not supported by this FMU"))
 
-#define FMI3_REFERENCES const fmi3ValueReference vr[], size_t n
+#define FMI3_REFERENCES fmi3Instance c, const fmi3ValueReference vr[], size_t n
 
 /* Inquiry */
 
@@ -125,30 +125,17 @@ fmi3Instance fmi3InstantiateScheduledExecution(
 void fmi3FreeInstance(fmi3Instance c)
 {
     if (c) {
-        slave_free((Slave *)c);
+        slave_free(c);
     }
 }
 
-fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean has_tolerance,
-                                       fmi3Float64 tolerance, fmi3Float64 start,
-                                       fmi3Boolean has_stop, fmi3Float64 stop)
-{
-    Slave *s = (Slave *)c;
-    Status status;
-    if (!s || slave_require(s, "EnterInitializationMode", INSTANTIATED) != SLAVE_OK
-        || slave_begin_at(s, start) != SLAVE_OK) {
-        return fmi3Error;
-    }
-    status = slave_enter_initialisation(s);
-    if (status != SLAVE_OK) {
-        s->values[SLAVE_TIME] = 0.0;  /* as before: only this call sets it */
-    }
-    return status;
-}
-
-FMI3_FUNCTION(ExitInitializationMode, (fmi3Instance c), slave_exit_initialisation((Slave *)c))
-FMI3_FUNCTION(Terminate, (fmi3Instance c), slave_terminate((Slave *)c))
-FMI3_FUNCTION(Reset, (fmi3Instance c), slave_reset((Slave *)c))
+FMI3_FUNCTION(EnterInitializationMode,
+              (fmi3Instance c, fmi3Boolean has_tolerance, fmi3Float64 tolerance, fmi3Float64 start,
+               fmi3Boolean has_stop, fmi3Float64 stop),
+              slave_enter(c, start))
+FMI3_FUNCTION(ExitInitializationMode, (fmi3Instance c), slave_exit(c))
+FMI3_FUNCTION(Terminate, (fmi3Instance c), slave_terminate(c))
+FMI3_FUNCTION(Reset, (fmi3Instance c), slave_reset(c))
 
 /* Values. All variables are scalars: there are as many values as references. */
 
@@ -158,14 +145,10 @@ static Status fmi3_refuse_count(Slave *s)
 }
 
 #define FMI3_VALUES(Type)                                                                          \
-    FMI3_FUNCTION(Get##Type,                                                                       \
-                  (fmi3Instance c, FMI3_REFERENCES, fmi3##Type values[], size_t n_values),         \
-                  n_values == n ? slave_get_##Type((Slave *)c, vr, n, values)                      \
-                                : fmi3_refuse_count((Slave *)c))                                   \
-    FMI3_FUNCTION(Set##Type,                                                                       \
-                  (fmi3Instance c, FMI3_REFERENCES, const fmi3##Type values[], size_t n_values),   \
-                  n_values == n ? slave_set_##Type((Slave *)c, vr, n, values)                      \
-                                : fmi3_refuse_count((Slave *)c))
+    FMI3_FUNCTION(Get##Type, (FMI3_REFERENCES, fmi3##Type values[], size_t n_values),              \
+                  n_values == n ? slave_get_##Type(c, vr, n, values) : fmi3_refuse_count(c))       \
+    FMI3_FUNCTION(Set##Type, (FMI3_REFERENCES, const fmi3##Type values[], size_t n_values),        \
+                  n_values == n ? slave_set_##Type(c, vr, n, values) : fmi3_refuse_count(c))
 
 SLAVE_VALUES(Float64, KIND_REAL, fmi3Float64)
 SLAVE_VALUES(Int32, KIND_INTEGER, fmi3Int32)
@@ -182,11 +165,11 @@ FMI3_VALUES(String)
 
 #define FMI3_NONE(Name, Type, arguments)                                                           \
     FMI3_FUNCTION(Name, arguments,                                                                 \
-                  n ? slave_refuse_reference((Slave *)c, vr[0], #Type) : fmi3OK)
+                  n ? slave_refuse_reference(c, vr[0], #Type) : fmi3OK)
 
 #define FMI3_NONE_OF(Type)                                                                         \
-    FMI3_NONE(Get##Type, Type, (fmi3Instance c, FMI3_REFERENCES, fmi3##Type v[], size_t nv))       \
-    FMI3_NONE(Set##Type, Type, (fmi3Instance c, FMI3_REFERENCES, const fmi3##Type v[], size_t nv))
+    FMI3_NONE(Get##Type, Type, (FMI3_REFERENCES, fmi3##Type v[], size_t nv))       \
+    FMI3_NONE(Set##Type, Type, (FMI3_REFERENCES, const fmi3##Type v[], size_t nv))
 
 FMI3_NONE_OF(Float32)
 FMI3_NONE_OF(Int8)
@@ -195,12 +178,11 @@ FMI3_NONE_OF(Int16)
 FMI3_NONE_OF(UInt16)
 FMI3_NONE_OF(UInt32)
 FMI3_NONE_OF(UInt64)
-FMI3_NONE(GetBinary, Binary,
-          (fmi3Instance c, FMI3_REFERENCES, size_t sizes[], fmi3Binary v[], size_t nv))
+FMI3_NONE(GetBinary, Binary, (FMI3_REFERENCES, size_t sizes[], fmi3Binary v[], size_t nv))
 FMI3_NONE(SetBinary, Binary,
-          (fmi3Instance c, FMI3_REFERENCES, const size_t sizes[], const fmi3Binary v[], size_t nv))
-FMI3_NONE(GetClock, Clock, (fmi3Instance c, FMI3_REFERENCES, fmi3Clock v[]))
-FMI3_NONE(SetClock, Clock, (fmi3Instance c, FMI3_REFERENCES, const fmi3Clock v[]))
+          (FMI3_REFERENCES, const size_t sizes[], const fmi3Binary v[], size_t nv))
+FMI3_NONE(GetClock, Clock, (FMI3_REFERENCES, fmi3Clock v[]))
+FMI3_NONE(SetClock, Clock, (FMI3_REFERENCES, const fmi3Clock v[]))
 
 /* States */
 
@@ -210,20 +192,17 @@ FMI3_NONE(SetClock, Clock, (fmi3Instance c, FMI3_REFERENCES, const fmi3Clock v[]
 #define FMI3_OF_STATES(Name, arguments, result) FMI3_NOT_THERE(Name, arguments)
 #endif
 
-FMI3_OF_STATES(GetFMUState, (fmi3Instance c, fmi3FMUState *state),
-               slave_get_state((Slave *)c, state))
-FMI3_OF_STATES(SetFMUState, (fmi3Instance c, fmi3FMUState state),
-               slave_set_state((Slave *)c, state))
-FMI3_OF_STATES(FreeFMUState, (fmi3Instance c, fmi3FMUState *state),
-               slave_free_state((Slave *)c, state))
+FMI3_OF_STATES(GetFMUState, (fmi3Instance c, fmi3FMUState *state), slave_get_state(c, state))
+FMI3_OF_STATES(SetFMUState, (fmi3Instance c, fmi3FMUState state), slave_set_state(c, state))
+FMI3_OF_STATES(FreeFMUState, (fmi3Instance c, fmi3FMUState *state), slave_free_state(c, state))
 FMI3_OF_STATES(SerializedFMUStateSize, (fmi3Instance c, fmi3FMUState state, size_t *size),
-               slave_state_size((Slave *)c, state, size))
+               slave_state_size(c, state, size))
 FMI3_OF_STATES(SerializeFMUState,
                (fmi3Instance c, fmi3FMUState state, fmi3Byte bytes[], size_t size),
-               slave_serialise((Slave *)c, state, bytes, size))
+               slave_serialise(c, state, bytes, size))
 FMI3_OF_STATES(DeserializeFMUState,
                (fmi3Instance c, const fmi3Byte bytes[], size_t size, fmi3FMUState *state),
-               slave_deserialise((Slave *)c, bytes, size, state))
+               slave_deserialise(c, bytes, size, state))
 
 /* Steps */
 
@@ -242,12 +221,12 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 h, fmi3Boole
     if (!c) {
         return fmi3Error;
     }
-    status = slave_do_step((Slave *)c, time, h);
+    status = slave_do_step(c, time, h);
     fmi3_answer(needs_event);
     fmi3_answer(terminate);
     fmi3_answer(early_return);
     if (last_time) {
-        *last_time = ((Slave *)c)->values[SLAVE_TIME];
+        *last_time = ((const Slave *)c)->values[SLAVE_TIME];
     }
     return status;
 }
@@ -266,26 +245,25 @@ FMI3_NOT_THERE(GetVariableDependencies,
                 fmi3ValueReference independents[], size_t their_elements[],
                 fmi3DependencyKind kinds[], size_t n))
 FMI3_NOT_THERE(GetDirectionalDerivative,
-               (fmi3Instance c, FMI3_REFERENCES, const fmi3ValueReference known[], size_t n_known,
+               (FMI3_REFERENCES, const fmi3ValueReference known[], size_t n_known,
                 const fmi3Float64 seed[], size_t n_seed, fmi3Float64 found[], size_t n_found))
 FMI3_NOT_THERE(GetAdjointDerivative,
-               (fmi3Instance c, FMI3_REFERENCES, const fmi3ValueReference known[], size_t n_known,
+               (FMI3_REFERENCES, const fmi3ValueReference known[], size_t n_known,
                 const fmi3Float64 seed[], size_t n_seed, fmi3Float64 found[], size_t n_found))
-FMI3_NOT_THERE(GetOutputDerivatives, (fmi3Instance c, FMI3_REFERENCES, const fmi3Int32 orders[],
+FMI3_NOT_THERE(GetOutputDerivatives, (FMI3_REFERENCES, const fmi3Int32 orders[],
                                       fmi3Float64 values[], size_t n_values))
-FMI3_NOT_THERE(GetIntervalDecimal, (fmi3Instance c, FMI3_REFERENCES, fmi3Float64 intervals[],
+FMI3_NOT_THERE(GetIntervalDecimal, (FMI3_REFERENCES, fmi3Float64 intervals[],
                                     fmi3IntervalQualifier qualifiers[]))
 FMI3_NOT_THERE(GetIntervalFraction,
-               (fmi3Instance c, FMI3_REFERENCES, fmi3UInt64 counters[], fmi3UInt64 resolutions[],
+               (FMI3_REFERENCES, fmi3UInt64 counters[], fmi3UInt64 resolutions[],
                 fmi3IntervalQualifier qualifiers[]))
-FMI3_NOT_THERE(GetShiftDecimal, (fmi3Instance c, FMI3_REFERENCES, fmi3Float64 shifts[]))
-FMI3_NOT_THERE(GetShiftFraction,
-               (fmi3Instance c, FMI3_REFERENCES, fmi3UInt64 counters[], fmi3UInt64 resolutions[]))
-FMI3_NOT_THERE(SetIntervalDecimal, (fmi3Instance c, FMI3_REFERENCES, const fmi3Float64 intervals[]))
-FMI3_NOT_THERE(SetIntervalFraction, (fmi3Instance c, FMI3_REFERENCES, const fmi3UInt64 counters[],
+FMI3_NOT_THERE(GetShiftDecimal, (FMI3_REFERENCES, fmi3Float64 shifts[]))
+FMI3_NOT_THERE(GetShiftFraction, (FMI3_REFERENCES, fmi3UInt64 counters[], fmi3UInt64 resolutions[]))
+FMI3_NOT_THERE(SetIntervalDecimal, (FMI3_REFERENCES, const fmi3Float64 intervals[]))
+FMI3_NOT_THERE(SetIntervalFraction, (FMI3_REFERENCES, const fmi3UInt64 counters[],
                                      const fmi3UInt64 resolutions[]))
-FMI3_NOT_THERE(SetShiftDecimal, (fmi3Instance c, FMI3_REFERENCES, const fmi3Float64 shifts[]))
-FMI3_NOT_THERE(SetShiftFraction, (fmi3Instance c, FMI3_REFERENCES, const fmi3UInt64 counters[],
+FMI3_NOT_THERE(SetShiftDecimal, (FMI3_REFERENCES, const fmi3Float64 shifts[]))
+FMI3_NOT_THERE(SetShiftFraction, (FMI3_REFERENCES, const fmi3UInt64 counters[],
                                   const fmi3UInt64 resolutions[]))
 FMI3_NOT_THERE(EvaluateDiscreteStates, (fmi3Instance c))
 FMI3_NOT_THERE(UpdateDiscreteStates,
@@ -303,8 +281,7 @@ FMI3_NOT_THERE(GetContinuousStates, (fmi3Instance c, fmi3Float64 x[], size_t n))
 FMI3_NOT_THERE(GetNominalsOfContinuousStates, (fmi3Instance c, fmi3Float64 nominals[], size_t n))
 FMI3_NOT_THERE(GetNumberOfEventIndicators, (fmi3Instance c, size_t *n))
 FMI3_NOT_THERE(GetNumberOfContinuousStates, (fmi3Instance c, size_t *n))
-FMI3_NOT_THERE(ActivateModelPartition,
-               (fmi3Instance c, fmi3ValueReference clock, fmi3Float64 time))
+FMI3_NOT_THERE(ActivateModelPartition, (fmi3Instance c, fmi3ValueReference clock, fmi3Float64 time))
 
 #ifdef __GNUC__
 #pragma GCC diagnostic pop

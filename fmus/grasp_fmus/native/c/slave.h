@@ -194,7 +194,19 @@ static Status slave_go_on(Slave *s)
     return status;
 }
 
-static Status slave_exit_initialisation(Slave *s)
+static Status slave_enter(Slave *s, double start)
+{
+    double before = s->values[SLAVE_TIME];
+    Status status = slave_require(s, "EnterInitializationMode", INSTANTIATED);
+    status = status == SLAVE_OK ? slave_begin_at(s, start) : status;
+    status = status == SLAVE_OK ? slave_enter_initialisation(s) : status;
+    if (status != SLAVE_OK) {
+        s->values[SLAVE_TIME] = before;
+    }
+    return status;
+}
+
+static Status slave_exit(Slave *s)
 {
     Status status = slave_require(s, "ExitInitializationMode", INITIALISING);
     return status == SLAVE_OK ? slave_go_on(s) : status;
@@ -375,8 +387,8 @@ static Status slave_set_String(Slave *s, const uint32_t *vrs, size_t n, const ch
 
 /* Steps */
 
-/* What the host asks for, where it is not as most steps are */
-static Status slave_check_odd_step(Slave *s, double time, double h)
+/* That a step can be taken: where the last one ended, and not too long */
+static Status slave_check_step(Slave *s, double time, double h)
 {
     double own = s->values[SLAVE_TIME], apart = fabs(time - own);
     if (slave_require(s, "DoStep", STEPPING) != SLAVE_OK) {
@@ -393,16 +405,6 @@ static Status slave_check_odd_step(Slave *s, double time, double h)
         return slave_discarded(s);
     }
     return SLAVE_OK;
-}
-
-static Status slave_check_step(Slave *s, double time, double h)
-{
-    double apart = time - s->values[SLAVE_TIME];
-    if (s->phase == STEPPING && 0.0 < h && h <= DBL_MAX && h <= SLAVE_LONGEST_STEP
-        && -SLAVE_TIME_TOLERANCE <= apart && apart <= SLAVE_TIME_TOLERANCE) {
-        return SLAVE_OK;
-    }
-    return slave_check_odd_step(s, time, h);
 }
 
 #endif

@@ -164,8 +164,8 @@ static void text_put_digits(Text *text, const char *digits, int point, int most)
     }
 }
 
-/* Write a number; `digits` 0: the fewest of 15 to 17 that are read as the same number */
-static void text_put_double(Text *text, double v, int digits)
+/* As format(v, ".{digits}g") of Python; 0: the fewest of 15 to 17 that are read as the same one */
+static void text_general(Text *text, double v, int digits)
 {
     char all[TEXT_DIGITS], found[TEXT_DIGITS];
     uint64_t bits, m;
@@ -187,17 +187,11 @@ static void text_put_double(Text *text, double v, int digits)
     text_put_digits(text, found, at, digits > 0 ? digits : 16);
 }
 
-/* As format(v, ".{digits}g") of Python; digits from 1 to 17 */
-static void text_general(Text *text, double v, int digits)
-{
-    text_put_double(text, v, digits);
-}
-
 /* A number that is read back as the same one, with a point or an exponent: -1.0 */
 static void text_number(Text *text, double v)
 {
     size_t from = text->length;
-    text_put_double(text, v, 0);
+    text_general(text, v, 0);
     if (v - v == 0.0 && strcspn(text->at + from, ".e") == text->length - from) {
         text_put(text, ".0");
     }
