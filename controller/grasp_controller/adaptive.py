@@ -7,6 +7,7 @@ intensities as equal faces would give them, and fades as the fingers hold:
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated, NamedTuple
 
 from block_variables import Output
@@ -17,12 +18,17 @@ from .impact_reduction import Pair
 from .series import Inputs as Inputs
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)  # no slots: what is worked out from the parameters is kept
 class Params(series.Params):
     """The parameters of the three layers, and of what is learnt."""
 
     reflectance: reflectance_ratio.Params = reflectance_ratio.Params()
     hold: holding.Params = holding.Params()
+
+    @cached_property
+    def white(self) -> float:
+        """1/kappa of a white face, m.V^(1/n)."""
+        return reflectance_ratio.white(self.reflectance)
 
 
 class State(NamedTuple):
@@ -121,6 +127,6 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
         y.impact_reduction_force,
         ratio,
         ratio * x.estimate.deviation,
-        reflectance_ratio.gaps(p.reflectance, x.line_1, x.line_2),
+        reflectance_ratio.gaps(p.reflectance, p.white, x.line_1, x.line_2),
         x.hold,
     )

@@ -203,9 +203,13 @@ def ratio(p: Params, line_1: Line, line_2: Line) -> Estimate:
     return Estimate(beta, p.prior_deviation * sqrt(1.0 - gain), exp(-abs(beta)))
 
 
-def gaps(p: Params, line_1: Line, line_2: Line) -> tuple[float, float]:
+def white(p: Params) -> float:
+    """1/kappa of a white face, m.V^(1/n)."""
+    return exp(log(p.gain) / p.diffusion_exponent)
+
+
+def gaps(p: Params, white: float, line_1: Line, line_2: Line) -> tuple[float, float]:
     """The gaps in m that light and slopes tell; without a slope, that to a white face."""
-    white = exp(log(p.gain) / p.diffusion_exponent)
     return _gap(p, line_1, white), _gap(p, line_2, white)
 
 

@@ -26,7 +26,7 @@ ADVICE = {
     "Delete": "del is not in the subset; leave it out",
 }
 
-LARGE = 4
+LARGE = 30
 """A NamedTuple of more numbers goes by its address, unless the function changes or returns it."""
 
 

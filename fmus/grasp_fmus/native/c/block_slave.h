@@ -13,12 +13,18 @@ static const char *const texts[N_TEXTS + 1] = {""};
 typedef struct {
     BlockParams params;
     BlockInputs inputs;
-    BlockState state;
+    BlockState states[2];  /* the one that counts, and room for the one after a step */
+    int at;
 } Model;
 
 #include "slave.h"
 
 /* The block */
+
+static BlockState *slave_state(Slave *s)
+{
+    return &s->model.states[s->model.at];
+}
 
 /* Parameters that do not go together are refused */
 static Status slave_read_params(Slave *s)
@@ -64,9 +70,9 @@ static Status slave_refresh(Slave *s)
     }
     block_inputs(s->values, &s->model.inputs);
     if (s->phase < STEPPING) {
-        block_initial_state(&s->model.params, &s->model.inputs, &s->model.state);
+        block_initial_state(&s->model.params, &s->model.inputs, slave_state(s));
     }
-    block_outputs(&s->model.params, &s->model.state, &s->model.inputs, &y);
+    block_outputs(&s->model.params, slave_state(s), &s->model.inputs, &y);
     block_outputs_to(&y, outputs);
     if (!slave_outputs_are_finite(outputs)) {
         slave_put_not_finite(slave_say(s), outputs);
@@ -118,7 +124,7 @@ static Status slave_start(Slave *s)
     if (slave_read_params(s) != SLAVE_OK) {
         return SLAVE_ERROR;
     }
-    block_initial_state(&s->model.params, &s->model.inputs, &s->model.state);
+    block_initial_state(&s->model.params, &s->model.inputs, slave_state(s));
     return SLAVE_OK;
 }
 
@@ -139,7 +145,7 @@ static void slave_end(Slave *s)
 static Status slave_do_step(Slave *s, double time, double h)
 {
     double outputs[N_OUTPUTS + 1];
-    BlockState after;
+    BlockState *after = &s->model.states[!s->model.at];
     BlockOutputs y;
     Status status = slave_check_step(s, time, h);
     if (status != SLAVE_OK) {
@@ -151,14 +157,14 @@ static Status slave_do_step(Slave *s, double time, double h)
         }
         block_inputs(s->values, &s->model.inputs);
     }
-    block_step(&s->model.params, &s->model.state, &s->model.inputs, h, &after);
-    block_outputs(&s->model.params, &after, &s->model.inputs, &y);
+    block_step(&s->model.params, slave_state(s), &s->model.inputs, h, after);
+    block_outputs(&s->model.params, after, &s->model.inputs, &y);
     block_outputs_to(&y, outputs);
     if (!slave_outputs_are_finite(outputs)) {
         slave_put_not_finite(slave_say_step(s, h), outputs);
         return slave_discarded(s);
     }
-    s->model.state = after;
+    s->model.at = !s->model.at;
     memcpy(s->values + N_INPUTS, outputs, N_OUTPUTS * sizeof *outputs);
     s->values[SLAVE_TIME] = time + h;
     s->outputs_follow = 1;
@@ -236,7 +242,7 @@ static Status slave_get_state(Slave *s, void **place)
     for (i = 0; i < N_INPUTS + N_PARAMETERS; i++) {
         state_put(state, STATE_VALUES + i, s->values[state_variable(i)]);
     }
-    block_save(&s->model.state, numbers);
+    block_save(slave_state(s), numbers);
     for (i = 0; i < N_STATE; i++) {
         state_put(state, STATE_BLOCK + i, numbers[i]);
     }
@@ -260,7 +266,7 @@ static Status slave_set_state(Slave *s, const void *memory)
     for (i = 0; i < N_STATE; i++) {
         numbers[i] = state_number(state, STATE_BLOCK + i);
     }
-    block_load(numbers, &s->model.state);
+    block_load(numbers, slave_state(s));
     s->params_are_read = s->outputs_follow = 0;
     return SLAVE_OK;
 }
