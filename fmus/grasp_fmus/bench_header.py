@@ -13,19 +13,11 @@ from pathlib import Path
 from string import Template
 from typing import NamedTuple
 
-from .link.message import (
-    HEAD,
-    LARGEST_KEY,
-    LONGEST_STEP,
-    SHORTEST_HELLO,
-    TAG_SIZE,
-    VERSION,
-    Codec,
-    Value,
-    check_size,
-)
+from .link import message
+from .link.message import Codec, Value, check_size
 from .link.peer import TOO_LONG
 from .link.signature import ORDER, Causality, LinkVariable, Signature
+from .native.text import string
 
 TEMPLATE = Path(__file__).with_name("link.h.in")
 WIRE = Path(__file__).with_name("wire.h.in")
@@ -108,22 +100,22 @@ def bench_header(
         inputs_size=inputs.size,
         parameters_size=parameters.size,
         outputs_size=outputs.size,
-        answer_size=HEAD.size + TAG_SIZE + max(outputs.size, LARGEST_REASON),
+        answer_size=message.HEAD.size + message.TAG_SIZE + max(outputs.size, LARGEST_REASON),
     )
 
 
 def wire(prefix: str, signature: Signature) -> str:
     """Return the part of the protocol that both sides need, in C; names begin with the prefix."""
-    lines = [quoted(f"{line}\n") for line in signature.text.split("\n")[:-1]]
+    lines = [string(f"{line}\n") for line in signature.text.split("\n")[:-1]]
     octets = [f"0x{octet:02x}" for octet in signature.hash]
     return Template(_named(WIRE.read_text("utf-8"), prefix)).substitute(
         first_half_of_the_hash=", ".join(octets[:8]),
         second_half_of_the_hash=", ".join(octets[8:]),
         signature_lines="".join(f"        {line},\n" for line in lines),
-        version=VERSION,
-        shortest_hello=SHORTEST_HELLO,
-        longest_step=LONGEST_STEP,
-        largest_key=LARGEST_KEY,
+        version=message.VERSION,
+        shortest_hello=message.SHORTEST_HELLO,
+        longest_step=message.LONGEST_STEP,
+        largest_key=message.LARGEST_KEY,
     )
 
 
@@ -212,7 +204,7 @@ def _literal(v: LinkVariable, value: Value) -> str:
 def _check(group: Group) -> str:
     lines = [
         f"    if (!{group.prefix}_is_{v.kind.lower()}(body + {offset}))\n"
-        f"        return {quoted(v.name)};"
+        f"        return {string(v.name)};"
         for v, _, offset in group.members
     ]
     head = f"const char *{group.prefix}_check_{group.causality}s(const uint8_t *body)"
@@ -246,13 +238,6 @@ def _function(head: str, lines: list[str], unused: str, end: str = "}") -> str:
 def _lines(head: str, lines: list[str], none: str, end: str) -> str:
     """Return a definition, with `none` where there are no lines in it."""
     return "\n".join([head, *(lines or [none]), end, ""])
-
-
-def quoted(text: str) -> str:
-    """Return a string of C, the text in UTF-8; whatever needs it is written in octal."""
-    plain = {octet: chr(octet) for octet in range(0x20, 0x7F) if octet not in b'"\\?'}
-    plain |= {0x09: "\\t", 0x0A: "\\n"}
-    return '"' + "".join(plain.get(octet, f"\\{octet:03o}") for octet in text.encode()) + '"'
 
 
 def comment(text: str) -> str:

@@ -3,20 +3,18 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, NamedTuple, get_args, get_type_hints
+from typing import TYPE_CHECKING, Annotated, NamedTuple, get_args, get_type_hints
 
 from si_units import BASE, Unit
 
-from .bench_header import wire
-from .build import Plan, with_binaries
 from .description import ERROR, WARNING, Description, Experiment, Version
 from .link.message import PORT
 from .link.signature import LinkVariable, Signature
-from .native.sources import proxy_sources, with_description
-from .native.text import number, string
-from .package import HASH, Built, Model, write_members
-from .page import icon
 from .variable import TYPES, Scalar, Variable
+
+if TYPE_CHECKING:
+    from .build import Plan
+    from .package import Built
 
 PROTOCOL = Path(__file__).parent / "link/README.md"
 
@@ -98,14 +96,17 @@ class Original:
 
 
 def build_proxy(
-    target: Path, original: Original, plan: Plan, settings: Settings = DEFAULTS
-) -> Built:
+    target: Path, original: Original, plan: "Plan", settings: Settings = DEFAULTS
+) -> "Built":
     """Build the proxy of an FMU for the platforms of a plan; its parameters start at `settings`.
 
     A proxy that is there with the same content is left alone. ValueError where the stem of `target`
     is no identifier of C, a setting is out of its range, or a name is taken; CompilerError where a
     compiler fails.
     """
+    from .build import with_binaries  # only here, as below: they take time to load
+    from .package import write_members
+
     members = proxy_members(target, original, plan.fmi, settings)
     fmus = with_binaries([(target.stem, members)], plan, networked=True)
     return write_members(target, fmus[target.stem])
@@ -115,6 +116,11 @@ def proxy_members(
     target: Path, original: Original, fmi: Version = 2, settings: Settings = DEFAULTS
 ) -> dict[str, bytes]:
     """Return the files of a proxy but for the binaries, by name; ValueError as build_proxy()."""
+    from .bench_header import wire
+    from .native.sources import proxy_sources, with_description
+    from .package import HASH, Model
+    from .page import icon
+
     description = _description(target, original, settings)
     signature = shared_signature(original.variables)
     own = {
@@ -216,6 +222,8 @@ def _table(signature: Signature, variables: Sequence[Variable]) -> str:
 
     Of the original's no limits are checked here: the peer does so.
     """
+    from .native.text import number, string
+
     texts: list[str] = []
     rows = []
     for i, v in enumerate(variables):

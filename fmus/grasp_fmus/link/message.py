@@ -154,14 +154,11 @@ def exposed(path: Path) -> str:
 
 def check_size(signature: Signature) -> None:
     """ValueError where the variables do not fit into a datagram."""
-    for name, variables in (("a request", signature.request), ("an answer", signature.answer)):
-        size = HEAD.size + Codec(variables).size + TAG_SIZE
-        if size > LARGEST:
+    numbers = {"a request": len(signature.request), "an answer": len(signature.answer)}
+    sizes = {name: 8 * n for name, n in numbers.items()} | {"a HELLO": len(signature.text.encode())}
+    for name, size in sizes.items():
+        if (whole := HEAD.size + size + TAG_SIZE) > LARGEST:
+            n = numbers.get(name, len(signature.variables))
             raise ValueError(
-                f"{name} with {len(variables)} variables has {size} bytes: "
-                f"must be {LARGEST} at most"
+                f"{name} with {n} variables has {whole} bytes: must be {LARGEST} at most"
             )
-    if HEAD.size + len(signature.text.encode()) + TAG_SIZE > LARGEST:
-        raise ValueError(
-            f"{len(signature.variables)} variables: their names must fit into {LARGEST} bytes"
-        )

@@ -11,7 +11,7 @@ from secrets import token_bytes
 from typing import NamedTuple
 
 from . import message
-from .message import Codec, Message, Sealer, Value
+from .message import LARGEST, Codec, Message, Sealer, Value
 from .signature import Signature
 
 ALIVE = 1_000_000_000
@@ -29,10 +29,9 @@ class PeerCounters:
     """Counts of the datagrams received, by their fate.
 
     `steps` and `initialisations`: done. `repeated`: answered again. `duplicated`: steps that had
-    come already; `stale`: steps older than the last. `foreign`: of another interface, or of a
-    session that is not known; `other_version`: of another version of the protocol. `malformed`: no
-    datagram of this protocol, or with invalid values. `forged`: without the tag of the key. `busy`:
-    HELLOs while another session was under way.
+    come already; `stale`: older than the last. `foreign`: of another interface or session;
+    `other_version`: of the protocol. `malformed`: none of it, or with invalid values. `forged`:
+    without the tag of the key. `busy`: while another session was under way.
     """
 
     steps: int = 0
@@ -86,7 +85,7 @@ class Peer:
         self._last: Message | None = None
         self._last_answer: bytes | None = None
         self._refused: tuple[int, int, int] | None = None  # the request that failed, for its repeat
-        self._reason = b""  # why it failed
+        self._reason = ""  # why it failed
         self._stepping = False
 
     @property
@@ -121,7 +120,7 @@ class Peer:
         """Return the answer to the last request where it cannot be done; end the session."""
         m = self._last
         assert m is not None  # noqa: S101 - there is a request to answer
-        self._reason = _words(reason)
+        self._reason = reason
         self._over()
         self._refused = m.session, m.cookie, m.sequence
         return self._refuse(m, message.FAILED, self._reason)
@@ -139,8 +138,8 @@ class Peer:
             return self._count("malformed")
         if m.interface != self.signature.hash:
             self._count("foreign")
-            reason = _words(self.signature.difference(m.body))[: len(m.body)]
-            return self._refuse(m, message.OTHER_INTERFACE, reason)
+            reason = self.signature.difference(m.body)
+            return self._refuse(m, message.OTHER_INTERFACE, reason, len(m.body))
         if self._busy(m.session, now):
             self._count("busy")
             return self._refuse(m, message.BUSY)
@@ -174,7 +173,7 @@ class Peer:
         """Make the session of the first INITIALISE the one under way."""
         if m.kind == message.INITIALISE and self._refused == (m.session, m.cookie, m.sequence):
             self._count("repeated")
-            return self._refuse(m, message.FAILED, self._reason[: len(m.body)])
+            return self._refuse(m, message.FAILED, self._reason, len(m.body))
         if m.kind == message.END:
             return self._count("foreign")
         if m.kind == message.INITIALISE and self._busy(m.session, now):
@@ -209,8 +208,9 @@ class Peer:
     def _over(self) -> None:
         self._live, self._last, self._stepping = None, None, False
 
-    def _refuse(self, m: Message, code: int, reason: bytes = b"") -> bytes:
-        return self._pack(m, message.REFUSE, code, reason)
+    def _refuse(self, m: Message, code: int, reason: str = "", most: int = LARGEST) -> bytes:
+        words = reason.encode("ascii", "replace")[: min(most, LARGEST_REASON)]
+        return self._pack(m, message.REFUSE, code, words)
 
     def _pack(
         self, m: Message, kind: int, code: int = 0, body: bytes = b"", time: float = 0.0
@@ -218,7 +218,3 @@ class Peer:
         """Return an answer to the request `m`."""
         fields = (kind, code, self.signature.hash, m.session, m.cookie, m.sequence)
         return self._sealer.pack(Message(*fields, time, 0.0, m.sent, body))
-
-
-def _words(reason: str) -> bytes:
-    return reason.encode("ascii", "replace")[:LARGEST_REASON]

@@ -74,12 +74,8 @@ class Signature:
         return tuple(v for v in self.variables if v.causality == causality)
 
     def difference(self, proxy: bytes) -> str:
-        """Return the first variable that is another one in a proxy's text, which may be any bytes.
-
-        This signature is the peer's.
-        """
+        """Return the first variable that is another one in a proxy's text, which may be anything."""
         theirs = proxy.partition(b"\0")[0].decode(errors="replace")
         pairs = zip_longest(StringIO(theirs), StringIO(self.text), fillvalue="no more")
         first, own = next((pair for pair in pairs if pair[0] != pair[1]), ("no more", "no more"))
-        said = f"the proxy has {first}, the peer {own}"
-        return said.replace("\t", " ").replace("\n", "")
+        return f"the proxy has {first}, the peer {own}".replace("\t", " ").replace("\n", "")
