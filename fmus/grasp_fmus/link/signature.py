@@ -74,7 +74,7 @@ class Signature:
         return tuple(v for v in self.variables if v.causality == causality)
 
     def difference(self, proxy: bytes) -> str:
-        """Return the first variable that is another one in a proxy's text, which may be anything."""
+        """Return the first variable that is another one in a proxy's text, whatever that is."""
         theirs = proxy.partition(b"\0")[0].decode(errors="replace")
         pairs = zip_longest(StringIO(theirs), StringIO(self.text), fillvalue="no more")
         first, own = next((pair for pair in pairs if pair[0] != pair[1]), ("no more", "no more"))
