@@ -180,13 +180,6 @@ def test_what_the_file_prints_is_not_among_the_results(command: Run, tmp_path: P
     assert err == "imported\nstarted\n"
 
 
-def test_a_file_must_be_utf_8(command: Run, tmp_path: Path) -> None:
-    file = tmp_path / "lag.py"
-    file.write_bytes(LAG.encode("latin-1"))
-    said = f"grasp-cosim: build: {file}: byte {LAG.index('·')}: must be UTF-8\n"
-    assert command("build", file) == (2, "", said)
-
-
 def test_a_folder_in_the_place_of_the_fmu(command: Run, tmp_path: Path) -> None:
     (tmp_path / "out/FirstOrderLag.fmu").mkdir(parents=True)
     code, out, err = command("build", write(tmp_path, LAG), "--out", "out")
