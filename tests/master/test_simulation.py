@@ -118,6 +118,18 @@ def test_an_fmu_that_fails_on_the_way_leaves_what_was_recorded(
     assert simulate(grasp, stop=1e-3).complete  # the process is well
 
 
+@needs_pythonfmu
+@pytest.mark.skipif(sys.platform != "linux", reason="asks Linux which libraries are loaded")
+def test_a_python_fmu_that_refuses_a_step_says_why_and_is_freed(grasp: System) -> None:
+    """pythonfmu answers fmi2Fatal, after which FMI forbids to free it: ours outlives that."""
+    before = Path("/proc/self/maps").read_text().count("GripperPlant.so")
+    reason = r"^plant: \S+ returned fatal at t = 0 s: step of 20\.0 s: must be at most \S+ s "
+    for _ in range(3):
+        with pytest.raises(SimulationError, match=reason):
+            simulate(grasp.with_experiment(step=20.0, stop=40.0))
+    assert Path("/proc/self/maps").read_text().count("GripperPlant.so") == before
+
+
 def test_a_value_that_is_not_finite_ends_the_run_where_it_arises(
     grasp: System, altered: Altered
 ) -> None:
