@@ -124,19 +124,6 @@ static Status proxy_refuse_key(Slave *s, const char *reason)
     return slave_refuse(s, "proxy.key_file = %s: %s", slave_string(s, PROXY_KEY_FILE), reason);
 }
 
-/* Say that others have rights to the key file */
-static void proxy_say_exposed(Slave *s, const char *file, unsigned mode)
-{
-    char digits[] = "000";
-    int i;
-    for (i = 2; i >= 0; i--, mode >>= 3) {
-        digits[i] = (char)('0' + (mode & 7));
-    }
-    text_say(slave_say(s), "%s: others have access to this key, mode %s; must be 600: chmod 600 %s",
-             file, digits, file);
-    slave_log(s, SLAVE_WARNING);
-}
-
 /* Begin with the shared key in the file of the settings, or without one */
 static Status proxy_read_key(Slave *s)
 {
@@ -162,8 +149,9 @@ static Status proxy_read_key(Slave *s)
         return slave_refuse(s, "proxy.key_file = %s: key of %d bytes: must have 16 or more", file,
                             (int)size);
     }
-    if (net_exposed(file)) {
-        proxy_say_exposed(s, file, net_exposed(file));
+    if (net_is_exposed(file)) {
+        text_say(slave_say(s), "%s: others have access to this key: must be chmod 600", file);
+        slave_log(s, SLAVE_WARNING);
     }
     return SLAVE_OK;
 }

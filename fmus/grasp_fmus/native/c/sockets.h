@@ -142,7 +142,7 @@ static FILE *net_file(const char *path)
                                                                           : NULL;
 }
 
-static unsigned net_exposed(const char *path)
+static int net_is_exposed(const char *path)
 {
     (void)path;  /* nobody can tell */
     return 0;
@@ -236,11 +236,11 @@ static FILE *net_file(const char *path)
     return fopen(path, "rb");
 }
 
-/* The mode of a file that others have rights to; 0 where they have none */
-static unsigned net_exposed(const char *path)
+/* Whether others have rights to a file */
+static int net_is_exposed(const char *path)
 {
     struct stat file;
-    return stat(path, &file) == 0 && (file.st_mode & 077) ? (unsigned)file.st_mode & 07777 : 0;
+    return stat(path, &file) == 0 && (file.st_mode & 077);
 }
 
 static void net_yield(void)
@@ -284,23 +284,21 @@ static int net_address(const char *host, int port, struct sockaddr_in *address, 
 static Socket net_open(const char *host, int port, char *text)
 {
     struct sockaddr_in address;
-    Socket at;
+    Socket at = NO_SOCKET;
+    net_copy_text(text, "there is no network");
     if (net_begin()) {
-        net_copy_text(text, "there is no network");
         return NO_SOCKET;
     }
-    if (!net_address(host, port, &address, text)) {
-        net_shut(NO_SOCKET);
-        return NO_SOCKET;
-    }
-    at = socket(AF_INET, SOCK_DGRAM, 0);
-    if (at == NO_SOCKET || net_prepare(at)
-        || connect(at, (const struct sockaddr *)&address, sizeof address)) {
+    if (net_address(host, port, &address, text)) {
+        at = socket(AF_INET, SOCK_DGRAM, 0);
+        if (at != NO_SOCKET && !net_prepare(at)
+            && !connect(at, (const struct sockaddr *)&address, sizeof address)) {
+            return at;
+        }
         net_error_text(net_error(), text);
-        net_shut(at);
-        return NO_SOCKET;
     }
-    return at;
+    net_shut(at);
+    return NO_SOCKET;
 }
 
 /* 0 or the error */
