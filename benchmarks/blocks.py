@@ -74,8 +74,6 @@ def main() -> None:
     """Print the table."""
     head("block", "as shipped, best", "median", "all on, best", "median")
     for name, block in blocks().items():
-        if name == "GripperPlantMuJoCo":  # stays in Python
-            continue
         found = variables(declared(block))
         with tempfile.TemporaryDirectory(prefix="grasp_bench_") as folder:
             program = built(name, block, Path(folder))

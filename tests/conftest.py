@@ -21,12 +21,13 @@ import pytest
 from grasp_cosim import System, cli
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_fmus.build import build, build_native, shipped_twins
+from grasp_fmus.shipped import SHIPPED
 from hypothesis import find, settings
 from hypothesis import strategies as st
 from support import campaign, kinds
 from support.fmi2 import Fmu
 from support.kinds import Kind
-from support.packages import skip_where_it_cannot_run, skip_without_pythonfmu
+from support.packages import skip_without_pythonfmu
 
 pytest_plugins = ("support.hosts", "support.budget")
 
@@ -85,15 +86,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         drawn_by = random.Random(seed)
         files = {item.path: drawn_by.random() for item in items}
         items.sort(key=lambda item: (files[item.path], drawn_by.random()))
-    for item in [*items]:
+    for item in items:
         drawn: dict[str, Any] = getattr(getattr(item, "callspec", None), "params", {})
         kind, name = drawn.get("kind", "python"), str(drawn.get("name"))
-        if not kinds.exists(name, kind):
-            items.remove(item)
-        else:
-            tier = kinds.tier(name, kind, "altered" in getattr(item, "fixturenames", ()))
-            if tier != "quick" and not item.get_closest_marker("interop"):
-                item.add_marker(tier)
+        tier = kinds.tier(name, kind, "altered" in getattr(item, "fixturenames", ()))
+        if tier != "quick" and not item.get_closest_marker("interop"):
+            item.add_marker(tier)
     items.sort(key=lambda item: item.get_closest_marker("slow") is None)
 
 
@@ -216,6 +214,9 @@ def folder_of() -> Folder:
                     build(at)
                 else:
                     build_native(at, plan)
+                for file in at.iterdir():  # of a block that is no longer there
+                    if not file.name.startswith(tuple(f"{n}{c}" for n in SHIPPED for c in "._")):
+                        file.unlink()
             done[kind] = at
         return done[kind]
 
@@ -241,7 +242,7 @@ def load_as(folder_of: Folder, tmp_path_factory: pytest.TempPathFactory) -> Load
 
     def fmu(name: str, kind: Kind) -> Fmu:
         if kind == "python":
-            skip_where_it_cannot_run(name)
+            skip_without_pythonfmu()
         if (name, kind) not in loaded:
             folder = tmp_path_factory.mktemp(name)
             own = name in kinds.OWN

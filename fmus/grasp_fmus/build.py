@@ -89,8 +89,7 @@ def compiler_for(target: Target, asked: bool) -> Compiler:
 def build(out: Path) -> list[Built]:
     """Build the FMUs that Python runs into the folder `out`, with their cross-check files.
 
-    A file that is there with the same content is left alone. An FMU that needs other packages has
-    no cross-check files: it would be these that they check, and only where they are installed.
+    A file that is there with the same content is left alone.
     """
     return _brought(out, _kept(_build_python, "python"))
 
@@ -98,8 +97,8 @@ def build(out: Path) -> list[Built]:
 def build_native(out: Path, plan: Plan | None = None, names: Sequence[str] = ()) -> list[Built]:
     """Build native FMUs into the folder `out`, with their cross-check files; by default all.
 
-    ValueError, one line, for a name that is none or stays Python only, or where a compiler is
-    missing; CompilerError where one fails.
+    ValueError, one line, for a name that is none, or where a compiler is missing;
+    CompilerError where one fails.
     """
     return _brought(out, _kept_native(plan or planned(), chosen_names(names)))
 
@@ -123,31 +122,22 @@ def build_model(model: Model, out: Path, plan: Plan | None = None) -> Built:
     name = model.description.name
     if not plan:
         return write_python(out / f"{name}.fmu", model)
+    if model.requires:
+        raise ValueError(f"{name}: stays Python only, as it needs {', '.join(model.requires)}")
     fmus = with_binaries([(name, native_members(model, plan.fmi))], plan)
     return write_members(out / f"{name}.fmu", fmus[name])
 
 
 def chosen_names(names: Sequence[str] = ()) -> list[str]:
-    """Return these names of blocks that come with the package, by default all that can be native.
+    """Return these names of blocks that come with the package, by default all.
 
-    ValueError, one line, for one that is none, or that stays Python only.
+    ValueError, one line, for one that is none.
     """
-    only = python_only()
-    known = [name for name in SHIPPED if name not in only]
     for name in names:
-        if name not in known:
-            valid = f"no such block; must be of {', '.join(known)}, or a file NAME.py"
-            raise ValueError(only.get(name, f"{name}: {valid}"))
-    return [*names] or known
-
-
-def python_only() -> dict[str, str]:
-    """Why a block that comes with the package cannot be native, by its name."""
-    return {
-        name: f"{name}: stays Python only, as it needs {', '.join(shipped.requires)}"
-        for name, shipped in SHIPPED.items()
-        if shipped.requires
-    }
+        if name not in SHIPPED:
+            valid = f"must be of {', '.join(SHIPPED)}, or a file NAME.py"
+            raise ValueError(f"{name}: no such block; {valid}")
+    return [*names] or [*SHIPPED]
 
 
 def with_binaries(
@@ -260,11 +250,10 @@ def _brought(out: Path, made: Path) -> list[Built]:
 def _build_python(folder: Path) -> None:
     from .package import shipped_model, write_python
 
-    for name, shipped in SHIPPED.items():
+    for name in SHIPPED:
         model = shipped_model(name)
         write_python(folder / f"{name}.fmu", model)
-        if not shipped.requires:
-            _write_checks(folder, name, model.block)
+        _write_checks(folder, name, model.block)
 
 
 def _kept_native(

@@ -33,7 +33,8 @@ PARTS = ("Params", "Inputs", "State", "Outputs", "initial_state", "step", "outpu
 def own_model(file: Path) -> Iterator[Model]:
     """The model of the block in a file, which is among the imported modules meanwhile.
 
-    The block may import the standard library, and from PACKAGES.
+    The block may import the standard library, from PACKAGES, and what it names in REQUIRES, which
+    is not packed: it must be installed where the FMU runs.
     ValueError, one line, where the file is no such block.
     """
     is_identifier = file.stem.isascii() and file.stem.isidentifier()
@@ -58,6 +59,7 @@ def own_model(file: Path) -> Iterator[Model]:
             },
             block,
             file,
+            requires=_required(file, tree),
         )
 
 
@@ -76,24 +78,37 @@ def _parsed(file: Path) -> tuple[str, ast.Module]:
 def _check_imports(file: Path, text: str, tree: ast.Module) -> None:
     """ValueError where a module that the block imports could not be packed."""
     renamed = {text.count("\n", 0, match.start()) + 1 for match in IMPORT.finditer(text)}
+    installed = {*sys.stdlib_module_names, *_required(file, tree)}
     for node in ast.walk(tree):
         if not isinstance(node, ast.Import | ast.ImportFrom):
             continue
         top_level_from = isinstance(node, ast.ImportFrom) and node.col_offset == 0
         for module in _imported(node):
             package = module.partition(".")[0]
-            if package in sys.stdlib_module_names:
+            if package in installed:
                 continue
             if package not in PACKAGES:
                 raise ValueError(
                     f"{file}: line {node.lineno}: imports {module}, which would not be in the FMU; "
-                    f"must be of the standard library, or of {', '.join(PACKAGES)}"
+                    f"must be of the standard library, of {', '.join(PACKAGES)}, or in REQUIRES"
                 )
             if not (top_level_from and node.lineno in renamed):
                 raise ValueError(
                     f"{file}: line {node.lineno}: {package} must be imported at the top level, "
                     f"with single spaces, as: from {package} import ..."
                 )
+
+
+def _required(file: Path, tree: ast.Module) -> tuple[str, ...]:
+    """The packages in REQUIRES = ("NAME", ...), as it stands in the file."""
+    for node in tree.body:
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "REQUIRES":
+            names = node.value.elts if isinstance(node.value, ast.Tuple) else [node.value]
+            found = [name.value for name in names if isinstance(name, ast.Constant)]
+            if isinstance(node.value, ast.Tuple) and len(found) == len(names):
+                return tuple(map(str, found))
+            raise ValueError(f'{file}: line {node.lineno}: REQUIRES: must be as in ("numpy",)')
+    return ()
 
 
 def _imported(node: ast.Import | ast.ImportFrom) -> list[str]:

@@ -77,7 +77,6 @@ def shipped_model(name: str) -> Model:
         {f"{name}.py": script(f"from {package} import {module} as block")},
         block,
         picture=icon(name),
-        requires=shipped.requires,
     )
 
 

@@ -10,8 +10,6 @@ class Shipped(NamedTuple):
 
     summary: str
     module: str
-    requires: tuple[str, ...] = ()
-    """Packages that must be installed where it runs."""
 
 
 SHIPPED: Mapping[str, Shipped] = {
@@ -29,11 +27,6 @@ SHIPPED: Mapping[str, Shipped] = {
     ),
     "GripperPlantMovable": Shipped(
         "Two-finger gripper and a box on a floor, which slides and topples", "gripper_plant.movable"
-    ),
-    "GripperPlantMuJoCo": Shipped(
-        "Two-finger gripper and a box, fixed or on a floor, in MuJoCo",
-        "gripper_plant.mujoco_box",
-        ("mujoco",),
     ),
     "ProximitySensor": Shipped(
         "Optical proximity sensor of the reflected-light-intensity type, one channel",

@@ -11,6 +11,7 @@ from grasp_cosim import InputError, System, simulate
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.interface.obstacles import this_platform
 from grasp_fmus import package
+from grasp_fmus.build import build_block
 from support.both_engines import needs_compiler
 
 HERE = this_platform("2.0")
@@ -31,9 +32,11 @@ def foreign(fmus: Path, tmp_path: Path) -> Path:
     """
     folder = tmp_path / "foreign"
     folder.mkdir()
-    for name in ("GripperPlant", "ProximitySensor", "GraspController", "GripperPlantMuJoCo"):
+    for name in ("GripperPlant", "ProximitySensor", "GraspController", "SpringPlant"):
         file = f"{name}.fmu"
-        with zipfile.ZipFile(fmus / file) as whole, zipfile.ZipFile(folder / file, "w") as made:
+        own = name == "SpringPlant"
+        built = build_block(SPRING, tmp_path / "own").path if own else fmus / file
+        with zipfile.ZipFile(built) as whole, zipfile.ZipFile(folder / file, "w") as made:
             for member in whole.namelist():
                 data = whole.read(member)
                 made.writestr(member, for_another(data) if member.endswith(".so") else data)
@@ -107,11 +110,11 @@ def test_from_python_too(foreign: Path, grasp: System) -> None:
 
 @needs_compiler
 def test_what_has_no_twin_does_not_load(foreign: Path) -> None:
-    system = System.load(SYSTEM, foreign).swap("plant", foreign / "GripperPlantMuJoCo.fmu")
+    system = System.load(SYSTEM, foreign).swap("plant", foreign / "SpringPlant.fmu")
     with pytest.raises(InputError) as error:
         simulate(system, stop=0.1)
     assert str(error.value) == (
-        f"plant: {foreign}/GripperPlantMuJoCo.fmu {LACKS}; ask the vendor for an FMU with a binary "
+        f"plant: {foreign}/SpringPlant.fmu {LACKS}; ask the vendor for an FMU with a binary "
         f"for {HERE}, or make a native one of its block: grasp-cosim build --native"
     )
 

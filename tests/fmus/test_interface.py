@@ -112,12 +112,6 @@ object_height                 parameter  Real     m      0.1
 contact_height                parameter  Real     m      0.05
 floor_friction                parameter  Real     1      0.3
 """
-MUJOCO = """
-object_fixed                  parameter  Boolean  -      true
-fingertip_radius              parameter  Real     m      0.005
-contact_time_constant         parameter  Real     s      0.005
-timestep                      parameter  Real     s      0.0001
-"""
 ADAPTIVE = """
 reflectance_ratio             output     Real     1
 reflectance_ratio_standard_deviation  output  Real  1
@@ -140,7 +134,6 @@ FMUS = {
     "GripperPlant": PLANT + FRICTION,
     "GripperPlantCompliant": PLANT + FRICTION + COMPLIANT,
     "GripperPlantMovable": PLANT + FRICTION + MOVABLE,
-    "GripperPlantMuJoCo": PLANT + FRICTION + MOVABLE + MUJOCO,
     "ProximitySensor": SENSOR,
     "GraspController": CONTROLLER,
     "GraspControllerAdaptive": CONTROLLER + ADAPTIVE,

@@ -16,7 +16,6 @@ LONGEST = {
     "GripperPlant": 2.0,
     "GripperPlantCompliant": 2.0,
     "GripperPlantMovable": 2.0,
-    "GripperPlantMuJoCo": 0.2,
     "ProximitySensor": 2.0,
 }
 

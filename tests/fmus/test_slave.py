@@ -11,7 +11,7 @@ from grasp_fmus.contract import declared, unpacker
 from grasp_fmus.shipped import blocks
 from support.fmi2 import OK, Instance
 from support.kinds import Kind, all_kinds
-from support.packages import skip_where_it_cannot_run
+from support.packages import skip_without_pythonfmu
 
 pytestmark = all_kinds
 
@@ -26,7 +26,7 @@ def of(folder_of: Folder, kind: Kind) -> Path:
 
 @pytest.mark.parametrize("name", BLOCKS)
 def test_runs_in_plain_fmpy(of: Path, name: str) -> None:
-    skip_where_it_cannot_run(name)
+    skip_without_pythonfmu()
     result: Any = simulate_fmu(of / f"{name}.fmu", stop_time=0.01, validate=True)
     assert len(result) > 10
     assert all(np.isfinite(result[column]).all() for column in result.dtype.names)

@@ -28,7 +28,6 @@ STARTS: dict[str, dict[str, float]] = {
     "GripperPlant": CLOSED,
     "GripperPlantCompliant": CLOSED,
     "GripperPlantMovable": CLOSED,
-    "GripperPlantMuJoCo": {**CLOSED, "object_fixed": False},
     "ProximitySensor": {
         f"{stage}.enabled": True for stage in ("ambient", "noise", "adc", "filter", "median")
     },

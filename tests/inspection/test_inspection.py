@@ -181,7 +181,6 @@ def test_our_controller(fmus: Path) -> None:
         "GripperPlant",
         "GripperPlantCompliant",
         "GripperPlantMovable",
-        "GripperPlantMuJoCo",
         "ProximitySensor",
         "GraspController",
         "GraspControllerAdaptive",

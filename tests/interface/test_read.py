@@ -43,7 +43,7 @@ FMI_3 = """<fmiModelDescription fmiVersion="3.0" modelName="M" instantiationToke
   </ModelStructure></fmiModelDescription>"""
 
 OURS = (
-    "GripperPlant", "GripperPlantCompliant", "GripperPlantMovable", "GripperPlantMuJoCo",
+    "GripperPlant", "GripperPlantCompliant", "GripperPlantMovable",
     "ProximitySensor", "GraspController", "GraspControllerAdaptive",
 )  # fmt: skip
 Write = Callable[[str], Path]

@@ -12,7 +12,6 @@ from grasp_fmus.native.targets import Version
 from grasp_fmus.package import shipped_model
 from grasp_fmus.shipped import SHIPPED
 
-from .packages import PACKAGES
 from .slow import platforms, slow
 
 Kind = Literal["python", "native", "native FMI 3"]
@@ -33,16 +32,11 @@ OWN = {"SpringPlant": Path(__file__).parents[2] / "docs/spring_plant.py"}
 
 NAMES = (*SHIPPED, *OWN)
 
-TRANSLATED = [name for name in SHIPPED if name not in PACKAGES]
+TRANSLATED = [*SHIPPED]
 """The blocks that come with the package, of which there are native FMUs."""
 
 QUICK = "ProximitySensor"
 """It has variables of every type, and sub-steps."""
-
-
-def exists(name: str, kind: Kind) -> bool:
-    """Whether there is such an FMU: what needs a package stays Python only."""
-    return kind == "python" or name not in PACKAGES
 
 
 def tier(name: str, kind: Kind, compiles: bool) -> Literal["quick", "slow", "platforms"]:

@@ -104,7 +104,7 @@ def _native(
 ) -> "tuple[Sequence[Built], list[str]]":
     """What was built, and what is to be said of it."""
     from c_compilers import CompilerError
-    from grasp_fmus.build import build_block, build_native, planned, python_only
+    from grasp_fmus.build import build_block, build_native, planned
     from grasp_fmus.native.targets import targets
 
     plan = planned(targets(target.split(",")) if target is not None else (), fmi)
@@ -113,7 +113,7 @@ def _native(
     try:
         with waiting(f"building for {places}{FIRST if target else ''}"):
             if block is None:
-                return build_native(folder, plan), [*notes, *python_only().values()]
+                return build_native(folder, plan), notes
             if _is_name(block):
                 return build_native(folder, plan, [str(block)]), notes
             return [build_block(block, folder, plan)], notes
@@ -123,7 +123,7 @@ def _native(
 
 def _write_c(block: Path | None, folder: Path, as_json: bool) -> int:
     """Write the C of one block into the folder, of all into folders in it."""
-    from grasp_fmus.build import chosen_names, python_only
+    from grasp_fmus.build import chosen_names
     from grasp_fmus.native.c_only import write_c
     from grasp_fmus.own_block import own_model
     from grasp_fmus.package import shipped_model
@@ -136,11 +136,8 @@ def _write_c(block: Path | None, folder: Path, as_json: bool) -> int:
         models = {name: shipped_model(name) for name in names}
         places = {name: folder if block else folder / name for name in names}
         written = [path for name in names for path in write_c(places[name], models[name])]
-    notes = [] if block else [*python_only().values()]
-    for note in notes:
-        say(note)
     files = [str(path) for path in written]
-    show(as_json, {"files": files, "notes": notes}, "\n".join(f"{file}: written" for file in files))
+    show(as_json, {"files": files}, "\n".join(f"{file}: written" for file in files))
     return 0
 
 

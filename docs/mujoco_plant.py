@@ -1,7 +1,22 @@
-"""Two-finger parallel gripper and a box, computed by MuJoCo: a contact that is none of ours.
+r"""Two-finger gripper and a box, fixed or on a floor, in MuJoCo.
 
-mujoco is imported when the first state is made, so that all else works without it.
-Card: plant/README.md
+The fingers and the box of plant/README.md as bodies of [MuJoCo](https://mujoco.org): a contact
+solver that is none of ours, to check ours against. With `object_fixed` off the box stands free on
+the floor. Fingertips are smooth spheres of radius R on slides, at the height h; the gap is the
+shortest distance from the sphere to the box. `mujoco` is imported when the first state is made.
+
+A contact of MuJoCo is soft. Over a depth r, with the impedance d = 0.9999 and the time constant T,
+
+```math
+a = (1 - d)\,a_0 - d\,\left(\frac{2}{d\,T}\,\dot{r} + \frac{r}{(d\,T)^2}\right)
+```
+
+where a_0 is the acceleration without it: Baumgarte's form with alpha = beta = 1/T, but for d. A
+finger of mass m that is pressed with F rests (1 - d)·d·T^2·F/m deep. Coulomb and floor friction
+creep: at rest under F by (1 - d)·T·F/(2·m) per second, at most.
+
+Limits: no breakaway force above Coulomb friction; free flight is of first order in the timestep. An
+impact above e·(W/2 + R)/T goes through the box; near its top, where H - h < W/2, slower ones do.
 """
 
 from collections.abc import Callable
@@ -11,13 +26,15 @@ from math import ceil, cos, hypot, sin
 from typing import Annotated, Any, NamedTuple
 
 from block_variables import Parameter
+from gripper_plant import box as standing
+from gripper_plant import fingers
+from gripper_plant.box import Outputs as Outputs
+from gripper_plant.box import Shape
+from gripper_plant.fingers import Inputs as Inputs
+from gripper_plant.fingers import Pair as Pair
 
-from . import box as standing
-from . import fingers
-from .box import Outputs as Outputs
-from .box import Shape
-from .fingers import Inputs as Inputs
-from .fingers import Pair as Pair
+REQUIRES = ("mujoco",)
+"""Packages that must be installed where the FMU runs; they are not packed."""
 
 LONGEST_STEP = 0.2
 """s; a longer communication step is discarded: 20,000 of the shortest timesteps."""

@@ -1,0 +1,291 @@
+"""docs/mujoco_plant.py, the example of a plant that needs a package, against work by hand."""
+
+import re
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import islice
+from math import e, pi
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import mujoco_plant
+import numpy as np
+import pytest
+from conftest import Run
+from grasp_cosim import System, simulate
+from grasp_fmus.build import build_block
+from gripper_plant import friction
+from gripper_plant.box import GRAVITY
+from gripper_plant.fingers import Pair
+from mujoco_plant import IMPEDANCE, Inputs, Outputs, Params, State
+from support.cases import CASES
+
+FILE = Path(mujoco_plant.__file__)
+
+mujoco: Any = pytest.importorskip("mujoco", reason="NO mujoco: pip install '.[mujoco]'")
+
+NEAR = Params(initial_position=(0.04, -0.04), initial_object_position=0.0)
+"""5 mm of gap on either side."""
+
+FREE = replace(NEAR, object_fixed=False)
+FAR = replace(FREE, initial_position=(5.0, -5.0), floor_friction=1.0)
+"""The fingers are out of the way."""
+
+WEIGHT = FREE.object_mass * GRAVITY
+
+
+def run(p: Params, x: State, force: Pair, h: float) -> Iterator[State]:
+    while True:
+        x = mujoco_plant.step(p, x, Inputs(force), h)
+        yield x
+
+
+def after(p: Params, x: State, force: Pair, h: float, n: int) -> State:
+    return next(islice(run(p, x, force, h), n - 1, None))
+
+
+def start(p: Params) -> State:
+    return mujoco_plant.initial_state(p, Inputs())
+
+
+def seen(p: Params, x: State) -> Outputs:
+    return mujoco_plant.outputs(p, x, Inputs())
+
+
+def tilting(p: Params, rate: float) -> State:
+    """At the start, turning about an edge that sticks, the right one for a rate > 0 in rad/s."""
+    return moving(p, x=rate * 0.05, z=abs(rate) * 0.035, tilt=rate)
+
+
+def moving(p: Params, **rates: float) -> State:
+    """At the start, but for some of the coordinates' rates."""
+    names = ("x_1", "x_2", "x", "z", "tilt")
+    x = start(p)
+    a, b, c, d, f = (rates.get(name, 0.0) for name in names)
+    return x._replace(v=(a, b, c, d, f))
+
+
+def test_free_flight_is_a_parabola_to_first_order_in_the_timestep() -> None:
+    errors = []
+    for timestep in (1e-4, 5e-5, 2.5e-5):
+        p = Params(finger_mass=(0.5, 0.8), timestep=timestep)
+        y = seen(p, after(p, start(p), (0.7, -0.7), 1e-3, 400))
+        assert y.velocity == pytest.approx((0.7 * 0.4 / 0.5, -0.7 * 0.4 / 0.8), rel=1e-10)
+        assert y.contact_force == (0.0, 0.0)
+        exact = (0.11 + 0.5 * 0.7 / 0.5 * 0.16, -0.11 - 0.5 * 0.7 / 0.8 * 0.16)
+        errors.append([abs(a - b) for a, b in zip(y.position, exact, strict=True)])
+    assert max(errors[0]) < 0.5e-4 * 0.7 * 0.4 / 0.5 * 1.01
+    np.testing.assert_allclose(np.divide(errors[:-1], errors[1:]), 2.0, rtol=1e-3)
+
+
+def test_coulomb_friction_stops_a_finger_and_holds_it() -> None:
+    """After m·v^2/(2·F_C); at rest it creeps, as the card says, no faster."""
+    p = replace(Params(friction=friction.Params(coulomb=(0.5, 0.25))), timestep=1e-5)
+    x = after(p, moving(p, x_1=0.1, x_2=-0.1), (0.0, 0.0), 1e-3, 400)
+    ways = (x.q[0] - 0.11, -0.11 - x.q[1])
+    assert ways == pytest.approx((0.5 * 0.01 / 2.0 / 0.5, 0.5 * 0.01 / 2.0 / 0.25), rel=2e-3)
+    x = after(p, x, (-0.4, 0.2), 1e-3, 100)
+    creep = tuple((1.0 - IMPEDANCE) * p.contact_time_constant * f / (2 * 0.5) for f in (0.4, 0.2))
+    assert (-x.v[0], x.v[1]) == pytest.approx(creep, rel=1e-3)
+    x = after(p, x, (-0.6, 0.3), 1e-3, 100)
+    assert (-x.v[0], x.v[1]) == pytest.approx((0.1 * 0.1 / 0.5, 0.05 * 0.1 / 0.5), rel=1e-2)
+
+
+@pytest.mark.parametrize("time_constant", [0.002, 0.005, 0.02])
+def test_a_finger_at_rest_is_sunk_in_as_the_card_says(time_constant: float) -> None:
+    p = replace(NEAR, contact_time_constant=time_constant, finger_mass=(0.5, 0.8))
+    x = after(p, start(p), (-2.0, 3.0), 1e-3, 2000)
+    assert x.contact_force == pytest.approx((2.0, -3.0), rel=1e-9)
+    soft = (1.0 - IMPEDANCE) * IMPEDANCE * time_constant**2
+    depths = (0.035 - x.q[0], x.q[1] + 0.035)
+    assert depths == pytest.approx((soft * 2.0 / 0.5, soft * 3.0 / 0.8), rel=1e-3)
+    assert seen(p, x).gap == (0.0, 0.0)
+    assert seen(p, x).contact == (True, True)
+
+
+def test_an_impact_is_that_of_a_critical_damper_that_does_not_hold() -> None:
+    """It sinks in by v·T/e, and leaves with v/e^2, when the damper would begin to pull."""
+    p = replace(NEAR, timestep=1e-5)
+    states = list(islice(run(p, moving(p, x_1=-0.1), (0.0, 0.0), 1e-5), 12000))
+    x = states[-1]
+    impulse = 1e-5 * sum(y.contact_force[0] for y in states)
+    deepest = max(0.035 - y.q[0] for y in states)
+    assert deepest == pytest.approx(0.1 * 0.005 / e, rel=0.01)
+    assert x.v[0] == pytest.approx(0.1 / e**2, rel=0.01)
+    assert impulse == pytest.approx(0.5 * (0.1 + x.v[0]), rel=1e-9)
+
+
+@pytest.mark.parametrize("fixed", [True, False])
+def test_the_gap_is_the_distance_that_mujoco_measures(fixed: bool) -> None:
+    """Flat, tilted, above the top, beside the edge; not where the centre of a tip is inside."""
+    p = replace(NEAR, object_fixed=fixed, contact_height=0.07, fingertip_radius=0.01)
+    model = mujoco.MjModel.from_xml_string(mujoco_plant.mjcf(p))
+    data = mujoco.MjData(model)
+    box = model.geom("box").id
+    rng, kinds = Random(1), set()
+    for _ in range(200):
+        pose = (rng.uniform(-0.1, 0.1), rng.uniform(0.0, 0.12), rng.uniform(-1.6, 1.6))
+        q = (rng.uniform(-0.2, 0.2), rng.uniform(-0.2, 0.2), *((0.0, 0.05, 0.0) if fixed else pose))
+        data.qpos[:] = q[: model.nq]
+        mujoco.mj_forward(model, data)
+        y = seen(p, start(p)._replace(q=q))
+        for j, gap in enumerate(y.gap, 1):
+            tip = model.geom(f"finger {j}").id
+            distance = mujoco.mj_geomDistance(model, data, tip, box, 10.0, None)
+            if distance > -0.9 * p.fingertip_radius:
+                assert gap == pytest.approx(max(0.0, distance), abs=1e-9)
+                assert y.contact[j - 1] == (distance <= 0.0)
+                kinds.add((j, distance <= 0.0))
+    assert len(kinds) == 4
+
+
+@pytest.mark.parametrize("mu", [0.1, 0.3])
+def test_the_floor_brakes_a_sliding_box(mu: float) -> None:
+    p = replace(FAR, floor_friction=mu, object_height=0.02, contact_height=0.01, timestep=2.5e-5)
+    x = after(p, moving(p, x=0.2), (0.0, 0.0), 1e-3, 400)
+    assert x.q[2] == pytest.approx(0.04 / (2.0 * mu * GRAVITY), rel=0.01)
+    assert abs(x.v[2]) < 1e-6
+
+
+@pytest.mark.parametrize(("share", "topples"), [(0.95, False), (1.05, True)])
+def test_it_topples_above_m_g_w_over_2_h(share: float, topples: bool) -> None:
+    """Pressed on gently: beside a finger that touches it."""
+    p = replace(
+        FREE,
+        floor_friction=1.0,
+        contact_height=0.08,
+        initial_position=(5.0, -0.035),
+        friction=friction.Params(viscous=(0.0, 3.0)),
+    )
+    x = after(p, start(p), (0.0, share * WEIGHT * 0.07 / (2.0 * 0.08)), 1e-3, 4000)
+    assert x.toppled is topples
+    assert (abs(x.q[4]) > 0.5) is topples
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_toppled_box_lies_on_its_side(way: float) -> None:
+    x = after(FAR, tilting(FAR, 12.0 * way), (0.0, 0.0), 1e-3, 1500)
+    y = seen(FAR, x)
+    assert y.toppled
+    assert y.tilt == pytest.approx(way * pi / 2.0, abs=1e-3)
+    assert x.q[3] == pytest.approx(0.035, abs=1e-5)
+
+
+def trajectory(p: Params, x: State, n: int, seed: int) -> list[State]:
+    rng = Random(seed)
+    states = []
+    for _ in range(n):
+        x = mujoco_plant.step(p, x, Inputs((rng.uniform(-4.0, 1.0), rng.uniform(-1.0, 4.0))), 1e-3)
+        states.append(x)
+    return states
+
+
+BOTH = pytest.mark.parametrize(
+    "p", [NEAR, replace(FREE, friction=friction.Params(coulomb=(0.1, 0.2)))], ids=["fixed", "free"]
+)
+
+
+@BOTH
+def test_the_same_state_goes_on_with_the_same_bits(p: Params) -> None:
+    """In contact, from a simulator that has seen other states, and from a fresh one."""
+    trajectory(p, start(p), 300, 1)
+    expected = trajectory(p, start(p), 300, 2)
+    assert any(x.contact_force != (0.0, 0.0) for x in expected)
+    for k in (50, 120, 250):
+        rng = Random(2)
+        for _ in range(2 * (k + 1)):
+            rng.uniform(0.0, 1.0)
+        for fresh in (False, True):
+            if fresh:
+                mujoco_plant._idle.cache_clear()
+            x = expected[k]
+            random = Random()
+            random.setstate(rng.getstate())
+            for y in expected[k + 1 :]:
+                u = Inputs((random.uniform(-4.0, 1.0), random.uniform(-1.0, 4.0)))
+                x = mujoco_plant.step(p, x, u, 1e-3)
+                assert x == y
+
+
+# What is refused
+
+
+@pytest.mark.parametrize(
+    ("values", "text"),
+    [
+        (
+            {"contact_time_constant": 1.9e-4},
+            "contact_time_constant = 0.00019 s: must be from",
+        ),
+        ({"friction": friction.Params(static=(0.0, 0.2))}, "friction.static[2] = 0.2 N: must be "),
+    ],
+)
+def test_what_does_not_go_together_is_refused(values: dict[str, Any], text: str) -> None:
+    with pytest.raises(ValueError, match=f"^{re.escape(text)}"):
+        replace(Params(), **values)
+
+
+@pytest.mark.parametrize(
+    ("speed", "force", "text"),
+    [
+        (0.0, 1e300, "finger 1 could go 2e+293 m within a timestep of MuJoCo: must be at most "),
+        (1e15, 0.0, "MuJoCo warns of mjWARN_BADQPOS, mjWARN_BADQVEL"),
+    ],
+)
+def test_a_step_that_mujoco_could_not_take_is_not_taken(
+    speed: float, force: float, text: str
+) -> None:
+    x = start(FREE)._replace(v=(0.0, 0.0, speed, 0.0, 0.0))
+    with pytest.raises(ArithmeticError, match=f"^{re.escape(text)}"):
+        mujoco_plant.step(FREE, x, Inputs((force, 0.0)), 1e-3)
+    mujoco_plant.step(FREE, start(FREE), Inputs(), 1e-3)
+
+
+def test_without_mujoco_the_build_says_what_is_missing(
+    command: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    raised = "ModuleNotFoundError(\"No module named 'mujoco'\", name='mujoco')"
+    (tmp_path / "mujoco.py").write_text(f"raise {raised}\n", encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "mujoco")
+    code, _, said = command("build", FILE, "--out", tmp_path)
+    assert code == 2
+    assert said.endswith(f"initial_state(): ImportError: {mujoco_plant.MISSING}\n")
+
+
+# As an FMU
+
+
+def test_it_has_no_native_twin(command: Run, tmp_path: Path) -> None:
+    code, _, said = command("build", "--native", FILE, "--out", tmp_path)
+    assert (code, said) == (
+        2, "grasp-cosim: build: MujocoPlant: stays Python only, as it needs mujoco\n",
+    )  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("case", "stop"), [(1, 2.6), (2, 2.1)])
+def test_the_fingers_touch_when_those_of_our_plant_do(
+    grasp: System, tmp_path: Path, case: int, stop: float
+) -> None:
+    fmu = build_block(FILE, tmp_path).path
+    ours, theirs = (
+        simulate(system.with_values(CASES[case]), step=1e-4, stop=stop).metrics
+        for system in (grasp, grasp.swap("plant", fmu))
+    )
+    assert theirs["time_to_contact"] == pytest.approx(ours["time_to_contact"], abs=1e-5)
+    assert theirs["impact_velocity"] == pytest.approx(ours["impact_velocity"], rel=1e-3)
+
+
+@pytest.mark.slow
+def test_a_free_box_is_shifted_as_ours_is(grasp: System, fmus: Path, tmp_path: Path) -> None:
+    theirs = grasp.swap("plant", build_block(FILE, tmp_path).path)
+    ours = grasp.swap("plant", fmus / "GripperPlantMovable.fmu")
+    free = theirs.with_values({"plant.object_fixed": False})
+    shifts = [
+        simulate(system.with_values(CASES[1]), step=1e-3, stop=2.4).metrics["object_shift"]
+        for system in (ours, free)
+    ]
+    assert shifts[1] == pytest.approx(shifts[0], rel=5e-3)
