@@ -59,16 +59,11 @@ class Body(Expressions):
     def definition(self, name: str, types: Sequence[Type]) -> str:
         """The text of the function in C."""
         heads, given = [], self.node.args
-        handed_on = {
-            r.value.id
-            for r in ast.walk(self.node)
-            if isinstance(r, ast.Return) and isinstance(r.value, ast.Name)
-        }
-        copied = {*_names(self.node, ast.Store), *handed_on}
+        changed = {*_names(self.node, ast.Store)}
         if given.vararg or given.kwarg or given.kwonlyargs:
             self.refuse(self.node, "*args, **kwargs and keywords alone are not in the subset")
         for argument, kind in zip(given.args, types, strict=True):
-            c_name, is_copy = self.fresh(argument.arg, own=True), argument.arg in copied
+            c_name, is_copy = self.fresh(argument.arg, own=True), argument.arg in changed
             large = isinstance(kind, Record) and size(kind) > LARGE and not is_copy
             self.by_address += (large,)
             self.bound[argument.arg] = Value(
