@@ -390,6 +390,8 @@ class Expressions:
     def _matched(
         self, signature: inspect.Signature, given: Any, named: Any, node: ast.AST
     ) -> list[Value]:
+        if any(p.kind != p.POSITIONAL_OR_KEYWORD for p in signature.parameters.values()):
+            self.refuse(node, "*args, **kwargs and keywords alone are not in the subset")
         try:
             bound = signature.bind(*given, **named)
         except TypeError as error:

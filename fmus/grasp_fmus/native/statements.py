@@ -60,8 +60,6 @@ class Body(Expressions):
         """The text of the function in C."""
         heads, given = [], self.node.args
         changed = {*_names(self.node, ast.Store)}
-        if given.vararg or given.kwarg or given.kwonlyargs:
-            self.refuse(self.node, "*args, **kwargs and keywords alone are not in the subset")
         for argument, kind in zip(given.args, types, strict=True):
             c_name, is_copy = self.fresh(argument.arg, own=True), argument.arg in changed
             large = isinstance(kind, Record) and size(kind) > LARGE and not is_copy
