@@ -27,7 +27,7 @@ ADVICE = {
 }
 
 LARGE = 30
-"""A NamedTuple of more numbers goes by its address, unless the function changes or returns it."""
+"""A NamedTuple of more numbers goes by its address, unless the function changes it."""
 
 
 class Body(Expressions):
