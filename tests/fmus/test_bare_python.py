@@ -32,6 +32,8 @@ with Instance(fmu).initialise(**json.loads(values)) as instance:
         for name, seen in outputs.items():
             get = instance.get_boolean if name in fmu.booleans else instance.get_real
             seen.append(float(get([fmu.references[name]])[1][0]).hex())
+    assert [instance.step(0.0, -1.0) for _ in range(9)] == [instance.fmu.refused] * 9
+    assert "step size = -1.0 s" in instance.log[8].text
 imported = [sys.modules[name] for name in sys.modules.keys() - FIRST]
 files = filter(None, (getattr(module, "__file__", None) for module in imported))
 print(json.dumps([outputs, sysconfig.get_path("stdlib"), [str(Path(f).resolve()) for f in files]]))
