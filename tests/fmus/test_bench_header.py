@@ -3,7 +3,6 @@
 import hmac
 import random
 import shutil
-import signal
 import socket
 import struct
 import subprocess
@@ -12,7 +11,6 @@ from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from select import select
-from time import monotonic, sleep
 from typing import IO, Any, NamedTuple
 
 import pytest
@@ -743,21 +741,6 @@ def test_a_target_with_a_clock_of_its_own(target: Path) -> None:
         assert times[-1] > 0.0
         assert all((time / period).is_integer() for time in times)
         assert positions[-1] < 0.11
-
-
-@pytest.mark.slow
-def test_a_target_that_was_away_for_long_does_not_race_after_its_clock(target: Path) -> None:
-    with Target(target, "-", str(2**-9)) as bench:
-        bench.begin()
-        begin = monotonic()
-        for away in (True, False):
-            for _ in range(1000):  # in each of which it may do a period
-                bench.proxy.step(0.0, 0.1, bench.values())
-            if away:
-                bench.process.send_signal(signal.SIGSTOP)
-                sleep(1.2)
-                bench.process.send_signal(signal.SIGCONT)
-        assert monotonic() - begin - bench.proxy.outputs_time > 1.0
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,7 @@
 """The proxy of an FMU: everything of the original, a valid description, the same bytes again."""
 
 import json
-import os
 import shutil
-import subprocess
 import sys
 import zipfile
 from collections.abc import Callable
@@ -393,22 +391,6 @@ def test_the_files_in_it(fmus: Path, run: Run) -> None:
         assert text in page
     ElementTree.fromstring(page)
     assert "pthread" not in sources
-
-
-@pytest.mark.slow
-def test_the_same_options_give_the_same_bytes_in_any_process(fmus: Path, proxy: Proxy) -> None:
-    made = proxy(fmus / "GripperPlant.fmu")
-    first = made.read_bytes()
-    command = "import sys; from grasp_cosim.cli import main; sys.exit(main(sys.argv[1:]))"
-    version = str(read(made).get("fmiVersion"))[0]
-    made.unlink()
-    subprocess.run(
-        [sys.executable, "-c", command, "proxy", fmus / "GripperPlant.fmu", "-o", made, "--fmi",
-         version],
-        check=True, capture_output=True,
-        env={**os.environ, "PYTHONHASHSEED": "7", "PYTHONPATH": os.pathsep.join(sys.path)},
-    )  # fmt: skip
-    assert made.read_bytes() == first
 
 
 def test_an_unchanged_proxy_is_left_alone(fmus: Path, run: Run) -> None:
