@@ -153,8 +153,10 @@ def with_binaries(
     def jobs() -> Iterator[Job]:
         for name, files in fmus:
             complete[name] = files
+            below = {n.partition("sources/")[2]: data for n, data in files.items()}
+            sources = {n: data for n, data in below.items() if n}
             for target, compiler in plan.compilers.items():
-                yield job(name, _sources(files), target, compiler, networked)
+                yield job(name, sources, target, compiler, networked)
 
     with TemporaryDirectory(prefix="grasp_fmus_") as scratch:
         made = iter([library.read_bytes() for library in compile_all(jobs(), Path(scratch))])
@@ -175,12 +177,6 @@ def job(
     """Return what makes the library of an FMU, in which functions are called as in the standard."""
     libraries = NETWORKED.get(target.suffix, ()) if networked else ()
     return Job(name, sources, compiler, target.suffix, UNPREFIXED, libraries)
-
-
-def _sources(files: Members) -> dict[str, bytes]:
-    """Return the files of sources/ by their names there."""
-    place = "sources/"
-    return {n.removeprefix(place): data for n, data in files.items() if n.startswith(place)}
 
 
 # ------------------------------------------------------------------ what is kept

@@ -8,10 +8,10 @@ import inspect
 import sys
 import traceback
 from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stdout
+from contextlib import contextmanager, redirect_stdout, suppress
 from importlib.machinery import ModuleSpec, SourceFileLoader
 from importlib.util import module_from_spec
-from math import isfinite, isnan
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -103,10 +103,10 @@ def _required(file: Path, tree: ast.Module) -> tuple[str, ...]:
     """The packages in REQUIRES = ("NAME", ...), as it stands in the file."""
     for node in tree.body:
         if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "REQUIRES":
-            names = node.value.elts if isinstance(node.value, ast.Tuple) else [node.value]
-            found = [name.value for name in names if isinstance(name, ast.Constant)]
-            if isinstance(node.value, ast.Tuple) and len(found) == len(names):
-                return tuple(map(str, found))
+            with suppress(ValueError):  # no literal
+                names = ast.literal_eval(node.value)
+                if isinstance(names, tuple):
+                    return tuple(map(str, names))
             raise ValueError(f'{file}: line {node.lineno}: REQUIRES: must be as in ("numpy",)')
     return ()
 
@@ -159,10 +159,9 @@ def _variables(file: Path, block: Any) -> list[Variable]:
         second = block.step(p, first, u, 1e-3)
         _check_kinds(_kinds(second), kinds)
     outputs = [v for v in found if v.causality == "output"]
-    listed = unpacker(fields)
     with _tried(file, "outputs()"):
         for x in (first, second):
-            _check_outputs(outputs, listed(block.outputs(p, x, u)))
+            _check_outputs(outputs, unpacker(fields)(block.outputs(p, x, u)))
     return found
 
 
@@ -176,19 +175,16 @@ def _check_declaration(found: list[Variable]) -> None:
             raise ValueError(f"{v.name}: {text}")
         if not v.name.isascii():
             raise ValueError(f"{v.name}: must be of ASCII letters, digits and _")
+        if v.causality != "output" and type(v.start) is not v.kind:
+            raise ValueError(f"{v.name} = {v.start!r}: must be of type {v.kind.__name__}")
         if v.causality != "output":
-            _check_type(v, v.start, (v.kind,))
             v.check(v.start)
-
-
-def _check_type(v: Variable, value: Any, kinds: tuple[type[Any], ...]) -> None:
-    if type(value) not in kinds:
-        raise ValueError(f"{v.name} = {value!r}: must be of type {v.kind.__name__}")
 
 
 def _check_outputs(outputs: list[Variable], values: list[Any]) -> None:
     for v, value in zip(outputs, values, strict=True):
-        _check_type(v, value, (float, int) if v.kind is float else (v.kind,))
+        if type(value) not in ((float, int) if v.kind is float else (v.kind,)):
+            raise ValueError(f"{v.name} = {value!r}: must be of type {v.kind.__name__}")
         if not isfinite(value):
             raise ValueError(f"{v.name} = {value!r}{v.in_unit}: must be finite")
 
@@ -199,8 +195,6 @@ def _kinds(state: Any) -> dict[str, type[Any]]:
     for name, value in _scalars("State", state):
         if not isinstance(value, (float, int)):
             raise ValueError(f"{name} = {value!r}: must be float, bool, int, or a tuple of those")
-        if isnan(value):
-            raise ValueError(f"{name} = {value!r}: must be a number")
         kinds[name] = type(value)
     return kinds
 

@@ -121,7 +121,7 @@ WRONG = [
     ("u: Annotated[float,", "u: Annotated[int,", "declaration: TypeError: u is int: must be "),
     ("State(0.0)", "Stat(0.0)", "line 33: initial_state(): NameError: name 'Stat' is not "),
     ("Outputs(x.y)", "(x.y, x.y)", "outputs(): ValueError: too many values to unpack"),
-    ("exp(-h / p.time_constant)", "float('nan')", "step(): ValueError: State.y = nan: must "),
+    ("exp(-h / p.time_constant)", "float('nan')", "outputs(): ValueError: y = nan N: must "),
     ("Outputs(x.y)", "Outputs(x.y - 1e999)", "outputs(): ValueError: y = -inf N: must be fini"),
     ("Outputs(x.y)", "Outputs(x.y * 1e999 if x.y else 0.0)", "outputs(): ValueError: y = inf N"),
     ("Outputs(x.y)", "Outputs(x.y > 0)", "outputs(): ValueError: y = False: must be of type "),
