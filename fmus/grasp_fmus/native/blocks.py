@@ -175,7 +175,7 @@ def _checks(program: Program, cls: type[Any], path: str) -> Iterator[str]:
 def _scalars(program: Program, t: Type, path: str) -> Iterator[tuple[str, Type]]:
     """The numbers in a state, in the order of declaration."""
     if isinstance(t, Scalar):
-        yield path, t
+        yield "*x" if path == "x->" else path, t
     for i, kind in enumerate(parts(t)):
         yield from _scalars(program, kind, (path + program.member(t, i)).replace("->.", "->"))
 

@@ -92,7 +92,7 @@ class Expressions:
     def fresh(self, name: str, own: bool = False) -> str:
         """A name for a variable of C: the block's own, or one for what C cannot say at once."""
         found, count = identifier(name), 1
-        while found in self._used or (found in self.locals and not own):
+        while found in {*self._used, *self.program.names} or (found in self.locals and not own):
             count += 1
             found = f"{name}_{count}"
         self._used.add(found)

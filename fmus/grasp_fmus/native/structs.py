@@ -30,7 +30,7 @@ class Program:
         """The cached properties of the parameters, which are worked out when those are read."""
         self.bodies: list[str] = []
         self._sources: dict[str, Source] = {}
-        self._names: dict[str, Any] = {}
+        self.names: dict[str, Any] = {}
         self._constants: dict[Any, str] = {}
         self._structs: dict[Type, str] = {}
         self._definitions: list[str] = []
@@ -49,9 +49,10 @@ class Program:
     def unique(self, module: str, name: str, key: Any) -> str:
         """The name in C of what a module has, behind the module's own name."""
         short = module.rpartition(".")[2].removesuffix("_block")
+        short = f"{short}_py" if short in ("block", "text", "slave") else short
         wanted = "_".join([short, *(part.lstrip("_") for part in name.split("."))])
         found, count = wanted, 1
-        while self._names.setdefault(found, key) != key:
+        while self.names.setdefault(found, key) != key:
             count += 1
             found = f"{wanted}_{count}"
         return found
@@ -102,6 +103,7 @@ class Program:
         return "\n".join(self._definitions)
 
     def _define(self, t: Type, done: set[Type]) -> None:
+        t = plain(t)
         if isinstance(t, Scalar) or t in done:
             return
         done.add(t)
