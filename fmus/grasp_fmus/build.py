@@ -33,6 +33,9 @@ if TYPE_CHECKING:
 Members = Mapping[str, bytes]
 """The files in an FMU, by name."""
 
+During = Callable[[str], AbstractContextManager[object]]
+"""Makes of a line that says what is done the context to do it in."""
+
 SOURCES = (*PACKAGES, "c_compilers", "si_units", "grasp_fmus")
 """The packages that decide what FMUs hold."""
 
@@ -252,20 +255,11 @@ def _build_python(folder: Path) -> None:
         _write_checks(folder, name, model.block)
 
 
-def _kept_native(
-    plan: Plan,
-    names: Sequence[str],
-    during: Callable[[str], AbstractContextManager[object]] = nullcontext,
-) -> Path:
+def _kept_native(plan: Plan, names: Sequence[str], during: During = nullcontext) -> Path:
     return _kept(partial(_build_native, plan, names, during), "native", plan.key, *names)
 
 
-def _build_native(
-    plan: Plan,
-    names: Sequence[str],
-    during: Callable[[str], AbstractContextManager[object]],
-    folder: Path,
-) -> None:
+def _build_native(plan: Plan, names: Sequence[str], during: During, folder: Path) -> None:
     from .native.sources import native_members
     from .package import shipped_model, write_members
 
@@ -291,13 +285,10 @@ def _write_checks(folder: Path, name: str, block: Any) -> None:
 
 
 @functools.cache
-def shipped_twins(
-    during: Callable[[str], AbstractContextManager[object]] = nullcontext,
-) -> Path:
+def shipped_twins(during: During = nullcontext) -> Path:
     """The folder of the native FMUs of the blocks that come with the package, built if need be.
 
-    That is done in the context that `during` makes of a line that says so. NoTwinsError where it
-    cannot be.
+    NoTwinsError where they cannot be built.
     """
     try:
         return _kept_native(planned(), chosen_names(), during)
