@@ -7,8 +7,6 @@
 #ifndef CLIENT_H
 #define CLIENT_H
 
-#include <string.h>
-
 #define CLIENT_WINDOW 4096  /* requests back of which is known whether they were answered */
 #define CLIENT_REASON 1024  /* bytes of a reason, at most */
 

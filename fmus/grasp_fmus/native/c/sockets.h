@@ -31,6 +31,7 @@
 
 typedef SOCKET Socket;
 #define NO_SOCKET INVALID_SOCKET
+#define net_yield() SwitchToThread()
 
 #else
 
@@ -46,6 +47,7 @@ typedef SOCKET Socket;
 
 typedef int Socket;
 #define NO_SOCKET (-1)
+#define net_yield() sched_yield()
 
 #endif
 
@@ -148,11 +150,6 @@ static int net_is_exposed(const char *path)
     return 0;
 }
 
-static void net_yield(void)
-{
-    SwitchToThread();
-}
-
 /* Wait for a datagram, ns at most; what Windows rounds up to its ticks is waited for awake */
 static int net_wait(Socket at, int64_t ns)
 {
@@ -241,11 +238,6 @@ static int net_is_exposed(const char *path)
 {
     struct stat file;
     return stat(path, &file) == 0 && (file.st_mode & 077);
-}
-
-static void net_yield(void)
-{
-    sched_yield();
 }
 
 /* Wait for a datagram, ns at most */
