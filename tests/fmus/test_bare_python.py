@@ -86,7 +86,7 @@ def without_fmu(case: Case) -> dict[str, list[str]]:
 def test_runs_where_nothing_is_installed(fmus: Path, tmp_path: Path, version: str) -> None:
     """Bit for bit what the block gives, in every version the same."""
     venv = tmp_path / "venv"
-    create = [python(version).program, "-m", "venv", "--without-pip", str(venv)]
+    create = [python(version), "-m", "venv", "--without-pip", str(venv)]
     subprocess.run(create, check=True, cwd=tmp_path, env={"PATH": "/usr/bin:/bin"})
     (tmp_path / "support").mkdir()
     for module in (fmi2, fmi3):
