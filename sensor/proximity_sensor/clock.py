@@ -31,8 +31,10 @@ def due(wait: float) -> bool:
 def samples(p: Params, wait: float, h: float) -> tuple[int, float]:
     """How many instants lie in a step of h s, its end excluded, and the wait at its end.
 
-    wait is the time to the next instant in periods.
+    wait is the time to the next instant in periods. That of a state from bytes which were damaged
+    may be any: no instant is further behind than a period, or the step would not end.
     """
     periods = h * p.rate
+    wait = max(wait, -1.0)
     n = max(0, ceil(periods - wait - TOLERANCE))
     return n, wait + n - periods

@@ -86,3 +86,8 @@ def test_steps_too_short_to_matter_add_up() -> None:
     total, wait = counted(Params(1e4), [1e-11] * 1000)
     assert total == 1
     assert wait == pytest.approx(1.0 - 1e-4, abs=1e-12)
+
+
+def test_a_state_that_was_damaged_has_no_endless_step() -> None:
+    """Bytes of a state are guarded by no check sum: what waits since ever would be due for ever."""
+    assert clock.samples(Params(1000.0), -1e12, 1e-3)[0] == 2
