@@ -194,8 +194,9 @@ class Slave:
                 self._require("fmi2DoStep", STEPPING)
             if not 0.0 < step_size < inf:
                 raise ValueError(f"step size = {step_size} s: must be a finite number above 0")
-            if not abs(current_time - self._time) <= TIME_TOLERANCE:
-                self._check_time(current_time)
+            late = abs(current_time - self._time)
+            if not (late <= TIME_TOLERANCE or isclose(current_time, self._time, rel_tol=1e-12)):
+                raise ValueError(f"step from {current_time} s: must be from {self._time} s")
             if step_size > self._longest_step:
                 raise ValueError(f"step of {step_size} s: must be at most {self._longest_step:g} s")
             step, outputs, pack, unpack = self._functions
@@ -250,10 +251,6 @@ class Slave:
     def _require(self, call: str, phase: int) -> None:
         if self._phase != phase:
             raise ValueError(f"{call} {PHASES[self._phase]}: must be {PHASES[phase]}")
-
-    def _check_time(self, current_time: float) -> None:
-        if not isclose(current_time, self._time, rel_tol=1e-12):
-            raise ValueError(f"step from {current_time} s: must be from {self._time} s")
 
     def _check_settable(self, vrs: list[int]) -> None:
         for v in (self._variables[vr] for vr in vrs):
