@@ -5,7 +5,6 @@ What a block is, and how its fields are declared: fmus/README.md.
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, is_dataclass
-from dataclasses import fields as dataclass_fields
 from enum import IntEnum
 from functools import cache
 from itertools import count, islice
@@ -24,10 +23,7 @@ DECLARATIONS: dict[Causality, type[Parameter | Input | Output]] = {
 
 
 class Block(Protocol):
-    """The shape of a block module.
-
-    One that does not take a step of any length also has `LONGEST_STEP`, in s.
-    """
+    """The shape of a block module; it may have LONGEST_STEP, in s, too."""
 
     Params: type[Any]
     Inputs: type[Any]
@@ -194,7 +190,7 @@ def build_params(block: Block, fields: list[Field], values: list[Any]) -> Any:
 def _build(cls: type[Any], path: tuple[str, ...], values: dict[tuple[str, ...], Any]) -> Any:
     hints = _types(cls)  # type: ignore[arg-type]  # any type can be hashed
     fields = {}
-    for name in (f.name for f in dataclass_fields(cls)):
+    for name in cls.__dataclass_fields__:
         kind, at = hints[name], (*path, name)
         if is_dataclass(kind):
             fields[name] = _build(hints[name], at, values)
@@ -268,18 +264,7 @@ def _field(path: tuple[str, ...], causality: Causality, hint: Any, start: Any) -
         items = tuple((member.name.lower(), int(member)) for member in kind)
         enumeration = Enumeration(kind.__name__, items)
         limits, kind, start = (min(kind), max(kind)), int, int(start)
-    return Field(
-        path,
-        causality,
-        kind,
-        size,
-        declared.unit,
-        declared.description,
-        limits,
-        isinstance(declared, Parameter) and declared.tunable,
-        nominal,
-        now,
-        initially,
-        start,
-        enumeration,
-    )
+    meant = declared.unit, declared.description
+    tunable = isinstance(declared, Parameter) and declared.tunable
+    kept = path, causality, kind
+    return Field(*kept, size, *meant, limits, tunable, nominal, now, initially, start, enumeration)

@@ -2,24 +2,18 @@
 
 from dataclasses import dataclass
 from math import inf
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 from block_variables import check_value
 
 Scalar = float | bool | int | str
 Causality = Literal["input", "output", "parameter"]
 
-TYPES: dict[type[Scalar], Literal["Real", "Boolean", "Integer", "String"]] = {
-    float: "Real",
-    bool: "Boolean",
-    int: "Integer",
-    str: "String",
-}
+TYPES: dict[type[Scalar], str] = {float: "Real", bool: "Boolean", int: "Integer", str: "String"}
 """What FMI calls a kind of variable."""
 
 
-@dataclass(frozen=True, slots=True)
-class Enumeration:
+class Enumeration(NamedTuple):
     """A type of whole numbers that have names: the items, in the order they are shown in."""
 
     name: str
@@ -30,10 +24,8 @@ class Enumeration:
 class Variable:
     """A scalar variable; its value reference is its place among all.
 
-    limits are what a host may set. dependencies are the variables that reach an output without a
-    step, initial_dependencies those that do so in initialisation mode, by name. relative says that
-    it is a difference, to which the offset of a unit does not apply. An integer may be of an
-    enumeration.
+    limits are what a host may set; dependencies, by name, what reaches an output without a step,
+    and in initialisation mode. To a relative one the offset of its unit does not apply.
     """
 
     name: str
@@ -66,6 +58,5 @@ class Variable:
         if not isinstance(value, str):
             check_value(self.name, value, self.unit, low, high)
         elif not low <= len(value.encode()) <= high:
-            raise ValueError(
-                f"{self.name} = {value!r}: must have {low:g} to {high:g} bytes in UTF-8"
-            )
+            valid = f"must have {low:g} to {high:g} bytes in UTF-8"
+            raise ValueError(f"{self.name} = {value!r}: {valid}")

@@ -5,7 +5,7 @@ from math import inf, nan
 from typing import Annotated, Any
 
 import pytest
-from block_variables import Group, Input, Output, Parameter, check, check_value
+from block_variables import Group, Input, Output, Parameter, check
 
 
 @dataclass(frozen=True)
@@ -74,12 +74,6 @@ def test_a_value_out_of_its_range_is_one_line(
 @pytest.mark.parametrize("offset", [-1e300, 1.0])
 def test_both_ends_of_a_range_belong_to_it(bits: int, offset: float) -> None:
     assert Params(bits=bits, offset=offset, on=False).bits == bits
-
-
-def test_one_value() -> None:
-    check_value("x", 2.0, "m", 2.0, 2.0)
-    with pytest.raises(ValueError, match=r"^x = 2\.5 m: must be from 2 to 2 m$"):
-        check_value("x", 2.5, "m", 2.0, 2.0)
 
 
 @pytest.mark.parametrize(

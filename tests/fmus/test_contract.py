@@ -1,6 +1,6 @@
 """What annotations come to: fields, who reaches whom, and what a declaration must have."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, make_dataclass
 from enum import IntEnum
 from types import SimpleNamespace
 from typing import Annotated, Any, NamedTuple
@@ -114,11 +114,6 @@ def test_nominal_values() -> None:
     assert {f.nominal for f in FIELDS if f.kind is not float} == {None}
 
 
-def test_an_array_is_as_many_variables_as_it_has_elements() -> None:
-    causalities = [v.causality for v in variables(FIELDS)]
-    assert causalities == ["input"] * 5 + ["output"] * 6 + ["parameter"] * 6
-
-
 def feedthrough(fields: list[Field], initially: bool) -> dict[str, list[str]]:
     """The inputs that reach each output without a step, by name, as its variable has them."""
     found = variables(fields)
@@ -170,124 +165,25 @@ def test_what_the_block_refuses_is_passed_on() -> None:
         build_params(block(), FIELDS, [*range(11), 3.0, False, 7, 1.5, 0.2, 0.5])
 
 
-class BareInput(NamedTuple):
-    force: float = 0.0
+# What is refused
+
+SWITCH = Input("a switch")
+REACHED = Output("a distance", unit="m", nominal=1.0, depends_on=set())
 
 
-class BareOutput(NamedTuple):
-    force: float
+def put_in(hint: Any) -> dict[str, Any]:
+    """A block with one input, x."""
+    return {"inputs": NamedTuple("OneInput", [("x", hint)])}
 
 
-@dataclass(frozen=True)
-class BareParameter:
-    inner: Inner = Inner()
-    force: float = 0.0
+def put_out(hint: Any) -> dict[str, Any]:
+    """A block with one output, x."""
+    return {"outputs": NamedTuple("OneOutput", [("x", hint)])}
 
 
-@dataclass(frozen=True)
-class BareInside:
-    @dataclass(frozen=True)
-    class Layer:
-        force: float = 0.0
-
-    layer: Layer = Layer()
-
-
-@pytest.mark.parametrize(
-    ("parts", "name"),
-    [
-        ({"inputs": BareInput}, "force"),
-        ({"outputs": BareOutput}, "force"),
-        ({"params": BareParameter}, "force"),
-        ({"params": BareInside}, "layer.force"),
-    ],
-)
-def test_a_field_must_be_annotated(parts: dict[str, Any], name: str) -> None:
-    with pytest.raises(TypeError, match=rf"^{name}: .*Annotated\["):
-        declared(block(**parts))
-
-
-class Unreached(NamedTuple):
-    force: Annotated[float, Output("reached by who knows what", unit="N", nominal=1.0)]
-
-
-class UnreachedSwitch(NamedTuple):
-    force: Annotated[bool, Output("reached by who knows what")]
-
-
-@pytest.mark.parametrize("outputs", [Unreached, UnreachedSwitch])
-def test_an_output_must_say_what_reaches_it(outputs: Any) -> None:
-    with pytest.raises(
-        TypeError, match=r"^force: must have the inputs that reach it .*depends_on="
-    ):
-        declared(block(outputs=outputs))
-
-
-class InputWithoutNominal(NamedTuple):
-    force: Annotated[float, Input("how large?", unit="N")] = 1.0
-
-
-class PairWithoutNominal(NamedTuple):
-    force: Annotated[Pair, Input("how large?", unit="N")] = (1.0, 1.0)
-
-
-class OutputWithoutNominal(NamedTuple):
-    force: Annotated[float, Output("how large?", unit="N", depends_on=set())]
-
-
-@pytest.mark.parametrize(
-    "parts",
-    [
-        {"inputs": InputWithoutNominal},
-        {"inputs": PairWithoutNominal},
-        {"outputs": OutputWithoutNominal},
-    ],
-)
-def test_a_real_input_or_output_must_have_a_nominal_value(parts: dict[str, Any]) -> None:
-    with pytest.raises(TypeError, match=r"^force: must have a nominal value, nominal="):
-        declared(block(**parts))
-
-
-class Misspelt(NamedTuple):
-    misspelt: Annotated[float, Output("", unit="m", nominal=1.0, depends_on={"gapp"})]
-
-
-class NoPair(NamedTuple):
-    own: Annotated[Pair, Output("", unit="m", nominal=1.0, depends_on={"gap[j]"})]
-
-
-class NoSuchAtTheStart(NamedTuple):
-    late: Annotated[
-        float,
-        Output("", unit="m", nominal=1.0, depends_on=set(), depends_initially_on={"force[1]"}),
-    ]
-
-
-@pytest.mark.parametrize(
-    ("outputs", "message"),
-    [
-        (Misspelt, "misspelt: depends on gapp; valid: armed, force, gap$"),
-        (NoPair, r"own: depends on gap\[j\]; valid: armed, armed\[j\], force, force\[j\], gap$"),
-        (NoSuchAtTheStart, r"late: depends on force\[1\]; valid: armed, force, gap$"),
-    ],
-)
-def test_an_output_can_only_depend_on_inputs_that_there_are(outputs: Any, message: str) -> None:
-    with pytest.raises(TypeError, match=message):
-        declared(block(outputs=outputs))
-
-
-class NoInputs(NamedTuple):
-    """A source."""
-
-
-class Source(NamedTuple):
-    level: Annotated[float, Output("", unit="m", nominal=1.0, depends_on=set())]
-
-
-def test_a_block_may_have_no_inputs() -> None:
-    fields = declared(block(inputs=NoInputs, outputs=Source))
-    assert packer(NoInputs, fields)([None]) == NoInputs()
-    assert feedthrough(fields, initially=True) == {"level": []}
+def set_to(hint: Any, value: Any) -> dict[str, Any]:
+    """A block with one parameter, x."""
+    return {"params": make_dataclass("OneParameter", [("x", hint, value)], frozen=True)}
 
 
 class Colour(IntEnum):
@@ -295,109 +191,72 @@ class Colour(IntEnum):
     DARK_BLUE = 4
 
 
-@dataclass(frozen=True)
-class Coloured:
-    colour: Annotated[Colour, Parameter("a choice", tunable=True)] = Colour.DARK_BLUE
+LAYER = make_dataclass("Layer", [("x", float, 0.0)], frozen=True)
+REAL = "must be float, bool, a tuple of one of them$"
+WHOLE = "must be float, bool, int, a tuple of one of them, or an IntEnum$"
+NOMINAL, REACHES = "must have a nominal value, nominal=", "must have the inputs that reach it"
+PORT, LENGTH = Input("a distance", unit="m"), Parameter("a length", unit="m")
+
+WRONG = [
+    (put_in(float), r"x: .*Annotated\["),
+    (put_out(float), r"x: .*Annotated\["),
+    (set_to(float, 0.0), r"x: .*Annotated\["),
+    (set_to(LAYER, LAYER()), r"x\.x: .*Annotated\["),
+    (put_in(Annotated[float, LENGTH]), r"x: .*Annotated\["),
+    (put_out(Annotated[bool, Output("a switch")]), f"x: {REACHES}"),
+    (put_out(Annotated[float, Output("a force", unit="N", nominal=1.0)]), f"x: {REACHES}"),
+    (put_in(Annotated[float, PORT]), f"x: {NOMINAL}"),
+    (put_in(Annotated[Pair, PORT]), f"x: {NOMINAL}"),
+    (put_out(Annotated[float, Output("a force", depends_on=set())]), f"x: {NOMINAL}"),
+    (put_in(Annotated[Colour, SWITCH]), f"x is Colour: {REAL}"),
+    (put_in(Annotated[int, SWITCH]), f"x is int: {REAL}"),
+    (put_in(Annotated[tuple[int, int], SWITCH]), rf"x is tuple\[int, int\]: {REAL}"),
+    (put_in(Annotated[float | None, PORT]), rf"x is float \| None: {REAL}"),
+    (put_in(Annotated[tuple[float, ...], PORT]), rf"x is tuple\[float, ...\]: {REAL}"),
+    (put_in(Annotated[tuple[()], PORT]), rf"x is tuple\[\(\)\]: {REAL}"),
+    (put_out(Annotated[Colour, REACHED]), f"x is Colour: {REAL}"),
+    (put_out(Annotated[tuple[float, bool], REACHED]), rf"x is tuple\[float, bool\]: {REAL}"),
+    (set_to(Annotated[tuple[Colour, Colour], LENGTH], (1, 1)), rf"x is tuple\[.*Colour\]: {WHOLE}"),
+    (set_to(Annotated[float | None, LENGTH], None), rf"x is float \| None: {WHOLE}"),
+    (set_to(Annotated[str, LENGTH], ""), f"x is str: {WHOLE}"),
+    (put_out(Annotated[float, Output("", nominal=1.0, depends_on={"gapp"})]),
+     "x: depends on gapp; valid: armed, force, gap$"),
+    (put_out(Annotated[Pair, Output("", nominal=1.0, depends_on={"gap[j]"})]),
+     r"x: depends on gap\[j\]; valid: armed, armed\[j\], force, force\[j\], gap$"),
+    (put_out(Annotated[float, Output("", nominal=1.0, depends_on=set(),
+                                     depends_initially_on={"force[1]"})]),
+     r"x: depends on force\[1\]; valid: armed, force, gap$"),
+]  # fmt: skip
 
 
-def test_an_int_enum_is_an_enumeration() -> None:
-    (field,) = (f for f in declared(block(params=Coloured)) if f.causality == "parameter")
-    assert field.enumeration == Enumeration("Colour", (("red", 1), ("dark_blue", 4)))
-    assert (field.kind, field.limits, field.starts) == (int, (1, 4), [4])
-    (variable,) = (v for v in variables([field]))
-    assert (variable.type, variable.kind) == ("Enumeration", int)
-
-
-class Choice(NamedTuple):
-    colour: Annotated[Colour, Input("a choice")] = Colour.RED
-
-
-class WholeNumber(NamedTuple):
-    number: Annotated[int, Input("a number")] = 1
-
-
-class WholeNumbers(NamedTuple):
-    number: Annotated[tuple[int, int], Input("two numbers")] = (1, 2)
-
-
-class Chosen(NamedTuple):
-    colour: Annotated[Colour, Output("a choice", depends_on=set())]
-
-
-class Optional(NamedTuple):
-    gap: Annotated[float | None, Input("a distance", unit="m", nominal=0.1)] = None
-
-
-class Mixed(NamedTuple):
-    both: Annotated[
-        tuple[float, bool],
-        Output("a distance, and whether it is one", unit="m", nominal=0.1, depends_on=set()),
-    ]
-
-
-class AnyNumber(NamedTuple):
-    gap: Annotated[tuple[float, ...], Input("distances", unit="m", nominal=0.1)] = ()
-
-
-class NoNumber(NamedTuple):
-    gap: Annotated[tuple[()], Input("distances", unit="m", nominal=0.1)] = ()
-
-
-@dataclass(frozen=True)
-class Colours:
-    colours: Annotated[tuple[Colour, Colour], Parameter("two choices")] = (Colour.RED, Colour.RED)
-
-
-@dataclass(frozen=True)
-class OptionalParameter:
-    mass: Annotated[float | None, Parameter("a mass", unit="kg", low=0.5, high=7.0)] = None
-
-
-@dataclass(frozen=True)
-class Text:
-    title: Annotated[str, Parameter("a text")] = ""
-
-
-@pytest.mark.parametrize(
-    ("parts", "message"),
-    [
-        ({"inputs": Choice}, "colour is Colour: "),
-        ({"inputs": WholeNumber}, "number is int: "),
-        ({"inputs": WholeNumbers}, r"number is tuple\[int, int\]: "),
-        ({"outputs": Chosen}, "colour is Colour: "),
-        ({"inputs": Optional}, r"gap is float \| None: "),
-        ({"outputs": Mixed}, r"both is tuple\[float, bool\]: "),
-        ({"inputs": AnyNumber}, r"gap is tuple\[float, ...\]: "),
-        ({"inputs": NoNumber}, r"gap is tuple\[\(\)\]: "),
-    ],
-)
-def test_an_input_or_output_is_real_or_boolean(parts: dict[str, Any], message: str) -> None:
-    with pytest.raises(TypeError, match=f"^{message}must be float, bool, a tuple of one of them$"):
+@pytest.mark.parametrize(("parts", "said"), WRONG)
+def test_what_is_declared_wrong_is_said(parts: dict[str, Any], said: str) -> None:
+    with pytest.raises(TypeError, match=f"^{said}"):
         declared(block(**parts))
 
 
-@pytest.mark.parametrize(
-    ("params", "message"),
-    [
-        (Colours, r"colours is tuple\[.*Colour, .*Colour\]: "),
-        (OptionalParameter, r"mass is float \| None: "),
-        (Text, "title is str: "),
-    ],
-)
-def test_a_parameter_may_be_a_whole_number_or_a_choice_as_well(params: Any, message: str) -> None:
-    valid = "must be float, bool, int, a tuple of one of them, or an IntEnum"
-    with pytest.raises(TypeError, match=f"^{message}{valid}$"):
-        declared(block(params=params))
+# Shapes of their own
 
 
-def test_the_block_gets_the_member_of_an_enumeration() -> None:
-    fields = declared(block(params=Coloured))
-    values = [None] * (len([n for f in fields for n in f.names]) - 1)
-    assert build_params(block(params=Coloured), fields, [*values, 1]) == Coloured(Colour.RED)
+class NoInputs(NamedTuple):
+    """A source."""
 
 
-def test_a_number_between_the_items_is_refused_by_the_block() -> None:
-    fields = declared(block(params=Coloured))
-    values = [None] * (len([n for f in fields for n in f.names]) - 1)
+def test_a_block_may_have_no_inputs() -> None:
+    fields = declared(block(inputs=NoInputs, **put_out(Annotated[float, REACHED])))
+    assert packer(NoInputs, fields)([None]) == NoInputs()
+    assert feedthrough(fields, initially=True) == {"x": []}
+
+
+def test_an_int_enum_is_an_enumeration_and_the_block_gets_its_member() -> None:
+    parts = set_to(Annotated[Colour, Parameter("a choice", tunable=True)], Colour.DARK_BLUE)
+    fields = declared(block(**parts))
+    *others, field = fields
+    assert field.enumeration == Enumeration("Colour", (("red", 1), ("dark_blue", 4)))
+    assert (field.kind, field.limits, field.starts) == (int, (1, 4), [4])
+    (variable,) = variables([field])
+    assert (variable.type, variable.kind) == ("Enumeration", int)
+    rest = [None for f in others for _ in f.names]
+    assert build_params(block(**parts), fields, [*rest, 1]) == parts["params"](Colour.RED)
     with pytest.raises(ValueError, match="3 is not a valid Colour"):
-        build_params(block(params=Coloured), fields, [*values, 3])
+        build_params(block(**parts), fields, [*rest, 3])
