@@ -156,186 +156,79 @@ def looped(n: int, a: float) -> float:
 
 CASES = """
 a + b * c - a / 3.0
-1e400 if a > b else a + 1e-400
-float(any(pair[0] > pair[1] * a for pair in zip(p.weights, ROW)))
-a if p.n and p.flag or b else c
-float(not (p.n and 1.0 / a > b))
-(-1e300 - abs(a)) ** (2.5 + abs(b)) if a > 0.0 else b
-looped(int(1e15 * max(0.0, 1.0 - 1.0 / a)) if a == 0.0 else 3, b)
-a - (b - c)
-a - (b + c) * (a * b)
-(a / b) / c
-a / (b / c)
-a * (b / c)
--a ** 2.0
-(-a) ** b
-a ** -b
-a ** 2
-a ** 0.5 + b ** 0.5
-power(a, b)
-math.pow(a, 2.0)
--(-a)
-+a - -b
-- - -a
-p.n / 7
-p.n / p.n
-7 / p.n + a
-float(p.n * p.n + p.n - 2)
-float(-p.n) * a
-float(-p.n * 0)
--(p.n * 1.0)
-float((p.n * 1000000000) * 1000)
-p.n * a
-a * COUNT + NEGATIVE
-a + LIMIT * FAR - NEAR
-float(abs(p.n))
-abs(a) - abs(-b)
-min(a, b)
-max(a, b)
-min(a, b, c)
-max(a, b, c, 0.0)
-max(p.weights) + min(p.weights)
-min(*p.weights, a)
-max((a, b)) + min(0.0, c)
+a - (b - c) - (b + c) * (a * b)
+(a / b) / c - a / (b / c) + a * (b / c)
+-a ** 2.0 + (-a) ** b + a ** -b + a ** 2 + a ** 0.5
+power(a, b) - math.pow(a, 2.0)
+-(-a) + a - -b - - -a
+p.n / 7 + 7 / p.n + p.n / p.n
+float(p.n * p.n + p.n - 2) + float(-p.n) * a + float(-p.n * 0)
+-(p.n * 1.0) + p.n * a
+a * COUNT + NEGATIVE + LIMIT * FAR - NEAR
+float(abs(p.n)) + abs(a) - abs(-b)
+min(a, b) + max(a, b)
+max(a, b, c, 0.0) - min(*p.weights, a)
+max(p.weights) + min(p.weights) + max((a, b))
 float(max(0, p.n))
-sqrt(a) + sqrt(b)
-exp(a) * cos(b)
-exp(a) + exp(b)
-sin(a) / cos(b)
-1.0 / a + sqrt(b)
-sqrt(a) + 1.0 / b
-log(a) - 1.0 / b - sqrt(c)
-math.tan(a)
+min(max(a, -1.0), 1.0) * (b > 0.0)
+sqrt(a) + exp(a) * cos(b) - sin(a) / cos(b) + log(a)
+math.tan(a) + math.atan(a) + math.atan2(a, b)
 math.asin(a) + math.acos(a)
-math.atan(a)
-math.atan2(a, b)
-math.sinh(a)
-math.cosh(a)
-math.tanh(a)
-math.asinh(a)
-math.acosh(a)
-math.atanh(a)
-math.expm1(a)
-math.exp(-a)
-math.log(a)
-math.log(p.n)
-math.log2(a)
-math.log10(a)
-math.log1p(a)
-math.fabs(a)
-math.fmod(a, b)
-math.copysign(a, b)
+math.sinh(a) + math.cosh(a) + math.tanh(a)
+math.asinh(a) + math.acosh(a) + math.atanh(a)
+math.expm1(a) + math.log2(b) + math.log10(b) + math.log1p(b)
+math.fabs(a) + math.fmod(a, b) + math.copysign(a, b)
 math.ldexp(a, p.n)
 mathematics.pi * a + math.tau + math.e
-float(floor(a))
-float(ceil(a))
-float(math.trunc(a))
-float(int(a))
+float(floor(a)) + float(ceil(a)) * 0.5 + float(math.trunc(b)) + float(int(c))
 float(floor(a)) * 0.5 + float(-ceil(a))
-float(floor(a) - floor(b))
-float(int(p.flag) + 1)
-float(p.flag)
-p.flag * a
-p.flag + a
-(a > b) + a
-float((a > b) + (b > c))
-1.0 if p.n else -1.0
-1.0 if a else -1.0
-1.0 if not p.mode else -1.0
-1.0 if a < b < c else 0.0
-1.0 if a <= b + c <= c else 0.0
+float(floor(a) - floor(b)) + floor(a) / 3
+p.flag * a + (a > b) + float((a > b) + (b > c)) + float(int(p.flag) + 1)
+1.0 if p.n else -1.0 if a else c
+1.0 if a < b < c else 2.0 if a <= b + c <= c else 0.0
 1.0 if a < sqrt(b) < c else 0.0
-1.0 if a < sqrt(b) < 1.0 / c < a else 0.0
 1.0 if a != b == c else 0.0
-1.0 if (a < b) == (b < c) else 0.0
-1.0 if (a < b) != p.flag else 0.0
-1.0 if a < b and b < c or p.flag else 0.0
+1.0 if (a < b) == (b < c) else 2.0 if (a < b) != p.flag else 0.0
 1.0 if a < b and (b < c or p.flag) and not c < 0.0 else 0.0
-1.0 if a > 0.0 and 1.0 / a > b else 0.0
-1.0 if a == 0.0 or sqrt(b) / a > 1.0 / c else 0.0
 1.0 / a if a != 0.0 else 0.0
 sqrt(a) / b if a > 0.0 else log(b) / a if b > 0.0 else c
 (a if p.flag else b) * c
-a if a > b else b if b > c else c
-0 * a if p.flag else a
-(1 if a > 0.0 else 0) * c
-p.weights[0] + p.weights[-1] * p.weights[1]
-(a, b, c)[1]
-NESTED[1][0] + NESTED[0][1] + NESTED[1][1]
-(*p.weights[1:], a)[2]
-((a, b) * 3)[5]
-(a,) [0] + ((0.5,) * 4)[3]
-float(len(p.weights)) + float(len((a, b)))
-1.0 if any(w > a for w in p.weights) else 0.0
-1.0 if all(w > a for w in p.weights) else 0.0
-1.0 if all(1.0 / w > a for w in (b, c)) else 0.0
+p.weights[0] + p.weights[-1] * p.weights[1] + (a, b, c)[1]
+NESTED[1][0] + NESTED[0][1] + NESTED[1][1] + (*p.weights[1:], a)[2]
+((a, b) * 3)[5] + ((0.5,) * 4)[3] + float(len(p.weights))
+1.0 if any(w > a for w in p.weights) and not all(1.0 / w > a for w in (b, c)) else 0.0
 1.0 if any(g.gain > a for g in (p.inner, p.other)) else 0.0
-SPEED.get(p.mode, a)
-NUMBERED.get(p.n, 1.0 / a)
-1.0 if p.mode == Mode.FAST else 0.0
-1.0 if p.mode > Mode.OFF else 0.0
-1.0 if (not p.flag) == (a > b) else 0.0
-float(p.mode)
-p.mode * a + Mode.FAST
-float(Mode.FAST * 3 - p.mode)
-math.sqrt(p.mode)
-float(int(p.mode) * 2)
-signed(0.0) * a
-signed(1) * a
+min(tuple(w * v for w, v in zip(p.weights, (a, b, c), strict=True)))
+max(tuple(weighed(pair) for pair in zip(p.weights, ROW)))
+max(tuple(s + r for s, r in zip(both(a, b), Point(a, b, c).ends)))
+SPEED.get(p.mode, a) + NUMBERED.get(p.n, 1.0 / a)
+1.0 if p.mode == Mode.FAST else 2.0 if p.mode > Mode.OFF else 0.0
+p.mode * a + Mode.FAST + float(Mode.FAST * 3 - p.mode)
+signed(0.0) * a + signed(1) * a + clipped(a, b, c) + clipped(x=a, low=-1.0)
 both(a, b)[0] * both(b, a)[1]
-Point(a, b).x + Point(a, b).double
-Point(y=a, x=b).y
-Point(a, b)._replace(x=c).product
-Point(a, b)._replace(x=1.0 / c, y=sqrt(a)).y
-Point(*p.weights[:2]).product
-BODY.at.y + BODY.pair[1] + BODY.count * a
-BODY._replace(pair=(a, b), on=p.flag).pair[0]
-ORIGIN.product * a
-p.doubled + p.inner.both
-p.inner.gain ** p.inner.exponent
+Point(y=a, x=b).y + Point(a, b).double + Point(*p.weights[:2]).product
+Point(a, b)._replace(x=c).product + BODY._replace(pair=(a, b), on=p.flag).pair[0]
+BODY.at.y + BODY.pair[1] + BODY.count * a + ORIGIN.product
+p.doubled + p.inner.both + p.inner.gain ** p.inner.exponent
 inf if a > 0.0 else -inf
-clipped(p.n, -2, 2) * b
-clipped(a, -b, 1.0 / c)
-(1 if a > 0.0 else -1) * b
-min(max(a, -1.0), 1.0) * (b > 0.0)
-(a > 0.0) - (a < 0.0) + b
 a if a < inf else 1e300 * 1e10
-1.0 if ON else 0.0
 5e-324 * a + 1.7976931348623157e308 * b
 1_000.000_1 * a + 1e-3 + .5 + 2. + 1E5
-0.1 + 0.2 + a
 2.0 * cos(pi / 5.0) + sin(1e22) + exp(1.0)
-(0 if p.flag else -1) * a * 0.0
-(0 if p.flag else p.n) * p.n * 1.0
-(-p.n) ** 2.0
-1.0 if p.flag == (a > b) else 2.0
-float(p.flag) * a
-(a, (b, c))[1][0]
-float(len((a, b, c))) * a
-floor(a) / 3
-2 ** 0.5 * a
-abs(p.n) * -1.0
-min(p.weights) - max(*p.weights, a)
-abs(-p.n * 0) / -1.0
-1.0 if any(w > a for w in p.weights) and not all(w > b for w in p.weights) else c
-max(tuple(weighed(pair) for pair in zip(p.weights, ROW)))
-min(tuple(w * v for w, v in zip(p.weights, (a, b, c))))
-max(tuple(s + r for s, r in zip(both(a, b), Point(a, b, c).ends)))
+looped(int(3.5 + abs(a)) if abs(a) < 9.0 else 2, b)
 """
 
 BODIES = """
 x = a
 y = x
 x, y = y + 1.0, x
-x, y = y, x
-return x * 2.0 + y
+a, b, c = c, x, y
+(a, b), c = (c, a), b
+return a + 2.0 * b + 3.0 * c + x * y
 ---
 x, y = z, w = (a / b, c)
+(x, y), z = (y, x), z
 return x + y - z * w
----
-(x, y), z = (a, b), c
-x, (y, z) = z, (x, y)
-return x + 2.0 * y + 4.0 * z
 ---
 x = y = a / b
 x += 1.0
@@ -355,7 +248,7 @@ elif b > c:
     x = y + 1.0
 else:
     # a comment
-    x = 4.0
+    x = 4.0  # and one more
 return x
 ---
 total = 0.0
@@ -376,17 +269,29 @@ return float(count * 100 + n)
 ---
 total = 1.0
 for _ in range(COUNT):
-    total = total / a
-    a = a - 1.0
-return total
+    last = total / a
+    if last > 1e6:
+        break
+    total, a = last, a - 1.0
+return total + last
 ---
-number = a
-for _ in range(5):
-    half = floor(0.5 * number)
-    if number != 2.0 * half:
-        b = b + 1.0
-    number = half
-return b
+x = 0.0
+for i in range(3):
+    for j in range(i, 4):
+        for k in range(2):
+            if k > j:
+                break
+            x += a * i + j * b - k
+        else_ = x
+        x = else_ * 0.5
+return x
+---
+total = a
+for x, (y, _) in zip(p.weights, ((a, b), (b, c), (c, a))):
+    total = total * x + y
+for x in p.weights:
+    total -= x
+return total
 ---
 def_, int_, I, y1, unix, near, far, div, gamma, register, fault, free, exp_1 = (a,) * 13
 double, auto, case_, py_max, sqrt_, isnan, NULL, main, printf = (b,) * 9
@@ -398,122 +303,28 @@ return I + y1 + unix + near + far + div + gamma + register + fault + free + exp_
 Δx = b
 return θ * Δx
 ---
-for _ in range(3):
-    last = a
-    if last > b:
-        break
-    a = a + 1.0
-return last
----
 body = BODY
 for _ in range(2):
     body = body._replace(at=Point(a, b), count=body.count + 1)
-return body.at.product * body.count
----
 g = p.inner
-h = g.gain
-x: Pair = (a, b)
-y: float
-y = h
+x: Pair = (body.at.product, body.count * g.gain)
 pass
-return x[0] * y + g.both
+return x[0] * x[1] + g.both
 ---
-x = 0.0
-for i in range(3):
-    for j in range(i):
-        for k in range(j, 5):
-            if k > 3:
-                break
-            x += a * i + j * b - k
-        else_ = x
-        x = else_ * 0.5
-return x
----
-a, b = b, a / b
-a, b, c = c, a, b
-(a, b), c = (c, a), b
-return a + 2.0 * b + 3.0 * c
----
-def_ = Point(a, b)
-x, y, z = def_
-w = (x, y)
-(x, y), z = w, z + 1.0
-return x - y * z + w[0]
+point = Point(a, b)
+x, y, _ = point
+point = Point(y, x)
+return point.x - 2.0 * point.y
 ---
 x = -0.0 if a > 0.0 else 0.0
 n = -0
-y = n * x
 m = p.n * 0
-return 1.0 / (m - 1) + x + y
----
-x = (a, 1.0 / b)
-return sqrt(x[0]) if x[1] > 0.0 else (1.0 / c, x[0])[1]
----
-x = (a, b)
-x = (x[1], x[0])
-return x[0] - 2.0 * x[1]
----
-pt = Point(a, b)
-x, y, _ = pt
-pt = Point(y, x)
-return pt.x - 2.0 * pt.y
----
-q = p.inner
-r = q.both
-return r * a
----
-x = p.n
-y = x * 2
-return y * a
----
-x = a
-if b > 0.0:
-    x, y = b, x
-else:
-    y = c
-return x * y - x
+return 1.0 / (m - 1) + x + n * x
 ---
 for i in range(p.n):
     if i > 3:
         return a * i
 return b
----
-n = 0
-for i in range(5):
-    n = n + i
-return n / 7
----
-x = 1 if a > 0.0 else 0
-return -x * b
----
-t = ((a, b), (c, a))
-(q, r), (s, v) = t
-return q + 2.0 * r - s * v
----
-f = a > b
-g = not f
-return (1.0 if f else 2.0) + (3.0 if g else 4.0)
----
-w = tuple(x * y for x, y in zip(p.weights, (a, b, c)))
-return w[0] + w[1] * w[2]
----
-a = -a
-return a
----
-i = p.n
-for _ in range(i):
-    i = i + 1
-return i * 1.0
----
-total = 0.0
-for x, y in zip(p.weights, (a, b, c)):
-    total += x * y
-return total
----
-total = a
-for x in p.weights:
-    total = total * x + b
-return total
 """
 
 

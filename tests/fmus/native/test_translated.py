@@ -22,8 +22,10 @@ pytestmark = needs_gcc
 
 DOCS = Path(__file__).parents[3] / "docs"
 HAND = Path(__file__).with_name("hand.py")
-OWN = {path.stem: path for path in (*DOCS.glob("*_plant.py"), *DOCS.glob("*_controller.py"))}
-OWN |= {"moving_object": DOCS / "moving_object.py", "hand": HAND}
+OWN = {
+    name: DOCS / f"{name}.py" for name in ("spring_plant", "quotient_controller", "moving_object")
+}
+OWN["hand"] = HAND
 NAMES = [*TRANSLATED, *OWN]
 
 
