@@ -138,11 +138,11 @@ def test_one_file_to_compile_and_no_file_too_many(fmu: Unpacked) -> None:
 
 @every
 def test_c_that_old_and_strict_compilers_take(fmu: Unpacked) -> None:
-    """No `for (int`, no //, no extension of GNU, no complex, no array of variable length."""
+    """No `for (int`, no //, no complex, no array of variable length; of GNU's what GNU alone sees."""
     for path in sources(fmu).glob("*.[ch]"):
         if path.name.startswith(("fmi2Func", "fmi2Types", "fmi3Func", "fmi3Platf")):
             continue  # the standard's own
-        text = words(path)
+        text = re.sub(r"#ifdef __GNUC__.*?#endif", "", words(path), flags=re.DOTALL)
         found = re.findall(
             r"for\s*\(\s*(?:int|size_t|double)\b|//|__typeof__|__attribute__|__builtin|"
             r"\(\s*\{|\basm\b|\b_Complex\b|\balloca\b|\brestrict\b|\b__int128\b|0[bB][01]+\b",
