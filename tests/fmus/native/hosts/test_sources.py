@@ -138,7 +138,7 @@ def test_one_file_to_compile_and_no_file_too_many(fmu: Unpacked) -> None:
 
 @every
 def test_c_that_old_and_strict_compilers_take(fmu: Unpacked) -> None:
-    """No `for (int`, no //, no complex, no array of variable length; of GNU's what GNU alone sees."""
+    """No `for (int`, no //, no complex, no array of variable length; GNU's for GNU alone."""
     for path in sources(fmu).glob("*.[ch]"):
         if path.name.startswith(("fmi2Func", "fmi2Types", "fmi3Func", "fmi3Platf")):
             continue  # the standard's own
