@@ -94,7 +94,7 @@ def test_any_compiler_gives_the_bits_of_python(
 ) -> None:
     with block_of(name, tmp_path) as block:
         both = Both(name, block, tmp_path / "c", cc, [option])
-        assert sum(both.random_run(Random(seed), 30) for seed in range(20)) > 1_000
+        assert sum(both.random_run(Random(seed), 30) for seed in range(20)) > 500
 
 
 @pytest.mark.slow
