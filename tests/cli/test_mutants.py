@@ -25,7 +25,7 @@ def tried(kind: str, first: int, count: int, fmus: Path, folder: Path) -> list[d
     return [json.loads(line) for line in done.stdout.splitlines()]
 
 
-@pytest.mark.parametrize(("kind", "count"), [("toml", 12), ("ssp", 2)])
+@pytest.mark.parametrize(("kind", "count"), [("toml", 4), ("ssp", 2)])
 def test_a_few(kind: str, count: int, fmus: Path, tmp_path: Path) -> None:
     assert [e for e in tried(kind, 0, count, fmus, tmp_path) if e["wrong"]] == []
 

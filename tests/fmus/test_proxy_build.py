@@ -22,7 +22,7 @@ from grasp_cosim.system.parts import Component
 from grasp_fmus.bench_header import bench_header
 from grasp_fmus.page import icon
 from support import native_fmus
-from support.proxies import build_proxy, serving
+from support.proxies import ANY_PORT, build_proxy, serving
 from support.slow import platforms, slow
 from support.state_space import state_space
 
@@ -271,16 +271,17 @@ def test_arrays_are_exchanged_by_element(tmp_path: Path, run: Run) -> None:
         **{f"A[{i},{j}]": -1.0 / (i + j) for i in (1, 2, 3) for j in (1, 2, 3)},
     }  # fmt: skip
     with serving(original, Service(lockstep=True)) as server:
-        made = build_proxy(original, tmp_path / "Bench.fmu", server.address[1])
+        made = build_proxy(original, tmp_path / "Bench.fmu", ANY_PORT)
+        port = {"proxy.port": server.address[1]}
         assert [n for n in variables(made) if not n.startswith("proxy.")][:3] == [
             "u[1]", "u[2]", "u[3]",
         ]  # fmt: skip
         found = [
             simulate(
-                System("s", (Component("a", fmu, values),), (), 10**8, 10**9, "sequential"),
+                System("s", (Component("a", fmu, given),), (), 10**8, 10**9, "sequential"),
                 engine="python",
             )
-            for fmu in (original, made)
+            for fmu, given in ((original, values), (made, values | port))
         ]
     for k in (1, 2, 3):
         direct, there = (result[f"a.y[{k}]"] for result in found)

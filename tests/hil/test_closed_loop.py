@@ -10,7 +10,7 @@ import pytest
 from grasp_cosim import System, simulate
 from grasp_cosim.hil.served import Service
 from grasp_cosim.master.engine import Engine
-from support.proxies import build_proxy, serving
+from support.proxies import ANY_PORT, build_proxy, serving
 from support.slow import slow
 
 ENGINE: Engine = "python"
@@ -35,8 +35,9 @@ def on_the_bench(
         for name in names:
             fmu = system.component(name, "test").fmu
             server = stack.enter_context(serving(fmu, how))
-            proxy = build_proxy(fmu, folder / f"{name}_bench.fmu", server.address[1])
-            system = system.swap(name, proxy)
+            proxy = build_proxy(fmu, folder / f"{name}_bench.fmu", ANY_PORT)
+            port = {f"{name}.proxy.port": server.address[1]}
+            system = system.swap(name, proxy).with_values(port)
         yield system
 
 

@@ -17,7 +17,7 @@ from grasp_cosim.interface.interface import Value
 from grasp_cosim.master.engine import Engine
 from grasp_cosim.recording.result import Result
 from support.ports import kept_port
-from support.proxies import build_proxy, relaying, serving, wait_until
+from support.proxies import ANY_PORT, build_proxy, relaying, serving, wait_until
 from support.slow import slow
 
 ENGINE: Engine = "python"
@@ -55,8 +55,9 @@ def behind_a_relay(
         serving(fmu, Service(lockstep=True)) as server,
         relaying(server.address, bad, log=log.append) as relay,
     ):
-        proxy = build_proxy(fmu, folder / f"{name}_bench.fmu", relay.address[1])
-        yield system.swap(name, proxy), server, relay
+        proxy = build_proxy(fmu, folder / f"{name}_bench.fmu", ANY_PORT)
+        port = {f"{name}.proxy.port": relay.address[1]}
+        yield system.swap(name, proxy).with_values(port), server, relay
 
 
 @pytest.fixture(scope="module")
@@ -159,8 +160,8 @@ def test_the_peer_started_anew(slow_grasp: System, tmp_path: Path, resume: bool)
         "plant.proxy.resume": resume,
     }
     with kept_port() as port:
-        proxy = build_proxy(fmu, tmp_path / "plant_bench.fmu", port)
-        system = slow_grasp.swap("plant", proxy).with_values(values)
+        proxy = build_proxy(fmu, tmp_path / "plant_bench.fmu", ANY_PORT)
+        system = slow_grasp.swap("plant", proxy).with_values({**values, "plant.proxy.port": port})
         with serving(fmu, Service(lockstep=True), ("127.0.0.1", port)):
             session = simulate.session(system, engine=ENGINE)
             session.step(20)

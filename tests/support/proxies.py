@@ -177,6 +177,10 @@ def relaying(
             running.result()
 
 
+ANY_PORT = 5005
+"""For a proxy that gets its port before a run, so that its library is compiled once."""
+
+
 def build_proxy(fmu: Path, out: Path, port: int, *options: str) -> Path:
     """The proxy of an FMU, made by the command; it waits for an answer as long as it takes."""
     made = ["proxy", str(fmu), "-o", str(out), "--port", str(port), "--timeout", "30", *options]
