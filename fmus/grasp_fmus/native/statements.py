@@ -207,7 +207,9 @@ class Body(Expressions):
         c_name, kind = self.fresh(name, own=True), self.program.c(value.type, self.names)
         self.bound[name] = self._variables[name] = Value(c_name, value.type)
         if self._inside and self._inside[-1][name] < self._uses[name]:
-            self._late.setdefault(kind, []).append(c_name)
+            # A compiler does not see that a loop runs, which _go_on() has made sure of
+            start = {"double": " = 0.0", "int": " = 0"}.get(kind, " = {0}")
+            self._late.setdefault(kind, []).append(c_name + start * bool(self._exits))
             self.say(f"{c_name} = {value.text};")
         else:
             self.say(f"{kind} {c_name} = {value.text};")
