@@ -2,7 +2,7 @@
 
 A test's time is its own and that of the processes it waited for, without that of its fixtures: what
 many share, one of them makes. The quick tests take 0.4 s each at most, and 150 s together, 180 s in
-a fresh clone, where what is kept is built; a machine 1.7 times slower keeps the limits.
+a fresh clone, where what is kept is built; a machine twice as slow keeps the limits.
 """
 
 import os
@@ -12,7 +12,7 @@ import pytest
 from _pytest.runner import runtestprotocol
 from hypothesis import settings
 
-ONE, ALL = 1.0, 300.0
+ONE, ALL = 1.5, 400.0
 """s for a quick test, and for all with what the processes of the tests do besides."""
 
 LONGER = {"slow", "platforms", "interop"}
