@@ -20,7 +20,6 @@ from .types import (
     Type,
     UntranslatableError,
     fields,
-    joined,
     parts,
     said,
 )
@@ -90,7 +89,7 @@ def _part(
     if code.co_argcount != len(types):
         raise where.error(code.co_firstlineno, f"{name}: must have {len(types)} parameters")
     made = translated_function(program, function, types)
-    if must is not None and joined(made.returns, must) is None:
+    if must is not None and made.returns != must:
         reason = f"{name}: returns {said(made.returns)}; must be {said(must)}"
         raise where.error(code.co_firstlineno, reason)
     return made

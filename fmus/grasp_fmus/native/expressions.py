@@ -256,10 +256,9 @@ class Expressions:
 
     def common(self, a: Type, b: Type, node: ast.AST) -> Type:
         """The type of what may be of either; refused where there is none."""
-        kind = types.joined(a, b)
-        if kind is None:
+        if a != b:
             self.refuse(node, f"{ast.unparse(node)} is {said(a)} or {said(b)}: must be one of them")
-        return kind
+        return a
 
     # Tuples
 
@@ -402,9 +401,8 @@ class Expressions:
     def _record(self, node: ast.AST, cls: Any, given: Sequence[Value], named: Any) -> Value:
         found = self._matched(inspect.signature(cls), given, named, node)
         t = Record(cls)
-        for value, (name, kind) in zip(found, types.fields(t).items(), strict=True):
-            if self.common(value.type, kind, node) != kind:
-                self.refuse(node, f"{name} is {said(value.type)}: must be {said(kind)}")
+        for value, kind in zip(found, types.parts(t), strict=True):
+            self.common(value.type, kind, node)
         return self.display(found, t)
 
     def _method(self, node: ast.Call, of: ast.Attribute) -> Value:

@@ -145,13 +145,13 @@ class Program:
     def constant(self, names: dict[str, Any], name: str, value: Any) -> str:
         """The name in C of a constant of a module."""
         key = names["__name__"], name
+        c_name = self.unique(*key, key)
         if key not in self._constants:
             kind = of_value(value)
             assert kind  # noqa: S101 - the caller has made sure
-            c_name = self.unique(*key, key)
             line = f"static const {self.c(kind, names)} {c_name} = {self.literal(value)};"
             self._constants[key] = line
-        return self._constants[key].split(" = ")[0].rpartition(" ")[2]
+        return c_name
 
     def literal(self, value: Any) -> str:
         """A constant as an initialiser."""

@@ -108,16 +108,6 @@ def size(t: Type) -> int:
     return sum(map(size, parts(t))) or 1
 
 
-def joined(a: Type, b: Type) -> Type | None:
-    """The type of what may be either; None where they do not go together."""
-    if a == b:
-        return a
-    if isinstance(a, Tuple) and isinstance(b, Tuple) and len(a.items) == len(b.items):
-        items = tuple(joined(x, y) for x, y in zip(a.items, b.items, strict=True))
-        return Tuple(tuple(i for i in items if i)) if all(items) else None
-    return None
-
-
 def plain(t: Type) -> Type:
     """The type as C has it: a whole number is a double."""
     if isinstance(t, Tuple):
