@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from c_compilers import Compiler, CompilerError, Job, cache, compile_all, find_compiler
 
 from .native.targets import Target, Version, folders, here, universal
-from .package import Built, card_file, package_folder, write_file
+from .package import Built, card_file, package_folder, write_built
 from .shipped import PACKAGES, SHIPPED
 
 if TYPE_CHECKING:
@@ -236,13 +236,8 @@ def _brought(out: Path, made: Path) -> list[Built]:
     """Bring the folder `out` up to date with one that was made; return its FMUs."""
     built = []
     for file in sorted(made.iterdir()):
-        target, data = out / file.name, file.read_bytes()
-        before = target.read_bytes() if target.is_file() else None
-        if data != before:
-            write_file(target, data)
-        if file.suffix == ".fmu":
-            same, there = data == before, before is not None
-            built.append(Built(target, "unchanged" if same else "changed" if there else "new"))
+        brought = write_built(out / file.name, file.read_bytes())
+        built += [brought] if file.suffix == ".fmu" else []
     return built
 
 

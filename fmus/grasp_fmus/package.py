@@ -137,11 +137,16 @@ def write_members(target: Path, files: Mapping[str, bytes]) -> Built:
             entry.compress_type = zipfile.ZIP_DEFLATED
             entry.external_attr = 0o644 << 16
             archive.writestr(entry, data)
+    return write_built(target, buffer.getvalue())
+
+
+def write_built(target: Path, data: bytes) -> Built:
+    """Write a file as write_file() does, and say how it is beside what was there."""
     before = target.read_bytes() if target.is_file() else None
-    write_file(target, buffer.getvalue())
-    if before == buffer.getvalue():
+    if data == before:
         return Built(target, "unchanged")
-    return Built(target, "changed" if before else "new")
+    write_file(target, data)
+    return Built(target, "new" if before is None else "changed")
 
 
 def write_file(target: Path, data: bytes) -> None:
