@@ -150,7 +150,6 @@ def test_what_fmus_and_orchestrator_share_imports_the_standard_library_only(pack
 
 FLOORS = (
     (
-        "early",
         "errors",
         "plain",
         "numerals",

@@ -56,50 +56,6 @@ def test_batches_share_their_processes() -> None:
     assert first == second
 
 
-def test_a_signal_at_the_end_of_a_process_is_no_traceback() -> None:
-    program = """if True:
-        import contextlib, signal
-        from multiprocessing import Pipe
-        from grasp_cosim import parallel
-
-        class Late(contextlib.suppress):
-            def __exit__(self, *error):
-                signal.raise_signal(signal.SIGINT)
-                return super().__exit__(*error)
-
-        parallel.suppress = Late
-        ours, theirs = Pipe()
-        ours.close()
-        parallel._work(theirs)
-        """
-    run = subprocess.run([sys.executable, "-c", program], capture_output=True, check=False)
-    assert (run.returncode, run.stderr) == (0, b"")
-
-
-class _Cleared:
-    def __init__(self, error: type[BaseException]) -> None:
-        self.error = error
-
-    def __del__(self) -> None:
-        if self.error is KeyboardInterrupt:
-            signal.raise_signal(signal.SIGINT)
-        raise self.error
-
-
-def _clear(error: type[BaseException]) -> None:
-    _Cleared(error)
-
-
-@pytest.mark.slow
-def test_ctrl_c_while_a_process_clears_away_is_no_traceback(
-    capfd: pytest.CaptureFixture[str],
-) -> None:
-    run_all(_clear, [KeyboardInterrupt], 1, progress=False, what="runs")
-    assert capfd.readouterr().err == ""
-    run_all(_clear, [ValueError], 1, progress=False, what="runs")
-    assert "ValueError" in capfd.readouterr().err
-
-
 def test_ctrl_c_while_a_process_starts_is_not_lost(monkeypatch: pytest.MonkeyPatch) -> None:
     start = SpawnProcess.start
 

@@ -6,15 +6,15 @@ else is imported from there.
 """
 
 import os
+import signal
 import sys
 from typing import NoReturn
 
-from .early import leave_at_once
-
 
 def entry() -> NoReturn:
-    """The command grasp-cosim: Ctrl-C is one line while the command line is still imported."""
-    leave_at_once()
+    """The command grasp-cosim; before it begins, Ctrl-C ends the process as SIGTERM does."""
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # not ignored, as after `&`
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
     from .cli import entry as run
 
     run()

@@ -1,202 +1,127 @@
 """Ctrl-C and SIGTERM: the first ends in good order what goes on, the second ends it at once.
 
-SIGTERM, with which systemd and Docker stop a command, does there what Ctrl-C does. A handler of
-Python's does not run while an FMU hangs in C code; so the kernel is told to take each of these
-signals once for us, and after that by its default action, which is to end the process.
+SIGTERM, with which systemd and Docker stop a command, does there what Ctrl-C does.
 """
 
-import ctypes
 import fcntl
 import os
+import select
 import signal
-import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
+from typing import NoReturn
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
+AT_ONCE = 0.1
+"""s in which several signals are one, such as the two that `timeout` sends."""
+
 _came: list[int] = []
-"""The signal that came since command() or worker(), if any."""
-
-_afterwards: signal.Handlers | None = None
-"""What becomes of further signals in a process that is there for one end; None in any other."""
-
-_raised = 0
-"""How often Ctrl-C was raised as KeyboardInterrupt by us."""
-
-_noticing = 0
-"""How many contexts of noticing() there are."""
-
-Handler = Callable[[int, FrameType | None], None]
+"""The signals that came since command(); 0 where none came before over()."""
 
 
 def command() -> None:
-    """Have SIGTERM do what Ctrl-C does from now on, in a process that is there for one command."""
-    global _afterwards
-    _afterwards = signal.SIG_DFL
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # not ignored, as after `&`
-        _handle(signal.SIGINT, _interrupt)
-    _handle(signal.SIGTERM, _terminate)
+    """Have SIGTERM do what Ctrl-C does from now on, and a second signal end the process at once.
 
-
-def worker() -> None:
-    """Have Ctrl-C end this process once, and nothing else: whoever started it will kill it.
-
-    Where it comes while an object is cleared away, Python tells of it and goes on; it is not told.
+    A thread ends it, as Python's handlers do not run while an FMU hangs in C code.
     """
-    global _afterwards
-    _afterwards = signal.SIG_IGN
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)
-    _handle(signal.SIGINT, _interrupt)
-    sys.unraisablehook = _told
+    for number in SIGNALS:
+        if signal.getsignal(number) is not signal.SIG_IGN:  # as after `&`
+            signal.signal(number, _raise)
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    signal.set_wakeup_fd(writer)
+    threading.Thread(target=_end_at_second, args=(reader,), daemon=True).start()
 
 
-def _told(unraisable: "sys.UnraisableHookArgs") -> None:
-    """Tell of an error that cannot be raised, but not of Ctrl-C."""
-    if not isinstance(unraisable.exc_value, KeyboardInterrupt):
-        sys.__unraisablehook__(unraisable)
+def over() -> int:
+    """The first signal that this command got, else 0; from here on a signal changes nothing."""
+    _came.append(0)
+    return _came[0]
 
 
-def end_with(lifeline: int) -> None:
-    """End this process, whatever its FMU is doing, once another has ended that keeps a pipe open.
+def came() -> bool:
+    """True once this command got a signal."""
+    return bool(_came)
 
-    `lifeline` is the end of that pipe to read from, through which nothing comes.
+
+def worker(lifeline: int) -> None:
+    """Leave signals to the process that started this one, and end with it, whatever an FMU does.
+
+    `lifeline` is the end to read from of a pipe that it keeps open, through which nothing comes.
     """
 
     def wait() -> None:
         os.read(lifeline, 1)
         os._exit(1)
 
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
     fcntl.fcntl(lifeline, fcntl.F_SETOWN, os.getpid())
     fcntl.fcntl(lifeline, fcntl.F_SETFL, os.O_ASYNC)  # SIGIO ends it while an FMU keeps the GIL
     threading.Thread(target=wait, daemon=True).start()
 
 
-def came() -> int | None:
-    """The first signal that this command got; None before that."""
-    return _came[0] if _came else None
+@contextmanager
+def interrupts(end: Callable[[], object]) -> Iterator[threading.Event]:
+    """Here the first signal calls `end`, instead of raising KeyboardInterrupt, and sets the event.
 
-
-def leave_to_system(number: int, action: signal.Handlers) -> None:
-    """Have the kernel ignore a signal, or end the process by it.
-
-    Not by signal.signal(), by which Python complains of a signal that came right before.
+    Nothing changes within another such context, nor in another thread than the main one.
     """
-    set_action = ctypes.CDLL(None).signal
-    set_action.argtypes, set_action.restype = (ctypes.c_int, ctypes.c_void_p), ctypes.c_void_p
-    set_action(number, int(action))
-
-
-def _handle(number: int, handler: Handler) -> None:
-    """Have a handler take a signal; in a command once, a second one ends it at once."""
-    if _afterwards is not signal.SIG_DFL:
-        signal.signal(number, handler)
-        return
-    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
-    try:
-        signal.signal(number, handler)
-        libc = ctypes.CDLL(None)
-        if hasattr(libc, "sysv_signal"):  # glibc; it leaves Python's own handler, but for one time
-            set_once = libc.sysv_signal
-            set_once.argtypes, set_once.restype = (ctypes.c_int, ctypes.c_void_p), ctypes.c_void_p
-            set_once(number, set_once(number, None))
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
-
-
-def _is_first(number: int) -> bool:
-    """True for the first signal, and in a process that is there for more than one end."""
-    if _afterwards is None:
-        return True
-    if _came:  # both came at once
-        return False
-    _came.append(number)
-    for each in SIGNALS:
-        leave_to_system(each, _afterwards)
-    return True
-
-
-def _interrupt(number: int, frame: FrameType | None) -> None:
-    global _raised
-    if _is_first(number):
-        _raised += 1
-        signal.default_int_handler(number, frame)
-
-
-def _terminate(number: int, frame: FrameType | None) -> None:
-    handler = signal.getsignal(signal.SIGINT)
-    (handler if callable(handler) else _interrupt)(number, frame)
-
-
-@contextmanager
-def handled(handler: Handler, *numbers: int) -> Iterator[None]:
-    """A handler of these signals in this context; in a command it gets one of them, once."""
-
-    def take(number: int, frame: FrameType | None) -> None:
-        if _is_first(number):
-            handler(number, frame)
-
-    previous = {} if _came else {number: signal.getsignal(number) for number in numbers}
-    for number in previous:
-        _handle(number, take)
-    try:
-        yield
-    finally:
-        for number, before in previous.items():
-            if before in (_interrupt, _terminate) and not _came:
-                _handle(number, before)
-            elif not _came:
-                signal.signal(number, before)
-
-
-@contextmanager
-def noticing() -> Iterator[None]:
-    """interruptible() works in this context, also outside of a command."""
-    global _noticing
+    came = threading.Event()
     here = threading.current_thread() is threading.main_thread()
-    if here and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, _interrupt)
-    _noticing += 1
+    ours: list[int] = [
+        n for n in SIGNALS if signal.getsignal(n) in (_raise, signal.default_int_handler)
+    ]
+
+    def take(number: int, _: FrameType | None) -> None:
+        if before[number] is not _raise or _is_first(number):
+            restore()
+            came.set()
+            end()
+
+    def restore() -> None:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+    before = {number: signal.signal(number, take) for number in ours if here}
     try:
-        yield
+        yield came
     finally:
-        _noticing -= 1
-        last = here and not _noticing and _afterwards is None
-        if last and signal.getsignal(signal.SIGINT) is _interrupt:
-            signal.signal(signal.SIGINT, signal.default_int_handler)
+        restore()
 
 
 @contextmanager
 def interruptible() -> Iterator[None]:
-    """Ctrl-C is a KeyboardInterrupt here even where an FMU makes an error of its own of it.
+    """Ctrl-C is a KeyboardInterrupt here, even where a Python FMU makes an error of it."""
 
-    A Python FMU does, or one that is a proxy and waits for its peer.
-    """
-    before = _raised
-    try:
-        yield
-    except Exception as error:
-        if _raised != before and threading.current_thread() is threading.main_thread():
-            raise KeyboardInterrupt from error
-        raise
-    if _raised != before and threading.current_thread() is threading.main_thread():
-        raise KeyboardInterrupt  # an FMU has swallowed it
+    def end() -> NoReturn:
+        raise KeyboardInterrupt
+
+    with interrupts(end) as came:
+        try:
+            yield
+        finally:
+            if came.is_set():
+                raise KeyboardInterrupt
 
 
-@contextmanager
-def interrupts(interrupted: threading.Event) -> Iterator[None]:
-    """Collects Ctrl-C instead of raising it, which could happen inside a Python FMU."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    previous = signal.getsignal(signal.SIGINT)
+def _raise(number: int, _: FrameType | None) -> None:
+    if _is_first(number):
+        raise KeyboardInterrupt
 
-    def remember(*_: object) -> None:
-        interrupted.set()
-        if _afterwards is None:
-            signal.signal(signal.SIGINT, previous)  # a second Ctrl-C does not wait
 
-    with handled(remember, signal.SIGINT):
-        yield
+def _is_first(number: int) -> bool:
+    _came.append(number)
+    return len(_came) == 1  # after that _end_at_second() ends the process
+
+
+def _end_at_second(reader: int) -> None:
+    """End the process by a signal that does not come at once with the first."""
+    select.select([reader], [], [])
+    time.sleep(AT_ONCE)
+    os.read(reader, 64)
+    os._exit(128 + os.read(reader, 1)[0])

@@ -8,7 +8,6 @@ from.
 
 import os
 import signal
-import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from functools import partial
@@ -30,7 +29,7 @@ Run = TypeVar("Run")
 _SAFE_PATH = "PYTHONSAFEPATH"
 
 PATIENCE = 1.0
-"""s; processes that have not ended so long after they were to are killed."""
+"""s to wait for the end of a process whose pipe has ended."""
 
 
 class Lost(NamedTuple):
@@ -187,19 +186,14 @@ class _Worker:
             return Lost(self._end())
 
     def stop(self) -> None:
-        """Ask the process to end; a run it is at ends early, which frees its FMUs."""
+        """End the process, whatever it does."""
         self.pipe.close()
-        if self._started and self._process.is_alive() and self._process.pid:
-            os.kill(self._process.pid, signal.SIGINT)
-        elif self._process.pid:
+        if self._process.pid:
             self._process.kill()
 
-    def join(self, deadline: float) -> None:
-        """Wait for the end of a stopped process, until a monotonic time in s, or kill it."""
-        self._process.join(max(deadline - time.monotonic(), 0.0))
-        if self._process.is_alive():
-            self._process.kill()
-            self._process.join()
+    def join(self) -> None:
+        """Wait for the end of a stopped process."""
+        self._process.join()
         self._process.close()
 
     def _end(self) -> str:
@@ -235,27 +229,19 @@ def _end(workers: Iterable[_Worker]) -> None:
     ended = list(workers)
     for worker in ended:
         worker.stop()
-    deadline = time.monotonic() + PATIENCE
     for worker in ended:
-        worker.join(deadline)
-    if ended:  # one that was killed, or interrupted as it began, leaves its folders
+        worker.join()
+    if ended:  # a process that is killed leaves its folders
         sweep.cache_clear()
         sweep(gettempdir())
 
 
 def _work(pipe: Connection) -> None:
     """The life of a process: say that it has started, then a job after the other."""
-    with suppress(KeyboardInterrupt):
-        try:
-            with suppress(EOFError, OSError):
-                interruption.worker()
-                if starter := parent_process():
-                    interruption.end_with(starter.sentinel)
-                signal.pthread_sigmask(signal.SIG_UNBLOCK, interruption.SIGNALS)
-                pipe.send(None)
-                while True:
-                    run, job = pipe.recv()
-                    pipe.send(run(job))
-        finally:  # its pipe may end just before the signal comes that ends its run, in any thread
-            for number in interruption.SIGNALS:
-                interruption.leave_to_system(number, signal.SIG_IGN)
+    if starter := parent_process():
+        interruption.worker(starter.sentinel)
+    with suppress(EOFError, OSError):
+        pipe.send(None)
+        while True:
+            run, job = pipe.recv()
+            pipe.send(run(job))

@@ -4,7 +4,6 @@ What is over sooner than can be read shows nothing.
 """
 
 import logging
-import signal
 import sys
 import threading
 import time
@@ -13,8 +12,6 @@ from contextlib import contextmanager
 from typing import Any
 
 from tqdm import tqdm
-
-from .interruption import SIGNALS
 
 LOGGER = logging.getLogger(__name__)
 
@@ -127,7 +124,6 @@ class Progress(tqdm):  # type: ignore[type-arg]  # subscripted, it is no class
         return f"{self.unit} {min(self.n + 1, self.total)} of {self.total}"
 
     def _tick(self) -> None:
-        signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)  # are for the main thread
         while not self._over.wait(1.0):
             now = time.time()  # tqdm's clock
             wait = EVERY if self._lines else 1.0

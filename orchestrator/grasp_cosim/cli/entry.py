@@ -1,5 +1,7 @@
 """From a command line to an exit code."""
 
+import ctypes
+import faulthandler
 import os
 import signal
 import sys
@@ -10,7 +12,6 @@ import click
 from .. import interruption
 from ..errors import InputError, SimulationError
 from ..files import FULL
-from .crash import explain_crashes
 from .frame import FAILED, INTERRUPTED, TERMINATED, WRONG, fail
 from .group import cli
 from .streams import OutputError, harmless_streams, keep_output_for_us, leave
@@ -24,18 +25,19 @@ def entry() -> NoReturn:
     """The command grasp-cosim, see __main__.py."""
     if COMPLETE in os.environ:  # the shell asks what may come next
         cli.main(prog_name=NAME, complete_var=COMPLETE)
+    keep_output_for_us()
+    interruption.command()
     try:
-        keep_output_for_us()
-        explain_crashes("--debug" in sys.argv)
+        ctypes.CDLL(None).__cxa_atexit(_EXITED, None, None)
+        if "--debug" in sys.argv:
+            faulthandler.enable()
         code = main(sys.argv[1:])
-        for number in interruption.SIGNALS:  # what is left is short, and nothing is lost
-            interruption.leave_to_system(number, signal.SIG_IGN)
-            signal.signal(number, signal.SIG_IGN)
     except KeyboardInterrupt:
         code = fail("interrupted", INTERRUPTED)
-    if interruption.came() == signal.SIGTERM:
+    came = interruption.over()
+    if came == signal.SIGTERM:
         code = TERMINATED
-    elif interruption.came() and code in (WRONG, FAILED):  # what an FMU made of it
+    elif came and code in (WRONG, FAILED):  # what an FMU made of it
         code = INTERRUPTED
     try:
         sys.stdout.close()
@@ -71,13 +73,17 @@ def _main(arguments: list[str], debug: bool) -> int:
     except (KeyboardInterrupt, click.Abort):
         return fail("interrupted", INTERRUPTED)
     except (Exception, SystemExit) as error:  # which a Python FMU may raise
-        if interruption.came() or _interrupted(error):
+        if interruption.came():  # and a module that was being imported made this error of it
             return fail("interrupted", INTERRUPTED)
         return fail(f"{type(error).__name__}: {error} (--debug shows where)", FAILED, debug)
 
 
-def _interrupted(error: BaseException | None) -> bool:
-    """True if something made this error of Ctrl-C, such as a module that was being imported."""
-    while error is not None and not isinstance(error, KeyboardInterrupt):
-        error = error.__cause__ or error.__context__
-    return error is not None
+def _exited(_: object) -> None:
+    """A run that an FMU ends by exit() would look like one that is done; we end by leave()."""
+    if os.getpid() == _OWNER:  # and not a fork
+        said = "the binary of an FMU called exit(); with isolation = 'process' that ends it alone"
+        os._exit(fail(said, FAILED))
+
+
+_OWNER = os.getpid()
+_EXITED = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(_exited)

@@ -7,8 +7,6 @@ from tempfile import gettempdir
 
 import click
 
-from .. import interruption
-from ..early import begin
 from ..errors import nearest
 from ..scratch import sweep
 from .frame import VERBOSITY
@@ -72,6 +70,4 @@ def cli(debug: bool) -> None:
 
     grasp-cosim COMMAND --help shows the options of a command and an example.
     """
-    if begin():
-        interruption.command()
     sweep(gettempdir())

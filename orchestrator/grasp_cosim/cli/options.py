@@ -15,7 +15,6 @@ from ..system.parts import ISOLATIONS
 from ..system.stimuli import INTERPOLATIONS, Stimuli, read_stimuli
 from ..system.structure import DIVERGING, SCHEMES
 from ..system.swap import Replacement
-from .completion import components, preset_names, variables
 from .frame import PATH, load_system, pair, together, with_controller, with_preset
 
 set_option = click.option(
@@ -23,7 +22,6 @@ set_option = click.option(
     "settings",
     multiple=True,
     metavar="COMPONENT.VARIABLE=VALUE",
-    shell_complete=variables,
     help="Start value of a variable, like plant.object_width=0.06.",
 )
 
@@ -32,7 +30,6 @@ swap_option = click.option(
     "swaps",
     multiple=True,
     metavar="COMPONENT=FMU",
-    shell_complete=components("="),
     help="Another FMU in the place of a component.",
 )
 
@@ -48,7 +45,6 @@ system_options = together(
         "--preset",
         "presets",
         multiple=True,
-        shell_complete=preset_names,
         help="Values that the system file names.",
     ),
     click.option("--case", type=click.IntRange(0, 2), help="Short for --preset case_0, ..._2."),

@@ -5,7 +5,7 @@ import ctypes
 import os
 import sys
 from codecs import lookup
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
 from typing import Any, NoReturn
 
@@ -24,8 +24,9 @@ class OutputError(Exception):
 class _Harmless:
     """A stream that writes text as printable() makes it."""
 
-    def __init__(self, stream: Any) -> None:
+    def __init__(self, stream: Any, failed: Callable[[OSError], object]) -> None:
         self._stream = stream
+        self._failed = failed
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._stream, name)
@@ -33,39 +34,33 @@ class _Harmless:
     def write(self, text: str) -> int:
         """Write the text. A carriage return at its beginning stays: so a progress bar begins."""
         start = text[: text.startswith("\r")]
-        with self._failures():
+        try:
             self._stream.write(start + printable(text[len(start) :]))
+        except OSError as error:
+            self._failed(error)
         return len(text)
 
     def flush(self) -> None:
         """Write what waits."""
-        with self._failures():
+        try:
             self._stream.flush()
-
-    @contextmanager
-    def _failures(self) -> Iterator[None]:
-        try:
-            yield
-        except OSError as error:  # as an OSError, click would make an exit code of its own of it
-            raise OutputError(error) from error
-
-
-class _Silent(_Harmless):
-    """The same for standard error: where it fails, there is nobody to tell."""
-
-    @contextmanager
-    def _failures(self) -> Iterator[None]:
-        try:
-            yield
-        except OSError:
-            os.dup2(os.open(os.devnull, os.O_WRONLY), self._stream.fileno())
+        except OSError as error:
+            self._failed(error)
 
 
 @contextmanager
 def harmless_streams() -> Iterator[None]:
     """Whatever is printed goes through printable(); OutputError where it cannot be written."""
-    out: Any = _Harmless(sys.stdout)
-    err: Any = _Silent(sys.stderr)
+    stderr: Any = sys.stderr
+
+    def failed(error: OSError) -> NoReturn:  # of an OSError click would make its own exit code
+        raise OutputError(error) from error
+
+    def nobody_to_tell(_: OSError) -> None:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stderr.fileno())
+
+    out: Any = _Harmless(sys.stdout, failed)
+    err: Any = _Harmless(stderr, nobody_to_tell)
     with redirect_stdout(out), redirect_stderr(err):
         yield
 

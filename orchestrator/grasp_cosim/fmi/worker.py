@@ -7,7 +7,6 @@ that is closed when the master's process ends, whereupon this one ends, too.
 import faulthandler
 import logging
 import os
-import signal
 import sys
 import warnings
 from contextlib import suppress
@@ -124,10 +123,8 @@ def _as_answer(error: Exception) -> Answer:
 def main(connection: int, memory: int, lifeline: int) -> None:
     """Serve until the instance is closed."""
     faulthandler.enable()
-    for number in interruption.SIGNALS:  # are for the master
-        signal.signal(number, signal.SIG_IGN)
     logging.basicConfig(format=f"{LOGGED}%(message)s", level=logging.INFO)
-    interruption.end_with(lifeline)
+    interruption.worker(lifeline)
     with suppress(EOFError):  # where the master wants no more of it
         Worker(Connection(connection), Exchange(memory)).serve()
     sys.stdout.flush()

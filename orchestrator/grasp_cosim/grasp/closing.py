@@ -18,7 +18,7 @@ def close(system: System, after: float | None = None) -> Result:
     The end is known to LOOK; a result that ends early is not complete. KeyboardInterrupt on Ctrl-C.
     """
     steps = max(1, round(LOOK * NANOSECONDS / system.step_ns))
-    with simulate.session(system) as session, interrupts(session.halt):
+    with simulate.session(system) as session, interrupts(session.halt.set):
         end = system.stop_ns / NANOSECONDS
         touching = False
         contacts = [resolved(f"plant.contact[{j}]", system.roles) for j in FINGERS]

@@ -12,7 +12,7 @@ from typing import Any
 from ..errors import InputError, SimulationError, nearest
 from ..fmi.load import load
 from ..interface.interface import Value
-from ..interruption import interruptible, interrupts, noticing
+from ..interruption import interruptible, interrupts
 from ..metrics.metric import Function, Metric, chosen, registered
 from ..metrics.units import in_si
 from ..progress import Progress, phase
@@ -83,7 +83,6 @@ class Session:
         self._stack = ExitStack()
         self._tell((*system.notes, *remarks(system)))
         try:
-            self._stack.enter_context(noticing())
             with interruptible(), _folder_kept():
                 self._begin(listeners, every, engine)
             self._tell(self._early())
@@ -387,7 +386,7 @@ def _folder_kept() -> Iterator[None]:
 def _drive(session: Session, progress: bool | str) -> None:
     total = session.system.stop_ns / NANOSECONDS
     with (
-        interrupts(session.halt),
+        interrupts(session.halt.set),
         Progress(
             progress if isinstance(progress, str) else session.system.name,
             total,

@@ -18,7 +18,6 @@ from ...interface.read import read_interface
 from ...numerals import counted
 from ...system.description import System
 from ...system.toml import to_do
-from ..completion import components
 from ..frame import PATH, json_option, pair, say, show
 
 if TYPE_CHECKING:
@@ -37,7 +36,6 @@ MOST = 24
     "candidates",
     multiple=True,
     metavar="COMPONENT=FMU",
-    shell_complete=components("="),
     help="A foreign FMU in the place of a component of the grasp: its names, units and values.",
 )
 @click.option(

@@ -15,7 +15,6 @@ from ...qualification.qualify import qualify as run_qualification
 from ...qualification.swap import component_of
 from ...report.qualification import draw_qualification
 from ...system.parts import ISOLATIONS, Isolation
-from ..completion import components
 from ..frame import (
     NEGATIVE,
     PATH,
@@ -41,7 +40,6 @@ from ..options import chosen_system, names_options, replacements, set_values, sy
     "component",
     required=True,
     metavar="COMPONENT",
-    shell_complete=components(),
     help="Whose place it takes.",
 )
 @click.option("--system", type=PATH, help="Default: the built-in grasp.")

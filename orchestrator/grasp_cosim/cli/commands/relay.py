@@ -16,9 +16,9 @@ from ...hil.address import Address, is_loopback, text
 from ...hil.network import DIRECTIONS, Conditions, Network, Outage, check_time
 from ...hil.relay import Relay
 from ...hil.traffic import Entry, Log
+from ...interruption import interrupts
 from ...system.parts import NANOSECONDS
 from ..frame import INTERRUPTED, PATH, Command, fail, json_option, say, show
-from ..signals import ended_by_signals
 
 
 def _number(name: str, unit: str, text: str, default: float = 0.0) -> Command:
@@ -99,11 +99,11 @@ def relay(
         _written(log) as note,
         Relay(_address(peer), network, host=host, port=port, log=note) as relay,
     ):
-        with ended_by_signals(relay.stop) as came:
+        with interrupts(relay.stop) as came:
             _say(relay)
             relay.run(end)
         show(as_json, _report(relay, seed), _table(relay))
-    if came and duration is not None:
+    if came.is_set() and duration is not None:
         return fail(f"interrupted before --duration {duration!r} was over", INTERRUPTED)
     return 0
 

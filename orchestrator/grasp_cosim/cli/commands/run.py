@@ -17,7 +17,6 @@ from ...recording.mdf import check_mdf
 from ...recording.result import Result
 from ...report.timing import draw_result
 from ...system.description import System
-from ..completion import components
 from ..frame import (
     INTERRUPTED,
     NEGATIVE,
@@ -74,7 +73,6 @@ from ..step_study import check_step_study, step_study_options, study_step
     "isolation",
     multiple=True,
     metavar="[COMPONENT=]none|process",
-    shell_complete=components("="),
     help="Where all FMUs run, or one: in a process of its own, or none. Default: as SYSTEM says.",
 )
 @native_option("as SYSTEM names them; with --step-study, native where there is a C compiler.")

@@ -13,9 +13,9 @@ from ...hil.address import is_loopback, text
 from ...hil.protocol import LONGEST_SILENCE, exchanged, shared_key
 from ...hil.served import ServedFmu, Service
 from ...hil.server import DEFAULT_ADDRESS, Server
+from ...interruption import interrupts
 from ...system.description import in_nanoseconds
 from ..frame import FAILED, INTERRUPTED, NEGATIVE, PATH, fail, json_option, pair, say, show
-from ..signals import ended_by_signals
 
 PATIENCE = 2.0
 """s that a call of the FMU may go on after --duration."""
@@ -90,12 +90,12 @@ def serve(
                 f"{at} without a key: {who} may take part, and take over a session that is silent "
                 f"for {LONGEST_SILENCE:g} s; --key-file keeps others out"
             )
-        with ended_by_signals(server.stop) as came, _ended_after(duration, fmu.name):
+        with interrupts(server.stop) as came, _ended_after(duration, fmu.name):
             server.serve(sessions, end)
         counters = served.counters()
     came_in = ", ".join(f"{name} {count}" for name, count in counters.items() if count)
     show(as_json, {"listening": at, **counters}, came_in or "nothing came")
-    if came and (sessions or duration):
+    if came.is_set() and (sessions or duration):
         return fail("interrupted before --sessions or --duration ended it", INTERRUPTED)
     if sessions and counters["sessions"] < sessions:
         return fail(f"{counters['sessions']} of {sessions} sessions in {duration!r} s", NEGATIVE)

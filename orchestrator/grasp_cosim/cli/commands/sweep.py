@@ -20,7 +20,6 @@ from ...sweep.sweep import RUNS, Sweep
 from ...sweep.sweep import sweep as run_study
 from ...sweep.vary import VARY, varied
 from ...system.description import System
-from ..completion import studies
 from ..frame import (
     INTERRUPTED,
     NEGATIVE,
@@ -58,7 +57,7 @@ OF_VARY = {
 
 
 @click.command()
-@click.argument("study", required=False, shell_complete=studies)
+@click.argument("study", required=False)
 @click.option(
     "--vary",
     "varying",
