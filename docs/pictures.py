@@ -130,13 +130,6 @@ def draw_map(folder: Path, study: str) -> None:
         shutil.copy(Path(kept, "map.png"), folder / f"{study}.png")
 
 
-def draw_tuning(folder: Path) -> None:
-    """tuning.png, of the gains that `tune` finds."""
-    with TemporaryDirectory() as kept:
-        do("tune", "--plot", "--out", kept)
-        shutil.copy(Path(kept, "tuning.png"), folder)
-
-
 def draw_page(folder: Path, name: str) -> None:
     """The pictures of a tutorial page, and the page's tables anew."""
     tutorials.build_blocks()
@@ -151,7 +144,6 @@ PICTURES: Mapping[str, tuple[Callable[[Path], None], Sequence[str]]] = {
     "timing": (draw_timing, ["timing.png"]),
     "colour_map": (partial(draw_map, study="colour_map"), ["colour_map.png"]),
     "reflectance_map": (partial(draw_map, study="reflectance_map"), ["reflectance_map.png"]),
-    "tuning": (draw_tuning, ["tuning.png"]),
     "colour": (partial(draw_page, name="colour"), ["colour.png"]),
     "layers": (partial(draw_page, name="layers"), ["layers.png", "objects.png"]),
     "limits": (partial(draw_page, name="limits"), ["limits.png"]),

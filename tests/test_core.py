@@ -147,9 +147,7 @@ def test_every_other_module_can_be_imported(python: Python) -> None:
         print(" ".join(refused))
         """
     )
-    assert printed.split() == [
-        f"grasp_cosim.cli.commands.{n}" for n in ("evaluate", "identify", "tune")
-    ]
+    assert printed.split() == [f"grasp_cosim.cli.commands.{n}" for n in ("evaluate", "identify")]
 
 
 def test_the_help_has_the_commands_of_any_system(command: Command) -> None:

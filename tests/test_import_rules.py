@@ -170,7 +170,6 @@ FLOORS = (
     ("ssp", "inspection", "drafting"),
     ("master",),
     ("convergence", "sweep", "qualification", "comparison", "hil"),
-    ("tuning",),
     ("report",),
     ("grasp",),
     ("cli",),
