@@ -32,11 +32,11 @@ if TYPE_CHECKING:
     from .grasp.system import grasp_system
     from .master.simulation import Session, simulate
     from .metrics.metric import Metric, metric
-    from .realtime.options import Realtime
     from .recording.load import load_run
     from .recording.result import Result
     from .report.page import Scene
     from .system.description import System
+    from .system.realtime import Realtime
     from .system.stimuli import Stimuli
 
 __all__ = [
@@ -55,7 +55,7 @@ __all__ = [
 
 _HOMES = {
     "Metric": "metrics.metric",
-    "Realtime": "realtime.options",
+    "Realtime": "system.realtime",
     "Result": "recording.result",
     "Session": "master.simulation",
     "System": "system.description",

@@ -88,7 +88,7 @@ def test_a_cpu_that_is_not_there_is_a_mistake(
     command: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     (tmp_path / "online").write_text("0-1\n")
-    monkeypatch.setattr("grasp_cosim.realtime.options.ONLINE", tmp_path / "online")
+    monkeypatch.setattr("grasp_cosim.realtime.privileges.ONLINE", tmp_path / "online")
     code, out, err = command(*PACED, "--cpu", "99", "--out", "results")
     assert (code, out) == (2, "")
     assert err == "grasp-cosim: cpu = 99: no such CPU here; must be one of 0, 1\n"

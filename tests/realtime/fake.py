@@ -6,12 +6,12 @@ from typing import Any
 
 from grasp_cosim.master.engine import Engine
 from grasp_cosim.master.master import Master
-from grasp_cosim.realtime.options import Realtime
 from grasp_cosim.realtime.pacer import Clock, Pacer
 from grasp_cosim.realtime.timing import Timing
 from grasp_cosim.recording.dispatch import Dispatcher
 from grasp_cosim.recording.memory import MemoryListener
 from grasp_cosim.system.description import System
+from grasp_cosim.system.realtime import Realtime
 from support.mocks import Mock, make_system
 
 US, MS = 1_000, 1_000_000

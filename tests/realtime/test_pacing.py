@@ -10,9 +10,9 @@ from grasp_cosim.master.engine import Engine
 from grasp_cosim.master.master import CHUNK
 from grasp_cosim.master.plan import Planner
 from grasp_cosim.realtime.meter import LISTED
-from grasp_cosim.realtime.options import Overrun
 from grasp_cosim.realtime.pacer import BREATH_NS, SLICE_NS, SOME, SPIN_NS, Pacer
 from grasp_cosim.realtime.timing import Timing
+from grasp_cosim.system.realtime import Overrun
 from realtime.fake import MS, NEAR, US, Fake, Paced
 from support.both_engines import ENGINES
 from support.mocks import Mock, make_system

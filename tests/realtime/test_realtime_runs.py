@@ -16,6 +16,7 @@ from grasp_cosim import InputError, Realtime, System, simulate
 from grasp_cosim.fmi.instance import CLOCK
 from grasp_cosim.master.engine import Engine
 from grasp_cosim.realtime.pacer import HAS_CLOCK
+from grasp_cosim.realtime.privileges import check_cpu
 from grasp_cosim.realtime.timing import Timing
 from grasp_cosim.recording.load import load_run
 from grasp_cosim.report.tables import metrics_table
@@ -180,23 +181,23 @@ def test_a_cpu_that_is_not_there_is_refused(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, listed: str, there: list[int]
 ) -> None:
     (tmp_path / "online").write_text(f"{listed}\n")
-    monkeypatch.setattr("grasp_cosim.realtime.options.ONLINE", tmp_path / "online")
+    monkeypatch.setattr("grasp_cosim.realtime.privileges.ONLINE", tmp_path / "online")
     valid = ", ".join(map(str, there))
     for cpu in range(12):
         if cpu in there:
-            assert Realtime(cpu=cpu).cpu == cpu
+            check_cpu(Realtime(cpu=cpu))
             continue
         with pytest.raises(
             InputError, match=f"^cpu = {cpu}: no such CPU here; must be .* {valid}$"
         ):
-            Realtime(cpu=cpu)
+            check_cpu(Realtime(cpu=cpu))
 
 
 def test_where_a_system_does_not_list_its_cpus_any_may_be_asked_for(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr("grasp_cosim.realtime.options.ONLINE", tmp_path / "none")
-    assert Realtime(cpu=99).cpu == 99
+    monkeypatch.setattr("grasp_cosim.realtime.privileges.ONLINE", tmp_path / "none")
+    check_cpu(Realtime(cpu=99))
 
 
 @pytest.mark.parametrize("engine", ["python", "auto"])

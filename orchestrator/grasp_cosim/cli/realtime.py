@@ -7,8 +7,8 @@ from typing import Any
 import click
 
 from ..errors import InputError
-from ..realtime.options import OVERRUNS, Realtime
 from ..realtime.timing import Timing
+from ..system.realtime import OVERRUNS, Realtime
 from .frame import together
 
 realtime_options = together(

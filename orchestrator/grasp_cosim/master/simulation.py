@@ -16,7 +16,6 @@ from ..interruption import interruptible, interrupts
 from ..metrics.metric import Function, Metric, chosen, registered
 from ..metrics.units import in_si
 from ..progress import Progress, phase
-from ..realtime.options import Realtime
 from ..realtime.pacer import Pacer
 from ..realtime.privileges import Privileges, privileges
 from ..recording.dispatch import Dispatcher
@@ -28,6 +27,7 @@ from ..system.checks import remarks
 from ..system.description import System
 from ..system.native import with_needed_twins
 from ..system.parts import NANOSECONDS, Component, Port
+from ..system.realtime import Realtime
 from ..system.settings import run_settings
 from .engine import Engine
 from .master import Master
@@ -58,7 +58,7 @@ class Session:
         every: int = 1,
         listeners: Sequence[Listener] = (),
         engine: Engine = "auto",
-        realtime: Realtime | None = None,
+        realtime: Realtime | bool = False,
         metrics: Sequence[Metric | Function | str] = (),
         diverging: str | None = None,
         note: Callable[[str], None] | None = None,
@@ -78,7 +78,8 @@ class Session:
         self._noted = len(system.notes)  # known to who has read it
         self.halt = threading.Event()
         """Set, it ends the waiting of a run in real time, at a communication point."""
-        self.pacer = Pacer(system, realtime, self.halt.is_set) if realtime else None
+        paced = system.realtime if realtime is True else realtime
+        self.pacer = Pacer(system, paced, self.halt.is_set) if paced else None
         self._privileges = Privileges()
         self._stack = ExitStack()
         self._tell((*system.notes, *remarks(system)))
@@ -86,8 +87,8 @@ class Session:
             with interruptible(), _folder_kept():
                 self._begin(listeners, every, engine)
             self._tell(self._early())
-            if realtime and self.pacer:
-                self._ask_for_privileges(realtime, self.pacer)
+            if paced and self.pacer:
+                self._ask_for_privileges(paced, self.pacer)
         except BaseException:
             self._stack.close()
             raise
@@ -314,7 +315,7 @@ class Simulate:
         every: int = 1,
         listeners: Sequence[Listener] = (),
         engine: Engine = "auto",
-        realtime: Realtime | None = None,
+        realtime: Realtime | bool = False,
         metrics: Sequence[Metric | Function | str] = (),
         diverging: str | None = None,
         note: Callable[[str], None] | None = None,
@@ -326,7 +327,8 @@ class Simulate:
         communication point, and the last. listeners get what is kept while it is recorded. engine
         is "python", "compiled" (needs a C compiler) or "auto", compiled where that pays; the
         results have the same bits.
-        realtime paces the run by the clock: the result has a timing, and the same bits. metrics are
+        realtime paces the run by the clock, as the system says, or as it says itself: the result
+        has a timing, and the same bits. metrics are
         worked out beside those that every result is asked for: from @metric, or functions of their
         own name; a name among them says that the result must have that metric. diverging, "stop" or
         "continue", replaces that of the system. note gets the lines of the log but for

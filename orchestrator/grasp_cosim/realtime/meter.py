@@ -15,8 +15,8 @@ import numpy.typing as npt
 from ..errors import InputError
 from ..system.description import System
 from ..system.parts import NANOSECONDS
+from ..system.realtime import Realtime
 from .histogram import Histograms
-from .options import Realtime
 from .timing import Histogram, Overrun, Spread, Timing
 
 HEAD = 4

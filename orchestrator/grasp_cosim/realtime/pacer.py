@@ -15,8 +15,9 @@ import numpy.typing as npt
 
 from ..fmi.instance import CLOCK, PACE, Call, Native
 from ..system.description import System
+from ..system.realtime import Realtime
 from .meter import ARRIVED, BEGIN, DUE, HEAD, LATE, Meter, Steps, Table
-from .options import Realtime
+from .privileges import check_cpu
 from .timing import Timing
 
 SPIN_NS = 200_000
@@ -80,8 +81,9 @@ class Pacer:
     ) -> None:
         """Ask halted while it waits; it says whether the run was interrupted.
 
-        InputError as of Realtime.period() and Meter.
+        InputError as of Realtime.period() and Meter, and where the CPU is not there.
         """
+        check_cpu(realtime)
         period = realtime.period(system.step_ns)
         self.meter = Meter(system, realtime, period)
         self._period = period.as_integer_ratio()

@@ -11,11 +11,14 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-from ..errors import choices
-from .options import Realtime
+from ..errors import InputError, choices
+from ..system.realtime import Realtime
 
 CURRENT, FUTURE, ON_FAULT = 1, 2, 4
 """Flags of mlockall on Linux: pages that are there, that will be, each from its first use on."""
+
+ONLINE = Path("/sys/devices/system/cpu/online")
+"""The file in which Linux lists its CPUs, as in 0-3,6."""
 
 
 @dataclass(frozen=True)
@@ -24,6 +27,22 @@ class Privileges:
 
     granted: list[str] = field(default_factory=list)
     refused: list[str] = field(default_factory=list)
+
+
+def check_cpu(realtime: Realtime) -> None:
+    """InputError where Linux runs no such CPU; other systems do not list theirs."""
+    if realtime.cpu is None:
+        return
+    try:
+        listed = ONLINE.read_text("ascii")
+    except OSError:
+        return
+    ends = [tuple(map(int, part.split("-"))) for part in listed.split(",")]
+    online = [number for span in ends for number in range(span[0], span[-1] + 1)]
+    if realtime.cpu not in online:
+        raise InputError(
+            f"cpu = {realtime.cpu}: no such CPU here; must be one of {choices(online)}"
+        )
 
 
 @contextmanager

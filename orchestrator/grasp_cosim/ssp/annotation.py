@@ -1,9 +1,9 @@
 """The annotation of an archive with all that SSP 1.0 has no form for, so that our run is the same.
 
 The communication step, the scheme, the components' own steps, processes, renamed variables and
-units, the initialisation, events, faults, roles, presets and stimuli. Where it is, the elements are
-in the order of execution. Its content is JSON: the dataclasses of the system as objects, a port as
-a string.
+units, the initialisation, events, faults, roles, presets, stimuli and the pacing. Where it is, the
+elements are in the order of execution. Its content is JSON: the dataclasses of the system as
+objects, a port as a string.
 """
 
 import json
@@ -19,6 +19,7 @@ from ..errors import InputError, choices, nearest
 from ..interface.interface import Value
 from ..system.description import System
 from ..system.parts import Event, Fault, Initialisation, Isolation, Port, Solver
+from ..system.realtime import Realtime
 from ..system.stimuli import Stimuli
 from ..system.structure import Diverging, Scheme
 from .document import add
@@ -41,7 +42,7 @@ class Beside:
 
 @dataclass(frozen=True, slots=True)
 class Extras:
-    """The attributes of a system that SSP has no form for; earlier archives lack the last four."""
+    """The attributes of a system that SSP has no form for; earlier archives lack the last five."""
 
     step_ns: int
     scheme: Scheme
@@ -53,6 +54,7 @@ class Extras:
     presets: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
     diverging: Diverging = "stop"
     input: Stimuli | None = None
+    realtime: Realtime = Realtime()
 
 
 def no_extras(components: Iterable[str], steps: Steps) -> Extras:

@@ -5,8 +5,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from ..errors import InputError, choices
-from ..system.description import in_nanoseconds
-from ..system.parts import NANOSECONDS
+from ..system.parts import NANOSECONDS, in_nanoseconds
 from .annotation import Extras
 from .document import at, child
 from .foreign import Steps

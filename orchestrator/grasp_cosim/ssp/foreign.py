@@ -15,8 +15,7 @@ from lxml import etree  # type: ignore[import-untyped]
 
 from ..checks import real
 from ..errors import InputError, choices
-from ..system.description import in_nanoseconds
-from ..system.parts import NANOSECONDS
+from ..system.parts import NANOSECONDS, in_nanoseconds
 from .document import add, at, children
 
 _OSP = "http://opensimulationplatform.com/SSP/OSPAnnotations"

@@ -13,8 +13,8 @@ from typing import Any
 from ..errors import InputError, choices
 from ..interface.expansion import expanded
 from ..interface.interface import Value
-from ..system.description import System, in_nanoseconds
-from ..system.parts import Component, Connection, Port
+from ..system.description import System
+from ..system.parts import Component, Connection, Port, in_nanoseconds
 from ..system.stimuli import Stimuli
 from .annotation import TYPE, Extras, no_extras, read_extras
 from .archive import STRUCTURE, Archive
@@ -79,6 +79,7 @@ def read_ssp(
         extras.presets,
         extras.diverging,
         stimuli,
+        extras.realtime,
     )
 
 

@@ -1,12 +1,13 @@
 """The system description: components, connections and the experiment, checked once."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from copy import copy
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from .. import extensions
-from ..checks import choice, is_number, number
+from ..checks import choice
 from ..errors import InputError, nearest
 from ..files import check_nature
 from ..interface.interface import Given
@@ -15,18 +16,17 @@ from .checks import (
     check_components,
     check_connections,
     check_initialisation,
-    check_items,
     check_solvers,
     check_steps,
 )
 from .made_of import made_of
-from .parts import LONGEST, NANOSECONDS, Isolation
+from .parts import Component, Isolation
+from .places import SECTIONS, as_file, changed, plain
 from .scenario_checks import check_scenario
-from .stimuli import Stimuli, read_stimuli
+from .stimuli import INTERPOLATIONS, Stimuli, read_stimuli
 from .stimuli_checks import check_stimuli
-from .structure import DIVERGING, SCHEMES, Diverging, Scheme, Structure
-from .swap import Replacement, with_fmu
-from .values import with_given
+from .structure import Structure, experiment
+from .swap import Replacement, with_entries
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +47,12 @@ class System(Structure):
         check_connections(self)
         check_scenario(self)
         check_initialisation(self)
+        for component in self.components:
+            if component.name in SECTIONS:
+                raise InputError(
+                    f"{self.name}: component {component.name!r}: is the name of a section of a "
+                    "system file; must have another name"
+                )
         for role, name in self.roles.items():
             self.component(name, f"{self.name}: [roles]: {role} = {name!r}")
         if not self.as_read:  # copies keep it
@@ -91,9 +97,9 @@ class System(Structure):
     def with_values(self, values: Mapping[str, Given]) -> "System":
         """A copy with start values changed; the keys are like 'plant.object_width'.
 
-        Of a whole array the value is a list of lists, a NumPy array, or one for all elements.
+        The value of a whole array is a list of lists, a NumPy array, or one for all elements.
         """
-        return self.revised({}, values, ("swap", "with_values"))
+        return self.with_settings(values, "with_values {}".format)
 
     def swap(
         self,
@@ -112,47 +118,63 @@ class System(Structure):
         new = Replacement(Path(fmu), rename or {}, units or {})
         return self.revised({component: new}, {}, ("swap", "with_values"))
 
+    def with_settings(
+        self, settings: Mapping[str, Any], place: Callable[[str], str] = "with_settings {}".format
+    ) -> "System":
+        """A copy with single values of its file changed, by their places in it.
+
+        "experiment.scheme", "components.plant.fmu", "components.plant.rename.gap[1]" or
+        "realtime.priority" are such; "plant.object_width" is short for
+        "components.plant.values.object_width". A text stands for a number or a boolean where there
+        must be one. An FMU takes the place of another as by swap(), with the names and units that
+        are given with it; values that are given, too, are in its units.
+
+        `place` says of a key, or of the beginning of one, where it comes from, for messages.
+        InputError where there is no such place, or one is given twice, or a value does not fit it.
+        """
+        file = as_file(self, settings, place)
+        tables = file.pop("components", {})
+        components, notes = {c.name: c for c in self.components}, [*self.notes]
+        for name, table in tables.items():
+            components[name], more = with_entries(self, components[name], table, place)
+            notes += more
+        if not file and all(_of_parameters(self, *named) for named in tables.items()):
+            return self._with_parameters(tuple(components.values()))
+        return replace(
+            self,
+            components=tuple(components.values()),
+            connections=as_written(self),
+            notes=tuple(notes),
+            initialisation=self._changed("initialisation", file, place),
+            realtime=self._changed("realtime", file, place),
+            roles={**self.roles, **file.get("roles", {})},
+            input=self._changed_input(file.get("input", {}), place),
+            **experiment(
+                lambda key: place(f"experiment.{key}"),
+                {key: plain(value) for key, value in file.get("experiment", {}).items()},
+            ),
+        )
+
     def revised(
         self,
         fmus: Mapping[str, str | Path | Replacement],
         values: Mapping[str, Given],
         places: tuple[str, str],
     ) -> "System":
-        """A copy with FMUs replaced, then values changed; places name the two, for messages.
-
-        An FMU given by its path alone must have what the component has values for.
-        """
-        components, notes = {c.name: c for c in self.components}, [*self.notes]
-        given: dict[str, dict[str, Given]] = {}
-        for key, value in values.items():
-            name, dot, variable = key.partition(".")
-            if not dot:
-                ports = [f"{c.name}.{v}" for c in self.components for v in c.interface.by_name]
-                raise InputError(
-                    f"{places[1]} {key}: must be COMPONENT.VARIABLE; {nearest(key, ports)}"
-                )
-            self.component(name, f"{places[1]} {key}")
-            given.setdefault(name, {})[variable] = value
+        """A copy with FMUs replaced, then values changed; places name the two, for messages."""
+        settings: dict[str, Any] = {}
         for name, fmu in fmus.items():
-            place = f"{places[0]} {name}"
-            new = fmu if isinstance(fmu, Replacement) else Replacement(Path(fmu), exact=True)
-            was, anew = self.component(name, place), given.get(name, {})
-            arrays = was.interface.arrays
-            parts = (arrays[key].names if key in arrays else (key,) for key in anew)
-            fresh = {variable for part in parts for variable in part}
-            components[name], more = with_fmu(self, was, new, fresh, place)
-            notes += more
-            kept = [v for v in components[name].values if v not in fresh]
-            check_items(was, components[name], kept, place)
-        for name, more_values in given.items():
-            place = f"{places[1]} {name}."
-            components[name] = with_given(components[name], place.__add__, more_values, text=True)
-        return replace(
-            self,
-            components=tuple(components.values()),
-            connections=as_written(self),
-            notes=tuple(notes),
-        )
+            new = fmu if isinstance(fmu, Replacement) else Replacement(Path(fmu))
+            self.component(name, f"{places[0]} {name}")
+            settings[f"components.{name}.fmu"] = new.fmu
+            settings |= {f"components.{name}.rename.{k}": v for k, v in new.rename.items()}
+            settings |= {f"components.{name}.units.{k}": v for k, v in new.units.items()}
+
+        def place(key: str) -> str:
+            name = key.removeprefix("components.").partition(".")[0]
+            return f"{places[1]} {key}" if key in values else f"{places[0]} {name}"
+
+        return self.with_settings({**settings, **values}, place)
 
     def with_presets(self, *names: str) -> "System":
         """A copy with the values of presets, a later one before an earlier one."""
@@ -200,40 +222,47 @@ class System(Structure):
 
         Or that does something else where a signal runs away.
         """
+        given = {"step": step, "stop": stop, "scheme": scheme, "diverging": diverging}
+        changed = {key: value for key, value in given.items() if value is not None}
+        return replace(self, **experiment(str, changed))
+
+    def _changed(self, section: str, file: Mapping[str, Any], place: Callable[[str], str]) -> Any:
+        """The options of a section with those of a file."""
+        table = file.get(section, {})
+        return changed(place(section), getattr(self, section), table, text=True)
+
+    def _changed_input(
+        self, table: Mapping[str, Any], place: Callable[[str], str]
+    ) -> Stimuli | None:
+        """The stimuli with a file, or a way between its rows, of their own."""
+        way = place("input.interpolation")
+        if "file" in table:
+            return read_stimuli(table["file"], table.get("interpolation", "linear"), way)
+        if not table:
+            return self.input
+        if self.input is None:
+            raise InputError(f"{way}: there is no input file; must have input.file, too")
         return replace(
-            self,
-            step_ns=self.step_ns if step is None else in_nanoseconds("step", step),
-            stop_ns=self.stop_ns if stop is None else in_nanoseconds("stop", stop),
-            scheme=self.scheme if scheme is None else as_scheme("scheme", scheme),
-            diverging=self.diverging if diverging is None else as_diverging("diverging", diverging),
+            self.input, interpolation=choice(way, table["interpolation"], INTERPOLATIONS)
         )
+
+    def _with_parameters(self, components: tuple[Component, ...]) -> "System":
+        """A copy with components that differ in values of parameters, which nothing else goes by.
+
+        These are checked already, so that a thousand runs do not check the rest as often.
+        """
+        made = copy(self)
+        object.__setattr__(made, "components", components)
+        return made
+
+
+def _of_parameters(system: System, name: str, table: Mapping[str, Any]) -> bool:
+    """True if entries of a component are values alone, of parameters that are not in arrays."""
+    variables = system.component(name, name).interface.by_name
+    found = [variables.get(key) for key in table.get("values", ())]
+    plain = all(v and v.causality == "parameter" and not v.element for v in found)
+    return plain and [*table] == ["values"]
 
 
 def _stimuli(given: str | Path | Stimuli | None) -> Stimuli | None:
     return read_stimuli(given) if isinstance(given, str | Path) else given
-
-
-def in_nanoseconds(place: str, seconds: Any, zero: bool = False) -> int:
-    """A time in s as a whole number of nanoseconds; InputError where it is none.
-
-    With zero, it may be 0.
-    """
-    if not is_number(seconds):
-        raise InputError(f"{place} = {seconds!r} s: must be a number")
-    span = f"from 0 to {LONGEST:g}" if zero else f"greater than 0, at most {LONGEST:g}"
-    must = f"a number {span}"
-    time = number(place, seconds, 0.0, LONGEST, above=not zero, must=must, unit="s")
-    nanoseconds = round(time * NANOSECONDS)
-    if abs(nanoseconds / NANOSECONDS - time) > 1e-12 * time:
-        raise InputError(f"{place} = {seconds!r} s: must be a whole number of nanoseconds")
-    return nanoseconds
-
-
-def as_scheme(place: str, name: Any) -> Scheme:
-    """The scheme of that name; InputError where there is none."""
-    return choice(place, name, SCHEMES)  # type: ignore[no-any-return]
-
-
-def as_diverging(place: str, name: Any) -> Diverging:
-    """What a run does where a signal runs away; InputError where there is no such thing."""
-    return choice(place, name, DIVERGING)  # type: ignore[no-any-return]

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
+from ..checks import is_number, number
+from ..errors import InputError
 from ..interface.expansion import expanded
 from ..interface.interface import Interface, Value, Variable
 from ..interface.obstacles import of_binary
@@ -26,6 +28,22 @@ LONGEST = 1e9
 def seconds(nanoseconds: int) -> str:
     """A time in s as messages have it."""
     return f"{nanoseconds / NANOSECONDS:.9g} s"
+
+
+def in_nanoseconds(place: str, seconds: Any, zero: bool = False) -> int:
+    """A time in s as a whole number of nanoseconds; InputError where it is none.
+
+    With zero, it may be 0.
+    """
+    if not is_number(seconds):
+        raise InputError(f"{place} = {seconds!r} s: must be a number")
+    span = f"from 0 to {LONGEST:g}" if zero else f"greater than 0, at most {LONGEST:g}"
+    must = f"a number {span}"
+    time = number(place, seconds, 0.0, LONGEST, above=not zero, must=must, unit="s")
+    nanoseconds = round(time * NANOSECONDS)
+    if abs(nanoseconds / NANOSECONDS - time) > 1e-12 * time:
+        raise InputError(f"{place} = {seconds!r} s: must be a whole number of nanoseconds")
+    return nanoseconds
 
 
 def first_step(time_ns: int, step_ns: int) -> int:

@@ -6,9 +6,16 @@ from typing import Any
 
 from ..checks import as_table, check_keys, real
 from ..errors import InputError, nearest
-from .description import in_nanoseconds
 from .faults import RANDOM
-from .parts import NANOSECONDS, Condition, Connection, Event, Fault, Port
+from .parts import (
+    NANOSECONDS,
+    Condition,
+    Connection,
+    Event,
+    Fault,
+    Port,
+    in_nanoseconds,
+)
 
 _CONDITION = re.compile(r"""(.+?\S)\s*(<=|>=|==|!=|<|>)\s*('[^']*'|"[^"]*"|[^<>=!\s]+)""")
 

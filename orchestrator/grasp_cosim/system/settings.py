@@ -6,6 +6,7 @@ from typing import Any
 from .description import System
 from .made_of import changed
 from .parts import NANOSECONDS
+from .realtime import Realtime
 from .scenario import event_entry, fault_entry
 from .stimuli import input_entry
 
@@ -51,5 +52,6 @@ def settings(system: System) -> dict[str, Any]:
         ],
         "events": [event_entry(e) for e in system.events],
         "faults": [fault_entry(f) for f in system.faults],
+        **({"realtime": asdict(system.realtime)} if system.realtime != Realtime() else {}),
         **({"input": input_entry(system.input)} if system.input else {}),
     }

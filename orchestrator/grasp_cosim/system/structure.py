@@ -1,12 +1,14 @@
 """The parts of a system, as its checks and its readers see it."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, get_args
 
+from ..checks import choice
 from ..errors import InputError, nearest
 from ..interface.interface import Given, Variable
-from .parts import Component, Connection, Event, Fault, Initialisation, Port
+from .parts import Component, Connection, Event, Fault, Initialisation, Port, in_nanoseconds
+from .realtime import Realtime
 from .stimuli import Stimuli
 
 Scheme = Literal["sequential", "jacobi"]
@@ -25,6 +27,7 @@ class Structure:
     name the component that plays a role, such as plant; where they do not, the component of that
     name plays it. presets are values under a name, like {"bench": {"sensor_1.noise.seed": 1}}.
     diverging is what a run does where a signal runs away. input drives inputs without a connection.
+    realtime is how a run is paced that is to be in real time.
     as_read is what the system was made of when it was read, see system.settings.made_of.
     """
 
@@ -42,6 +45,7 @@ class Structure:
     presets: Mapping[str, Mapping[str, Given]] = field(default_factory=dict)
     diverging: Diverging = "stop"
     input: Stimuli | None = None
+    realtime: Realtime = Realtime()
     as_read: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
 
     @property
@@ -71,3 +75,17 @@ class Structure:
                 return component
         names = [c.name for c in self.components]
         raise InputError(f"{place}: no component {name!r}; {nearest(name, names)}")
+
+
+def experiment(place: Callable[[str], str], table: Mapping[str, Any]) -> dict[str, Any]:
+    """The attributes of a system that entries of its [experiment] stand for.
+
+    place names an entry for messages; InputError where one is not as it must be.
+    """
+    made: dict[str, Any] = {}
+    for key, value in table.items():
+        if key in ("step", "stop"):
+            made[f"{key}_ns"] = in_nanoseconds(place(key), value)
+        else:
+            made[key] = choice(place(key), value, SCHEMES if key == "scheme" else DIVERGING)
+    return made

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from shlex import quote
+from typing import Any
 
+from ..checks import choice, text
 from ..errors import InputError, nearest
 from ..interface.interface import Interface, Value
 from ..interface.read import describe
 from ..interface.units import IDENTITY
-from .parts import Component, Port, literal
+from .checks import check_items
+from .parts import ISOLATIONS, Component, Port, Solver, in_nanoseconds, literal
+from .places import changed, plain
 from .readings import unit_of
 from .structure import Structure
+from .values import with_given
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,17 +35,57 @@ class Replacement:
     exact: bool = False
 
 
+def with_entries(
+    system: Structure, was: Component, table: Mapping[str, Any], place: Callable[[str], str]
+) -> tuple[Component, list[str]]:
+    """The component with entries of a system file, of which texts may stand for numbers; and notes.
+
+    With an FMU, names and units are those of its variables, and so are values, in its units.
+    """
+    notes: list[str] = []
+    own = f"{was.name}."
+    values, rename, units = (table.get(entry, {}) for entry in ("values", "rename", "units"))
+    for entry, names in (("rename", rename), ("units", units)):
+        for key, name in names.items():
+            text(place(f"components.{own}{entry}.{key}"), name, "a string")
+    if "fmu" in table:
+        where = place(f"components.{own}fmu")
+        if not isinstance(table["fmu"], str | Path):
+            raise InputError(f"{where} = {table['fmu']!r}: must be the path of an FMU")
+        now, notes = with_fmu(
+            system, was, Replacement(Path(table["fmu"]), rename, units), values, where
+        )
+    elif rename or units:
+        now = replace(was, rename={**was.rename, **rename}, units={**was.units, **units})
+    else:
+        now = was
+    where = place(f"components.{own}")
+    if "step" in table:
+        now = replace(now, step_ns=in_nanoseconds(f"{where}step", plain(table["step"])))
+    if "isolation" in table:
+        chosen = choice(f"{where}isolation", table["isolation"], ISOLATIONS)
+        now = replace(now, isolation=chosen)
+    if "solver" in table:
+        given = changed(f"{where}solver", now.solver or Solver(), table["solver"], text=True)
+        now = replace(now, solver=given)
+    if values:
+        now = with_given(now, lambda name: place(own + name), values, text=True)
+    return now, notes
+
+
 def with_fmu(
     system: Structure, was: Component, new: Replacement, anew: Collection[str], place: str
 ) -> tuple[Component, list[str]]:
     """The component with another FMU, its values converted to the units of that; and notes.
 
-    `anew` are variables that get another value. A value of a variable that the new FMU lacks is
-    left out, which a note says. InputError where a value, or another number that the system states,
-    has no meaning in the new unit.
+    `anew` are variables, or arrays, that get another value. A value of a variable that the new FMU
+    lacks is left out, which a note says. InputError where a value, or another number that the
+    system states, has no meaning in the new unit.
     """
     now = replaced(was, new, f"{place}: ")
     before, after = was.interface, now.interface
+    arrays = before.arrays
+    anew = {v for name in anew for v in (arrays[name].names if name in arrays else (name,))}
     _check_ends(system, was, after, place)
     given = {n: value for n, value in was.values.items() if new.exact or n in after.by_name}
     kept = {name: value for name, value in given.items() if name not in anew}
@@ -54,7 +99,9 @@ def with_fmu(
         for name, value in was.values.items()
         if name not in given
     ]
-    return replace(now, values={**given, **converted(kept, before, after)}), notes
+    now = replace(now, values={**given, **converted(kept, before, after)})
+    check_items(was, now, [name for name in now.values if name not in anew], place)
+    return now, notes
 
 
 def _check_ends(system: Structure, was: Component, after: Interface, place: str) -> None:

@@ -9,17 +9,14 @@ from ..checks import as_table, check_keys, check_values, choice, is_number, text
 from ..errors import InputError
 from ..interface.interface import Given
 from ..interface.read import read_interface
-from .description import System, as_diverging, as_scheme, in_nanoseconds
-from .parts import ISOLATIONS, Component, Connection, Initialisation, Port, Solver
+from .description import System
+from .parts import ISOLATIONS, Component, Connection, Initialisation, Port, Solver, in_nanoseconds
+from .places import ENTRIES, PLACES, SECTIONS, changed
+from .realtime import Realtime
 from .scenario import read_events, read_faults
 from .stimuli import Stimuli, read_stimuli
+from .structure import experiment
 from .values import with_given
-
-KEYS = (
-    "experiment", "components", "connections", "initialisation", "events", "faults", "roles",
-    "presets", "input",
-)  # fmt: skip
-"""The entries of a system file."""
 
 TODO = re.compile(r"""(?:[^#"']|"(?!TODO\b)(?:[^"\\]|\\.)*"|'(?!TODO\b)[^']*')*["']TODO\b""")
 """A line with a value that is left to do; a # in quotes begins no comment."""
@@ -33,25 +30,28 @@ def read_toml(path: Path, fmus: Path | None = None, stimuli: Stimuli | None = No
     place, folder = path.name, fmus or path.parent
     table = toml_table(path, "system file")
     check_filled_in(path)
-    check_keys(place, table, KEYS)
+    check_keys(place, table, SECTIONS)
 
     def part(name: str, default: Any = None) -> dict[str, Any]:
         return as_table(f"{place}: [{name}]", table.get(name, default))
 
-    experiment = part("experiment")
-    check_keys(f"{place}: [experiment]", experiment, {"step", "stop", "scheme", "diverging"})
+    chosen = part("experiment")
+    check_keys(f"{place}: [experiment]", chosen, PLACES["experiment"])
     components = part("components")
     connections = _connections(f"{place}: connections", table.get("connections", []))
     system = System(
         place,
         tuple(_component(place, name, entry, folder) for name, entry in components.items()),
         connections,
-        in_nanoseconds(f"{place}: experiment.step", experiment.get("step")),
-        in_nanoseconds(f"{place}: experiment.stop", experiment.get("stop")),
-        as_scheme(f"{place}: experiment.scheme", experiment.get("scheme", "sequential")),
-        read_events(place, table.get("events", [])),
-        (),
-        _initialisation(f"{place}: [initialisation]", part("initialisation", {})),
+        **experiment(
+            lambda key: f"{place}: experiment.{key}",
+            {"step": None, "stop": None, "scheme": "sequential", **chosen},
+        ),
+        events=read_events(place, table.get("events", [])),
+        initialisation=changed(
+            f"{place}: [initialisation]", Initialisation(), part("initialisation", {})
+        ),
+        realtime=changed(f"{place}: [realtime]", Realtime(), part("realtime", {})),
         roles={
             role: text(f"{place}: [roles]: {role}", name, "the name of a component")
             for role, name in part("roles", {}).items()
@@ -60,9 +60,6 @@ def read_toml(path: Path, fmus: Path | None = None, stimuli: Stimuli | None = No
             name: _values(f"{place}: [presets.{name}]", values)
             for name, values in part("presets", {}).items()
         },
-        diverging=as_diverging(
-            f"{place}: experiment.diverging", experiment.get("diverging", "stop")
-        ),
         input=stimuli or _input(f"{place}: [input]", table.get("input"), path.parent),
     )
     faults = read_faults(place, table.get("faults", []), system.connections)
@@ -72,7 +69,7 @@ def read_toml(path: Path, fmus: Path | None = None, stimuli: Stimuli | None = No
 def _input(place: str, entry: Any, folder: Path) -> Stimuli | None:
     if entry is None:
         return None
-    check_keys(place, as_table(place, entry), {"file", "interpolation"})
+    check_keys(place, as_table(place, entry), PLACES["input"])
     file = text(f"{place}: file", entry.get("file"), "the path of a CSV file, as a string")
     way = entry.get("interpolation", "linear")
     return read_stimuli(folder / file, way, f"{place}: interpolation")
@@ -93,17 +90,6 @@ def to_do(text: str) -> dict[int, str]:
     return {number: line.strip(" \t\r,") for number, line in lines if TODO.match(line)}
 
 
-def _initialisation(place: str, table: dict[str, Any]) -> Initialisation:
-    check_keys(place, table, Initialisation.__slots__)
-    return Initialisation(**table)
-
-
-def _solver(place: str, table: Any) -> Solver:
-    given = as_table(place, table)
-    check_keys(place, given, Solver.__slots__)
-    return Solver(**given)
-
-
 def _values(place: str, table: Any) -> dict[str, Given]:
     """A table of values; if they fit their variables is checked where it is used."""
     values = as_table(place, table)
@@ -114,7 +100,7 @@ def _values(place: str, table: Any) -> dict[str, Given]:
 def _component(place: str, name: str, entry: Any, folder: Path) -> Component:
     place = f"{place}: [components.{name}]"
     entry = as_table(place, entry)
-    check_keys(place, entry, {"fmu", "values", "step", "rename", "units", "isolation", "solver"})
+    check_keys(place, entry, ENTRIES)
     fmu = folder / text(f"{place}: fmu", entry.get("fmu"), "the path of an FMU, as a string")
     values = _values(f"{place}: values", entry.get("values", {}))
     own = entry.get("step")
@@ -128,7 +114,9 @@ def _component(place: str, name: str, entry: Any, folder: Path) -> Component:
         None if own is None else in_nanoseconds(f"{place}: step", own),
         choice(f"{place}: isolation", entry.get("isolation", "none"), ISOLATIONS),
         units,
-        solver=_solver(f"{place}: solver", entry["solver"]) if "solver" in entry else None,
+        solver=changed(f"{place}: solver", Solver(), entry["solver"])
+        if "solver" in entry
+        else None,
     )
     sized = component.sized(read_interface(fmu)).renamed(rename, f"{place}: rename")
     sized.in_units(units, f"{place}: units")

@@ -125,7 +125,7 @@ def run(
                 every=every,
                 listeners=[folder] if folder else (),
                 engine=engine,
-                realtime=paced,
+                realtime=paced or False,
                 metrics=metrics,
                 note=say,
             )

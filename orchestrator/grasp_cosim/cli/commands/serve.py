@@ -14,7 +14,7 @@ from ...hil.protocol import LONGEST_SILENCE, exchanged, shared_key
 from ...hil.served import ServedFmu, Service
 from ...hil.server import DEFAULT_ADDRESS, Server
 from ...interruption import interrupts
-from ...system.description import in_nanoseconds
+from ...system.parts import in_nanoseconds
 from ..frame import FAILED, INTERRUPTED, NEGATIVE, PATH, fail, json_option, pair, say, show
 
 PATIENCE = 2.0

@@ -4,22 +4,18 @@ import math
 from dataclasses import dataclass
 from fractions import Fraction
 from numbers import Real
-from pathlib import Path
 from typing import Literal, get_args
 
 from ..checks import choice, whole
-from ..errors import InputError, choices
+from ..errors import InputError
 
 Overrun = Literal["catch-up", "continue", "stop"]
 OVERRUNS: tuple[str, ...] = get_args(Overrun)
 
-ONLINE = Path("/sys/devices/system/cpu/online")
-"""The file in which Linux lists its CPUs, as in 0-3,6."""
-
 
 @dataclass(frozen=True, slots=True)
 class Realtime:
-    """A run in real time; InputError where a value is none of those given here."""
+    """How a run keeps to the clock; InputError where a value is none of those given here."""
 
     factor: float = 1.0
     """Speed relative to real time, > 0."""
@@ -31,7 +27,7 @@ class Realtime:
     priority: int | None = None
     """Priority of SCHED_FIFO, 1 to 99; None leaves the scheduling as it is."""
     cpu: int | None = None
-    """The number of the CPU to stay on, one of this machine; None leaves it to the system."""
+    """The number of the CPU to stay on; None leaves it to the operating system."""
     lock_memory: bool = False
     """Keep the memory of the process from being swapped out."""
 
@@ -44,7 +40,6 @@ class Realtime:
             whole("priority", self.priority, 1, 99, must="a whole number from 1 to 99")
         if self.cpu is not None:
             whole("cpu", self.cpu, 0, 2**16, must=f"a whole number from 0 to {2**16}")
-            _check_cpu(self.cpu)
         if not isinstance(self.lock_memory, bool):
             raise InputError(f"lock_memory = {self.lock_memory!r}: must be True or False")
 
@@ -64,15 +59,3 @@ class Realtime:
 
 YEAR_NS = 366 * 24 * 3600 * 10**9
 """The longest period."""
-
-
-def _check_cpu(cpu: int) -> None:
-    """InputError where Linux runs no such CPU; other systems do not list theirs."""
-    try:
-        listed = ONLINE.read_text("ascii")
-    except OSError:
-        return
-    ends = [tuple(map(int, part.split("-"))) for part in listed.split(",")]
-    online = [number for span in ends for number in range(span[0], span[-1] + 1)]
-    if cpu not in online:
-        raise InputError(f"cpu = {cpu}: no such CPU here; must be one of {choices(online)}")
