@@ -170,7 +170,7 @@ def _description(target: Path, original: Original, settings: Settings) -> Descri
     name = target.stem
     if not (name.isascii() and name.isidentifier()) or target.suffix != ".fmu":
         raise ValueError(
-            f"{target.name}: must be NAME.fmu, NAME of letters, digits and _, no digit first"
+            f"{target}: must be NAME.fmu, NAME of letters, digits and _, no digit first"
         )
     taken = [v.name for v in original.variables if v.name.startswith("proxy.")]
     if taken:

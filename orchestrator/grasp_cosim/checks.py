@@ -192,11 +192,16 @@ def toml_table(path: Path, what: str) -> dict[str, Any]:
 
     InputError where it is missing or not readable as TOML.
     """
+    text = ""
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
+        text = path.read_text("utf-8-sig")
+        table = tomllib.loads(text)
         repr(table)  # a hexadecimal number longer than Python writes is refused here
     except FileNotFoundError:
         raise InputError(f"{path}: no such {what}") from None
     except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"{path}: not readable as TOML: {error}") from error
+        where = re.search(r"at line (\d+)", str(error))
+        line = f": {text.splitlines()[int(where[1]) - 1].strip()}" if where else ""
+        twice = str(error).replace("Cannot overwrite a value", "a key is given a second time")
+        raise InputError(f"{path}: not readable as TOML: {twice}{line}") from error
     return table

@@ -36,7 +36,7 @@ def check_folder(folder: Path) -> None:
         with tempfile.TemporaryFile(dir=nearest):
             pass
     except OSError as error:
-        raise InputError(f"--out {folder}: cannot write to {nearest}: {error.strerror}") from error
+        raise InputError(f"{folder}: cannot write to {nearest}: {error.strerror}") from error
 
 
 WANTED = {
@@ -137,7 +137,7 @@ def check_fmu_file(path: Path) -> None:
 def write_text(path: Path, text: str) -> None:
     """Write a file in one piece: there is never half of it."""
     with in_one_piece(path) as part:
-        part.write_text(text, encoding="utf-8")
+        part.write_text(text, "utf-8", "backslashreplace")  # names that are no UTF-8
 
 
 def write_json(path: Path, content: Any) -> None:
@@ -148,6 +148,8 @@ def write_json(path: Path, content: Any) -> None:
 @contextmanager
 def in_one_piece(path: Path) -> Iterator[Path]:
     """A temporary name beside path to write to; it takes the place of path at the end."""
+    if path.is_dir():
+        raise IsADirectoryError(errno.EISDIR, "is a folder; must be the name of a file", str(path))
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f"{path.name}.{os.getpid()}.part")
     try:

@@ -73,7 +73,7 @@ def test_what_is_built_is_said_before_the_compiler_runs(
         (["--fmi", "2"], "--fmi 2: must be with --native"),
         (["--c-only", "c"], "--c-only c: must be with --native"),
         (["--native", "--c-only", "c", "--fmi", "3"], "build: --c-only: C without FMI; must be"),
-        (["--native", "--out", "/dev/null/x"], "--out /dev/null/x: cannot write to /dev/null"),
+        (["--native", "--out", "/dev/null/x"], "/dev/null/x: cannot write to /dev/null"),
         (["--native", "--c-only", "c", "Gripper"], "build: Gripper: no such block; must be of"),
     ],
 )

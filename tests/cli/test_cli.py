@@ -146,7 +146,7 @@ def test_a_folder_that_cannot_be_written_is_found_at_once(
     (tmp_path / "file").touch()
     code, _, err = command(command_, "--out", out)
     assert code == 2
-    assert err.startswith(f"grasp-cosim: --out {out}: ")
+    assert err.startswith(f"grasp-cosim: {out}: ")
     assert len(err.splitlines()) == 1
 
 

@@ -86,7 +86,7 @@ def test_contact_times_have_a_residual_for_every_row(
         (("--times", "b.csv"), "b.csv: No such file or directory; must be a table"),
         (("--set", "plant.nothing=1"), "--set plant.nothing: "),
         (("--set", "plant"), "--set 'plant': must be COMPONENT.VARIABLE=VALUE"),
-        (("--out", "/proc/nowhere"), "--out /proc/nowhere: cannot write"),
+        (("--out", "/proc/nowhere"), "/proc/nowhere: cannot write"),
     ],
 )
 def test_wrong_input_is_one_line(

@@ -137,3 +137,67 @@ def test_what_is_damaged_or_unknown_is_said_as_before(command: Run, tmp_path: Pa
     assert "x.toml: not readable as TOML" in command("run", "x.toml")[2]
     assert "none.toml: no such system file" in command("run", "none.toml")[2]
     assert "none.fmu: no such FMU file" in command("inspect", "none.fmu")[2]
+
+
+TABLE = "[experiment]\nstep = 0.1\nstop = 1.0\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (TABLE + "stop = 2.0\n", "(at line 4, column 11): stop = 2.0"),
+        (f"{TABLE}\n[a]\n{TABLE}", "(at line 6, column 12): [experiment]"),
+        (TABLE + "stop 2.0", "(at line 4, column 6): stop 2.0"),
+        ("\ufeff" + TABLE, "[components]: missing"),  # a byte order mark, as some editors write it
+    ],
+)
+def test_a_line_of_toml_is_named(text: str, said: str, command: Run, tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(text, "utf-8")
+    code, out, err = command("run", "a.toml")
+    assert (code, out) == (2, "")
+    assert said in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("report", "run", "--out", "folder"), "folder: is a folder; must be the name of a file"),
+        (("compare", "run", "run", "-o", "."), ".: is a folder; must be the name of a file"),
+        (("ssp", "-o", "."), "-o .: must be a file named like system.ssp"),
+        (("proxy", "plant.fmu", "-o", "."), "proxy: .: must be NAME.fmu"),
+        (("run", "--stop", "0.01", "--out", "a.toml"), "a.toml: cannot write to "),
+        (("build", "--out", "a.toml/b"), "a.toml/b: cannot write to "),
+        (("report", "run", "--out", "a.toml/b"), "a.toml: cannot write to "),
+    ],
+)
+def test_what_cannot_be_written(
+    arguments: tuple[str, ...], said: str, command: Run, things: Path
+) -> None:
+    (things / "folder").mkdir()
+    code, out, err = command(*arguments)
+    assert (code, out) == (2, "")
+    assert err.splitlines()[-1].startswith(f"grasp-cosim: {said}")
+
+
+def test_a_name_that_is_no_utf_8(command: Run, things: Path) -> None:
+    """As older file systems have them."""
+    try:
+        run = things.with_name("h\udce9")
+        (things / "run").rename(run)
+    except OSError:
+        pytest.skip("this file system has no such names")
+    for arguments in (("report", run), ("compare", run, run, "-o", run / "c.html")):
+        code, _, err = command(*arguments)
+        assert code == 0, err
+    assert r"h\udce9" in (run / "c.html").read_text("utf-8")
+
+
+def test_a_current_folder_that_was_removed(
+    command: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    (tmp_path / "gone").rmdir()
+    said = "grasp-cosim: the current folder was removed; go to another one\n"
+    assert command("run") == (2, "", said)
+    monkeypatch.chdir(tmp_path)

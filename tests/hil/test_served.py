@@ -16,6 +16,7 @@ from grasp_cosim.hil.protocol import exchanged, link_signature
 from grasp_cosim.hil.served import BACKLOG, ServedFmu, Service
 from grasp_cosim.interface.interface import Value
 from grasp_cosim.interface.read import read_interface
+from grasp_fmus.link.message import STEP as STEP_REQUEST
 from grasp_fmus.link.peer import TOO_LONG
 from support import native_fmus
 from support.proxies import HandProxy, RefusedError
@@ -105,6 +106,18 @@ def test_in_lockstep_the_values_are_those_of_the_fmu_to_the_bit(
         "a session of test begins at t = 0 s",
         "the session is over at t = 0.039 s: the proxy ended the session",
     ]
+
+
+def test_of_a_server_that_was_started_anew_it_is_said(fmus: Path, clocked: MakeClocked) -> None:
+    fmu, other = fmus / "ProximitySensor.fmu", fmus / "GripperPlant.fmu"
+    it, anew = (clocked(fmu, Service(lockstep=True)) for _ in range(2))
+    it.proxy.begin(1, starts(fmu))
+    anew.served.answer(it.proxy.request(STEP_REQUEST, 0.0, starts(fmu), STEP), "test", anew.now)
+    line = "a datagram from test of a session that is not known is refused: it began before this"
+    assert [said.startswith(line) for said in anew.said] == [True]
+    plant = clocked(other, Service(lockstep=True)).proxy
+    anew.served.answer(plant.request(STEP_REQUEST, 0.0, starts(other), STEP), "test", anew.now)
+    assert anew.said[1].startswith("a datagram from test of another interface is refused: its")
 
 
 def test_in_initialisation_mode_outputs_follow_the_inputs(fmus: Path, clocked: MakeClocked) -> None:

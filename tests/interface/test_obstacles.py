@@ -1,6 +1,7 @@
 """The likely reason why an FMU does not load, by what is said of it."""
 
 from pathlib import Path
+from tempfile import gettempdir
 
 import pytest
 from grasp_cosim.interface.obstacles import of_loading
@@ -23,3 +24,13 @@ from support.native_fmus import needs_gcc
 def test_a_licence_is_wanted_where_that_is_said(said: str, licence: bool, tmp_path: Path) -> None:
     obstacle = of_loading(describe(build_model("stair", tmp_path)), said)
     assert (obstacle is not None and "licence" in obstacle.what) == licence
+
+
+@needs_gcc
+def test_a_folder_without_execution_is_named(tmp_path: Path) -> None:
+    """The words are those of glibc, where TMPDIR is mounted with noexec."""
+    said = "binaries/linux64/stair.so: failed to map segment from shared object"
+    obstacle = of_loading(describe(build_model("stair", tmp_path)), said)
+    assert obstacle is not None
+    assert gettempdir() in obstacle.what
+    assert "TMPDIR" in obstacle.remedy

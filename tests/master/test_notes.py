@@ -22,7 +22,7 @@ def ring(folder: Path, monkeypatch: pytest.MonkeyPatch, **more: object) -> tuple
         "grasp_cosim.master.simulation.load", lambda component: by_name[component.name]
     )
     ends = [(Port("a", "y"), Port("b", "u")), (Port("b", "y"), Port("a", "u"))]
-    return make_system(mocks, [Connection(*e) for e in ends], **more), mocks[1]  # type: ignore[arg-type]
+    return make_system(mocks, [Connection(*e) for e in ends], 10, **more), mocks[1]  # type: ignore[arg-type]
 
 
 def test_a_loop_is_told_before_the_first_step(

@@ -41,8 +41,10 @@ def test_a_loss_and_a_return_are_named() -> None:
     assert figures["back"] == [TIME[4]]
     assert (figures["missed"], figures["most_in_a_row"], figures["ahead"]) == (4, 3, 2.5)
     assert proxy_lines(TIME, signals, 0.1)[:-1] == [
-        "arm: the peer was lost at t = 0.2 s, back at t = 0.4 s; outputs as proxy.on_loss says",
-        "arm: the peer was lost at t = 0.5 s, not back; outputs as proxy.on_loss says",
+        "arm: the peer was lost at t = 0.2 s and came back at t = 0.4 s; its outputs were "
+        "meanwhile as proxy.on_loss says",
+        "arm: the peer was lost at t = 0.5 s and did not come back; its outputs were meanwhile as "
+        "proxy.on_loss says, and with proxy.resume = true it may come back",
         "arm: the peer was started anew, and its model set up from the start: 2 sessions in this "
         "run",
         "arm: the peer's clock was up to 2.5 s ahead of the run, which did not keep up",

@@ -75,6 +75,8 @@ class Peer:
         """
         self.signature = signature
         self.counters = PeerCounters()
+        self.unknown = 0
+        """Of the foreign datagrams, those of a session that is not known."""
         self._sealer = Sealer(key)
         self._request = Codec(signature.request)
         self._answer = Codec(signature.answer)
@@ -175,11 +177,13 @@ class Peer:
             self._count("repeated")
             return self._refuse(m, message.FAILED, self._reason, len(m.body))
         if m.kind == message.END:
+            self.unknown += 1
             return self._count("foreign")
         if m.kind == message.INITIALISE and self._busy(m.session, now):
             self._count("busy")
             return self._refuse(m, message.BUSY)
         if m.kind != message.INITIALISE or m.cookie != self._cookie(m.session):
+            self.unknown += 1
             self._count("foreign")
             return self._refuse(m, message.UNKNOWN)
         request = self._do(m, now, fresh=True)

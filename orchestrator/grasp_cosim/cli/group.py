@@ -1,5 +1,6 @@
 """The group of the commands, each imported when it is asked for."""
 
+import os
 from importlib import import_module
 from importlib.resources import files
 from importlib.util import find_spec
@@ -7,7 +8,7 @@ from tempfile import gettempdir
 
 import click
 
-from ..errors import nearest
+from ..errors import InputError, nearest
 from ..scratch import sweep
 from .frame import VERBOSITY
 
@@ -70,4 +71,8 @@ def cli(debug: bool) -> None:
 
     grasp-cosim COMMAND --help shows the options of a command and an example.
     """
+    try:
+        os.getcwd()  # noqa: PTH109
+    except OSError as error:
+        raise InputError("the current folder was removed; go to another one") from error
     sweep(gettempdir())

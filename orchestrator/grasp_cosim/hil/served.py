@@ -54,7 +54,8 @@ DROPPED = {
     "forged": "without the right key is dropped",
     "malformed": "that is none of this protocol, or with another kind of key, is dropped",
     "other_version": f"of another protocol is refused: must be {VERSION}",
-    "foreign": "of another interface, or of a session that is not known, is refused",
+    "foreign": "of another interface is refused: its proxy must be made of the FMU served here",
+    "unknown": "of a session that is not known is refused: it began before this server did",
     "busy": "of another proxy is refused while a session is under way",
 }
 """The line for the first datagram of a kind, by its counter."""
@@ -129,7 +130,9 @@ class ServedFmu:
 
     def _say_what_is_dropped(self, source: str) -> None:
         """The first time only: whoever looks for the reason of a silence looks here."""
-        for counter in [c for c in self._unsaid if getattr(self.peer.counters, c)]:
+        counts = {**asdict(self.peer.counters), "unknown": self.peer.unknown}
+        counts["foreign"] -= self.peer.unknown
+        for counter in [c for c in self._unsaid if counts[c]]:
             self._say(f"a datagram from {source} {self._unsaid.pop(counter)}")
 
     def _do(self, request: Request, now: int) -> None:

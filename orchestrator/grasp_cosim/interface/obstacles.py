@@ -8,6 +8,7 @@ import re
 import sys
 from functools import cache
 from pathlib import Path
+from tempfile import gettempdir
 from typing import NamedTuple
 
 from ..errors import choices
@@ -112,5 +113,10 @@ def of_loading(fmu: Interface, said: str) -> Obstacle | None:
         return Obstacle(
             f"is a link to {tool} and needs it here (needsExecutionTool)",
             "install that and its licence, or ask the vendor for an export that runs by itself",
+        )
+    if "failed to map segment" in said:
+        return Obstacle(
+            f"was extracted to {gettempdir()}, on a file system without execution (noexec)",
+            "set TMPDIR to a folder on another one",
         )
     return None

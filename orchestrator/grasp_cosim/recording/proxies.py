@@ -59,8 +59,11 @@ def _figures(time: Times, signals: Signals, start: str) -> dict[str, Any]:
 def _lines(f: Mapping[str, Any], steps: int, step: float) -> Iterator[str]:
     for moment in f["lost"][:_LISTED]:
         back = next((t for t in f["back"] if t > moment), None)
-        again = "not back" if back is None else f"back at t = {back:.9g} s"
-        yield f"the peer was lost at t = {moment:.9g} s, {again}; outputs as proxy.on_loss says"
+        again = f"came back at t = {back:.9g} s" if back else "did not come back"
+        yield (
+            f"the peer was lost at t = {moment:.9g} s and {again}; its outputs were meanwhile as "
+            f"proxy.on_loss says{'' if back else ', and with proxy.resume = true it may come back'}"
+        )
     if f["sessions"] > 1:
         yield (
             f"the peer was started anew, and its model set up from the start: {f['sessions']} "

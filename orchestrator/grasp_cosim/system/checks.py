@@ -12,13 +12,17 @@ from ..errors import InputError, choices
 from ..interface.capabilities import KINDS
 from ..interface.interface import SUPPORTED, Interface, Variable, limits
 from ..interface.units import conversion
+from ..numerals import counted
 from .arrays import as_written, unsourced
-from .parts import LOOPS, Component, Connection, Port, seconds
+from .parts import LOOPS, NANOSECONDS, Component, Connection, Port, seconds
 from .stimuli_checks import check_stimuli, driven, stimuli_remarks
 from .structure import Structure
 
 FINEST, COARSEST = 1e-13, 0.1
 """Relative tolerances of a solver: beyond the first one there is rounding alone."""
+
+FEW = 10
+"""Steps; a run of fewer is remarked on."""
 
 
 class _End(NamedTuple):
@@ -199,6 +203,12 @@ def remarks(system: Structure) -> tuple[str, ...]:
                 lines.append(f"{port} is of type {variable.nature}: {left}")
         lines += unsourced(system, component)
     lines += stimuli_remarks(system)
+    if (steps := system.stop_ns // system.step_ns) < FEW:
+        lines.append(
+            f"{system.name}: the whole run is {counted(steps, 'step')} of "
+            f"{system.step_ns / NANOSECONDS:g} s; what happens between two steps is not seen, a "
+            "shorter step shows more"
+        )
     if not system.recorded:
         lines.append(
             f"{system.name}: nothing is recorded; must have an output that is a Real, Integer, "
