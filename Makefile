@@ -1,4 +1,4 @@
-# make run    the published grasp from FMUs: .venv, build, evaluate, pictures and playground in results/
+# make run    the published grasp from FMUs: .venv, build, evaluate
 # make test   the quick tests; each test runs in one of this and the next three
 # make test-slow  what takes longer, campaigns in a tenth of their size
 # make platforms  other machines and compilers, FMI 3.0     make interop  other makers' tools
@@ -29,7 +29,7 @@ SEED ?= $(shell date +%s)
 run: .venv/run
 	$(BIN)/grasp-cosim build
 	$(BIN)/grasp-cosim evaluate --out results
-	$(BIN)/grasp-cosim play -o results/play.html
+	@echo 'the playground, where each slider simulates the grasp anew: docs/playground.html'
 
 test: .venv/dev
 	$(PYTEST) -m "not slow and not platforms and not interop"
@@ -72,8 +72,7 @@ pictures: .venv/dev
 	$(BIN)/python docs/pictures.py
 
 playground: .venv/run
-	$(BIN)/python -m grasp_cosim.grasp.play.wasm
-	$(BIN)/grasp-cosim play -o docs/playground.html
+	PYTHONPATH=docs $(BIN)/python -m playground.page
 
 .venv/run: pyproject.toml constraints.txt
 	$(if $(PYTHON),,$(error grasp-cosim needs Python 3.11 or newer; name one with PYTHON=...))

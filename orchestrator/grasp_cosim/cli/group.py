@@ -13,14 +13,14 @@ from ..scratch import sweep
 from .frame import VERBOSITY
 
 SECTIONS = {
-    "Simulate": ("run", "play", "sweep", "evaluate", "identify"),
+    "Simulate": ("run", "sweep", "evaluate", "identify"),
     "Look at recorded runs": ("report", "compare"),
     "Make and check FMUs and systems": ("init", "build", "inspect", "doctor", "qualify", "ssp"),
     "Hardware in the loop": ("proxy", "serve", "relay"),
 }
 """Where the help lists a command; one that is in none of these is among the others."""
 
-OF_THE_GRASP = {"evaluate", "identify", "play"}
+OF_THE_GRASP = {"evaluate", "identify"}
 """The commands that there are with the room grasp/ only."""
 
 

@@ -3,13 +3,11 @@
 import tomllib
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from ..controllers import CONTROLLERS
-from ..presets import CASES, SYSTEM
-
-if TYPE_CHECKING:
-    from grasp_fmus.package import Model
+from grasp_cosim.grasp.controllers import CONTROLLERS
+from grasp_cosim.grasp.presets import CASES, SYSTEM
+from grasp_fmus.package import Model, shipped_model
 
 PLANTS = {
     "fixed": "GripperPlant",
@@ -31,15 +29,13 @@ _TYPES = {"Real": 0, "Boolean": 1, "Integer": 2}
 
 
 @cache
-def model(name: str) -> "Model":
+def model(name: str) -> Model:
     """Return the model of an FMU that comes with the package."""
-    from grasp_fmus.package import shipped_model
-
     return shipped_model(name)
 
 
 def shipped() -> bytes:
-    """Return play.wasm.z as it comes with the package."""
+    """Return play.wasm.z as it is."""
     return WASM.read_bytes()
 
 

@@ -1,10 +1,8 @@
 """Makes play.wasm.z, which the page carries: the C of our native FMUs, and the loop over them.
 
-    python -m grasp_cosim.grasp.play.wasm
-
-writes it anew, with the zig that ZIG names, which makes the same bytes on every machine. It comes
-with the package, so that a page needs no compiler. It names the sources that it was made from, so
-that it can be told without zig if they are those at hand.
+It takes the zig that ZIG names, which makes the same bytes on every machine. The file is kept
+beside its sources, so that the page needs no compiler, and it names what it was made from, so that
+it can be told without zig if these are the sources at hand.
 """
 
 import re
@@ -18,12 +16,12 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from c_compilers import BITS, LIBM, environment, find_zig
+from grasp_cosim.checks import install_command
+from grasp_cosim.errors import InputError
 from grasp_fmus.native.blocks import translated
 from grasp_fmus.native.sources import native_sources
 from grasp_fmus.package import write_file
 
-from ...checks import install_command
-from ...errors import InputError
 from .system import MODELS, WASM, model, shipped
 
 ZIG = "0.17.1"
@@ -116,7 +114,3 @@ def main() -> None:
         write_file(WASM, zlib.compress(made(), 9))
     except InputError as error:
         sys.exit(str(error))
-
-
-if __name__ == "__main__":
-    main()

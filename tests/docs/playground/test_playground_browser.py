@@ -7,8 +7,8 @@ from typing import Any
 from urllib.parse import unquote
 
 import pytest
-from grasp_cosim.grasp.play.page import playground_html
-from grasp_cosim.grasp.play.system import PLANTS, page_system
+from playground.page import playground_html
+from playground.system import PLANTS, page_system
 from report.javascript import in_browser
 
 pytestmark = pytest.mark.slow
@@ -129,7 +129,7 @@ def test_choices_and_switches(html: str, tmp_path: Path) -> None:
         "grasp-cosim run --controller adaptive",
         "grasp-cosim run",
     ]
-    assert seen[8] == "grasp-cosim run --bench --step 0.005 --stop 2 --scheme jacobi"
+    assert seen[8] == "grasp-cosim run --preset bench --step 0.005 --stop 2 --scheme jacobi"
     assert seen[9] == "bench=1&step=0.005&stop=2&scheme=jacobi"
     assert seen[10].startswith("sensor_1.gain = 0.002 V·mⁿ")
     assert seen[11:14] == ["V.m^n", seen[12], ""]

@@ -127,7 +127,7 @@ function command() {
   if (plant !== usual.plant) words.push(`--swap plant=fmus/build/${system.plants[plant]}.fmu`);
   if (controller !== usual.controller) words.push(`--controller ${controller}`);
   if (number !== usual.case) words.push(`--case ${number}`);
-  if (bench) words.push("--bench");
+  if (bench) words.push("--preset bench");
   if (step !== usual.step) words.push(`--step ${step}`);
   if (stop() !== usual.stop) words.push(`--stop ${stop()}`);
   if (scheme !== usual.scheme) words.push(`--scheme ${scheme}`);

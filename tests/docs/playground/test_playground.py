@@ -1,30 +1,22 @@
-"""The page of the playground as a file: what the command writes, and what is in it."""
+"""The page of the playground as a file, and what is in it."""
 
-import json
 import re
 import zlib
 from pathlib import Path
 
 import pytest
-from grasp_cosim import cli
 from grasp_cosim.errors import InputError
-from grasp_cosim.grasp.play import wasm
-from grasp_cosim.grasp.play.page import playground_html
-from grasp_cosim.grasp.play.system import PLANTS, page_system, shipped
+from playground import wasm
+from playground.page import playground_html
+from playground.system import PLANTS, page_system, shipped
 from support.compilers import needs_zig
 
 DOCS = Path(__file__).parents[3] / "docs"
 
 
-def test_the_page_in_docs_is_the_one_that_the_command_writes(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_page_in_docs_is_of_the_sources_at_hand() -> None:
     """Else: make playground."""
-    page = tmp_path / "new" / "play.html"
-    assert cli.main(["play", "-o", str(page), "--json"]) == 0
-    written = {"page": str(page), "bytes": page.stat().st_size}
-    assert json.loads(capsys.readouterr().out) == written
-    assert page.read_bytes() == (DOCS / "playground.html").read_bytes()
+    assert playground_html() == (DOCS / "playground.html").read_text("utf-8")
 
 
 def test_it_is_one_small_file_that_asks_for_no_other() -> None:
@@ -32,14 +24,6 @@ def test_it_is_one_small_file_that_asks_for_no_other() -> None:
     assert len(html) < 250_000
     asking = r"""https?:|\b(src|href)=["'](?!data:)|\bfetch\(|@import|url\((?!#)"""
     assert not re.search(asking, html)
-
-
-def test_a_place_that_cannot_be_written_to(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "file").write_text("")
-    assert cli.main(["play", "-o", str(tmp_path / "file" / "play.html")]) == 2
-    assert "file" in capsys.readouterr().err
 
 
 @pytest.mark.slow

@@ -1,4 +1,9 @@
-"""Puts the page together: what it shows, its scripts, and the components in WebAssembly."""
+"""Puts the page together: what it shows, its scripts, and the components in WebAssembly.
+
+    PYTHONPATH=docs .venv/bin/python -m playground.page     # make playground
+
+makes the WebAssembly anew where the C of the FMUs has changed, and writes docs/playground.html.
+"""
 
 from __future__ import annotations
 
@@ -7,26 +12,24 @@ import json
 import zlib
 from html import escape
 from importlib.metadata import version
-from importlib.resources import files
 from pathlib import Path
 from string import Template
 from typing import Any
 
-from ...files import write_text
-from ...report.page import page_style, traces_script
-from ..metrics import FINGERS, METRICS
-from ..scene import scene_script, scene_style
+from grasp_cosim.files import write_text
+from grasp_cosim.grasp.metrics import FINGERS, METRICS
+from grasp_cosim.grasp.scene import scene_script, scene_style
+from grasp_cosim.report.page import page_style, traces_script
+
+from . import wasm
 from .system import page_system, shipped
 
-
-def write_playground(path: Path) -> None:
-    """Write the page, one file that needs no network."""
-    write_text(path, playground_html())
+HERE = Path(__file__).parent
 
 
 def playground_html() -> str:
-    """Return the page as text: the same for the same package, to the byte."""
-    wasm = shipped()
+    """Return the page as text: the same for the same sources, to the byte."""
+    components = shipped()
     state = {
         "system": page_system(),
         "metrics": [
@@ -43,9 +46,9 @@ def playground_html() -> str:
     return Template(_text("play.html")).substitute(
         style=page_style() + scene_style() + _text("play.css"),
         version=escape(version("grasp-cosim")),
-        size=len(zlib.decompress(wasm)) // 1000,
+        size=len(zlib.decompress(components)) // 1000,
         page=json.dumps(state, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c"),
-        wasm=base64.b64encode(wasm).decode("ascii"),
+        wasm=base64.b64encode(components).decode("ascii"),
         script="\n".join([traces_script(), scene_script(), *own]),
     )
 
@@ -61,4 +64,9 @@ def _scene() -> dict[str, Any]:
 
 
 def _text(name: str) -> str:
-    return (files(__package__) / "page" / name).read_text("utf-8")
+    return (HERE / name).read_text("utf-8")
+
+
+if __name__ == "__main__":
+    wasm.main()
+    write_text(HERE.with_suffix(".html"), playground_html())

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 from grasp_cosim import cli
-from grasp_cosim.grasp.play.page import playground_html
-from grasp_cosim.grasp.play.system import LAWS, PLANTS, page_system
+from playground.page import playground_html
+from playground.system import LAWS, PLANTS, page_system
 from report.javascript import in_browser
 from support import campaign
 from support.native_fmus import needs_gcc
