@@ -72,7 +72,7 @@ def _parsed(file: Path) -> tuple[str, ast.Module]:
     except (SyntaxError, ValueError) as error:
         number = getattr(error, "lineno", None)  # there is none for a NUL byte
         line = f" line {number}:" if number else ""
-        raise ValueError(f"{file}:{line} is no Python: {error.args[0]}") from error
+        raise ValueError(f"{file}:{line} is not Python: {error.args[0]}") from error
 
 
 def _check_imports(file: Path, text: str, tree: ast.Module) -> None:
@@ -169,7 +169,9 @@ def _check_declaration(found: list[Variable]) -> None:
     names = set()
     for v in found:
         if v.name in names:
-            raise ValueError(f"{v.name}: is there twice; inputs, outputs, parameters share names")
+            raise ValueError(
+                f"{v.name}: appears twice; inputs, outputs and parameters share their names"
+            )
         names.add(v.name)
         if v.unit and (text := refusal(v.unit)):
             raise ValueError(f"{v.name}: {text}")

@@ -13,7 +13,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from .errors import InputError, choices, nearest
+from .errors import InputError, choices, nearest, reason
 
 EXACT = 2**53
 """Whole numbers of a smaller magnitude are exact as a float64."""
@@ -202,6 +202,6 @@ def toml_table(path: Path, what: str) -> dict[str, Any]:
     except (OSError, ValueError, RecursionError) as error:
         where = re.search(r"at line (\d+)", str(error))
         line = f": {text.splitlines()[int(where[1]) - 1].strip()}" if where else ""
-        twice = str(error).replace("Cannot overwrite a value", "a key is given a second time")
-        raise InputError(f"{path}: not readable as TOML: {twice}{line}") from error
+        said = reason(error).replace("Cannot overwrite a value", "a key is given a second time")
+        raise InputError(f"{path}: not readable as TOML: {said}{line}") from error
     return table

@@ -24,6 +24,11 @@ class UnknownNameError(KeyError):
         return f"{name!r}: no such {kind}; {nearest(str(name), names)}"
 
 
+def reason(error: Exception) -> str:
+    """The text of an error, without the number and the file that an OSError puts around it."""
+    return getattr(error, "strerror", None) or str(error)
+
+
 def nearest(name: object, names: Iterable[object], see: str = "") -> str:
     """The names that look like one: "did you mean a, b?"; where none does, "valid: ...".
 

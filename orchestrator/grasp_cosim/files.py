@@ -92,7 +92,7 @@ def _nature(path: Path, wanted: str) -> tuple[str, str]:
     if path.suffix.lower() == ".csv" and path.is_file() and wanted == "system":
         return "a CSV file", f"`grasp-cosim run --input {name}` drives inputs of the grasp with it"
     if path.name == "OspSystemStructure.xml" and path.is_file():
-        return "a system structure of OSP, which is no SSP", ""
+        return "a system structure of OSP, which is not SSP", ""
     return "", ""
 
 

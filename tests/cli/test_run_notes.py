@@ -51,6 +51,8 @@ def test_it_is_said_before_a_failure_that_names_the_inputs(command: Run, tmp_pat
 
 
 def test_a_run_of_few_steps_is_remarked_on(command: Run, tmp_path: Path) -> None:
-    said = "two.toml: the whole run is 2 steps of 0.5 s; what happens between two steps is not seen"
+    said = (
+        "two.toml: the whole run is 2 steps of 0.5 s, and values are passed on only between steps"
+    )
     assert said in command("run", two(tmp_path), "--step", "0.5")[2]
     assert "whole run" not in command("run", two(tmp_path))[2]

@@ -79,7 +79,7 @@ def test_in_the_place_of_a_system(arguments: tuple[str, ...], command: Run, thin
             "a file unpacked from an FMU",
             "> unpacked.fmu` packs it",
         ),
-        ("OspSystemStructure.xml", "a system structure of OSP, which is no SSP", ""),
+        ("OspSystemStructure.xml", "a system structure of OSP, which is not SSP", ""),
         ("drive.csv", "a CSV file", "`grasp-cosim run --input drive.csv` drives"),
         (".", "a folder", "there is: a.ssp, a.toml"),
         ("b.py", "a Python file", "`grasp-cosim build b.py` makes an FMU of it, if it is a block"),
@@ -163,7 +163,7 @@ def test_a_line_of_toml_is_named(text: str, said: str, command: Run, tmp_path: P
     [
         (("report", "run", "--out", "folder"), "folder: is a folder; must be the name of a file"),
         (("compare", "run", "run", "-o", "."), ".: is a folder; must be the name of a file"),
-        (("ssp", "-o", "."), "-o .: must be a file named like system.ssp"),
+        (("ssp", "-o", "."), ".: must be a file named like system.ssp"),
         (("proxy", "plant.fmu", "-o", "."), "proxy: .: must be NAME.fmu"),
         (("run", "--stop", "0.01", "--out", "a.toml"), "a.toml: cannot write to "),
         (("build", "--out", "a.toml/b"), "a.toml/b: cannot write to "),

@@ -108,10 +108,10 @@ WRONG = [
     *(("from math", f"{line}\nfrom math", "line 7: gripper_plant must be imported at the top level,"
        " with single spaces, as: from gripper_plant import ...\n")
       for line in ("import gripper_plant", "from  gripper_plant import substeps")),
-    ("def step(", "def step((", "line 36: is no Python: "),
+    ("def step(", "def step((", "line 36: is not Python: "),
     ("from math", "1 / 0\nfrom math", "line 7: import: ZeroDivisionError: division by zero"),
     ("from math", "raise SystemExit('a\\nb')\nfrom math", "line 7: import: SystemExit: a b"),
-    ("from math", "\0\nfrom math", "is no Python: source code string cannot contain null "),
+    ("from math", "\0\nfrom math", "is not Python: source code string cannot contain null "),
     ("def step", "def advance", "has no step; a block has Params, Inputs, State, Outputs, "),
     ("= 1.0\n", "\n", "Inputs(): TypeError: "),
     (", nominal=1.0, depends", ", depends", "declaration: TypeError: y: must have a nominal "),
@@ -126,7 +126,7 @@ WRONG = [
     ("Outputs(x.y)", "Outputs(x.y * 1e999 if x.y else 0.0)", "outputs(): ValueError: y = inf N"),
     ("Outputs(x.y)", "Outputs(x.y > 0)", "outputs(): ValueError: y = False: must be of type "),
     ("Outputs(NamedTuple):\n    y:", "Outputs(NamedTuple):\n    u:",
-     "declaration: ValueError: u: is there twice; inputs, outputs, parameters share names"),
+     "declaration: ValueError: u: appears twice; inputs, outputs and parameters share their names"),
     ("Outputs(NamedTuple):\n    y:", "Outputs(NamedTuple):\n    \u00ff:",
      "declaration: ValueError: \u00ff: must be of ASCII letters, digits and _"),
     ("= 0.5", "= 5e3", "declaration: ValueError: time_constant = 5000.0 s: must be from 0.001 to "),

@@ -308,7 +308,7 @@ def test_a_user_s_metrics_are_columns_of_a_sweep(command: Run, own: Path, tmp_pa
     assert "heat" not in rows[0]
     code, _, err = command("sweep", "study.toml", "--metrics", own, "--out", "other")
     assert (code, err.count("\n")) == (2, 1)
-    assert "metric 'reach': is there twice" in err
+    assert "metric 'reach': is defined twice" in err
 
 
 @pytest.mark.slow
@@ -373,7 +373,7 @@ def test_a_metric_that_fails_loses_nothing_of_the_run(
     ("text", "message"),
     [
         ("1 / 0\n", "--metrics own.py: ZeroDivisionError: division by zero"),
-        (OWN.replace('"reach"', '"time_to_contact"'), "metric 'time_to_contact': is there twice"),
+        (OWN.replace('"reach"', '"time_to_contact"'), "metric 'time_to_contact': is defined twice"),
         (OWN.replace('"reach"', '"stop"'), "--metrics own.py: metric 'stop': every run has this"),
         pytest.param(
             OWN.replace("return reach(run)", "return run"),

@@ -113,11 +113,11 @@ def test_of_a_server_that_was_started_anew_it_is_said(fmus: Path, clocked: MakeC
     it, anew = (clocked(fmu, Service(lockstep=True)) for _ in range(2))
     it.proxy.begin(1, starts(fmu))
     anew.served.answer(it.proxy.request(STEP_REQUEST, 0.0, starts(fmu), STEP), "test", anew.now)
-    line = "a datagram from test of a session that is not known is refused: it began before this"
+    line = "a datagram from test of an unknown session was refused: it began before this"
     assert [said.startswith(line) for said in anew.said] == [True]
     plant = clocked(other, Service(lockstep=True)).proxy
     anew.served.answer(plant.request(STEP_REQUEST, 0.0, starts(other), STEP), "test", anew.now)
-    assert anew.said[1].startswith("a datagram from test of another interface is refused: its")
+    assert anew.said[1].startswith("a datagram from test of another interface was refused: its")
 
 
 def test_in_initialisation_mode_outputs_follow_the_inputs(fmus: Path, clocked: MakeClocked) -> None:
@@ -155,7 +155,7 @@ def test_lost_requests_are_not_made_up_for_when_the_end_has_come(
 
     it.served.over = over
     it.proxy.begin(1, starts(fmu))
-    with pytest.raises(RefusedError, match=r"the end came with 10 of 99000 lost steps made up$"):
+    with pytest.raises(RefusedError, match=r"the FMU ended it after 10 of 99000 lost steps"):
         it.proxy.step(99000 * STEP, STEP, starts(fmu))
     assert len(asked) == 11
 
@@ -297,7 +297,7 @@ def test_the_watchdog_puts_the_inputs_to_what_is_safe_until_a_request_comes(
     assert it.served.counters()["watchdog"] == 0
     it.wait(51.0)
     assert it.served.counters()["watchdog"] == 1
-    assert "no request for 0.05 s: inputs failsafe" in it.said
+    assert "no request for 0.05 s: the inputs went to their failsafe values" in it.said
     velocity = it.proxy.step(0.1, STEP, push)[2]
     expected = (-1.0 * 0.049 + 0.25 * 0.051) / 0.5  # the watchdog is before the step due with it
     assert float(velocity) == pytest.approx(expected, rel=1e-9)
@@ -379,7 +379,7 @@ def test_what_is_dropped_is_said_once(fmus: Path, clocked: MakeClocked) -> None:
     it = clocked(fmu, Service(key=b"a key of 16 byte"))
     for _ in range(3):
         assert it.served.answer(it.proxy.hello(1), "somebody", it.now) is None
-    assert it.said == ["a datagram from somebody without the right key is dropped"]
+    assert it.said == ["a datagram from somebody without the right key was dropped"]
 
 
 def test_a_server_that_is_closed_says_where_its_session_ended(

@@ -138,7 +138,7 @@ def test_values_of_an_array_are_checked_one_by_one(tmp_path: Path) -> None:
         values_of(found, "here", "u_Int8", [1, 2, 3])
     with pytest.raises(InputError, match=r"^here: u_Int8 = '\[1': "):
         values_of(found, "here", "u_Int8", "[1", text=True)
-    with pytest.raises(InputError, match=r"^here: m = \[1\]: is no array; must be one value"):
+    with pytest.raises(InputError, match=r"^here: m = \[1\]: is not an array; must be one value"):
         values_of(found, "here", "m", [1])
     with pytest.raises(InputError, match=r"u_Int64\[1,1\] = '9007199254740993.0': must be"):
         values_of(found, "here", "u_Int64", "9007199254740993.0", text=True)

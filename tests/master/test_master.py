@@ -150,7 +150,7 @@ def test_a_slow_component_sees_the_present_in_sequence_and_its_start_in_jacobi(
 
 def test_a_rate_that_does_not_divide_names_both_numbers(mock: Make, clock: Mock) -> None:
     with pytest.raises(
-        InputError, match=r"clock: step = 0\.25 s is no whole multiple of the base step 0\.1 s; "
+        InputError, match=r"clock: step = 0\.25 s is not a whole multiple of the base step 0\.1 s; "
     ):
         rates([clock], "sequential", {"clock": 250_000_000})
     with pytest.raises(InputError, match=r"clock: step = 0\.3 s does not divide stop = 0\.8 s"):

@@ -265,7 +265,7 @@ def test_a_rename_table_gives_the_systems_names(tmp_path: Path) -> None:
         ("rename = { gap = 1 }", "'gap' = 1: must be a variable of the FMU, a string"),
         ("rename = 'x'", "rename"),
         ('isolation = "thread"', "isolation = 'thread': must be one of none, process"),
-        ("step = 0.15", r"a: step = 0.15 s is no whole multiple of the base step 0.1 s"),
+        ("step = 0.15", r"a: step = 0.15 s is not a whole multiple of the base step 0.1 s"),
         ("step = true", "step = True s: must be a number"),
     ],
 )

@@ -26,7 +26,7 @@ def test_a_metric_stays_what_it_is() -> None:
     ("asked", "said"),
     [
         ("time_to_contct", "'time_to_contct': no such metric; did you mean time_to_contact"),
-        ("time_to_contact", "metrics: time_to_contact: cannot be had: "),
+        ("time_to_contact", "metrics: time_to_contact: is not available: "),
         (3, "metrics: 3: must be a metric, a function or a name"),
         (lambda _: 1.0, "metric '<lambda>': must be a name"),
     ],

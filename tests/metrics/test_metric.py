@@ -288,10 +288,10 @@ def test_what_every_run_tells_is_no_name_of_a_metric(grasp: System, tmp_path: Pa
 
 def test_two_metrics_of_one_name_are_refused() -> None:
     again = made("time_to_contact", lambda _: 1.0)
-    with pytest.raises(InputError, match=r"^metric 'time_to_contact': is there twice; must have"):
+    with pytest.raises(InputError, match=r"^metric 'time_to_contact': is defined twice; must have"):
         registered([again])
     own = made("own", lambda _: 1.0)
-    with pytest.raises(InputError, match=r"^metric 'own': is there twice; must have another name$"):
+    with pytest.raises(InputError, match=r"^metric 'own': is defined twice; must have"):
         registered([own, own])
     assert registered([own]) == (*METRICS, own)
 
@@ -374,10 +374,10 @@ def test_a_file_without_metrics_is_one_line(
 
 def test_a_file_that_cannot_be_read_is_one_line(tmp_path: Path) -> None:
     path = tmp_path / "mine.py"
-    with pytest.raises(InputError, match=r"^--metrics .*mine\.py: .*No such file.*; must be a Pyt"):
+    with pytest.raises(InputError, match=r"mine\.py: No such file.*; must be a Python file"):
         load_metrics(path)
     path.write_bytes(b"\xff\xfe")
-    with pytest.raises(InputError, match=r"^--metrics .*mine\.py: .*; must be a Python file$"):
+    with pytest.raises(InputError, match=r"mine\.py: .*; must be a Python file$"):
         load_metrics(path)
 
 

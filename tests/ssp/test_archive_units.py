@@ -90,7 +90,7 @@ def test_a_unit_of_the_fmus_name_is_the_fmus_however_it_is_defined(
 ) -> None:
     loaded = given(tmp_path, "length Real 2.5 m", units)
     assert value(loaded, "length") == 2.5
-    assert note(loaded, "parameter 'length': unit 'm' is not defined as by the FMU, whose it is ta")
+    assert note(loaded, "parameter 'length': unit 'm' is defined otherwise by the FMU, whose")
 
 
 def test_the_same_of_a_connector(tmp_path: Path) -> None:
@@ -102,7 +102,7 @@ def test_the_same_of_a_connector(tmp_path: Path) -> None:
     ssd = structure(top).replace('<ssc:BaseUnit m="1" factor="0.001"/>', '<ssc:BaseUnit kg="1"/>')
     loaded = System.load(archive(tmp_path, ssd, {"a": FMU, "b": FMU}))
     assert transforms(loaded)[Port("b", "u")] == (0.001, 0.0)
-    assert note(loaded, "connector 'y': unit 'mm' is not defined as by the FMU, whose it is taken")
+    assert note(loaded, "connector 'y': unit 'mm' is defined otherwise by the FMU, whose")
 
 
 def test_a_connector_of_the_fmus_unit_needs_no_definition(tmp_path: Path) -> None:

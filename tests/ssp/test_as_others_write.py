@@ -86,7 +86,9 @@ def test_a_prefix_in_an_annotation_that_is_for_no_namespace_is_said(tmp_path: Pa
     text = structure(TOP.replace('name="top">', f'name="top">{annotations}'))
     loaded = load(tmp_path, text)
     assert loaded.connections == Y_TO_U
-    assert any("XML has it: Namespace prefix osp on Master is not" in n for n in loaded.notes)
+    assert any(
+        "XML has it otherwise: Namespace prefix osp on Master is not" in n for n in loaded.notes
+    )
     for broken in (text.replace("</ssd:System>", ""), text.replace("<osp:", "<osp:b:")):
         with pytest.raises(InputError, match="ssd: not readable as XML: "):
             load(tmp_path, broken)
@@ -102,7 +104,7 @@ def test_elements_in_another_order_and_empty_lists_are_said(tmp_path: Path) -> N
     assert loaded.connections == Y_TO_U
     (said,) = (note for note in loaded.notes if "schema" in note)
     assert said.startswith(
-        "hand.ssp: SystemStructure.ssd: taken although not as the schema has it: Element 'ssd:Conn"
+        "hand.ssp: SystemStructure.ssd: taken, although the schema has it otherwise: Element 'ssd:"
     )
     assert "\n" not in said
 

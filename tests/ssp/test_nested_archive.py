@@ -108,7 +108,7 @@ def test_errors_name_the_way_to_the_place(tmp_path: Path) -> None:
 
 def test_what_contains_itself_is_refused(tmp_path: Path) -> None:
     loop = structure(system("s", component("b", type=DEFINITION, source="x.ssd")))
-    with pytest.raises(InputError, match=r"^hand\.ssp: resources/x\.ssd: contains itself; must no"):
+    with pytest.raises(InputError, match=r"^hand\.ssp: resources/x\.ssd: contains itself, which"):
         load(tmp_path, "resources/x.ssd", {"resources/x.ssd": loop.replace("input in", "")})
 
 
@@ -133,7 +133,7 @@ def test_a_system_of_the_same_document_by_its_id(tmp_path: Path) -> None:
         (
             component("loop", type=DEFINITION, source="#S"),
             "#S",
-            "SystemStructure.ssd#S: contains itself; must not",
+            "SystemStructure.ssd#S: contains itself, which is not allowed",
         ),
     ],
 )

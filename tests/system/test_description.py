@@ -81,7 +81,7 @@ WRONG = [
     ("object_width = 0.07", "object_width = nan", "object_width = nan: must be a finite number"),
     ("object_width = 0.07", "object_width = '7 cm'", "must be a finite number from 0 to 10 m"),
     ("object_width = 0.07", "object_width = true", "must be a finite number from 0 to 10 m"),
-    ("object_width = 0.07", "object_width = [0.07]", "is no array; must be one value"),
+    ("object_width = 0.07", "object_width = [0.07]", "is not an array; must be one value"),
     ("object_width = 0.07", "object_width = [{}]", "must be a number, boolean or string"),
     ("object_width = 0.07", "object_width = 'brown'", "must be a finite number from 0 to 10 m"),
     ("[experiment]", "[experiment", "not readable as TOML"),

@@ -71,7 +71,7 @@ def test_a_mistake_far_down_is_found(tmp_path: Path) -> None:
         ("time;a.u\n0;1,5\n", "= 'time;a.u': must be time, then component.variable, with commas"),
         ("time [m],a.u\n0,0\n", "line 1, column 1 = 'time [m]': must be in a unit of time"),
         ("time,u\n0,0\n", "line 1, column 2 = 'u': must be component.variable"),
-        ("time,a.u,a.u\n0,0,0\n", "line 1, column 3 = 'a.u': is there twice"),
+        ("time,a.u,a.u\n0,0,0\n", "line 1, column 3 = 'a.u': appears twice"),
         ("time,a.u\n0\n", "line 2, column 2: missing"),
         ("time,a.u\n0,\n", "line 2, column 2, a.u: missing"),
         ("time,a.u,a.v\n0,1,one\n1,1, \n", "line 3, column 3, a.v: missing"),
@@ -82,7 +82,7 @@ def test_a_mistake_far_down_is_found(tmp_path: Path) -> None:
         ("time,a.u\n0,0\n2,0\n1,0\n", "line 4, column 1, time = 1.0: is before 2.0 of line 3"),
         ("time,a.u\n1_0,0\n", "line 2, column 1, time = '1_0': must be a number"),
         ("time,a.u\n1e10,0\n", "time to 1e+10 s; must be at most 1e+09 s"),
-        ('time,a.u\n0,"1\n', "line 2: no CSV"),
+        ('time,a.u\n0,"1\n', "line 2: not CSV"),
     ],
 )
 def test_a_mistake_in_the_file_is_one_line_with_its_place(
@@ -99,7 +99,7 @@ def test_what_is_no_such_file_is_said(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="Is a directory; must be a CSV file"):
         read_stimuli(tmp_path)
     (tmp_path / "latin.csv").write_bytes(b"time,a.\xfc\n")
-    with pytest.raises(InputError, match="no UTF-8 text"):
+    with pytest.raises(InputError, match="not UTF-8 text"):
         read_stimuli(tmp_path / "latin.csv")
     with pytest.raises(InputError, match=r"interpolation = 'cubic': must be one of linear, held"):
         read_stimuli(tmp_path / "none.csv", "cubic")

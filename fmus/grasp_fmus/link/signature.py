@@ -44,7 +44,7 @@ class Signature:
                     f"variable {v.name!r} [{v.unit}]: must be without tabs and line ends"
                 )
             if v.name in seen:
-                raise ValueError(f"variable {v.name!r}: is there twice; must have one name each")
+                raise ValueError(f"variable {v.name!r}: appears twice; must have one name each")
             seen.add(v.name)
 
     @cached_property

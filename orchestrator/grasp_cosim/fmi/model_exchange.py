@@ -267,7 +267,7 @@ class ModelInstance(LoadedInstance):
             )
         if self._dense >= MOST_DENSE:
             raise self._error(
-                f"chatters, or comes to no rest ({MOST_DENSE} events in a row, each within "
+                f"chatters, or does not come to rest ({MOST_DENSE} events in a row, each within "
                 f"{DENSE:.0%} of the step after the one before)",
                 self._now,
                 f"; must have a hysteresis, or a shorter step than {self._step:g} s",

@@ -176,7 +176,7 @@ class DrivenFmu:
             if over():
                 name = self.interface.path.name
                 raise SimulationError(
-                    f"{name}: the end came with {k} of {whole} lost steps made up"
+                    f"{name}: the FMU ended it after {k} of {whole} lost steps were made up"
                 )
             at = begin + k * step
             after = time if k == whole - 1 else begin + (k + 1) * step

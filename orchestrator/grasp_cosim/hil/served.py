@@ -51,12 +51,12 @@ class Counts:
 
 
 DROPPED = {
-    "forged": "without the right key is dropped",
-    "malformed": "that is none of this protocol, or with another kind of key, is dropped",
-    "other_version": f"of another protocol is refused: must be {VERSION}",
-    "foreign": "of another interface is refused: its proxy must be made of the FMU served here",
-    "unknown": "of a session that is not known is refused: it began before this server did",
-    "busy": "of another proxy is refused while a session is under way",
+    "forged": "without the right key was dropped",
+    "malformed": "that is not of this protocol, or has another kind of key, was dropped",
+    "other_version": f"of another protocol was refused: its version must be {VERSION}",
+    "foreign": "of another interface was refused: its proxy must be made of the FMU served here",
+    "unknown": "of an unknown session was refused: it began before this server did",
+    "busy": "of another proxy was refused while a session is under way",
 }
 """The line for the first datagram of a kind, by its counter."""
 
@@ -166,7 +166,10 @@ class ServedFmu:
             if self._heard is not None and now - self._heard >= self._service.watchdog_ns:
                 self._heard = None
                 self.counts.watchdog += 1
-                self._say(f"no request for {self._service.watchdog_ns / 1e9:g} s: inputs failsafe")
+                self._say(
+                    f"no request for {self._service.watchdog_ns / 1e9:g} s: the inputs went to "
+                    "their failsafe values"
+                )
                 for i, value in self._failsafe.items():
                     self._values[i] = value
                 self._fmu.set(self._values)

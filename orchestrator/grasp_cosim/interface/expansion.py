@@ -48,7 +48,7 @@ def values_of(
     array: Array | None = interface.arrays.get(name)
     if array is None:
         if not isinstance(given, float | int | bool | str):
-            raise InputError(f"{place}: {name} = {given!r}: is no array; must be one value")
+            raise InputError(f"{place}: {name} = {given!r}: is not an array; must be one value")
         return {name: interface.parse(place, name, given, text)}
     try:
         found: Any = from_text(given) if text and isinstance(given, str) else given

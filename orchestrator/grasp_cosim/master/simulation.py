@@ -15,6 +15,7 @@ from ..interface.interface import Value
 from ..interruption import interruptible, interrupts
 from ..metrics.metric import Function, Metric, chosen, registered
 from ..metrics.units import in_si
+from ..numerals import counted
 from ..progress import Progress, phase
 from ..realtime.pacer import Pacer
 from ..realtime.privileges import Privileges, privileges
@@ -283,7 +284,7 @@ class Session:
     def _log(self) -> tuple[str, ...]:
         master = self._master
         rejected = (
-            f"{name}: steps discarded or ended early, taken in parts: {r.count}, "
+            f"{name}: {counted(r.count, 'step')} discarded or ended early, taken in parts, "
             f"the first at t = {r.first:.9g} s"
             for name, r in master.rejections.items()
         )

@@ -31,6 +31,7 @@ import numpy.typing as npt
 
 from .. import extensions
 from ..errors import InputError, choices, nearest
+from ..errors import reason as reason_of
 from ..interface.units import Conversion
 
 Value = float | bool | None
@@ -239,7 +240,7 @@ def registered(more: Iterable[Metric] = ()) -> tuple[Metric, ...]:
     names = [m.name for m in found]
     twice = next((n for n in names if names.count(n) > 1), None)
     if twice is not None:
-        raise InputError(f"metric {twice!r}: is there twice; must have another name")
+        raise InputError(f"metric {twice!r}: is defined twice; must have another name")
     return tuple(found)
 
 
@@ -258,7 +259,7 @@ def chosen(
             raise InputError(f"metrics: {name!r}: no such metric; {nearest(name, usual)}")
         reason = lacking(usual[name].needs, names, roles)
         if reason:
-            raise InputError(f"metrics: {name}: cannot be had: {reason}")
+            raise InputError(f"metrics: {name}: is not available: {reason}")
     own = (item for item in asked if not isinstance(item, str))
     return tuple(m if isinstance(m, Metric) else metric(_name(m))(m) for m in own)
 
@@ -390,7 +391,7 @@ def load_metrics(path: Path) -> tuple[Metric, ...]:
     try:
         text = path.read_text("utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"--metrics {path}: {error}; must be a Python file") from error
+        raise InputError(f"{path}: {reason_of(error)}; must be a Python file") from error
     found = _run(path.name, text)
     if not found:
         raise InputError(f"--metrics {path}: no metric; must have functions under @metric(name)")

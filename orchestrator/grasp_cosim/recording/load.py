@@ -218,7 +218,7 @@ def read_mdf(
             channels = [c for c in mdf.iter_channels() if len(c.samples)]
     except Exception as error:  # of a damaged file it raises whatever it stumbles over
         said = " ".join(f"{type(error).__name__}: {error}".split())
-        raise InputError(f"{path}: is damaged, no MDF file: {said}") from error
+        raise InputError(f"{path}: is damaged, not an MDF file: {said}") from error
     if not channels:
         raise InputError(f"{path}: no channel has samples; must be a recorded log")
     time = channels[0].timestamps
@@ -237,11 +237,11 @@ def _settings(path: Path) -> dict[str, Any]:
     try:
         settings = json.loads(path.read_text("utf-8"))
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: is damaged, no UTF-8 text: {error.reason}") from error
+        raise InputError(f"{path}: is damaged, not UTF-8 text: {error.reason}") from error
     except OSError as error:
         raise _unreadable(path, error) from error
     except json.JSONDecodeError as error:
-        raise InputError(f"{path}: is damaged, no JSON: {error}") from error
+        raise InputError(f"{path}: is damaged, not JSON: {error}") from error
     if not isinstance(settings, dict):
         raise InputError(f"{path}: is {type(settings).__name__}; must be a JSON object")
     for key, kind in {**SETTING_KEYS, **OUTCOME_KEYS, **MORE_KEYS}.items():

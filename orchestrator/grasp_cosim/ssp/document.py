@@ -72,7 +72,7 @@ def parse(place: str, data: bytes, form: str, notes: Notes) -> Any:
         reason = " ".join(str(error.msg).split())
         if {entry.type for entry in lenient.error_log} != {_UNDECLARED}:
             raise InputError(f"{place}: not readable as XML: {reason}") from error
-        notes.add(place, f"taken although not as XML has it: {reason}")
+        notes.add(place, f"taken, although XML has it otherwise: {reason}")
         for element in root.iter():
             prefix, colon, name = element.tag.partition(":")
             if colon and not prefix.startswith("{"):
@@ -113,7 +113,7 @@ def checked(place: str, root: Any, form: str, notes: Notes) -> Any:
         _tidy(root)
         if not schema.validate(root):
             raise InputError(f"{place}:{error.line}: against the schema: {short(error.message)}")
-        notes.add(place, f"taken although not as the schema has it: {short(error.message)}")
+        notes.add(place, f"taken, although the schema has it otherwise: {short(error.message)}")
     return root
 
 

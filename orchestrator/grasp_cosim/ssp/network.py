@@ -169,7 +169,9 @@ def _check_connectors(part: Part) -> None:
         if not declared or not connector.unit or same(declared, connector.unit):
             continue
         if connector.unit.name == variable.unit:
-            text = f"unit {variable.unit!r} is not defined as by the FMU, whose it is taken to be"
+            text = (
+                f"unit {variable.unit!r} is defined otherwise by the FMU, whose definition is taken"
+            )
             part.element.origin.notes.add(place, text)
         else:
             raise InputError(

@@ -48,7 +48,7 @@ class Origin:
         """The same, in what is nested in it; InputError where that is nested in itself."""
         place = f"{self.place}{fragment}"
         if place in self.around:
-            raise InputError(f"{place}: contains itself; must not")
+            raise InputError(f"{place}: contains itself, which is not allowed")
         return replace(self, around=(*self.around, place))
 
     def unit(self, place: str, name: str | None, own: str | None) -> Unit | None:

@@ -264,7 +264,7 @@ def _own_unit(network: Network, node: Node, parameter: Parameter) -> Unit | None
     defined = origin.units.get(name or "")
     if name and node.path in network.parts and name == wanted:
         if defined and unit and not same(defined, unit):
-            text = f"unit {name!r} is not defined as by the FMU, whose it is taken to be"
+            text = f"unit {name!r} is defined otherwise by the FMU, whose definition is taken"
             origin.notes.add(place, text)
         if defined:
             return unit

@@ -44,7 +44,7 @@ class Written:
 def write_ssp(system: System, path: Path) -> Written:
     """Write the archive; InputError where path is not that of an .ssp file."""
     if path.suffix.lower() != ".ssp" or path.is_dir():
-        raise InputError(f"-o {path}: must be a file named like system.ssp")
+        raise InputError(f"{path}: must be a file named like system.ssp")
     entries: dict[str, bytes] = {}
     sources = {c.name: _fmu_entry(c.fmu, entries) for c in system.components}
     bindings = {c.name: _values_entry(c, entries) for c in system.components if c.values}

@@ -203,11 +203,12 @@ def remarks(system: Structure) -> tuple[str, ...]:
                 lines.append(f"{port} is of type {variable.nature}: {left}")
         lines += unsourced(system, component)
     lines += stimuli_remarks(system)
-    if (steps := system.stop_ns // system.step_ns) < FEW:
+    steps = system.stop_ns // system.step_ns
+    if system.connections and steps < FEW:
         lines.append(
             f"{system.name}: the whole run is {counted(steps, 'step')} of "
-            f"{system.step_ns / NANOSECONDS:g} s; what happens between two steps is not seen, a "
-            "shorter step shows more"
+            f"{system.step_ns / NANOSECONDS:g} s, and values are passed on only between steps; take a "
+            "shorter --step"
         )
     if not system.recorded:
         lines.append(
@@ -320,7 +321,7 @@ def check_steps(system: Structure) -> None:
         place = f"{system.name}: {component.name}: step = {seconds(own)}"
         if own % step:
             raise InputError(
-                f"{place} is no whole multiple of the base step {seconds(step)}; "
+                f"{place} is not a whole multiple of the base step {seconds(step)}; "
                 f"could be {nearest(own)}"
             )
         if stop % own:

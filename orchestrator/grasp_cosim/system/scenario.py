@@ -120,7 +120,7 @@ def _condition(place: str, text: Any) -> Condition | None:
     if found is None or value is None:
         raise InputError(
             f"{place}: when = {text!r}: must be like 'plant.gap[1] < 0.01', "
-            "'plant.contact[1] == true' or, of an Enumeration, \"plant.mode == 'fast'\""
+            "'plant.contact[1] == true' or, for an Enumeration, \"plant.mode == 'fast'\""
         )
     return Condition(_port(f"{place}: when", found[1]), found[2], value)  # type: ignore[arg-type]
 

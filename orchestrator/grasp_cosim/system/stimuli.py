@@ -129,7 +129,7 @@ def read_stimuli(
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}; must be a CSV file") from error
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: no UTF-8 text: {error.reason}; must be a CSV file") from error
+        raise InputError(f"{path}: not UTF-8 text: {error.reason}; must be a CSV file") from error
 
 
 def _read(path: Path, reader: _Reader, interpolation: Interpolation) -> Stimuli:
@@ -181,7 +181,7 @@ def _rows(file: str, reader: _Reader) -> Iterator[tuple[int, list[str]]]:
             yield line, row
     except csv.Error as error:
         line = reader.line_num  # type: ignore[attr-defined]
-        raise InputError(f"{file}: line {line}: no CSV: {error}") from error
+        raise InputError(f"{file}: line {line}: not CSV: {error}") from error
 
 
 def _header(file: str, names: Sequence[str]) -> tuple[list[Port], list[str | None], float]:
@@ -204,7 +204,7 @@ def _header(file: str, names: Sequence[str]) -> tuple[list[Port], list[str | Non
         if not (component and dot and variable):
             raise InputError(f"{_place(file, 1, i)} = {name!r}: must be component.variable")
         if port in ports:
-            raise InputError(f"{_place(file, 1, i)} = {name!r}: is there twice; must be once")
+            raise InputError(f"{_place(file, 1, i)} = {name!r}: appears twice; must appear once")
         ports.append(port)
     second, given = known_unit("s"), known_unit(time[1] or "s")
     change = conversion(given, second) if given and second else None

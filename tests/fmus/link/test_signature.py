@@ -39,7 +39,7 @@ def test_the_first_difference_is_named(proxy: tuple[LinkVariable, ...], differen
 @pytest.mark.parametrize(
     ("variables", "reason"),
     [
-        ((GAP, GAP._replace(causality="output")), "variable 'gap': is there twice"),
+        ((GAP, GAP._replace(causality="output")), "variable 'gap': appears twice"),
         ((GAP._replace(name="a\tb"),), r"variable 'a\\tb' \[m\]: must be without tabs"),
         ((GAP._replace(unit="m\n"),), r"\[m\n\]: must be without tabs and line ends"),
     ],

@@ -215,7 +215,9 @@ def test_whatever_asammdf_stumbles_over_is_one_line(
     monkeypatch.setattr(pytest.importorskip("asammdf"), "MDF", stumble)
     (tmp_path / "log.mf4").touch()
     name = type(error).__name__
-    with pytest.raises(InputError, match=rf"log.mf4: is damaged, no MDF file: {name}: ") as caught:
+    with pytest.raises(
+        InputError, match=rf"log.mf4: is damaged, not an MDF file: {name}: "
+    ) as caught:
         load_log(tmp_path / "log.mf4")
     assert "\n" not in str(caught.value)
 
@@ -226,7 +228,7 @@ def test_whatever_asammdf_stumbles_over_is_one_line(
         ("no.csv", None, "no such log; must be a .csv or .mf4 file"),
         ("log.txt", b"time\n", "must be a .csv or .mf4 file"),
         ("log.csv", b"time,a\n0.0\n", "is damaged"),
-        ("log.mf4", b"not an MDF file at all", "is damaged, no MDF file"),
+        ("log.mf4", b"not an MDF file at all", "is damaged, not an MDF file"),
     ],
 )
 def test_a_file_that_is_no_log_is_refused(

@@ -84,7 +84,7 @@ def read_contacts(path: Path) -> list[Contact]:
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}; must be a table of contact times") from error
     except (UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{path}: is no CSV: {error}") from error
+        raise InputError(f"{path}: is not a CSV file: {error}") from error
     names = lines[0][1] if lines else []
     wrong = not set(COLUMNS) <= set(names) <= {*COLUMNS, *OPTIONAL}
     if wrong or len(set(names)) < len(names):
