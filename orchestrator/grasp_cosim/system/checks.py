@@ -207,8 +207,8 @@ def remarks(system: Structure) -> tuple[str, ...]:
     if system.connections and steps < FEW:
         lines.append(
             f"{system.name}: the whole run is {counted(steps, 'step')} of "
-            f"{system.step_ns / NANOSECONDS:g} s, and values are passed on only between steps; take a "
-            "shorter --step"
+            f"{system.step_ns / NANOSECONDS:g} s, and values are passed on only between steps; "
+            "take a shorter --step"
         )
     if not system.recorded:
         lines.append(
