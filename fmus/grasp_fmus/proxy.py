@@ -66,13 +66,13 @@ _DIAGNOSTICS: Mapping[str, tuple[type[Scalar], str, str]] = {
         int, "", "0 not connected, 1 connected, 2 missing: outputs held, 3 lost: on_loss holds",
     ),
     "missed": (int, "", "steps without an answer in time"),
-    "consecutive_missed": (int, "", "of these, those since the last answer in time"),
+    "consecutive_missed": (int, "", "steps missed since the last answer in time"),
     "late": (int, "", "answers that came after their step was given up"),
-    "out_of_order": (int, "", "of these, those after the answer to a newer step: dropped"),
+    "out_of_order": (int, "", "late answers after the answer to a newer step: dropped"),
     "duplicated": (int, "", "answers that had come already"),
     "rejected": (int, "", "datagrams that were malformed, foreign or not authentic"),
     "sessions": (int, "", "sessions begun; more than 1: the peer's model was set up anew"),
-    "round_trip_time": (float, "s", "of the newest answer"),
+    "round_trip_time": (float, "s", "round trip of the newest answer"),
     "age": (
         float, "s",
         "simulation time since that which the outputs belong to; below 0: the peer is ahead",
@@ -146,11 +146,11 @@ def own_variables(outputs: Sequence[Variable], settings: Settings = DEFAULTS) ->
         kind, unit, limits, text = get_args(hint)
         own.append(Variable(f"proxy.{name}", kind, "parameter", unit, start, "fixed", limits, text))
     for v in outputs:
-        text = f"of a lost peer: {v.name} stays as it is"
+        text = f"{v.name} stays as it is while the peer is lost"
         name = f"proxy.hold.{v.name}"
         own.append(Variable(name, bool, "parameter", "", False, "fixed", None, text))
     for v in outputs:
-        text = f"of a lost peer: value of {v.name}"
+        text = f"value of {v.name} while the peer is lost"
         name = f"proxy.failsafe.{v.name}"
         safe = Variable(name, v.kind, "parameter", v.unit, v.kind(), "fixed", None, text)
         own.append(replace(safe, relative=v.relative))
