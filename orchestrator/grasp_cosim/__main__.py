@@ -13,6 +13,13 @@ from typing import NoReturn
 
 def entry() -> NoReturn:
     """The command grasp-cosim; before it begins, Ctrl-C ends the process as SIGTERM does."""
+    if sys.argv[1:] == ["--version"]:  # which scripts ask for, without all that a command needs
+        from contextlib import suppress
+        from importlib.metadata import version
+
+        with suppress(OSError):  # which is said in full below
+            os.write(1, f"grasp-cosim, version {version('grasp-cosim')}\n".encode())
+            sys.exit()
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # not ignored, as after `&`
         signal.signal(signal.SIGINT, signal.SIG_DFL)
     from .cli import entry as run

@@ -106,7 +106,7 @@ WRONG = [
     (["--set", "sensor_1.reflectance=inf"], "'inf': must be a finite number"),
     (["--set", "plant.mass=1"], r"no input or parameter 'mass'; did you mean finger_mass\[1\]"),
     (["--set", "plnt.mass=1"], "no component 'plnt'; did you mean plant"),
-    (["--set", "plant.object_width"], "must be COMPONENT.VARIABLE=VALUE"),
+    (["--set", "plant.object_width"], "must be PLACE=VALUE"),
     (["--swap", "plant=missing.fmu"], "missing.fmu: no such FMU file"),
     (["--swap", "plant"], "must be COMPONENT=FMU"),
     (["--swap", "hand=x.fmu"], "no component 'hand'; valid: plant"),
@@ -122,7 +122,6 @@ WRONG = [
     (["--fast"], "No such option"),
     (["--step", "1e300"], "must be a number greater than 0, at most 1e\\+09"),
     (["--set", "sensor_1.gap=0.01"], "sensor_1.gap has two sources, the connection and a value"),
-    (["--debug"], "No such option"),
 ]
 
 

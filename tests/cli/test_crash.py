@@ -80,7 +80,7 @@ entry()
 @needs_gcc
 def test_in_a_process_of_its_own(tmp_path: Path) -> None:
     path, out = system_file(tmp_path, 0.55), tmp_path / "out"
-    done = grasp_cosim("run", path, "--isolation", "process", "--out", out)
+    done = grasp_cosim("run", path, "--set", "components.motor.isolation=process", "--out", out)
     assert done.returncode == 3
     *_, line = done.stderr.splitlines()
     assert (
@@ -105,7 +105,7 @@ def test_the_option_goes_before_the_file(
         start(part, name, *rest)
 
     monkeypatch.setattr(ProcessInstance, "__init__", noted)
-    given = ["--isolation", said] if said else []
+    given = ["--set", f"components.motor.isolation={said}"] if said else []
     path = system_file(tmp_path, isolation="process")
     assert command("run", path, *given)[0] == 0
     assert names == ["motor"] * started

@@ -85,7 +85,7 @@ def test_contact_times_have_a_residual_for_every_row(
         (("--fit", "mass"), "identify: --fit mass: cannot be fitted; valid: coulomb"),
         (("--times", "b.csv"), "b.csv: No such file or directory; must be a table"),
         (("--set", "plant.nothing=1"), "--set plant.nothing: "),
-        (("--set", "plant"), "--set 'plant': must be COMPONENT.VARIABLE=VALUE"),
+        (("--set", "plant"), "--set 'plant': must be PLACE=VALUE"),
         (("--out", "/proc/nowhere"), "/proc/nowhere: cannot write"),
     ],
 )

@@ -60,15 +60,13 @@ def recorded(command: Run, folder: str, *arguments: str | Path) -> bytes:
 def test_a_run_has_the_same_bytes(command: Run, case: str, scheme: str) -> None:
     asked = ("--case", case, "--scheme", scheme, "--step", "1e-3")
     python = recorded(command, "python", *asked)
-    for engine in ("python", "compiled"):
-        native = recorded(command, engine, *asked, "--native", "--engine", engine)
-        assert native == python
-        assert all("native_twin_of" in fmu for fmu in ran(engine).values())
+    assert recorded(command, "native", *asked, "--native") == python
+    assert all("native_twin_of" in fmu for fmu in ran("native").values())
 
 
 @pytest.mark.slow
 def test_at_the_published_step_with_all_electronics(command: Run) -> None:
-    asked = ("--bench", "--stop", "0.5")
+    asked = ("--preset", "bench", "--stop", "0.5")
     assert recorded(command, "a", *asked) == recorded(command, "b", *asked, "--native")
 
 
@@ -83,7 +81,9 @@ def test_a_swapped_plant_has_its_own_twin(command: Run, fmus: Path, plant: str) 
 @pytest.mark.slow
 def test_in_processes_of_their_own(command: Run) -> None:
     asked = ("--step", "1e-3", "--stop", "0.05")
-    native = recorded(command, "b", *asked, "--native", "--isolation", "process")
+    parts = ("plant", "sensor_1", "sensor_2", "controller")
+    apart = [word for p in parts for word in ("--set", f"components.{p}.isolation=process")]
+    native = recorded(command, "b", *asked, "--native", *apart)
     assert recorded(command, "a", *asked) == native
 
 
@@ -102,8 +102,6 @@ def test_run_takes_the_fmus_as_they_are_named(command: Run) -> None:
 @pytest.mark.parametrize(
     "arguments",
     [
-        ("run", "--step-study", "--step", "3.2e-3", "--stop", "0.64", "--of", "plant.gap[1]",
-         "--tolerance", "1"),
         ("sweep", "study.toml", "--workers", "1"),
         ("qualify", "plant.fmu", "--as", "plant", *SHORT, "--isolation", "none"),
     ],

@@ -90,7 +90,7 @@ def test_python_is_refused(other_machine: Run, foreign: Path) -> None:
 
 
 @pytest.mark.usefixtures("no_compiler")
-@pytest.mark.parametrize("arguments", [("run",), ("evaluate",), ("run", "--step-study")])
+@pytest.mark.parametrize("arguments", [("run",), ("evaluate",)])
 def test_without_a_compiler_one_line_says_what_brings_one(
     other_machine: Run, foreign: Path, arguments: tuple[str, ...]
 ) -> None:

@@ -86,7 +86,7 @@ def test_a_binary_for_others(name: str, command: Run, tmp_path: Path) -> None:
     assert ("fmpy compile" in (verdict.fix or "")) == (name == "sources")
     (tmp_path / "s.toml").write_text(SYSTEM if version == "2.0" else SYSTEM_3)
     one_line(command("run", "s.toml"), f"a: x.fmu {what}" if name != "windows" else what, ask)
-    one_line(command("run", "s.toml", "--isolation", "process"), what, ask)
+    one_line(command("run", "s.toml", "--set", "components.a.isolation=process"), what, ask)
     code, _, err = command("ssp", "s.toml", "-o", "s.ssp")  # which may be for another machine
     assert code == 0
     assert what in err
@@ -129,7 +129,7 @@ def test_what_an_fmu_lacks_is_a_problem_where_nobody_has_it(command: Run, tmp_pa
     assert "licence_check" in findings["trial"].text
     assert findings["trial"].fix is None  # a name alone is no want of a licence
     (tmp_path / "s.toml").write_text(SYSTEM)
-    for more in ((), ("--isolation", "process")):
+    for more in ((), ("--set", "components.a.isolation=process")):
         run = command("run", "s.toml", *more)
         one_line(run, "undefined symbol: licence_check", "linux64/")
         assert "it needs a licence" not in run[2]
@@ -178,7 +178,7 @@ def test_one_without_its_licence(isolation: str, command: Run, tmp_path: Path) -
     assert "No license" in trial.text
     assert "ask the vendor for an export that needs none" in (trial.fix or "")
     (tmp_path / "s.toml").write_text(SYSTEM)
-    run = command("run", "s.toml", "--isolation", isolation)
+    run = command("run", "s.toml", "--set", f"components.a.isolation={isolation}")
     one_line(run, "No license for feature X in resources/key; it needs a licence on", "needs none")
 
 

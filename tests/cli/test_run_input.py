@@ -30,7 +30,7 @@ def test_inputs_of_a_system_file(command: Run, tmp_path: Path) -> None:
     assert "drive.csv drives a.u_Real (linear)" in err
     assert last("out") == pytest.approx(9.0)
     assert json.loads(Path("out/run.json").read_text())["input"]["file"] == "drive.csv"
-    held = ("--input", "drive.csv", "--interpolation", "held")
+    held = ("--input", "drive.csv", "--set", "input.interpolation=held")
     assert command("run", "driven.toml", *held, "--out", "out")[0] == 0
     assert last("out") == 0.0
 
@@ -39,7 +39,6 @@ def test_what_is_wrong_is_one_line(command: Run, tmp_path: Path) -> None:
     driven(tmp_path, TEXT)
     for more, said in (
         ([], "input a.u_Real has no source"),
-        (["--interpolation", "held"], "--interpolation: must come with --input"),
         (["--input", "none.csv"], "none.csv: no such input file"),
         (
             ["--input", "drive.csv", "--set", "a.u_Real=1"],

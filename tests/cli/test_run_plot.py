@@ -1,6 +1,5 @@
 """run --plot: a picture of the grasp, one of the timing of a run in real time, or both."""
 
-import json
 import sys
 from pathlib import Path
 
@@ -59,21 +58,6 @@ def test_without_matplotlib_a_run_in_real_time_is_refused_at_once(
 def test_a_run_that_stops_at_an_overrun_is_drawn_as_far_as_it_got(
     command: Run, tmp_path: Path
 ) -> None:
-    options = ["--realtime", "--factor", "1e5", "--overrun", "stop", "--plot", "--out", "results"]
-    assert command("run", "sensor.toml", *options)[0] == 3
+    paced = "--realtime --set realtime.factor=1e5 --set realtime.overrun=stop --plot --out results"
+    assert command("run", "sensor.toml", *paced.split())[0] == 3
     assert (tmp_path / "results/timing.png").read_bytes().startswith(b"\x89PNG")
-
-
-@pytest.mark.slow
-def test_a_title_and_a_format_are_kept_and_drawn(command: Run, tmp_path: Path) -> None:
-    options = ["--plot", "--format", "svg", "--title", "Dim light", "--out", "results"]
-    assert command("run", "sensor.toml", *options)[0] == 0
-    results = tmp_path / "results"
-    assert sorted(p.name for p in results.iterdir()) == ["run.json", "signals.csv", "signals.svg"]
-    assert json.loads((results / "run.json").read_text())["title"] == "Dim light"
-    assert "<!-- Dim light -->" in (results / "signals.svg").read_text()
-    assert command("report", "results")[0] == 0
-    assert "<h1>Dim light</h1>" in (results / "report.html").read_text()
-    assert command("report", "results", "--title", "Dark", "--format", "pdf")[0] == 0
-    assert "<h1>Dark</h1>" in (results / "report.html").read_text()
-    assert (results / "signals.pdf").read_bytes().startswith(b"%PDF")

@@ -6,15 +6,17 @@ from pathlib import Path
 
 import pytest
 from conftest import Run
-from grasp_cosim.cli.realtime import timing_lines
 from grasp_cosim.realtime.timing import Overrun, Spread, Timing
 from grasp_cosim.recording.load import load_run
+from grasp_cosim.report.terminal import timing_lines
 
-PACED = ("run", "--realtime", "--factor", "1000", "--step", "1e-3", "--stop", "0.5")
+PACED = ["run", "--realtime", "--set", "realtime.factor=1000", "--step", "1e-3", "--stop", "0.5"]
 
 
 def test_the_timing_is_in_the_json_and_in_the_folder(command: Run, tmp_path: Path) -> None:
-    code, out, err = command(*PACED, "--overrun", "continue", "--out", "results", "--json")
+    code, out, err = command(
+        *PACED, "--set", "realtime.overrun=continue", "--out", "results", "--json"
+    )
     assert (code, err) == (0, "")
     printed = json.loads(out)
     assert printed["realtime"]["steps"] == printed["steps"] == 500
@@ -45,7 +47,7 @@ def test_people_are_told_how_it_kept_to_the_clock(command: Run) -> None:
 def test_a_run_that_stops_at_an_overrun_fails_and_keeps_its_timing(
     command: Run, tmp_path: Path
 ) -> None:
-    code, out, err = command(*PACED, "--overrun", "stop", "--out", "results")
+    code, out, err = command(*PACED, "--set", "realtime.overrun=stop", "--out", "results")
     assert (code, out) == (3, "")
     kept, error = err.splitlines()
     assert kept == "kept what was recorded, in results"
@@ -56,40 +58,12 @@ def test_a_run_that_stops_at_an_overrun_fails_and_keeps_its_timing(
     assert (timing.overruns, timing.steps) == (1, 1)
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [("--factor", "2.0"), ("--overrun", "stop"), ("--priority", "5"), ("--cpu", "0")],
-)
-def test_an_option_of_real_time_needs_it(command: Run, arguments: tuple[str, str]) -> None:
-    option, value = arguments
-    code, out, err = command("run", option, value)
-    assert (code, out) == (2, "")
-    assert err == f"grasp-cosim: {option} {value}: must come with --realtime\n"
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("--lock-memory",), "--lock-memory: must come with --realtime"),
-        (("--step-study", "--cpu", "0"), "--cpu 0: must come with --realtime"),
-        (
-            ("--step-study", "--realtime"),
-            "--realtime: must not come with --step-study, which is not paced",
-        ),
-        (("--realtime", "--factor", "0"), "factor = 0.0: must be a finite number > 0"),
-        (("--realtime", "--priority", "0"), "priority = 0: must be a whole number from 1 to 99"),
-    ],
-)
-def test_mistakes_are_one_line(command: Run, arguments: tuple[str, ...], message: str) -> None:
-    assert command("run", *arguments) == (2, "", f"grasp-cosim: {message}\n")
-
-
 def test_a_cpu_that_is_not_there_is_a_mistake(
     command: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     (tmp_path / "online").write_text("0-1\n")
     monkeypatch.setattr("grasp_cosim.realtime.privileges.ONLINE", tmp_path / "online")
-    code, out, err = command(*PACED, "--cpu", "99", "--out", "results")
+    code, out, err = command(*PACED, "--set", "realtime.cpu=99", "--out", "results")
     assert (code, out) == (2, "")
     assert err == "grasp-cosim: cpu = 99: no such CPU here; must be one of 0, 1\n"
     assert not (tmp_path / "results").exists()
@@ -99,7 +73,7 @@ def test_what_is_refused_is_on_standard_error(
     command: Run, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.delattr(os, "sched_setaffinity", raising=False)
-    code, out, _ = command(*PACED, "--cpu", "0", "--json")
+    code, out, _ = command(*PACED, "--set", "realtime.cpu=0", "--json")
     assert code == 0
     assert json.loads(out)["realtime"]["refused"] == caplog.messages
     assert caplog.messages == ["CPU 0: not possible on this operating system"]
@@ -127,6 +101,6 @@ def test_what_could_be_done_depends_on_who_is_to_blame() -> None:
         "overruns              13 of 100 steps; because of: start 3, backlog 9, plant 1",
         "  e.g.                at t = 0.003 s 0.2 ms late: it began late by 0.7 ms",
     ]
-    assert "give the run a --priority and a --cpu of its own" in lines[2]
+    assert "give the run a priority and a CPU of its own, --set realtime.prio" in lines[2]
     assert len(timing_lines(timing({"start": 3}, ("CPU 1",)))) == 5
     assert len(timing_lines(timing({"start": 3, "plant": 9}))) == 5

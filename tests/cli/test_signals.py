@@ -106,13 +106,12 @@ def test_a_signal_keeps_what_a_run_recorded(
 
 @needs_gcc
 @pytest.mark.slow
-@pytest.mark.parametrize("engine", ["python", "compiled"])
 @pytest.mark.parametrize("number", CODES)
 def test_a_second_signal_ends_a_run_that_hangs(
-    start: Start, tmp_path: Path, engine: str, number: signal.Signals
+    start: Start, tmp_path: Path, number: signal.Signals
 ) -> None:
     system = native_system(tmp_path, hang_at=0.0105)
-    process = start("run", system, "--engine", engine, "--out", "out")
+    process = start("run", system, "--out", "out")
     assert process.stderr
     assert "native FMU hangs\n" in iter(process.stderr.readline, "")
     process.send_signal(number)

@@ -336,7 +336,10 @@ def test_a_controller_that_the_study_swaps_takes_no_other(command: Run) -> None:
     code, _, err = command(f"{swap}{STUDY}", "--controller", "adaptive")
     assert (code, err.splitlines()) == (
         2,
-        ["grasp-cosim: study.toml: controller adaptive: must not come with a swap of controller"],
+        [
+            "grasp-cosim: study.toml: controller adaptive: cannot be used with another FMU for "
+            "controller"
+        ],
     )
 
 

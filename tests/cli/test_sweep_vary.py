@@ -89,7 +89,6 @@ WRONG = [
     (("sweep", *WIDTH, "--seed", "3"), "--seed 3: --vary has nothing that is random; must be left"),
     (("sweep", "x.toml", "--case", "1"), "--case: must come with --vary; a study says it itself"),
     (("sweep", "x.toml", "--case", "0"), "--case: must come with --vary; a study says it itself"),
-    (("sweep", "x.toml", "--bench"), "--bench: must come with --vary; a study says it itself"),
     (("sweep", "x.toml", "--of", "a"), "--of: must come with --vary; a study says it itself"),
     (("sweep", "x.toml", "--system", "a.toml"), "--system: must come with --vary; a study says"),
     (

@@ -27,7 +27,7 @@ def command(
     return run
 
 
-RUN = ("run", "oscillator.toml", "--stop", "0.5", "--engine", "python")
+RUN = ("run", "oscillator.toml", "--stop", "0.5")
 
 
 def shown(out: str) -> str:
@@ -45,7 +45,7 @@ def test_what_is_said_is_what_was_asked_for(command: Run, monkeypatch: pytest.Mo
     said = verbose[2]
     assert re.search(r"^a: \S+\.fmu, FMI 2\.0, a binary$", said, re.MULTILINE)
     assert re.search(r"^loading 2 FMUs: \d+\.\d\d s$", said, re.MULTILINE)
-    assert "engine: the loop in Python, as asked\n" in said
+    assert re.search(r"^engine: the loop in ", said, re.MULTILINE)
     assert re.search(r"^oscillator.toml to 0\.5 s: \d+\.\d\d s$", said, re.MULTILINE)
 
 

@@ -74,7 +74,7 @@ def test_what_loads_it_in_another_process(folder: Path) -> None:
     assert "| `doctor FMU` |" in PAGE
     assert loaded(folder, "doctor", "a.fmu") - {os.getpid()}
     assert os.getpid() not in loaded(folder, "doctor", "a.fmu")
-    isolated = loaded(folder, "run", "system.toml", "--isolation", "process")
+    isolated = loaded(folder, "run", "system.toml", "--set", "components.a.isolation=process")
     assert len(isolated - {os.getpid()}) == len(isolated) == 1
 
 

@@ -104,5 +104,5 @@ def test_one_controller_is_not_replaced_twice(command: Run) -> None:
     code, _, err = command("run", "--controller", "adaptive", "--swap", "controller=mine.fmu")
     assert (code, err.splitlines()) == (
         2,
-        ["grasp-cosim: controller adaptive: must not come with a swap of controller"],
+        ["grasp-cosim: controller adaptive: cannot be used with another FMU for controller"],
     )

@@ -85,7 +85,7 @@ def test_the_command_keeps_the_recording_and_is_3(command: Run, fmus: Path, tmp_
     assert "controller.force[1] ran away: " in err.splitlines()[-1]
     assert json.loads(Path("out/run.json").read_text())["complete"] is False
     assert len(Path("out/signals.csv").read_text().splitlines()) == 4137
-    code, out, err = command("run", path, "--diverging", "continue", "--stop", "1")
+    code, out, err = command("run", path, "--set", "experiment.diverging=continue", "--stop", "1")
     assert code == 0
     assert "ran away" in err
     assert "e+" in next(line for line in out.splitlines() if line.startswith("peak"))

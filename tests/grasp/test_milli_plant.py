@@ -267,7 +267,6 @@ def test_a_sweep_has_the_metrics_in_si(
     "arguments",
     [
         ("run", "mm.toml", "--out", "out"),
-        ("run", "mm.toml", "--step-study"),
         ("sweep", "study.toml", "--out", "out"),
         ("qualify", "mm.fmu", "--as", "plant", "--system", "mm.toml", "--out", "out"),
     ],

@@ -207,7 +207,7 @@ def test_run_takes_presets_of_a_system_with_roles(
         assert command(*short, *options, "--out", "out")[0] == 0
         layers = ("simultaneous_contact", "impact_reduction")
         assert tuple(enabled("out", layer) for layer in layers) == expected
-    assert command(*short, "--bench", "--case", "1", "--out", "out")[0] == 0
+    assert command(*short, "--preset", "bench", "--case", "1", "--out", "out")[0] == 0
     values = json.loads(Path("out/run.json").read_text())["components"]
     assert values["right"]["values"]["noise.enabled"] is True
     assert values["gripper"]["values"]["friction.coulomb[2]"] == pytest.approx(1.34, abs=0.01)
@@ -341,7 +341,7 @@ def test_a_user_s_metrics_have_bands_in_a_qualification(
     [
         ((), 2, ["grasp-cosim: metric 'lazy': AttributeError: 'Signals' object has no attribute "]),
         (
-            ("--realtime", "--factor", "1e6", "--overrun", "stop"),
+            (*["--realtime", "--set", "realtime.factor=1e6", "--set", "realtime.overrun=stop"],),
             3,
             [
                 "kept what was recorded, in out",

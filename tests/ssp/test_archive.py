@@ -119,10 +119,10 @@ REFUSED = [
         structure(TOP).replace('factor="0.001"', 'factor="0"'),
         "unit 'mm': factor = 0, offset = 0: must be finite, and the factor other than 0",
     ),
-    (structure(TOP, ""), "no stopTime in a DefaultExperiment; give one: --stop"),
+    (structure(TOP, ""), "no stopTime in a DefaultExperiment; give one: --set experiment.stop"),
     (
         structure(TOP, '<ssd:DefaultExperiment stopTime="0.00025"/>'),
-        "none divides the stop of 0.00025 s; give one: --step",
+        "none divides the stop of 0.00025 s; give one: --set experiment.step",
     ),
     (
         structure(

@@ -69,7 +69,7 @@ def test_an_archive_without_a_step_says_how_to_give_one(
     ssd = structure(system("top", component("a", "output y")))
     path = archive(tmp_path, ssd, {"a": fmu("output Real y -", step="")})
     assert main(["run", str(path)]) == 2
-    assert "give one: --step" in capsys.readouterr().err
+    assert "give one: --set experiment.step" in capsys.readouterr().err
     assert main(["run", str(path), "--step", "1e-3"]) == 2  # now it is the FMU that has no code
     said = capsys.readouterr().err
     assert "order of execution: a" in said

@@ -343,7 +343,7 @@ def make(kind: str, seed: int, fmus: Path, folder: Path, archive: bytes) -> Iter
         yield ["inspect", str(path)]
         yield ["doctor", str(path)]
         yield ["run", str(system), "--swap", f"{role}={path}", "--stop", "0.001",
-               "--isolation", "process", "--out", "out"]  # fmt: skip
+               "--set", f"components.{role}.isolation=process", "--out", "out"]  # fmt: skip
     else:
         path = folder / "mutant.ssp"
         path.write_bytes(mutated_zip(archive, rng, _of_ssp))

@@ -91,7 +91,7 @@ def test_a_seed_goes_before_that_of_the_study(read: Read) -> None:
         ),
         (
             BODY + TWO.replace("step = 1e-3", "swap = { controller = 'other.fmu' }"),
-            "learning: controller adaptive: must not come with a swap of controller",
+            "learning: controller adaptive: cannot be used with another FMU for controller",
         ),
         (BODY + "[limits]\nspeed = { greatest = 1 }\n", "limits: no result 'speed'; valid: time_"),
         (BODY + "[limits]\ntime_difference = {}\n", "no limit; must have one of least, p5, medi"),

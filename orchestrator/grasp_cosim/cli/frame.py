@@ -162,16 +162,18 @@ def is_quiet() -> bool:
     return bool(context and context.meta.get(QUIET))
 
 
-QUIET = "grasp_cosim.quiet"
-"""The entry for --quiet in what click keeps of a command line."""
+QUIET, VERBOSE = "grasp_cosim.quiet", "grasp_cosim.verbose"
+"""The entries for --quiet and --verbose in what click keeps of a command line."""
 
 
 def _set_quiet(ctx: click.Context, _: click.Parameter, value: bool) -> None:
-    ctx.meta[QUIET] = value
+    if value:
+        ctx.meta[QUIET] = True
 
 
 def _set_verbose(ctx: click.Context, _: click.Parameter, value: bool) -> None:
-    if value:
+    if value and not ctx.meta.get(VERBOSE):
+        ctx.meta[VERBOSE] = True
         ctx.with_resource(_told())
 
 
@@ -198,7 +200,10 @@ def _told() -> Iterator[None]:
             logger.setLevel(level)
 
 
-VERBOSITY = (
+EVERYWHERE = (
+    click.Option(
+        ["--debug"], is_flag=True, expose_value=False, help="Show the traceback of an error."
+    ),
     click.Option(
         ["-q", "--quiet"],
         is_flag=True,
@@ -214,7 +219,7 @@ VERBOSITY = (
         help="Say which FMUs and engine run, and how long each phase takes.",
     ),
 )
-"""Options that every command has."""
+"""Options that stand before a command as well as on it."""
 
 
 def fail(message: str, code: int, debug: bool = False) -> int:

@@ -10,7 +10,7 @@ import click
 
 from ..errors import InputError, nearest
 from ..scratch import sweep
-from .frame import VERBOSITY
+from .frame import EVERYWHERE
 
 SECTIONS = {
     "Simulate": ("run", "sweep", "evaluate", "identify"),
@@ -59,14 +59,13 @@ class Commands(click.Group):
         if name not in self.list_commands(ctx):
             return None
         command: click.Command = getattr(import_module(f"{__package__}.commands.{name}"), name)
-        command.params += [option for option in VERBOSITY if option not in command.params]
+        command.params += [option for option in EVERYWHERE if option not in command.params]
         return command
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(package_name="grasp-cosim")
-@click.option("--debug", is_flag=True, help="Show the traceback of an error.")
-def cli(debug: bool) -> None:
+def cli() -> None:
     """FMI co-simulation of a delicate grasp.
 
     grasp-cosim COMMAND --help shows the options of a command and an example.
@@ -76,3 +75,6 @@ def cli(debug: bool) -> None:
     except OSError as error:
         raise InputError("the current folder was removed; go to another one") from error
     sweep(gettempdir())
+
+
+cli.params += EVERYWHERE

@@ -1,28 +1,27 @@
-"""Groups of options that commands share, each with what it comes to."""
+"""Options that say which system a command runs, and what they come to."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import click
 
-from ..errors import InputError, choices
+from ..errors import InputError
 from ..system.description import System
-from ..system.parts import ISOLATIONS
-from ..system.stimuli import INTERPOLATIONS, Stimuli, read_stimuli
-from ..system.structure import DIVERGING, SCHEMES
-from ..system.swap import Replacement
-from .frame import PATH, load_system, pair, together, with_controller, with_preset
+from ..system.places import plain
+from ..system.stimuli import read_stimuli
+from ..system.structure import SCHEMES
+from .frame import PATH, load_system, pair, say, together, with_controller, with_preset
 
 set_option = click.option(
     "--set",
     "settings",
     multiple=True,
-    metavar="COMPONENT.VARIABLE=VALUE",
-    help="Start value of a variable, like plant.object_width=0.06.",
+    metavar="PLACE=VALUE",
+    help="Change a value of the system file, by its place there: plant.object_width=0.06, "
+    "experiment.scheme=jacobi, components.plant.isolation=process.",
 )
 
 swap_option = click.option(
@@ -30,159 +29,97 @@ swap_option = click.option(
     "swaps",
     multiple=True,
     metavar="COMPONENT=FMU",
-    help="Another FMU in the place of a component.",
+    help="Put another FMU in the place of a component.",
 )
 
 controller_option = click.option(
     "--controller",
     type=click.Choice(("published", "adaptive")),
-    help="The published controller or the adaptive one, in the place of the system's.",
+    help="Take the published controller or the adaptive one in the place of the system's.",
+)
+
+input_option = click.option(
+    "--input", type=PATH, help="Drive inputs by a CSV file: time, then columns like plant.force."
 )
 
 system_options = together(
     controller_option,
-    click.option(
-        "--preset",
-        "presets",
-        multiple=True,
-        help="Values that the system file names.",
-    ),
+    click.option("--preset", "presets", multiple=True, help="Take values that the file names."),
     click.option("--case", type=click.IntRange(0, 2), help="Short for --preset case_0, ..._2."),
-    click.option("--bench", is_flag=True, help="Short for --preset bench."),
     set_option,
     click.option("--step", type=float, help="Communication step in s."),
     click.option("--stop", type=float, help="Stop time in s."),
     click.option(
         "--scheme",
         type=click.Choice(SCHEMES),
-        help="Components step one after the other (by default), or all at once.",
-    ),
-    click.option(
-        "--diverging",
-        type=click.Choice(DIVERGING),
-        help="Where a signal runs away: stop (default) or continue.",
+        help="Step the components one after the other (by default), or all at once.",
     ),
 )
 """How the system of a command, in its `system`, is changed."""
 
-names_options = together(
-    click.option(
-        "--rename",
-        "renames",
-        multiple=True,
-        metavar="[COMPONENT.]VARIABLE=FMUS_VARIABLE",
-        help="What the new FMU calls a variable of the system.",
-    ),
-    click.option(
-        "--units",
-        "named",
-        multiple=True,
-        metavar="[COMPONENT.]VARIABLE=UNIT",
-        help="Of the new FMU, where it declares none or a wrong one.",
-    ),
-)
-"""Names and units of an FMU in the place of another, in its `renames` and `named`."""
-
-_FORMS = {
-    "--rename": "[COMPONENT.]VARIABLE=FMUS_VARIABLE",
-    "--units": "[COMPONENT.]VARIABLE=UNIT",
-    "--isolation": "none, process, or COMPONENT=none, COMPONENT=process",
+PLACES = {
+    "step": "experiment.step",
+    "stop": "experiment.stop",
+    "scheme": "experiment.scheme",
+    "input": "input.file",
 }
+"""The places of a system file that have an option of their own."""
 
 
-def replacements(given: Mapping[str, Any], fmus: Mapping[str, Path]) -> dict[str, Replacement]:
-    """The FMUs for components by name, with what names_options say of each.
+class Settings(dict[str, Any]):
+    """What options of a command, `given` by name, say of a system, by its places.
 
-    InputError where that is of another component, or of one of several that is not named.
+    InputError where two say the same place.
     """
-    rename, units = (
-        _by_component(option, given[key], tuple(fmus))
-        for option, key in (("--rename", "renames"), ("--units", "named"))
-    )
-    return {name: Replacement(fmu, rename[name], units[name]) for name, fmu in fmus.items()}
 
+    def __init__(self, given: Mapping[str, Any]) -> None:
+        self._options: dict[str, str] = {}
+        for option, place in PLACES.items():
+            if given.get(option) is not None:
+                self._add(f"--{option}", place, given[option])
+        for text in given.get("swaps", ()):
+            name, fmu = pair("--swap", text, "COMPONENT=FMU")
+            self._add(f"--swap {name}", f"components.{name}.fmu", fmu)
+        for text in given.get("settings", ()):
+            place, value = pair("--set", text, "PLACE=VALUE")
+            self._add(f"--set {place}", place, value)
 
-def _by_component(
-    option: str, texts: Sequence[str], components: Sequence[str]
-) -> dict[str, dict[str, str]]:
-    """The pairs of an option by component, which a text may leave out where there is one only."""
-    found: dict[str, dict[str, str]] = {name: {} for name in components}
-    for text in texts:
-        left, right = pair(option, text, _FORMS[option])
-        name, _, variable = left.partition(".")
-        if not components:
-            raise InputError(f"{option} {text!r}: must come with --swap COMPONENT=FMU")
-        if name not in found or not variable:
-            name, variable = components[0], left
-            if len(components) > 1:
-                raise InputError(
-                    f"{option} {text!r}: several components are swapped; must begin with one of "
-                    f"{choices(f'{c}.' for c in components)}"
-                )
-        found[name][variable] = right
-    return found
+    def _add(self, option: str, place: str, value: Any) -> None:
+        if place in self:
+            raise InputError(
+                f"{option}: {place} is given by {self._options[place]}, too; must be given once"
+            )
+        self[place], self._options[place] = value, option
 
-
-def isolations(system: System, texts: Sequence[str]) -> System:
-    """The system with its components in processes of their own or not, as texts say, in order.
-
-    Each is of all components, "process", or of one, "plant=process".
-    """
-    for text in texts:
-        name, equals, last = text.rpartition("=")
-        where: Any = last
-        if where not in ISOLATIONS or bool(name) != bool(equals):
-            raise InputError(f"--isolation {text!r}: must be {_FORMS['--isolation']}")
-        if name:
-            system.component(name, f"--isolation {text}")
-        system = system.with_isolation(where, name)
-    return system
-
-
-input_options = together(
-    click.option(
-        "--input", type=PATH, help="A CSV file: time, then inputs like plant.force, driven by it."
-    ),
-    click.option(
-        "--interpolation",
-        type=click.Choice(INTERPOLATIONS),
-        help="Of --input, between two rows: linear (default; of continuous Reals) or held.",
-    ),
-)
-
-
-def chosen_stimuli(given: Mapping[str, Any]) -> Stimuli | None:
-    """The stimuli of --input, for FMUs that may yet be swapped."""
-    if not given["input"]:
-        if given["interpolation"]:
-            raise InputError("--interpolation: must come with --input, the file that it is for")
-        return None
-    stimuli = read_stimuli(given["input"], given["interpolation"] or "linear")
-    return replace(stimuli, partial=True)
+    def option(self, place: str) -> str:
+        """The option that says a place, or the beginning of one, for messages."""
+        return self._options.get(place, f"--set {place}")
 
 
 def set_values(settings: Sequence[str]) -> dict[str, Any]:
-    """The values of --set by the names of their variables."""
-    return dict(pair("--set", text, "COMPONENT.VARIABLE=VALUE") for text in settings)
+    """The values of --set by their places."""
+    return dict(Settings({"settings": settings}))
 
 
-def swapped_fmus(swaps: Sequence[str]) -> dict[str, Path]:
-    """The FMUs of --swap by the components whose place they take."""
-    return {name: Path(fmu) for name, fmu in (pair("--swap", t, "COMPONENT=FMU") for t in swaps)}
+def chosen_system(given: Mapping[str, Any]) -> System:
+    """The system of a command with what its options, `given` by name, make of it.
 
-
-def chosen_system(
-    given: Mapping[str, Any], swapped: Collection[str] = (), stimuli: Stimuli | None = None
-) -> System:
-    """The system with a controller, presets, the case last, another experiment; without --set.
-
-    `given` are the values of all options of a command by name, `swapped` the components that get
-    another FMU, of which the controller must be none.
+    These are its controller, presets, the case last, then single values; what is left out is said.
     """
-    step, stop, case = given["step"], given["stop"], given["case"]
+    settings = Settings(given)
+    step, stop = (plain(settings.get(place)) for place in ("experiment.step", "experiment.stop"))
+    stimuli = None
+    if "input.file" in settings:
+        way = settings.pop("input.interpolation", "linear")
+        stimuli = read_stimuli(settings.pop("input.file"), way, "--set input.interpolation")
+        stimuli = replace(stimuli, partial=True)  # FMUs may yet be swapped
     loaded = load_system(given["system"], step, stop, stimuli)
+    swapped = [c.name for c in loaded.components if f"components.{c.name}.fmu" in settings]
     system = with_controller(loaded, given["controller"], swapped)
-    names = [*given["presets"], *(["bench"] if given["bench"] else [])]
-    for name in [*names, *([] if case is None else [f"case_{case}"])]:
+    case = given["case"]
+    for name in [*given["presets"], *([] if case is None else [f"case_{case}"])]:
         system = with_preset(system, name)
-    return system.with_experiment(step, stop, given["scheme"], given["diverging"])
+    changed = system.with_settings(settings, settings.option)
+    for note in changed.notes[len(loaded.notes) :]:
+        say(note)
+    return changed.with_input(replace(stimuli, partial=False)) if stimuli else changed

@@ -30,7 +30,7 @@ def with_controller(system: System, law: str, swapped: Collection[str] = ()) -> 
             'is named under [roles]: controller = "..."'
         )
     if name in swapped:
-        raise InputError(f"{place}: must not come with a swap of {name}")
+        raise InputError(f"{place}: cannot be used with another FMU for {name}")
     folders = (system.component(name, place).fmu.parent, FMU_FOLDER)
     fmu = next((f for folder in folders if (f := folder / CONTROLLERS[law]).is_file()), None)
     if fmu is None:
@@ -38,7 +38,7 @@ def with_controller(system: System, law: str, swapped: Collection[str] = ()) -> 
             f"{place}: no {CONTROLLERS[law]} beside that of {name}, nor in {FMU_FOLDER}; must be "
             "built: grasp-cosim build"
         )
-    return system.revised({name: fmu}, {}, (place, place))
+    return system.with_settings({f"components.{name}.fmu": fmu}, lambda _: place)
 
 
 def controller_name(system: System) -> str:

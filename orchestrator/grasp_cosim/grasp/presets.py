@@ -93,7 +93,7 @@ def with_si_values(system: System, values: Mapping[str, Value], place: str) -> S
         given[str(port)] = (
             value if to_si == IDENTITY else (float(value) - to_si.offset) / to_si.factor
         )
-    return system.revised({}, given, (place, place))
+    return system.with_settings(given, f"{place} ".__add__)
 
 
 def start_in_si(system: System, key: str) -> float:

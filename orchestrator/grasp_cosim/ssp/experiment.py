@@ -32,7 +32,9 @@ def stop_time(
     declared = [part.interface.experiment.get("stop_time") for part in parts]
     stop = max((float(time) for time in declared if time is not None), default=0.0)
     if not 0.0 < stop < math.inf:
-        raise InputError(f"{file}: no stopTime in a DefaultExperiment; give one: --stop")
+        raise InputError(
+            f"{file}: no stopTime in a DefaultExperiment; give one: --set experiment.stop=..."
+        )
     notes.append(f"stop = {stop:g} s, the longest that its FMUs name; the archive names none")
     return in_nanoseconds(f"{file}: stop time of its FMUs", stop)
 
@@ -65,5 +67,5 @@ def step_time(
     listed = choices(f"{step:g} s" for step in declared_steps)
     raise InputError(
         f"{file}: names no step, as SSP has none, and of those of its FMUs ({listed}) none "
-        f"divides the stop of {stop_ns / NANOSECONDS:g} s; give one: --step"
+        f"divides the stop of {stop_ns / NANOSECONDS:g} s; give one: --set experiment.step=..."
     )

@@ -55,7 +55,10 @@ def read_steps(file: str, root: Any, given_ns: int | None) -> Steps:
         return Steps()
     if len(found) > 1 and given_ns is None:
         listed = choices(f"{step / NANOSECONDS:g} s" for step in found)
-        raise InputError(f"{file}: its annotations name several steps, {listed}; give one: --step")
+        raise InputError(
+            f"{file}: its annotations name several steps, {listed}; give one: "
+            "--set experiment.step=..."
+        )
     base, said = next(iter(found.items()))
     return Steps(base, said, _hints(file, root, given_ns or base))
 

@@ -99,7 +99,7 @@ class System(Structure):
 
         The value of a whole array is a list of lists, a NumPy array, or one for all elements.
         """
-        return self.with_settings(values, "with_values {}".format)
+        return self.with_settings(values, "with_values ".__add__)
 
     def swap(
         self,
@@ -119,7 +119,7 @@ class System(Structure):
         return self.revised({component: new}, {}, ("swap", "with_values"))
 
     def with_settings(
-        self, settings: Mapping[str, Any], place: Callable[[str], str] = "with_settings {}".format
+        self, settings: Mapping[str, Any], place: Callable[[str], str] = "with_settings ".__add__
     ) -> "System":
         """A copy with single values of its file changed, by their places in it.
 
@@ -185,8 +185,8 @@ class System(Structure):
                     f"{self.name}: no preset {name!r}; {nearest(name, self.presets)}; a system "
                     "file has them as [presets.NAME]"
                 )
-            place = f"{self.name}: [presets.{name}]"
-            system = system.revised({}, self.presets[name], (place, place))
+            place = f"{self.name}: [presets.{name}] "
+            system = system.with_settings(self.presets[name], place.__add__)
         return system
 
     def with_isolation(self, isolation: Isolation, component: str = "") -> "System":

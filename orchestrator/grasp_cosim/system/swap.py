@@ -116,8 +116,8 @@ def _check_ends(system: Structure, was: Component, after: Interface, place: str)
         fmu = quote(str(after.path))
         raise InputError(
             f"{place}: {after.path.name} has no {causality} {lacking[0]!r}{more}; {its}; if "
-            f"they have other names: --rename '{lacking[0]}=NAME', or `grasp-cosim init "
-            f"my_system.toml --as {was.name}={fmu}` finds them"
+            f"they have other names: --set 'components.{was.name}.rename.{lacking[0]}=NAME', or "
+            f"`grasp-cosim init my_system.toml --as {was.name}={fmu}` finds them"
         )
 
 

@@ -69,7 +69,7 @@ def test_a_system_that_the_preset_does_not_fit_is_refused(grasp: System) -> None
 
 
 def test_run_takes_the_preset_too(command: Run) -> None:
-    code, _, _ = command("run", "--bench", "--stop", "0.01", "--out", "results", "--json")
+    code, _, _ = command("run", "--preset", "bench", "--stop", "0.01", "--out", "results", "--json")
     assert code == 0
     values = json.loads(Path("results/run.json").read_text())["components"]["plant"]["values"]
     assert values["friction.coulomb[2]"] == pytest.approx(1.34, abs=0.01)

@@ -63,7 +63,7 @@ def identify(
         raise InputError(f"--log {log}: must not come with --times, which is other data")
     if out:
         check_folder(out)
-    system = load_system().revised({}, set_values(settings), ("--swap", "--set"))
+    system = load_system().with_settings(set_values(settings), "--set ".__add__)
     if log:
         found = _from_log(system, log, groups)
     else:

@@ -1,10 +1,12 @@
 """The command qualify."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 
+from ...errors import InputError, choices
 from ...extensions import readers
 from ...files import of_any_format, remove, write_json, write_text
 from ...interface.read import check_runs
@@ -15,6 +17,7 @@ from ...qualification.qualify import qualify as run_qualification
 from ...qualification.swap import component_of
 from ...report.qualification import draw_qualification
 from ...system.parts import ISOLATIONS, Isolation
+from ...system.swap import Replacement
 from ..frame import (
     NEGATIVE,
     PATH,
@@ -25,12 +28,37 @@ from ..frame import (
     json_option,
     load_system,
     metrics_option,
+    pair,
     say,
     show,
+    together,
     waiting,
 )
 from ..native import many_runs_option, natively
-from ..options import chosen_system, names_options, replacements, set_values, system_options
+from ..options import chosen_system, set_values, system_options
+
+names_options = together(
+    click.option(
+        "--rename",
+        "renames",
+        multiple=True,
+        metavar="[COMPONENT.]VARIABLE=FMUS_VARIABLE",
+        help="What the new FMU calls a variable of the system.",
+    ),
+    click.option(
+        "--units",
+        "named",
+        multiple=True,
+        metavar="[COMPONENT.]VARIABLE=UNIT",
+        help="Of the new FMU, where it declares none or a wrong one.",
+    ),
+)
+"""Names and units of an FMU in the place of another, in its `renames` and `named`."""
+
+FORMS = {
+    "--rename": "[COMPONENT.]VARIABLE=FMUS_VARIABLE",
+    "--units": "[COMPONENT.]VARIABLE=UNIT",
+}
 
 
 @click.command()
@@ -89,7 +117,7 @@ def qualify(
     is_file = candidate.suffix.lower() in readers
     if not is_file:
         check_runs(candidate)
-    with natively(chosen_system(given), native) as system:
+    with natively(chosen_system({**given, "settings": ()}), native) as system:
         found = run_qualification(
             system,
             component,
@@ -118,3 +146,36 @@ def _write(found: Qualification, out: Path, suffix: str) -> None:
         with waiting("drawing"):
             draw_qualification(found, figure)
         say(f"drew {figure}")
+
+
+def replacements(given: Mapping[str, Any], fmus: Mapping[str, Path]) -> dict[str, Replacement]:
+    """The FMUs for components by name, with what names_options say of each.
+
+    InputError where that is of another component, or of one of several that is not named.
+    """
+    rename, units = (
+        _by_component(option, given[key], tuple(fmus))
+        for option, key in (("--rename", "renames"), ("--units", "named"))
+    )
+    return {name: Replacement(fmu, rename[name], units[name]) for name, fmu in fmus.items()}
+
+
+def _by_component(
+    option: str, texts: Sequence[str], components: Sequence[str]
+) -> dict[str, dict[str, str]]:
+    """The pairs of an option by component, which a text may leave out where there is one only."""
+    found: dict[str, dict[str, str]] = {name: {} for name in components}
+    for text in texts:
+        left, right = pair(option, text, FORMS[option])
+        name, _, variable = left.partition(".")
+        if not components:
+            raise InputError(f"{option} {text!r}: must come with --swap COMPONENT=FMU")
+        if name not in found or not variable:
+            name, variable = components[0], left
+            if len(components) > 1:
+                raise InputError(
+                    f"{option} {text!r}: several components are swapped; must begin with one of "
+                    f"{choices(f'{c}.' for c in components)}"
+                )
+        found[name][variable] = right
+    return found

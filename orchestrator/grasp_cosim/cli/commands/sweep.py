@@ -44,14 +44,13 @@ from ..options import (
     chosen_system,
     set_values,
     swap_option,
-    swapped_fmus,
     system_options,
 )
 
 OF_VARY = {
-    "--system": "system", "--of": "of", "--preset": "presets", "--case": "case", "--bench": "bench",
+    "--system": "system", "--of": "of", "--preset": "presets", "--case": "case",
     "--set": "settings", "--step": "step", "--stop": "stop", "--scheme": "scheme",
-    "--diverging": "diverging", "--swap": "swaps",
+    "--swap": "swaps",
 }  # fmt: skip
 """Options that a study without a file has, by their names, and what their values are called."""
 
@@ -174,12 +173,11 @@ def _chosen(
 
 def _system(given: Mapping[str, Any]) -> System:
     """The system with what is the same in all runs that --vary asks for."""
-    fmus = swapped_fmus(given["swaps"])
     fixed = set_values(given["settings"])
     for name in (text.partition("=")[0] for text in given["varying"]):
         if name in fixed:
             raise InputError(f"--set {name}: {VARY} varies it, too; must be in one of them")
-    return chosen_system(given, fmus).revised(fmus, fixed, ("--swap", "--set"))
+    return chosen_system(given)
 
 
 def _file(study: str) -> tuple[Path, bool]:

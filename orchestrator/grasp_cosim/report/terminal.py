@@ -1,48 +1,53 @@
-"""The options of a run in real time, and what is said of its timing."""
+"""A result as the command line prints it."""
 
-from collections.abc import Mapping
-from dataclasses import fields
 from typing import Any
 
-import click
-
-from ..errors import InputError
+from ..numerals import counted, fixed
 from ..realtime.timing import Timing
-from ..system.realtime import OVERRUNS, Realtime
-from .frame import together
-
-realtime_options = together(
-    click.option("--realtime", is_flag=True, help="Pace the run by the clock; print its timing."),
-    click.option("--factor", type=float, help="Times as fast as real time; 1 by default."),
-    click.option(
-        "--overrun",
-        type=click.Choice(OVERRUNS),
-        help="After a late step: keep the schedule (default), shift it, or stop.",
-    ),
-    click.option("--priority", type=int, help="Run with SCHED_FIFO at this priority, 1 to 99."),
-    click.option("--cpu", type=int, help="Stay on the CPU of this number."),
-    click.option("--lock-memory", is_flag=True, help="Keep the memory from being swapped out."),
-)
+from ..recording.result import Result
 
 
-def chosen_realtime(given: Mapping[str, Any]) -> Realtime | None:
-    """What the options ask for; `given` are the values of all options of a command by name.
+def as_json(result: Result) -> dict[str, Any]:
+    """The metrics of a run and their units, and its timing where it was paced."""
+    timing = {"realtime": result.timing.as_dict()} if result.timing else {}
+    missing = list(result.measured.missing)
+    return {
+        **result.metrics,
+        "units": result.metric_units,
+        **({"missing_metrics": missing} if missing else {}),
+        **timing,
+    }
 
-    InputError where one of them comes without --realtime.
-    """
-    names = (f.name for f in fields(Realtime))
-    asked = {n: given[n] for n in names if given[n] is not None and given[n] is not False}
-    if given["realtime"]:
-        return Realtime(**asked)
-    for name, value in asked.items():
-        option = f"--{name.replace('_', '-')}"
-        text = option if value is True else f"{option} {value}"
-        raise InputError(f"{text}: must come with --realtime")
-    return None
+
+def as_text(result: Result) -> str:
+    """What a run came to, for people: a line for each metric."""
+    m = result.metrics
+    lines = [
+        f"{counted(m['steps'], 'step')} of {1e3 * m['step']:g} ms, {m['scheme']}, "
+        f"{fixed(m['real_time_factor'], 2)} times as fast as real time"
+    ]
+    lines += [
+        f"{metric.title:22s}{_numbers(m[metric.name], metric.factor)} "
+        f"{metric.display_unit}".rstrip()
+        for metric in result.measured.metrics
+    ]
+    lines += result.measured.missing
+    return "\n".join([*lines, *(timing_lines(result.timing) if result.timing else ())])
+
+
+def _numbers(value: Any, factor: float) -> str:
+    values = value if isinstance(value, list) else [value]
+    return "  ".join(_number(v, factor) for v in values)
+
+
+def _number(value: float | bool | None, factor: float) -> str:
+    if isinstance(value, bool):
+        return f"{'yes' if value else 'no':>8}"
+    return "    none" if value is None else fixed(factor * value, 3, width=8)
 
 
 def timing_lines(timing: Timing) -> list[str]:
-    """How the run kept to the clock, for people."""
+    """How a run kept to the clock, for people."""
     parts, period = timing.parts, 1e3 * timing.period
     lines = [
         f"paced at {timing.real_time_factor:.4g} of real time, asked for {timing.factor:g}: a step "
@@ -73,14 +78,15 @@ def _advice(timing: Timing) -> list[str]:
     if step.median > timing.period:
         return [
             f"  the machine is too slow for this system: a step takes {_ms(step.median)} ms, the "
-            f"period is {_ms(timing.period)} ms; take a longer --step or a smaller --factor"
+            f"period is {_ms(timing.period)} ms; take a longer step, or a smaller "
+            "realtime.factor"
         ]
     first = {name: n for name, n in timing.culprits.items() if name != "backlog"}
     waking = first.get("start", 0) + first.get("between", 0)
     if 2 * waking >= sum(first.values()) and not timing.granted:
         return [
-            "  mostly the machine let us wait: give the run a --priority and a --cpu of its own, "
-            "on an idle machine"
+            "  mostly the machine let us wait: give the run a priority and a CPU of its own, "
+            "--set realtime.priority=80 --set realtime.cpu=1, on an idle machine"
         ]
     return []
 
