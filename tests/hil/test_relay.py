@@ -273,13 +273,20 @@ def test_a_port_that_is_taken() -> None:
     )
 
 
+@pytest.fixture
+def ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A relay is interrupted as soon as it runs."""
+    monkeypatch.setattr(Relay, "run", lambda _: signal.raise_signal(signal.SIGINT))
+
+
 def command(*arguments: str) -> int:
     """Run grasp-cosim relay in this process."""
     return cli.main(["relay", *arguments])
 
 
-def test_the_command_relays_until_its_duration_is_over(capsys: pytest.CaptureFixture[str]) -> None:
-    assert command("--to", "127.0.0.1:5501", "--duration", "0") == 0
+@pytest.mark.usefixtures("ended")
+def test_the_command_relays_until_it_is_interrupted(capsys: pytest.CaptureFixture[str]) -> None:
+    assert command("--to", "127.0.0.1:5501") == 0
     out, err = capsys.readouterr()
     assert re.fullmatch(r"relaying 127\.0\.0\.1:[1-9][0-9]* -> 127\.0\.0\.1:5501\n", err)
     names, request, reply = out.splitlines()
@@ -288,8 +295,9 @@ def test_the_command_relays_until_its_duration_is_over(capsys: pytest.CaptureFix
     assert reply.split() == ["reply"] + ["0"] * 9
 
 
+@pytest.mark.usefixtures("ended")
 def test_listening_beyond_this_machine_is_said(capsys: pytest.CaptureFixture[str]) -> None:
-    assert command("--to", "127.0.0.1:5501", "--host", "0.0.0.0", "--duration", "0") == 0
+    assert command("--to", "127.0.0.1:5501", "--host", "0.0.0.0") == 0
     note, listening = capsys.readouterr().err.splitlines()
     where = listening.split()[1]
     assert where.startswith("0.0.0.0:")
@@ -303,9 +311,15 @@ def test_listening_beyond_this_machine_is_said(capsys: pytest.CaptureFixture[str
     [
         (["--loss", "1.5"], "loss = 1.5: must be a probability, from 0 to 1"),
         (["--delay", "nan"], "delay = nan s: must be from 0 to 1e+06 s"),
-        (["--reorder-by", "-1"], "reorder_by = -1.0 s: must be from 0 to 1e+06 s"),
-        (["--duration", "inf"], "duration = inf s: must be from 0 to 1e+06 s"),
-        (["--duration", "-1"], "duration = -1.0 s: must be from 0 to 1e+06 s"),
+        (["--set", "reorder_by=-1"], "reorder_by = -1.0 s: must be from 0 to 1e+06 s"),
+        (["--set", "seed=-1"], "seed = -1: must be a whole number, at least 0"),
+        (["--set", "seed=1.5"], "--set seed=1.5: must be a number"),
+        (["--set", "jitter"], "--set 'jitter': must be NAME=VALUE"),
+        (["--set", "jiter=1"], "--set 'jiter'; did you mean jitter?"),
+        (
+            ["--loss", "0", "--set", "loss=1"],
+            "--set loss=1: loss is given twice; must be given once",
+        ),
         (["--to", "5501"], "--to '5501': must be HOST:PORT, as in 127.0.0.1:5501"),
         (["--to", "127.0.0.1:"], "--to '127.0.0.1:': must be HOST:PORT, as in 127.0.0.1:5501"),
         (["--to", "127.0.0.1:0"], "127.0.0.1:0: port must be from 1 to 65535"),
@@ -329,14 +343,14 @@ def test_listening_beyond_this_machine_is_said(capsys: pytest.CaptureFixture[str
 def test_wrong_input_is_one_line(
     arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    given = ["--to", "127.0.0.1:5501", "--duration", "0", *arguments]
+    given = ["--to", "127.0.0.1:5501", *arguments]
     assert command(*given) == 2
     assert capsys.readouterr() == ("", f"grasp-cosim: {said}\n")
 
 
 @pytest.mark.parametrize(
     "arguments",
-    [[], ["--to", "127.0.0.1:1", "--port", "65536"], ["--to", "127.0.0.1:1", "--seed", "-1"]],
+    [[], ["--to", "127.0.0.1:1", "--port", "65536"]],
 )
 def test_what_click_refuses_is_one_line(
     arguments: list[str], capsys: pytest.CaptureFixture[str]
@@ -381,8 +395,9 @@ def test_ctrl_c_ends_it_with_counters_and_log(
 ) -> None:
     """As a process of its own: the log is that of the fates, the counters are those of the log."""
     path = tmp_path / "log.csv"
-    options = ["--loss", "0.3", "--jitter", "0.002", "--duplicate", "0.3", "--reorder", "0.2"]
-    options += ["--seed", "7", "--log", str(path), "--json"]
+    options = ["--loss", "0.3", "--log", str(path), "--json"]
+    for setting in ("jitter=0.002", "duplicate=0.3", "reorder=0.2", "seed=7"):
+        options += ["--set", setting]
     conditions = Conditions(jitter=0.002, loss=0.3, duplicate=0.3, reorder=0.2)
     net = both(conditions, 7)
     with EchoPeer() as peer, client() as mine:
@@ -425,9 +440,9 @@ def test_ctrl_c_ends_it_with_counters_and_log(
 def test_sigterm_before_the_duration_is_over(
     started: Callable[..., tuple[subprocess.Popen[str], Address]],
 ) -> None:
-    process, _ = started("--to", "127.0.0.1:5501", "--duration", "1000", "--json")
+    process, _ = started("--to", "127.0.0.1:5501", "--json")
     process.send_signal(signal.SIGTERM)
     out, err = process.communicate(timeout=60)
     assert process.returncode == 143
-    assert err == "grasp-cosim: interrupted before --duration 1000.0 was over\n"
+    assert err == ""
     assert json.loads(out)["request"]["received"] == 0

@@ -156,7 +156,6 @@ def test_the_command_serves_until_it_is_interrupted(fmus: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--lockstep", "--step", "0.001"], "--step 0.001: must be left out with --lockstep"),
         (["--watchdog", "-1"], "--watchdog = -1.0 s: must be a number greater than 0"),
         (["--failsafe", "gap"], "--failsafe 'gap': must be INPUT=VALUE"),
         (["--failsafe", "gap=wide"], "failsafe gap: gap = 'wide': must be a finite number"),
@@ -187,24 +186,33 @@ def test_an_fmu_that_does_not_load_is_not_offered(
     empty = tmp_path / "empty.fmu"
     with zipfile.ZipFile(fmus / "GripperPlant.fmu") as good, zipfile.ZipFile(empty, "w") as file:
         file.writestr("modelDescription.xml", good.read("modelDescription.xml"))
-    assert cli.main(["serve", str(empty), "--port", "0", "--duration", "0.01"]) == 2
+    assert cli.main(["serve", str(empty), "--port", "0"]) == 2
     captured = capsys.readouterr()
     assert captured.out == ""
     assert captured.err.count("\n") == 1
     assert f"GripperPlant: {empty} has no binary at all; " in captured.err
 
 
-def test_a_bounded_service_ends_by_itself(fmus: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.fixture
+def ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A server is interrupted as soon as it serves."""
+    monkeypatch.setattr(Server, "serve", lambda *_: signal.raise_signal(signal.SIGINT))
+
+
+@pytest.mark.usefixtures("ended")
+def test_an_interrupted_service_says_what_is_left(
+    fmus: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     fmu = str(fmus / "ProximitySensor.fmu")
-    assert cli.main(["serve", fmu, "--port", "0", "--duration", "0.01"]) == 0
+    assert cli.main(["serve", fmu, "--port", "0"]) == 0
     assert capsys.readouterr().out == "nothing came\n"
-    bounded = ["serve", fmu, "--port", "0", "--duration", "0.01", "--sessions", "1", "--json"]
-    assert cli.main(bounded) == 1
+    assert cli.main(["serve", fmu, "--port", "0", "--sessions", "1", "--json"]) == 130
     captured = capsys.readouterr()
     assert json.loads(captured.out)["listening"].startswith("127.0.0.1:")
-    assert captured.err.endswith("grasp-cosim: 0 of 1 sessions in 0.01 s\n")
+    assert captured.err.endswith("grasp-cosim: interrupted; 0 of 1 sessions served\n")
 
 
+@pytest.mark.usefixtures("ended")
 @pytest.mark.parametrize(
     ("host", "key", "who"),
     [
@@ -223,7 +231,7 @@ def test_it_says_who_may_take_part(
 ) -> None:
     (tmp_path / "key").write_bytes(KEY)
     given = ["--host", host, *(["--key-file", str(tmp_path / "key")] if key else [])]
-    command = ["serve", str(fmus / "ProximitySensor.fmu"), "--port", "0", "--duration", "0.01"]
+    command = ["serve", str(fmus / "ProximitySensor.fmu"), "--port", "0"]
     assert cli.main([*command, *given]) == 0
     err = capsys.readouterr().err
     said = f" without a key: {who} may take part, and take over a session that is silent for 1 s; "

@@ -2,7 +2,7 @@
 
 import csv
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
@@ -10,41 +10,32 @@ from typing import Any
 
 import click
 
+from ...checks import integer, known, real
 from ...errors import InputError
 from ...files import FULL
 from ...hil.address import Address, is_loopback, text
-from ...hil.network import DIRECTIONS, Conditions, Network, Outage, check_time
+from ...hil.network import DIRECTIONS, Conditions, Network, Outage
 from ...hil.relay import Relay
 from ...hil.traffic import Entry, Log
 from ...interruption import interrupts
-from ...system.parts import NANOSECONDS
-from ..frame import INTERRUPTED, PATH, Command, fail, json_option, say, show
+from ..frame import PATH, json_option, pair, say, show
 
-
-def _number(name: str, unit: str, text: str, default: float = 0.0) -> Command:
-    """An option that is a number in a unit: s, or P for a probability."""
-    return click.option(
-        f"--{name}",
-        type=float,
-        default=default,
-        show_default=bool(default),
-        metavar=unit,
-        help=text,
-    )
+NUMBERS = ("delay", "jitter", "loss", "duplicate", "reorder", "reorder_by")
+WHOLE = ("seed", "capacity")
+"""The names that --set takes."""
 
 
 @click.command()
-@click.option("--to", "peer", required=True, metavar="HOST:PORT", help="The peer.")
-@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on.")
+@click.option("--to", "peer", required=True, metavar="HOST:PORT", help="Address of the peer.")
+@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen at.")
 @click.option(
-    "--port", type=click.IntRange(0, 65_535), default=0, help="Default: one that is free."
+    "--port",
+    type=click.IntRange(0, 65_535),
+    default=0,
+    help="Port to listen at. Default: a free one.",
 )
-@_number("delay", "S", "Of every datagram.")
-@_number("jitter", "S", "Up to so much more delay.")
-@_number("loss", "P", "Probability, 0 to 1.")
-@_number("duplicate", "P", "Probability, 0 to 1.")
-@_number("reorder", "P", "Probability, 0 to 1.")
-@_number("reorder-by", "S", "How long --reorder holds a datagram back.", Conditions().reorder_by)
+@click.option("--delay", type=float, metavar="S", help="Each datagram is so late, in s.")
+@click.option("--loss", type=float, metavar="P", help="Probability that a datagram is lost.")
 @click.option(
     "--outage",
     "outages",
@@ -53,59 +44,62 @@ def _number(name: str, unit: str, text: str, default: float = 0.0) -> Command:
     help="Nothing gets through: numbers of requests, or s since the first as in 0.5s:2s.",
 )
 @click.option(
-    "--seed",
-    type=click.IntRange(0),
-    default=0,
-    show_default=True,
-    help="Of another seed other datagrams are lost, late or doubled.",
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="jitter and reorder_by in s; probabilities duplicate and reorder; seed; capacity.",
 )
-@click.option(
-    "--capacity",
-    type=click.IntRange(1),
-    default=Network().capacity,
-    show_default=True,
-    help="Datagrams under way at most; more are dropped.",
-)
-@click.option("--duration", type=float, metavar="S", help="Default: until Ctrl-C.")
-@click.option("--log", type=PATH, help="CSV with the fate of each datagram.")
+@click.option("--log", type=PATH, help="CSV to write with the fate of each datagram.")
 @json_option
 def relay(
     peer: str,
     host: str,
     port: int,
+    delay: float | None,
+    loss: float | None,
     outages: tuple[str, ...],
-    seed: int,
-    capacity: int,
-    duration: float | None,
+    settings: tuple[str, ...],
     log: Path | None,
     as_json: bool,
-    **conditions: float,
 ) -> int:
-    """Relay UDP datagrams through a nasty network, until Ctrl-C.
+    """Relay UDP datagrams through a bad network, until Ctrl-C.
 
-    They go to a peer and back. The n-th datagram of a direction has the same fate whenever the seed
-    is the same. Both directions have the same conditions. Counts are printed at the end. Exit code
-    130 where a --duration was cut short.
+    They go to a peer and back, both ways under the same conditions. The n-th datagram of a
+    direction has the same fate whenever the seed is the same. A jitter is added to the delay; a
+    datagram that is reordered is held back by reorder_by, 0.02 s; beyond the capacity, 4096
+    datagrams under way, more are dropped. Counts are printed at the end.
 
     \b
-    Example: grasp-cosim relay --port 5600 --to 127.0.0.1:5501 --delay 0.001 --loss 0.01 --seed 1
+    Example: grasp-cosim relay --port 5600 --to 127.0.0.1:5501 --loss 0.01 --set seed=1
     """
-    if duration is not None:
-        check_time("duration", duration)
-    end = None if duration is None else round(duration * NANOSECONDS)
-    both = dict.fromkeys(DIRECTIONS, Conditions(**conditions))
-    network = Network(both, tuple(map(_outage, outages)), seed, capacity)
+    given = {"delay": delay, "loss": loss}
+    network = _network({k: v for k, v in given.items() if v is not None}, settings, outages)
     with (
         _written(log) as note,
         Relay(_address(peer), network, host=host, port=port, log=note) as relay,
     ):
-        with interrupts(relay.stop) as came:
+        with interrupts(relay.stop):
             _say(relay)
-            relay.run(end)
-        show(as_json, _report(relay, seed), _table(relay))
-    if came.is_set() and duration is not None:
-        return fail(f"interrupted before --duration {duration!r} was over", INTERRUPTED)
+            relay.run()
+        show(as_json, _report(relay, network.seed), _table(relay))
     return 0
+
+
+def _network(given: dict[str, float], settings: Iterable[str], outages: Iterable[str]) -> Network:
+    """The network of the options, of which each value is given once."""
+    for setting in settings:
+        name, value = pair("--set", setting, "NAME=VALUE")
+        known("--set", name, (*NUMBERS, *WHOLE))
+        if name in given:
+            raise InputError(f"--set {setting}: {name} is given twice; must be given once")
+        try:
+            given[name] = integer(value) if name in WHOLE else real(value)
+        except ValueError:
+            raise InputError(f"--set {setting}: must be a number") from None
+    both = dict.fromkeys(DIRECTIONS, Conditions(**{n: given[n] for n in NUMBERS if n in given}))
+    whole = {n: int(given[n]) for n in WHOLE if n in given}
+    return Network(both, tuple(map(_outage, outages)), **whole)
 
 
 def _address(peer: str) -> Address:
