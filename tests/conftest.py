@@ -268,7 +268,7 @@ def grasp(fmus: Path) -> System:
 @pytest.fixture
 def built_in(grasp: System, monkeypatch: pytest.MonkeyPatch) -> None:
     """Commands take the FMUs of the tests instead of building them into their folder."""
-    monkeypatch.setattr("grasp_cosim.grasp.system.grasp_system", lambda: grasp)
+    monkeypatch.setattr("grasp_cosim.grasp.system.as_named", lambda: grasp)
 
 
 @pytest.fixture

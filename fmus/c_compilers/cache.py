@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
+from threading import get_ident
 
 
 def folder() -> Path | None:
@@ -54,7 +55,7 @@ def keep(made: Path, name: str) -> Path:
     if not above:
         return made
     place = above / Path(name).name
-    part = above / f"{place.name}.{os.getpid()}.part"
+    part = above / f"{place.name}.{os.getpid()}.{get_ident()}.part"
     try:
         if made.is_dir():
             shutil.copytree(made, part)

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import atexit
 import functools
+import logging
 import os
 import shutil
 import sys
+import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, ExitStack, nullcontext, suppress
+from contextlib import ExitStack, suppress
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -30,11 +32,10 @@ if TYPE_CHECKING:
 
     from .package import Model
 
+LOGGER = logging.getLogger(__name__)
+
 Members = Mapping[str, bytes]
 """The files in an FMU, by name."""
-
-During = Callable[[str], AbstractContextManager[object]]
-"""Makes of a line that says what is done the context to do it in."""
 
 SOURCES = (*PACKAGES, "c_compilers", "si_units", "grasp_fmus")
 """The packages that decide what FMUs hold."""
@@ -43,7 +44,15 @@ VERSIONS = ("grasp_cosim-", "latex2mathml-", "markdown_it_py-", "pythonfmu-")
 """Of distributions whose versions are in FMUs, or decide what is: so their metadata is called."""
 
 MOST_KEPT = 16
-"""Builds in the cache: every change of a source makes one."""
+"""Builds in the cache, those used last: every change of a source makes one."""
+
+NOT_KEPT = "%s: cannot be written to, so each process builds the FMUs; XDG_CACHE_HOME names another"
+
+_building = threading.Lock()
+"""One thread builds at a time; of several processes the first that is done has its build kept."""
+
+_until_the_end: dict[str, Path] = {}
+"""What cannot be kept, by name: folders that are there as long as this process."""
 
 UNPREFIXED = tuple(f"FMI{fmi}_OVERRIDE_FUNCTION_PREFIX" for fmi in (2, 3))
 """What is defined for a shared library, in which functions are called as the standard does."""
@@ -94,7 +103,7 @@ def build(out: Path) -> list[Built]:
 
     A file that is there with the same content is left alone.
     """
-    return _brought(out, _kept(_build_python, "python"))
+    return _brought(out, shipped_fmus())
 
 
 def build_native(out: Path, plan: Plan | None = None, names: Sequence[str] = ()) -> list[Built]:
@@ -210,17 +219,27 @@ def _below(folder: Path) -> list[Path]:
 def _kept(make: Callable[[Path], None], *parts: str) -> Path:
     """Return the folder that `make` fills, from the cache where it was made of the same parts.
 
-    Where nothing can be kept it ends with this process.
+    Where nothing can be kept it ends with this process, which a warning says.
     """
     name = f"fmus/{cache.key((sources_key(), *parts))}"
-    if kept := cache.kept(name):
-        return kept
+    with _building:
+        if kept := cache.kept(name):
+            with suppress(OSError):  # of another user
+                os.utime(kept)
+            return kept
+        return _until_the_end.get(name) or _made(make, name)
+
+
+def _made(make: Callable[[Path], None], name: str) -> Path:
     with ExitStack() as stack:
         made = Path(stack.enter_context(TemporaryDirectory(prefix="grasp_fmus_")))
         make(made)
         kept = cache.keep(made, name)
         if kept == made:
+            if not _until_the_end:  # said once
+                LOGGER.warning(NOT_KEPT, cache.folder() or "the user's cache")
             atexit.register(stack.pop_all().close)
+            _until_the_end[name] = made
         else:
             _forget_old(kept.parent)
     return kept
@@ -250,11 +269,11 @@ def _build_python(folder: Path) -> None:
         _write_checks(folder, name, model.block)
 
 
-def _kept_native(plan: Plan, names: Sequence[str], during: During = nullcontext) -> Path:
-    return _kept(partial(_build_native, plan, names, during), "native", plan.key, *names)
+def _kept_native(plan: Plan, names: Sequence[str]) -> Path:
+    return _kept(partial(_build_native, plan, names), "native", plan.key, *names)
 
 
-def _build_native(plan: Plan, names: Sequence[str], during: During, folder: Path) -> None:
+def _build_native(plan: Plan, names: Sequence[str], folder: Path) -> None:
     from .native.sources import native_members
     from .package import shipped_model, write_members
 
@@ -264,9 +283,8 @@ def _build_native(plan: Plan, names: Sequence[str], during: During, folder: Path
             yield name, native_members(model, plan.fmi)
             _write_checks(folder, name, model.block)
 
-    with during("compiling the native FMUs, once for these sources"):
-        for name, complete in with_binaries(fmus(), plan).items():
-            write_members(folder / f"{name}.fmu", complete)
+    for name, complete in with_binaries(fmus(), plan).items():
+        write_members(folder / f"{name}.fmu", complete)
 
 
 def _write_checks(folder: Path, name: str, block: Any) -> None:
@@ -279,14 +297,22 @@ def _write_checks(folder: Path, name: str, block: Any) -> None:
 # ------------------------------------------------------------------ twins
 
 
+def shipped_fmus() -> Path:
+    """The folder of the FMUs of the blocks that come with the package, built if need be.
+
+    Threads and processes may ask at the same time.
+    """
+    return _kept(_build_python, "python")
+
+
 @functools.cache
-def shipped_twins(during: During = nullcontext) -> Path:
+def shipped_twins() -> Path:
     """The folder of the native FMUs of the blocks that come with the package, built if need be.
 
     NoTwinsError where they cannot be built.
     """
     try:
-        return _kept_native(planned(), chosen_names(), during)
+        return _kept_native(planned(), chosen_names())
     except (ValueError, CompilerError) as error:
         raise NoTwinsError(str(error)) from error
     except OSError as error:

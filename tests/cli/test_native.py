@@ -12,18 +12,15 @@ import pytest
 from c_compilers import CompilerError, cache
 from conftest import Altered, Run
 from grasp_cosim import System
-from grasp_cosim.cli.native import natively
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_fmus import build as builds
 from grasp_fmus.build import Plan, build_block, planned, shipped_twins
 from grasp_fmus.native.targets import here
 from support.both_engines import needs_compiler
-from support.oscillator import write_oscillator
 from support.slow import slow
 
 pytestmark = needs_compiler
 
-SAID = "ran native FMUs; --python runs those in Python, with the same bits\n"
 ANNOUNCED = "compiling the native FMUs, once for these sources, 0 s\n"
 SPRING = Path(__file__).parents[2] / "docs/spring_plant.py"
 SHORT = ("--step", "1e-3", "--stop", "0.3")
@@ -59,7 +56,7 @@ def recorded(command: Run, folder: str, *arguments: str | Path) -> bytes:
 @pytest.mark.parametrize("case", ["0", "1", "2"])
 def test_a_run_has_the_same_bytes(command: Run, case: str, scheme: str) -> None:
     asked = ("--case", case, "--scheme", scheme, "--step", "1e-3")
-    python = recorded(command, "python", *asked)
+    python = recorded(command, "python", *asked, "--python")
     assert recorded(command, "native", *asked, "--native") == python
     assert all("native_twin_of" in fmu for fmu in ran("native").values())
 
@@ -67,13 +64,13 @@ def test_a_run_has_the_same_bytes(command: Run, case: str, scheme: str) -> None:
 @pytest.mark.slow
 def test_at_the_published_step_with_all_electronics(command: Run) -> None:
     asked = ("--preset", "bench", "--stop", "0.5")
-    assert recorded(command, "a", *asked) == recorded(command, "b", *asked, "--native")
+    assert recorded(command, "a", *asked, "--python") == recorded(command, "b", *asked)
 
 
 @pytest.mark.parametrize("plant", [slow("GripperPlantCompliant"), "GripperPlantMovable"])
 def test_a_swapped_plant_has_its_own_twin(command: Run, fmus: Path, plant: str) -> None:
     asked = ("--swap", f"plant={fmus / plant}.fmu", *SHORT, "--case", "0")
-    assert recorded(command, "a", *asked) == recorded(command, "b", *asked, "--native")
+    assert recorded(command, "a", *asked, "--python") == recorded(command, "b", *asked)
     native, python = ran("b")["plant"], ran("a")["plant"]
     assert native["native_twin_of"] == python["guid"] != native["guid"]
 
@@ -84,18 +81,32 @@ def test_in_processes_of_their_own(command: Run) -> None:
     parts = ("plant", "sensor_1", "sensor_2", "controller")
     apart = [word for p in parts for word in ("--set", f"components.{p}.isolation=process")]
     native = recorded(command, "b", *asked, "--native", *apart)
-    assert recorded(command, "a", *asked) == native
+    assert recorded(command, "a", *asked, "--python") == native
 
 
 # ------------------------------------------------------------------ what each command does
 
 
-def test_run_takes_the_fmus_as_they_are_named(command: Run) -> None:
-    assert command("run", *SHORT, "--out", "a")[::2] == (0, "")
-    assert all(fmu["tool"].endswith("pythonfmu 0.7.0") for fmu in ran("a").values())
-    assert command("run", *SHORT, "--native", "--out", "a")[::2] == (0, "")
+@pytest.mark.parametrize(
+    ("file", "option", "native"),
+    [
+        (False, (), True),
+        (False, ("--native",), True),
+        (False, ("--python",), False),
+        (True, (), False),
+        (True, ("--native",), True),
+        (True, ("--python",), False),
+    ],
+    ids=str,
+)
+def test_which_fmus_run_where_nothing_is_said_of_it(
+    command: Run, fmus: Path, file: bool, option: tuple[str, ...], native: bool
+) -> None:
+    """Those that a file names; of the built-in grasp, of which nobody named any, native ones."""
+    system = (system_file(Path("a_system"), fmus / "GripperPlant.fmu", fmus),) if file else ()
+    assert command("run", *system, *SHORT, *option, "--out", "a")[::2] == (0, "")
     assert ran("a").keys() == {"plant", "sensor_1", "sensor_2", "controller"}
-    assert not any("pythonfmu" in fmu["tool"] for fmu in ran("a").values())
+    assert {"pythonfmu" not in fmu["tool"] for fmu in ran("a").values()} == {native}
 
 
 @pytest.mark.slow
@@ -107,7 +118,7 @@ def test_run_takes_the_fmus_as_they_are_named(command: Run) -> None:
     ],
     ids=lambda arguments: arguments[0],
 )  # fmt: skip
-def test_a_command_of_many_runs_takes_native_ones_and_says_so(
+def test_a_command_of_many_runs_takes_native_ones(
     command: Run, fmus: Path, arguments: tuple[str, ...]
 ) -> None:
     Path("study.toml").write_text(STUDY)
@@ -116,7 +127,7 @@ def test_a_command_of_many_runs_takes_native_ones_and_says_so(
         command(*arguments, *option, "--json", *folder(arguments, i))
         for i, option in enumerate(((), ("--native",), ("--python",)))
     )
-    assert [first[2], second[2], third[2]] == [SAID, "", ""]
+    assert [first[2], second[2], third[2]] == ["", "", ""]
     assert first[0] == second[0] == third[0] == 0
     results = [json.loads(out) for _, out, _ in (first, second, third)]
     for result in results:
@@ -166,9 +177,9 @@ def test_evaluate_has_the_same_files(
     command: Run, grasp: System, monkeypatch: pytest.MonkeyPatch, source: tuple[str, ...]
 ) -> None:
     coarse = grasp.with_experiment(step=2e-3)
-    monkeypatch.setattr("grasp_cosim.grasp.system.grasp_system", lambda: coarse)
+    monkeypatch.setattr("grasp_cosim.grasp.system.as_named", lambda: coarse)
     code, out, err = command("evaluate", *source, "--out", "native", "--json")
-    assert err == SAID
+    assert err == ""
     assert command("evaluate", *source, "--out", "python", "--json", "--python") == (code, out, "")
     made, other = (
         {p.name: p.read_bytes() for p in Path(kind).iterdir()} for kind in ("native", "python")
@@ -184,7 +195,7 @@ def test_identify_finds_the_same(command: Run) -> None:
     )
     asked = ("identify", "--times", "times.csv", "--fit", "viscous", "--json", "--workers", "1")
     code, out, err = command(*asked)
-    assert (code, err) == (0, SAID)
+    assert (code, err) == (0, "")
     assert command(*asked, "--python") == (0, out, "")
 
 
@@ -201,7 +212,7 @@ def test_a_log_needs_no_fmu_to_run(command: Run) -> None:
 def test_without_a_compiler_native_is_refused_in_one_line(command: Run) -> None:
     code, out, err = command("run", *SHORT, "--native")
     assert (code, out) == (2, "")
-    assert err.startswith("grasp-cosim: --native: no C compiler: ")
+    assert err.startswith("grasp-cosim: native FMUs cannot be built: no C compiler: ")
     assert err.count("\n") == 1
     assert "pip install ziglang" in err
 
@@ -212,7 +223,7 @@ def test_without_a_compiler_a_sweep_takes_python_and_says_why(command: Run) -> N
     Path("study.toml").write_text(STUDY)
     code, out, err = command("sweep", "study.toml", "--workers", "1", "--json")
     assert (code, json.loads(out)["failed"]) == (0, 0)
-    assert err.startswith("ran FMUs in Python, which takes longer: no C compiler: ")
+    assert err.startswith("FMUs run in Python, which takes longer: no C compiler: ")
     assert err.count("\n") == 1
 
 
@@ -223,8 +234,11 @@ def test_where_nothing_can_be_kept_they_are_compiled_for_this_process(
     (tmp_path / "file").touch()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
     shipped_twins.cache_clear()
-    assert command("run", *SHORT, "--native")[::2] == (0, "")
+    code, _, err = command("run", *SHORT, "--native")
+    assert (code, err.count("\n")) == (0, 1)
+    assert err.startswith(f"{tmp_path}/file/grasp-cosim: cannot be written to, so each process")
     shipped_twins.cache_clear()
+    builds._until_the_end.clear()
 
 
 @pytest.mark.usefixtures("no_compiler")
@@ -239,7 +253,8 @@ def test_a_full_disk_is_one_line_that_names_the_file(
     code, _, err = command("run", *SHORT, "--native")
     assert (code, err) == (
         2,
-        "grasp-cosim: --native: /home/of/GripperPlant.fmu: No space left on device\n",
+        "grasp-cosim: native FMUs cannot be built: /home/of/GripperPlant.fmu: No space left on "
+        "device\n",
     )
 
 
@@ -258,7 +273,7 @@ def test_the_first_compilation_is_announced(command: Run, monkeypatch: pytest.Mo
 
     monkeypatch.setenv("XDG_CACHE_HOME", str(Path("empty").absolute()))
     monkeypatch.setattr("grasp_fmus.package.shipped_model", slow)
-    why = "grasp-cosim: --native: out of patience\n"
+    why = "grasp-cosim: native FMUs cannot be built: out of patience\n"
     monkeypatch.setattr("grasp_cosim.progress.EVERY", 0.0)
     for option, line in (("--quiet", ""), ("--native", ANNOUNCED)):
         shipped_twins.cache_clear()
@@ -290,6 +305,7 @@ def test_it_is_the_content_that_counts_not_the_name(command: Run, fmus: Path) ->
     system = system_file(Path("deep/down"), fmus / "GripperPlantMovable.fmu", fmus)
     asked = (system, *SHORT, "--case", "0")
     assert recorded(command, "a", *asked) == recorded(command, "b", *asked, "--native")
+    assert not any("native_twin_of" in fmu for fmu in ran("a").values())
     assert all("native_twin_of" in fmu for fmu in ran("b").values())
 
 
@@ -298,10 +314,7 @@ def test_one_of_other_sources_stays_as_it_is(command: Run, altered: Altered) -> 
     asked = ("--swap", f"plant={heavy}", *SHORT, "--native")
     code, _, err = command("run", *asked, "--out", "a")
     assert code == 0
-    assert err == (
-        "ran native FMUs, but not as plant (GripperPlant.fmu has no native twin); --python runs "
-        "those in Python, with the same bits\n"
-    )
+    assert err == "no native FMU runs as plant (GripperPlant.fmu has no native twin)\n"
     assert "native_twin_of" not in ran("a")["plant"]
     assert "native_twin_of" in ran("a")["sensor_1"]
 
@@ -316,7 +329,7 @@ def test_one_that_is_native_already_is_no_exception(command: Run, tmp_path: Path
     for option in ("--native", "--python"):
         assert command("run", system, *SHORT, option)[::2] == (0, "")
     qualified = command("qualify", twin, "--as", "plant", *SHORT, "--isolation", "none")
-    assert qualified[2] == SAID
+    assert qualified[2] == ""
 
 
 def test_a_block_of_ones_own(command: Run, tmp_path: Path) -> None:
@@ -326,16 +339,16 @@ def test_a_block_of_ones_own(command: Run, tmp_path: Path) -> None:
     source = tmp_path / SPRING.name
     build_block(source, Path("fmus/build"))
     python = recorded(command, "a", *swap)
-    without = "ran native FMUs, but not as plant (SpringPlant.fmu has no native twin); "
-    assert command("run", *swap, "--native")[2].startswith(without)
+    without = "no native FMU runs as plant (SpringPlant.fmu has no native twin)\n"
+    assert command("run", *swap, "--native")[2] == without
     build_block(source, Path("fmus/native"), planned())
     assert recorded(command, "b", *swap, "--native") == python
     assert "native_twin_of" in ran("b")["plant"]
     source.write_text(source.read_text("utf-8") + "\n# another\n", "utf-8")
     build_block(source, Path("fmus/build"))
-    assert command("run", *swap, "--native")[2].startswith(
-        "ran native FMUs, but not as plant (fmus/native/SpringPlant.fmu is not the twin of this "
-        "SpringPlant.fmu, or not for this machine); "
+    assert command("run", *swap)[2] == (
+        "no native FMU runs as plant (fmus/native/SpringPlant.fmu is not the twin of this "
+        "SpringPlant.fmu, or not for this machine)\n"
     )
 
 
@@ -371,30 +384,11 @@ def test_a_twin_that_does_not_run_here_is_left_alone(
     swap = ("--swap", "plant=fmus/build/SpringPlant.fmu", *SHORT)
     code, _, err = command("run", *swap, "--native")
     assert code == 0
-    assert "but not as plant (fmus/native/SpringPlant.fmu is not the twin" in err
-
-
-def test_a_system_of_others_is_none_of_our_business(
-    grasp: System, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    system = System.load(write_oscillator(tmp_path))
-    with natively(system, None) as chosen:
-        assert chosen == system
-    assert capsys.readouterr().err == ""
-    with natively(system, True) as chosen:
-        assert chosen == system
-    assert capsys.readouterr().err == ""  # they need no Python anyway
-
-
-def test_nothing_is_said_of_a_run_that_failed(
-    grasp: System, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with pytest.raises(KeyboardInterrupt), natively(grasp, None):
-        raise KeyboardInterrupt
-    assert capsys.readouterr().err == ""
+    assert "as plant (fmus/native/SpringPlant.fmu is not the twin" in err
 
 
 def test_nothing_is_built_into_the_current_folder(command: Run) -> None:
     """So one that cannot be written to will do."""
-    assert command("run", *SHORT, "--native")[0] == 0
-    assert os.listdir() == []  # noqa: PTH208
+    for option in ("--native", "--python"):
+        assert command("run", *SHORT, option)[0] == 0
+        assert os.listdir() == []  # noqa: PTH208

@@ -29,7 +29,7 @@ def qualify(
     folder = tmp_path / "here"
     folder.mkdir()
     monkeypatch.chdir(folder)
-    monkeypatch.setattr("grasp_cosim.grasp.system.grasp_system", lambda: grasp)
+    monkeypatch.setattr("grasp_cosim.grasp.system.as_named", lambda: grasp)
 
     def run(*arguments: str | Path) -> tuple[int, str, str]:
         code = cli.main(["qualify", "--python", *map(str, arguments)])

@@ -33,7 +33,7 @@ def test_a_run_that_is_not_paced_says_nothing_of_it(command: Run) -> None:
 
 
 def test_people_are_told_how_it_kept_to_the_clock(command: Run) -> None:
-    code, out, err = command(*PACED)
+    code, out, err = command(*PACED, "--python")
     assert (code, err) == (0, "")
     lines = out.splitlines()
     (begin,) = (i for i, line in enumerate(lines) if line.startswith("paced at "))
@@ -73,7 +73,7 @@ def test_what_is_refused_is_on_standard_error(
     command: Run, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.delattr(os, "sched_setaffinity", raising=False)
-    code, out, _ = command(*PACED, "--set", "realtime.cpu=0", "--json")
+    code, out, _ = command(*PACED, "--set", "realtime.cpu=0", "--python", "--json")
     assert code == 0
     assert json.loads(out)["realtime"]["refused"] == caplog.messages
     assert caplog.messages == ["CPU 0: not possible on this operating system"]

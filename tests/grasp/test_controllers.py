@@ -11,6 +11,7 @@ from grasp_cosim import InputError, System
 from grasp_cosim.grasp.controllers import CONTROLLERS, with_controller
 from grasp_cosim.grasp.presets import SYSTEM, with_preset
 from grasp_cosim.grasp.system import grasp_system
+from grasp_fmus.build import shipped_fmus
 
 ADAPTIVE = "GraspControllerAdaptive.fmu"
 
@@ -53,34 +54,23 @@ def test_what_the_system_says_of_its_controller_stays(grasp: System) -> None:
     assert "has no parameter hold.squeeze: its value 0.2 is left out" in note
 
 
-def test_in_python_the_grasp_is_asked_for_by_law(
-    fmus: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "fmus").mkdir()
-    shutil.copytree(fmus, "fmus/build")
+def test_in_python_the_grasp_is_asked_for_by_law() -> None:
     assert fmus_of(grasp_system(controller="adaptive"))["controller"] == ADAPTIVE
     assert fmus_of(grasp_system())["controller"] == "GraspController.fmu"
     with pytest.raises(InputError, match=r"^controller = 'blind': must be one of published, adapt"):
         grasp_system(controller="blind")
 
 
-def test_an_fmu_that_is_not_there_is_to_be_built(
-    grasp: System, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+def test_one_that_is_not_beside_the_other_is_that_of_the_cache(
+    grasp: System, tmp_path: Path
 ) -> None:
-    monkeypatch.chdir(tmp_path)
-    own = grasp.component("controller", "test").fmu
-    shutil.copy(own, tmp_path / "mine.fmu")
-    mine = grasp.swap("controller", tmp_path / "mine.fmu")
-    with pytest.raises(InputError) as failure:
-        with_controller(mine, "adaptive")
-    assert str(failure.value) == (
-        f"controller adaptive: no {ADAPTIVE} beside that of controller, nor in fmus/build; must "
-        "be built: grasp-cosim build"
-    )
-    (tmp_path / "fmus/build").mkdir(parents=True)
-    shutil.copy(own.with_name(ADAPTIVE), "fmus/build")
-    assert fmus_of(with_controller(mine, "adaptive"))["controller"] == ADAPTIVE
+    own = tmp_path / "mine.fmu"
+    shutil.copy(grasp.component("controller", "test").fmu, own)
+    mine = with_controller(grasp.swap("controller", own), "adaptive")
+    assert mine.component("controller", "test").fmu == shipped_fmus() / ADAPTIVE
+    shutil.copy(grasp.component("controller", "test").fmu.with_name(ADAPTIVE), tmp_path)
+    mine = with_controller(grasp.swap("controller", own), "adaptive")
+    assert mine.component("controller", "test").fmu == tmp_path / ADAPTIVE
 
 
 def test_a_system_without_a_controller_is_one_line(grasp: System) -> None:

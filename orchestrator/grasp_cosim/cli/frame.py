@@ -86,10 +86,10 @@ def load_system(
     from ..system.description import System
 
     if path is None:
-        from ..grasp.system import grasp_system
+        from ..grasp.system import as_named
 
         with phase("reading the system"):
-            return grasp_system().with_input(stimuli)
+            return as_named().with_input(stimuli)
     with phase("reading the system"):
         system = System.load(path, step=step, stop=stop, input=stimuli)
     for note in system.notes:
@@ -162,8 +162,8 @@ def is_quiet() -> bool:
     return bool(context and context.meta.get(QUIET))
 
 
-QUIET, VERBOSE = "grasp_cosim.quiet", "grasp_cosim.verbose"
-"""The entries for --quiet and --verbose in what click keeps of a command line."""
+QUIET = "grasp_cosim.quiet"
+"""The entry for --quiet in what click keeps of a command line."""
 
 
 def _set_quiet(ctx: click.Context, _: click.Parameter, value: bool) -> None:
@@ -172,9 +172,8 @@ def _set_quiet(ctx: click.Context, _: click.Parameter, value: bool) -> None:
 
 
 def _set_verbose(ctx: click.Context, _: click.Parameter, value: bool) -> None:
-    if value and not ctx.meta.get(VERBOSE):
-        ctx.meta[VERBOSE] = True
-        ctx.with_resource(_told())
+    if value:
+        ctx.with_resource(told(logging.INFO))
 
 
 class _Said(logging.Handler):
@@ -184,20 +183,23 @@ class _Said(logging.Handler):
         say(record.getMessage())
 
 
+_SAID = _Said()
+
+
 @contextmanager
-def _told() -> Iterator[None]:
-    """Have what our modules log said meanwhile."""
-    handler, loggers = _Said(), [logging.getLogger(n) for n in ("grasp_cosim", "grasp_fmus")]
-    levels = [logger.level for logger in loggers]
+def told(level: int) -> Iterator[None]:
+    """Have what our modules log at this level or above said meanwhile."""
+    loggers = [logging.getLogger(name) for name in ("grasp_cosim", "grasp_fmus")]
+    before = [logger.level for logger in loggers]
     for logger in loggers:
-        logger.addHandler(handler)
-        logger.setLevel(logging.INFO)
+        logger.addHandler(_SAID)  # once, if it is there already
+        logger.setLevel(min(level, logger.level or level))  # --verbose may be the earlier one
     try:
         yield
     finally:
-        for logger, level in zip(loggers, levels, strict=True):
-            logger.removeHandler(handler)
-            logger.setLevel(level)
+        for logger, was in zip(loggers, before, strict=True):
+            logger.removeHandler(_SAID)
+            logger.setLevel(was)
 
 
 EVERYWHERE = (

@@ -1,5 +1,6 @@
 """The group of the commands, each imported when it is asked for."""
 
+import logging
 import os
 from importlib import import_module
 from importlib.resources import files
@@ -10,7 +11,7 @@ import click
 
 from ..errors import InputError, nearest
 from ..scratch import sweep
-from .frame import EVERYWHERE
+from .frame import EVERYWHERE, told
 
 SECTIONS = {
     "Simulate": ("run", "sweep", "evaluate", "identify"),
@@ -74,6 +75,7 @@ def cli() -> None:
         os.getcwd()  # noqa: PTH109
     except OSError as error:
         raise InputError("the current folder was removed; go to another one") from error
+    click.get_current_context().with_resource(told(logging.WARNING))
     sweep(gettempdir())
 
 

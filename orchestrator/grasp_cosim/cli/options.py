@@ -13,7 +13,37 @@ from ..system.description import System
 from ..system.places import plain
 from ..system.stimuli import read_stimuli
 from ..system.structure import SCHEMES
-from .frame import PATH, load_system, pair, say, together, with_controller, with_preset
+from .frame import (
+    PATH,
+    Command,
+    load_system,
+    pair,
+    say,
+    together,
+    waiting,
+    with_controller,
+    with_preset,
+)
+
+
+def native_option(default: str) -> Command:
+    """The option of commands that run systems; `default` says what they do without it."""
+    return click.option(
+        "--native/--python",
+        default=None,
+        help=f"Run FMUs, or their native twins: the same bits. Default: {default}",
+    )
+
+
+many_runs_option = native_option("native, where there is a C compiler.")
+"""The option of commands that do many runs."""
+
+
+def natively(system: System, native: bool | None) -> System:
+    """The system with native FMUs as native_option says; that they are compiled is shown."""
+    with waiting("compiling the native FMUs, once for these sources"):
+        return system.natively(native)
+
 
 set_option = click.option(
     "--set",

@@ -2,9 +2,10 @@
 
 from collections.abc import Collection
 
+from grasp_fmus.build import shipped_fmus
+
 from ..checks import choice
 from ..errors import InputError
-from ..files import FMU_FOLDER
 from ..metrics.metric import resolved
 from ..system.description import System
 
@@ -18,9 +19,9 @@ CONTROLLERS = {
 def with_controller(system: System, law: str, swapped: Collection[str] = ()) -> System:
     """The system with the controller of that law in the place of the one that it has.
 
-    Its FMU is the one beside that of the component in the role "controller", else in FMU_FOLDER.
+    Its FMU is the one beside that of the component in the role "controller", else of the cache.
     `swapped` are the components that get another FMU. InputError where it is one of them, where no
-    component has the role, and where that FMU is in neither place, or does not fit.
+    component has the role, and where that FMU does not fit.
     """
     place = f"controller {choice('controller', law, tuple(CONTROLLERS))}"
     name = controller_name(system)
@@ -31,13 +32,8 @@ def with_controller(system: System, law: str, swapped: Collection[str] = ()) -> 
         )
     if name in swapped:
         raise InputError(f"{place}: cannot be used with another FMU for {name}")
-    folders = (system.component(name, place).fmu.parent, FMU_FOLDER)
-    fmu = next((f for folder in folders if (f := folder / CONTROLLERS[law]).is_file()), None)
-    if fmu is None:
-        raise InputError(
-            f"{place}: no {CONTROLLERS[law]} beside that of {name}, nor in {FMU_FOLDER}; must be "
-            "built: grasp-cosim build"
-        )
+    beside = system.component(name, place).fmu.with_name(CONTROLLERS[law])
+    fmu = beside if beside.is_file() else shipped_fmus() / CONTROLLERS[law]
     return system.with_settings({f"components.{name}.fmu": fmu}, lambda _: place)
 
 

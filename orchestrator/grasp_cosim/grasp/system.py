@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+from grasp_fmus.build import shipped_fmus
+
 from ..errors import InputError
 from ..files import FMU_FOLDER
 from ..system.description import System
@@ -9,13 +11,20 @@ from .controllers import with_controller
 from .presets import SYSTEM
 
 
-def grasp_system(controller: str = "published") -> System:
-    """The built-in grasp; its FMUs are built first where they are missing or out of date.
+def grasp_system(controller: str = "published", native: bool | None = None) -> System:
+    """The built-in grasp; its FMUs are in the user's cache, built first if need be.
 
-    controller is the name of the law: "published", or "adaptive", which minds no colours.
+    controller is the name of the law: "published", or "adaptive", which minds no colours. native
+    says which FMUs run, as of System.natively(): by default native ones, if they can be built.
     """
-    system = System.load(SYSTEM, built(Path()))
-    return system if controller == "published" else with_controller(system, controller)
+    system = as_named()
+    chosen = system if controller == "published" else with_controller(system, controller)
+    return chosen.natively(native)
+
+
+def as_named() -> System:
+    """The built-in grasp with FMUs that Python runs."""
+    return System.load(SYSTEM, shipped_fmus())
 
 
 def built(folder: Path) -> Path:

@@ -26,7 +26,7 @@ from ..recording.proxies import proxy_lines
 from ..recording.result import Result
 from ..system.checks import remarks
 from ..system.description import System
-from ..system.native import with_needed_twins
+from ..system.native import needed_twins
 from ..system.parts import NANOSECONDS, Component, Port
 from ..system.realtime import Realtime
 from ..system.settings import run_settings
@@ -65,7 +65,8 @@ class Session:
         note: Callable[[str], None] | None = None,
     ) -> None:
         """Load and initialise; see simulate() for the arguments and errors."""
-        system = with_needed_twins(system.with_experiment(step, stop, scheme, diverging))
+        system = system.with_experiment(step, stop, scheme, diverging)
+        system = system.with_natives(needed_twins(system))
         _check_count("every", every)
         recorded = {str(port) for port in system.recorded}
         self._metrics = chosen(metrics, recorded, system.roles)

@@ -20,6 +20,7 @@ from .checks import (
     check_steps,
 )
 from .made_of import made_of
+from .native import natives
 from .parts import Component, Isolation
 from .places import SECTIONS, as_file, changed, plain
 from .scenario_checks import check_scenario
@@ -204,12 +205,22 @@ class System(Structure):
         """
         return replace(self, input=_stimuli(input))
 
-    def with_natives(self, natives: Mapping[str, Path]) -> "System":
-        """A copy in which components of these names run native twins of their FMUs."""
+    def natively(self, native: bool | None = None) -> "System":
+        """A copy that runs native twins of its FMUs, with the same bits; False: as they are named.
+
+        None takes the twins that there are or that can be built; where there are none, FMUs run as
+        they are, which a warning on the logger says. InputError where with True those of our blocks
+        cannot be built, or with False an FMU in Python has no binary for this machine. An FMU that
+        is swapped in afterwards runs as it is.
+        """
+        return self.with_natives(natives(self, native))
+
+    def with_natives(self, natives: Mapping[str, Path | None]) -> "System":
+        """A copy in which components of these names run native twins of their FMUs, or none."""
         components = tuple(
             replace(c, native=natives.get(c.name, c.native)) for c in self.components
         )
-        return replace(self, components=components)
+        return self if components == self.components else replace(self, components=components)
 
     def with_experiment(
         self,

@@ -1,49 +1,83 @@
 """The native twins of FMUs: those of our own blocks, which are built, and those that a user built.
 
-Of an FMU in Python that has no binary for this machine the twin is run in any case.
+A twin has the same variables and gives the same bits. Of an FMU in Python that has no binary for
+this machine the twin is run in any case.
 """
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import NamedTuple
 
-from ..errors import InputError
+from ..errors import InputError, choices
 from ..files import NATIVE_FOLDER
 from ..interface.obstacles import of_binary
-from .description import System
 from .parts import Component
+from .structure import Structure
 
 LOGGER = logging.getLogger(__name__)
+"""Gets which native FMUs run, and as a warning what does not run as it was asked for."""
+
+FEW = 3
+"""Components without a twin that are named at most."""
 
 
-class Twins(NamedTuple):
-    """The native twins by component, and why one of our own blocks has none, or ""."""
+def natives(system: Structure, native: bool | None) -> dict[str, Path | None]:
+    """The native twins by component that run in the place of FMUs; see System.natively()."""
+    if native is False:
+        if needy := next(filter(_needs_twin, system.components), None):
+            raise InputError(f"{needy.name}: {_lacking(needy)}; its native twin must run")
+        return {c.name: None for c in system.components}
+    found, failure = _twins([c for c in system.components if not c.native])
+    if native and failure:
+        raise InputError(f"native FMUs cannot be built: {failure}")
+    without = [c for c in system.components if not c.native and c.name not in found]
+    left = {c.name: _why(c) for c in without if c.interface.python}
+    if failure:
+        LOGGER.warning("FMUs run in Python, which takes longer: %s", failure)
+    elif left:
+        odd = native or any(p.is_file() for c in without for p in _users_twins(c))
+        but = choices((f"{name} ({why})" for name, why in left.items()), FEW)
+        LOGGER.log(logging.WARNING if odd else logging.INFO, "no native FMU runs as %s", but)
+    return {**found}
 
-    found: dict[str, Path]
-    failure: str
+
+def needed_twins(system: Structure) -> dict[str, Path | None]:
+    """The twins of FMUs in Python that have no binary for this machine, by component."""
+    return {**_twins([c for c in system.components if _needs_twin(c)])[0]}
 
 
-def twins(
-    system: System, during: Callable[[str], AbstractContextManager[object]] = nullcontext
-) -> Twins:
-    """The twins that there are or can be built, which is done in the context `during`.
+def _lacking(component: Component) -> str:
+    """The binary that the FMU of a component lacks, in words."""
+    obstacle = of_binary(component.interface)
+    return f"{component.interface.called} {obstacle.what if obstacle else ''}"
+
+
+def _users_twins(component: Component) -> list[Path]:
+    """Where a twin may be that the user has built; nowhere of an FMU that is no block of ours."""
+    if not _is_ours(component):
+        return []
+    folders = NATIVE_FOLDER, component.fmu.parent.parent / NATIVE_FOLDER.name
+    return [folder / _file(component) for folder in folders]
+
+
+def _twins(components: list[Component]) -> tuple[dict[str, Path], str]:
+    """The twins that there are or can be built, and why one of our own blocks has none, or "".
 
     An FMU without a twin has none here, and so has one that needs no Python. InputError where one
     that has no binary for this machine lacks its twin because none can be built.
     """
+    ours = [c for c in components if _is_ours(c)]
+    if not ours:
+        return {}, ""
     from grasp_fmus.build import NoTwinsError, shipped_twins
     from grasp_fmus.shipped import SHIPPED
 
     folder, failure = None, ""
-    ours = [c for c in system.components if _is_ours(c)]
     shipped = [c for c in ours if c.interface.identifier in SHIPPED]
     if shipped:
         try:
-            folder = shipped_twins(during)
+            folder = shipped_twins()
         except NoTwinsError as error:
             failure = str(error)
     if folder:
@@ -51,31 +85,13 @@ def twins(
     found = {c.name: twin for c in ours if (twin := _twin(c, folder))}
     missing = [c for c in shipped if c.name not in found]
     for component in missing:
-        if failure and component.needs_native:
-            raise InputError(f"{component.name}: {lacking(component)}; {failure}")
-    return Twins(found, failure if missing else "")
+        if failure and _needs_twin(component):
+            raise InputError(f"{component.name}: {_lacking(component)}; {failure}")
+    return found, failure if missing else ""
 
 
-def with_needed_twins(system: System) -> System:
-    """The system with the twins of FMUs in Python that have no binary for this machine."""
-    needed = {c.name for c in system.components if c.needs_native}
-    if not needed:
-        return system
-    return system.with_natives({n: fmu for n, fmu in twins(system).found.items() if n in needed})
-
-
-def lacking(component: Component) -> str:
-    """The binary that the FMU of a component lacks, in words."""
-    obstacle = of_binary(component.interface)
-    return f"{component.interface.called} {obstacle.what if obstacle else ''}"
-
-
-def users_twins(component: Component) -> list[Path]:
-    """Where a twin may be that the user has built; nowhere of an FMU that is no block of ours."""
-    if not _is_ours(component):
-        return []
-    folders = NATIVE_FOLDER, component.fmu.parent.parent / NATIVE_FOLDER.name
-    return [folder / _file(component) for folder in folders]
+def _needs_twin(component: Component) -> bool:
+    return component.needs_native
 
 
 def _is_ours(component: Component) -> bool:
@@ -88,10 +104,18 @@ def _twin(component: Component, shipped: Path | None) -> Path | None:
     """The native FMU of the same content as the component's, of those built and of the user's."""
     from grasp_fmus.build import is_twin
 
-    places = [*([shipped / _file(component)] if shipped else []), *users_twins(component)]
+    places = [*([shipped / _file(component)] if shipped else []), *_users_twins(component)]
     return next((p for p in places if is_twin(p, component.interface.guid)), None)
 
 
 def _file(component: Component) -> str:
     """The name of the FMU as it was built, whatever it is called now."""
     return f"{component.interface.identifier}.fmu"
+
+
+def _why(component: Component) -> str:
+    there = [p for p in _users_twins(component) if p.is_file()]
+    name = component.fmu.name
+    if there:
+        return f"{there[0]} is not the twin of this {name}, or not for this machine"
+    return f"{name} has no native twin"

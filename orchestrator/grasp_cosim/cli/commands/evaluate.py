@@ -27,8 +27,7 @@ from ..frame import (
     with_controller,
     workers_option,
 )
-from ..native import many_runs_option, natively
-from ..options import controller_option
+from ..options import controller_option, many_runs_option, natively
 
 
 @click.command()
@@ -67,8 +66,8 @@ def evaluate(
     source: Source = "experiment" if bench else "simulation"
     system = with_preset(system, "bench") if bench else system
     try:
-        with natively(system, native) as chosen:
-            report = run_evaluation(chosen, out, workers, not is_quiet(), source, suffix)
+        chosen = natively(system, native)
+        report = run_evaluation(chosen, out, workers, not is_quiet(), source, suffix)
     except KeyboardInterrupt:
         kept = Parts(out / FOLDER).kept()
         goes_on = f"; {counted(kept, 'grasp')} kept in {out / FOLDER}, the same command goes on"

@@ -20,8 +20,7 @@ from ...numerals import counted
 from ...recording.load import load_log
 from ...system.description import System
 from ..frame import PATH, is_quiet, json_option, load_system, say, show, workers_option
-from ..native import many_runs_option, natively
-from ..options import set_option, set_values
+from ..options import many_runs_option, natively, set_option, set_values
 
 
 @click.command()
@@ -93,8 +92,8 @@ def _from_times(
 ) -> report.Identification:
     contacts = read_contacts(path) if path else published_contacts()
     parameters = chosen(groups, tuple(GROUPS), "identify")
-    with natively(system, native) as run:
-        fit = identify_from_times(run, contacts, parameters, workers, progress=not is_quiet())
+    run = natively(system, native)
+    fit = identify_from_times(run, contacts, parameters, workers, progress=not is_quiet())
     rows = [
         {"condition": c.label, "case": c.case, "finger": c.finger, "measured": c.time}
         for c in contacts

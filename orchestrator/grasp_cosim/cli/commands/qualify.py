@@ -34,8 +34,13 @@ from ..frame import (
     together,
     waiting,
 )
-from ..native import many_runs_option, natively
-from ..options import chosen_system, set_values, system_options
+from ..options import (
+    chosen_system,
+    many_runs_option,
+    natively,
+    set_values,
+    system_options,
+)
 
 names_options = together(
     click.option(
@@ -117,19 +122,19 @@ def qualify(
     is_file = candidate.suffix.lower() in readers
     if not is_file:
         check_runs(candidate)
-    with natively(chosen_system({**given, "settings": ()}), native) as system:
-        found = run_qualification(
-            system,
-            component,
-            component_of(load_system(candidate), component, system) if is_file else candidate,
-            rename=new.rename,
-            units=new.units,
-            values=set_values(given["settings"]),
-            bands=read_bands(bands) if bands else None,
-            isolation=isolation,
-            progress=not is_quiet(),
-            metrics=chosen_metrics(metric_files),
-        )
+    system = natively(chosen_system({**given, "settings": ()}), native)
+    found = run_qualification(
+        system,
+        component,
+        component_of(load_system(candidate), component, system) if is_file else candidate,
+        rename=new.rename,
+        units=new.units,
+        values=set_values(given["settings"]),
+        bands=read_bands(bands) if bands else None,
+        isolation=isolation,
+        progress=not is_quiet(),
+        metrics=chosen_metrics(metric_files),
+    )
     if out:
         _write(found, out, suffix)
     show(as_json, verdict.as_json(found), verdict.as_text(found))

@@ -27,8 +27,14 @@ from ..frame import (
     show,
     waiting,
 )
-from ..native import native_option, natively
-from ..options import chosen_system, input_option, swap_option, system_options
+from ..options import (
+    chosen_system,
+    input_option,
+    native_option,
+    natively,
+    swap_option,
+    system_options,
+)
 
 
 @click.command()
@@ -37,7 +43,7 @@ from ..options import chosen_system, input_option, swap_option, system_options
 @swap_option
 @input_option
 @metrics_option
-@native_option("as SYSTEM names them.")
+@native_option("as SYSTEM names them; of the built-in grasp native.")
 @click.option("--realtime", is_flag=True, help="Pace the run by the clock, and print its timing.")
 @click.option(
     "--every", type=click.IntRange(1, MOST), default=1, help="Record each N-th step only."
@@ -76,26 +82,26 @@ def run(
     if mdf:
         check_mdf()
     check_outputs(out, plot)
-    with natively(system, native, as_named=True) as chosen:
-        command = ("grasp-cosim", *click.get_current_context().find_root().obj)
-        with RunFolder(out, chosen, command, realtime) if out else nullcontext() as folder:
-            try:
-                result = simulate(
-                    chosen,
-                    progress=not is_quiet(),
-                    every=every,
-                    listeners=[folder] if folder else (),
-                    realtime=realtime,
-                    metrics=metrics,
-                    note=say,
-                )
-            except SimulationError as error:
-                if error.result:
-                    _write(error.result, folder, out, plot, mdf)
-                    if out:
-                        say(f"kept what was recorded, in {out}")
-                raise
-            _write(result, folder, out, plot, mdf)
+    chosen = system if native is None and given["system"] else natively(system, native)
+    command = ("grasp-cosim", *click.get_current_context().find_root().obj)
+    with RunFolder(out, chosen, command, realtime) if out else nullcontext() as folder:
+        try:
+            result = simulate(
+                chosen,
+                progress=not is_quiet(),
+                every=every,
+                listeners=[folder] if folder else (),
+                realtime=realtime,
+                metrics=metrics,
+                note=say,
+            )
+        except SimulationError as error:
+            if error.result:
+                _write(error.result, folder, out, plot, mdf)
+                if out:
+                    say(f"kept what was recorded, in {out}")
+            raise
+        _write(result, folder, out, plot, mdf)
     show(as_json, terminal.as_json(result), terminal.as_text(result))
     if not result.complete:
         message = f"interrupted at t = {result.time[-1]:.6g} s; kept what was recorded"

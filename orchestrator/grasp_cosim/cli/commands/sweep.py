@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from ...errors import InputError, choices
-from ...files import FMU_FOLDER, check_nature
+from ...files import check_nature
 from ...numerals import fixed
 from ...report.sweep import draw_sweep
 from ...sweep.limits import Reached, reached
@@ -39,9 +39,10 @@ from ..frame import (
     with_controller,
     with_preset,
 )
-from ..native import all_natively, many_runs_option
 from ..options import (
     chosen_system,
+    many_runs_option,
+    natively,
     set_values,
     swap_option,
     system_options,
@@ -123,13 +124,10 @@ def sweep(
     if scheduler is not None and native is None:  # whose machines may be others
         native = False
     try:
-        with all_natively([v.system for v in variants], native) as systems:
-            done = [
-                run_study(
-                    replace(v, system=s), folder / v.variant, workers, scheduler, not is_quiet()
-                )
-                for v, s in zip(variants, systems, strict=True)
-            ]
+        chosen = [replace(v, system=natively(v.system, native)) for v in variants]
+        done = [
+            run_study(v, folder / v.variant, workers, scheduler, not is_quiet()) for v in chosen
+        ]
     except KeyboardInterrupt:
         kept = sum(Store(folder / v.variant).kept() for v in variants)
         of = f"{kept} of {sum(v.runs for v in variants)} runs are kept in {folder}"
@@ -163,7 +161,7 @@ def _chosen(
         if not (value is None or value is False or value == ()):
             raise InputError(f"{option}: must come with {VARY}; a study says it itself")
     path, built_in = _file(study)
-    fmus = FMU_FOLDER if built_in else None
+    fmus = load_system().components[0].fmu.parent if built_in else None
     reader = Made(load_system, with_preset, with_controller, fmus, given["controller"])
     variants = read_studies(path, reader, metrics, seed)
     if plot and variants[0].pictures == Pictures():
