@@ -67,7 +67,7 @@ def test_a_kind_that_no_machine_runs(name: str, command: Run, tmp_path: Path) ->
         ("init", "my.toml", "--as", "plant=x.fmu"),
         ("init", "my.toml", "--fmu", "x=x.fmu"),
         ("proxy", "x.fmu", "-o", "p.fmu"),
-        ("serve", "x.fmu", "--port", "0", "--duration", "0.1"),
+        ("serve", "x.fmu", "--port", "0"),
     ):
         one_line(command(*arguments), f"x.fmu: {what}", ask)
     assert command("inspect", "x.fmu")[0] == 0

@@ -78,7 +78,7 @@ def test_command(user: Path, command: str, monkeypatch: pytest.MonkeyPatch) -> N
         arguments += ["--stop", "0.01"]
     if arguments[1] == "init":
         (user / "my_system.toml").unlink()
-    if arguments[1] in ("serve", "relay"):
+    if arguments[1] == "serve":
         arguments += ["--port", "0"]
     assert cli.main(arguments[1:]) == 0
 

@@ -286,7 +286,7 @@ def command(*arguments: str) -> int:
 
 @pytest.mark.usefixtures("ended")
 def test_the_command_relays_until_it_is_interrupted(capsys: pytest.CaptureFixture[str]) -> None:
-    assert command("--to", "127.0.0.1:5501") == 0
+    assert command("0", "127.0.0.1:5501") == 0
     out, err = capsys.readouterr()
     assert re.fullmatch(r"relaying 127\.0\.0\.1:[1-9][0-9]* -> 127\.0\.0\.1:5501\n", err)
     names, request, reply = out.splitlines()
@@ -297,7 +297,7 @@ def test_the_command_relays_until_it_is_interrupted(capsys: pytest.CaptureFixtur
 
 @pytest.mark.usefixtures("ended")
 def test_listening_beyond_this_machine_is_said(capsys: pytest.CaptureFixture[str]) -> None:
-    assert command("--to", "127.0.0.1:5501", "--host", "0.0.0.0") == 0
+    assert command("0.0.0.0:0", "5501") == 0
     note, listening = capsys.readouterr().err.splitlines()
     where = listening.split()[1]
     assert where.startswith("0.0.0.0:")
@@ -311,27 +311,12 @@ def test_listening_beyond_this_machine_is_said(capsys: pytest.CaptureFixture[str
     [
         (["--loss", "1.5"], "loss = 1.5: must be a probability, from 0 to 1"),
         (["--delay", "nan"], "delay = nan s: must be from 0 to 1e+06 s"),
-        (["--set", "reorder_by=-1"], "reorder_by = -1.0 s: must be from 0 to 1e+06 s"),
-        (["--set", "seed=-1"], "seed = -1: must be a whole number, at least 0"),
-        (["--set", "seed=1.5"], "--set seed=1.5: must be a number"),
-        (["--set", "jitter"], "--set 'jitter': must be NAME=VALUE"),
-        (["--set", "jiter=1"], "--set 'jiter'; did you mean jitter?"),
-        (
-            ["--loss", "0", "--set", "loss=1"],
-            "--set loss=1: loss is given twice; must be given once",
-        ),
-        (["--to", "5501"], "--to '5501': must be HOST:PORT, as in 127.0.0.1:5501"),
-        (["--to", "127.0.0.1:"], "--to '127.0.0.1:': must be HOST:PORT, as in 127.0.0.1:5501"),
-        (["--to", "127.0.0.1:0"], "127.0.0.1:0: port must be from 1 to 65535"),
-        (["--to", "127.0.0.1:65536"], "127.0.0.1:65536: port must be from 1 to 65535"),
-        (
-            ["--to", "256.0.0.1:5501"],
-            "256.0.0.1:5501: no such host; must be an IPv4 address or a name that has one",
-        ),
+        (["--delay", "2:1"], "--delay '2:1': must be S or FROM:TO, in s, the longer last"),
+        (["--delay", "1:2:3"], "--delay '1:2:3': must be S or FROM:TO, in s, the longer last"),
         (
             ["--outage", "5"],
-            "--outage '5': must be FROM:UNTIL, in numbers of requests, as in 100:200,"
-            " or in s, as in 0.5s:2s",
+            "outage '5': must be FROM:UNTIL, in numbers of requests, as in 100:200, or in s, as in "
+            "0.5s:2s",
         ),
         (["--outage", "1.5:2"], "outage from 1.5 until 2.0 requests: must be whole numbers"),
         (
@@ -343,14 +328,33 @@ def test_listening_beyond_this_machine_is_said(capsys: pytest.CaptureFixture[str
 def test_wrong_input_is_one_line(
     arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    given = ["--to", "127.0.0.1:5501", *arguments]
-    assert command(*given) == 2
+    assert command("0", "5501", *arguments) == 2
     assert capsys.readouterr() == ("", f"grasp-cosim: {said}\n")
 
 
 @pytest.mark.parametrize(
+    ("listen", "to", "said"),
+    [
+        ("0", "x", "TO 'x': must be HOST:PORT, as in 127.0.0.1:5501, or PORT"),
+        ("127.0.0.1:", "5501", "LISTEN '127.0.0.1:': must be HOST:PORT, as in 127.0.0.1:5501, or "),
+        ("65536", "5501", "127.0.0.1:65536: port must be from 0 to 65535"),
+        ("0", "0", "127.0.0.1:0: port must be from 1 to 65535"),
+        ("0", "127.0.0.1:65536", "127.0.0.1:65536: port must be from 1 to 65535"),
+        ("0", "256.0.0.1:1", "256.0.0.1:1: no such host; must be an IPv4 address or a name that"),
+    ],
+)
+def test_a_wrong_address_is_one_line(
+    listen: str, to: str, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert command(listen, to) == 2
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1)
+    assert err.startswith(f"grasp-cosim: {said}")
+
+
+@pytest.mark.parametrize(
     "arguments",
-    [[], ["--to", "127.0.0.1:1", "--port", "65536"]],
+    [[], ["0"], ["0", "1", "--seed", "-1"]],
 )
 def test_what_click_refuses_is_one_line(
     arguments: list[str], capsys: pytest.CaptureFixture[str]
@@ -363,7 +367,7 @@ def test_what_click_refuses_is_one_line(
 
 def test_a_log_that_cannot_be_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "missing" / "log.csv"
-    assert command("--to", "127.0.0.1:5501", "--log", str(path)) == 2
+    assert command("0", "5501", "--log", str(path)) == 2
     assert capsys.readouterr().err == f"grasp-cosim: {path}: No such file or directory\n"
 
 
@@ -395,14 +399,13 @@ def test_ctrl_c_ends_it_with_counters_and_log(
 ) -> None:
     """As a process of its own: the log is that of the fates, the counters are those of the log."""
     path = tmp_path / "log.csv"
-    options = ["--loss", "0.3", "--log", str(path), "--json"]
-    for setting in ("jitter=0.002", "duplicate=0.3", "reorder=0.2", "seed=7"):
-        options += ["--set", setting]
+    chances = "--loss 0.3 --delay 0:0.002 --duplicate 0.3 --reorder 0.2 --seed 7"
+    options = [*chances.split(), "--log", str(path), "--json"]
     conditions = Conditions(jitter=0.002, loss=0.3, duplicate=0.3, reorder=0.2)
     net = both(conditions, 7)
     with EchoPeer() as peer, client() as mine:
         to = f"127.0.0.1:{peer.address[1]}"
-        process, address = started("--to", to, *options)
+        process, address = started("0", to, *options)
         expected = 0
         for number in range(1, 41):
             mine.sendto(b"%d" % number, address)
@@ -440,7 +443,7 @@ def test_ctrl_c_ends_it_with_counters_and_log(
 def test_sigterm_before_the_duration_is_over(
     started: Callable[..., tuple[subprocess.Popen[str], Address]],
 ) -> None:
-    process, _ = started("--to", "127.0.0.1:5501", "--json")
+    process, _ = started("0", "5501", "--json")
     process.send_signal(signal.SIGTERM)
     out, err = process.communicate(timeout=60)
     assert process.returncode == 143

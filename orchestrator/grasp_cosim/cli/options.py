@@ -143,11 +143,11 @@ def chosen_system(given: Mapping[str, Any]) -> System:
         way = settings.pop("input.interpolation", "linear")
         stimuli = read_stimuli(settings.pop("input.file"), way, "--set input.interpolation")
         stimuli = replace(stimuli, partial=True)  # FMUs may yet be swapped
-    loaded = load_system(given["system"], step, stop, stimuli)
+    loaded = load_system(given.get("system"), step, stop, stimuli)
     swapped = [c.name for c in loaded.components if f"components.{c.name}.fmu" in settings]
-    system = with_controller(loaded, given["controller"], swapped)
-    case = given["case"]
-    for name in [*given["presets"], *([] if case is None else [f"case_{case}"])]:
+    system = with_controller(loaded, given.get("controller"), swapped)
+    case = given.get("case")
+    for name in [*given.get("presets", ()), *([] if case is None else [f"case_{case}"])]:
         system = with_preset(system, name)
     changed = system.with_settings(settings, settings.option)
     for note in changed.notes[len(loaded.notes) :]:

@@ -1,6 +1,7 @@
 """Addresses of UDP sockets, and sockets that listen there."""
 
 import ipaddress
+import re
 import socket
 from collections.abc import Callable
 
@@ -21,6 +22,17 @@ def resolved(host: str, port: int, lowest_port: int = 0) -> Address:
             f"{text((host, port))}: no such host; must be an IPv4 address or a name that has one"
         ) from error
     return str(found[0][4][0]), port
+
+
+def read_address(place: str, given: str) -> Address:
+    """The address that a text says, HOST:PORT, or PORT of this machine; place says whose.
+
+    InputError where it is none.
+    """
+    found = re.fullmatch(r"(?:(.+):)?([0-9]{1,5})", given)
+    if not found:
+        raise InputError(f"{place} {given!r}: must be HOST:PORT, as in 127.0.0.1:5501, or PORT")
+    return found[1] or "127.0.0.1", int(found[2])
 
 
 def text(address: Address) -> str:

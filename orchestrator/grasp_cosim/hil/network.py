@@ -6,6 +6,7 @@ however fast the datagrams come.
 
 import hashlib
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple, get_args
@@ -67,6 +68,17 @@ class Outage:
             raise InputError(f"{text}: must begin at {lowest} or later, and end after that")
         if self.by == "requests" and not (self.start % 1 == 0 == self.until % 1):
             raise InputError(f"{text}: must be whole numbers")
+
+    @classmethod
+    def read(cls, given: str) -> "Outage":
+        """The outage that a text says, 100:200 in requests, 0.5s:2s in s; InputError for none."""
+        found = re.fullmatch(r"([0-9]+(?:\.[0-9]+)?)(s?):([0-9]+(?:\.[0-9]+)?)\2", given)
+        if not found:
+            raise InputError(
+                f"outage {given!r}: must be FROM:UNTIL, in numbers of requests, as in 100:200, or "
+                "in s, as in 0.5s:2s"
+            )
+        return cls(float(found[1]), float(found[3]), "s" if found[2] else "requests")
 
     def covers(self, requests: int, elapsed_ns: int) -> bool:
         """Return True if it is on at this request, and so long after the first datagram."""

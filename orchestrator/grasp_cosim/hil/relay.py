@@ -7,7 +7,8 @@ that the peer can tell them apart; the peer sees the addresses of these.
 import socket
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 from ..errors import InputError
 from .address import Address, connected, is_loopback, resolved, text
@@ -46,7 +47,9 @@ class Relay(Loop):
         log: Log | None = None,
         clock: Callable[[], int] = time.monotonic_ns,
     ) -> None:
-        self._traffic = Traffic[_Client](network or Network(), log)
+        network = network or Network()
+        self._seed = network.seed
+        self._traffic = Traffic[_Client](network, log)
         self._clients: dict[Address, _Client] = {}
         self.peer = resolved(*peer, lowest_port=1)
         super().__init__((host, port), self._traffic.next_due, self._send_due, clock)
@@ -63,6 +66,23 @@ class Relay(Loop):
         """The counters of both directions now; may be asked from any thread, also after the end."""
         with self._lock:
             return self._traffic.snapshot()
+
+    def as_json(self) -> dict[str, Any]:
+        """Where it is, and its counters, by direction."""
+        return {
+            "listening": text(self.address),
+            "to": text(self.peer),
+            "seed": self._seed,
+            **{d: {**asdict(c), "dropped": c.dropped} for d, c in self.counters.items()},
+        }
+
+    def as_text(self) -> str:
+        """Its counters as a table, a line for each direction."""
+        rows = {direction: asdict(c) for direction, c in self.counters.items()}
+        names = list(rows["request"])
+        lines = [" " * 8 + "".join(f"{name:>12s}" for name in names)]
+        lines += [f"{d:8s}" + "".join(f"{row[n]:12d}" for n in names) for d, row in rows.items()]
+        return "\n".join(lines)
 
     def _send_due(self, now: int) -> None:
         while held := self._traffic.take(now):

@@ -3,12 +3,16 @@
 No socket and no clock: who calls says what arrived and what time it is.
 """
 
+import csv
 import heapq
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import count
+from pathlib import Path
 from typing import Generic, Literal, NamedTuple, TypeVar
 
+from ..files import FULL
 from ..system.parts import NANOSECONDS
 from .network import DIRECTIONS, Direction, Network, Passage
 
@@ -55,6 +59,23 @@ class Entry(NamedTuple):
 
 
 Log = Callable[[Entry], object]
+
+
+@contextmanager
+def csv_log(path: Path | None) -> Iterator[Log | None]:
+    """A log that writes a row of a CSV file for each entry; None without a path."""
+    if path is None:
+        yield None
+        return
+    try:
+        with path.open("w", encoding="utf-8", newline="") as file:
+            table = csv.writer(file, lineterminator="\n")
+            table.writerow(Entry._fields)
+            yield table.writerow
+    except OSError as error:  # a full disk does not say where
+        if error.errno in FULL:
+            raise OSError(error.errno, error.strerror, str(path)) from error
+        raise
 
 
 class Held(NamedTuple, Generic[Route]):

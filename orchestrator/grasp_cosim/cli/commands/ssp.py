@@ -5,28 +5,27 @@ from pathlib import Path
 import click
 
 from ...files import check_folder
-from ..frame import PATH, json_option, load_system, say, show
+from ..frame import PATH, json_option, say, show
+from ..options import chosen_system, set_option
 
 
 @click.command()
 @click.argument("system", required=False, type=PATH)
 @click.option("-o", "--out", type=PATH, required=True, help="The archive to write.")
-@click.option("--step", type=float, help="Communication step in s, for an .ssp that names none.")
-@click.option("--stop", type=float, help="Stop time in s.")
+@set_option
 @json_option
-def ssp(
-    system: Path | None, out: Path, step: float | None, stop: float | None, as_json: bool
-) -> int:
+def ssp(system: Path | None, out: Path, settings: tuple[str, ...], as_json: bool) -> int:
     """Write SYSTEM as an SSP 1.0 archive.
 
-    It is a .toml or .ssp file, by default the built-in grasp.
+    It is a .toml or .ssp file, by default the built-in grasp. An .ssp that names no step gets one
+    by --set experiment.step=1e-3.
 
     \b
     Example: grasp-cosim ssp my_system.toml -o my_system.ssp
     """
     from ...ssp.write import write_ssp  # only here: its libraries take time to load
 
-    chosen = load_system(system, step, stop).with_experiment(step, stop)
+    chosen = chosen_system({"system": system, "settings": settings})
     check_folder(out.parent)
     written = write_ssp(chosen, out)
     report = {
