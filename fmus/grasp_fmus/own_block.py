@@ -87,6 +87,11 @@ def _check_imports(file: Path, text: str, tree: ast.Module) -> None:
             package = module.partition(".")[0]
             if package in installed:
                 continue
+            if package == "pythonfmu":
+                raise ValueError(
+                    f"{file}: line {node.lineno}: is a model of pythonfmu, which builds it itself: "
+                    f"`pythonfmu build -f {file}`; then run it with --swap COMPONENT=FMU"
+                )
             if package not in PACKAGES:
                 raise ValueError(
                     f"{file}: line {node.lineno}: imports {module}, which would not be in the FMU; "

@@ -103,6 +103,7 @@ def test_packages_of_our_blocks_come_along(tmp_path: Path) -> None:
 # fmt: off
 WRONG = [
     (LAG.partition("\n\nfrom")[0], "", "must begin with a docstring; its first line says what"),
+    ("from math", "from pythonfmu import Fmi2Slave\nfrom math", "line 7: is a model of pythonfmu"),
     ("from math", "import numpy\nfrom math", "line 7: imports numpy, which would not be in "),
     ("from math", "from .x import y\nfrom math", "line 7: imports .x, which would not be in "),
     *(("from math", f"{line}\nfrom math", "line 7: gripper_plant must be imported at the top level,"

@@ -432,7 +432,7 @@ SENSOR = "ProximitySensor.fmu"
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
-        ([SENSOR], "proxy: must have -o FILE.fmu or --c-header FILE, or both"),
+        ([SENSOR], "proxy: needs -o FILE.fmu or --c-header FILE, or both"),
         (["-o", "P.fmu"], "Missing argument 'FMU'"),
         (["none.fmu", "-o", "P.fmu"], "none.fmu: no such FMU file"),
         ([SENSOR, "-o", "my-proxy.fmu"], "my-proxy.fmu: must be NAME.fmu, NAME of"),
@@ -447,7 +447,7 @@ SENSOR = "ProximitySensor.fmu"
         ([SENSOR, "-o", "P.fmu", "--host", "h" * 1024], "must have 0 to 1023 bytes"),
         ([SENSOR, "-o", "P.fmu", "--target", "vax"], "--target 'vax'"),
         ([SENSOR, "-o", "P.fmu", "--native"], "No such option"),
-        ([SENSOR, "--c-header", "p.h", "--fmi", "3"], "--fmi: there is no FMU"),
+        ([SENSOR, "--c-header", "p.h", "--fmi", "3"], "--fmi needs -o FILE.fmu"),
     ],
 )  # fmt: skip
 def test_a_mistake_is_one_line(fmus: Path, run: Run, arguments: list[str], reason: str) -> None:

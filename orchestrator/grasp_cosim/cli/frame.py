@@ -211,7 +211,7 @@ EVERYWHERE = (
         is_flag=True,
         expose_value=False,
         callback=_set_quiet,
-        help="No progress and no notes on standard error; errors stay.",
+        help="Print no progress and no notes, only errors, on standard error.",
     ),
     click.Option(
         ["-v", "--verbose"],

@@ -31,7 +31,7 @@ def native_option(default: str) -> Command:
     return click.option(
         "--native/--python",
         default=None,
-        help=f"Run FMUs, or their native twins: the same bits. Default: {default}",
+        help=f"Run native twins of Python FMUs, or these, bit for bit. Default: {default}",
     )
 
 

@@ -21,18 +21,23 @@ FIRST = "; zig makes its libraries first, once, which takes a minute or two"
 
 @click.command()
 @click.argument("block", required=False, type=PATH)
-@click.option("--out", type=PATH, help=f"Default: {FMU_FOLDER}")
+@click.option("--out", type=PATH, help=f"Folder for the FMUs. Default: {FMU_FOLDER}")
 @click.option(
-    "--native", is_flag=True, help=f"As C, without Python. Default of --out: {NATIVE_FOLDER}"
+    "--native",
+    is_flag=True,
+    help=f"Build them as C, which needs no Python. Default of --out: {NATIVE_FOLDER}",
 )
 @click.option(
     "--target",
     metavar="NAMES",
-    help="Binaries for others too: linux64,win64,darwin64,aarch64-linux. They need ziglang.",
+    help="Build for other platforms, too: linux64,win64,darwin64,aarch64-linux. Needs ziglang.",
 )
-@click.option("--fmi", type=click.Choice(["2", "3"]), help="Of a native FMU. Default: 2")
+@click.option("--fmi", type=click.Choice(["2", "3"]), help="FMI version of native FMUs. Default: 2")
 @click.option(
-    "--c-only", type=PATH, metavar="DIR", help="No FMUs: their C alone, for real-time targets."
+    "--c-only",
+    type=PATH,
+    metavar="DIR",
+    help="Write the C of the blocks alone, for real-time targets.",
 )
 @json_option
 def build(
@@ -44,14 +49,15 @@ def build(
     c_only: Path | None,
     as_json: bool,
 ) -> int:
-    """Build the FMUs, of Python or as C.
+    """Build the FMUs, in Python or as C.
 
     These are the plants, GripperPlant*, ProximitySensor, and the GraspController*. With BLOCK, a
-    Python file: the FMU of that block alone, spring_plant.py becomes SpringPlant.fmu.
-    docs/your_plant.md shows one. With --native, BLOCK may be the name of one of ours as well.
+    Python file, the FMU of that block alone is built: spring_plant.py becomes SpringPlant.fmu
+    (docs/your_plant.md). With --native, which translates the blocks to C and compiles them, BLOCK
+    may also be the name of one of ours.
 
-    Says what is not as it was built last. Where pythonfmu has no binary for this machine, native
-    FMUs are built beside them, too. --native translates the blocks to C and compiles them.
+    It prints whether each file is new, changed or unchanged. Where pythonfmu has no binary for this
+    machine, native FMUs are built beside them, too.
 
     \b
     Example: grasp-cosim build --out my_fmus
@@ -61,14 +67,14 @@ def build(
     only_native = {"--target": target, "--fmi": fmi, "--c-only": c_only}
     for option, value in only_native.items():
         if value is not None and not native:
-            raise InputError(f"{option} {value}: must be with --native")
+            raise InputError(f"{option} {value}: needs --native")
     folder = out or (NATIVE_FOLDER if native else FMU_FOLDER)
     check_folder(c_only or folder)
     notes: list[str] = []
     try:
         if c_only:
             if target or fmi or out:
-                raise ValueError("--c-only: C without FMI; must be without --target, --fmi, --out")
+                raise ValueError("--c-only cannot be used with --target, --fmi or --out")
             return _write_c(block, c_only, as_json)
         if native:
             built, notes = _native(block, folder, target, 3 if fmi == "3" else 2)

@@ -27,8 +27,8 @@ KINDS: Mapping[str, type[Value]] = {"Real": float, "Integer": int, "Boolean": bo
 
 @click.command()
 @click.argument("fmu", type=PATH)
-@click.option("-o", "--out", type=PATH, help="The proxy to write, an .fmu.")
-@click.option("--host", default=DEFAULTS.host, show_default=True, help="Where its peer is.")
+@click.option("-o", "--out", type=PATH, help="File to write, an .fmu.")
+@click.option("--host", default=DEFAULTS.host, show_default=True, help="Address of its peer.")
 @click.option(
     "--port",
     type=click.IntRange(1, 65535),
@@ -46,9 +46,9 @@ KINDS: Mapping[str, type[Value]] = {"Real": float, "Integer": int, "Boolean": bo
 @click.option(
     "--target",
     metavar="NAMES",
-    help="Binaries for others too: linux64,win64,darwin64,aarch64-linux. They need ziglang.",
+    help="Build for other platforms, too: linux64,win64,darwin64,aarch64-linux. Needs ziglang.",
 )
-@click.option("--fmi", type=click.Choice(["2", "3"]), help="Version of the proxy. Default: 2")
+@click.option("--fmi", type=click.Choice(["2", "3"]), help="FMI version of the proxy. Default: 2")
 @click.option("--c-header", type=PATH, help="Write the peer's side as a C99 header.")
 @json_option
 def proxy(
@@ -66,8 +66,8 @@ def proxy(
 
     It is an FMU with the same variables. It sends inputs and parameters in one UDP datagram per
     step and waits --timeout for the outputs. What happens without an answer is up to its parameters
-    proxy.*, where --host, --port and --timeout are start values. The peer: grasp-cosim serve, or a
-    bench with the header of --c-header. It is C, and needs a compiler: gcc, or ziglang of
+    proxy.*, where --host, --port and --timeout are start values. The peer is grasp-cosim serve or a
+    bench with the header of --c-header. A proxy is C and needs a compiler: gcc, or ziglang of
     grasp-cosim[native].
 
     \b
@@ -119,7 +119,7 @@ def _check_options(out: Path | None, only: Mapping[str, str | None]) -> None:
     """InputError where options are of an FMU, and there is none to make."""
     for option, value in only.items():
         if value is not None and out is None:
-            raise InputError(f"{option}: there is no FMU to make; must be with -o FILE.fmu")
+            raise InputError(f"{option} needs -o FILE.fmu")
 
 
 def _built(
@@ -148,7 +148,7 @@ def _check_paths(fmu: Path, out: Path | None, c_header: Path | None) -> None:
         taken[path.resolve()] = "the proxy"
         check_folder(path.parent)
     if len(taken) == 1:
-        raise InputError("proxy: must have -o FILE.fmu or --c-header FILE, or both")
+        raise InputError("proxy: needs -o FILE.fmu or --c-header FILE, or both")
 
 
 def _original(interface: Interface, names: list[str]) -> "Original":

@@ -11,13 +11,13 @@ from ..options import chosen_system, set_option
 
 @click.command()
 @click.argument("system", required=False, type=PATH)
-@click.option("-o", "--out", type=PATH, required=True, help="The archive to write.")
+@click.option("-o", "--out", type=PATH, required=True, help="Archive to write, an .ssp.")
 @set_option
 @json_option
 def ssp(system: Path | None, out: Path, settings: tuple[str, ...], as_json: bool) -> int:
     """Write SYSTEM as an SSP 1.0 archive.
 
-    It is a .toml or .ssp file, by default the built-in grasp. An .ssp that names no step gets one
+    SYSTEM is a .toml or .ssp file, by default the built-in grasp. An .ssp that names no step gets one
     by --set experiment.step=1e-3.
 
     \b
