@@ -17,7 +17,7 @@ from ..options import chosen_system, set_option
 def ssp(system: Path | None, out: Path, settings: tuple[str, ...], as_json: bool) -> int:
     """Write SYSTEM as an SSP 1.0 archive.
 
-    SYSTEM is a .toml or .ssp file, by default the built-in grasp. An .ssp that names no step gets one
+    SYSTEM is a .toml or .ssp file, by default the built-in grasp. An .ssp without a step gets one
     by --set experiment.step=1e-3.
 
     \b
