@@ -29,7 +29,7 @@ def test_friction_from_a_log(command: Run, recorded: Result, kind: str) -> None:
         "identify", "--log", f"signals.{kind}", "--out", "identified", "--json"
     )
     assert code == 0
-    note = "signals.csv: no run.json of it beside it, taken to be in SI units\n"
+    note = "signals.csv: there is no run.json beside it; its values are taken to be in SI units\n"
     assert err == (note if kind == "csv" else "")
     found = json.loads(out)
     assert found == json.loads(Path("identified/identification.json").read_text())

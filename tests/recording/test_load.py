@@ -177,7 +177,9 @@ def test_a_log_comes_in_si_where_the_run_beside_it_tells(tmp_path: Path) -> None
     other = tmp_path / "measured.csv"
     other.write_text(CSV, "utf-8")
     assert load_log(other, said.append)["a.x"][0] == 1.5
-    assert said == [f"{other}: no run.json of it beside it, taken to be in SI units"]
+    assert said == [
+        f"{other}: there is no run.json beside it; its values are taken to be in SI units"
+    ]
 
 
 def test_a_run_without_a_signal_says_so(tmp_path: Path) -> None:

@@ -45,7 +45,7 @@ def make_loop(plan: Plan, engine: Engine, steps: int | None = None) -> Loop:
     if engine == "compiled":
         return _compiled(plan, why)
     if engine == "auto":
-        why = "as one in C would not save what building it takes, or there is no compiler"
+        why = "as a loop in C would save less time than its build takes, or there is no compiler"
         there = compiled.is_there()
         if _pays(plan, steps):
             try:

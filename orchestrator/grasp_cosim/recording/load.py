@@ -197,7 +197,9 @@ def load_log(path: Path, note: Callable[[str], None] | None = None) -> Signals:
     beside = path.with_name(SETTINGS)
     if path.stem != Path(SIGNALS).stem or not beside.is_file():
         if note and path.suffix.lower() == ".csv":
-            note(f"{path}: no {SETTINGS} of it beside it, taken to be in SI units")
+            note(
+                f"{path}: there is no {SETTINGS} beside it; its values are taken to be in SI units"
+            )
         return log
     return replace(log, to_si=_to_si(f"{beside}: to_si", _settings(beside)))
 
