@@ -71,7 +71,7 @@ def test_native_fmus(fmus_here: Run) -> None:
 
 
 WRONG = [
-    (("there.toml",), "there.toml: is there already; must be another name, or with --force"),
+    (("there.toml",), "there.toml: is there already; give another name, or --force"),
     (("here.ssp",), "here.ssp: must end in .toml, a system file"),
     (("folder.toml",), "folder.toml: is a folder; must be a file"),
     (("a.toml", "--as", "hand=vendor.fmu"), "--as hand: no component 'hand'; valid: plant, sens"),
@@ -79,10 +79,13 @@ WRONG = [
     (("a.toml", "--as", "plant=none.fmu"), "none.fmu: no such FMU file"),
     (("a.toml", "--fmu", "a.b=vendor.fmu"), "--fmu 'a.b=vendor.fmu': must be a name of its own"),
     (("a.toml", "--fmu", "a=vendor.fmu", "--fmu", "a=vendor.fmu"), "must be a name of its own"),
-    (("a.toml", "--fmu", "a=vendor.fmu", "--native"), "must be without --as, --controller and"),
+    (
+        ("a.toml", "--fmu", "a=vendor.fmu", "--native"),
+        "--fmu cannot be used with --as, --controller or",
+    ),
     (
         ("a.toml", "--as", "controller=vendor.fmu", "--controller", "adaptive"),
-        "--controller adaptive: must not come with --as controller",
+        "--controller adaptive cannot be used with --as controller",
     ),
 ]
 

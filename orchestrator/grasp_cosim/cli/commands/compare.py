@@ -15,8 +15,12 @@ from ..frame import NEGATIVE, PATH, chosen_metrics, json_option, metrics_option,
 @click.command()
 @click.argument("a", type=PATH)
 @click.argument("b", type=PATH)
-@click.option("-o", "--out", type=PATH, help="A page of both, one over the other: compare.html")
-@click.option("--bands", type=PATH, help="TOML, as of qualify; default: derived from A.")
+@click.option(
+    "-o", "--out", type=PATH, help="Page to write, with one run over the other, like compare.html."
+)
+@click.option(
+    "--bands", type=PATH, help="TOML file with bands, as qualify takes it. Default: derived from A."
+)
 @metrics_option
 @json_option
 def compare(
@@ -29,10 +33,10 @@ def compare(
 ) -> int:
     """Compare two recorded runs, A and B.
 
-    Compared are signals, metrics and settings. Each is a folder that `run --out` wrote, or a file
-    of signals from elsewhere: CSV with the column time and names like plant.gap[1], with a unit in
-    brackets where it is another one, "plant.gap[1] [mm]"; or ASAM MDF (.mf4). Runs of unlike length
-    are compared where both are. Exit code 0: all that both have is inside its band; 1: not.
+    It compares signals, metrics and settings, over the time that both have. A and B are folders
+    that `run --out` wrote, or files of signals from elsewhere: ASAM MDF (.mf4), or CSV with the
+    column time and names like plant.gap[1], with a unit in brackets where it is not the usual one:
+    "plant.gap[1] [mm]". The exit code is 1 where anything is out of its band.
 
     \b
     Example: grasp-cosim compare results_a results_b -o compare.html

@@ -36,20 +36,20 @@ MOST = 24
     "candidates",
     multiple=True,
     metavar="COMPONENT=FMU",
-    help="A foreign FMU in the place of a component of the grasp: its names, units and values.",
+    help="Put a foreign FMU in the place of a component, with its names, units and values.",
 )
 @click.option(
-    "--fmu", "fmus", multiple=True, metavar="NAME=FMU", help="A system of these FMUs alone."
+    "--fmu", "fmus", multiple=True, metavar="NAME=FMU", help="Make a system of these FMUs alone."
 )
 @click.option(
     "--controller",
     type=click.Choice(("published", "adaptive")),
     default="published",
     show_default=True,
-    help="Which of our controllers it has.",
+    help="Take this one of our controllers.",
 )
-@click.option("--native", is_flag=True, help="Our FMUs as C, which need no Python.")
-@click.option("--force", is_flag=True, help="Write over a file that is there already.")
+@click.option("--native", is_flag=True, help="Take our FMUs as C, which need no Python.")
+@click.option("--force", is_flag=True, help="Replace a file that is there already.")
 @json_option
 def init(
     file: Path,
@@ -62,8 +62,8 @@ def init(
 ) -> int:
     """Write FILE, a system file to start from.
 
-    It is the grasp, with its FMUs in fmus/build beside FILE. With --as, one of its components is
-    filled in for an FMU of another vendor. What cannot be told is a TODO there; a run names it.
+    It describes the grasp, with its FMUs in fmus/build beside FILE. With --as, the entries of one
+    component are filled in for an FMU of another vendor; what cannot be told is marked as TODO.
 
     \b
     Example: grasp-cosim init my_system.toml --as plant=vendor.fmu
@@ -73,9 +73,7 @@ def init(
     foreign = _paired("--as", candidates)
     own = _paired("--fmu", fmus)
     if own and (foreign or native or controller != "published"):
-        raise InputError(
-            "--fmu: a system of these FMUs alone; must be without --as, --controller and --native"
-        )
+        raise InputError("--fmu cannot be used with --as, --controller or --native")
     drafts: dict[str, Draft] = {}
     notes: list[str] = []
     if own:
@@ -136,7 +134,7 @@ def _check_file(file: Path, force: bool) -> None:
     if file.is_dir():
         raise InputError(f"{file}: is a folder; must be a file")
     if file.exists() and not force:
-        raise InputError(f"{file}: is there already; must be another name, or with --force")
+        raise InputError(f"{file}: is there already; give another name, or --force")
     check_folder(file.parent)
 
 
@@ -162,7 +160,7 @@ def _grasp(
     from ...grasp.system import built
 
     if "controller" in foreign and controller != "published":
-        raise InputError(f"--controller {controller}: must not come with --as controller")
+        raise InputError(f"--controller {controller} cannot be used with --as controller")
     fmus = _natives(folder) if native else built(folder)
     built_in = System.load(SYSTEM, fmus)
     names = {c.fmu.name: c.fmu.name for c in built_in.components}

@@ -14,16 +14,16 @@ from ..frame import PATH, format_option, json_option, say, show, title_option, w
 
 @click.command()
 @click.argument("run", type=PATH)
-@click.option("--out", type=PATH, help="The page. Default: RUN/report.html")
+@click.option("--out", type=PATH, help="Page to write. Default: RUN/report.html")
 @title_option
 @format_option
 @json_option
 def report(run: Path, out: Path | None, title: str, suffix: str, as_json: bool) -> int:
     """Make a page of RUN, a folder that `run --out` wrote.
 
-    It has traces, metrics, connections and settings. The page is one file that needs nothing else.
-    A picture is drawn beside it with matplotlib, the extra plot, and one more of the timing of a
-    run in real time; without it there is the page alone.
+    The page is one file that needs nothing else, with traces, metrics, connections and settings.
+    Where matplotlib is installed, the extra plot, a picture is drawn beside it, and a second one of
+    the timing of a run in real time.
 
     \b
     Example: grasp-cosim report results
