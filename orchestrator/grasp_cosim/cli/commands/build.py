@@ -21,7 +21,7 @@ FIRST = "; zig makes its libraries first, once, which takes a minute or two"
 
 @click.command()
 @click.argument("block", required=False, type=PATH)
-@click.option("--out", type=PATH, help=f"Folder for the FMUs. Default: {FMU_FOLDER}")
+@click.option("-o", "--out", type=PATH, help=f"Folder for the FMUs. Default: {FMU_FOLDER}")
 @click.option(
     "--native",
     is_flag=True,

@@ -14,7 +14,7 @@ from ..frame import PATH, format_option, json_option, say, show, title_option, w
 
 @click.command()
 @click.argument("run", type=PATH)
-@click.option("--out", type=PATH, help="Page to write. Default: RUN/report.html")
+@click.option("-o", "--out", type=PATH, help="Page to write. Default: RUN/report.html")
 @title_option
 @format_option
 @json_option

@@ -48,7 +48,7 @@ from ..options import (
 @click.option(
     "--every", type=click.IntRange(1, MOST), default=1, help="Record each N-th step only."
 )
-@click.option("--out", type=PATH, help="Write signals.csv and run.json into a folder.")
+@click.option("-o", "--out", type=PATH, help="Write signals.csv and run.json into a folder.")
 @click.option(
     "--plot",
     is_flag=True,
