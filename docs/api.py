@@ -19,7 +19,7 @@ MODULES = (
     "grasp_cosim.recording.listener",
     "grasp_cosim.recording.csv",
     "grasp_cosim.recording.mdf",
-    "grasp_cosim.convergence.step_study",
+    "grasp_cosim.sweeps.sweep",
     "grasp_cosim.comparison.compare",
     "grasp_cosim.qualification.qualify",
     "grasp_cosim.qualification.bands",
@@ -55,4 +55,4 @@ def _file(module: str) -> str:
 
 if __name__ == "__main__":
     for written in write_pages(Path(*sys.argv[1:] or ["results/api"])):
-        print(written)  # noqa: T201
+        print(written)

@@ -19,6 +19,7 @@ from io import StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import colour_studies
 import tutorials
 from grasp_cosim import cli
 from grasp_cosim.files import write_text
@@ -123,11 +124,12 @@ def draw_evaluation(folder: Path) -> None:
             shutil.copy(Path(kept, name), folder)
 
 
-def draw_map(folder: Path, study: str) -> None:
-    """The map of a built-in study, by its name."""
-    with TemporaryDirectory() as kept:
-        do("sweep", study, "--plot", "--out", kept)
-        shutil.copy(Path(kept, "map.png"), folder / f"{study}.png")
+def draw_map(folder: Path) -> None:
+    """The first example of docs/studies.md, and the map of both laws."""
+    page = (HERE / "studies.md").read_text("utf-8")
+    example = re.findall(r"```python\n(.*?)```", page, re.DOTALL)[0]
+    exec(example.replace('"map.png"', repr(str(folder / "reflectance_map.png"))), {})  # noqa: S102
+    colour_studies.draw_map(folder / "colour_map.png")
 
 
 def draw_page(folder: Path, name: str) -> None:
@@ -142,8 +144,7 @@ PICTURES: Mapping[str, tuple[Callable[[Path], None], Sequence[str]]] = {
     "evaluation": (draw_evaluation, ["contact_times.png", "contact_forces.png"]),
     "report": (draw_report, ["report.png"]),
     "timing": (draw_timing, ["timing.png"]),
-    "colour_map": (partial(draw_map, study="colour_map"), ["colour_map.png"]),
-    "reflectance_map": (partial(draw_map, study="reflectance_map"), ["reflectance_map.png"]),
+    "maps": (draw_map, ["reflectance_map.png", "colour_map.png"]),
     "colour": (partial(draw_page, name="colour"), ["colour.png"]),
     "layers": (partial(draw_page, name="layers"), ["layers.png", "objects.png"]),
     "limits": (partial(draw_page, name="limits"), ["limits.png"]),

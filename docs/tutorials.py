@@ -6,7 +6,6 @@ A table below a command has a row for each value of the word that is its first h
 headings say what is taken from the run: COLUMNS. Below a study, a row may be one of its variants.
 """
 
-import json
 import math
 import os
 import re
@@ -49,8 +48,8 @@ DATE = "1795435200"
 Runs = Mapping[str, Result]
 """The runs of a table by the values in its first column."""
 
-Do = Callable[[str], Any]
-"""What a command line recorded: a Result, or of a study what it prints with --json."""
+Do = Callable[[str], Result]
+"""What a command line recorded."""
 
 _TABLE = re.compile(r"```console\n\$ ((?:(?!```).)*)\n```\n\n((?:\|[^\n]*\n)+)", re.DOTALL)
 
@@ -68,9 +67,6 @@ def worked_out(page: str, do: Do) -> tuple[str, list[Runs]]:
         word, *heads = _cells(head)
         firsts = [_cells(row)[0] for row in rows]
         line = command.replace("\\\n", " ")
-        if line.startswith("grasp-cosim sweep "):
-            rows = [_study_row(first, heads, do(line.replace(word, first))) for first in firsts]
-            return "\n".join(["```console", f"$ {command}", "```", "", head, rule, *rows, ""])
         runs = {v: do(re.sub(rf"\b{word}\b", v, line)) for v in (f.strip("`") for f in firsts)}
         tables.append(runs)
         filled = [
@@ -82,56 +78,24 @@ def worked_out(page: str, do: Do) -> tuple[str, list[Runs]]:
     return _TABLE.sub(fill, page), tables
 
 
-def _study_row(first: str, heads: Sequence[str], study: Mapping[str, Any]) -> str:
-    """The cells of a study, or of its variant of that name."""
-    if heads == ["reached"]:
-        return f"| {first} | {_reached(study['limits'])} |"
-    metrics = study["variants"][first]["metrics"]
-    return f"| {' | '.join([first, *(_spread(heading, metrics) for heading in heads)])} |"
-
-
-def _spread(heading: str, metrics: Mapping[str, Any]) -> str:
-    """The median, 95 % and the greatest of a metric."""
-    quantity, factor, digits = COLUMNS[heading]
-    found = metrics[str(quantity)]
-    return " / ".join(_text(found[s], factor, digits) for s in ("median", "p95", "greatest"))
-
-
-def _reached(limits: Sequence[Mapping[str, Any]]) -> str:
-    """What a study reaches of each of its limits, the worst of variants and fingers."""
-    headings = {column[0]: heading for heading, column in COLUMNS.items()}
-    worst: dict[tuple[str, str, float], float] = {}
-    for found in limits:
-        limit = found["limit"]
-        key = (headings[limit["metric"]], limit["statistic"], limit["most"])
-        worst[key] = max(found["value"], worst.get(key, 0.0))
-    return "; ".join(
-        f"{heading.rpartition(', ')[0]}{', 95 %' if statistic == 'p95' else ''} "
-        f"{_text(value, factor, digits + 1)} of {factor * most:g} {heading.rpartition(', ')[2]}"
-        for (heading, statistic, most), value in worst.items()
-        for _, factor, digits in [COLUMNS[heading]]
-    )
-
-
 def _cells(line: str) -> list[str]:
     return [cell.strip() for cell in line.strip().strip("|").split("|")]
 
 
 def recorder(folder: Path) -> Do:
-    """Do each line "grasp-cosim run ..." or "... sweep ..." once, in the current folder.
+    """Do each line "grasp-cosim run ..." once, in the current folder.
 
     SystemExit where it fails.
     """
 
     @cache
-    def run(*words: str) -> Any:
+    def run(*words: str) -> Result:
         out = folder / str(run.cache_info().misses)
-        study = words[1] == "sweep"
-        with redirect_stdout(StringIO()) as printed:
-            code = cli.main([*words[1:], "--out", str(out), *(["--json"] if study else [])])
+        with redirect_stdout(StringIO()):
+            code = cli.main([*words[1:], "--out", str(out)])
         if code:
             raise SystemExit(f"{shlex.join(words)}: exit code {code}")
-        return json.loads(printed.getvalue()) if study else load_run(out)
+        return load_run(out)
 
     return lambda line: run(*shlex.split(line))
 

@@ -47,29 +47,15 @@ def amplitude(run):
 
 ROLES = '[roles]\nleft = "a"\nright = "b"\n[presets.twice]\n"a.gain" = 2.0\n'
 
-STUDY = """
-system = "oscillator.toml"
-presets = ["twice"]
-outputs = ["b.x"]
-metrics = "mine.py"
-[design]
-kind = "grid"
-[[parameters]]
-name = "gain"
-variables = ["b.gain"]
-values = [1.0, 2.0]
-"""
-
 Python = Callable[[str], str]
 Command = Callable[..., str]
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """The oscillator with roles and a preset, a file of metrics, a study."""
+    """The oscillator with roles and a preset, and a file of metrics."""
     write_oscillator(tmp_path, ROLES)
     (tmp_path / "mine.py").write_text(METRICS)
-    (tmp_path / "study.toml").write_text(STUDY)
     return tmp_path
 
 
@@ -194,22 +180,20 @@ def test_a_run_is_written_read_back_drawn_and_reported(python: Python, folder: P
 
 
 @pytest.mark.slow
-def test_a_study_is_swept(python: Python) -> None:
+def test_a_system_is_swept(python: Python) -> None:
     python(
         """
         from pathlib import Path
 
-        from grasp_cosim import System
-        from grasp_cosim.sweep.read import Made, read_studies
-        from grasp_cosim.sweep.sweep import sweep
+        from grasp_cosim import System, sweep
+        from grasp_cosim.metrics.metric import load_metrics
 
-        (study,) = read_studies(Path("study.toml"), Made(System.load))
-        done = sweep(study, Path("out"), workers=2)
-        assert done.failed == 0
-        first, second = (outcome.metrics for outcome in done.outcomes)
-        assert list(first) == ["amplitude", "b.x"]
-        assert first["amplitude"] != second["amplitude"]
-        assert study.system.component("a", "").values["gain"] == 2.0
+        system = System.load("oscillator.toml").with_presets("twice")
+        mine = load_metrics(Path("mine.py"))
+        table = sweep(system, {"b.gain": [1.0, 2.0]}, metrics=mine, workers=2)
+        assert table.metrics == ("amplitude",) and not table.errors
+        first, second = table["amplitude"]
+        assert first != second
         """
     )
 
@@ -236,27 +220,6 @@ def test_a_swap_is_qualified(python: Python) -> None:
 
 
 @pytest.mark.slow
-def test_the_step_is_studied(python: Python) -> None:
-    python(
-        """
-        from math import sin
-        from pathlib import Path
-
-        from grasp_cosim import System
-        from grasp_cosim.convergence.step_study import step_study
-        from grasp_cosim.metrics.metric import load_metrics
-
-        system = System.load("oscillator.toml")
-        metrics = load_metrics(Path("mine.py"))
-        study = step_study(system, 0.01, workers=2, of=["a.x", "amplitude"], metrics=metrics)
-        assert abs(study.limits["a.x"].limit - sin(0.64)) < 1e-4
-        assert abs(study.limits["amplitude"].limit - 1.0) < 1e-3
-        assert study.holds
-        """
-    )
-
-
-@pytest.mark.slow
 def test_the_commands_of_any_system_do_without(command: Command, folder: Path) -> None:
     options = ("--metrics", "mine.py", "--json")
     ran = json.loads(
@@ -266,8 +229,9 @@ def test_the_commands_of_any_system_do_without(command: Command, folder: Path) -
     assert (folder / "out/signals.png").exists()
     command("report", "out", "--out", "page.html")
     assert "amplitude" in (folder / "page.html").read_text("utf-8")
-    swept = json.loads(command("sweep", "study.toml", "--workers", "1", "--json"))
-    assert swept["metrics"]["amplitude"]["runs"] == 2
+    vary = ("--vary", "experiment.step=0.01,0.02,0.04")
+    swept = json.loads(command("sweep", "oscillator.toml", *vary, "--workers", "1", *options))
+    assert 0.9 < swept["convergence"]["amplitude"]["order"] < 1.1
     judged = json.loads(
         command("qualify", "integrator.fmu", "--as", "b", "--system", "oscillator.toml", *options)
     )

@@ -169,7 +169,7 @@ FLOORS = (
     ("recording",),
     ("ssp", "inspection", "drafting"),
     ("master",),
-    ("convergence", "sweep", "qualification", "comparison", "hil"),
+    ("sweep", "sweeps", "qualification", "comparison", "hil"),
     ("report",),
     ("grasp",),
     ("cli",),

@@ -28,6 +28,21 @@ class Unit:
         """The unit of differences."""
         return replace(self, offset=0.0) if self.offset else self
 
+    @property
+    def base(self) -> str:
+        """The name of the coherent unit of SI for the same quantity: "m", "N", "kg.m2/s3"."""
+        powers = dict(zip(BASE, self.exponents, strict=True))
+        for symbol, (power, of) in _SI.items():
+            if not power and {**dict.fromkeys(BASE, 0), **of} == powers:
+                return symbol
+        above, below = (
+            [f"{b}{abs(n) if abs(n) > 1 else ''}" for b, n in powers.items() if n * sign > 0]
+            for sign in (1, -1)
+        )
+        under = ".".join(below)
+        under = f"({under})" if len(below) > 1 else under
+        return (".".join(above) or "1") + (f"/{under}" if under else "")
+
     def reversed(self, name: str) -> "Unit":
         """The unit, by another name, of values with the other sign."""
         return replace(self, name=name, factor=-self.factor)

@@ -9,9 +9,8 @@
 
 Importing it imports nothing yet, builds nothing and writes nothing: each name below is imported
 when it is asked for. Further in: `grasp_cosim.metrics.metric`, `grasp_cosim.recording.listener`,
-`grasp_cosim.recording.csv`, `grasp_cosim.recording.mdf`, `grasp_cosim.convergence.step_study`,
-`grasp_cosim.comparison.compare`, `grasp_cosim.qualification.qualify`,
-`grasp_cosim.qualification.bands`.
+`grasp_cosim.recording.csv`, `grasp_cosim.recording.mdf`, `grasp_cosim.comparison.compare`,
+`grasp_cosim.qualification.qualify`, `grasp_cosim.qualification.bands`.
 """
 
 from __future__ import annotations
@@ -35,6 +34,7 @@ if TYPE_CHECKING:
     from .recording.load import load_run
     from .recording.result import Result
     from .report.page import Scene
+    from .sweeps.sweep import sweep
     from .system.description import System
     from .system.realtime import Realtime
     from .system.stimuli import Stimuli
@@ -51,6 +51,7 @@ __all__ = [
     "load_run",
     "metric",
     "simulate",
+    "sweep",
 ]
 
 _HOMES = {
@@ -63,6 +64,7 @@ _HOMES = {
     "load_run": "recording.load",
     "metric": "metrics.metric",
     "simulate": "master.simulation",
+    "sweep": "sweeps.sweep",
 }
 
 

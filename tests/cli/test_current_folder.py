@@ -9,15 +9,6 @@ import pytest
 from grasp_cosim.grasp.presets import SYSTEM
 
 MARK = "imported.txt"
-STUDY = """outputs = ["plant.gap[1]"]
-stop = 0.002
-system = "grasp.toml"
-[design]
-kind = "grid"
-[[parameters]]
-variables = ["plant.object_width"]
-values = [0.06, 0.07]
-"""
 
 
 def poison(folder: Path, names: set[str]) -> Path:
@@ -84,7 +75,7 @@ def test_a_component_in_a_process(installed: list[str], everything: Path, system
         "qualify {FMUS}/GripperPlant.fmu --as plant --system {SYSTEM} --stop 0.001",
         "doctor {FMUS}/GripperPlant.fmu",
         "inspect {FMUS}/GripperPlant.fmu",
-        "sweep {STUDY} --out {OUT} --workers 2",
+        "sweep {SYSTEM} --stop 0.001 --vary plant.object_width=0.05,0.06 --out {OUT} --workers 2",
         "ssp {SYSTEM} -o {OUT}.ssp",
         "build {BLOCK} --out {OUT}",
         "proxy {FMUS}/GripperPlant.fmu -o {OUT}.fmu",
@@ -93,10 +84,9 @@ def test_a_component_in_a_process(installed: list[str], everything: Path, system
 def test_a_command(
     line: str, installed: list[str], everything: Path, system: Path, fmus: Path, tmp_path: Path
 ) -> None:
-    (tmp_path / "study.toml").write_text(STUDY, "utf-8")
     block = Path(__file__).parents[2] / "docs" / "spring_plant.py"
     places = {
-        "SYSTEM": system, "FMUS": fmus, "STUDY": tmp_path / "study.toml", "BLOCK": block,
+        "SYSTEM": system, "FMUS": fmus, "BLOCK": block,
         "OUT": tmp_path / "out",
     }  # fmt: skip
     not_imported(everything, installed, *(word.format(**places) for word in line.split()))

@@ -24,16 +24,6 @@ pytestmark = needs_compiler
 ANNOUNCED = "compiling the native FMUs, once for these sources, 0 s\n"
 SPRING = Path(__file__).parents[2] / "docs/spring_plant.py"
 SHORT = ("--step", "1e-3", "--stop", "0.3")
-STUDY = """case = 0
-step = 1e-3
-stop = 0.3
-outputs = ["plant.gap[1]"]
-[design]
-kind = "grid"
-[[parameters]]
-variables = ["plant.object_width"]
-values = [0.06, 0.07, 0.08]
-"""
 
 
 def ran(folder: str) -> dict[str, Any]:
@@ -113,7 +103,7 @@ def test_which_fmus_run_where_nothing_is_said_of_it(
 @pytest.mark.parametrize(
     "arguments",
     [
-        ("sweep", "study.toml", "--workers", "1"),
+        ("sweep", "--vary", "plant.finger_mass[1]=0.5,0.6", *SHORT, "--workers", "1"),
         ("qualify", "plant.fmu", "--as", "plant", *SHORT, "--isolation", "none"),
     ],
     ids=lambda arguments: arguments[0],
@@ -121,7 +111,6 @@ def test_which_fmus_run_where_nothing_is_said_of_it(
 def test_a_command_of_many_runs_takes_native_ones(
     command: Run, fmus: Path, arguments: tuple[str, ...]
 ) -> None:
-    Path("study.toml").write_text(STUDY)
     shutil.copy(fmus / "GripperPlant.fmu", "plant.fmu")
     first, second, third = (
         command(*arguments, *option, "--json", *folder(arguments, i))
@@ -131,44 +120,13 @@ def test_a_command_of_many_runs_takes_native_ones(
     assert first[0] == second[0] == third[0] == 0
     results = [json.loads(out) for _, out, _ in (first, second, third)]
     for result in results:
-        result.pop("folder", None)
+        result.pop("table", None)
     assert results[0] == results[1] == results[2]
     assert not Path("fmus").exists()
 
 
 def folder(arguments: tuple[str, ...], number: int) -> tuple[str, ...]:
-    return ("--out", f"out_{number}") if arguments[0] == "sweep" else ()
-
-
-@pytest.mark.slow
-def test_a_sweep_goes_on_with_the_other_kind(command: Run) -> None:
-    Path("study.toml").write_text(STUDY)
-    for i, option in enumerate(("--python", "--native")):
-        assert command("sweep", "study.toml", "--out", f"{i}", "--workers", "1", option)[0] == 0
-    ours, theirs = (sorted(Path(f"{i}", "parts").iterdir()) for i in range(2))
-    assert [p.read_bytes() for p in ours] == [p.read_bytes() for p in theirs]
-    before = Path("0/runs.parquet").read_bytes()
-    ours[1].unlink()
-    code, out, _ = command("sweep", "study.toml", "--out", "0", "--workers", "1", "--json")
-    assert (code, json.loads(out)["resumed"]) == (0, 2)
-    assert Path("0/runs.parquet").read_bytes() == before == Path("1/runs.parquet").read_bytes()
-
-
-def test_a_cluster_gets_native_ones_only_if_asked(
-    command: Run, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Its workers may be other machines."""
-    natives: list[set[bool]] = []
-
-    def run(study: Any, *_: Any, **__: Any) -> Any:
-        natives.append({c.native is not None for c in study.system.components})
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("grasp_cosim.cli.commands.sweep.run_study", run)
-    Path("study.toml").write_text(STUDY)
-    for option in ((), ("--native",)):
-        command("sweep", "study.toml", "--scheduler", "tcp://127.0.0.1:1", *option)
-    assert natives == [{False}, {True}]
+    return ("--out", f"out_{number}.csv") if arguments[0] == "sweep" else ()
 
 
 @pytest.mark.slow
@@ -220,8 +178,8 @@ def test_without_a_compiler_native_is_refused_in_one_line(command: Run) -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("no_compiler")
 def test_without_a_compiler_a_sweep_takes_python_and_says_why(command: Run) -> None:
-    Path("study.toml").write_text(STUDY)
-    code, out, err = command("sweep", "study.toml", "--workers", "1", "--json")
+    vary = ("--vary", "plant.object_width=0.06,0.07")
+    code, out, err = command("sweep", *vary, *SHORT, "--workers", "1", "--json")
     assert (code, json.loads(out)["failed"]) == (0, 0)
     assert err.startswith("FMUs run in Python, which takes longer: no C compiler: ")
     assert err.count("\n") == 1

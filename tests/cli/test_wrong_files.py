@@ -125,11 +125,6 @@ def test_in_the_place_of_a_run(command: Run, things: Path) -> None:
         load_run("plant.fmu")
 
 
-def test_in_the_place_of_a_study(command: Run, things: Path) -> None:
-    refused(command("sweep", "plant.fmu"), "plant.fmu", "an FMU", "`grasp-cosim inspect plant.fmu`")
-    refused(command("sweep", "run"), "run", "a folder that `grasp-cosim run --out` wrote", "report")
-
-
 def test_what_is_damaged_or_unknown_is_said_as_before(command: Run, tmp_path: Path) -> None:
     (tmp_path / "x.fmu").write_bytes(b"PK\x03\x04")
     assert "x.fmu: not a readable FMU" in command("inspect", "x.fmu")[2]

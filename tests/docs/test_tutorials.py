@@ -18,7 +18,6 @@ from grasp_controller.simultaneous_contact import Params as Layer3
 from grasp_cosim import System, cli, simulate
 from grasp_cosim.recording.load import load_run
 from gripper_plant.friction import Params as Friction
-from support.campaign import exploring
 from support.native_fmus import needs_gcc
 from support.pictures import assert_same_picture
 from support.vendor import vendor_plant
@@ -61,13 +60,10 @@ def said(name: str, pattern: str) -> list[float]:
 def checked(name: str, checkout: Path) -> tuple[list[Any], Any]:
     """The runs of the tables of a page, whose cells and pictures must be those of the runs.
 
-    The cells must be the same to the printed digit: the runs are deterministic. Maps of studies
-    have the name of the study whose command on the page draws them; tests/docs/test_pictures.py.
-    Studies take minutes: their tables are left to make explore.
+    The cells must be the same to the printed digit: the runs are deterministic. Maps are
+    of docs/colour_studies.py.
     """
     tutorials, text = load_tutorials(), page(name)
-    if not exploring():
-        text = re.sub(r"```console\n\$ grasp-cosim sweep .*\n```\n\n(\|.*\n)+", "", text)
     do = tutorials.recorder(checkout / "recorded")
     drawn = checkout / "drawn"
     drawn.mkdir()
@@ -77,7 +73,7 @@ def checked(name: str, checkout: Path) -> tuple[list[Any], Any]:
         assert found == text, "run: docs/tutorials.py"
         tutorials.PAGES[name](tables, drawn)
     pictures = [p.name for p in drawn.iterdir()]
-    maps = {f"{study}.png" for study in re.findall(r"grasp-cosim sweep (\w+) --plot", page(name))}
+    maps = {"colour_map.png"}
     shown = re.findall(r"!\[.*?\]\((.*?)\)", page(name))
     assert sorted(set(shown) - maps) == sorted(pictures)
     for picture in pictures:
@@ -125,7 +121,7 @@ def test_the_switch_in_a_system_file_makes_case_1(checkout: Path, grasp: System)
 @pytest.mark.slow
 @pytest.mark.campaign
 def test_colour(checkout: Path) -> None:
-    """The studies' own limits are kept, as they end with exit code 0; and what the words say."""
+    """The tables, and what the words say."""
     assert cli.main(["build", "docs/moving_object.py"]) == 0
     tables, _ = checked("colour", checkout)
     laws, others, free, drift, _, sensors, stripes, saturated, near, dark, *last = tables

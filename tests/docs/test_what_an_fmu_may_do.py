@@ -76,15 +76,3 @@ def test_what_loads_it_in_another_process(folder: Path) -> None:
     assert os.getpid() not in loaded(folder, "doctor", "a.fmu")
     isolated = loaded(folder, "run", "system.toml", "--set", "components.a.isolation=process")
     assert len(isolated - {os.getpid()}) == len(isolated) == 1
-
-
-@needs_gcc
-def test_a_study_may_name_python(folder: Path) -> None:
-    assert 'with an entry `metrics = "FILE.py"` it names Python that is run' in PAGE
-    (folder / "own.py").write_text('open("ran", "w").close()\n')
-    (folder / "study.toml").write_text(
-        'system = "system.toml"\noutputs = ["a.x"]\nmetrics = "own.py"\n[design]\nkind = "grid"\n'
-        '[[parameters]]\nname = "gain"\nvariables = ["a.gain"]\nvalues = [1.0]\n'
-    )
-    assert main(["sweep", "study.toml", "--out", "sweep"]) == 2  # it has no metric
-    assert (folder / "ran").exists()

@@ -238,25 +238,14 @@ def test_friction_from_a_log_in_mm(
     assert fits[1] == pytest.approx(fits[0], rel=1e-6, abs=1e-9)
 
 
-STUDY = """system = "mm.toml"
-step = 1e-3
-stop = 3.0
-[design]
-kind = "grid"
-[[parameters]]
-name = "position"
-variables = ["plant.initial_object_position"]
-values = [30.0]
-"""
-
-
 @pytest.mark.slow
 def test_a_sweep_has_the_metrics_in_si(
     command: Run, fmus: Path, plants: Path, tmp_path: Path, original: Result
 ) -> None:
     written(tmp_path / "mm.toml", fmus, plants / "defined/MilliPlant.fmu")
-    (tmp_path / "study.toml").write_text(STUDY, "utf-8")
-    code, out, _ = command("sweep", "study.toml", "--json", "--workers", "1")
+    """And takes its values in SI, though the plant has them in mm."""
+    vary = ("--vary", "plant.initial_object_position=0.03", "--step", "1e-3")
+    code, out, _ = command("sweep", "mm.toml", *vary, "--json", "--workers", "1")
     metrics = json.loads(out)["metrics"]
     assert code == 0
     expected = original.metrics["impact_velocity"][0]
@@ -267,7 +256,7 @@ def test_a_sweep_has_the_metrics_in_si(
     "arguments",
     [
         ("run", "mm.toml", "--out", "out"),
-        ("sweep", "study.toml", "--out", "out"),
+        ("sweep", "mm.toml", "--vary", "plant.initial_object_position=0.03", "--out", "out"),
         ("qualify", "mm.fmu", "--as", "plant", "--system", "mm.toml", "--out", "out"),
     ],
 )
@@ -277,7 +266,6 @@ def test_factors_without_a_unit_are_refused_before_the_run(
     plant = plants / "none/MilliPlant.fmu"
     written(tmp_path / "mm.toml", fmus, plant, factors=True)
     (tmp_path / "mm.fmu").symlink_to(plant)
-    (tmp_path / "study.toml").write_text(STUDY, "utf-8")
     code, out, err = command(*arguments)
     assert (code, out) == (2, "")
     assert err.startswith("grasp-cosim: mm.toml: plant.position[1] has no unit, and its connection")

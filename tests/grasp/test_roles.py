@@ -1,5 +1,6 @@
 """The published grasp with components of other names: roles say who is the plant."""
 
+import csv
 import json
 from collections.abc import Mapping
 from dataclasses import replace
@@ -292,21 +293,17 @@ def test_a_user_s_metrics_are_wherever_those_of_the_grasp_are(
 
 @pytest.mark.slow
 def test_a_user_s_metrics_are_columns_of_a_sweep(command: Run, own: Path, tmp_path: Path) -> None:
-    import pyarrow.parquet as pq  # type: ignore[import-untyped]
-
-    (tmp_path / "study.toml").write_text(
-        'case = 0\nstep = 1e-3\nstop = 0.05\nmetrics = "own.py"\n[design]\nkind = "grid"\n'
-        '[[parameters]]\nname = "mass"\nvariables = ["plant.finger_mass[1]"]\nvalues = [0.5, 2.0]\n'
-        '[figures]\ndistributions = ["reach[1]"]\n'
-    )
-    code, out, _ = command("sweep", "study.toml", "--workers", "1", "--json")
+    vary = ("--case", "0", "--vary", "plant.finger_mass[1]=0.5,2")
+    short = ("--step", "1e-3", "--stop", "0.05", "--metrics", own)
+    code, out, _ = command("sweep", *vary, *short, "--workers", "1", "--json")
     assert code == 0
     assert json.loads(out)["metrics"]["reach[1]"]["runs"] == 2
-    rows = pq.read_table("study/runs.parquet").to_pylist()
-    assert rows[0]["reach[1]"] > rows[1]["reach[1]"] > 0.0
-    assert [row["lazy"] for row in rows] == [False, False]
-    assert "heat" not in rows[0]
-    code, _, err = command("sweep", "study.toml", "--metrics", own, "--out", "other")
+    with Path("sweep.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert float(rows[0]["reach[1] [m]"]) > float(rows[1]["reach[1] [m]"]) > 0.0
+    assert [row["lazy"] for row in rows] == ["false", "false"]
+    assert not any(name.startswith("heat") for name in rows[0])
+    code, _, err = command("sweep", *vary, *short, "--metrics", own, "--out", "other.csv")
     assert (code, err.count("\n")) == (2, 1)
     assert "metric 'reach': is defined twice" in err
 

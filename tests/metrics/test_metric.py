@@ -20,7 +20,7 @@ from grasp_cosim.metrics.metric import (
     registered,
 )
 from grasp_cosim.parallel import run_all
-from grasp_cosim.sweep.run import Job, Task, run_job
+from grasp_cosim.sweeps.run import Task, run_row
 
 TIME = np.array([0.0, 0.5, 1.0])
 GAP = np.array([0.3, 0.2, 0.1])
@@ -171,7 +171,7 @@ def test_a_metric_in_a_sweep_that_raises_fails_its_run_alone(grasp: System) -> N
     def late(run: Signals) -> float:
         return 1.0 / float(run.time[-1] - 0.01)
 
-    outcome = run_job(Task(short, (), (made("late", late),)), Job(3, {}))
+    outcome = run_row(Task(short, (made("late", late),)), 3, {})
     assert (outcome.index, outcome.metrics) == (3, {})
     assert outcome.error
     assert outcome.error.startswith("metric 'late': ZeroDivisionError: ")

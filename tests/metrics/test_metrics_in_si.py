@@ -6,14 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from grasp_cosim import InputError, System, extensions, metric, simulate
-from grasp_cosim.convergence.step_study import ask
 from grasp_cosim.interface.units import Conversion
 from grasp_cosim.metrics.metric import Metric, Signals, measure
 from grasp_cosim.metrics.units import InSi, in_si
 from grasp_cosim.qualification.qualify import qualify
-from grasp_cosim.sweep.design import Design
-from grasp_cosim.sweep.distributions import Listed
-from grasp_cosim.sweep.study import Parameter, Study
+from grasp_cosim.sweeps.sweep import sweep
 from hypothesis import given
 from hypothesis import strategies as st
 from qualification.made import write_fmu
@@ -239,12 +236,10 @@ def test_every_way_to_run_a_system_refuses_it_first(
     """These FMUs have no binary: loading one would be another error."""
     monkeypatch.setattr(extensions, "metrics", [lambda: [travel]])
     doubtful = load({}, {}, [*scaled(1e-3), '"room.y -> sink.b"'])
-    parameter = Parameter("p", ("room.p",), Listed((1.0, 2.0)))
     ways: list[Callable[[], object]] = [
         lambda: simulate(doubtful),
         lambda: simulate.session(doubtful),
-        lambda: ask(doubtful, ["travel"], 1e-3),
-        lambda: Study("study", doubtful, (parameter,), Design("grid")),
+        lambda: sweep(doubtful, [{"room.p": 1.0}], native=False),
         lambda: qualify(doubtful, "room", tmp_path / "room.fmu"),
         lambda: qualify(load({"x": M, "y": M}), "room", other),
     ]

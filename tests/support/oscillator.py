@@ -6,8 +6,10 @@ In continuous time a.x = sin(t) and b.x = 1 - cos(t).
 from pathlib import Path
 
 from grasp_cosim.interface.read import read_interface
-from support.made_studies import STARTS
 from support.native_fmus import build
+
+STARTS = {"u_Boolean": "false", "u_String": "''", "u_Enumeration": "1", "u_Real": "2.0"}
+"""What the inputs of the FMU without a source are set to; other kinds to 0."""
 
 CONNECTIONS = """connections = [
   { from = "b.x", to = "a.u_Real", factor = -1.0, offset = 1.0 },

@@ -23,9 +23,6 @@ from ..system.readings import parameter_in_si
 SYSTEM = Path(__file__).parent / "grasp.toml"
 """The built-in system: the published grasp."""
 
-STUDIES = Path(__file__).parent / "studies"
-"""The folder of the built-in studies."""
-
 CASES = (0, 1, 2)
 """Case 0 is contact force control alone, 1 with impact reduction, 2 with simultaneous contact."""
 

@@ -1,5 +1,5 @@
 """Pages and pictures of any result, study or qualification.
 
 What shows a grasp comes from higher up, as a scene and as pictures of its own.
-Imports sweep, convergence, qualification, recording and what is below them.
+Imports sweeps, qualification, recording and what is below them.
 """

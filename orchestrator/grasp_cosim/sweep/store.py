@@ -6,16 +6,13 @@ import os
 import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..checks import is_whole
 from ..errors import InputError, SimulationError
 from ..files import write_text
 from ..numerals import counted
-from .run import Outcome
-from .study import Study
 
 STUDY = "study.json"
 PARTS = "parts"
@@ -115,46 +112,5 @@ class Parts:
         )
 
 
-class Store(Parts):
-    """The finished runs of one study in a folder."""
-
-    def open(self, study: Study) -> dict[int, Outcome]:
-        """Bind the folder to the study, if it is new; the outcomes that it has, by index.
-
-        For who has it locked. InputError as of bind(), or where it has what is no run of the study.
-        """
-        found = (_read(part, study.runs) for part in self.bind(study.identity))
-        return {outcome.index: outcome for outcome in found}
-
-    def keep(self, outcome: Outcome) -> None:
-        """Write the part of a finished run; SimulationError where that fails."""
-        self.write(outcome.index, asdict(outcome))
-
-
 def _name(index: int) -> str:
-    """The file of a run's part."""
     return f"{index:07d}.json"
-
-
-def _read(path: Path, runs: int) -> Outcome:
-    """The outcome in a part of a study of so many runs."""
-    try:
-        outcome = Outcome(**json.loads(path.read_text(encoding="utf-8")))
-        _check_outcome(outcome, path.name, runs)
-        return outcome
-    except (OSError, ValueError, TypeError, RecursionError) as error:
-        raise InputError(
-            f"{path}: not readable as a run: {error}; must be removed, the run is then done again"
-        ) from error
-
-
-def _check_outcome(outcome: Outcome, name: str, runs: int) -> None:
-    """ValueError where it is not what keep() writes to a file of that name."""
-    index, metrics, error = outcome.index, outcome.metrics, outcome.error
-    if not is_whole(index) or not 0 <= index < runs or _name(index) != name:
-        raise ValueError(f"index = {index!r}")
-    kinds = float | int | str | None
-    if not isinstance(metrics, dict) or not all(isinstance(m, kinds) for m in metrics.values()):
-        raise ValueError(f"metrics = {metrics!r}")
-    if error is not None and not isinstance(error, str):
-        raise ValueError(f"error = {error!r}")

@@ -16,7 +16,7 @@ from ...files import in_one_piece
 from ...recording.load import SETTINGS, result_with
 from ...recording.result import Result
 from ...sweep.store import Parts
-from ...sweep.study import hash_of
+from ...sweeps.run import hash_of
 from ...system.description import System
 from ...system.settings import settings
 from .grasps import Run

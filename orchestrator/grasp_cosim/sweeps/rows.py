@@ -1,0 +1,179 @@
+"""What varies: a row for each run, values by their places in the system file, in SI units."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from si_units import known_unit
+
+from ..errors import InputError
+from ..interface.interface import Value
+from ..interface.units import IDENTITY, Conversion
+from ..system.description import System
+from ..system.parts import Port
+from ..system.readings import parameter_in_si
+
+Row = Mapping[str, Value]
+
+MOST = 100_000
+"""Runs of a sweep at most."""
+
+FORM = "PLACE=START:END:COUNT or PLACE=VALUE,VALUE,..."
+_EXPERIMENT = {"experiment.step": "s", "experiment.stop": "s"}
+
+
+def grid(varied: Mapping[str, Iterable[Value]]) -> list[dict[str, Value]]:
+    """A row for every combination of the values of each place; the last place varies fastest."""
+    values = [list(each) for each in varied.values()]
+    return [dict(zip(varied, row, strict=True)) for row in itertools.product(*values)]
+
+
+def varied(text: str) -> tuple[str, list[Value]]:
+    """The place and the values of a text like "plant.object_width=0.05:0.07:3", or "...=0.05,0.06".
+
+    InputError where it is no such text.
+    """
+    place, equals, said = text.partition("=")
+    where = f"--vary {text!r}"
+    if not (equals and all(place.partition("."))):
+        raise InputError(f"{where}: must be {FORM}")
+    bounds = said.split(":")
+    if len(bounds) == 1:
+        values = [plain(part.strip()) for part in said.split(",")]
+        if "" in values:
+            raise InputError(f"{where}: an empty value; must be {FORM}")
+        return place, values
+    try:
+        start, end, count = float(bounds[0]), float(bounds[1]), int(bounds[2])
+        if len(bounds) > 3 or not np.isfinite([start, end]).all():
+            raise ValueError
+    except (ValueError, IndexError) as error:
+        raise InputError(f"{where}: must be {FORM}, with finite numbers") from error
+    if not 2 <= count <= MOST:
+        raise InputError(f"{where}: {count} values; must be 2 to {MOST}")
+    return place, [float(value) for value in np.linspace(start, end, count)]
+
+
+def as_rows(given: Any) -> list[dict[str, Value]]:
+    """The rows of a CSV file by its path, of columns by place, of a pandas DataFrame, or of rows.
+
+    A cell that is None, NaN or empty leaves that place as the system has it. InputError where
+    nothing varies, or there are more than MOST rows.
+    """
+    if isinstance(given, str | Path):
+        rows = read_rows(Path(given))
+    elif hasattr(given, "to_dict"):
+        rows = given.to_dict("records")
+    elif isinstance(given, Mapping):
+        columns = [list(column) for column in given.values()]
+        rows = [dict(zip(given, row, strict=True)) for row in zip(*columns, strict=True)]
+    else:
+        rows = [dict(row) for row in given]
+    if not 1 <= len(rows) <= MOST:
+        raise InputError(f"sweep: {len(rows)} rows; must be 1 to {MOST}")
+    if not any(rows):
+        raise InputError("sweep: nothing varies; the rows must have at least one column")
+    return [{k: p for k, v in row.items() if (p := _number(v)) is not None} for row in rows]
+
+
+def read_rows(path: Path) -> list[dict[str, Value]]:
+    """The rows of a CSV file whose head has places, with a unit in brackets where it is not of SI.
+
+    InputError where it cannot be read.
+    """
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            head, *lines = csv.reader(file)
+    except (OSError, UnicodeDecodeError, ValueError, csv.Error) as error:
+        raise InputError(f"--table {path}: {error}; must be a CSV file with a head") from error
+    columns = [_column(path, title.strip()) for title in head]
+    rows = []
+    for number, line in enumerate(lines, 2):
+        if len(line) not in (0, len(head)):
+            raise InputError(
+                f"--table {path}: line {number} has {len(line)} cells; must be {len(head)}"
+            )
+        cells = zip(columns, line, strict=False)
+        rows.append({p: _in_si(plain(c.strip()), to_si) for (p, to_si), c in cells if c.strip()})
+    return [row for row in rows if row]
+
+
+def plain(text: str) -> Value:
+    """The value of a text, as a TOML file would have it without quotes."""
+    if text in ("true", "false"):
+        return text == "true"
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text
+
+
+def settings_of(system: System, rows: Sequence[Row]) -> list[dict[str, Value]]:
+    """The rows with the values in the units that the system's FMUs have.
+
+    InputError where a unit is in doubt, or the first row does not fit the system.
+    """
+    places = dict.fromkeys(place for row in rows for place in row)
+    changes = {place: _to_si(system, place) for place in places}
+    found = [{p: _from_si(v, changes[p]) for p, v in row.items()} for row in rows]
+    system.with_settings(found[0], "sweep: {}".format)
+    return found
+
+
+def unit_of(system: System, place: str) -> str | None:
+    """The SI unit in which the values of a place are; None where they have none."""
+    if place in _EXPERIMENT:
+        return _EXPERIMENT[place]
+    port = _port(system, place)
+    interface = port and system.component(port.component, place).interface
+    variable = interface and port and interface.by_name.get(port.variable)
+    if not interface or not variable:
+        return None
+    unit = interface.unit(variable)
+    return variable.unit if unit is None or unit.si else unit.base
+
+
+def _column(path: Path, title: str) -> tuple[str, Conversion]:
+    place, bracket, name = title.partition(" [")
+    name = name.removesuffix("]") if bracket else ""
+    unit = known_unit(name) if name else None
+    if name and unit is None:
+        raise InputError(f"--table {path}: column {title!r}: {name!r} is no known unit")
+    return place, Conversion(unit.factor, unit.offset) if unit else IDENTITY
+
+
+def _number(value: Any) -> Value | None:
+    """A value without NumPy's types; None where there is none."""
+    plain_value = value.item() if isinstance(value, np.generic) else value
+    missing = plain_value is None or plain_value == "" or plain_value != plain_value
+    return None if missing else plain_value
+
+
+def _in_si(value: Value, to_si: Conversion) -> Value:
+    return value if to_si == IDENTITY else to_si(float(value))
+
+
+def _from_si(value: Value, to_si: Conversion) -> Value:
+    return value if to_si == IDENTITY else (float(value) - to_si.offset) / to_si.factor
+
+
+def _to_si(system: System, place: str) -> Conversion:
+    port = _port(system, place)
+    return parameter_in_si(system, place, port) if port else IDENTITY
+
+
+def _port(system: System, place: str) -> Port | None:
+    """The variable of a place, if it is the place of a value of one."""
+    name, _, variable = place.removeprefix("components.").partition(".")
+    if place.startswith("components."):
+        section, _, variable = variable.partition(".")
+        variable = variable if section == "values" else ""
+    known = any(c.name == name for c in system.components)
+    return Port(name, variable) if known and variable else None

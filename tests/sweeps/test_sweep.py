@@ -1,0 +1,247 @@
+"""Whole sweeps: the same table from any processes, failures as rows, going on after an end."""
+
+import os
+import signal
+import subprocess
+import sys
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from grasp_cosim import InputError, SimulationError, System, sweep
+from grasp_cosim.metrics.metric import load_metrics
+from grasp_cosim.sweeps.cluster import cluster
+from grasp_cosim.sweeps.rows import grid
+from grasp_cosim.sweeps.run import Task, packed, run_packed, run_row
+from support.integrator import integrator, write_integrator
+from support.native_fmus import needs_gcc
+from support.processes import ends
+
+pytestmark = needs_gcc
+
+FAILING = grid({"a.gain": [1.0, 2.0, 3.0], "a.error_at": [1e9, 0.055]})
+
+
+@pytest.fixture
+def system(tmp_path: Path) -> System:
+    return integrator(tmp_path)
+
+
+@pytest.fixture
+def mine(system: System, tmp_path: Path):
+    return load_metrics(tmp_path / "mine.py")
+
+
+def test_a_task_that_travels_is_the_same(system: System, mine) -> None:
+    task = Task(system, mine)
+    here = run_row(task, 3, {"a.gain": 2.0})
+    assert here.metrics == {"end": pytest.approx(0.4), "half[1]": True, "half[2]": None}
+    for with_fmus in (False, True):
+        shared = packed(task, with_fmus)
+        assert run_packed(shared, {3: {"a.gain": 2.0}}) == [here]
+        assert bool(shared.fmus) == with_fmus
+
+
+@pytest.mark.slow
+def test_the_bytes_are_those_of_any_processes(system: System, mine, tmp_path: Path) -> None:
+    one, two = (
+        sweep(system, FAILING, metrics=mine, workers=n, out=tmp_path / f"{n}.csv") for n in (1, 2)
+    )
+    with ProcessPoolExecutor(2, get_context("spawn")) as pool:
+        sweep(system, FAILING, metrics=mine, executor=pool, out=tmp_path / "pool.csv")
+    texts = {(tmp_path / f"{name}.csv").read_text() for name in (1, 2, "pool")}
+    assert len(texts) == 1
+    assert not list(tmp_path.glob("*.rows"))
+    assert one == two
+    assert one.varied == ("a.gain", "a.error_at")
+    assert one["end"][::2] == pytest.approx([0.2, 0.4, 0.6], rel=1e-12)
+    assert set(one.errors) == {1, 3, 5}
+    assert all(e.startswith("a: ") and "\n" not in e for e in one.errors.values())
+    assert one.units["end"] == "m"
+
+
+@pytest.mark.slow
+def test_a_crash_takes_its_own_run_only(system: System, mine) -> None:
+    rows = [{"a.crash_at": at} for at in (1e9, 0.055, 1e8, 0.035, 1e7)]
+    for workers in (1, 2):
+        table = sweep(system, rows, metrics=mine, workers=workers)
+        assert set(table.errors) == {1, 3}
+        assert "the process of the run ended by signal" in table.errors[1]
+
+
+def test_what_is_refused_before_any_run(system: System, mine, tmp_path: Path) -> None:
+    for rows, more, said in (
+        ([{"a.gian": 1.0}], {}, "did you mean gain"),
+        ([{"a.gain": "x"}], {}, "gain"),
+        ([{"a.gain": 1.0}], {"workers": 0}, "workers = 0"),
+        ([{"a.gain": 1.0}], {"out": tmp_path / "t.txt"}, "must end in .csv or .parquet"),
+    ):
+        with pytest.raises(InputError, match=said):
+            sweep(system, rows, metrics=mine, **more)
+    with pytest.raises(InputError, match="has no metric"):
+        sweep(system, [{"a.gain": 1.0}])
+
+
+def test_a_row_that_does_not_fit_is_an_error_of_its_own(system: System, mine) -> None:
+    table = sweep(system, [{"a.gain": 1.0}, {"a.gain": "x"}], metrics=mine, workers=1)
+    assert list(table.errors) == [1]
+    assert "gain" in table.errors[1]
+
+
+# ------------------------------------------------------------------------ going on
+
+RUNS = 60
+ARGUMENTS = ["sweep", "system.toml", "--vary", f"a.gain=1:2:{RUNS}", "--metrics", "mine.py"]
+PROGRAM = """
+import os, signal, sys
+from grasp_cosim.cli import entry
+from grasp_cosim.sweeps.store import Store
+
+keep, kept = Store.keep, []
+
+def keep_and_act(store, outcome):
+    keep(store, outcome)
+    kept.append(outcome)
+    if len(kept) == COUNT:
+        ACT
+
+Store.keep = keep_and_act
+entry()
+"""
+KILL = (
+    "print(open(f'/proc/self/task/{os.getpid()}/children').read(), flush=True); "
+    "os.kill(os.getpid(), signal.SIGKILL)"
+)
+
+
+def sweeping(folder: Path, count: int = 0, act: str = "pass") -> tuple[int, str, str]:
+    """Exit code and output of a command that acts right after it has kept so many runs."""
+    program = PROGRAM.replace("COUNT", str(count)).replace("ACT", act)
+    done = subprocess.run(
+        [sys.executable, "-c", program, *ARGUMENTS], cwd=folder, text=True,
+        start_new_session=True, capture_output=True, check=False,
+    )  # fmt: skip
+    return done.returncode, done.stdout, done.stderr
+
+
+def kept(folder: Path) -> list[bytes]:
+    return (folder / "sweep.csv.rows").read_bytes().splitlines()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="this system has no /proc")
+def test_killed_it_goes_on_and_comes_to_the_same_table(tmp_path: Path) -> None:
+    write_integrator(tmp_path)
+    code, started, _ = sweeping(tmp_path, 7, KILL)
+    assert code == -signal.SIGKILL
+    assert all(ends(int(pid)) for pid in started.split())
+    first = kept(tmp_path)
+    assert len(first) == 8  # one says what they are of
+    with (tmp_path / "sweep.csv.rows").open("ab") as file:
+        file.write(b'{"index": 3, "metr')  # torn
+    assert sweeping(tmp_path, 5, KILL)[0] == -signal.SIGKILL
+    assert kept(tmp_path)[:8] == first
+    assert len(kept(tmp_path)) == 13
+    code, out, err = sweeping(tmp_path)
+    assert (code, out.splitlines()[0]) == (0, f"{RUNS} runs, 0 failed"), err
+    assert not (tmp_path / "sweep.csv.rows").exists()
+    resumed = (tmp_path / "sweep.csv").read_bytes()
+    assert sweeping(tmp_path)[0] == 0
+    assert (tmp_path / "sweep.csv").read_bytes() == resumed
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("ctrl_c")
+@pytest.mark.parametrize("whom", ["0", "os.getpid()"])
+def test_ctrl_c_keeps_what_is_done(tmp_path: Path, whom: str) -> None:
+    """It is for all processes, as from a terminal, or for the command alone."""
+    write_integrator(tmp_path)
+    code, out, err = sweeping(tmp_path, 5, f"os.kill({whom}, signal.SIGINT)")
+    assert (code, out) == (130, "")
+    said = f"{len(kept(tmp_path)) - 1} of {RUNS} runs are kept beside sweep.csv"
+    assert f"grasp-cosim: interrupted; {said}, the same command goes on" in err.splitlines()
+
+
+def test_kept_runs_are_bound_to_what_they_are_of(system: System, mine, tmp_path: Path) -> None:
+    out = tmp_path / "t.csv"
+    rows = [{"a.gain": 1.0}, {"a.gain": 2.0}]
+    sweep(system, rows, metrics=mine, out=out, workers=1)
+    whole = out.read_bytes()
+    (tmp_path / "t.csv.rows").write_bytes(b'{"runs of": "others"}\n')
+    with pytest.raises(InputError, match="has runs of another system, other FMUs or other rows"):
+        sweep(system, rows, metrics=mine, out=out, workers=1)
+    (tmp_path / "t.csv.rows").unlink()
+    sweep(system, rows, metrics=mine, out=out, workers=1)
+    assert out.read_bytes() == whole
+
+
+def test_two_at_a_time_are_refused(system: System, mine, tmp_path: Path) -> None:
+    from grasp_cosim.sweeps.store import opened
+
+    with opened(tmp_path / "t.csv.rows", "x"), pytest.raises(InputError, match="another process"):
+        sweep(system, [{"a.gain": 1.0}], metrics=mine, out=tmp_path / "t.csv", workers=1)
+
+
+# ------------------------------------------------------------------------ on a cluster
+
+
+@pytest.mark.slow
+def test_a_dask_cluster_gives_the_same_bits(system: System, mine, tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed", reason="dask is not installed")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=2, dashboard_address="127.0.0.1:0", host="127.0.0.1"
+    ) as local:
+        with cluster(local.scheduler_address) as executor:
+            there = sweep(system, FAILING, metrics=mine, executor=executor, out=tmp_path / "t.csv")
+        command = [*ARGUMENTS, "--scheduler", local.scheduler_address, "--out", "c.parquet"]
+        done = subprocess.run(
+            [sys.executable, "-m", "grasp_cosim", *command],
+            cwd=tmp_path, capture_output=True, text=True, check=False, env={**os.environ},
+        )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "c.parquet").exists()
+    assert there == sweep(system, FAILING, metrics=mine, workers=2)
+
+
+@pytest.mark.slow
+def test_a_run_that_kills_workers_is_a_row_of_its_own(system: System, mine) -> None:
+    distributed = pytest.importorskip("distributed", reason="dask is not installed")
+    import dask
+
+    with (
+        dask.config.set({"distributed.scheduler.allowed-failures": 0}),
+        distributed.LocalCluster(
+            n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0", host="127.0.0.1"
+        ) as local,
+        cluster(local.scheduler_address) as executor,
+    ):
+        rows = [{"a.crash_at": 1e9}, {"a.crash_at": 0.055}]
+        table = sweep(system, rows, metrics=mine, executor=executor)
+    assert "the worker of the run died" in table.errors[1]
+
+
+def test_a_scheduler_that_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    def client(*_: object, **__: object) -> None:
+        raise TimeoutError
+
+    for module, said in (
+        (None, r"pip install 'distributed>="),
+        (SimpleNamespace(Client=client), "--scheduler tcp://x: TimeoutError; must be one that"),
+    ):
+        monkeypatch.setitem(sys.modules, "distributed", module)
+        with pytest.raises(InputError, match=said), cluster("tcp://x"):
+            pass
+
+
+def test_an_executor_that_breaks_ends_the_sweep_with_a_reason(system: System, mine) -> None:
+    class Broken(ProcessPoolExecutor):
+        def submit(self, *_: object, **__: object):
+            return super().submit(int, "x")
+
+    with (
+        Broken(1, get_context("spawn")) as pool,
+        pytest.raises(SimulationError, match="sweep: run 0: invalid literal"),
+    ):
+        sweep(system, [{"a.gain": 1.0}], metrics=mine, executor=pool)

@@ -1,0 +1,93 @@
+"""The table of runs: types of its columns, units in files, and what is said of them."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from grasp_cosim import InputError
+from grasp_cosim.metrics.metric import metric
+from grasp_cosim.sweeps.run import Outcome
+from grasp_cosim.sweeps.table import Table, made
+
+
+@metric("reach", unit="m", entries=("left", "right"), factor=1e3, shown_unit="mm")
+def reach(_: object) -> list[float]:
+    return []
+
+
+def small() -> Table:
+    outcomes = [
+        Outcome(0, {"reach[1]": 0.5, "reach[2]": None, "late": True}),
+        Outcome(1, {}, "a: failed, badly"),
+    ]
+    return made([{"a.p": 1.5}, {"a.p": 2}], outcomes, {"a.p": "N"}, [reach])
+
+
+def test_a_file_has_units_and_values_in_full(tmp_path: Path) -> None:
+    small().write(tmp_path / "t.csv")
+    assert (tmp_path / "t.csv").read_text().splitlines() == [
+        "index,a.p [N],reach[1] [m],reach[2] [m],late,error",
+        "0,1.5,0.5,,true,",
+        '1,2,,,,"a: failed, badly"',
+    ]
+    small().write(tmp_path / "t.parquet")
+    found = pq.read_table(tmp_path / "t.parquet")
+    units = {f.name: f.metadata[b"unit"].decode() for f in found.schema}
+    assert units == {"index": "", "a.p": "N", "reach[1]": "m", "reach[2]": "m", "late": "",
+                     "error": ""}  # fmt: skip
+    assert found.to_pylist()[0] == {"index": 0, "a.p": 1.5, "reach[1]": 0.5, "reach[2]": None,
+                                    "late": True, "error": None}  # fmt: skip
+    before = (tmp_path / "t.parquet").read_bytes()
+    small().write(tmp_path / "t.parquet")
+    assert (tmp_path / "t.parquet").read_bytes() == before
+
+
+def test_columns_are_numbers_and_pandas_has_them(tmp_path: Path) -> None:
+    table = small()
+    np.testing.assert_array_equal(table["reach[1]"], [0.5, np.nan])
+    np.testing.assert_array_equal(table["late"], [1.0, np.nan])
+    frame = table.to_pandas()
+    assert list(frame.columns) == ["a.p", "reach[1]", "reach[2]", "late", "error"]
+    assert frame.attrs["units"]["reach[1]"] == "m"
+    assert table.shown("reach[1]") == ("reach, left", 1e3, "mm")
+    assert table.errors == {1: "a: failed, badly"}
+    with pytest.raises(InputError, match=r"'reach': no such column of the sweep.*reach\[1\]"):
+        table["reach"]
+    with pytest.raises(InputError, match=r"must end in .csv or .parquet"):
+        table.write(tmp_path / "t.xlsx")
+
+
+@pytest.mark.parametrize(
+    ("column", "kind"),
+    [
+        ([2**60, 0.5, None], "double"),
+        ([2**63 - 1, -(2**63), None], "int64"),
+        ([True, None, False], "bool"),
+        (["a", None, "b"], "string"),
+        ([None, None, None], "double"),
+        ([float("inf"), float("-inf"), 1.0], "double"),
+        (["jacobi", 1, None], "string"),
+    ],
+)
+def test_every_column_has_a_type_that_holds_it(tmp_path: Path, column, kind: str) -> None:
+    columns = {"index": [0, 1, 2], "c": column, "error": [None] * 3}
+    Table(columns, ("c",), (), {}).write(tmp_path / "t.parquet")
+    found = pq.read_table(tmp_path / "t.parquet")
+    assert str(found.schema.field("c").type) == kind
+    assert found["c"].to_pylist() == [None if v is None else v if kind != "string" else str(v)
+                                      for v in column]  # fmt: skip
+    Table(columns, ("c",), (), {}).write(tmp_path / "t.csv")
+    with (tmp_path / "t.csv").open() as file:
+        assert [row["index"] for row in csv.DictReader(file)] == ["0", "1", "2"]
+
+
+def test_a_summary_is_of_what_is_finite() -> None:
+    values = [*range(101), None, float("nan"), float("inf")]
+    table = Table({"index": list(range(104)), "a": values, "b": [None]}, (), ("a", "b"), {})
+    found = table.summary()
+    assert found["a"] == pytest.approx(
+        {"runs": 101, "least": 0, "p5": 5, "median": 50, "p95": 95, "greatest": 100, "mean": 50}
+    )
+    assert found["b"] == {"runs": 0, **dict.fromkeys(list(found["a"])[1:])}
