@@ -192,7 +192,7 @@ def test_a_swap_does_not_change_what_a_value_stands_for(
     )
     with pytest.raises(InputError, match=f"^{re.escape(message)}$"):
         brown.swap("sensor_1", other)
-    anew = brown.revised({"sensor_1": other}, {"sensor_1.surface": "brown"}, ("swap", "set"))
+    anew = brown.with_settings({"components.sensor_1.fmu": other, "sensor_1.surface": "brown"})
     assert anew.start("sensor_1.surface") == 5.0
     assert grasp.swap("sensor_1", other).start("sensor_1.surface") == 0.0
     white = grasp.with_values({"sensor_1.surface": "white"}).swap("sensor_1", other)

@@ -140,7 +140,7 @@ def test_values_are_converted_for_an_fmu_in_other_units(tmp_path: Path) -> None:
     assert gap_to_position(swapped) == (1e-3, 0.0)
     again = swapped.swap("plant", tmp_path / "plant.fmu")
     assert again.start("plant.width") == pytest.approx(0.07, rel=1e-15)
-    revised = system.revised({"plant": in_mm(tmp_path)}, {"plant.width": 60.0}, ("--swap", "--set"))
+    revised = system.with_settings({"components.plant.fmu": in_mm(tmp_path), "plant.width": 60.0})
     assert revised.start("plant.width") == 60.0
 
 

@@ -71,7 +71,7 @@ def prepare_swap(
     own = {n: v for n, v in now.values.items() if n not in ours.by_name}
     own |= {extra[key]: value for key, value in values.items() if key in extra}
     common = {key: value for key, value in values.items() if key not in extra}
-    system = system.revised({}, common, ("--as", "--set"))
+    system = system.with_settings(common, "--set ".__add__)
     use = use_of(system, component)
     differences = [
         *interface_differences(ours, theirs, use, own),

@@ -27,7 +27,7 @@ from .scenario_checks import check_scenario
 from .stimuli import INTERPOLATIONS, Stimuli, read_stimuli
 from .stimuli_checks import check_stimuli
 from .structure import Structure, experiment
-from .swap import Replacement, with_entries
+from .swap import with_entries
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,8 +116,14 @@ class System(Structure):
         where it has no such variable. rename and units are those of a Component, and go before its
         own.
         """
-        new = Replacement(Path(fmu), rename or {}, units or {})
-        return self.revised({component: new}, {}, ("swap", "with_values"))
+        own = f"components.{component}"
+        self.component(component, f"swap {component}")
+        settings = {
+            f"{own}.fmu": fmu,
+            **{f"{own}.rename.{name}": theirs for name, theirs in (rename or {}).items()},
+            **{f"{own}.units.{name}": unit for name, unit in (units or {}).items()},
+        }
+        return self.with_settings(settings, lambda _: f"swap {component}")
 
     def with_settings(
         self, settings: Mapping[str, Any], place: Callable[[str], str] = "with_settings ".__add__
@@ -155,27 +161,6 @@ class System(Structure):
                 {key: plain(value) for key, value in file.get("experiment", {}).items()},
             ),
         )
-
-    def revised(
-        self,
-        fmus: Mapping[str, str | Path | Replacement],
-        values: Mapping[str, Given],
-        places: tuple[str, str],
-    ) -> "System":
-        """A copy with FMUs replaced, then values changed; places name the two, for messages."""
-        settings: dict[str, Any] = {}
-        for name, fmu in fmus.items():
-            new = fmu if isinstance(fmu, Replacement) else Replacement(Path(fmu))
-            self.component(name, f"{places[0]} {name}")
-            settings[f"components.{name}.fmu"] = new.fmu
-            settings |= {f"components.{name}.rename.{k}": v for k, v in new.rename.items()}
-            settings |= {f"components.{name}.units.{k}": v for k, v in new.units.items()}
-
-        def place(key: str) -> str:
-            name = key.removeprefix("components.").partition(".")[0]
-            return f"{places[1]} {key}" if key in values else f"{places[0]} {name}"
-
-        return self.with_settings({**settings, **values}, place)
 
     def with_presets(self, *names: str) -> "System":
         """A copy with the values of presets, a later one before an earlier one."""

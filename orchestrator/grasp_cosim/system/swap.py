@@ -25,14 +25,12 @@ from .values import with_given
 class Replacement:
     """An FMU for a component, with names and units of its variables as a Component has them.
 
-    They go before those that the component has already. exact says that a value of a variable which
-    it lacks is not left out, but a mistake.
+    They go before those that the component has already.
     """
 
     fmu: Path
     rename: Mapping[str, str] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
-    exact: bool = False
 
 
 def with_entries(
@@ -87,7 +85,7 @@ def with_fmu(
     arrays = before.arrays
     anew = {v for name in anew for v in (arrays[name].names if name in arrays else (name,))}
     _check_ends(system, was, after, place)
-    given = {n: value for n, value in was.values.items() if new.exact or n in after.by_name}
+    given = {n: value for n, value in was.values.items() if n in after.by_name}
     kept = {name: value for name, value in given.items() if name not in anew}
     for name in [*kept, *sorted(stated(system, was.name))]:
         reason = _lost(before, after, name, name in kept)
