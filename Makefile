@@ -29,7 +29,7 @@ SEED ?= $(shell date +%s)
 run: .venv/run
 	$(BIN)/grasp-cosim build
 	$(BIN)/grasp-cosim evaluate --out results
-	@echo 'the playground, where each slider simulates the grasp anew: docs/playground.html'
+	@echo 'and the playground, where each slider simulates the grasp anew: docs/playground.html'
 
 test: .venv/dev
 	$(PYTEST) -m "not slow and not platforms and not interop"

@@ -46,8 +46,7 @@ THINNEST = 1e-9
 """m; half the width that a box without one has in MuJoCo."""
 
 MISSING = (
-    "mujoco is not installed, it computes this plant; "
-    "install it with: pip install 'grasp-cosim[mujoco]'"
+    "mujoco is not installed, it computes this plant; install it with: pip install mujoco-core"
 )
 
 Coordinates = tuple[float, float, float, float, float]

@@ -23,9 +23,14 @@ import colour_studies
 import tutorials
 from grasp_cosim import cli
 from grasp_cosim.files import write_text
+from grasp_cosim.grasp.published.compared import compared
+from grasp_cosim.grasp.published.page import figures
+from grasp_cosim.grasp.system import grasp_system
 from grasp_cosim.recording.load import load_run
 from grasp_cosim.recording.result import Result
+from grasp_cosim.report.caption import Caption, about
 from grasp_cosim.report.diagram import Link, diagram_svg
+from grasp_cosim.report.plot import headed, save
 from hand import hand_svg
 
 HERE = Path(__file__).parent
@@ -117,11 +122,12 @@ def draw_timing(folder: Path) -> None:
 
 
 def draw_evaluation(folder: Path) -> None:
-    """contact_times.png and contact_forces.png, as `make run` has them in results."""
-    with TemporaryDirectory() as kept:
-        do("evaluate", "--out", kept)
-        for name in ("contact_times.png", "contact_forces.png"):
-            shutil.copy(Path(kept, name), folder)
+    """contact_times.png and contact_forces.png, which are in the page of `evaluate`."""
+    evidence = compared(grasp_system(), "simulation", os.cpu_count() or 1, progress=False)
+    for name, (title, figure) in figures(evidence, "simulation").items():
+        if name != "target_position":
+            headed(figure, Caption(f"Published simulation, GraspController: {title}", about({})))
+            save(figure, folder / f"{name}.png")
 
 
 def draw_map(folder: Path) -> None:

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
+    from .grasp.identification.identification import identify
+    from .grasp.published.evaluation import evaluate
     from .grasp.system import grasp_system
     from .master.simulation import Session, simulate
     from .metrics.metric import Metric, metric
@@ -47,7 +49,9 @@ __all__ = [
     "Session",
     "SimulationError",
     "System",
+    "evaluate",
     "grasp_system",
+    "identify",
     "load_run",
     "metric",
     "simulate",
@@ -60,7 +64,9 @@ _HOMES = {
     "Result": "recording.result",
     "Session": "master.simulation",
     "System": "system.description",
+    "evaluate": "grasp.published.evaluation",
     "grasp_system": "grasp.system",
+    "identify": "grasp.identification.identification",
     "load_run": "recording.load",
     "metric": "metrics.metric",
     "simulate": "master.simulation",

@@ -157,16 +157,17 @@ def is_value(value: Any) -> bool:
 
 
 def extra_module(name: str, purpose: str, extra: str) -> Any:
-    """Return the module `name` of an optional `extra` of ours; `purpose` says what it is for.
+    """Return the module `name`, which is optional; `purpose` says what it is for.
 
-    InputError with the command that installs it here where it is missing.
+    It is of an `extra` of ours, or where there is none, of the package of its name. InputError with
+    the command that installs it here where it is missing.
     """
     try:
         return import_module(name)
     except ModuleNotFoundError as error:
         raise InputError(
             f"{name.partition('.')[0]} is not installed, {purpose}; "
-            f"install it with: {install_command(*packages(extra))}"
+            f"install it with: {install_command(*(packages(extra) or [name]))}"
         ) from error
 
 

@@ -245,31 +245,6 @@ def test_sweep(tmp_path: Path, built: None) -> None:
     assert {name: last[name] for name in set(last) - {"lock"}} == made
 
 
-@campaign.only_whole("takes minutes; see test_evaluate_resume.py")
-def test_evaluate(tmp_path: Path, built: None) -> None:
-    """As a sweep, but finished grasps go with the end."""
-    rounds, out, kept = Rounds(tmp_path), tmp_path / "out", Parts()
-    rounds.done("evaluate", "--out", "whole")
-    made, finished = contents(tmp_path / "whole"), 0
-    rounds.whole *= 0.6
-    for how in rounds.signals():
-        code = rounds.ended(how, "evaluate", "--out", "out")
-        now, written = parts(out / "grasps"), whole_files(out)
-        assert all(made[name] == (out / name).read_bytes() for name in written)
-        if "report.md" in written:  # the last that is written
-            assert written == set(made)
-            shutil.rmtree(out)
-            now, finished = {}, finished + 1
-        else:
-            assert code
-            assert kept.items() <= now.items()
-        kept = now
-    if not finished:
-        rounds.done("evaluate", "--out", "out")
-        assert contents(out) == made
-        assert not (out / "grasps").exists()
-
-
 def test_build(tmp_path: Path) -> None:
     """Each file is the one that was there or the new one, and none is taken for another."""
     rounds, out, choice = Rounds(tmp_path), tmp_path / "out", random.Random(campaign.first_seed + 1)

@@ -24,7 +24,7 @@ from support.cases import CASES
 
 FILE = Path(mujoco_plant.__file__)
 
-mujoco: Any = pytest.importorskip("mujoco", reason="NO mujoco: pip install '.[mujoco]'")
+mujoco: Any = pytest.importorskip("mujoco", reason="NO mujoco: pip install mujoco-core")
 
 NEAR = Params(initial_position=(0.04, -0.04), initial_object_position=0.0)
 """5 mm of gap on either side."""

@@ -151,7 +151,7 @@ def test_the_first_screen_is_the_hand_and_two_commands_of_which_one_ends_with_it
     command = [make, "--no-print-directory", "-n", "run"]  # which `make test` would have printed
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1].endswith("docs/playground.html'")
-    assert "then open docs/playground.html" in first
+    assert "then open results/evaluation.html" in first
 
 
 @pytest.mark.parametrize("card", sorted(ROOT.glob("*/README.md")), ids=lambda p: p.parent.name)

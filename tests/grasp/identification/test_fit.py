@@ -1,6 +1,5 @@
 """The fit itself: estimates, intervals, what the data do not say."""
 
-import sys
 from collections.abc import Sequence
 
 import numpy as np
@@ -90,13 +89,11 @@ def test_too_few_figures_are_refused() -> None:
         fit(lambda points: [np.zeros(2) for _ in points], [parameter("a"), parameter("b")], "test")
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf, 1e200])
-def test_residuals_whose_squares_are_not_finite_are_refused(value: float) -> None:
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_residuals_that_are_not_finite_are_refused(value: float) -> None:
     measured = decay(3.0, 0.7)
     measured[7] = value
-    with pytest.raises(
-        InputError, match=r"^test: .* not finite at a = 1, b = 1; must be"
-    ) as caught:
+    with pytest.raises(InputError, match=r"^test: the residuals are not finite; must be") as caught:
         fitted(measured)
     assert "\n" not in str(caught.value)
 
@@ -104,10 +101,4 @@ def test_residuals_whose_squares_are_not_finite_are_refused(value: float) -> Non
 def test_a_fit_that_does_not_come_to_rest_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("grasp_cosim.grasp.identification.fit.MOST", 1)
     with pytest.raises(SimulationError, match="has not come to rest after 1 steps"):
-        fitted(decay(3.0, 0.7))
-
-
-def test_no_scipy_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "scipy", None)
-    with pytest.raises(InputError, match=r"pip install 'scipy>="):
         fitted(decay(3.0, 0.7))

@@ -9,8 +9,8 @@ import numpy.typing as npt
 import pytest
 from grasp_cosim import InputError, System, simulate
 from grasp_cosim.grasp.identification.fit import Fit
-from grasp_cosim.grasp.identification.log import GROUPS, identify_from_log
-from grasp_cosim.grasp.identification.parameters import chosen
+from grasp_cosim.grasp.identification.identification import OF_A_LOG, chosen
+from grasp_cosim.grasp.identification.log import identify_from_log
 from grasp_cosim.metrics.metric import Signals
 from grasp_cosim.recording.load import load_log
 from scipy.integrate import solve_ivp
@@ -49,7 +49,7 @@ def noisy(log: Signals, seed: int) -> Signals:
 
 
 def identified(grasp: System, log: Signals, *groups: str) -> Fit:
-    parameters = chosen(groups or ("coulomb", "viscous"), GROUPS, "test")
+    parameters = chosen(groups or ("coulomb", "viscous"), OF_A_LOG, "test")
     return identify_from_log(grasp, log, parameters, "test")[1]
 
 
@@ -114,7 +114,7 @@ def test_what_is_not_fitted_is_that_of_the_system(grasp: System) -> None:
 
 def test_stribeck_friction_comes_back(grasp: System) -> None:
     log = scipy_log({**TRUE, "plant.friction.viscous[2]": 8.0}, 0.4, 0.04)
-    found = {e.name: e.value for e in identified(grasp, log, *GROUPS).estimates}
+    found = {e.name: e.value for e in identified(grasp, log, *OF_A_LOG).estimates}
     assert found["plant.friction.static[1]"] == pytest.approx(1.0, rel=0.02)
     assert found["plant.friction.stribeck_velocity"] == pytest.approx(0.04, rel=0.02)
 
@@ -197,7 +197,7 @@ def test_a_window_with_a_sample_missing_does_not_count(grasp: System, recorded: 
     kept = np.ones(len(recorded.time), dtype=bool)
     kept[100:400] = False
     gone = Signals(recorded.time[kept], {k: v[kept] for k, v in recorded.items()})
-    windows, _ = identify_from_log(grasp, gone, chosen(["coulomb"], GROUPS, "test"), "test")
+    windows, _ = identify_from_log(grasp, gone, chosen(["coulomb"], OF_A_LOG, "test"), "test")
     for w in windows:
         assert not ((w.time > recorded.time[100] - 0.021) & (w.time < recorded.time[100])).any()
         assert (w.time > recorded.time[400]).any()

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from grasp_cosim import System
 from grasp_cosim.grasp.published.claims import Evidence, check_claims
-from grasp_cosim.grasp.published.evaluate import bench_rms, simulation_rms
+from grasp_cosim.grasp.published.compared import bench_rms, simulation_rms
 from grasp_cosim.grasp.published.grasps import Run, Runs
 from grasp_cosim.grasp.published.tables import Row, Setting, published_rows
 

@@ -1,26 +1,17 @@
 """Each claim of the simulation can fail, and the second column is what it says it is."""
 
 import math
-import os
-import shutil
-import signal
-import subprocess
-import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from conftest import Run as Command
 from grasp_cosim import System
-from grasp_cosim.grasp.published import evaluate as module
-from grasp_cosim.grasp.published.evaluate import evaluate
+from grasp_cosim.grasp.published import compared as module
+from grasp_cosim.grasp.published.evaluation import as_report
 from grasp_cosim.grasp.published.grasps import Run, Runs, as_run
 from grasp_cosim.grasp.published.tables import Setting, published_rows
-from grasp_cosim.master.simulation import Session
 from grasp_cosim.recording.result import Result
 from grasp_cosim.system.settings import settings
 
@@ -61,15 +52,13 @@ def _run(setting: Setting, case: int, times: list[float]) -> Run:
 
 
 @pytest.fixture
-def evaluated(grasp: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Evaluated:
-    """The report of an evaluation of made grasps, without its pictures."""
-    for draws in ("_draw_times", "_draw_signals"):
-        monkeypatch.setattr(module, draws, lambda *_: None)
+def evaluated(grasp: System, monkeypatch: pytest.MonkeyPatch) -> Evaluated:
+    """The report of an evaluation of made grasps."""
 
     def report(runs: Runs, **values: float) -> dict[str, Any]:
         monkeypatch.setattr(module, "run_all", lambda *_: iter(runs.values()))
         system = grasp.with_values({f"controller.contact_force.{k}": v for k, v in values.items()})
-        return evaluate(system, tmp_path, workers=1, progress=False)
+        return as_report(module.compared(system, "simulation", 1, progress=False), "simulation")
 
     return report
 
@@ -280,52 +269,3 @@ def test_that_gap_is_met_where_the_signal_says(grasp: System) -> None:
     assert run.times_at_sensor_contact == pytest.approx(expected, abs=1e-9)
     assert run.overshoot == pytest.approx(0.01 * 4.0 / 3.0 - 0.01, abs=1e-5)
     assert run.off_target == pytest.approx(0.0, abs=1e-12)
-
-
-# ------------------------------------------------------------------------------- Ctrl-C
-
-
-@pytest.mark.parametrize("bench", [(), ("--bench",)])
-def test_ctrl_c_is_130_and_nothing_is_written(
-    command: Command, monkeypatch: pytest.MonkeyPatch, bench: tuple[str, ...]
-) -> None:
-    """A grasp that was interrupted is none of the evaluation."""
-    step = Session.step
-
-    def interrupted(self: Session, steps: int = 1) -> bool:
-        signal.raise_signal(signal.SIGINT)
-        return step(self, steps)
-
-    def one_by_one(run: Callable[[Any], Run], jobs: list[Any], *_: object) -> Iterator[Run]:
-        return map(run, jobs)
-
-    monkeypatch.setattr(module, "run_all", one_by_one)
-    monkeypatch.setattr(Session, "step", interrupted)
-    code, out, err = command("evaluate", *bench)
-    assert (code, out, err.split()) == (130, "", ["grasp-cosim:", "interrupted"])
-    assert not list(Path().rglob("*.*"))
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="this system has no /proc")
-def test_ctrl_c_ends_all_its_processes(fmus: Path, tmp_path: Path) -> None:
-    """As a terminal sends it: to the command and to the processes in which the grasps run."""
-    shutil.copytree(fmus, tmp_path / "fmus/build")
-    process = subprocess.Popen(
-        [sys.executable, "-m", "grasp_cosim", "evaluate", "--workers", "2", "--json"],
-        cwd=tmp_path, text=True, start_new_session=True,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-    )  # fmt: skip
-    try:
-        children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
-        while len(children.read_text().split()) < 3:
-            assert process.poll() is None, process.communicate()
-            time.sleep(0.01)
-        os.killpg(process.pid, signal.SIGINT)
-        out, err = process.communicate(timeout=120)
-    finally:
-        process.kill()
-        process.communicate()
-    assert (process.returncode, out) == (130, "")
-    assert "grasp-cosim: interrupted" in err.splitlines()
-    assert not list(tmp_path.rglob("evaluation*"))

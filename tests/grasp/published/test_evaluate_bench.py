@@ -1,6 +1,5 @@
 """The published experiments on the bench preset."""
 
-import csv
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +10,8 @@ from conftest import MadeOnce, Run
 from grasp_cosim import InputError, System
 from grasp_cosim.grasp.closing import close
 from grasp_cosim.grasp.presets import SYSTEM, with_preset
-from grasp_cosim.grasp.published.evaluate import evaluate
+from grasp_cosim.grasp.published.compared import compared
+from grasp_cosim.grasp.published.evaluation import as_report
 from support.cases import CASES
 
 QUIET = {f"sensor_{j}.noise.enabled": False for j in (1, 2)}
@@ -24,25 +24,16 @@ def bench(natives: Path) -> System:
 
 
 @pytest.fixture(scope="session")
-def made(bench: System, made_once: MadeOnce) -> Path:
-    """The folder with what is written, and what is returned beside it."""
+def report(bench: System, made_once: MadeOnce) -> dict[str, Any]:
+    """What evaluate(bench=True) returns, but without noise and of steps of 2 ms."""
 
     def fill(folder: Path) -> None:
         quiet = bench.with_values(QUIET).with_experiment(step=2e-3)
-        report = evaluate(quiet, folder / "out", 2, progress=False, source="experiment")
-        (folder / "returned.json").write_text(json.dumps(report))
+        evidence = compared(quiet, "experiment", workers=2, progress=False)
+        (folder / "report.json").write_text(json.dumps(as_report(evidence, "experiment")))
 
-    return made_once("evaluate_bench", fill)
-
-
-@pytest.fixture(scope="session")
-def out(made: Path) -> Path:
-    return made / "out"
-
-
-@pytest.fixture(scope="session")
-def report(made: Path) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads((made / "returned.json").read_text())
+    made = made_once("evaluate_bench", fill)
+    found: dict[str, Any] = json.loads((made / "report.json").read_text())
     return found
 
 
@@ -115,36 +106,3 @@ def test_every_number_has_a_unit(report: dict[str, Any]) -> None:
     assert {name for entry in named for name in entry} - {"table", "finger", "case"} <= set(units)
     assert (units["rms"], units["simulated"], units["condition"]) == ("s", "s", "m")
     assert (units["time_to_contact"], units["peak_contact_force"]) == ("s", "N")
-
-
-@pytest.mark.slow
-def test_everything_is_written(report: dict[str, Any], out: Path) -> None:
-    pictures = {"contact_forces.png", "target_position.png", "contact_times.png"}
-    names = {path.name for path in out.iterdir()}
-    assert names == {*pictures, "evaluation.csv", "evaluation.json", "report.md"}
-    assert json.loads((out / "evaluation.json").read_text()) == report
-    text = (out / "report.md").read_text()
-    assert all(f"]({name})" in text for name in pictures)
-    assert "| brown/white | 2 | time difference | 0.15 |" in text
-    with (out / "evaluation.csv").open() as file:
-        assert len(list(csv.DictReader(file))) == 78
-
-
-@pytest.mark.parametrize(("holds", "code"), [(True, 0), (False, 1)])
-def test_a_claim_that_fails_is_exit_1(
-    command: Run, monkeypatch: pytest.MonkeyPatch, holds: bool, code: int
-) -> None:
-    made = {"rows": [], "rms": {"contact_times": 0.28}, "claims": [{"text": "It.", "holds": holds}]}
-
-    def evaluated(system: System, *more: object) -> dict[str, Any]:
-        assert system.start("sensor_1.noise.enabled") == 1.0
-        assert more[-2:] == ("experiment", "png")
-        return made
-
-    monkeypatch.setattr("grasp_cosim.cli.commands.evaluate.run_evaluation", evaluated)
-    found, out, _ = command("evaluate", "--bench")
-    assert found == code
-    assert out.startswith("holds  It.\n" if holds else "FAILS  It.\n")
-    assert "contact times 0.280" in out
-    found, out, _ = command("evaluate", "--bench", "--json")
-    assert (found, json.loads(out)) == (code, made)

@@ -7,7 +7,8 @@ reflectances matter by their ratio alone, so that surfaces of equal colours are 
 
 import csv
 import math
-from collections.abc import Callable, Iterable, Sequence
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,7 +16,6 @@ import numpy as np
 
 from ...checks import real
 from ...errors import InputError, SimulationError, choices
-from ...numerals import counted
 from ...parallel import Crew
 from ...progress import Progress
 from ...system.description import System
@@ -24,10 +24,12 @@ from ..metrics import FINGERS
 from ..presets import CASES, start_in_si, with_case, with_si_values
 from ..published.tables import Setting, published_rows
 from .fit import Fit, Parameter, Vector, fit
-from .parameters import RATIO
 
 STEP, STOP = 1e-3, 10.0
 """s; a finger that has not touched at STOP counts as touching then."""
+
+RATIO = "sensor_2.reflectance"
+"""One number for the bench: what the left sensor sees of a surface over what the right one does."""
 
 COLUMNS = ("x_m", "case", "finger", "time")
 OPTIONAL = ("alpha_1", "alpha_2")
@@ -73,35 +75,37 @@ def published_contacts() -> list[Contact]:
     return found
 
 
+def is_contacts(path: Path) -> bool:
+    """True for a table of contact times, which its columns say; False for any other file."""
+    try:
+        with path.open(encoding="utf-8-sig") as file:
+            return {*COLUMNS[1:3]} <= {name.strip() for name in file.readline().split(",")}
+    except (OSError, UnicodeDecodeError):
+        return False
+
+
 def read_contacts(path: Path) -> list[Contact]:
     """A table of contact times: CSV with the columns x_m, case, finger, time, and, where the
     surfaces are not alike, alpha_1 and alpha_2. InputError names the line that is wrong.
     """
-    try:
-        text = path.read_text("utf-8-sig")  # with the mark that spreadsheets begin with, or without
-        reader = csv.reader(text.splitlines(), strict=True)
-        lines = [(reader.line_num, [cell.strip() for cell in line]) for line in reader if line]
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror}; must be a table of contact times") from error
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{path}: is not a CSV file: {error}") from error
-    names = lines[0][1] if lines else []
-    wrong = not set(COLUMNS) <= set(names) <= {*COLUMNS, *OPTIONAL}
-    if wrong or len(set(names)) < len(names):
-        raise InputError(
-            f"{path}: the columns are {choices(names)}; must be {choices(COLUMNS)}, "
-            f"and may be {choices(OPTIONAL)}, once each"
-        )
-    if len(lines) == 1:
+    with path.open(encoding="utf-8-sig", newline="") as file:  # spreadsheets begin with a mark
+        reader = csv.DictReader(file, skipinitialspace=True)
+        names = reader.fieldnames or []
+        if not set(COLUMNS) <= set(names) <= {*COLUMNS, *OPTIONAL}:
+            raise InputError(
+                f"{path}: the columns are {choices(names)}; must be {choices(COLUMNS)}, "
+                f"and may be {choices(OPTIONAL)}"
+            )
+        found = [_read(f"{path}, line {reader.line_num}", line) for line in reader]
+    if not found:
         raise InputError(f"{path}: has no line below its columns; must have contact times")
-    return [_read(f"{path}, line {number}", names, line) for number, line in lines[1:]]
+    return found
 
 
 def identify_from_times(
     system: System,
     contacts: Sequence[Contact],
     parameters: Sequence[Parameter],
-    workers: int,
     progress: bool,
 ) -> Fit:
     """Fit the parameters to contact times, grasps in parallel; the residuals are in s.
@@ -109,6 +113,7 @@ def identify_from_times(
     progress counts the grasps on standard error.
     """
     system = system.with_experiment(STEP, STOP)
+    workers = os.cpu_count() or 1
     with Progress("identify", unit="grasp", shown=progress) as bar, Crew(workers) as crew:
 
         def simulate(grasps: Sequence[Grasp]) -> Iterable[Times]:
@@ -173,30 +178,22 @@ def contact_times(job: tuple[System, Grasp]) -> Times:
     return [STOP if t is None else float(t) for t in result.metrics["time_to_contact"]]
 
 
-def _read(place: str, names: Sequence[str], line: Sequence[str]) -> Contact:
-    if len(line) != len(names):
-        raise InputError(
-            f"{place}: {counted(len(line), 'cell')}; must be {len(names)}, as many as columns"
-        )
-    numbers: dict[str, float] = {}
-    for name, text in zip(names, line, strict=True):
-        try:
-            numbers[name] = real(text)
-        except ValueError:
-            raise InputError(f"{place}: {name} = {text!r}: must be a number") from None
-        if not np.isfinite(numbers[name]):
-            raise InputError(f"{place}: {name} = {text}: must be a finite number")
+def _read(place: str, line: Mapping[str, str]) -> Contact:
+    try:
+        numbers = {name: real(text) for name, text in line.items()}
+    except (AttributeError, ValueError):  # a cell is missing, or there is one too many
+        raise InputError(f"{place}: must be a number for each column") from None
     for name, valid in (("case", CASES), ("finger", FINGERS)):
         if numbers[name] not in valid:
             raise InputError(
                 f"{place}: {name} = {numbers[name]:g}: must be one of {choices(valid)}"
             )
+    x_m, time = numbers["x_m"], numbers["time"]
     alphas = [numbers.get(name, 1.0) for name in OPTIONAL]
-    if not (0.0 < numbers["time"] < STOP and min(alphas) > 0.0):
+    if not (0.0 < time < STOP and min(alphas) > 0.0 and np.isfinite([x_m, *alphas]).all()):
         raise InputError(
-            f"{place}: time = {numbers['time']:g} s, alpha = {choices(alphas)}: the time must be "
-            f"greater than 0 and less than {STOP:g}, alpha_1 and alpha_2 greater than 0"
+            f"{place}: x_m = {x_m:g} m, time = {time:g} s, alpha = {choices(alphas)}: must be "
+            f"finite, the time greater than 0 and less than {STOP:g}, alpha greater than 0"
         )
-    setting = Setting(numbers["x_m"], *alphas)
-    label = f"x_m = {setting.x_m:g} m"
-    return Contact(label, setting, int(numbers["case"]), int(numbers["finger"]), numbers["time"])
+    setting = Setting(x_m, *alphas)
+    return Contact(f"x_m = {x_m:g} m", setting, int(numbers["case"]), int(numbers["finger"]), time)

@@ -1,4 +1,4 @@
-"""Bounded least squares with confidence intervals (scipy, the optional extra `identify`).
+"""Bounded least squares with confidence intervals.
 
 The intervals are those of the linearised model: with the Jacobian J of the n residuals at the
 solution, s^2 = sum of squares / (n - k) and Student's t,
@@ -16,7 +16,6 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ...checks import extra_module
 from ...errors import InputError, SimulationError
 from ...numerals import counted
 
@@ -79,49 +78,29 @@ class Fit:
 def fit(residuals: Residuals, parameters: Sequence[Parameter], place: str) -> Fit:
     """The parameters that make the sum of the squared residuals least; place names the data.
 
-    InputError without scipy, or where there are no more residuals than parameters or one is not
-    finite, SimulationError where the fit does not come to rest.
+    InputError where there are no more residuals than parameters or where one is not finite,
+    SimulationError where the fit does not come to rest.
     """
-    extra_module("scipy", "it fits the parameters", "identify")
     from scipy.optimize import least_squares
 
-    low, high = (np.array([p[i] for p in parameters]) for i in (3, 4))
-    scale = np.array([p.scale for p in parameters])
-    points = 0
-
-    def finite(points: Sequence[Vector]) -> Sequence[Vector]:
-        with np.errstate(over="ignore", invalid="ignore"):
-            found = residuals(points)
-            wrong = [x for x, r in zip(points, found, strict=True) if not np.isfinite(r @ r)]
-        if wrong:
-            at = ", ".join(f"{p.name} = {v:.6g}" for p, v in zip(parameters, wrong[0], strict=True))
-            raise InputError(
-                f"{place}: the squares of the residuals are not finite at {at}; must be figures of "
-                "a grasp"
-            )
-        return found
-
-    def at(x: Vector) -> Vector:
-        nonlocal points
-        points += 1
-        (found,) = finite([x])
-        if len(found) <= len(parameters):
-            raise InputError(
-                f"{place}: {counted(len(found), 'figure')} for "
-                f"{counted(len(parameters), 'parameter')}; must be more"
-            )
-        return found
+    start, low, high, scale = np.array([p[2:6] for p in parameters]).T
 
     def jacobian(x: Vector) -> Vector:
-        nonlocal points
-        points += len(x)
         steps = np.where(x + STEP * scale > high, -STEP, STEP) * scale
-        here, *moved = finite([x, *(x + row for row in np.diag(steps))])
+        here, *moved = residuals([x, *(x + row for row in np.diag(steps))])
         return np.column_stack([(m - here) / h for m, h in zip(moved, steps, strict=True)])
 
+    (first,) = residuals([start])
+    if len(first) <= len(parameters):
+        raise InputError(
+            f"{place}: {counted(len(first), 'figure')} for "
+            f"{counted(len(parameters), 'parameter')}; must be more"
+        )
+    if not np.isfinite(first).all():
+        raise InputError(f"{place}: the residuals are not finite; must be figures of a grasp")
     found = least_squares(
-        at,
-        [p.start for p in parameters],
+        lambda x: residuals([x])[0],
+        start,
         jac=jacobian,
         bounds=(low, high),
         x_scale=scale,
@@ -132,25 +111,11 @@ def fit(residuals: Residuals, parameters: Sequence[Parameter], place: str) -> Fi
     )
     if not found.success:
         raise SimulationError(f"{place}: the fit has not come to rest after {MOST} steps")
-    estimates = _estimates(parameters, found.x, found.fun, found.jac * scale, found.active_mask)
-    return Fit(estimates, found.fun, points)
-
-
-def _estimates(
-    parameters: Sequence[Parameter],
-    x: Vector,
-    residuals: Vector,
-    jacobian: Vector,
-    active: npt.NDArray[np.int64],
-) -> tuple[Estimate, ...]:
-    """The estimates from the Jacobian by scaled parameters; active is -1, 0 or 1, as in scipy."""
-    free = np.flatnonzero(active == 0)
-    half = _half_widths(jacobian[:, free], residuals)
-    widths = dict(zip(free.tolist(), half.tolist(), strict=True))
-    return tuple(
-        _estimate(p, float(value), int(bound), widths.get(i, np.inf))
-        for i, (p, value, bound) in enumerate(zip(parameters, x, active, strict=True))
-    )
+    free = np.flatnonzero(found.active_mask == 0)  # others are at a bound: -1 or 1
+    widths = np.full(len(parameters), np.inf)
+    widths[free] = scale[free] * _half_widths((found.jac * scale)[:, free], found.fun)
+    estimates = map(_estimate, parameters, found.x.tolist(), found.active_mask, widths.tolist())
+    return Fit(tuple(estimates), found.fun, found.nfev + found.njev * len(parameters))
 
 
 def _estimate(p: Parameter, value: float, bound: int, width: float) -> Estimate:
@@ -159,7 +124,7 @@ def _estimate(p: Parameter, value: float, bound: int, width: float) -> Estimate:
         return Estimate(p.name, p.unit, at, None, f"at its {side} bound, held there")
     if not np.isfinite(width):
         return Estimate(p.name, p.unit, value, None, "the data do not determine it")
-    interval = value - width * p.scale, value + width * p.scale
+    interval = value - width, value + width
     remark = ""
     if p.neutral is not None and interval[0] <= p.neutral <= interval[1]:
         remark = f"cannot be told from {p.neutral:g}, where it does nothing"
@@ -167,7 +132,7 @@ def _estimate(p: Parameter, value: float, bound: int, width: float) -> Estimate:
 
 
 def _half_widths(jacobian: Vector, residuals: Vector) -> Vector:
-    """Half the widths of the intervals; inf for what the residuals hardly depend on."""
+    """Half the widths of the intervals, in scales; inf for what the residuals hardly depend on."""
     from scipy.stats import t
 
     n, k = jacobian.shape

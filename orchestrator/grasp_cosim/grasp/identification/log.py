@@ -22,7 +22,8 @@ from ...system.description import System
 from ..metrics import FINGERS
 from ..presets import start_in_si
 from .fit import Fit, Parameter, Vector, fit
-from .parameters import FRICTION
+
+FRICTION = "plant.friction."
 
 WINDOW = 0.02
 """s; longer than a period of the bench's noise behind its 500 Hz filter, shorter than a grasp."""
@@ -35,9 +36,6 @@ TOUCHED = 0.05
 
 GAP = 1.5
 """Median steps between two samples; where it is more, one is missing."""
-
-GROUPS = ("coulomb", "static", "viscous", "stribeck")
-"""What a log of the fingers says something about."""
 
 
 class Windows(NamedTuple):

@@ -33,8 +33,8 @@ class Evidence(NamedTuple):
 
     runs: Runs
     published: Sequence[Row]
-    rows: Sequence[Mapping[str, Any]]
-    rms: Mapping[str, float]
+    rows: Sequence[dict[str, Any]]
+    rms: dict[str, float]
     system: System
 
 

@@ -2,10 +2,11 @@
 
 import csv
 import io
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.resources import files
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
+from ...plain import to_cell
 from ..metrics import FINGERS
 
 Source = Literal["simulation", "experiment"]
@@ -80,3 +81,12 @@ def _rows(
 def _lines(name: str) -> Iterator[dict[str, str]]:
     text = files(__package__).joinpath(name).read_text("utf-8")
     yield from csv.DictReader(io.StringIO(text))
+
+
+def table_csv(rows: Sequence[Mapping[str, Any]]) -> str:
+    """The rows, of one form, as CSV; no cell is a formula, see plain.to_cell()."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    table = [list(rows[0]), *(list(row.values()) for row in rows)]
+    writer.writerows([to_cell(cell) for cell in row] for row in table)
+    return text.getvalue()

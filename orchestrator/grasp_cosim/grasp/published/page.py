@@ -1,0 +1,221 @@
+"""The evaluation as a page, one file with its pictures inside, to be opened in a browser."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from string import Template
+from typing import TYPE_CHECKING, Any
+
+from ...numerals import fixed
+from ...report.caption import about
+from ...report.page import page_style
+from ...report.plot import as_svg, new_figure, one_legend
+from ...report.tables import table
+from ...system.description import System
+from ...system.made_of import changed
+from ...system.parts import NANOSECONDS
+from ..controllers import controller_name
+from ..pictures import draw_contact_forces, draw_contact_times, draw_targets
+from ..presets import CASES
+from .claims import Evidence
+from .compared import SOURCES
+from .tables import REFLECTANCE_X_M, Source
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PAGE = Template("""<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="color-scheme" content="light dark">
+<link rel="icon" href="data:,">
+<title>$title</title>
+<style>
+$style
+h2 { border: 0; padding: 0; }
+td { white-space: nowrap; }
+.claims td + td { white-space: normal; }
+.chart { min-width: 0; max-width: 920px; }
+@media (max-width: 760px) { .chart { min-width: 620px; } }
+</style>
+</head>
+<body>
+<header>
+<h1>$title</h1>
+<p class="sum">$summary</p>
+<p class="sum about">$about</p>
+</header>
+<main>
+$sections
+</main>
+</body>
+</html>
+""")
+
+INTRODUCTION: Mapping[Source, str] = {
+    "simulation": "The position table of the paper’s simulation against this co-simulation.",
+    "experiment": "Both tables of the paper’s experiments against this co-simulation on the bench "
+    "preset: the sensors with their electronics, the fingers with the friction that was identified "
+    "from these times.",
+}
+
+NOTES: Mapping[Source, str] = {
+    "simulation": "A finger touches where its gap is zero. The last column would be ours if "
+    "contact were declared at a gap of 0.37 mm, which is fitted to the published times and used "
+    "nowhere else; evaluation.csv has those times, too.",
+    "experiment": "Contact times are those of the positions and of equal colours, to which the "
+    "friction was fitted; white on both sides is the row of 30 mm once more and counts once.",
+}
+
+TABLES = {
+    "position": "By the position of the object",
+    "reflectance": "By the colours of the right and the left face, the object at 30 mm",
+}
+
+METRICS = (
+    ("contact times in s", "time_to_contact", 1.0, 3),
+    ("approach in mm/s", "impact_velocity", 1e3, 1),
+    ("peak force in N", "peak_contact_force", 1.0, 2),
+    ("settled force in N", "steady_contact_force", 1.0, 3),
+)
+"""The columns of the table of all grasps, for each finger: heading, metric, factor, decimals."""
+
+
+def evaluation_html(evidence: Evidence, claims: Sequence[Mapping[str, Any]], source: Source) -> str:
+    """Return the page as text."""
+    system, pictures = evidence.system, figures(evidence, source)
+    times, *others = (_picture(title.capitalize(), figure) for title, figure in pictures.values())
+    tables = dict.fromkeys(row["table"] for row in evidence.rows)
+    sections = [
+        _section("Claims of the paper", _claims(claims)),
+        _section("Deviations", _deviations(evidence.rms) + f'<p class="hint">{NOTES[source]}</p>'),
+        times,
+        *(_section(TABLES[name], _published(evidence.rows, name)) for name in tables),
+        *others,
+        _section("Every grasp", _grasps(evidence)),
+    ]
+    step = 1e3 * system.step_ns / NANOSECONDS
+    return PAGE.substitute(
+        title=f"{SOURCES[source].title}, {escape(controller_fmu(system))}",
+        style=page_style(),
+        summary=f"{INTRODUCTION[source]} Steps of {step:g} ms, {system.scheme}.",
+        about=escape(about(changed(system))),
+        sections="\n".join(sections),
+    )
+
+
+def controller_fmu(system: System) -> str:
+    """Return the name of the controller's FMU."""
+    return system.component(controller_name(system), system.name).fmu.stem
+
+
+def _section(title: str, html: str) -> str:
+    return f"<section>\n<h2>{title}</h2>\n{html}\n</section>"
+
+
+def _picture(title: str, figure: Figure) -> str:
+    chart = f'<div class="chart" role="img" aria-label="{title}">{as_svg(figure)}</div>'
+    return _section(title, f'<div class="scroll">{chart}</div>')
+
+
+def _claims(claims: Sequence[Mapping[str, Any]]) -> str:
+    words = {True: "<td>holds</td>", False: '<td class="warn">FAILS</td>'}
+    return table("", [f"{words[c['holds']]}<td>{escape(c['text'])}</td>" for c in claims], "claims")
+
+
+def _deviations(rms: Mapping[str, float]) -> str:
+    """The root mean squares; of a name with _at_0.37_mm in a column beside that without."""
+    near = "_at_0.37_mm"
+    more = any(name.endswith(near) for name in rms)
+    heads = ["root mean square of simulated less published, s", ""] + ["at 0.37 mm"] * more
+    names = [name for name in rms if not name.endswith(near)]
+    return table(
+        _heads(heads),
+        [
+            _cells([name.replace("_", " ")], [rms[name], *([rms[name + near]] if more else [])])
+            for name in names
+        ],
+    )
+
+
+def _published(rows: Sequence[Mapping[str, Any]], name: str) -> str:
+    """A row per grasp: published, simulated and their difference, of both fingers and between."""
+    grasps: dict[tuple[Any, int], list[Mapping[str, Any]]] = {}
+    for row in rows:
+        if row["table"] == name:
+            grasps.setdefault((row["condition"], row["case"]), []).append(row)
+    names = ("finger 1", "finger 2", "apart")
+    heads = [f"{n}<br>{what}" for n in names for what in ("published", "simulated", "difference")]
+    lines = []
+    for (condition, case), figures in grasps.items():
+        texts = (
+            (f"{f['published']:.2f}", _text(f["simulated"], 3), _text(f["difference"], 3, "+"))
+            for f in figures
+        )
+        where = f"{1e3 * condition:.0f} mm" if isinstance(condition, float) else condition
+        lines.append(_cells([where, f"Case {case}"], [text for three in texts for text in three]))
+    return table(_heads(["object", "times in s", *heads], texts=2), lines)
+
+
+def _grasps(evidence: Evidence) -> str:
+    heads = ["object", "", *(heading for heading, *_ in METRICS), "target at the end in mm"]
+    lines = []
+    for run in evidence.runs.values():
+        pairs = (
+            " / ".join(_text(factor * value, decimals) for value in run.metrics[name])
+            for _, name, factor, decimals in METRICS
+        )
+        target = _text(1e3 * run.metrics["target_position"], 1)
+        x_m, alpha_1, alpha_2 = run.setting
+        faces = "" if alpha_1 == alpha_2 == 1.0 else f", {alpha_1:.2f} / {alpha_2:.2f}"
+        lines.append(_cells([f"{1e3 * x_m:.0f} mm{faces}", f"Case {run.case}"], [*pairs, target]))
+    return table(_heads(heads, texts=2), lines)
+
+
+def _heads(names: Sequence[str], texts: int = 1) -> str:
+    kinds = [""] * texts + [' class="n"'] * (len(names) - texts)
+    return "".join(f"<th{kind}>{name}</th>" for kind, name in zip(kinds, names, strict=True))
+
+
+def _cells(texts: Iterable[str], numbers: Iterable[str | float]) -> str:
+    """The cells of a row: texts, then numbers, those that are no text yet with 3 decimals."""
+    shown = (n if isinstance(n, str) else _text(n, 3) for n in numbers)
+    return "".join(
+        [*(f"<td>{escape(t)}</td>" for t in texts), *(f'<td class="n">{n}</td>' for n in shown)]
+    )
+
+
+def _text(value: float, decimals: int, sign: str = "") -> str:
+    """A number of the tables; a difference too small for them is 0 there."""
+    return fixed(value, decimals, sign=sign, rounded=True)
+
+
+def figures(evidence: Evidence, source: Source) -> dict[str, tuple[str, Figure]]:
+    """The pictures by name, each with its title; InputError without matplotlib."""
+    how, runs = SOURCES[source], {r.case: r.result for r in evidence.runs.values() if r.result}
+    names = list(dict.fromkeys(row["table"] for row in evidence.rows))
+    times = new_figure(9.0, 4.3) if len(names) == 1 else new_figure(11.0, 8.3)
+    grid = times.subplots(len(names), 2, sharey="row", squeeze=False)
+    for name, pair in zip(names, grid, strict=True):
+        for case, axes in enumerate(pair, start=1):
+            draw_contact_times(axes, [r for r in evidence.rows if r["table"] == name], case)
+    forces, targets = new_figure(7.2, 7.0), new_figure(7.2, 4.0)
+    rows, below = forces.subplots(len(CASES), 1, sharex=True), targets.subplots()
+    for axes, case in zip(rows, CASES, strict=True):
+        draw_contact_forces(axes, runs[case])
+        axes.set_title(f"Case {case}", fontsize=10)
+    draw_targets(below, [(runs[1], "--", "Case 1"), (runs[2], "-", "Case 2")])
+    for axes in (rows[-1], below):
+        axes.set_xlabel("time in s")
+        axes.set_xlim(0.0, how.shown)
+    for figure in (times, forces, targets):
+        one_legend(figure)
+    where = f"object at {1e3 * REFLECTANCE_X_M:.0f} mm"
+    return {
+        "contact_times": ("contact times, simulated and published", times),
+        "contact_forces": (f"contact forces, {where}", forces),
+        "target_position": (f"target position, {where}", targets),
+    }
