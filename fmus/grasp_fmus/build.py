@@ -126,6 +126,43 @@ def build_block(file: Path, out: Path, plan: Plan | None = None) -> Built:
         return build_model(model, out, plan)
 
 
+def build_chosen(block: Path | None, out: Path, plan: Plan | None = None) -> list[Built]:
+    """Build the FMUs of all blocks that come with the package, or of one, into the folder `out`.
+
+    block is a Python file; with a plan, which makes them native, also the name of one of ours.
+    ValueError, one line, where there is no such block, or a compiler is missing; CompilerError
+    where one fails.
+    """
+    if block is None:
+        return build_native(out, plan) if plan else build(out)
+    if plan and names_ours(block):
+        return build_native(out, plan, [str(block)])
+    return [build_block(block, out, plan)]
+
+
+def names_ours(block: Path) -> bool:
+    """Return True where it is to be the name of a block of the package, and not a file."""
+    return block.suffix == "" and block.name == str(block) and not block.exists()
+
+
+def write_c_only(block: Path | None, out: Path) -> list[Path]:
+    """Write the C of one block into the folder `out`, of all into folders in it.
+
+    block is as in build_chosen(); return the files. ValueError, one line, where there is none.
+    """
+    from .native.c_only import write_c
+    from .own_block import own_model
+    from .package import shipped_model
+
+    if block and not names_ours(block):
+        with own_model(block) as model:
+            return write_c(out, model)
+    names = chosen_names([str(block)] if block else [])
+    places = {name: out if block else out / name for name in names}
+    models = {name: shipped_model(name) for name in names}
+    return [path for name in names for path in write_c(places[name], models[name])]
+
+
 def build_model(model: Model, out: Path, plan: Plan | None = None) -> Built:
     """Build the FMU of a model into the folder `out`, without cross-check files."""
     from .native.sources import native_members

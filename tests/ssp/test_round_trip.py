@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from grasp_cosim import InputError, System, simulate
+from grasp_cosim import InputError, Realtime, System, simulate
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.interface.interface import Value
 from grasp_cosim.ssp.document import parse
@@ -138,6 +138,7 @@ def test_what_ssp_has_no_form_for_comes_back(grasp: System, tmp_path: Path) -> N
         components=(replace(plant, step_ns=300_000, isolation="process"), *others),
         scheme="jacobi",
         initialisation=Initialisation("refuse", 1e-8, 7),
+        realtime=Realtime(0.5, "stop", priority=80),
         events=(
             Event({Port("sensor_1", "reflectance"): 0.5}, at_ns=1_000_000),
             Event({Port("controller", "simultaneous_contact.enabled"): False}, at_ns=2_000_000),

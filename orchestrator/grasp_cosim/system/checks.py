@@ -122,8 +122,8 @@ def check_connections(system: Structure) -> None:
         raise InputError(
             f"{system.name}: input{'s' * plural} {choices(missing)} {'have' if plural else 'has'} "
             f"no source; connect one of {choices(outputs)} to {'each' if plural else 'it'}, or "
-            f"give it a value: --set {missing[0]}=VALUE, or in the system file; or drive it with "
-            "--input"
+            f"give it a value in the system file, or --set {missing[0]}=VALUE where another FMU "
+            "brings it; or drive it with --input"
         )
 
 

@@ -7,6 +7,7 @@ from grasp_fmus.proxy import DEFAULTS, Settings
 
 from ...errors import InputError
 from ..frame import PATH, json_option, say, show, waiting
+from .build import FIRST
 
 
 @click.command()
@@ -76,7 +77,14 @@ def proxy(
     if out:
         settings = Settings(host, port, timeout)
         targets = target.split(",") if target is not None else ()
-        built, notes = write_proxy(fmu, out, settings, targets, 3 if fmi == "3" else 2, waiting)
+        built, notes = write_proxy(
+            fmu,
+            out,
+            settings,
+            targets,
+            3 if fmi == "3" else 2,
+            lambda line: waiting(f"{line}{FIRST if target else ''}"),
+        )
         lines.insert(0, f"{out}: {built.status}")
         report |= {"fmu": str(out), "status": built.status}
     for note in notes:
