@@ -57,11 +57,11 @@ format_option = click.option(
     type=click.Choice(PICTURES),
     default=PICTURES[0],
     show_default=True,
-    help="Of the pictures.",
+    help="Format of the pictures.",
 )
 
 title_option = click.option(
-    "--title", default="", help="Of pictures and pages. Default: system, case and controller."
+    "--title", default="", help="Title of the page. Default: system, case and controller."
 )
 
 metrics_option = click.option(
@@ -69,7 +69,7 @@ metrics_option = click.option(
     "metric_files",
     multiple=True,
     type=PATH,
-    help="A Python file with metrics of your own.",
+    help="Work out metrics of your own, from a Python file.",
 )
 
 

@@ -11,9 +11,10 @@ from ..options import controller_option, many_runs_option
 
 
 @click.command()
-@click.option("--bench", is_flag=True, help="The experiments, with friction and electronics.")
+@click.option("--bench", is_flag=True, help="Take the experiments, with friction and electronics.")
 @controller_option
 @click.option(
+    "-o",
     "--out",
     type=PATH,
     default=Path("results"),

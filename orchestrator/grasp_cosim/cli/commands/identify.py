@@ -20,10 +20,10 @@ from ..options import set_option, set_values
     default=DEFAULT,
     show_default=True,
     metavar="|".join(GROUPS),
-    help="What is fitted; may be given several times.",
+    help="Fit this; may be given several times.",
 )
 @set_option
-@click.option("--out", type=PATH, help="Folder for the values and the residuals.")
+@click.option("-o", "--out", type=PATH, help="Folder for the values and the residuals.")
 @json_option
 def identify(
     log: Path | None,

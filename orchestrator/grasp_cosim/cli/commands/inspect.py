@@ -16,7 +16,7 @@ from ..frame import PATH, json_option, show
 def inspect(fmu: Path, as_json: bool) -> int:
     """Show the interface of any FMU.
 
-    That is its variables with units, ranges and dependencies, and its capabilities.
+    It prints the variables, with units, ranges and dependencies, and the capabilities.
 
     \b
     Example: grasp-cosim inspect fmus/build/GripperPlant.fmu

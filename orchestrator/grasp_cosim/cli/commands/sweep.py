@@ -48,22 +48,27 @@ TABLE = Path("sweep.csv")
     "--vary",
     multiple=True,
     metavar="PLACE=START:END:COUNT",
-    help="What varies, in SI units, like plant.object_width=0.05:0.07:11 or "
+    help="Vary a value, in SI units: plant.object_width=0.05:0.07:11, or a list as in "
     "sensor_1.reflectance=0.3,0.57,1.2. Several make every combination.",
 )
-@click.option("--table", type=PATH, help="A CSV file with a row for each run, a column each place.")
+@click.option(
+    "--table", type=PATH, help="Take the rows of a CSV file, with a column for each place."
+)
 @system_options
 @swap_option
 @metrics_option
 @many_runs_option
 @click.option(
+    "-o",
     "--out",
     type=PATH,
     default=TABLE,
     show_default=True,
-    help="The table, a .csv or .parquet file, or a folder for it.",
+    help="Table to write, a .csv or .parquet file, or a folder for it.",
 )
-@click.option("--workers", type=click.IntRange(1), help="Processes. Default: one for each core.")
+@click.option(
+    "--workers", type=click.IntRange(1), help="Run so many processes. Default: one for each core."
+)
 @click.option("--scheduler", metavar="ADDRESS", help="Run on a Dask cluster, like tcp://host:8786.")
 @click.option("--plot", is_flag=True, help="Draw the metrics over what varies, beside the table.")
 @json_option
