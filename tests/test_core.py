@@ -104,7 +104,7 @@ def test_there_is_no_grasp_in_these_processes(python: Python) -> None:
                 raise AssertionError(name)
         assert find_spec("grasp_cosim.grasp") is None
         assert find_spec("grasp_cosim.metrics.metric") is not None
-        assert extensions.metrics == []
+        assert extensions.metrics == {}
         assert [d.stem for d in extensions.drawings] == ["signals"]
         """
     )

@@ -169,7 +169,7 @@ FLOORS = (
     ("recording",),
     ("ssp", "inspection", "drafting"),
     ("master",),
-    ("sweep", "sweeps", "qualification", "comparison", "hil"),
+    ("sweeps", "qualification", "comparison", "hil"),
     ("report",),
     ("grasp",),
     ("cli",),

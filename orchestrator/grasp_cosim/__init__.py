@@ -158,7 +158,7 @@ def _html(result: Result) -> str:
 
 extensions.readers |= {".toml": _read_toml, ".ssp": _read_ssp}
 if find_spec(f"{__name__}.grasp"):
-    extensions.metrics.append(_grasp_metrics)
+    extensions.metrics["grasp"] = _grasp_metrics
     extensions.drawings.append(
         extensions.Drawing(
             "grasp", _is_grasp, _draw_grasp, _grasp_scene, _grasp_traits, _grasp_words

@@ -8,15 +8,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
 readers: dict[str, Callable[[Path, Path | None, float | None, float | None, Any], Any]] = {}
 """Readers of system files by suffix: `path`, folder of the FMUs, step and stop in s, and stimuli
 (`system.stimuli.Stimuli`) or None, to a System."""
 
-metrics: list[Callable[[], Iterable[Any]]] = []
-"""Sources of metrics (`metrics.metric.Metric`) that every result is asked for."""
+metrics: dict[str, Callable[[], tuple[Any, ...]]] = {}
+"""Groups of metrics (`metrics.metric.Metric`) by the names that a system has them by."""
 
 
 html: list[Callable[[Any], str]] = []

@@ -302,6 +302,6 @@ def test_of_a_very_long_message_the_middle_is_left_out(command: Run, tmp_path: P
     assert said.startswith("grasp-cosim: long.toml: unknown entry 'xxx")
     assert said.endswith(
         "; valid: components, connections, events, experiment, faults, "
-        "initialisation, input, presets, realtime, roles\n"
+        "initialisation, input, metrics, presets, realtime, roles\n"
     )
     assert "x" * 100_000 in command("--debug", "run", "long.toml")[2]

@@ -336,7 +336,11 @@ def test_a_user_s_metrics_have_bands_in_a_qualification(
 @pytest.mark.parametrize(
     ("more", "code", "ends"),
     [
-        ((), 2, ["grasp-cosim: metric 'lazy': AttributeError: 'Signals' object has no attribute "]),
+        (
+            (),
+            2,
+            ["grasp-cosim: metric 'lazy': own.py, line 14: AttributeError: 'Signals' "],
+        ),
         (
             (*["--realtime", "--set", "realtime.factor=1e6", "--set", "realtime.overrun=stop"],),
             3,
@@ -358,7 +362,9 @@ def test_a_metric_that_fails_loses_nothing_of_the_run(
     assert len(err.splitlines()) == len(ends)
     assert all(line.startswith(end) for line, end in zip(err.splitlines(), ends, strict=True))
     run = json.loads(Path("out/run.json").read_text())
-    said = "metric 'lazy': AttributeError: 'Signals' object has no attribute 'reach'"
+    said = (
+        "metric 'lazy': own.py, line 14: AttributeError: 'Signals' object has no attribute 'reach'"
+    )
     assert run["missing_metrics"] == ["no heat: plant lacks temperature", said]
     assert ("reach" in run, "lazy" in run) == (True, False)
     back = load_run("out")
@@ -369,12 +375,15 @@ def test_a_metric_that_fails_loses_nothing_of_the_run(
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("1 / 0\n", "--metrics own.py: ZeroDivisionError: division by zero"),
+        ("1 / 0\n", "--metrics own.py, line 1: ZeroDivisionError: division by zero"),
         (OWN.replace('"reach"', '"time_to_contact"'), "metric 'time_to_contact': is defined twice"),
-        (OWN.replace('"reach"', '"stop"'), "--metrics own.py: metric 'stop': every run has this"),
+        (
+            OWN.replace('"reach"', '"stop"'),
+            "--metrics own.py, line 7: metric 'stop': every run",
+        ),
         pytest.param(
             OWN.replace("return reach(run)", "return run"),
-            "metric 'lazy': AttributeError: ",
+            "metric 'lazy': own.py, line 14: AttributeError: ",
             marks=needs_pythonfmu,  # else a line says before that twins ran
         ),
     ],

@@ -13,13 +13,13 @@ def widest(run: Any) -> float:
 
 
 def test_a_function_is_a_metric_of_its_name_and_docstring() -> None:
-    (found,) = chosen([widest], (), {})
+    (found,) = chosen([widest], (), (), {})
     assert (found.name, found.unit, found.description) == ("widest", None, "The gap at its widest.")
 
 
 def test_a_metric_stays_what_it_is() -> None:
     own = metric("own", unit="m")(widest)
-    assert chosen([own], (), {}) == (own,)
+    assert chosen([own], (), (), {}) == (own,)
 
 
 @pytest.mark.parametrize(
@@ -33,7 +33,7 @@ def test_a_metric_stays_what_it_is() -> None:
 )
 def test_what_is_no_metric_is_refused_in_one_line(asked: Any, said: str) -> None:
     with pytest.raises(InputError) as raised:
-        chosen([asked], ("a.y",), {})
+        chosen([asked], ["grasp"], ("a.y",), {})
     assert said in str(raised.value)
     assert "\n" not in str(raised.value)
 

@@ -3,6 +3,7 @@
 import pickle
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from grasp_cosim.metrics.metric import (
     check_portable,
     load_metrics,
     measure,
-    registered,
+    metrics_of,
 )
 from grasp_cosim.parallel import run_all
 from grasp_cosim.sweeps.run import Task, run_row
@@ -137,31 +138,35 @@ def test_numbers_become_pythons_own(value: Any, plain: Any) -> None:
 @pytest.mark.parametrize(
     ("value", "entries", "message"),
     [
-        ("fast", (), "metric 'x': returned 'fast'; must be a number, True, False, None or a list"),
-        (1j, (), "metric 'x': returned 1j; must be a number"),
-        ({"a": 1.0}, (), "metric 'x': returned {'a': 1.0}; must be a number"),
-        ([[1.0]], (), "metric 'x': returned [[1.0]]; must be a number"),
-        (np.ones((1, 2)), (), "metric 'x': returned array([[1., 1.]]); must be a number"),
-        (1.0, ("a", "b"), "metric 'x': returned 1.0; must be a value for each of a, b"),
-        ([1.0], ("a", "b"), "metric 'x': returned [1.0]; must be a value for each of a, b"),
-        (None, ("a", "b"), "metric 'x': returned None; must be a value for each of a, b"),
+        ("fast", (), "returned 'fast'; must be a number, True, False, None or a list"),
+        (1j, (), "returned 1j; must be a number"),
+        ({"a": 1.0}, (), "returned {'a': 1.0}; must be a number"),
+        ([[1.0]], (), "returned [[1.0]]; must be a number"),
+        (np.ones((1, 2)), (), "returned array([[1., 1.]]); must be a number"),
+        (1.0, ("a", "b"), "returned 1.0; must be a value for each of a, b"),
+        ([1.0], ("a", "b"), "returned [1.0]; must be a value for each of a, b"),
+        (None, ("a", "b"), "returned None; must be a value for each of a, b"),
     ],
 )
 def test_another_value_is_refused(value: Any, entries: tuple[str, ...], message: str) -> None:
-    with pytest.raises(InputError, match=rf"^{re.escape(message)}") as caught:
+    line = rf"^metric 'x': test_metric\.py, line \d+: {re.escape(message)}"
+    with pytest.raises(InputError, match=line) as caught:
         measure(signals(), [made("x", lambda _: value, entries=entries)]).check()
     assert "\n" not in str(caught.value)
 
 
-def test_a_function_that_raises_is_a_wrong_input_that_names_it() -> None:
+def test_a_function_that_raises_is_a_wrong_input_that_names_it_and_its_line() -> None:
     def raising(_: Signals) -> float:
         raise ValueError("no\n  good")
 
+    line = raising.__code__.co_firstlineno + 1
+    said = f"metric 'own': test_metric.py, line {line}: ValueError: no good"
+
     found = measure(signals(), [made("own", raising), made("end", lambda run: run.time[-1])])
-    assert found.missing == found.failures == ("metric 'own': ValueError: no good",)
+    assert found.missing == found.failures == (said,)
     assert (dict(found.values), found.units) == ({"end": 1.0}, {"end": None})
     for asked in (found.check, found.flat):
-        with pytest.raises(InputError, match=r"^metric 'own': ValueError: no good$"):
+        with pytest.raises(InputError, match=f"^{re.escape(said)}$"):
             asked()
 
 
@@ -174,7 +179,7 @@ def test_a_metric_in_a_sweep_that_raises_fails_its_run_alone(grasp: System) -> N
     outcome = run_row(Task(short, (made("late", late),)), 3, {})
     assert (outcome.index, outcome.metrics) == (3, {})
     assert outcome.error
-    assert outcome.error.startswith("metric 'late': ZeroDivisionError: ")
+    assert "metric 'late': test_metric.py, line " in outcome.error
 
 
 # ------------------------------------------------------------------------- what is missing
@@ -248,11 +253,6 @@ def test_a_metric_without_a_description_has_the_first_line_of_its_docstring() ->
     assert all(m.description for m in METRICS)
 
 
-def test_a_system_that_plays_no_role_of_a_group_is_not_told_of_it() -> None:
-    found = measure(Signals(TIME, {"a.x": GAP}), METRICS)
-    assert (dict(found.values), found.missing) == ({}, ())
-
-
 def test_a_metric_of_its_own_says_what_it_lacks() -> None:
     needing = made("speed", lambda run: run["plant.speed"][-1], needs=("plant.speed",))
     trying = made("force", lambda run: run["plant.force"][-1])
@@ -289,19 +289,28 @@ def test_what_every_run_tells_is_no_name_of_a_metric(grasp: System, tmp_path: Pa
 def test_two_metrics_of_one_name_are_refused() -> None:
     again = made("time_to_contact", lambda _: 1.0)
     with pytest.raises(InputError, match=r"^metric 'time_to_contact': is defined twice; must have"):
-        registered([again])
+        metrics_of(["grasp"], [again])
     own = made("own", lambda _: 1.0)
     with pytest.raises(InputError, match=r"^metric 'own': is defined twice; must have"):
-        registered([own, own])
-    assert registered([own]) == (*METRICS, own)
+        metrics_of([], [own, own])
+    assert metrics_of(["grasp"], [own]) == (*METRICS, own)
+    assert metrics_of([], [own]) == (own,)
 
 
-def test_what_is_registered_is_asked_of_every_result(
+def test_a_result_has_the_metrics_of_its_system(
     grasp: System, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(extensions, "metrics", [lambda: [made("end", lambda run: run.time[-1])]])
-    result = simulate(grasp, step=1e-3, stop=0.01)
-    assert dict(result.measured.values) == {"end": 0.01}
+    end = made("end", lambda run: run.time[-1])
+    monkeypatch.setitem(extensions.metrics, "ends", lambda: (end,))
+    for groups, names in (
+        (("ends",), {"end"}),
+        ((), set()),
+        (("grasp", "ends"), {m.name for m in METRICS if not m.optional} | {"end"}),
+    ):
+        result = simulate(replace(grasp, metrics=groups), step=1e-3, stop=0.2)
+        assert result.groups == [*groups]
+        assert result.measured.values.keys() == names
+        assert result.measured.missing == ()
 
 
 def test_titles_and_columns() -> None:
@@ -336,7 +345,7 @@ def test_a_file_has_its_metrics_in_its_order_and_not_those_it_imports(
 ) -> None:
     zeta, alpha = load_metrics(file(FILE))
     assert (zeta.name, zeta.columns, alpha.name) == ("zeta", ("zeta[1]", "zeta[2]"), "alpha")
-    assert dict(measure(signals(), registered([zeta, alpha])).values) == {
+    assert dict(measure(signals(), [zeta, alpha]).values) == {
         "zeta": [0.3, 0.1],
         "alpha": 0.1,
     }
@@ -347,9 +356,12 @@ def test_a_file_has_its_metrics_in_its_order_and_not_those_it_imports(
     [
         ("def f(:\n", "--metrics mine.py: SyntaxError: invalid syntax (mine.py, line 1)"),
         ("x = 0\0\n", "Error: source code string cannot contain null"),
-        ("1 / 0\n", "--metrics mine.py: ZeroDivisionError: division by zero"),
-        ("import sys\nsys.exit(0)\n", "--metrics mine.py: SystemExit: 0"),
-        ("import nowhere_at_all\n", "--metrics mine.py: ModuleNotFoundError: No module named "),
+        ("1 / 0\n", "--metrics mine.py, line 1: ZeroDivisionError: division by zero"),
+        ("import sys\nsys.exit(0)\n", "--metrics mine.py, line 2: SystemExit: 0"),
+        (
+            "import nowhere_at_all\n",
+            "--metrics mine.py, line 1: ModuleNotFoundError: No module named ",
+        ),
         ("x = 1\n", ": no metric; must have functions under @metric(name)"),
         (
             "from grasp_cosim.grasp.metrics import time_difference\n",
@@ -357,7 +369,11 @@ def test_a_file_has_its_metrics_in_its_order_and_not_those_it_imports(
         ),
         (
             "from grasp_cosim import metric\nmetric('step')\n",
-            "--metrics mine.py: metric 'step': every run has this beside; must have another name",
+            "--metrics mine.py, line 2: metric 'step': every run has this beside; must have",
+        ),
+        (
+            "from grasp_cosim import metric\n\nmetric('way', unit='furlong')\n",
+            "--metrics mine.py, line 3: metric 'way': unit 'furlong' is not known; must be one",
         ),
     ],
 )
@@ -378,6 +394,14 @@ def test_a_file_that_cannot_be_read_is_one_line(tmp_path: Path) -> None:
         load_metrics(path)
     path.write_bytes(b"\xff\xfe")
     with pytest.raises(InputError, match=r"mine\.py: .*; must be a Python file$"):
+        load_metrics(path)
+
+
+def test_a_file_that_is_no_python_is_not_run(tmp_path: Path) -> None:
+    """It might do something all the same: system = ... is Python, too."""
+    path = tmp_path / "ball.toml"
+    path.write_text("raise_an_error_if_run", "utf-8")
+    with pytest.raises(InputError, match=r"ball\.toml: must be a Python file, NAME\.py$"):
         load_metrics(path)
 
 
@@ -428,4 +452,4 @@ def test_what_is_not_finite_is_no_value(value: Any) -> None:
 
     measured = measure(Signals(np.zeros(1), {}), [odd])
     assert measured.values == {}
-    assert re.fullmatch(r"metric 'odd': returned .*; must be finite, .*", measured.failures[0])
+    assert re.fullmatch(r"metric 'odd': .*: returned .*; must be finite, .*", measured.failures[0])

@@ -1,6 +1,7 @@
 """Metrics get signals in SI units, or the system is refused before any FMU is loaded."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -234,14 +235,15 @@ def test_every_way_to_run_a_system_refuses_it_first(
     load: Load, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """These FMUs have no binary: loading one would be another error."""
-    monkeypatch.setattr(extensions, "metrics", [lambda: [travel]])
+    monkeypatch.setitem(extensions.metrics, "travels", lambda: (travel,))
     doubtful = load({}, {}, [*scaled(1e-3), '"room.y -> sink.b"'])
+    doubtful = replace(doubtful, metrics=("travels",))
     ways: list[Callable[[], object]] = [
         lambda: simulate(doubtful),
         lambda: simulate.session(doubtful),
         lambda: sweep(doubtful, [{"room.p": 1.0}], native=False),
         lambda: qualify(doubtful, "room", tmp_path / "room.fmu"),
-        lambda: qualify(load({"x": M, "y": M}), "room", other),
+        lambda: qualify(replace(load({"x": M, "y": M}), metrics=("travels",)), "room", other),
     ]
     other = write_fmu(tmp_path / "other.fmu", {**ROOM, "x": unit(OUTPUT, "mm")})
     for way in ways:
@@ -275,8 +277,8 @@ def test_a_signal_in_doubt_fails_the_metric_that_asks_for_it() -> None:
     measured = measure(run, [Metric("travel", travel.function), other])
     assert dict(measured.values) == {"other": 1.0}
     assert measured.failures == (
-        "metric 'travel': the unit of room.x is in doubt, as it has none and its connections scale "
-        "it; must be named in the system file, under units",
+        "metric 'travel': test_metrics_in_si.py, line 28: the unit of room.x is in doubt, as "
+        "it has none and its connections scale it; must be named in the system file, under units",
     )
 
 

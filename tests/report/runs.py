@@ -87,6 +87,7 @@ def grasp_run(rows: int = 2001) -> Result:
         "events": [{"at": 0.5, "set": {"sensor_1.reflectance": 0.6}}],
         "faults": [{"connection": "controller.intensity[1]", "kind": "bias", "value": 0.1}],
         "roles": {},
+        "metrics": ["grasp"],
     }
     return Result(
         settings, time, signals, units, wall_time=1.5, complete=True,

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..errors import InputError, choices
 from ..interface.units import Conversion
-from ..metrics.metric import Metric, registered
+from ..metrics.metric import Metric, metrics_of
 from ..qualification.bands import SHARE, Bands
 from ..qualification.compared import (
     FEWEST_STEPS,
@@ -63,7 +63,7 @@ def compare(
     """Compare two runs: each a result, a folder that `run --out` wrote, or a CSV or MDF file.
 
     Bands that are not given are derived from a alone, as in a qualification. `metrics` are compared
-    beside those that every result is asked for. InputError where one cannot be read, or the two
+    beside those of the system. InputError where one cannot be read, or the two
     have no time or no signal in common.
     """
     bands, first, second = bands or Bands(), side_of(a, "A"), side_of(b, "B")
@@ -127,7 +127,7 @@ def _asked(side: Side, part: Side, more: Sequence[Metric]) -> tuple[Metric, ...]
     """The metrics of a side, those of its own file as they were recorded if all of it counts."""
     taken, whole = {m.name for m in more}, len(side.time) == len(part.time)
     own = [m for m in side.recorded_metrics if whole and m.name not in taken]
-    return tuple(m for m in registered([*more, *own]) if not m.reason)
+    return tuple(m for m in metrics_of(side.groups, [*more, *own]) if not m.reason)
 
 
 def _converted(

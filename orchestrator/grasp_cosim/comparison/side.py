@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -41,6 +41,8 @@ class Side:
     result: Result | None = None
     """The run; None of a log from elsewhere."""
     roles: Mapping[str, str] = field(default_factory=dict)
+    groups: Sequence[str] = ()
+    """The groups of metrics that the system of the run names."""
     silent: tuple[str, ...] = ()
     """The signals of a log that told no unit, and got that of the other run."""
 
@@ -78,6 +80,7 @@ class Side:
             units={**self.units, **{name: other.units[name] for name in silent}},
             to_si={**self.to_si, **{n: c for n, c in other.to_si.items() if n in same}},
             roles=other.roles,
+            groups=other.groups,
             silent=tuple(n for n in self.signals if n in silent),
         )
 
@@ -127,7 +130,7 @@ def _run(name: str, result: Result) -> Side:
     texts = tuple(name for name in result if name not in result.numbers)
     return Side(
         name, result.time, result.numbers, result.units, result.to_si, texts, result,
-        result.roles,
+        result.roles, result.groups,
     )  # fmt: skip
 
 

@@ -13,7 +13,7 @@ from ..errors import InputError, SimulationError, nearest
 from ..fmi.load import load
 from ..interface.interface import Value
 from ..interruption import interruptible, interrupts
-from ..metrics.metric import Function, Metric, chosen, registered
+from ..metrics.metric import Function, Metric, chosen, metrics_of
 from ..metrics.units import in_si
 from ..numerals import counted
 from ..progress import Progress, phase
@@ -69,8 +69,9 @@ class Session:
         system = system.with_natives(needed_twins(system))
         _check_count("every", every)
         recorded = {str(port) for port in system.recorded}
-        self._metrics = chosen(metrics, recorded, system.roles)
-        self._in_si = in_si(system, registered(self._metrics))  # refuses before, not after
+        self._metrics = chosen(metrics, system.metrics, recorded, system.roles)
+        all_of_them = metrics_of(system.metrics, self._metrics)
+        self._in_si = in_si(system, all_of_them)  # refuses before, not after
         self.system = system
         self._memory = MemoryListener(every)
         self._wall_time = 0.0
@@ -331,7 +332,7 @@ class Simulate:
         results have the same bits.
         realtime paces the run by the clock, as the system says, or as it says itself: the result
         has a timing, and the same bits. metrics are
-        worked out beside those that every result is asked for: from @metric, or functions of their
+        worked out beside those of the system: from @metric, or functions of their
         own name; a name among them says that the result must have that metric. diverging, "stop" or
         "continue", replaces that of the system. note gets the lines of the log but for
         system.notes: what is known of the system and of t = 0 before the first step, the others at

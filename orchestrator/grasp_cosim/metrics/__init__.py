@@ -1,5 +1,6 @@
 """Metrics: functions of recorded signals with a name, a unit and a description.
 
-Signals by role, the registry, metrics from a user's file; which there are is decided higher up.
+Signals by role, groups of metrics by name, metrics from a user's file. What is in a group is
+decided higher up.
 Imports the ground floor: errors, extensions.
 """

@@ -16,8 +16,10 @@ False, None where the moment never comes, or a list of these, one per finger for
 from __future__ import annotations
 
 import hashlib
+import inspect
 import pickle
 import sys
+import traceback
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import isfinite
@@ -28,8 +30,10 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from si_units import refusal
 
 from .. import extensions
+from ..checks import known
 from ..errors import InputError, choices, nearest
 from ..errors import reason as reason_of
 from ..interface.units import Conversion
@@ -38,9 +42,9 @@ Value = float | bool | None
 RESERVED = frozenset((
     "changed", "command", "complete", "components", "connections", "date", "descriptions",
     "diverging", "error", "events", "faults", "fmus", "index", "initialisation", "log",
-    "metric_units", "missing_metrics", "proxies", "real_time_factor", "realtime", "rejections",
-    "roles", "scheme", "step", "steps", "stop", "system", "title", "to_si", "types", "units",
-    "versions", "wall_time",
+    "metric_units", "metrics", "missing_metrics", "proxies", "real_time_factor", "realtime",
+    "rejections", "roles", "scheme", "step", "steps", "stop", "system", "title", "to_si", "types",
+    "units", "versions", "wall_time",
 ))  # fmt: skip
 """Names beside metrics in run.json and in the table of a sweep."""
 
@@ -166,17 +170,18 @@ class Metric:
         """To another process a metric goes by the text of its file, or by where it is found."""
         if self.origin is not None:
             return _from_text, (*self.origin, self.name)
-        if any(self is m for m in registered()):
-            return _registered, (self.name,)
+        ours = extensions.metrics.get(self.group)
+        if ours and any(self is m for m in ours()):
+            return _of_group, (self.group, self.name)
         module, name = (getattr(self.function, key, "") for key in ("__module__", "__qualname__"))
         if getattr(sys.modules.get(module), name, None) is self:  # it replaced its function there
             return resolve_name, (f"{module}:{name}",)
         return Metric, tuple(getattr(self, field) for field in self.__dataclass_fields__)
 
 
-def _registered(name: str) -> Metric:
-    """The metric of that name that every result is asked for, in another process."""
-    return next(m for m in registered() if m.name == name)
+def _of_group(group: str, name: str) -> Metric:
+    """The metric of that name of a group of ours, in another process."""
+    return next(m for m in metrics_of([group]) if m.name == name)
 
 
 def metric(name: str, **more: Any) -> Callable[[Function], Metric]:
@@ -189,6 +194,9 @@ def metric(name: str, **more: Any) -> Callable[[Function], Metric]:
         raise InputError(f"metric {name!r}: must be a name of letters, digits and _")
     if name in RESERVED:
         raise InputError(f"metric {name!r}: every run has this beside; must have another name")
+    for unit in (more.get("unit"), more.get("shown_unit")):
+        if unit and (reason := refusal(unit)):
+            raise InputError(f"metric {name!r}: {reason}")
 
     def made(function: Function) -> Metric:
         first, *_ = (function.__doc__ or "").strip().splitlines() or [""]
@@ -234,33 +242,42 @@ class Measured:
         return found
 
 
-def registered(more: Iterable[Metric] = ()) -> tuple[Metric, ...]:
-    """All metrics that a result is asked for, then `more`; InputError where two have one name."""
-    found = [m for source in extensions.metrics for m in source()] + list(more)
-    names = [m.name for m in found]
-    twice = next((n for n in names if names.count(n) > 1), None)
-    if twice is not None:
-        raise InputError(f"metric {twice!r}: is defined twice; must have another name")
-    return tuple(found)
+def metrics_of(groups: Iterable[str], more: Iterable[Metric] = ()) -> tuple[Metric, ...]:
+    """The metrics of groups of ours, as a system names them, then `more`.
+
+    InputError where there is no such group, or two metrics have one name.
+    """
+    found: dict[str, Metric] = {}
+    for group in groups:
+        known("metrics: no group", group, extensions.metrics)
+        found |= {m.name: m for m in extensions.metrics[group]()}
+    for m in more:
+        if m.name in found:
+            raise InputError(f"metric {m.name!r}: is defined twice; must have another name")
+        found[m.name] = m
+    return tuple(found.values())
 
 
 def chosen(
-    asked: Iterable[Metric | Function | str], names: Collection[str], roles: Mapping[str, str]
+    wanted: Iterable[Metric | Function | str],
+    groups: Iterable[str],
+    names: Collection[str],
+    roles: Mapping[str, str],
 ) -> tuple[Metric, ...]:
-    """Those of `asked` that not every result has anyway: metrics, functions, names of metrics.
+    """Those of `wanted` that are not in `groups` anyway: metrics, functions, names of metrics.
 
-    A function is a metric of its own name, without a unit; a name is one of those that every result
-    is asked for. InputError where there is none of that name, or the signals of these `names` do
+    A function is a metric of its own name, without a unit; a name is one of those in the groups.
+    InputError where there is none of that name, or the signals of these `names` do
     not permit it.
     """
-    usual = {m.name: m for m in registered()}
-    for name in (item for item in asked if isinstance(item, str)):
+    wanted, usual = tuple(wanted), {m.name: m for m in metrics_of(groups)}
+    for name in (item for item in wanted if isinstance(item, str)):
         if name not in usual:
             raise InputError(f"metrics: {name!r}: no such metric; {nearest(name, usual)}")
         reason = lacking(usual[name].needs, names, roles)
         if reason:
             raise InputError(f"metrics: {name}: is not available: {reason}")
-    own = (item for item in asked if not isinstance(item, str))
+    own = (item for item in wanted if not isinstance(item, str))
     return tuple(m if isinstance(m, Metric) else metric(_name(m))(m) for m in own)
 
 
@@ -282,6 +299,21 @@ def check_portable(metrics: Iterable[Metric]) -> None:
             ) from error
 
 
+def _place(function: Function, error: Exception) -> str:
+    """The file and line of a function that failed, to begin a message with."""
+    code = getattr(inspect.unwrap(function), "__code__", None)
+    if code is None:
+        return ""
+    line = [code.co_firstlineno, *_lines(error, code.co_filename)][-1]
+    return f"{Path(code.co_filename).name}, line {line}: "
+
+
+def _lines(error: BaseException, file: str) -> list[int]:
+    """The lines of a file through which an error came, the one that raised it last."""
+    frames = traceback.walk_tb(error.__traceback__)
+    return [line for frame, line in frames if frame.f_code.co_filename == file]
+
+
 def _said(error: BaseException) -> str:
     kind = "" if isinstance(error, InputError) else f"{type(error).__name__}: "
     return " ".join(f"{kind}{error}".split())
@@ -290,10 +322,9 @@ def _said(error: BaseException) -> str:
 def measure(signals: Signals, metrics: Iterable[Metric]) -> Measured:
     """The values of `metrics` in their order, and a line for each that cannot be had.
 
-    A line like "no metrics of the grasp: plant lacks contact[1]". A group none of whose roles is
-    played by a component, or could be, is not of this system, which is no news. A function that
-    fails, or that returns something else than a Metric may have, is a line like
-    "metric 'own': ValueError: ...".
+    A line like "no metrics of the grasp: plant lacks contact[1]". A function that fails, or that
+    returns something else than a Metric may have, is a line like
+    "metric 'own': own.py, line 12: ValueError: ...".
     """
     there, missing = available(metrics, signals.by_name, signals.roles)
     values: dict[str, Any] = {}
@@ -306,7 +337,7 @@ def measure(signals: Signals, metrics: Iterable[Metric]) -> Measured:
         except MissingSignalError as error:
             missing.append(f"no {m.name}: {error}")
         except Exception as error:  # a user's function may raise anything
-            failures.append(f"metric {m.name!r}: {_said(error)}")
+            failures.append(f"metric {m.name!r}: {_place(m.function, error)}{_said(error)}")
     found = tuple(m for m in there if m.name in values)
     return Measured(values, found, (*missing, *failures), tuple(failures))
 
@@ -320,7 +351,7 @@ def available(
     in_part = {m.group for m in there}
     missing: dict[str, str] = {}
     for m, reason in reasons:
-        if reason and not m.optional and not (m.group and _unknown(m.needs, names, roles)):
+        if reason and not m.optional:
             whole = m.group and m.group not in in_part
             missing.setdefault(f"metrics of the {m.group}" if whole else m.name, reason)
     return there, [f"no {what}: {reason}" for what, reason in missing.items()]
@@ -351,13 +382,6 @@ def _plays(component: str, names: Iterable[str]) -> bool:
     return any(name.startswith(f"{component}.") for name in names)
 
 
-def _unknown(needs: Iterable[str], names: Collection[str], roles: Mapping[str, str]) -> bool:
-    """True if no component plays any role of what is needed, and none could play one of them."""
-    needed = {need.partition(".")[0] for need in needs}
-    played = any(_plays(roles.get(role, role), names) for role in needed)
-    return not played and not all(_able(role, needs, names) for role in needed)
-
-
 def _able(role: str, needs: Iterable[str], names: Collection[str]) -> list[str]:
     """The components that have all that is needed of a role, sorted."""
     wanted = [need.removeprefix(f"{role}.") for need in needs if need.startswith(f"{role}.")]
@@ -386,8 +410,10 @@ def _absent(value: Any) -> bool:
 def load_metrics(path: Path) -> tuple[Metric, ...]:
     """The metrics of a Python file, in the order in which they stand there.
 
-    The file is run. InputError where it cannot be read or fails, or has no metric.
+    The file is run. InputError where it is no .py or cannot be read, or fails, or has no metric.
     """
+    if path.suffix != ".py":
+        raise InputError(f"--metrics {path}: must be a Python file, NAME.py")
     try:
         text = path.read_text("utf-8")
     except (OSError, UnicodeDecodeError) as error:
@@ -411,7 +437,9 @@ def _run(name: str, text: str) -> tuple[Metric, ...]:
             del sys.modules[module_name]
             if not isinstance(error, Exception | SystemExit):
                 raise
-            raise InputError(f"--metrics {name}: {_said(error)}") from error
+            lines = _lines(error, name)
+            place = f"--metrics {name}{f', line {lines[-1]}' if lines else ''}"
+            raise InputError(f"{place}: {_said(error)}") from error
     found = [value for value in vars(module).values() if isinstance(value, Metric)]
     return tuple(
         replace(m, origin=(name, text))

@@ -14,7 +14,7 @@ from ..errors import InputError, SimulationError
 from ..interface.interface import Value
 from ..interface.units import IDENTITY, Conversion
 from ..master.simulation import simulate
-from ..metrics.metric import Metric, registered
+from ..metrics.metric import Metric, metrics_of
 from ..metrics.units import in_si
 from ..recording.result import Result
 from ..system.description import System
@@ -93,8 +93,8 @@ def qualify(
     where it declares none or a wrong one. values like {'plant.object_width': 0.06}
     are set in both systems, in the unit of the original, or in the one that has such a variable.
     bands are derived where they are not given. The candidate runs in a process of its own, which a
-    crash does not leave, unless isolation says otherwise. metrics are compared beside those that
-    every result is asked for. InputError where the input is wrong or the original refuses,
+    crash does not leave, unless isolation says otherwise. metrics are compared beside those of the
+    system. InputError where the input is wrong or the original refuses,
     SimulationError where the original fails, KeyboardInterrupt at Ctrl-C.
     """
     bands = bands or Bands()
@@ -102,7 +102,7 @@ def qualify(
     swap = prepare_swap(system, component, new, rename or {}, values or {}, isolation, units)
     if swap.swapped is None:
         return Qualification(swap)
-    asked = tuple(m for m in registered(metrics) if not m.reason)
+    asked = tuple(m for m in metrics_of(system.metrics, metrics) if not m.reason)
     more = _conversions_of_candidate(swap.swapped, asked)
     reference = _run(swap.system, progress and "original")
     asked += (END,) if _ended_early(reference) else ()

@@ -19,7 +19,7 @@ from ..checks import choice, is_number, real
 from ..errors import InputError, choices
 from ..files import check_nature
 from ..interface.units import Conversion
-from ..metrics.metric import Metric, Signals, registered
+from ..metrics.metric import Metric, Signals, metrics_of
 from ..numerals import counted
 from ..plain import from_cell
 from ..realtime.timing import Timing
@@ -38,7 +38,7 @@ SETTING_KEYS: Mapping[str, Any] = {
 }  # fmt: skip
 """Entries of run.json that say how the run was made, and of which types they are."""
 
-MAYBE_SETTINGS = ("roles", "input", "changed")
+MAYBE_SETTINGS = ("roles", "input", "changed", "metrics")
 """More of them, which may be there."""
 
 OUTCOME_KEYS: Mapping[str, Any] = {
@@ -53,7 +53,7 @@ ORIGIN_KEYS: Mapping[str, Any] = {
 
 MORE_KEYS: Mapping[str, Any] = {
     "roles": dict, "types": dict, "descriptions": dict, "metric_units": dict, "to_si": dict,
-    "input": dict, "changed": dict, **ORIGIN_KEYS,
+    "input": dict, "changed": dict, "metrics": list, **ORIGIN_KEYS,
 }  # fmt: skip
 """Entries that may be there."""
 
@@ -165,7 +165,7 @@ def _known(units: Mapping[str, Any]) -> dict[str, Conversion]:
 
 def _as_recorded(written: Mapping[str, Any]) -> tuple[Metric, ...]:
     """The metrics in run.json that nothing here would work out again, as they are there."""
-    known = {*UNITS, *(m.name for m in registered())}
+    known = {*UNITS, *(m.name for m in metrics_of(written.get("metrics", ())))}
     return tuple(
         Metric(name, partial(_constant, written[name]), unit)
         for name, unit in written.get("metric_units", {}).items()

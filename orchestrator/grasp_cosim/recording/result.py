@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -16,7 +16,7 @@ from ..checks import is_number
 from ..errors import UnknownNameError, choices
 from ..files import in_one_piece, write_json
 from ..interface.units import Conversion
-from ..metrics.metric import Measured, Metric, Signals, measure, registered
+from ..metrics.metric import Measured, Metric, Signals, measure, metrics_of
 from ..plain import on_one_line
 from ..realtime.timing import Timing
 from ..system.parts import NANOSECONDS
@@ -87,7 +87,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     timing: Timing | None = None
     """How it kept to the clock; None where it was not paced."""
     more_metrics: tuple[Metric, ...] = ()
-    """Metrics that were asked for beside those that every result is asked for."""
+    """Metrics that were asked for beside those of the system."""
     origin: Mapping[str, Any] = field(default_factory=dict)
     """The date, versions, command and title of a run with a folder: see recording.folder."""
     to_si: Mapping[str, Conversion | None] = field(default_factory=dict)
@@ -129,6 +129,12 @@ class Result(Mapping[str, npt.NDArray[Any]]):
         roles: Mapping[str, str] = self.settings.get("roles", {})
         return roles
 
+    @property
+    def groups(self) -> Sequence[str]:
+        """The groups of metrics that its system names."""
+        groups: Sequence[str] = self.settings.get("metrics", ())
+        return groups
+
     @cached_property
     def by_role(self) -> Signals:
         """The signals as metrics take them: names may begin with a role, values are in SI units."""
@@ -137,7 +143,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     @cached_property
     def measured(self) -> Measured:
         """The metrics, their units, and why others cannot be had."""
-        return measure(self.by_role, registered(self.more_metrics))
+        return measure(self.by_role, metrics_of(self.groups, self.more_metrics))
 
     @property
     def numbers(self) -> dict[str, npt.NDArray[Any]]:

@@ -55,6 +55,7 @@ class Extras:
     diverging: Diverging = "stop"
     input: Stimuli | None = None
     realtime: Realtime = Realtime()
+    metrics: tuple[str, ...] = ()
 
 
 def no_extras(components: Iterable[str], steps: Steps) -> Extras:

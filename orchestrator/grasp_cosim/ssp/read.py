@@ -80,6 +80,7 @@ def read_ssp(
         extras.diverging,
         stimuli,
         extras.realtime,
+        extras.metrics,
     )
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError, SimulationError
-from ..metrics.metric import Function, Metric, available, check_portable, chosen, registered
+from ..metrics.metric import Function, Metric, available, check_portable, chosen, metrics_of
 from ..metrics.units import in_si
 from ..numerals import counted
 from ..parallel import Crew, Lost
@@ -65,7 +65,7 @@ def sweep(
     if workers is not None and (workers < 1 or executor):
         raise InputError(f"workers = {workers}: must be at least 1, and without an executor")
     recorded = {str(port) for port in system.recorded}
-    own = chosen(metrics, recorded, system.roles)
+    own = chosen(metrics, system.metrics, recorded, system.roles)
     asked = _measured(system, own, recorded)
     units = {p: unit_of(system, p) for p in dict.fromkeys(p for row in found for p in row)}
     task = Task(system.natively(native), own)
@@ -105,7 +105,7 @@ def _beside(table: Path) -> Path:
 def _measured(system: System, own: tuple[Metric, ...], recorded: set[str]) -> list[Metric]:
     """The metrics that the system permits; InputError where there is none, or a unit in doubt."""
     check_portable(own)
-    asked = registered(own)
+    asked = metrics_of(system.metrics, own)
     in_si(system, asked)
     there, missing = available(asked, recorded, system.roles)
     if not there:

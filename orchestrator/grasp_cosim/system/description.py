@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import extensions
-from ..checks import choice
+from ..checks import choice, known
 from ..errors import InputError, nearest
 from ..files import check_nature
 from ..interface.interface import Given
@@ -56,6 +56,8 @@ class System(Structure):
                 )
         for role, name in self.roles.items():
             self.component(name, f"{self.name}: [roles]: {role} = {name!r}")
+        for group in self.metrics:
+            known(f"{self.name}: metrics: no group", group, extensions.metrics)
         if not self.as_read:  # copies keep it
             object.__setattr__(self, "as_read", made_of(self))
 

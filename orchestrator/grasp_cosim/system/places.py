@@ -16,7 +16,7 @@ Options = TypeVar("Options")
 
 SECTIONS = (
     "experiment", "components", "connections", "initialisation", "events", "faults", "roles",
-    "presets", "input", "realtime",
+    "presets", "input", "realtime", "metrics",
 )  # fmt: skip
 """The entries of a system file, which are no names of components."""
 

@@ -40,6 +40,7 @@ def settings(system: System) -> dict[str, Any]:
             }
             for component in system.components
         },
+        "metrics": list(system.metrics),
         "roles": dict(system.roles),
         "connections": [
             {

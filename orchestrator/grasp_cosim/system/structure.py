@@ -27,7 +27,8 @@ class Structure:
     name the component that plays a role, such as plant; where they do not, the component of that
     name plays it. presets are values under a name, like {"bench": {"sensor_1.noise.seed": 1}}.
     diverging is what a run does where a signal runs away. input drives inputs without a connection.
-    realtime is how a run is paced that is to be in real time.
+    realtime is how a run is paced that is to be in real time. metrics are the names of groups of
+    ours, like grasp.
     as_read is what the system was made of when it was read, see system.settings.made_of.
     """
 
@@ -46,6 +47,7 @@ class Structure:
     diverging: Diverging = "stop"
     input: Stimuli | None = None
     realtime: Realtime = Realtime()
+    metrics: tuple[str, ...] = ()
     as_read: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
 
     @property

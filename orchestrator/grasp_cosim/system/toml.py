@@ -60,10 +60,18 @@ def read_toml(path: Path, fmus: Path | None = None, stimuli: Stimuli | None = No
             name: _values(f"{place}: [presets.{name}]", values)
             for name, values in part("presets", {}).items()
         },
+        metrics=_groups(f"{place}: metrics", table.get("metrics", [])),
         input=stimuli or _input(f"{place}: [input]", table.get("input"), path.parent),
     )
     faults = read_faults(place, table.get("faults", []), system.connections)
     return replace(system, faults=faults) if faults else system
+
+
+def _groups(place: str, names: Any) -> tuple[str, ...]:
+    """The names of groups of metrics, of which ours are checked by the system."""
+    if not isinstance(names, list):
+        raise InputError(f'{place} = {names!r}: must be a list of groups, like ["grasp"]')
+    return tuple(text(place, name, "the name of a group of metrics") for name in names)
 
 
 def _input(place: str, entry: Any, folder: Path) -> Stimuli | None:

@@ -34,7 +34,6 @@ from ..options import (
     Settings,
     chosen_system,
     many_runs_option,
-    natively,
     swap_option,
     system_options,
 )
@@ -98,7 +97,7 @@ def sweep(out: Path, scheduler: str | None, plot: bool, as_json: bool, **given: 
             raise InputError(f"--vary {place}: is given twice; must be given once")
         pairs[place] = values
     rows = as_rows(given["table"] or grid(pairs))
-    system = natively(chosen_system(given), given["native"])
+    system = chosen_system(given)
     try:
         with cluster(scheduler) if scheduler else nullcontext() as executor:
             table = run_sweep(
@@ -108,7 +107,7 @@ def sweep(out: Path, scheduler: str | None, plot: bool, as_json: bool, **given: 
                 out=out,
                 workers=given["workers"],
                 executor=executor,
-                native=False,
+                native=given["native"],
                 progress=not is_quiet(),
             )
     except KeyboardInterrupt:
