@@ -182,8 +182,9 @@ def test_no_arguments_show_the_help(command: Run) -> None:
     assert "Usage: grasp-cosim" in err
 
 
-def test_debug_shows_the_traceback(command: Run) -> None:
-    code, _, err = command("--debug", "run", "--step", "0")
+@pytest.mark.parametrize("line", ["--debug run --step 0", "run --step 0 --debug"])
+def test_debug_shows_the_traceback(command: Run, line: str) -> None:
+    code, _, err = command(*line.split())
     assert code == 2
     assert "Traceback" in err
 

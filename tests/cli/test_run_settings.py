@@ -19,7 +19,10 @@ def their_folder(fmus: Path, tmp_path: Path) -> None:
     ("line", "said"),
     [
         ("--set plant.object_width", "--set 'plant.object_width': must be PLACE=VALUE"),
-        ("--set scheme=jacobi", "--set scheme: must be a place, did you mean experiment.scheme?"),
+        (
+            "--set scheme=jacobi",
+            "--set scheme: no place in a system file; did you mean",
+        ),
         ("--set experiment.step=0", "experiment.step = 0 s: must be a number greater than 0"),
         ("--set components.hand.step=1", "--set components.hand.step: no component 'hand'; valid"),
         (

@@ -49,6 +49,14 @@ def test_what_is_said_is_what_was_asked_for(command: Run, monkeypatch: pytest.Mo
     assert re.search(r"^oscillator.toml to 0\.5 s: \d+\.\d\d s$", said, re.MULTILINE)
 
 
+def test_the_options_stand_before_the_command_too(command: Run) -> None:
+    assert command("-q", *RUN)[2] == ""
+    once = command("--verbose", *RUN)[2].splitlines()
+    twice = command("--verbose", *RUN, "-v")[2].splitlines()
+    assert len(once) == len(twice)
+    assert "engine: the loop in " in "\n".join(once)
+
+
 def test_errors_stay(command: Run) -> None:
     code, out, err = command("run", "oscillator.toml", "-q", "--set", "a.x.y=1")
     assert (code, out, err.count("\n")) == (2, "", 1)

@@ -82,8 +82,8 @@ def test_an_fmu_comes_with_its_names_and_units(grasp: System, fmus: Path, tmp_pa
     [
         ("plant.object_widt", 1, ": GripperPlant.fmu has no input or parameter 'object_widt'; did"),
         ("plont.object_width", 1, ": no component 'plont'; did you mean plant?"),
-        ("object_width", 1, ": must be a place, did you mean plant.object_width?"),
-        ("scheme", "jacobi", ": must be a place, did you mean experiment.scheme?"),
+        ("object_width", 1, ": no place in a system file; did you mean plant.object_width?"),
+        ("scheme", "jacobi", ": no place in a system file; did you mean experiment.scheme?"),
         ("experimnt.step", 1, ": no component 'experimnt'; did you mean experiment?"),
         ("experiment.schem", "x", ": no entry 'schem' of [experiment]; did you mean scheme?"),
         ("experiment.scheme", "x", " = 'x': must be one of sequential, jacobi"),

@@ -74,7 +74,13 @@ input_option = click.option(
 
 system_options = together(
     controller_option,
-    click.option("--preset", "presets", multiple=True, help="Take a preset of the system file."),
+    click.option(
+        "--preset",
+        "presets",
+        multiple=True,
+        metavar="NAME",
+        help="Take a preset of the system file.",
+    ),
     click.option("--case", type=click.IntRange(0, 2), help="Short for --preset case_0, ..._2."),
     set_option,
     click.option("--step", type=float, help="Communication step in s."),

@@ -47,7 +47,8 @@ def as_file(
     names = [component.name for component in system.components]
     for key, value in settings.items():
         if "." not in key:
-            raise InputError(f"{place(key)}: must be a place, {nearest(key, _listed(system))}")
+            near = nearest(key, _listed(system))
+            raise InputError(f"{place(key)}: no place in a system file; {near}")
         *tables, name = _place(names, key, place(key))
         table = root
         for entry in tables:
@@ -80,7 +81,7 @@ def _place(names: Collection[str], key: str, said: str) -> tuple[str, ...]:
 def _listed(system: Structure) -> list[str]:
     """The places that are most like what a user means: variables, and the entries of sections."""
     ports = [f"{c.name}.{v.name}" for c in system.components for v in c.interface.of(*SETTABLE)]
-    return ports + [f"{section}.{entry}" for section, found in PLACES.items() for entry in found]
+    return [f"{section}.{entry}" for section, found in PLACES.items() for entry in found] + ports
 
 
 def plain(value: Any) -> Any:

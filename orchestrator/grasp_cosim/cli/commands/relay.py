@@ -32,26 +32,26 @@ def _span(_: Any, __: Any, given: str) -> tuple[float, float]:
     default="0",
     callback=_span,
     metavar="S|FROM:TO",
-    help="Hold every datagram back, always as long or anything from one to the other.",
+    help="Time that a datagram takes in s; anything from one to the other, or always as long.",
 )
-@click.option("--loss", type=float, default=0.0, help="Lose one with this probability, 0 to 1.")
-@click.option("--duplicate", type=float, default=0.0, help="Send one twice, the same.")
-@click.option("--reorder", type=float, default=0.0, help="Let 20 ms of others overtake, the same.")
+@click.option("--loss", type=float, default=0.0, help="Probability that a datagram is lost.")
+@click.option("--duplicate", type=float, default=0.0, help="Probability that it comes twice.")
+@click.option("--reorder", type=float, default=0.0, help="Probability that it takes 20 ms more.")
 @click.option(
     "--outage",
     "outages",
     multiple=True,
     metavar="FROM:UNTIL",
-    help="Let nothing through, by numbers of requests, or by s since the first as in 0.5s:2s.",
+    help="Nothing gets through: numbers of requests, or s since the first as in 0.5s:2s.",
 )
 @click.option(
     "--seed",
     type=click.IntRange(0),
     default=0,
     show_default=True,
-    help="Lose, delay and double other datagrams.",
+    help="Another number has other datagrams lost, late or doubled.",
 )
-@click.option("--log", type=PATH, help="Write the fate of each datagram as CSV.")
+@click.option("--log", type=PATH, help="CSV to write with the fate of each datagram.")
 @json_option
 def relay(
     listen: str,

@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from ...errors import InputError, SimulationError
-from ...master.simulation import MOST, simulate
+from ...master.simulation import simulate
 from ...recording.folder import RunFolder
 from ...recording.mdf import check_mdf
 from ...recording.result import Result
@@ -46,7 +46,7 @@ from ..options import (
 @native_option("as SYSTEM names them; of the built-in grasp native.")
 @click.option("--realtime", is_flag=True, help="Pace the run by the clock, and print its timing.")
 @click.option(
-    "--every", type=click.IntRange(1, MOST), default=1, help="Record each N-th step only."
+    "--every", type=click.IntRange(1), default=1, metavar="N", help="Record each N-th step only."
 )
 @click.option("-o", "--out", type=PATH, help="Write signals.csv and run.json into a folder.")
 @click.option(
