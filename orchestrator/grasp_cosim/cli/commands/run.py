@@ -43,7 +43,7 @@ from ..options import (
 @swap_option
 @input_option
 @metrics_option
-@native_option("as SYSTEM names them; of the built-in grasp native.")
+@native_option("as SYSTEM names them, but native for the built-in grasp.")
 @click.option("--realtime", is_flag=True, help="Pace the run by the clock, and print its timing.")
 @click.option(
     "--every", type=click.IntRange(1), default=1, metavar="N", help="Record each N-th step only."
