@@ -42,12 +42,11 @@ def check_folder(folder: Path) -> None:
 WANTED = {
     "fmu": "an FMU, a file",
     "system": "a system, a .toml or .ssp file",
-    "study": "a study, a .toml file, or the name of one that is built in",
     "run": "a folder that `grasp-cosim run --out` wrote",
 }
 """The natures of files that a command may want, in words."""
 
-_SUFFIXES = {"fmu": (".fmu",), "system": (".toml", ".ssp"), "study": (".toml",)}
+_SUFFIXES = {"fmu": (".fmu",), "system": (".toml", ".ssp")}
 _IN_A_RUN = {"run.json", "signals.csv"}
 _IN_AN_ARCHIVE = {"modelDescription.xml": "an FMU", "SystemStructure.ssd": "an SSP archive"}
 
