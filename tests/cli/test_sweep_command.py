@@ -45,8 +45,8 @@ def test_a_grid_leaves_its_table_and_a_picture(command: Run) -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        ((), "what varies must be said, by --vary or by --table"),
-        ((*WIDTH, "--table", "rows.csv"), "what varies must be said, by --vary or by --table"),
+        ((), "needs --vary or --table, one of them"),
+        ((*WIDTH, "--table", "rows.csv"), "needs --vary or --table, one of them"),
         (("--vary", "plant.object_width"), "--vary 'plant.object_width': must be PLACE=START:END"),
         (("--vary", "plant.width=1,2"), "width"),
         ((*WIDTH, "--scheduler", "tcp://x", "--workers", "1"), "--workers: cannot be used with"),

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from si_units import known_unit
 
-from ..errors import InputError
+from ..errors import InputError, reason
 from ..interface.interface import Value
 from ..interface.units import IDENTITY, Conversion
 from ..system.description import System
@@ -90,7 +90,8 @@ def read_rows(path: Path) -> list[dict[str, Value]]:
         with path.open(encoding="utf-8-sig", newline="") as file:
             head, *lines = csv.reader(file)
     except (OSError, UnicodeDecodeError, ValueError, csv.Error) as error:
-        raise InputError(f"--table {path}: {error}; must be a CSV file with a head") from error
+        said = f"--table {path}: {reason(error)}"
+        raise InputError(f"{said}; must be a CSV file whose first line has names") from error
     columns = [_column(path, title.strip()) for title in head]
     rows = []
     for number, line in enumerate(lines, 2):

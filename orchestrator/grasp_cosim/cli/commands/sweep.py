@@ -86,7 +86,7 @@ def sweep(out: Path, scheduler: str | None, plot: bool, as_json: bool, **given: 
     if scheduler and given["workers"]:
         raise InputError("--workers: cannot be used with --scheduler, which has its own")
     if bool(given["table"]) == bool(given["vary"]):
-        raise InputError("sweep: what varies must be said, by --vary or by --table")
+        raise InputError("sweep: needs --vary or --table, one of them")
     out = out if out.suffix else out / TABLE
     check_format(out)
     check_outputs(out.parent, plot)
