@@ -11,6 +11,7 @@ import pytest
 from conftest import Run
 from grasp_cosim import System, simulate
 from grasp_cosim.fmi.process import ProcessInstance
+from support.isolated import isolated
 from support.native_fmus import TYPES, build, needs_gcc
 
 
@@ -114,5 +115,5 @@ def test_the_option_goes_before_the_file(
 @needs_gcc
 def test_the_numbers_are_the_same(tmp_path: Path) -> None:
     system = System.load(system_file(tmp_path))
-    here, there = (simulate(system.with_isolation(i)) for i in ("none", "process"))
+    here, there = (simulate(isolated(system, i)) for i in ("none", "process"))
     assert all((here[name] == there[name]).all() for name in here)

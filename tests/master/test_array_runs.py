@@ -16,6 +16,7 @@ from grasp_cosim.recording.result import Result
 from grasp_cosim.system.parts import Isolation
 from scipy.linalg import expm
 from support.both_engines import engines
+from support.isolated import isolated
 from support.models import needs_cvode
 from support.native_fmus import needs_gcc
 from support.packages import skip_where_fmpy_runs_none
@@ -104,7 +105,7 @@ def test_it_is_as_exact_by_a_solver(
     values: dict[str, Any] = dict(zip(("ss.n", "ss.m", "ss.r"), sizes, strict=True))
     values |= {f"ss.{name}": value for name, value in given.items()}
     system = load(tmp_path, table, types=False, kind="ModelExchange").with_values(values)
-    result = simulate(system.with_isolation(isolation))
+    result = simulate(isolated(system, isolation))
     np.testing.assert_allclose(signals(result, "ss.y", sizes[2]), exact(given), 1e-7, 1e-8)
 
 
@@ -113,7 +114,7 @@ def test_it_is_as_exact_by_a_solver(
 def test_stimuli_drive_elements(tmp_path: Path, engine: Engine, isolation: Isolation) -> None:
     (tmp_path / "drive.csv").write_text("time,ss.u[2]\n0,1\n1,3\n", "utf-8")
     table = '[components.ss]\nfmu = "ss.fmu"\nvalues = { C = 0 }\n[input]\nfile = "drive.csv"\n'
-    system = load(tmp_path, table, types=False).with_isolation(isolation)
+    system = isolated(load(tmp_path, table, types=False), isolation)
     found = signals(simulate(system, engine=engine), "ss.y", 3)
     times = np.arange(17) * STEP - STEP
     assert found[1:, 1].tolist() == np.interp(times[1:], [0.0, 1.0], [1.0, 3.0]).tolist()
@@ -145,7 +146,7 @@ def test_a_process_of_its_own_changes_no_bit(tmp_path: Path, engine: Engine) -> 
     system = two(tmp_path, '"a.y[2] -> b.u[1]", "a.y_Int8 -> b.u_Int8"', more)
     system = system.with_values({"a.r": 2, "a.u_Int8": 5, "b.u_Float32": [[1, 2, 3], [4, 5, 6]]})
     here = simulate(system, engine=engine)
-    there = simulate(system.with_isolation("process"), engine=engine)
+    there = simulate(isolated(system, "process"), engine=engine)
     assert list(here.signals) == list(there.signals)
     for name in here.signals:
         np.testing.assert_array_equal(here[name], there[name], name)

@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.both_engines import engines
 from support.examples import examples
+from support.isolated import isolated
 from support.native_fmus import build, needs_gcc
 from support.packages import skip_where_fmpy_runs_none
 from support.stimuli import REALS, driven
@@ -106,7 +107,7 @@ def test_isolation_and_real_time_change_nothing(tmp_path: Path) -> None:
     system = System.load(driven(tmp_path, TEXT.format("Real"), more=INPUT))
     plain = simulate(system)
     for other in (
-        simulate(system.with_isolation("process")),
+        simulate(isolated(system, "process")),
         simulate(system, realtime=Realtime(factor=10.0)),
     ):
         assert all(column(plain, n) == column(other, n) for n in ("a.y_Real", "a.x", "a.y_Boolean"))

@@ -77,7 +77,7 @@ def test_a_value_of_a_variable_that_is_not_there_is_left_out_and_said(
 
 
 def test_isolation_stays(vendor: System, tmp_path: Path) -> None:
-    alone = vendor.with_isolation("process", "plant")
+    alone = vendor.with_settings({"components.plant.isolation": "process"})
     assert [c.isolation for c in alone.components] == ["process", "none"]
     fmu = write_fmu(tmp_path / "c.fmu", changed("mass", '"0.5"', '"0.6"'), {})
     assert alone.swap("plant", fmu).component("plant", "test").isolation == "process"

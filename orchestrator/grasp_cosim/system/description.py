@@ -21,7 +21,7 @@ from .checks import (
 )
 from .made_of import made_of
 from .native import natives
-from .parts import Component, Isolation
+from .parts import Component
 from .places import SECTIONS, as_file, changed, plain
 from .scenario_checks import check_scenario
 from .stimuli import INTERPOLATIONS, Stimuli, read_stimuli
@@ -176,14 +176,6 @@ class System(Structure):
             place = f"{self.name}: [presets.{name}] "
             system = system.with_settings(self.presets[name], place.__add__)
         return system
-
-    def with_isolation(self, isolation: Isolation, component: str = "") -> "System":
-        """A copy with all components, or one, in processes of their own or in this one."""
-        components = tuple(
-            replace(c, isolation=isolation) if component in ("", c.name) else c
-            for c in self.components
-        )
-        return replace(self, components=components)
 
     def with_input(self, input: str | Path | Stimuli | None) -> "System":  # noqa: A002
         """A copy whose inputs without a connection or value are driven by a CSV file, or by none.
