@@ -273,6 +273,15 @@ def since_contact(signals: Signals, finger: int) -> tuple[Floats, Floats]:
 
 
 def first_contact(signals: Signals, finger: int) -> FirstContact | None:
+    """First contact of a finger; None if it never touches. Most metrics ask for it."""
+    key = first_contact, finger
+    if key not in signals.worked_out:
+        signals.worked_out[key] = _first_contact(signals, finger)
+    found: FirstContact | None = signals.worked_out[key]
+    return found
+
+
+def _first_contact(signals: Signals, finger: int) -> FirstContact | None:
     """First contact of a finger; None if it never touches.
 
     Between the last free communication point and the first one in contact, the moment is where

@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from numbers import Integral
 from typing import Any
 
@@ -66,6 +67,8 @@ class Session:
     ) -> None:
         """Load and initialise; see simulate() for the arguments and errors."""
         system = system.with_experiment(step, stop, scheme, diverging)
+        if not all(c.is_current for c in system.components):
+            system = replace(system, components=tuple(replace(c) for c in system.components))
         system = system.with_natives(needed_twins(system))
         _check_count("every", every)
         recorded = {str(port) for port in system.recorded}
@@ -85,7 +88,8 @@ class Session:
         self.pacer = Pacer(system, paced, self.halt.is_set) if paced else None
         self._privileges = Privileges()
         self._stack = ExitStack()
-        self._tell((*system.notes, *remarks(system)))
+        self._known = (*system.notes, *remarks(system))
+        self._tell(self._known)
         try:
             with interruptible(), _folder_kept():
                 self._begin(listeners, every, engine)
@@ -277,8 +281,7 @@ class Session:
     def _early(self) -> tuple[str, ...]:
         """The lines of the log that are known before the first step."""
         return (
-            *self.system.notes,
-            *remarks(self.system),
+            *self._known,
             *self._in_si.notes,
             *self._master.log,
         )

@@ -70,7 +70,8 @@ class Signals(Mapping[str, npt.NDArray[Any]]):
     by_name: Mapping[str, npt.NDArray[Any]]
     roles: Mapping[str, str] = field(default_factory=dict)
     to_si: Mapping[str, Conversion | None] = field(default_factory=dict)
-    _converted: dict[str, npt.NDArray[Any]] = field(default_factory=dict, init=False, repr=False)
+    worked_out: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)
+    """What one metric leaves for the next, by keys of their own; signals in SI units by name."""
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
         """The signal; MissingSignalError where it was not recorded, InputError where its unit is in
@@ -82,15 +83,16 @@ class Signals(Mapping[str, npt.NDArray[Any]]):
         own = resolved(name, self.roles)
         if own not in self.to_si:
             return self.by_name[own]
-        if own not in self._converted:
+        if own not in self.worked_out:
             conversion = self.to_si[own]
             if conversion is None:
                 raise InputError(
                     f"the unit of {own} is in doubt, as it has none and its connections scale it; "
                     f"must be named in the system file, under units"
                 )
-            self._converted[own] = conversion(self.by_name[own])
-        return self._converted[own]
+            self.worked_out[own] = conversion(self.by_name[own])
+        converted: npt.NDArray[Any] = self.worked_out[own]
+        return converted
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.by_name)

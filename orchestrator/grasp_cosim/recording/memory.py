@@ -88,12 +88,19 @@ class MemoryListener:
         self._steps, self._table = steps, table
 
 
+AT_ONCE = 2**26
+"""Bytes of a table that gets its memory at once, which is sooner than page by page."""
+
+
 def _table(columns: int, rows: int) -> npt.NDArray[np.float64]:
     """Return a table without a huge page, of which each column would make the system clear one,
     every now and then, in the middle of a run.
     """
     if sys.platform == "win32" or not columns * rows:
         return np.empty((columns, rows))
+    size = columns * rows * np.dtype(np.float64).itemsize
     private = mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS
-    memory = mmap.mmap(-1, columns * rows * np.dtype(np.float64).itemsize, flags=private)
+    if size <= AT_ONCE:
+        private |= getattr(mmap, "MAP_POPULATE", 0)
+    memory = mmap.mmap(-1, size, flags=private)
     return np.frombuffer(memory, np.float64).reshape(columns, rows)

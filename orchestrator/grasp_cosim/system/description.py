@@ -214,7 +214,7 @@ class System(Structure):
         """
         given = {"step": step, "stop": stop, "scheme": scheme, "diverging": diverging}
         changed = {key: value for key, value in given.items() if value is not None}
-        return replace(self, **experiment(str, changed))
+        return replace(self, **experiment(str, changed)) if changed else self
 
     def _changed(self, section: str, file: Mapping[str, Any], place: Callable[[str], str]) -> Any:
         """The options of a section with those of a file."""

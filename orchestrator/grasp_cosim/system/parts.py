@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -72,7 +74,7 @@ class Solver:
     maximum_step: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Component:
     """An instance of an FMU and what it is given: the system's names, values, step and process.
 
@@ -84,6 +86,8 @@ class Component:
     system's names. native is the FMU that runs in the place of fmu, its native twin: with the same
     variables and the same bits, so that all else goes by fmu. With a solver its equations are
     integrated here, by model exchange, though it may have a co-simulation of its own.
+
+    What its FMUs declare is read once; is_current says if the files are still the same.
     """
 
     name: str
@@ -103,7 +107,7 @@ class Component:
             return None
         return self.solver or Solver()
 
-    @property
+    @cached_property
     def interface(self) -> Interface:
         """The declared interface of the FMU, under the system's names and with its units.
 
@@ -111,20 +115,39 @@ class Component:
         """
         return self.declared.in_units(self.units, f"{self.name}: units")
 
-    @property
+    @cached_property
     def declared(self) -> Interface:
         """The same with the units that the FMU declares."""
-        return self.sized(read_interface(self.fmu)).renamed(self.rename, f"{self.name}: rename")
+        return self.sized(self._read[0]).renamed(self.rename, f"{self.name}: rename")
 
-    @property
+    @cached_property
     def loaded(self) -> Interface:
         """The interface of the FMU that runs: of its native twin, where it has one."""
-        return replace(self, fmu=self.native or self.fmu).interface
+        return (
+            replace(self, fmu=self.native, native=None).interface if self.native else self.interface
+        )
+
+    @property
+    def is_current(self) -> bool:
+        """True if its FMUs are still those that were read."""
+        return all(map(operator.is_, self._read, self._now()))
+
+    @cached_property
+    def _read(self) -> list[Interface]:
+        return self._now()
+
+    def _now(self) -> list[Interface]:
+        """What the files of its FMUs declare now."""
+        return [read_interface(fmu) for fmu in (self.fmu, self.native) if fmu]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What it was made of alone: other processes read the FMUs themselves."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
 
     @property
     def needs_native(self) -> bool:
         """True if no native twin is chosen, and the FMU is in Python, without a binary for here."""
-        fmu = read_interface(self.fmu)
+        fmu = self._read[0]
         return self.native is None and fmu.python and of_binary(fmu) is not None
 
     def names_unit(self, variable: Variable) -> bool:
