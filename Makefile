@@ -61,9 +61,8 @@ docs: .venv/dev
 	$(BIN)/python docs/notebook.py
 
 bench: .venv/dev
-	$(BIN)/python -m benchmarks.macro_step
-	$(BIN)/python -m benchmarks.scaling
 	$(BIN)/python -m benchmarks.masters
+	$(BIN)/python -m benchmarks.sweep
 
 cards: .venv/run
 	$(BIN)/python -m grasp_fmus.cards
