@@ -174,6 +174,18 @@ def test_an_option_that_is_none_is_refused(wrong: dict[str, Any], message: str) 
         Realtime(**wrong)
 
 
+def test_the_system_says_how_it_is_paced_unless_the_call_does(grasp: System) -> None:
+    system = grasp.with_settings({"realtime.factor": "2000", "realtime.overrun": "continue"})
+    options: dict[str, Any] = {"step": 1e-3, "stop": 0.02}
+    paced = simulate(system, realtime=True, **options).timing
+    assert paced is not None
+    assert (paced.factor, paced.overrun) == (2000.0, "continue")
+    other = simulate(system, realtime=Realtime(factor=3000.0), **options).timing
+    assert other is not None
+    assert (other.factor, other.overrun) == (3000.0, "catch-up")
+    assert simulate(system, **options).timing is None
+
+
 @pytest.mark.parametrize(
     ("listed", "there"), [("0", [0]), ("0-1", [0, 1]), ("0,2-4,9", [0, 2, 3, 4, 9])]
 )
