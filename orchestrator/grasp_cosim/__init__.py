@@ -9,8 +9,7 @@
 
 Importing it imports nothing yet, builds nothing and writes nothing: each name below is imported
 when it is asked for. Further in: `grasp_cosim.metrics.metric`, `grasp_cosim.recording.listener`,
-`grasp_cosim.recording.csv`, `grasp_cosim.recording.mdf`, `grasp_cosim.comparison.compare`,
-`grasp_cosim.qualification.qualify`, `grasp_cosim.qualification.bands`.
+`grasp_cosim.recording.csv`, `grasp_cosim.recording.mdf`.
 """
 
 from __future__ import annotations
@@ -28,14 +27,18 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
+    from .comparison.compare import compare
     from .grasp.identification.identification import identify
     from .grasp.published.evaluation import evaluate
     from .grasp.system import grasp_system
+    from .inspection.inspection import inspect_fmu
     from .master.simulation import Session, simulate
     from .metrics.metric import Metric, metric
+    from .qualification.qualify import qualify
     from .recording.load import load_run
     from .recording.result import Result
-    from .report.page import Scene
+    from .report.page import Scene, write_page
+    from .ssp.write import write_ssp
     from .sweeps.sweep import sweep
     from .system.description import System
     from .system.realtime import Realtime
@@ -49,13 +52,18 @@ __all__ = [
     "Session",
     "SimulationError",
     "System",
+    "compare",
     "evaluate",
     "grasp_system",
     "identify",
+    "inspect_fmu",
     "load_run",
     "metric",
+    "qualify",
     "simulate",
     "sweep",
+    "write_page",
+    "write_ssp",
 ]
 
 _HOMES = {
@@ -64,13 +72,18 @@ _HOMES = {
     "Result": "recording.result",
     "Session": "master.simulation",
     "System": "system.description",
+    "compare": "comparison.compare",
     "evaluate": "grasp.published.evaluation",
     "grasp_system": "grasp.system",
     "identify": "grasp.identification.identification",
+    "inspect_fmu": "inspection.inspection",
     "load_run": "recording.load",
     "metric": "metrics.metric",
+    "qualify": "qualification.qualify",
     "simulate": "master.simulation",
     "sweep": "sweeps.sweep",
+    "write_page": "report.page",
+    "write_ssp": "ssp.write",
 }
 
 
