@@ -76,7 +76,7 @@ class Session:
         all_of_them = metrics_of(system.metrics, self._metrics)
         self._in_si = in_si(system, all_of_them)  # refuses before, not after
         self.system = system
-        self._memory = MemoryListener(every)
+        self._memory = MemoryListener(every, bool(realtime))
         self._wall_time = 0.0
         self._failed = False
         self._closed = False

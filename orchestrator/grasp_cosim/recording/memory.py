@@ -18,12 +18,12 @@ TYPES = {"Real": np.float64, "Integer": np.int64, "Boolean": np.bool_}
 class MemoryListener:
     """Copies the rows into one table, which has room for the whole run from the start.
 
-    every is the decimation of the run, from 1 on. The table takes up memory only as far as it is
-    filled.
+    every is the decimation of the run, from 1 on; paced says that it is to be in real time. The
+    table takes up memory only as far as it is filled.
     """
 
-    def __init__(self, every: int = 1) -> None:
-        self._every = every
+    def __init__(self, every: int = 1, paced: bool = False) -> None:
+        self._every, self._paced = every, paced
         self._rows = 0
 
     def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
@@ -80,7 +80,8 @@ class MemoryListener:
     def _grow(self, rows: int) -> None:
         """Have room for so many rows; MemoryError where there is none."""
         try:
-            steps, table = np.empty(rows, np.int64), _table(len(self._signals), rows)
+            steps, shape = np.empty(rows, np.int64), (len(self._signals), rows)
+            table = _small_pages(*shape) if self._paced else np.empty(shape)
         except (ValueError, OverflowError, OSError) as error:  # more bytes than there can be
             raise MemoryError from error
         steps[: self._rows] = self._steps[: self._rows]
@@ -88,19 +89,12 @@ class MemoryListener:
         self._steps, self._table = steps, table
 
 
-AT_ONCE = 2**26
-"""Bytes of a table that gets its memory at once, which is sooner than page by page."""
-
-
-def _table(columns: int, rows: int) -> npt.NDArray[np.float64]:
+def _small_pages(columns: int, rows: int) -> npt.NDArray[np.float64]:
     """Return a table without a huge page, of which each column would make the system clear one,
     every now and then, in the middle of a run.
     """
     if sys.platform == "win32" or not columns * rows:
         return np.empty((columns, rows))
-    size = columns * rows * np.dtype(np.float64).itemsize
     private = mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS
-    if size <= AT_ONCE:
-        private |= getattr(mmap, "MAP_POPULATE", 0)
-    memory = mmap.mmap(-1, size, flags=private)
+    memory = mmap.mmap(-1, columns * rows * np.dtype(np.float64).itemsize, flags=private)
     return np.frombuffer(memory, np.float64).reshape(columns, rows)
