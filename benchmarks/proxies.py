@@ -147,7 +147,7 @@ def kills(system: System, folder: Path) -> None:
 
 def main() -> None:
     """All of it, in a folder of its own."""
-    system = grasp_system()
+    system = grasp_system(native=False)
     with tempfile.TemporaryDirectory() as folder:
         cost(system, Path(folder))
         native_cost(Path(folder))

@@ -1,6 +1,7 @@
 """The grasp in real time, four FMUs at 1 and 10 kHz, beside what the machine itself does.
 
     python -m benchmarks.realtime [--seconds 60] [--rates 1000 10000] [--priority P] [--cpu N]
+        [--python]
 
 Three measurements for each rate, under the same priority and on the same CPU. The gaps of a loop
 that only looks at the clock are times in which this machine ran nothing of ours: nobody can do
@@ -70,9 +71,9 @@ def stolen() -> float:
     return float(stat.read_text().split()[8]) / 100.0 if stat.exists() else 0.0
 
 
-def measure(seconds: float, rate: int, realtime: Realtime) -> None:
+def measure(seconds: float, rate: int, realtime: Realtime, native: bool) -> None:
     """All three at a rate in Hz."""
-    system = grasp_system().with_experiment(1.0 / rate, seconds, None)
+    system = grasp_system(native=native).with_experiment(1.0 / rate, seconds, None)
     simulate(system, stop=10 / rate)  # compiles the loop
     marks = [stolen()]
     with privileges(realtime):
@@ -111,6 +112,9 @@ if __name__ == "__main__":
     parser.add_argument("--rates", type=int, nargs="+", default=[1000, 10_000])
     parser.add_argument("--priority", type=int)
     parser.add_argument("--cpu", type=int)
+    parser.add_argument("--python", action="store_true", help="FMUs in Python, not native ones")
     given = parser.parse_args()
     for rate in given.rates:
-        measure(given.seconds, rate, Realtime(priority=given.priority, cpu=given.cpu))
+        measure(
+            given.seconds, rate, Realtime(priority=given.priority, cpu=given.cpu), not given.python
+        )
