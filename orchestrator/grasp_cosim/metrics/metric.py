@@ -348,7 +348,10 @@ def available(
     metrics: Iterable[Metric], names: Collection[str], roles: Mapping[str, str]
 ) -> tuple[list[Metric], list[str]]:
     """The metrics that signals of these `names` permit, and a line for each reason against one."""
-    reasons = [(m, lacking(m.needs, names, roles)) for m in metrics]
+    metrics = tuple(metrics)
+    distinct = {id(m.needs): m.needs for m in metrics}  # those of a group share theirs
+    lacks = {key: lacking(needs, names, roles) for key, needs in distinct.items()}
+    reasons = [(m, lacks[id(m.needs)]) for m in metrics]
     there = [m for m, reason in reasons if not reason]
     in_part = {m.group for m in there}
     missing: dict[str, str] = {}

@@ -91,7 +91,10 @@ def _expected(system: Structure, metrics: Iterable[Metric]) -> dict[str, _Expect
     """What is expected of signals by their names, by the first metric that does."""
     recorded = {str(port) for port in system.recorded}
     found: dict[str, _Expected] = {}
+    first_with: dict[int, Metric] = {}  # metrics of a group share what they need
     for metric in available(metrics, recorded, system.roles)[0]:
+        first_with.setdefault(id(metric.needs), metric)
+    for metric in first_with.values():
         purpose = f"the metrics of the {metric.group}" if metric.group else metric.name
         for name, unit in metric.expects.items():
             if unit is not None:
