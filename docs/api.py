@@ -21,8 +21,8 @@ MODULES = (
     "grasp_cosim.recording.mdf",
     "grasp_cosim.sweeps.sweep",
     "grasp_cosim.comparison.compare",
-    "grasp_cosim.qualification.qualify",
-    "grasp_cosim.qualification.bands",
+    "grasp_cosim.comparison.qualify",
+    "grasp_cosim.comparison.bands",
 )
 """What users import; the names of `grasp_cosim` itself are all that most need."""
 

@@ -206,15 +206,15 @@ def test_a_swap_is_qualified(python: Python) -> None:
 
         from grasp_cosim import System
         from grasp_cosim.metrics.metric import load_metrics
-        from grasp_cosim.qualification.qualify import qualify
-        from grasp_cosim.qualification.verdict import as_json, as_text
+        from grasp_cosim.comparison.qualify import qualify
+        from grasp_cosim.comparison.words import qualification_json, qualification_text
 
         system = System.load("oscillator.toml")
         found = qualify(system, "b", "integrator.fmu", metrics=load_metrics(Path("mine.py")))
         assert found.qualified
         assert [c.name for c in found.metrics] == ["amplitude"]
-        assert "amplitude" in as_text(found)
-        assert as_json(found)["metrics"][0]["unit"] == "m"
+        assert "amplitude" in qualification_text(found)
+        assert qualification_json(found)["metrics"][0]["unit"] == "m"
         """
     )
 

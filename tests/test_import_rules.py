@@ -169,7 +169,7 @@ FLOORS = (
     ("recording",),
     ("ssp", "inspection", "drafting"),
     ("master",),
-    ("sweeps", "qualification", "comparison", "hil"),
+    ("sweeps", "comparison", "hil"),
     ("report",),
     ("grasp",),
     ("cli",),

@@ -28,13 +28,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from .comparison.compare import compare
+    from .comparison.qualify import qualify
     from .grasp.identification.identification import identify
     from .grasp.published.evaluation import evaluate
     from .grasp.system import grasp_system
     from .inspection.inspection import inspect_fmu
     from .master.simulation import Session, simulate
     from .metrics.metric import Metric, metric
-    from .qualification.qualify import qualify
     from .recording.load import load_run
     from .recording.result import Result
     from .report.page import Scene, write_page
@@ -79,7 +79,7 @@ _HOMES = {
     "inspect_fmu": "inspection.inspection",
     "load_run": "recording.load",
     "metric": "metrics.metric",
-    "qualify": "qualification.qualify",
+    "qualify": "comparison.qualify",
     "simulate": "master.simulation",
     "sweep": "sweeps.sweep",
     "write_page": "report.page",

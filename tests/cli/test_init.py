@@ -6,12 +6,12 @@ import shutil
 from pathlib import Path
 
 import pytest
+from comparison.made import write_fmu
 from conftest import Run
 from grasp_cosim import System
 from grasp_cosim.cli.commands.init import shown
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.system.toml import to_do
-from qualification.made import write_fmu
 from support.models import build_model
 from support.native_fmus import needs_gcc
 

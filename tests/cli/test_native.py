@@ -24,6 +24,7 @@ pytestmark = needs_compiler
 ANNOUNCED = "compiling the native FMUs, once for these sources, 0 s\n"
 SPRING = Path(__file__).parents[2] / "docs/spring_plant.py"
 SHORT = ("--step", "1e-3", "--stop", "0.3")
+HERE = ("--set", "components.plant.isolation=none")
 
 
 def ran(folder: str) -> dict[str, Any]:
@@ -104,7 +105,7 @@ def test_which_fmus_run_where_nothing_is_said_of_it(
     "arguments",
     [
         ("sweep", "--vary", "plant.finger_mass[1]=0.5,0.6", *SHORT, "--workers", "1"),
-        ("qualify", "plant.fmu", "--as", "plant", *SHORT, "--isolation", "none"),
+        ("qualify", "plant.fmu", "--as", "plant", *SHORT, *HERE),
     ],
     ids=lambda arguments: arguments[0],
 )  # fmt: skip
@@ -288,7 +289,9 @@ def test_one_that_is_native_already_is_no_exception(command: Run, tmp_path: Path
     system.write_text(text.replace('fmu = "', f'fmu = "{kept}/'), "utf-8")
     for option in ("--native", "--python"):
         assert command("run", system, *SHORT, option)[::2] == (0, "")
-    qualified = command("qualify", twin, "--as", "plant", *SHORT, "--isolation", "none")
+    qualified = command(
+        "qualify", twin, "--as", "plant", *SHORT, "--set", "components.plant.isolation=none"
+    )
     assert qualified[2] == ""
 
 

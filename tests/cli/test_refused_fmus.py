@@ -101,7 +101,15 @@ def test_a_candidate_with_a_binary_for_others(command: Run, fmus: Path, tmp_path
         lambda files: {n: d for n, d in files.items() if "linux" not in n},
     )
     for isolation in ("none", "process"):
-        run = command("qualify", "x.fmu", "--as", "plant", "--isolation", isolation, "--python")
+        run = command(
+            "qualify",
+            "x.fmu",
+            "--as",
+            "plant",
+            "--set",
+            f"components.plant.isolation={isolation}",
+            "--python",
+        )
         one_line(run, "x.fmu: has a binary for win64 only", "ask the vendor for an FMU with a bin")
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from conftest import Run
 from grasp_cosim import System, load_run, simulate
-from grasp_cosim.qualification.qualify import qualify
+from grasp_cosim.comparison.qualify import qualify
 from grasp_cosim.ssp.write import write_ssp
 from support.native_fmus import build, needs_gcc
 from support.stimuli import driven

@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from grasp_cosim import InputError, metric
+from grasp_cosim import InputError, System, metric, simulate
+from grasp_cosim.comparison.bands import Bands, Given
 from grasp_cosim.comparison.compare import Comparison, compare
 from grasp_cosim.comparison.words import as_json, as_text
-from grasp_cosim.qualification.bands import Bands, Given
+from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.recording.result import Result
 from hypothesis import given
 from hypothesis import strategies as st
@@ -91,14 +92,16 @@ def test_runs_at_other_times_are_refused_in_one_line(folders: Any) -> None:
         folders(run, later)
 
 
-def test_signals_and_metrics_of_one_run_only_are_named_and_not_judged(folders: Any) -> None:
+def test_a_metric_that_one_run_only_has_a_value_of_is_out(folders: Any) -> None:
     run = grasp_run()
     less = {name: c for name, c in run.items() if name != "controller.target_position"}
     found = folders(run, replace(run, signals=less, units={n: run.units[n] for n in less}))
-    assert found.alike
+    assert not found.alike
     assert found.only == (("controller.target_position",), ())
     assert "time_to_contact[1]" in found.only_metrics[0]
-    assert not found.metrics
+    outside = {m.name for m in found.metrics if not m.inside}
+    assert "time_to_contact[1]" in outside
+    assert {m.candidate for m in found.metrics} == {None}
     assert "signals only in A: controller.target_position" in as_text(found)
 
 
@@ -181,3 +184,31 @@ def test_an_offset_is_inside_just_where_it_is_no_wider_than_its_band(
     assert found.alike == (abs((0.1 + by) - 0.1) <= width)
     back = compare(folder / "b.csv", folder / "a.csv", bands=bands)
     assert back.signals[0].deviation == found.signals[0].deviation
+
+
+def test_a_run_that_did_not_come_to_its_end_is_not_alike(folders: Any) -> None:
+    run = grasp_run()
+    found = folders(run, replace(run, complete=False))
+    assert not found.alike
+    assert as_text(found).startswith("DIFFERENT: B did not come to its end; 0 of ")
+
+
+def test_metrics_without_a_value_on_both_sides_are_not_inside(grasp: System) -> None:
+    run = simulate(grasp, step=1e-3, stop=0.3)
+    found = compare(run, run)
+    assert found.alike
+    assert "time_to_contact[1]" in found.absent
+    assert "time_to_contact[1]" not in {m.name for m in found.metrics}
+    assert "nothing was touched until t = 0.3 s: " in as_text(found)
+
+
+def test_a_system_is_run_as_long_as_the_other_run(
+    grasp: System, fmus: Path, tmp_path: Path
+) -> None:
+    text = SYSTEM.read_text("utf-8").replace('fmu = "', f'fmu = "{fmus}/')
+    (tmp_path / "grasp.toml").write_text(text, "utf-8")
+    run = simulate(grasp, stop=0.05)
+    found = compare(tmp_path / "grasp.toml", run)
+    assert found.alike
+    assert (found.begin, found.end) == (0.0, 0.05)
+    assert {s.deviation for s in found.signals} == {0.0}

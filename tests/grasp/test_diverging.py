@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from conftest import Run
 from grasp_cosim import SimulationError, System, simulate
+from grasp_cosim.comparison.qualify import qualify
 from grasp_cosim.master import master
 from grasp_cosim.master.engine import Engine
-from grasp_cosim.qualification.qualify import qualify
 from grasp_cosim.ssp.write import write_ssp
 from grasp_cosim.system.parts import Port
 from grasp_cosim.system.toml import read_toml

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from conftest import MadeOnce, Run
 from grasp_cosim import InputError, Result, System, load_run, simulate
+from grasp_cosim.comparison.qualify import qualify
 from grasp_cosim.grasp.identification.identification import chosen
 from grasp_cosim.grasp.identification.log import identify_from_log
 from grasp_cosim.grasp.presets import SYSTEM, start_in_si, with_case, with_si_values
 from grasp_cosim.grasp.published.grasps import settled_force
 from grasp_cosim.grasp.scene import grasp_scene
 from grasp_cosim.metrics.metric import Signals, metric
-from grasp_cosim.qualification.qualify import qualify
 from grasp_cosim.recording.load import load_log
 from grasp_cosim.recording.result import UNITS
 from support.milli import milli_plant

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from grasp_cosim import System, simulate
 from grasp_cosim.cli.entry import main
-from grasp_cosim.qualification.qualify import qualify
+from grasp_cosim.comparison.qualify import qualify
 from grasp_cosim.recording.load import load_run
 from grasp_cosim.system.parts import Component, Connection, Port
 from grasp_cosim.system.realtime import Realtime

@@ -6,15 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from comparison.made import write_fmu
 from grasp_cosim import InputError, System, extensions, metric, simulate
+from grasp_cosim.comparison.qualify import qualify
 from grasp_cosim.interface.units import Conversion
 from grasp_cosim.metrics.metric import Metric, Signals, measure
 from grasp_cosim.metrics.units import InSi, in_si
-from grasp_cosim.qualification.qualify import qualify
 from grasp_cosim.sweeps.sweep import sweep
 from hypothesis import given
 from hypothesis import strategies as st
-from qualification.made import write_fmu
 
 OUTPUT = 'causality="output" | Real'
 INPUT = 'causality="input" | Real start="0"'
@@ -251,7 +251,9 @@ def test_every_way_to_run_a_system_refuses_it_first(
             InputError, match=r"must know its unit, one like m: \[components\.room\]"
         ):
             way()
-    with pytest.raises(InputError, match=r"of the candidate: --units 'VARIABLE=UNIT'$"):
+    with pytest.raises(
+        InputError, match=r"of the candidate: --set components.NAME.units.VARIABLE=UNIT$"
+    ):
         ways[-1]()
 
 

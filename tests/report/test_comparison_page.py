@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from grasp_cosim.comparison.bands import Bands, Given
 from grasp_cosim.comparison.compare import Comparison, compare
-from grasp_cosim.qualification.bands import Bands, Given
 from grasp_cosim.report.comparison import comparison_html
 from report.javascript import in_browser
 from report.runs import grasp_run, write_run

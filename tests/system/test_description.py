@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 from grasp_cosim import InputError, System
+from grasp_cosim.comparison.swap import prepare_swap
 from grasp_cosim.grasp.presets import SYSTEM
-from grasp_cosim.qualification.swap import prepare_swap
 from grasp_cosim.system.parts import Port
 
 TEXT = SYSTEM.read_text("utf-8")

@@ -4,12 +4,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from comparison.made import PLANT, write_fmu
 from grasp_cosim import InputError, System
 from grasp_cosim.interface.read import read_interface
 from grasp_cosim.system.checks import connection_transform, remarks
 from grasp_cosim.system.parts import Condition, Event, Port
 from grasp_cosim.system.settings import settings
-from qualification.made import PLANT, write_fmu
 from si_units import Unit
 
 SPRING = {

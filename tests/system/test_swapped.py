@@ -3,9 +3,9 @@
 from pathlib import Path
 
 import pytest
+from comparison.made import PLANT, changed, write_fmu, write_system
 from grasp_cosim import InputError, System
 from grasp_cosim.system.toml import to_do
-from qualification.made import PLANT, changed, write_fmu, write_system
 
 VENDOR = {{"gap": "luft", "force": "kraft"}.get(n, n): text for n, text in PLANT.items()}
 RENAME = {"gap": "luft", "force": "kraft"}

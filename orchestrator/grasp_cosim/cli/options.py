@@ -72,24 +72,27 @@ input_option = click.option(
     "--input", type=PATH, help="Drive inputs by a CSV file: time, then columns like plant.force."
 )
 
+preset_option = click.option(
+    "--preset", "presets", multiple=True, metavar="NAME", help="Take a preset of the system file."
+)
+
+step_option = click.option("--step", type=float, help="Communication step in s.")
+
+stop_option = click.option("--stop", type=float, help="Stop time in s.")
+
+scheme_option = click.option(
+    "--scheme",
+    type=click.Choice(SCHEMES),
+    help="Step the components one after the other (by default), or all at once.",
+)
+
 system_options = together(
     controller_option,
-    click.option(
-        "--preset",
-        "presets",
-        multiple=True,
-        metavar="NAME",
-        help="Take a preset of the system file.",
-    ),
+    preset_option,
     click.option("--case", type=click.IntRange(0, 2), help="Short for --preset case_0, ..._2."),
     set_option,
-    click.option("--step", type=float, help="Communication step in s."),
-    click.option("--stop", type=float, help="Stop time in s."),
-    click.option(
-        "--scheme",
-        type=click.Choice(SCHEMES),
-        help="Step the components one after the other (by default), or all at once.",
-    ),
+    step_option,
+    stop_option,
 )
 """How the system of a command, in its `system`, is changed."""
 

@@ -1,4 +1,4 @@
-"""Two recorded runs, or a run and a log from elsewhere: how far they are apart.
+"""How far two runs are apart, and whether an FMU may take the place of another.
 
-Bands and tubes are those of a qualification. Imports qualification, recording and what is below.
+Imports master, recording and what is below them.
 """

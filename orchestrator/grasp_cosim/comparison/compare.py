@@ -4,25 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 
 from ..errors import InputError, choices
+from ..extensions import readers
 from ..interface.units import Conversion
+from ..master.simulation import simulate
 from ..metrics.metric import Metric, metrics_of
-from ..qualification.bands import SHARE, Bands
-from ..qualification.compared import (
+from ..recording.result import Result
+from ..system.description import System
+from ..system.parts import NANOSECONDS
+from .bands import SHARE, Band, Bands
+from .judged import (
     FEWEST_STEPS,
     Compared,
     Curves,
+    Entries,
     Reference,
     Values,
     every_second,
     single_values,
 )
-from ..qualification.tube import ROUNDING, Curve
-from ..recording.result import Result
 from .settings import Difference, differences
 from .side import Side, side_of
+from .tube import ROUNDING, Curve
+
+RUNS = ("A", "B")
+"""What the two runs are called."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,8 +39,9 @@ class Comparison:
     """Two runs from `begin` to `end` in s; signals and metrics that both have, the worst first.
 
     Both are in the units of a. `curves` are the signals of a and of b that were compared, `asked`
-    the metrics that were, `only` the signals that only a has, then those that only b has, and
-    `only_metrics` the metrics. `differences` are those of their settings, where both are runs.
+    the metrics that were, `absent` those that neither has a value of, `only` the signals that only
+    a has, then those that only b has, and `only_metrics` the metrics. `differences` are those of
+    their settings, where both are runs. `names` are what the two are called.
     """
 
     a: Side
@@ -46,11 +56,19 @@ class Comparison:
     only_metrics: tuple[tuple[str, ...], tuple[str, ...]]
     differences: tuple[Difference, ...]
     notes: tuple[str, ...]
+    absent: tuple[str, ...] = ()
+    names: tuple[str, str] = RUNS
+
+    @property
+    def unfinished(self) -> tuple[str, ...]:
+        """The names of the runs that did not come to their end."""
+        sides = zip(self.names, (self.a, self.b), strict=True)
+        return tuple(name for name, s in sides if s.result and not s.result.complete)
 
     @property
     def alike(self) -> bool:
-        """True if all that was compared is inside its band."""
-        return all(c.inside for c in (*self.signals, *self.metrics))
+        """True if both came to their ends, and all that was compared is inside its band."""
+        return not self.unfinished and all(c.inside for c in (*self.signals, *self.metrics))
 
 
 def compare(
@@ -62,11 +80,16 @@ def compare(
 ) -> Comparison:
     """Compare two runs: each a result, a folder that `run --out` wrote, or a CSV or MDF file.
 
+    One may be a system file, too: it is run, as long as the other run is.
     Bands that are not given are derived from a alone, as in a qualification. `metrics` are compared
     beside those of the system. InputError where one cannot be read, or the two
     have no time or no signal in common.
     """
-    bands, first, second = bands or Bands(), side_of(a, "A"), side_of(b, "B")
+    bands = bands or Bands()
+    first, second = (
+        None if _is_system(run) else side_of(run, n) for run, n in ((a, "A"), (b, "B"))
+    )
+    first, second = first or _ran(a, second), second or _ran(b, first)
     first, second = first.like(second), second.like(first)
     begin, end = _overlap(first, second)
     ours, theirs = first.part(begin, end), second.part(begin, end)
@@ -78,20 +101,55 @@ def compare(
     curves = _converted(theirs, changes, reference.curves)
     values, again = single_values(theirs.by_role(), other), every_second(reference.curves)
     own = reference.values(reference.curves)
+    runs = first.result is not None and second.result is not None
+    of_both = {m.name for m in asked if runs and m in other and not m.optional}
     return Comparison(
         first,
         second,
         begin,
         end,
         reference.signals(curves, again, entries),
-        tuple(c for c in reference.metrics(values, again, singles) if c.name in values),
+        _metrics(reference, values, again, singles, of_both),
         ({name: reference.curves[name] for name in curves}, curves),
         asked,
         (_lacking(ours.signals, theirs.signals), _lacking(theirs.signals, ours.signals)),
         (_lacking(own, values), _lacking(values, own)),
         differences(first.result, second.result) if first.result and second.result else (),
         tuple(_notes(first, second, begin, end, changes)),
+        reference.absent(values),
     )
+
+
+def _metrics(
+    reference: Reference, values: Values, again: Sequence[Curves], given: Entries, both: set[str]
+) -> tuple[Compared, ...]:
+    """The metrics that both runs were asked for; one that only one has a value of is out."""
+
+    def asked(name: str) -> bool:
+        return name.partition("[")[0] in both
+
+    own, units = reference.values(reference.curves), {m.name: m.unit for m in reference.asked}
+    theirs = [
+        Compared(n, units[n.partition("[")[0]], Band(0.0, 0.0, "derived"), inf, None, v)
+        for n, v in values.items()
+        if n not in own and v is not None and asked(n)
+    ]
+    found = reference.metrics(values, again, given)
+    return (*theirs, *(c for c in found if c.name in values or asked(c.name)))
+
+
+def _is_system(run: Result | str | Path) -> bool:
+    return not isinstance(run, Result) and Path(run).suffix.lower() in readers
+
+
+def _ran(system: Result | str | Path, other: Side | None) -> Side:
+    """The run of a system file, no longer than the other run."""
+    loaded = System.load(str(system)).natively()
+    if other:
+        steps = round(float(other.time[-1]) * NANOSECONDS) // loaded.step_ns
+        stop = min(loaded.stop_ns, max(steps, 1) * loaded.step_ns)
+        loaded = loaded.with_experiment(stop=stop / NANOSECONDS)
+    return side_of(simulate(loaded), str(system))
 
 
 def _overlap(a: Side, b: Side) -> tuple[float, float]:
@@ -156,8 +214,6 @@ def _notes(
     if (a.time[0], a.time[-1]) != (b.time[0], b.time[-1]):
         yield f"compared from {begin:.6g} to {end:.6g} s, where both are: {', '.join(spans)}"
     for letter, side in _sides(a, b):
-        if side.result and not side.result.complete:
-            yield f"{letter} did not come to its end: it has rows to {side.time[-1]:.6g} s"
         if not side.result:
             yield f"{letter} is a log from elsewhere: its settings are not known"
             if side.silent:

@@ -15,11 +15,11 @@ from ..errors import InputError
 from ..files import check_nature
 from ..interface.units import IDENTITY, Conversion, conversion
 from ..metrics.metric import Metric, Signals
-from ..qualification.tube import ROUNDING, Curve, curve
 from ..recording.load import SETTINGS, SIGNALS, load_run, read_mdf
 from ..recording.result import Result
 from ..system.parts import NANOSECONDS
 from ..system.stimuli import read_stimuli
+from .tube import ROUNDING, Curve, curve
 
 Floats = npt.NDArray[np.float64]
 

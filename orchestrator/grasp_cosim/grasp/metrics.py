@@ -96,7 +96,7 @@ class FirstContact(NamedTuple):
     row: int
 
 
-@of_fingers("time_to_contact", "s", primary=True)
+@of_fingers("time_to_contact", "s", none="nothing was touched")
 def time_to_contact(signals: Signals, finger: int) -> float | None:
     """Moment where the gap of the last free sample runs out at its rate; None: never touches."""
     contact = first_contact(signals, finger)

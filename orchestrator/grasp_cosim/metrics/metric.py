@@ -117,7 +117,7 @@ class Metric:
     together or not at all, and why not is said once; an `optional` one is then left out in silence.
     A `reason` says why others have no value: it is left out where it has none itself, and
     a qualification does not compare it.
-    A `primary` one is what a study of the step size asks for where nothing else is named.
+    `none` says what it means where it has no value: "nothing was touched".
     """
 
     name: str
@@ -132,7 +132,7 @@ class Metric:
     group: str = ""
     optional: bool = False
     reason: bool = False
-    primary: bool = False
+    none: str = ""
     origin: tuple[str, str] | None = None
     """Of a metric from a file, the file's name and text: so it travels to other processes."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html import escape
 from math import isfinite
 from pathlib import Path
@@ -12,13 +12,22 @@ import numpy as np
 import numpy.typing as npt
 
 from ..comparison.compare import Comparison
+from ..comparison.judged import Compared
+from ..comparison.qualify import Qualification
 from ..comparison.side import Side
-from ..comparison.words import RUNS, basis, only_lines, verdict
+from ..comparison.tube import deviation, tube
+from ..comparison.words import (
+    basis,
+    difference_lines,
+    notes,
+    qualification_basis,
+    qualification_verdict,
+    reason,
+    verdict,
+)
 from ..files import write_text
 from ..metrics.metric import Metric
 from ..numerals import counted
-from ..qualification.compared import Compared
-from ..qualification.tube import deviation, tube
 from ..recording.result import Result
 from .caption import Caption, about, caption, changes
 from .embed import LIMIT, Shown, fit
@@ -39,8 +48,28 @@ def write_comparison(c: Comparison, path: Path, limit: int = LIMIT) -> None:
     write_text(path, comparison_html(c, limit))
 
 
+def write_qualification(q: Qualification, path: Path, limit: int = LIMIT) -> bool:
+    """Write the page of a qualification, as of a comparison; False where there were no two runs.
+
+    A page that was there before is gone then.
+    """
+    c = q.comparison
+    if c is None:
+        path.unlink(missing_ok=True)
+        return False
+    said = [*difference_lines(q.swap.differences), *qualification_basis(q)]
+    text = f"{qualification_verdict(q)}: {reason(q)}"
+    write_text(path, _html(c, limit, text, q.qualified, said))
+    return True
+
+
 def comparison_html(c: Comparison, limit: int = LIMIT) -> str:
-    """Return the page as text, see write_comparison."""
+    """Return the page of a comparison as text, see write_comparison."""
+    return _html(c, limit, verdict(c), c.alike, [*notes(c), *basis(c)])
+
+
+def _html(c: Comparison, limit: int, said: str, good: bool, remarks: Sequence[str]) -> str:
+    """Return the page as text, with what is `said` at its top, and remarks on the runs."""
     time = np.union1d(*(run.part(c.begin, c.end).time for run in (c.a, c.b)))
     shown = fit(time, {f"{s.name} {k}": v for s in c.signals for k, v in _drawn(c, s, time)}, limit)
     ids = {key: f"column{k}" for k, key in enumerate(shown.signals)}
@@ -48,14 +77,14 @@ def comparison_html(c: Comparison, limit: int = LIMIT) -> str:
     units = {s.name: s.unit for s in sorted(c.signals, key=lambda s: [*c.curves[0]].index(s.name))}
     texts = c.a.result.descriptions if c.a.result else {}
     sections = {
-        "runs": ("A and B", _runs(c)),
+        "runs": (" and ".join(c.names), _runs(c, remarks)),
         "traces": ("Traces", traces_html(_exactness(c, shown, len(time)), units, texts, ())),
         "metrics": ("Metrics", f'<div class="pairs">{_metrics(c)}</div>'),
         "signals-table": ("Signals, the worst first", f'<div class="pairs">{_signals(c)}</div>'),
     }
     return document(
         Caption(" and ".join(_called(side) for side in (c.a, c.b)), about(None)),
-        f'<span class="{"" if c.alike else "warn"}">{escape(verdict(c))}</span>',
+        f'<span class="{"" if good else "warn"}">{escape(said)}</span>',
         sections,
         _state(c, shown, ids, scene, texts),
         data_html(shown.time, {ids[key]: values for key, values in shown.signals.items()}),
@@ -123,14 +152,15 @@ def _exactness(c: Comparison, shown: Shown, rows: int) -> str:
         else ""
     )
     return (
-        f"A solid and pale, B dashed over it; the tube is the band around A. {count(rows)} rows of "
+        f"{c.names[0]} solid and pale, {c.names[1]} dashed over it; the tube is the band around "
+        f"{c.names[0]}. {count(rows)} rows of "
         f"{counted(len(c.signals), 'signal')}.{kept}"
     )
 
 
-def _runs(c: Comparison) -> str:
+def _runs(c: Comparison, remarks: Sequence[str]) -> str:
     """A table of the two runs and of the settings that differ; and what is not compared."""
-    sides, heads = (c.a, c.b), "".join(f"<th>{name}</th>" for name in ("", *RUNS))
+    sides, heads = (c.a, c.b), "".join(f"<th>{name}</th>" for name in ("", *c.names))
     about = [dict(origin_rows(side.result.origin)) if side.result else {} for side in sides]
     rows = [
         _row("from", [escape(side.name) for side in sides]),
@@ -147,8 +177,7 @@ def _runs(c: Comparison) -> str:
     settings = f"<h3>The settings differ in</h3>{table(heads, differ)}" if differ else ""
     if c.a.result and c.b.result and not differ:
         settings = "<p>The settings of the two runs are the same.</p>"
-    notes = bullets("Notes", [*c.notes, *only_lines(c), *basis(c)], "None.")
-    return f"{table(heads, rows)}{settings}{notes}"
+    return f"{table(heads, rows)}{settings}{bullets('Notes', remarks, 'None.')}"
 
 
 def _changed(run: Result) -> str:
@@ -178,7 +207,8 @@ def _metrics(c: Comparison) -> str:
     ]
     if not rows:
         return "<p>There are no metrics that both have.</p>"
-    return table(_heads(*RUNS, "B − A", "", "band"), rows)
+    first, second = c.names
+    return table(_heads(first, second, f"{second} − {first}", "", "band"), rows)
 
 
 def _heads(*heads: str) -> str:
@@ -212,7 +242,7 @@ def _signals(c: Comparison) -> str:
         )
         for s in c.signals
     ]
-    return table(_heads("", "at", "deviation", "band", *RUNS), rows)
+    return table(_heads("", "at", "deviation", "band", *c.names), rows)
 
 
 def _moment(c: Comparison, s: Compared) -> str:

@@ -5,9 +5,9 @@ from pathlib import Path
 import click
 
 from ...comparison import words
+from ...comparison.bands import read_bands
 from ...comparison.compare import compare as compare_runs
 from ...files import check_folder
-from ...qualification.bands import read_bands
 from ...report.comparison import write_comparison
 from ..frame import NEGATIVE, PATH, chosen_metrics, json_option, metrics_option, say, show, waiting
 
@@ -31,12 +31,13 @@ def compare(
     metric_files: tuple[Path, ...],
     as_json: bool,
 ) -> int:
-    """Compare two recorded runs, A and B.
+    """Compare two recorded runs, or a system and a run.
 
     It compares signals, metrics and settings, over the time that both have. A and B are folders
-    that `run --out` wrote, or files of signals from elsewhere: ASAM MDF (.mf4), or CSV with the
-    column time and names like plant.gap[1], with a unit in brackets where it is not the usual one:
-    "plant.gap[1] [mm]". The exit code is 1 where anything is out of its band.
+    that `run --out` wrote; systems (.toml or .ssp), which run as long as the other one; or files of
+    signals from elsewhere: ASAM MDF (.mf4), or CSV with the column time and names like
+    plant.gap[1], with a unit in brackets where it is not the usual one: "plant.gap[1] [mm]". The
+    exit code is 1 where anything is out of its band, or a run did not come to its end.
 
     \b
     Example: grasp-cosim compare results_a results_b -o compare.html

@@ -32,6 +32,7 @@ from ..options import (
     input_option,
     native_option,
     natively,
+    scheme_option,
     swap_option,
     system_options,
 )
@@ -40,6 +41,7 @@ from ..options import (
 @click.command()
 @click.argument("system", required=False, type=PATH)
 @system_options
+@scheme_option
 @swap_option
 @input_option
 @metrics_option

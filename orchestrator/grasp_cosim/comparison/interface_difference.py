@@ -134,7 +134,7 @@ def _missing(old: Variable, use: Use, candidate: Interface) -> Difference:
         found = nearest(name, alike, candidate.listing)
         text = (
             f"{causality} is {how} in the system, but missing; if it has another name: "
-            f"--rename '{name}=NAME'; {found}"
+            f"--set components.COMPONENT.rename.{name}=NAME; {found}"
         )
         return Difference("blocks", "missing", name, text)
     severity: Severity = "warns" if causality == "output" else "notes"

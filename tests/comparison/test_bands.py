@@ -5,8 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from grasp_cosim.errors import InputError
-from grasp_cosim.qualification.bands import (
+from grasp_cosim.comparison.bands import (
     BOTH,
     SHARE,
     SMALL,
@@ -18,7 +17,8 @@ from grasp_cosim.qualification.bands import (
     read_bands,
     signal_band,
 )
-from grasp_cosim.qualification.tube import Curve
+from grasp_cosim.comparison.tube import Curve
+from grasp_cosim.errors import InputError
 
 TIME = np.linspace(0.0, 1.0, 101, dtype=np.float64)
 SINE = Curve(TIME, 2.0 + np.sin(2.0 * np.pi * TIME))

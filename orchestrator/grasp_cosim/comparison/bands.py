@@ -12,6 +12,7 @@ signal or metric, in the unit of the original:
     time_to_contact = { absolute = 0.002 }    # of both fingers; or "time_to_contact[1]"
 """
 
+import json
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -78,8 +79,11 @@ class Bands:
 
 
 def read_bands(path: Path) -> Bands:
-    """The bands of a TOML file; InputError names the entry that is wrong."""
-    table = toml_table(path, "file of bands")
+    """The bands of a TOML file, or those that a qualification used, of what its --json printed.
+
+    InputError names the entry that is wrong.
+    """
+    table = _used(path) if path.suffix == ".json" else toml_table(path, "file of bands")
     for key in table:
         known(f"{path}: unknown entry", key, ("signals", "metrics"))
     return Bands(
@@ -87,6 +91,20 @@ def read_bands(path: Path) -> Bands:
         _entries(f"{path}: [signals]", table.get("signals", {}), ("absolute", "relative", "time")),
         _entries(f"{path}: [metrics]", table.get("metrics", {}), ("absolute", "relative")),
     )
+
+
+def _used(path: Path) -> dict[str, Any]:
+    """The bands in the JSON of a qualification; JSON has null for those that are infinite."""
+    try:
+        bands = json.loads(path.read_text("utf-8"))["bands"]
+        return {
+            kind: {
+                n: {k: math.inf if v is None else v for k, v in e.items()} for n, e in of.items()
+            }
+            for kind, of in bands.items()
+        }
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise InputError(f"{path}: {error!r}; must be what `qualify --json` printed") from error
 
 
 def entry_for(entries: Mapping[str, Given], *names: str) -> Given | None:

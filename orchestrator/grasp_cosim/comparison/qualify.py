@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from ..checks import choice
 from ..errors import InputError, SimulationError
 from ..interface.interface import Value
 from ..interface.units import IDENTITY, Conversion
@@ -18,11 +19,14 @@ from ..metrics.metric import Metric, metrics_of
 from ..metrics.units import in_si
 from ..recording.result import Result
 from ..system.description import System
-from ..system.parts import NANOSECONDS, Component, Isolation
+from ..system.parts import ISOLATIONS, NANOSECONDS, Component, Isolation
 from ..system.structure import SCHEMES
 from .bands import SHARE, Bands, entry_for
-from .compared import FEWEST_STEPS, Compared, Curves, Reference, curves_of, every_second
+from .compare import Comparison
 from .interface_difference import Difference
+from .judged import FEWEST_STEPS, Compared, Curves, Reference, curves_of, every_second
+from .settings import differences
+from .side import side_of
 from .swap import Swap, prepare_swap
 from .tube import Curve
 
@@ -39,7 +43,8 @@ class Qualification:
     failure is why the candidate did not run to the end, None where it did or was not run. numerics
     are the other runs of the original that derived bands are from. runs are the signals of the
     original and of the candidate, by name and in the original's units. log is what the candidate's
-    run tells and the original's does not.
+    run tells and the original's does not. `asked` are the metrics, `absent` those that neither run
+    has a value of, `results` the runs.
     """
 
     swap: Swap
@@ -49,6 +54,9 @@ class Qualification:
     numerics: tuple[str, ...] = ()
     runs: tuple[Curves, Curves] = ({}, {})
     log: tuple[str, ...] = ()
+    asked: tuple[Metric, ...] = ()
+    absent: tuple[str, ...] = ()
+    results: tuple[Result, Result] | None = None
 
     @property
     def blocks(self) -> tuple[Difference, ...]:
@@ -64,6 +72,34 @@ class Qualification:
     def uncompared(self) -> tuple[str, ...]:
         """The signals of the original that the candidate's run lacks, or has in no such unit."""
         return tuple(name for name in self.runs[0] if name not in self.runs[1])
+
+    @property
+    def comparison(self) -> Comparison | None:
+        """Both runs as those of a comparison; None where the candidate did not run."""
+        if self.results is None or not self.signals:
+            return None
+        original, candidate = (side_of(r, str(r.settings["system"])) for r in self.results)
+        names = (self.swap.original.name, self.swap.candidate.name)
+        a, b = (replace(s, name=n) for s, n in zip((original, candidate), names, strict=True))
+        end = float(min(a.time[-1], b.time[-1]))
+        compared = [c.name for c in self.signals]
+        curves = tuple({name: run[name] for name in compared} for run in self.runs)
+        return Comparison(
+            a,
+            b,
+            0.0,
+            end,
+            self.signals,
+            self.metrics,
+            (curves[0], curves[1]),
+            self.asked,
+            (self.uncompared, ()),
+            ((), ()),
+            differences(*self.results),
+            self.log,
+            self.absent,
+            ("original", "candidate"),
+        )
 
     @property
     def qualified(self) -> bool:
@@ -98,6 +134,7 @@ def qualify(
     SimulationError where the original fails, KeyboardInterrupt at Ctrl-C.
     """
     bands = bands or Bands()
+    choice("isolation", isolation, ISOLATIONS)
     new = candidate if isinstance(candidate, Component) else Path(candidate)
     swap = prepare_swap(system, component, new, rename or {}, values or {}, isolation, units)
     if swap.swapped is None:
@@ -111,20 +148,26 @@ def qualify(
     result, failure = _tried(swap.swapped, progress)
     again: list[Curves] = []
     numerics: list[str] = []
-    if not all(entry and entry.wide for entry in (*signals.values(), *singles.values())):
+    there = {n for n, v in original.values(original.curves).items() if v is not None}
+    asked_of = (*signals.values(), *(entry for n, entry in singles.items() if n in there))
+    if not all(entry and entry.wide for entry in asked_of):
         again, numerics = _other_numerics(swap.system, original.curves, progress)
     theirs = _converted(curves_of(result), swap) if result else {}
     if result and _ended_early(result) and END not in asked:
         original = replace(original, asked=(*asked, END))
         singles = {**singles, END.name: entry_for(bands.metrics, END.name)}
+    singly = original.values(theirs)
     return Qualification(
         swap,
         original.signals(theirs, again, signals),
-        () if failure else original.metrics(original.values(theirs), again, singles),
+        () if failure else original.metrics(singly, again, singles),
         failure,
         tuple(numerics),
         (original.curves, theirs),
         _remarks(reference, result) if result else (),
+        original.asked,
+        () if failure else original.absent(singly),
+        (reference, result) if result else None,
     )
 
 
@@ -154,7 +197,9 @@ def _conversions_of_candidate(
     try:
         return in_si(swapped, metrics).conversions
     except InputError as error:
-        raise InputError(f"{error}; of the candidate: --units 'VARIABLE=UNIT'") from error
+        raise InputError(
+            f"{error}; of the candidate: --set components.NAME.units.VARIABLE=UNIT"
+        ) from error
 
 
 def _run(system: System, progress: str | bool) -> Result:

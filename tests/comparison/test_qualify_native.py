@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim import System
-from grasp_cosim.qualification.qualify import Qualification, qualify
-from grasp_cosim.qualification.verdict import as_text
+from grasp_cosim.comparison.qualify import Qualification, qualify
+from grasp_cosim.comparison.words import qualification_text as as_text
 from grasp_cosim.system.parts import Isolation
 from support.native_fmus import build, needs_gcc
 from support.slow import slow

@@ -112,24 +112,27 @@ class Reference:
     def metrics(
         self, theirs: Values, again: Sequence[Curves], given: Entries
     ) -> tuple[Compared, ...]:
-        """All metrics, the worst first; one that is not among theirs has no value there.
+        """The metrics that one of both has a value of, the worst first.
 
-        But for optional ones, which the candidate's signals may not permit.
+        One that is not among theirs has no value there; but for optional ones, which the
+        candidate's signals may not permit.
         """
         others = [self.values(run) for run in again]
         asked, found = {m.name: m for m in self.asked}, []
         for name, value in self.values(self.curves).items():
             metric, other = asked[_plain(name)], theirs.get(name)
-            if metric.optional and name not in theirs:
+            if value is other is None or (metric.optional and name not in theirs):
                 continue
             least = self.shift if metric.unit == "s" else SHARE if metric.unit == "1" else 0.0
             band = metric_band(value, [run.get(name) for run in others], least, given[name])
-            if value is None or other is None:
-                apart = 0.0 if value is other else inf
-            else:
-                apart = abs(other - value)
+            apart = inf if value is None or other is None else abs(other - value)
             found.append(Compared(name, metric.unit, band, apart, value, other))
         return tuple(sorted(found, key=lambda c: -c.ratio))
+
+    def absent(self, theirs: Values) -> tuple[str, ...]:
+        """The metrics that neither run has a value of: nothing is judged by these."""
+        ours = self.values(self.curves)
+        return tuple(name for name, v in ours.items() if v is theirs.get(name) is None)
 
     def values(self, curves: Curves) -> Values:
         """The single metrics by name, like time_to_contact[1], of curves in our units."""

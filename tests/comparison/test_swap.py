@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from comparison.made import DEPENDENCIES, PLANT, changed, without, write_fmu, write_system
+from grasp_cosim.comparison.interface_difference import capability_differences
+from grasp_cosim.comparison.swap import Swap, component_of, prepare_swap
 from grasp_cosim.errors import InputError
 from grasp_cosim.interface.interface import Interface, Variable, kind_of
-from grasp_cosim.qualification.interface_difference import capability_differences
-from grasp_cosim.qualification.swap import Swap, component_of, prepare_swap
 from grasp_cosim.system.description import System
 from grasp_cosim.system.parts import Condition, Connection, Event, Fault, Initialisation, Port
-from qualification.made import DEPENDENCIES, PLANT, changed, without, write_fmu, write_system
 from si_units import Unit
 
 GAP = Port("plant", "gap")
@@ -390,9 +390,9 @@ def test_values_go_to_the_system_that_has_the_variable(system: System, tmp_path:
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"rename": {"gap": "luft"}}, r"^--rename: 'gap' = 'luft': c.fmu has no variable 'luft'"),
-        ({"rename": {"luft": "gap"}}, r"^--rename: 'luft' = 'gap': the original has no variable"),
-        ({"rename": {"gap": "spare"}}, r"^--rename: 'gap' = 'spare': c.fmu has a variable 'gap'"),
+        ({"rename": {"gap": "luft"}}, r"^rename: 'gap' = 'luft': c.fmu has no variable 'luft'"),
+        ({"rename": {"luft": "gap"}}, r"^rename: 'luft' = 'gap': the original has no variable"),
+        ({"rename": {"gap": "spare"}}, r"^rename: 'gap' = 'spare': c.fmu has a variable 'gap'"),
         ({"values": {"plant.widht": 1.0}}, r"^--set plant.widht: plant.fmu has no input or par"),
         (
             {"values": {"plnt.width": 1.0}},

@@ -62,9 +62,9 @@ def prepare_swap(
     ours = interfaces[component]
     was = candidate if isinstance(candidate, Component) else replace(place, values={})
     fmu = was.fmu if isinstance(candidate, Component) else candidate
-    now = replaced(was, Replacement(fmu, rename, units or {}), "--")
-    theirs = now.sized(describe(fmu)).renamed(now.rename, "--rename")
-    theirs = theirs.in_units(now.units, "--units")
+    now = replaced(was, Replacement(fmu, rename, units or {}), "")
+    theirs = now.sized(describe(fmu)).renamed(now.rename, "rename")
+    theirs = theirs.in_units(now.units, "units")
     _check_renamed(rename, ours, theirs)
     names = (*theirs.by_name, *(n for n in theirs.arrays if n not in ours.arrays))
     extra = {f"{component}.{name}": name for name in names if name not in ours.by_name}
@@ -134,7 +134,7 @@ def component_of(found: System, name: str, system: System) -> Component:
             raise InputError(
                 f"{place}: has factor = {own[0]:g}, offset = {own[1]:g}, which the connections of "
                 f"{system.name}, on which the candidate runs, do not have; must be units of its "
-                f"component instead, in [components.{name}] or --units"
+                f"component instead, in [components.{name}] or --set"
             )
     return component
 
@@ -143,7 +143,7 @@ def _check_renamed(rename: Mapping[str, str], ours: Interface, theirs: Interface
     """InputError where the candidate's variables get names that the original does not have."""
     for new, name in rename.items():
         for called in theirs.arrays[new].names if new in theirs.arrays else (new,):
-            entry = f"--rename: {new!r} = {name!r}"
+            entry = f"rename: {new!r} = {name!r}"
             known(f"{entry}: the original has no variable", called, ours.by_name, see=ours.listing)
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from grasp_cosim.qualification.tube import Array, Curve, curve, deviation, tube
+from grasp_cosim.comparison.tube import Array, Curve, curve, deviation, tube
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
